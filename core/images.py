@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Picture files and colour spaces: the one door. OpenImageIO reads and writes every file.
+
+Arrays are float32, rows from the top, [H, W, C]. *sRGB* means encoded with the IEC 61966-2-1 curve in [0, 1];
+*linear* means scene or reflectance values with the same primaries; *data* is neither (masks, normals, specular).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import OpenImageIO as oiio
+
+from .capture import replacing
+from .messages import Problem
+
+
+def srgb_to_linear(srgb: np.ndarray) -> np.ndarray:
+    """sRGB -> linear, any shape; negative values map to negative ones."""
+    srgb = np.asarray(srgb, np.float32)
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((np.maximum(srgb, 0) + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def linear_to_srgb(linear: np.ndarray) -> np.ndarray:
+    """linear -> sRGB, any shape, clipped to [0, 1]."""
+    linear = np.clip(np.asarray(linear, np.float32), 0, 1)
+    return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear ** (1 / 2.4) - 0.055).astype(np.float32)
+
+
+def read_srgb(path: Path) -> np.ndarray:
+    """A picture as sRGB [H, W, 3]; an EXR's linear values are encoded. EXIF orientation is applied."""
+    pixels = _rgb(_read(path))
+    return linear_to_srgb(pixels) if _is_linear(path) else pixels
+
+
+def read_linear(path: Path) -> np.ndarray:
+    """A picture as linear [H, W, 3]; anything but EXR and HDR is decoded from sRGB."""
+    pixels = _rgb(_read(path))
+    return pixels if _is_linear(path) else srgb_to_linear(pixels)
+
+
+def read_data(path: Path) -> np.ndarray:
+    """The stored values [H, W, C], integers scaled to [0, 1], no colour space applied."""
+    return _read(path)
+
+
+def read_mask(path: Path) -> np.ndarray:
+    """A grey picture [H, W] in [0, 1], stored values; of a colour picture the mean of R, G, B."""
+    pixels = _read(path)
+    return np.ascontiguousarray(pixels[..., 0] if pixels.shape[2] < 3 else pixels[..., :3].mean(-1))
+
+
+def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8) -> None:
+    """sRGB [H, W, 3 or 4] (alpha stays as it is) to PNG (8 or 16 bit) or JPEG (8 bit), atomically."""
+    _write(path, np.clip(srgb, 0, 1), f"uint{bits}", "sRGB")
+
+
+def write_linear(path: Path, linear: np.ndarray) -> None:
+    """Linear [H, W, C] to a half-float ZIP EXR, atomically."""
+    _write(path, linear, "half", "lin_srgb")
+
+
+def write_data(path: Path, data: np.ndarray, bits: int = 8) -> None:
+    """Data [H, W] or [H, W, C] in [0, 1] to PNG (8 or 16 bit), or to a half-float EXR, atomically; no colour space."""
+    _write(path, data, "half" if _is_linear(path) else f"uint{bits}", "raw")
+
+
+def resize(image: np.ndarray, width: int, height: int) -> np.ndarray:
+    """[H, W(, C)] resampled: area averaging to shrink, Lanczos to enlarge."""
+    shrinks = width * height < image.shape[0] * image.shape[1]
+    return cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LANCZOS4)
+
+
+def _is_linear(path: Path) -> bool:
+    return Path(path).suffix.lower() in (".exr", ".hdr")
+
+
+def _rgb(pixels: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, 2))
+
+
+def _read(path: Path) -> np.ndarray:
+    image = oiio.ImageBuf(str(path))
+    if not image.read(0, 0, True, oiio.FLOAT):
+        raise Problem(f"{path} is not a picture that can be read ({image.geterror().strip()}).", "Save it again as PNG, JPEG or EXR.")
+    if image.spec().getattribute("Orientation") not in (None, 1):
+        image = oiio.ImageBufAlgo.reorient(image)
+    return np.asarray(image.get_pixels(oiio.FLOAT), np.float32)
+
+
+def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str) -> None:
+    pixels = np.ascontiguousarray(pixels if pixels.ndim == 3 else pixels[..., None], np.float32)
+    height, width, channels = pixels.shape
+    spec = oiio.ImageSpec(width, height, channels, kind)
+    spec.attribute("oiio:ColorSpace", colour_space)
+    if _is_linear(path):
+        spec.attribute("compression", "zip")
+    elif Path(path).suffix.lower() in (".jpg", ".jpeg"):
+        spec.attribute("Compression", "jpeg:92")
+    else:
+        spec.attribute("png:compressionLevel", 3)
+    with replacing(path) as temporary:
+        output = oiio.ImageOutput.create(str(temporary))
+        if output is None or not output.open(str(temporary), spec) or not output.write_image(pixels) or not output.close():
+            error = (output.geterror() if output else oiio.geterror()) or "unknown error"
+            # OpenImageIO gives text only: touching the folder ourselves turns a full or read-only disk into its OSError
+            with open(temporary, "ab") as file:
+                file.write(b"\0" * 65536)
+                file.flush()
+            raise OSError(0, error.strip())

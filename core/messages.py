@@ -1,0 +1,150 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a worker says: one JSON line per message, a closed set of kinds, and how a stage reports.
+
+Ground floor: standard library only. A job ends with exactly one of Done, Cancelled or Failed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+
+class Problem(Exception):
+    """A failure the user can act on: what is wrong, and what to do about it. Never shown as a traceback."""
+
+    def __init__(self, problem: str, remedy: str):
+        super().__init__(f"{problem} {remedy}")
+        self.problem = problem
+        self.remedy = remedy
+
+
+class CancelledError(Exception):
+    """Raised by `Reporter` inside a stage once the user has asked to stop."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """A stage has done `done` of `of` units of work; `eta_s` seconds remain for the stage (None: unknown)."""
+
+    stage: str
+    done: float
+    of: float
+    text: str = ""
+    eta_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Log:
+    """One line for whoever reads along."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Preview:
+    """A picture of the capture folder has new content; `path` is relative to the capture."""
+
+    stage: str
+    path: str
+
+
+@dataclass(frozen=True)
+class StageDone:
+    """A stage ended; `skipped` when it was fresh. `figures` are its quality figures."""
+
+    stage: str
+    seconds: float
+    skipped: bool
+    figures: dict
+
+
+@dataclass(frozen=True)
+class Done:
+    """The job ended well."""
+
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Cancelled:
+    """The job ended because the user asked; what was finished is kept."""
+
+    stage: str
+
+
+@dataclass(frozen=True)
+class Failed:
+    """The job ended with a problem and its remedy, both whole sentences."""
+
+    stage: str
+    problem: str
+    remedy: str
+
+
+KINDS = {kind.__name__: kind for kind in (Progress, Log, Preview, StageDone, Done, Cancelled, Failed)}
+FINAL = (Done, Cancelled, Failed)
+Message = Progress | Log | Preview | StageDone | Done | Cancelled | Failed
+
+
+def to_line(message: Message) -> str:
+    """One JSON line without its newline; non-ASCII escaped, so that any pipe encoding carries it."""
+    return json.dumps({"kind": type(message).__name__, **asdict(message)})
+
+
+def from_line(line: str) -> Message:
+    """The message of one line. Raises ValueError for anything that is not one."""
+    fields = json.loads(line)
+    if not isinstance(fields, dict) or fields.get("kind") not in KINDS:
+        raise ValueError(f"not a worker message: {line[:80]!r}")
+    kind = KINDS[fields.pop("kind")]
+    try:
+        return kind(**fields)
+    except TypeError as error:
+        raise ValueError(str(error)) from error
+
+
+class Reporter:
+    """How a stage speaks: progress, log lines, previews and quality figures; and where it hears of a cancel.
+
+    Every call but `figure` raises CancelledError once `cancelled()` is true, so a stage that reports often
+    (several times a second) can be stopped at any report without code of its own.
+    """
+
+    def __init__(self, stage: str, emit: Callable[[Message], None] = lambda message: None, cancelled: Callable[[], bool] = lambda: False,
+                 clock: Callable[[], float] | None = None):
+        import time
+
+        self.stage = stage
+        self.figures: dict = {}
+        self._emit = emit
+        self._cancelled = cancelled
+        self._clock = clock or time.monotonic
+        self._started = self._clock()
+
+    def check(self) -> None:
+        """Raises CancelledError if the user asked to stop."""
+        if self._cancelled():
+            raise CancelledError(self.stage)
+
+    def progress(self, done: float, of: float, text: str = "") -> None:
+        """`done` of `of` equal units are finished; the ETA is the elapsed time scaled to what is left."""
+        self.check()
+        elapsed = self._clock() - self._started
+        eta = elapsed * (of - done) / done if done > 0 else None
+        self._emit(Progress(self.stage, float(done), float(of), text, eta))
+
+    def log(self, text: str) -> None:
+        self.check()
+        self._emit(Log(text))
+
+    def preview(self, path: str) -> None:
+        """`path` is relative to the capture folder."""
+        self.check()
+        self._emit(Preview(self.stage, path))
+
+    def figure(self, name: str, value) -> None:
+        """A quality figure (JSON value) for capture.json and the report; a name of lower_case words with its unit last."""
+        self.figures[name] = value

@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A mesh to pixels: in UV space by rasterising, in a camera by ray casting; and what a camera sees of it.
+
+Row 0 of a UV map is its top: texel (row, column) of an S x S map has its centre at
+u = (column + 0.5) / S, v = 1 - (row + 0.5) / S.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import trimesh
+from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+from .meshes import Mesh
+from .views import View
+
+
+def rasterize_uv(mesh: Mesh, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Which triangle covers each texel's centre: face index int32 [S, S] (-1: none) and barycentric coordinates float32 [S, S, 3]."""
+    corners = mesh.uvs[mesh.face_uvs] * [size, -size] + [-0.5, size - 0.5]  # [F, 3, 2] in texels: x = column, y = row
+    face = np.full((size, size), -1, np.int32)
+    bary = np.zeros((size, size, 3), np.float32)
+    low = np.maximum(np.ceil(corners.min(1)), 0).astype(int)
+    high = np.minimum(np.floor(corners.max(1)), size - 1).astype(int)
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
+    for f in np.flatnonzero((np.abs(area) > 1e-12) & (high >= low).all(1)):
+        y, x = np.mgrid[low[f, 1]:high[f, 1] + 1, low[f, 0]:high[f, 0] + 1]
+        wa = ((b[f, 0] - x) * (c[f, 1] - y) - (c[f, 0] - x) * (b[f, 1] - y)) / area[f]
+        wb = ((c[f, 0] - x) * (a[f, 1] - y) - (a[f, 0] - x) * (c[f, 1] - y)) / area[f]
+        wc = 1 - wa - wb
+        inside = (wa >= -1e-9) & (wb >= -1e-9) & (wc >= -1e-9)
+        face[y[inside], x[inside]] = f
+        bary[y[inside], x[inside]] = np.stack([wa, wb, wc], -1)[inside]
+    return face, bary
+
+
+def interpolate(values: np.ndarray, corners: np.ndarray, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
+    """Per-vertex values [V, C] at raster samples: corners [F, 3] index them, face [...] and bary [..., 3] say where. Zero where face < 0."""
+    picked = values[corners[np.maximum(face, 0)]]  # [..., 3, C]
+    return (picked * bary[..., None]).sum(-2) * (face >= 0)[..., None]
+
+
+def bleed(image: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """[H, W(, C)] with every unknown texel given its nearest known one's value, so that filtering meets no black seam."""
+    if not known.any():
+        return image
+    _, labels = cv2.distanceTransformWithLabels((~known).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    nearest = np.zeros(labels.max() + 1, np.int64)
+    nearest[labels[known]] = np.flatnonzero(known)
+    return image.reshape(-1, *image.shape[2:])[nearest[labels]]
+
+
+class RayCaster:
+    """First hits of rays with a mesh (Embree)."""
+
+    def __init__(self, mesh: Mesh):
+        self.mesh = mesh
+        self._intersector = RayMeshIntersector(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False))
+
+    def first_hits(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """origins and unit directions [N, 3] -> face int64 [N] (-1: miss), barycentric [N, 3], distance [N] in metres (inf: miss)."""
+        count = len(directions)
+        face, bary, distance = np.full(count, -1), np.zeros((count, 3)), np.full(count, np.inf)
+        if count:
+            triangle, ray, location = self._intersector.intersects_id(origins, directions, multiple_hits=False, return_locations=True)
+            face[ray] = triangle
+            bary[ray] = trimesh.triangles.points_to_barycentric(self.mesh.vertices[self.mesh.faces[triangle]], location)
+            distance[ray] = np.linalg.norm(location - origins[ray], axis=1)
+        return face, bary, distance
+
+    def blocked(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """bool [N]: whether a ray hits anything."""
+        return self._intersector.intersects_any(origins, directions) if len(directions) else np.zeros(0, bool)
+
+
+def visible_from(caster: RayCaster, points: np.ndarray, normals: np.ndarray, centre: np.ndarray, offset: float = 5e-4) -> np.ndarray:
+    """bool [N]: whether surface points [N, 3] with unit normals face `centre` [3] and nothing lies between. `offset` in metres lifts them off."""
+    towards = centre - points
+    directions = towards / np.linalg.norm(towards, axis=1, keepdims=True)
+    facing = (directions * normals).sum(1) > 0
+    seen = np.zeros(len(points), bool)
+    seen[facing] = ~caster.blocked(points[facing] + offset * normals[facing], directions[facing])
+    return seen
+
+
+def render_view(caster: RayCaster, view: View, scale: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The mesh through a view's camera at `scale` times its size: face int64 [h, w] (-1: background), bary [h, w, 3], distance [h, w] in metres."""
+    width, height = round(view.width * scale), round(view.height * scale)
+    y, x = np.mgrid[0:height, 0:width]
+    pixels = (np.stack([x.ravel(), y.ravel()], -1) + 0.5) * [view.width / width, view.height / height]
+    directions = view.rays(pixels)
+    face, bary, distance = caster.first_hits(np.repeat(view.centre[None], len(directions), 0), directions)
+    return face.reshape(height, width), bary.reshape(height, width, 3), distance.reshape(height, width)
+
+
+def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Bilinear values of [H, W(, C)] at pixels [N, 2] (pixel centres at +0.5; clamped at the border)."""
+    xy = (np.asarray(pixels, np.float32) - 0.5).reshape(-1, 1, 2)
+    out = [cv2.remap(np.ascontiguousarray(image, np.float32), xy[i:i + 32000, :, 0], xy[i:i + 32000, :, 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+           for i in range(0, len(xy), 32000)]  # cv2.remap takes fewer than 32767 rows
+    return np.concatenate(out)[:, 0] if out else np.zeros((0, *image.shape[2:]), np.float32)

@@ -1,0 +1,179 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One frozen dataclass per stage. Default, range, unit and tooltip of every setting are written here and nowhere else.
+
+Ground floor: standard library only. The docstring under a field is its tooltip in Blender and its line in the
+command line's help; `metadata` holds `min`, `max`, `choices` and `unit`.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from dataclasses import asdict, dataclass, field, fields, replace
+from functools import cache
+
+from .messages import Problem
+
+
+def setting(default, **metadata):
+    return field(default=default, metadata=metadata)
+
+
+@dataclass(frozen=True)
+class FramesSettings:
+    max_frames: int = setting(300, min=3, max=1000)
+    """Frames taken from the video at equal intervals"""
+    long_side: int = setting(960, min=320, max=3840, unit="px")
+    """Longer side of the extracted frames"""
+    views: int = setting(16, min=3, max=64)
+    """Sharp, evenly spread frames chosen for the texture (V in the paper)"""
+
+
+@dataclass(frozen=True)
+class CamerasSettings:
+    interpupillary_mm: float = setting(63.0, min=40.0, max=80.0, unit="mm")
+    """Distance between the pupils; sets the scale of the head"""
+    matching: str = setting("auto", choices=("auto", "sequential", "exhaustive"))
+    """Which frames are matched with each other; auto: neighbours in a video, all pairs in a few photographs"""
+    features: str = setting("auto", choices=("auto", "plain", "skin"))
+    """Feature settings; skin holds on low-contrast faces and costs ten times as much; auto tries plain first"""
+
+
+@dataclass(frozen=True)
+class ScanSettings:
+    pairs: int = setting(24, min=2, max=400)
+    """Stereo pairs that are matched and fused"""
+    voxel_mm: float = setting(1.0, min=0.3, max=5.0, unit="mm")
+    """Size of a voxel of the fused surface"""
+
+
+@dataclass(frozen=True)
+class RegistrationSettings:
+    iterations: int = setting(30, min=1, max=200)
+    """Steps of the non-rigid fit, stiff to soft"""
+
+
+@dataclass(frozen=True)
+class DelightSettings:
+    delighter: str = setting("shading", choices=("none", "folder", "shading"))
+    """How the light is taken out of the frames before the texture is built"""
+    folder: str = setting("")
+    """Folder of delit pictures for the folder delighter, matched by name"""
+
+
+@dataclass(frozen=True)
+class TextureSettings:
+    size: int = setting(1024, min=256, max=4096, unit="px")
+    """Side of the texture"""
+
+
+@dataclass(frozen=True)
+class ShadowMaskSettings:
+    sensitivity: float = setting(0.5, min=0.0, max=1.0)
+    """How readily a dark region is taken for a shadow"""
+    dilate_px: int = setting(8, min=0, max=64, unit="px")
+    """How far the proposal is grown, at a 1024 px texture"""
+
+
+@dataclass(frozen=True)
+class SolveSettings:
+    size: int = setting(1024, min=128, max=1024, unit="px")
+    """Side of the map that is solved"""
+    steps: int = setting(75, min=4, max=600)
+    """Sampling steps"""
+    guidance: str = setting("dps", choices=("dps", "proximal"))
+    """dps follows the paper through the network's gradient; proximal is a closed form, twice as fast"""
+    grid_cells: int = setting(96, min=1, max=512)
+    """Cells per side of the texel grid of lights over the whole map's face crop (96 cells of 8 texels at 1024)"""
+    skin_tone: str = setting("auto")
+    """Skin tone as sRGB R,G,B in 0..1 (linear mean over facial skin), or auto"""
+    checkpoint_every: int = setting(10, min=1, max=600)
+    """Steps between two checkpoints"""
+
+
+@dataclass(frozen=True)
+class UpscaleSettings:
+    size: int = setting(4096, min=1024, max=8192, unit="px")
+    """Side of the delivered maps"""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All stages' settings, with what they share."""
+
+    seed: int = 0
+    device: str = "cpu"
+    frames: FramesSettings = field(default_factory=FramesSettings)
+    cameras: CamerasSettings = field(default_factory=CamerasSettings)
+    scan: ScanSettings = field(default_factory=ScanSettings)
+    registration: RegistrationSettings = field(default_factory=RegistrationSettings)
+    delight: DelightSettings = field(default_factory=DelightSettings)
+    texture: TextureSettings = field(default_factory=TextureSettings)
+    shadow_mask: ShadowMaskSettings = field(default_factory=ShadowMaskSettings)
+    solve: SolveSettings = field(default_factory=SolveSettings)
+    upscale: UpscaleSettings = field(default_factory=UpscaleSettings)
+
+
+QUALITIES = ("draft", "standard", "full")
+_PRESETS = {
+    "draft": {"solve": {"size": 512, "steps": 30, "guidance": "proximal"}, "scan": {"pairs": 16}},
+    "standard": {},
+    "full": {"solve": {"steps": 150}, "scan": {"pairs": 48}},
+}
+
+
+def preset(quality: str) -> Settings:
+    """The settings of a quality preset. Raises Problem for an unknown name."""
+    if quality not in _PRESETS:
+        raise Problem(f"There is no quality named {quality!r}.", f"Choose one of {', '.join(QUALITIES)}.")
+    return from_json({stage: values for stage, values in _PRESETS[quality].items()})
+
+
+def to_json(settings: Settings) -> dict:
+    return asdict(settings)
+
+
+def from_json(values: dict, base: Settings | None = None) -> Settings:
+    """Settings with `values` (stage -> {name: value}, and seed, device) laid over `base` or the defaults.
+
+    Raises Problem for an unknown name, a wrong type, or a value out of its range.
+    """
+    settings = base or Settings()
+    for name, value in values.items():
+        current = getattr(settings, name, None)
+        if current is None:
+            raise Problem(f"There is no setting named {name!r}.", "Remove it from the job or update the add-on.")
+        if hasattr(current, "__dataclass_fields__"):
+            value = replace(current, **{k: _checked(type(current), name, k, v) for k, v in value.items()})
+        settings = replace(settings, **{name: value})
+    return settings
+
+
+def _checked(kind: type, stage: str, name: str, value):
+    by_name = {f.name: f for f in fields(kind)}
+    if name not in by_name:
+        raise Problem(f"Stage {stage} has no setting named {name!r}.", "Remove it from the job or update the add-on.")
+    f = by_name[name]
+    expected = type(f.default)
+    if expected is float and isinstance(value, int) and not isinstance(value, bool):
+        value = float(value)
+    if type(value) is not expected:
+        raise Problem(f"{stage}.{name} is {value!r}, which is not a {expected.__name__}.", f"Its default is {f.default!r}.")
+    m = f.metadata
+    if "choices" in m and value not in m["choices"]:
+        raise Problem(f"{stage}.{name} is {value!r}.", f"Choose one of {', '.join(m['choices'])}.")
+    if ("min" in m and value < m["min"]) or ("max" in m and value > m["max"]):
+        raise Problem(f"{stage}.{name} is {value}.", f"It goes from {m['min']} to {m['max']}{' ' + m['unit'] if 'unit' in m else ''}.")
+    return value
+
+
+@cache
+def tooltips(kind: type) -> dict[str, str]:
+    """Field name -> the docstring under it, read from this module's source."""
+    body = ast.parse(inspect.getsource(kind)).body[0].body
+    found = {}
+    for node, following in zip(body, body[1:], strict=False):
+        if isinstance(node, ast.AnnAssign) and isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant):
+            found[node.target.id] = following.value.value
+    return found

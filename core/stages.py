@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The chain as data: what each stage reads and writes, in order. A name ending in / is a folder.
+
+Ground floor: standard library only; a stage's module is imported by the worker alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from .messages import Problem
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step of the chain: `module`'s `run(capture, settings, report)` turns `reads` into `writes`.
+
+    `wishes` are read when they are there. `shared` names the shared settings (seed, device) the result depends on,
+    `data` the shipped files (relative to core/).
+    """
+
+    name: str
+    label: str
+    reads: tuple[str, ...]
+    writes: tuple[str, ...]
+    module: str
+    wishes: tuple[str, ...] = field(default=())
+    shared: tuple[str, ...] = field(default=())
+    data: tuple[str, ...] = field(default=())
+
+
+MAPS = ("diffuse_albedo.png", "diffuse_albedo.exr", "specular_albedo.png", "normal.png", "shading.exr", "confidence.png")
+
+STAGES = (
+    Stage("frames", "Frames", (), ("frames/",), "core.frames"),
+    Stage("cameras", "Cameras", ("frames/",), ("cameras/",), "core.cameras", shared=("seed",)),
+    Stage("scan", "Scan", ("frames/", "cameras/"), ("scan.ply",), "core.scan"),
+    Stage("registration", "Head", ("frames/", "cameras/", "scan.ply"), ("head.obj", "landmarks.json"), "core.registration",
+          data=("assets/head.obj", "assets/head.json")),
+    Stage("delight", "Delight", ("frames/", "cameras/", "head.obj"), ("delit/",), "core.delight"),
+    Stage("texture", "Texture", ("delit/", "cameras/", "head.obj"), ("texture.exr", "texture.png", "texture_confidence.exr"), "core.texture"),
+    Stage("shadow_mask", "Shadow Mask", ("texture.exr", "texture_confidence.exr", "head.obj"), ("shadow_mask_auto.png",), "core.shadow_mask"),
+    Stage("solve", "Solve", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
+          tuple(f"maps/{name}" for name in MAPS), "core.solve", wishes=("shadow_mask.png", "protect_mask.png"), shared=("seed",), data=("weights/prior.safetensors",)),
+    Stage("upscale", "4K Maps", tuple(f"maps/{name}" for name in MAPS), tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale"),
+)
+
+NAMES = tuple(stage.name for stage in STAGES)
+MASK_STAGE = "shadow_mask"  # in Blender the chain stops after it, for the artist
+
+
+def by_name(name: str) -> Stage:
+    """The stage of that name. Raises Problem for an unknown one."""
+    if name not in NAMES:
+        raise Problem(f"There is no stage named {name!r}.", f"The stages are {', '.join(NAMES)}.")
+    return STAGES[NAMES.index(name)]

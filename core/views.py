@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Calibrated views: the frames with the cameras that took them, as every stage after `cameras` reads them.
+
+A COLMAP camera looks along its +z, x to the right, y down; pixel (0.5, 0.5) is the centre of the upper left one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+
+from .capture import Capture
+from .messages import Problem
+
+
+@dataclass(frozen=True)
+class View:
+    """One registered frame. rotation [3, 3] and translation [3] take world points (metres) into the camera."""
+
+    name: str
+    path: Path
+    camera: pycolmap.Camera
+    rotation: np.ndarray
+    translation: np.ndarray
+    selected: bool
+
+    @property
+    def width(self) -> int:
+        return self.camera.width
+
+    @property
+    def height(self) -> int:
+        return self.camera.height
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Centre of projection in the world [3], metres."""
+        return -self.rotation.T @ self.translation
+
+    @property
+    def axis(self) -> np.ndarray:
+        """Unit viewing direction in the world [3]."""
+        return self.rotation[2]
+
+    def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """World points [N, 3] -> pixels [N, 2] (lens distortion applied; nan behind the camera) and depths [N] in metres."""
+        local = np.asarray(points, np.float64) @ self.rotation.T + self.translation
+        depth = local[:, 2]
+        pixels = np.full((len(local), 2), np.nan)
+        front = depth > 1e-6
+        if front.any():
+            pixels[front] = self.camera.img_from_cam(local[front])
+        return pixels, depth
+
+    def rays(self, pixels: np.ndarray) -> np.ndarray:
+        """Pixels [N, 2] -> unit directions in the world [N, 3] from `centre`."""
+        plane = np.asarray(self.camera.cam_from_img(np.asarray(pixels, np.float64)))
+        directions = np.concatenate([plane, np.ones((len(plane), 1))], 1) @ self.rotation
+        return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+def read_views(capture: Capture, selected_only: bool = False) -> list[View]:
+    """The registered frames in frame order. Raises Problem where the cameras are missing or damaged."""
+    import json
+
+    try:
+        frames = {f["name"]: f for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
+        model = pycolmap.Reconstruction(str(capture.cameras))
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
+        raise Problem(f"The cameras of this capture cannot be read ({error}).", "Run the stages frames and cameras again.") from error
+    views = []
+    for image in sorted(model.images.values(), key=lambda image: image.name):
+        frame = frames.get(image.name)
+        if frame is None or (selected_only and not frame["selected"]):
+            continue
+        pose = image.cam_from_world() if callable(image.cam_from_world) else image.cam_from_world
+        views.append(View(image.name, capture.frames / image.name, model.cameras[image.camera_id],
+                          pose.rotation.matrix(), np.array(pose.translation), frame["selected"]))
+    return views
