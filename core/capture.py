@@ -71,7 +71,8 @@ def storage_problem(error: OSError, path: Path) -> Problem:
     import errno
 
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return Problem(f"The disk is full: {path} could not be written.", "Free some space (a capture needs about 1 GB) and run again; finished stages are kept.")
+        return Problem(f"The disk is full: {path} could not be written.",
+                       "Free some space (a capture needs about 1 GB) and run again; finished stages are kept.")
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
         return Problem(f"{path} cannot be written: the folder is read-only.", "Choose a folder you may write to, or change its permissions.")
     return Problem(f"{path} could not be written ({error.strerror or error}).", "Check the disk and the folder, then run again.")
@@ -126,7 +127,8 @@ class Capture:
         except FileNotFoundError:
             return {"format": FORMAT, "source": "", "stages": {}}
         except (OSError, ValueError) as error:
-            raise Problem(f"{self.json} cannot be read ({error}).", "Restore it from a backup, or delete it to start this capture anew; pictures and masks stay.") from error
+            raise Problem(f"{self.json} cannot be read ({error}).",
+                          "Restore it from a backup, or delete it to start this capture anew; pictures and masks stay.") from error
         if not isinstance(record, dict) or not isinstance(record.get("stages"), dict):
             raise Problem(f"{self.json} is not a capture record.", "Choose a folder that ends in .wildcap, or delete this file to start anew.")
         if record.get("format", 0) > FORMAT:

@@ -42,7 +42,8 @@ STAGES = (
     Stage("texture", "Texture", ("delit/", "cameras/", "head.obj"), ("texture.exr", "texture.png", "texture_confidence.exr"), "core.texture"),
     Stage("shadow_mask", "Shadow Mask", ("texture.exr", "texture_confidence.exr", "head.obj"), ("shadow_mask_auto.png",), "core.shadow_mask"),
     Stage("solve", "Solve", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
-          tuple(f"maps/{name}" for name in MAPS), "core.solve", wishes=("shadow_mask.png", "protect_mask.png"), shared=("seed",), data=("weights/prior.safetensors",)),
+          tuple(f"maps/{name}" for name in MAPS), "core.solve", wishes=("shadow_mask.png", "protect_mask.png"), shared=("seed",),
+          data=("weights/prior.safetensors",)),
     Stage("upscale", "4K Maps", tuple(f"maps/{name}" for name in MAPS), tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale"),
 )
 
