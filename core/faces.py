@@ -1,0 +1,161 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Faces and people in pictures: MediaPipe's detector, 468 face-mesh landmarks and person segmentation, run by OpenCV.
+
+The networks are the .tflite files of the installed `mediapipe` package (Apache-2.0), which is found but never imported.
+Bazarevsky et al., BlazeFace (2019); Kartynnik et al., Real-time Facial Surface Geometry (2019).
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from .messages import Problem
+
+RIGHT_EYE, LEFT_EYE = (33, 133), (362, 263)
+"""Landmarks at the outer and inner corner of the person's right eye, and at the inner and outer of the left: they stay put when the lids close."""
+BROW, CHIN, NOSE = 9, 152, 1
+_SHORT_RANGE = "face_detection/face_detection_short_range.tflite"
+_LANDMARK = "face_landmark/face_landmark.tflite"
+_SEGMENTATION = "selfie_segmentation/selfie_segmentation.tflite"
+
+
+@dataclass(frozen=True)
+class Face:
+    """A face in a picture: box (x0, y0, x1, y1) of its landmarks [px], landmarks float32 [468, 3]
+    (x, y in pixels, centres at +0.5; z towards the scene behind, relative, same scale), score in [0, 1]."""
+
+    box: tuple[float, float, float, float]
+    landmarks: np.ndarray
+    score: float
+
+    @property
+    def yaw_deg(self) -> float:
+        """How far the head is turned, in degrees: 0 faces the camera, positive where it turns to the picture's right."""
+        across = self.landmarks[list(LEFT_EYE)].mean(0) - self.landmarks[list(RIGHT_EYE)].mean(0)
+        return float(np.degrees(np.arctan2(across[2], np.linalg.norm(across[:2]))))
+
+
+def detect(srgb: np.ndarray, last: Face | None = None) -> Face | None:
+    """The most prominent face of an sRGB picture [H, W, 3] in [0, 1], or None.
+
+    `last`, the face of the frame before, is followed first: turned heads stay found where the detector alone loses them.
+    Raises Problem where the networks are not installed.
+    """
+    image = np.clip(np.asarray(srgb, np.float32), 0, 1)
+    if last is not None:
+        face = _landmarks(image, _region_of_landmarks(last.landmarks))
+        if face is not None and face.score > 0.6:
+            return face
+    for margin in (0.0, 0.5):  # a face that fills the picture is found once it is made smaller
+        region = _detect_region(image, margin)
+        if region is None:
+            continue
+        face = _landmarks(image, region)
+        if face is not None:
+            return _landmarks(image, _region_of_landmarks(face.landmarks)) or face
+    return None
+
+
+def segment_person(srgb: np.ndarray) -> np.ndarray:
+    """How surely each pixel of an sRGB picture [H, W, 3] belongs to a person: float32 [H, W] in [0, 1]."""
+    height, width = srgb.shape[:2]
+    small = cv2.resize(np.clip(np.asarray(srgb, np.float32), 0, 1), (256, 256), interpolation=cv2.INTER_AREA)
+    mask = _run(_SEGMENTATION, small)[0].reshape(256, 256)
+    return np.clip(cv2.resize(mask, (width, height), interpolation=cv2.INTER_LINEAR), 0, 1)
+
+
+def _detect_region(image: np.ndarray, margin: float) -> tuple | None:
+    """The best detection as a square region (centre x, y, side [px], angle [rad]), or None. `margin` pads the picture by that share of its long side."""
+    height, width = image.shape[:2]
+    side = max(height, width) * (1 + 2 * margin)
+    scale = 128 / side
+    move = np.array([[scale, 0, 64 - scale * width / 2], [0, scale, 64 - scale * height / 2]], np.float32)
+    shrunk = cv2.resize(image, (max(1, round(width * scale)), max(1, round(height * scale))), interpolation=cv2.INTER_AREA)
+    square = np.zeros((128, 128, 3), np.float32)
+    top, left = (128 - shrunk.shape[0]) // 2, (128 - shrunk.shape[1]) // 2
+    square[top:top + shrunk.shape[0], left:left + shrunk.shape[1]] = shrunk
+    scores, boxes = _run(_SHORT_RANGE, square * 2 - 1)
+    scores, boxes = scores.reshape(-1), boxes.reshape(-1, 16)
+    sure = scores > 0  # logit of 0.5
+    if not sure.any():
+        return None
+    boxes = boxes[sure] + np.tile(_anchors()[sure], 8) * (np.arange(16) // 2 != 1)  # every pair but width and height is relative to the anchor
+    weight = 1 / (1 + np.exp(-np.clip(scores[sure], -100, 100)))
+    best = np.argmax(weight * np.sqrt(np.abs(boxes[:, 2] * boxes[:, 3])))  # the most prominent, not merely the surest
+    near = np.linalg.norm(boxes[:, :2] - boxes[best, :2], axis=1) < 0.4 * boxes[best, 2]
+    box = np.average(boxes[near], axis=0, weights=weight[near])  # blended, as MediaPipe's weighted suppression
+    right_eye, left_eye = box[4:6], box[6:8]
+    angle = np.arctan2(*(left_eye - right_eye)[::-1])
+    centre = (box[:2] - move[:, 2]) / scale
+    return (*centre, 1.5 * max(box[2], box[3]) / scale, angle)
+
+
+def _region_of_landmarks(landmarks: np.ndarray) -> tuple:
+    """The square region a face mesh is read from next: half as large again as the mesh, eyes level."""
+    across = landmarks[LEFT_EYE[1], :2] - landmarks[RIGHT_EYE[0], :2]
+    angle = np.arctan2(across[1], across[0])
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    level = landmarks[:, :2] @ turn.T
+    low, high = level.min(0), level.max(0)
+    return (*(turn.T @ ((low + high) / 2)), 1.5 * (high - low).max(), angle)
+
+
+def _landmarks(image: np.ndarray, region: tuple) -> Face | None:
+    """The face mesh in a region of the picture, or None where there is none."""
+    x, y, side, angle = region
+    if not 8 < side < 20 * max(image.shape[:2]):
+        return None
+    scale = 192 / side
+    c, s = np.cos(angle) * scale, np.sin(angle) * scale
+    to_crop = np.array([[c, s, 96 - c * x - s * y], [-s, c, 96 + s * x - c * y]])  # region to 192 x 192, eyes level; in pixel-edge coordinates
+    shift = to_crop.copy()
+    shift[:, 2] += to_crop[:, :2] @ [0.5, 0.5] - 0.5  # cv2 counts from pixel centres
+    source = image
+    if scale < 0.5:  # what warpAffine would alias
+        blur = 0.5 / scale
+        source = cv2.GaussianBlur(image, (0, 0), blur / 2) if blur < 4 else cv2.blur(image, (int(blur), int(blur)))
+    crop = cv2.warpAffine(source, shift, (192, 192), flags=cv2.INTER_LINEAR)
+    score, points = _run(_LANDMARK, crop, ("conv2d_31", "conv2d_21"))
+    score = float(1 / (1 + np.exp(-score.ravel()[0])))
+    if score < 0.5:
+        return None
+    points = points.reshape(468, 3)
+    landmarks = np.empty((468, 3), np.float32)
+    landmarks[:, :2] = (points[:, :2] - to_crop[:, 2]) @ np.linalg.inv(to_crop[:, :2]).T
+    landmarks[:, 2] = points[:, 2] / scale
+    low, high = landmarks[:, :2].min(0), landmarks[:, :2].max(0)
+    return Face((float(low[0]), float(low[1]), float(high[0]), float(high[1])), landmarks, score)
+
+
+@cache
+def _anchors() -> np.ndarray:
+    """Centres of the 896 anchors [896, 2] in pixels of 128 x 128: two per cell of 16 x 16, six per cell of 8 x 8."""
+    return np.concatenate([np.stack(np.meshgrid(*[(np.arange(n) + 0.5) * 128 / n] * 2), -1).reshape(-1, 2).repeat(count, 0) for n, count in ((16, 2), (8, 6))])
+
+
+def _run(name: str, image: np.ndarray, outputs: tuple | None = None) -> list[np.ndarray]:
+    """The network's outputs for a picture [S, S, 3] already in its range."""
+    net = _net(name)
+    net.setInput(np.ascontiguousarray(image.transpose(2, 0, 1)[None], np.float32))
+    return net.forward(outputs or net.getUnconnectedOutLayersNames())
+
+
+@cache
+def _net(name: str):
+    spec = importlib.util.find_spec("mediapipe")
+    path = Path(spec.submodule_search_locations[0]) / "modules" / name if spec else None
+    if path is None or not path.is_file():
+        raise Problem("The networks that find faces (package mediapipe 0.10.21) are not installed.",
+                      "Install them with `pip install --no-deps -r requirements/nets.txt`, or press Install Solver in the add-on's preferences.")
+    try:
+        return cv2.dnn.readNetFromTFLite(np.fromfile(path, np.uint8))  # by content: OpenCV may not open a path with accents
+    except cv2.error as error:
+        raise Problem(f"The network {path.name} of the package mediapipe cannot be read.",
+                      "Reinstall it: `pip install --no-deps --force-reinstall -r requirements/nets.txt`.") from error
