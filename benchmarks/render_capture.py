@@ -23,8 +23,8 @@ def main() -> None:
         repository.mkdir()
         (repository / "wildcap").symlink_to(ROOT, target_is_directory=True)
         os.environ["BLENDER_USER_EXTENSIONS"] = extensions
+        import bpy  # noqa: F401, I001  (makes addon_utils importable)
         import addon_utils
-        import bpy  # noqa: F401
 
         if addon_utils.enable("bl_ext.user_default.wildcap") is None:
             raise SystemExit("Blender could not enable the extension.")
