@@ -53,9 +53,19 @@ def read_mask(path: Path) -> np.ndarray:
     return np.ascontiguousarray(pixels[..., 0] if pixels.shape[2] < 3 else pixels[..., :3].mean(-1))
 
 
-def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8) -> None:
-    """sRGB [H, W, 3 or 4] (alpha stays as it is) to PNG (8 or 16 bit) or JPEG (8 bit), atomically."""
-    _write(path, np.clip(srgb, 0, 1), f"uint{bits}", "sRGB")
+def read_focal_35mm(path: Path) -> float | None:
+    """The focal length in millimetres of 35 mm film that a photograph's EXIF tells, or None."""
+    image = oiio.ImageInput.open(str(path))
+    if image is None:
+        return None
+    focal = image.spec().getattribute("Exif:FocalLengthIn35mmFilm")
+    image.close()
+    return float(focal) if focal else None
+
+
+def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8, quality: int = 92) -> None:
+    """sRGB [H, W, 3 or 4] (alpha stays as it is) to PNG (8 or 16 bit) or JPEG (8 bit, of that quality), atomically."""
+    _write(path, np.clip(srgb, 0, 1), f"uint{bits}", "sRGB", quality)
 
 
 def write_linear(path: Path, linear: np.ndarray) -> None:
@@ -91,7 +101,7 @@ def _read(path: Path) -> np.ndarray:
     return np.asarray(image.get_pixels(oiio.FLOAT), np.float32)
 
 
-def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str) -> None:
+def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str, quality: int = 92) -> None:
     pixels = np.ascontiguousarray(pixels if pixels.ndim == 3 else pixels[..., None], np.float32)
     height, width, channels = pixels.shape
     spec = oiio.ImageSpec(width, height, channels, kind)
@@ -99,7 +109,7 @@ def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str) -> None
     if _is_linear(path):
         spec.attribute("compression", "zip")
     elif Path(path).suffix.lower() in (".jpg", ".jpeg"):
-        spec.attribute("Compression", "jpeg:92")
+        spec.attribute("Compression", f"jpeg:{quality}")
     else:
         spec.attribute("png:compressionLevel", 3)
     with replacing(path) as temporary:

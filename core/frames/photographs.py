@@ -1,0 +1,38 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Folders of photographs, in the order of their names, upright by their EXIF orientation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from .. import images
+from ..messages import Problem, Reporter
+from .source import Picture, evenly, fit
+
+SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr")
+PHONE_ONLY = (".heic", ".heif", ".avif", ".dng")
+
+
+def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) -> Iterator[Picture]:
+    """At most `most` photographs, evenly spread; one that cannot be read is passed over with a line in the log."""
+    files = sorted(p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
+    pictures = [p for p in files if p.suffix.lower() in SUFFIXES]
+    if not pictures:
+        if any(p.suffix.lower() in PHONE_ONLY for p in files):
+            raise Problem(f"The photographs in {folder.name} are HEIC or raw files, which cannot be read.",
+                          "Export them as JPEG or PNG (on an iPhone: Settings, Camera, Formats, Most Compatible).")
+        raise Problem(f"There are no photographs in {folder}.", "Choose a folder with JPEG, PNG, TIFF or WebP pictures of the face, or a video.")
+    chosen = evenly(len(pictures), most)
+    for done, index in enumerate(chosen, 1):
+        path = pictures[index]
+        try:
+            srgb = images.read_srgb(path)
+        except Problem as problem:
+            report.log(f"{path.name} is left out: {problem.problem}")
+            continue
+        focal = images.read_focal_35mm(path)
+        srgb = fit(srgb, long_side)
+        focal_px = None if focal is None else round(focal / 36 * max(srgb.shape[:2]), 2)  # a full frame is 36 mm wide
+        yield Picture(srgb, int(index), None, path.name, focal_px, done, len(chosen))
