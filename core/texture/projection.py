@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What one view sees of the head's surface: its colours at every texel, and how well it saw them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from .. import raster
+from ..meshes import Mesh, vertex_normals
+from ..views import View
+
+DARKEST = 2e-3
+"""Linear values below this are noise to a logarithm."""
+MARGIN_PX = (1.5, 12.0)
+"""Pixels from a silhouette at which a texel starts to count, and counts in full."""
+GRAZING = 0.15
+"""Cosine of the steepest viewing angle that counts."""
+
+
+@dataclass
+class Surface:
+    """The head unfolded: per texel of its UV charts a point in the world and a unit normal."""
+
+    covered: np.ndarray  # bool [S, S]: texels inside a chart
+    points: np.ndarray  # [N, 3] metres, of the covered texels
+    normals: np.ndarray  # [N, 3]
+    caster: raster.RayCaster
+
+    @classmethod
+    def of(cls, mesh: Mesh, size: int) -> Surface:
+        face, bary = raster.rasterize_uv(mesh, size)
+        covered = face >= 0
+        points = raster.interpolate(mesh.vertices, mesh.faces, face[covered], bary[covered])
+        normals = raster.interpolate(vertex_normals(mesh), mesh.faces, face[covered], bary[covered])
+        return cls(covered, points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12), raster.RayCaster(mesh))
+
+
+@dataclass
+class Observation:
+    """One view in UV space, float32 [S, S, ...]; zero weight where it sees nothing."""
+
+    name: str
+    picture: np.ndarray  # linear [H, W, 3]
+    pixels: np.ndarray  # [S, S, 2] where in the picture each texel is seen
+    log_colour: np.ndarray  # [S, S, 3] natural logarithm of linear colour
+    quality: np.ndarray  # [S, S] in [0, 1]: angle and silhouette only; makes the confidence map
+    weight: np.ndarray  # [S, S] quality with distance and sharpness: who wins where
+
+    def resample(self, pixels: np.ndarray) -> None:
+        """Reads the picture anew, at other pixels [S, S, 2]; one resampling from the original, never two."""
+        self.pixels = pixels
+        self.log_colour = log_colours(self.picture, pixels)
+
+
+def observe(view: View, picture: np.ndarray, surface: Surface, sharpness: float) -> Observation:
+    """Projects every texel into a linear picture [H, W, 3] of any size of that view. sharpness in [0, 1] scales its weight."""
+    covered = surface.covered
+    xy, depth = view.project(surface.points)
+    inside = (depth > 0) & (xy[:, 0] > 1) & (xy[:, 1] > 1) & (xy[:, 0] < view.width - 1) & (xy[:, 1] < view.height - 1)
+    towards = view.centre - surface.points
+    distance = np.linalg.norm(towards, axis=1)
+    cosine = (towards * surface.normals).sum(1) / distance
+    seen = inside & (cosine > GRAZING)
+    seen[seen] = raster.visible_from(surface.caster, surface.points[seen], surface.normals[seen], view.centre)
+
+    margin = np.zeros(len(xy))
+    margin[seen] = raster.sample(_silhouette_distance(surface.caster, view), xy[seen])
+    near, far = MARGIN_PX
+    ramp = np.clip((margin - near) / (far - near), 0, 1)
+    quality = np.where(seen, np.clip((cosine - GRAZING) / (1 - GRAZING), 0, 1) * ramp, 0)
+    scale = [picture.shape[1] / view.width, picture.shape[0] / view.height]
+    pixels = _scatter(np.nan_to_num(xy, nan=-1) * scale, covered)
+    reference = np.median(distance[seen]) if seen.any() else 1.0
+    weight = quality ** 2 * sharpness * (reference / distance) ** 2
+    return Observation(view.name, picture, pixels, log_colours(picture, pixels), _scatter(quality, covered), _scatter(weight, covered))
+
+
+def log_colours(picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Bicubic log colours [S, S, 3] of a linear picture at pixels [S, S, 2]; bilinear would soften pores."""
+    x, y = (np.ascontiguousarray(pixels[..., i] - 0.5, np.float32) for i in range(2))
+    return np.log(np.maximum(cv2.remap(picture, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE), DARKEST))
+
+
+def _silhouette_distance(caster: raster.RayCaster, view: View, scale: float = 0.5) -> np.ndarray:
+    """[H, W]: pixels to the nearest depth jump (one part of the head before another, or before the background)."""
+    _, _, distance = raster.render_view(caster, view, scale)
+    footprint = 1 / (scale * view.camera.mean_focal_length())  # metres across a pixel, per metre of distance
+    depth = np.where(np.isfinite(distance), distance, 1e3)
+    jump = cv2.morphologyEx(depth.astype(np.float32), cv2.MORPH_GRADIENT, np.ones((3, 3))) > 16 * footprint * depth  # 3 x 3 spans two pixels: 83 degrees
+    to_jump = cv2.distanceTransform((~jump).astype(np.uint8), cv2.DIST_L2, 5) / scale
+    return cv2.resize(to_jump, (view.width, view.height), interpolation=cv2.INTER_LINEAR)
+
+
+def _scatter(values: np.ndarray, covered: np.ndarray) -> np.ndarray:
+    """Per covered texel [N(, C)] -> float32 [S, S(, C)], zero elsewhere."""
+    out = np.zeros((*covered.shape, *values.shape[1:]), np.float32)
+    out[covered] = values
+    return out
