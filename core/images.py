@@ -53,6 +53,16 @@ def read_mask(path: Path) -> np.ndarray:
     return np.ascontiguousarray(pixels[..., 0] if pixels.shape[2] < 3 else pixels[..., :3].mean(-1))
 
 
+def size(path: Path) -> tuple[int, int]:
+    """Width and height as stored, without reading the pixels."""
+    image = oiio.ImageInput.open(str(path))
+    if image is None:
+        raise Problem(f"{path} is not a picture that can be read ({oiio.geterror().strip()}).", "Run the stage that makes it again, or save it anew.")
+    width, height = image.spec().width, image.spec().height
+    image.close()
+    return width, height
+
+
 def read_focal_35mm(path: Path) -> float | None:
     """The focal length in millimetres of 35 mm film that a photograph's EXIF tells, or None."""
     image = oiio.ImageInput.open(str(path))

@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Solved cameras against known ones: `python benchmarks/cameras_against_truth.py CAPTURE TRUTH`.
+
+TRUTH holds cameras.json: {"focal_px", "width", "cameras": [{"frame", "matrix_world"}]}, Blender's camera-to-world.
+Centres are compared after a similarity fit, as shares of the mean distance from the cameras to what they look at.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from core.capture import Capture  # noqa: E402
+from core.views import View, read_views  # noqa: E402
+
+BLENDER_TO_COLMAP = np.diag([1.0, -1.0, -1.0])
+
+
+def compare(capture: Capture, truth: Path) -> dict:
+    """Figures of a capture's cameras against a truth folder's."""
+    record = json.loads((truth / "cameras.json").read_text(encoding="utf-8"))
+    true = {camera["frame"]: np.array(camera["matrix_world"]) for camera in record["cameras"]}
+    views, matrices = _paired(capture, true)
+    centres, true_centres = np.array([view.centre for view in views]), matrices[:, :3, 3]
+    scale, rotation, translation = similarity(centres, true_centres)
+    target = _looked_at(true_centres, -matrices[:, :3, 2])
+    distance = np.linalg.norm(true_centres - target, axis=1).mean()
+    errors = np.linalg.norm(scale * centres @ rotation.T + translation - true_centres, axis=1) / distance
+    turned = [np.degrees(np.arccos(np.clip((np.trace(m[:3, :3] @ BLENDER_TO_COLMAP @ v.rotation @ rotation.T) - 1) / 2, -1, 1)))
+              for v, m in zip(views, matrices, strict=True)]
+    up = rotation @ [0, 0, 1]
+    forward = rotation @ [0, -1, 0]
+    return {
+        "frames": len(true), "registered": len(views), "centre_error_median_percent": 100 * np.median(errors), "centre_error_max_percent": 100 * errors.max(),
+        "rotation_error_median_deg": np.median(turned), "focal_px": views[0].camera.mean_focal_length() * record["width"] / views[0].width,
+        "true_focal_px": record["focal_px"], "true_units_per_metre": scale,
+        "up_tilt_deg": np.degrees(np.arccos(np.clip(up[2], -1, 1))), "facing_off_deg": np.degrees(np.arctan2(forward[0], -forward[1])),
+    }
+
+
+def similarity(source: np.ndarray, target: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """scale, rotation [3, 3], translation [3] that take source [N, 3] to target in the least-squares sense (Umeyama 1991)."""
+    a, b = source - source.mean(0), target - target.mean(0)
+    u, s, vt = np.linalg.svd(b.T @ a)
+    sign = np.diag([1, 1, np.sign(np.linalg.det(u @ vt))])
+    rotation = u @ sign @ vt
+    scale = (s * np.diag(sign)).sum() / (a**2).sum()
+    return scale, rotation, target.mean(0) - scale * rotation @ source.mean(0)
+
+
+def _paired(capture: Capture, true: dict) -> tuple[list[View], np.ndarray]:
+    index = {f["name"]: f["video_frame"] for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
+    views = [view for view in read_views(capture) if index[view.name] in true]
+    return views, np.array([true[index[view.name]] for view in views])
+
+
+def _looked_at(centres: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """The point nearest to all optical axes."""
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    return np.linalg.solve(across.sum(0), (across @ centres[:, :, None]).sum(0))[:, 0]
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 3:
+        raise SystemExit(__doc__)
+    for name, value in compare(Capture(sys.argv[1]), Path(sys.argv[2])).items():
+        print(f"{name:30} {value:.4g}")

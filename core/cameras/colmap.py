@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""COLMAP in a process of its own, so that a cancel takes effect at once: `python -m core.cameras.colmap JOB.json`.
+
+Says {"step", "done", "of"} as JSON lines on standard output; dies with its parent (end of file on standard input).
+Schoenberger and Frahm, Structure-from-Motion Revisited (2016).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import threading
+from pathlib import Path
+
+import pycolmap
+
+OVERLAP = 10
+CHUNK = 8
+
+
+def reconstruct(job: dict) -> bool:
+    """Runs a job: images (folder), groups [{names, width, height, focal_px or null}] of one camera each, skin (feature settings), sequential,
+    seed, database and output (paths). Writes the largest model to output; False where there is none."""
+    pycolmap.set_random_seed(job["seed"])
+    _extract(job)
+    _match(job)
+    models = _map(job)
+    if not models:
+        return False
+    best = max(models.values(), key=lambda model: model.num_reg_images())
+    Path(job["output"]).mkdir(parents=True, exist_ok=True)
+    best.write_binary(job["output"])
+    return True
+
+
+def _extract(job: dict) -> None:
+    options = pycolmap.FeatureExtractionOptions()
+    options.use_gpu = False
+    if job["skin"]:  # what holds on low-contrast skin, at ten times the cost
+        options.sift.estimate_affine_shape = True
+        options.sift.domain_size_pooling = True
+        options.sift.peak_threshold = 0.002
+        options.sift.max_num_features = 8000
+    total = sum(len(group["names"]) for group in job["groups"])
+    done = 0
+    for camera_id, group in enumerate(job["groups"], 1):
+        for start in range(0, len(group["names"]), CHUNK):
+            reader = pycolmap.ImageReaderOptions()
+            reader.camera_model = "SIMPLE_RADIAL"
+            reader.default_focal_length_factor = 1.0  # between a phone's wide (0.8) and its portrait lens (1.4)
+            if start:
+                reader.existing_camera_id = camera_id
+            elif group["focal_px"]:
+                reader.camera_params = f"{group['focal_px']},{group['width'] / 2},{group['height'] / 2},0"
+            names = group["names"][start:start + CHUNK]
+            pycolmap.extract_features(job["database"], job["images"], names, pycolmap.CameraMode.SINGLE, reader, options, pycolmap.Device.cpu)
+            done += len(names)
+            _say("finding features", done, total)
+
+
+def _match(job: dict) -> None:
+    _say("matching features", 0, 1)
+    options = pycolmap.FeatureMatchingOptions()
+    options.use_gpu = False
+    options.guided_matching = job["skin"]
+    verification = pycolmap.TwoViewGeometryOptions()
+    verification.ransac.random_seed = job["seed"]
+    if job["sequential"]:
+        pairing = pycolmap.SequentialPairingOptions()
+        pairing.overlap = OVERLAP
+        pycolmap.match_sequential(job["database"], options, pairing, verification, pycolmap.Device.cpu)
+    else:
+        pycolmap.match_exhaustive(job["database"], options, pycolmap.ExhaustivePairingOptions(), verification, pycolmap.Device.cpu)
+    _say("matching features", 1, 1)
+
+
+def _map(job: dict) -> dict[int, pycolmap.Reconstruction]:
+    options = pycolmap.IncrementalPipelineOptions()
+    options.random_seed = job["seed"]
+    options.mapper.random_seed = job["seed"]
+    options.triangulation.random_seed = job["seed"]
+    options.min_model_size = 3
+    options.extract_colors = True
+    total = sum(len(group["names"]) for group in job["groups"])
+    if job["skin"] or total < 12:
+        options.min_num_matches = 12
+        options.mapper.abs_pose_min_num_inliers = 12
+        options.mapper.init_min_num_inliers = 40
+        options.mapper.init_min_tri_angle = 4.0
+    done = 2  # the first pair is registered together
+
+    def another() -> None:
+        nonlocal done
+        done = min(done + 1, total)
+        _say("placing cameras", done, total)
+
+    folder = Path(job["output"]).with_name("models")
+    folder.mkdir(parents=True, exist_ok=True)
+    return pycolmap.incremental_mapping(job["database"], job["images"], str(folder), options, next_image_callback=another)
+
+
+def _say(step: str, done: int, of: int) -> None:
+    print(json.dumps({"step": step, "done": done, "of": of}), flush=True)
+
+
+def _die_with_parent() -> None:
+    sys.stdin.read()
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    threading.Thread(target=_die_with_parent, daemon=True).start()
+    pycolmap.logging.minloglevel = 2
+    found = reconstruct(json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")))
+    sys.stdout.flush()
+    os._exit(0 if found else 3)

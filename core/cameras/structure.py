@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Structure from motion over a capture's frames: starts COLMAP's process, follows it, and gives back its model."""
+
+from __future__ import annotations
+
+import json
+import queue
+import subprocess
+import sys
+import tempfile
+import threading
+from pathlib import Path
+
+import pycolmap
+
+from .. import images
+from ..messages import Problem, Reporter
+
+ALL_PAIRS = 40
+"""Up to this many frames all pairs are matched; beyond, those near each other in the video."""
+STEPS = {"finding features": (0.0, 0.4), "matching features": (0.4, 0.6), "placing cameras": (0.6, 1.0)}
+NO_MODEL = 3
+
+
+def solve_structure(frames: dict, folder: Path, skin: bool, matching: str, seed: int, report: Reporter) -> pycolmap.Reconstruction | None:
+    """The largest model of frames.json's `frames`, whose pictures lie in `folder`, in COLMAP's own world; None where nothing fits together."""
+    records = frames["frames"]
+    sequential = matching == "sequential" or (matching == "auto" and frames.get("kind") == "video" and len(records) > ALL_PAIRS)
+    with tempfile.TemporaryDirectory(prefix="wildcap_") as temporary:
+        job = {"images": str(folder.resolve()), "groups": _groups(records, folder), "skin": skin, "sequential": sequential, "seed": seed,
+               "database": str(Path(temporary) / "database.db"), "output": str(Path(temporary) / "model")}
+        path = Path(temporary) / "job.json"
+        path.write_text(json.dumps(job), encoding="utf-8")
+        return pycolmap.Reconstruction(job["output"]) if _follow(path, report) else None
+
+
+def _groups(records: list[dict], folder: Path) -> list[dict]:
+    """Frames that share a camera: those of one size and one focal length."""
+    groups = {}
+    for record in records:
+        width, height = images.size(folder / record["name"])
+        key = width, height, record.get("focal_px")
+        groups.setdefault(key, []).append(record["name"])
+    return [{"names": names, "width": w, "height": h, "focal_px": f} for (w, h, f), names in groups.items()]
+
+
+def _follow(job: Path, report: Reporter) -> bool:
+    """Runs COLMAP's process, reporting its progress; ends it at a cancel. True where it made a model."""
+    command = [sys.executable, "-E", "-s", "-B", "-m", f"{__package__}.colmap", str(job)]
+    process = subprocess.Popen(command, cwd=Path(__file__).parents[2], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8")
+    lines = queue.SimpleQueue()
+    reader = threading.Thread(target=lambda: [lines.put(line) for line in process.stdout], daemon=True)
+    reader.start()
+    share, step = 0.0, "finding features"
+    try:
+        while reader.is_alive() or not lines.empty():
+            try:
+                said = json.loads(lines.get(timeout=0.2))
+                low, high = STEPS[said["step"]]
+                share, step = low + (high - low) * said["done"] / said["of"], said["step"]
+            except (queue.Empty, ValueError, KeyError):
+                pass
+            report.progress(share, 1, step)
+        code = process.wait()
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
+        process.stdin.close()
+        process.stdout.close()
+    if code not in (0, NO_MODEL):
+        raise Problem(f"The camera solver stopped unexpectedly (code {code}).",
+                      "Close other programs to free memory, or lower frames.max_frames, and run again.")
+    return code == 0
