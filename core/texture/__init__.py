@@ -11,7 +11,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from .. import images, meshes, raster
+from .. import images, meshes
 from ..capture import Capture
 from ..messages import Problem, Reporter
 from ..settings import Settings
@@ -58,7 +58,8 @@ def _observe_all(capture, head, size, report):
     sharpness = {f["name"]: f["sharpness"] for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
     views = [(view, path) for view in read_views(capture) if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
     if not views:
-        raise Problem("There is no delit frame of a registered view.", "Run the stage delight, or put pictures named like the frames into the delighter's folder.")
+        raise Problem("There is no delit frame of a registered view.",
+                      "Run the stage delight, or put pictures named like the frames into the delighter's folder.")
     report.progress(0, len(views) + 4, "unfolding the head")
     surface = Surface.of(head, size)
     best = max(sharpness[view.name] for view, _ in views) or 1.0
