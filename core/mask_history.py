@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The last ten of each of the artist's masks, kept before a new one takes the place.
+
+Ground floor: standard library only; the add-on and `core mask import` write masks, both through here.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from pathlib import Path
+
+from .capture import Capture, replacing
+
+KEPT = 10
+
+
+def keep(capture: Capture, mask: Path) -> Path | None:
+    """Copies `mask` (shadow_mask.png or protect_mask.png) to mask_history/NAME_DATE_TIME.png and drops all but the last ten of that name.
+
+    Returns the copy, or None when there is no mask yet. Raises Problem when the folder cannot be written.
+    """
+    if not mask.is_file():
+        return None
+    stamp = f"{time.strftime('%Y%m%d_%H%M%S')}_{time.time_ns() // 1_000_000 % 1000:03d}"
+    copy = capture.mask_history / f"{mask.stem}_{stamp}{mask.suffix}"
+    with replacing(copy) as temporary:
+        shutil.copyfile(mask, temporary)
+    for old in sorted(capture.mask_history.glob(f"{mask.stem}_*{mask.suffix}"))[:-KEPT]:
+        old.unlink(missing_ok=True)
+    return copy

@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender for the add-on's tests: the checkout seen as an installed extension, under the very name users get.
+
+The bpy wheel hangs at exit when a class stays registered, so the fixture disables the extension at the end.
+"""
+
+import os
+import tempfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+MODULE = "bl_ext.user_default.wildcap"
+
+# Blender reads this when it starts, and any test may be the one that imports bpy first.
+os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="wildcap-test-")
+
+
+@pytest.fixture(scope="session")
+def enabled_extension():
+    """The extension's package inside Blender; enabled once per test process."""
+    pytest.importorskip("bpy")
+    import addon_utils
+
+    repository = Path(os.environ["BLENDER_USER_RESOURCES"]) / "extensions" / "user_default"
+    repository.mkdir(parents=True, exist_ok=True)
+    (repository / "wildcap").symlink_to(ROOT, target_is_directory=True)
+    assert addon_utils.enable(MODULE, default_set=True) is not None, "Blender could not enable the extension"
+    yield MODULE
+    addon_utils.disable(MODULE, default_set=True)
+
+
+@pytest.fixture
+def wildcap(enabled_extension):
+    """As `enabled_extension`, with Blender's start-up scene emptied first: import_module(f"{wildcap}.wildcap_addon...") is the add-on."""
+    import bpy
+
+    bpy.ops.wm.read_homefile(use_empty=True)
+    return enabled_extension

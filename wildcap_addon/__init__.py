@@ -1,0 +1,20 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on: what runs inside Blender. Of `core` it imports the ground floor only; the heavy work is a worker's.
+
+Rooms, in the order in which they register; each has `register` and `unregister`, and they leave in reverse.
+"""
+
+from . import capture, jobs, paint, panel, preferences, properties, reconstruct, relight, setup, solve, status
+
+ROOMS = (preferences, properties, panel, setup, capture, reconstruct, paint, solve, relight, status, jobs)
+
+
+def register():
+    for room in ROOMS:
+        room.register()
+
+
+def unregister():
+    for room in reversed(ROOMS):
+        room.unregister()

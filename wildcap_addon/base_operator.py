@@ -1,0 +1,37 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What all operators share: any exception becomes a problem and a remedy in the panel, never a traceback in the artist's face."""
+
+import traceback
+
+from ..core.messages import Problem
+from . import captures, problems, status
+
+
+class BaseOperator:
+    """Mixin: an operator says what it does in `work(context)` and raises Problem for what the artist can mend."""
+
+    bl_options = {'REGISTER'}
+
+    def execute(self, context):
+        root = captures.root(captures.active(context))
+        try:
+            self.work(context)
+        except Problem as problem:
+            return self._refuse(root, problem)
+        except Exception as error:  # the one place that catches everything: an artist reads problems, not tracebacks
+            traceback.print_exc()
+            return self._refuse(root, Problem(f"{self.bl_label} failed unexpectedly: {type(error).__name__}: {error}",
+                                              "Nothing was deleted. Try again; if it stays, report it with the text of the system console."))
+        problems.clear(root)
+        problems.clear(captures.root(captures.active(context)))
+        status.refresh(context)
+        return {'FINISHED'}
+
+    def work(self, context):
+        raise NotImplementedError
+
+    def _refuse(self, root: str, problem: Problem):
+        problems.show(root, problem)
+        self.report({'ERROR'}, str(problem))
+        return {'CANCELLED'}

@@ -1,0 +1,30 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What all panels share: where they are, and how a stage's settings are listed."""
+
+from dataclasses import fields
+
+from .properties import STAGE_KINDS
+
+
+class WildcapPanel:
+    """Mixin: a panel of the WildCap tab."""
+
+    bl_space_type = 'VIEW_3D'
+    bl_region_type = 'UI'
+    bl_category = "WildCap"
+
+
+class FoldedPanel(WildcapPanel):
+    """Mixin: a room's folded panel under the main one."""
+
+    bl_parent_id = "WILDCAP_PT_main"
+    bl_options = {'DEFAULT_CLOSED'}
+
+
+def draw_settings(layout, item, stage: str, without: tuple[str, ...] = ()) -> None:
+    """The fields of a stage's settings, in their order."""
+    group = getattr(item, stage)
+    for f in fields(STAGE_KINDS[stage]):
+        if f.name not in without:
+            layout.prop(group, f.name)

@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panel: the captures of this scene."""
+
+import bpy
+
+from .. import captures
+from ..base_panel import FoldedPanel
+
+
+class WILDCAP_UL_captures(bpy.types.UIList):
+    def draw_item(self, context, layout, data, item, icon, active_data, active_property):
+        layout.prop(item, "name", text="", emboss=False, icon='USER')
+
+
+class WILDCAP_PT_capture(FoldedPanel, bpy.types.Panel):
+    bl_label = "Captures"
+    bl_order = 10
+
+    def draw(self, context):
+        layout = self.layout
+        props = context.scene.wildcap
+        row = layout.row()
+        row.template_list("WILDCAP_UL_captures", "", props, "captures", props, "active_index", rows=2)
+        column = row.column(align=True)
+        column.operator("wildcap.choose_video", text="", icon='ADD')
+        column.operator("wildcap.open_capture", text="", icon='FILE_FOLDER')
+        column.operator("wildcap.close_capture", text="", icon='REMOVE')
+        item = captures.active(context)
+        if item is not None:
+            layout.prop(item, "path", text="")
+
+
+CLASSES = (WILDCAP_UL_captures, WILDCAP_PT_capture)

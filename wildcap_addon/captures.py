@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which capture the panel and the operators mean: that of the active head, or the one chosen in the scene's list."""
+
+from pathlib import Path
+
+import bpy
+
+from ..core.capture import Capture
+from ..core.messages import Problem
+
+HEAD_KEY = "wildcap_capture"
+"""Custom property of a head object: its capture's folder."""
+
+
+def active(context) -> bpy.types.PropertyGroup | None:
+    """The active head's item of the scene's list, else the list's active one, else None."""
+    props = context.scene.wildcap
+    active_object = context.view_layer.objects.active if context.view_layer else None
+    path = active_object.get(HEAD_KEY) if active_object else None
+    for item in props.captures if path else ():
+        if item.path == path:
+            return item
+    return props.captures[props.active_index] if 0 <= props.active_index < len(props.captures) else None
+
+
+def require(context) -> bpy.types.PropertyGroup:
+    """As `active`. Raises Problem when there is none."""
+    item = active(context)
+    if item is None:
+        raise Problem("There is no face to work on yet.", "Choose a video, or open the sample head.")
+    return item
+
+
+def folder(item) -> Capture:
+    """The item's capture; one that moved together with its .blend is found beside it."""
+    path = Path(bpy.path.abspath(item.path))
+    beside = Path(bpy.data.filepath).parent / path.name if bpy.data.filepath else path
+    return Capture(beside if not path.is_dir() and beside.is_dir() else path)
+
+
+def root(item) -> str:
+    """The key under which run-time state about a capture is kept; '' for none."""
+    return str(folder(item).root) if item is not None else ""
+
+
+def add(context, path: Path) -> bpy.types.PropertyGroup:
+    """The list's item for a folder, made if need be, and now the active one."""
+    props = context.scene.wildcap
+    index = next((i for i, item in enumerate(props.captures) if item.path == str(path)), None)
+    if index is None:
+        item = props.captures.add()
+        item.name, item.path = Path(path).stem, str(path)
+        index = len(props.captures) - 1
+    props.active_index = index
+    active_object = context.view_layer.objects.active
+    if active_object is not None and active_object.get(HEAD_KEY) not in (None, str(path)):
+        context.view_layer.objects.active = None  # or the other head would keep its capture active
+    return props.captures[index]
+
+
+def head(context, item) -> bpy.types.Object | None:
+    """The capture's head, if it is in this scene."""
+    return item.head if item.head is not None and item.head.name in context.scene.objects else None
+
+
+def require_head(context, item) -> bpy.types.Object:
+    found = head(context, item)
+    if found is None:
+        raise Problem("The head is not in this scene.", "Click Bring In Head; if it was never reconstructed, click Reconstruct.")
+    return found

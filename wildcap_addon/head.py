@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The head object of a capture: head.obj brought into the scene with its UVs and its texture; again in place when it changed."""
+
+import bpy
+
+from ..core.capture import Capture
+from ..core.messages import Problem
+from . import captures
+
+
+def bring_in(context, item) -> bpy.types.Object:
+    """The capture's head in the scene, active and selected. An existing head keeps its place and materials and gets the new mesh."""
+    capture = captures.folder(item)
+    if not capture.head.is_file():
+        raise Problem("This capture has no head yet.", "Click Reconstruct first.")
+    mesh = read_mesh(context, capture)
+    head = captures.head(context, item)
+    if head is None:
+        head = bpy.data.objects.new(item.name, mesh)
+        context.collection.objects.link(head)
+        item.head = head
+    else:
+        old, head.data = head.data, mesh
+        for material in old.materials:
+            mesh.materials.append(material)
+        if old.users == 0:
+            bpy.data.meshes.remove(old)
+    mesh.name = item.name
+    head[captures.HEAD_KEY] = item.path
+    head["wildcap_head_time"] = capture.head.stat().st_mtime
+    _show_texture(head, capture)
+    context.view_layer.update()  # what was linked and removed above is known to it only now
+    for other in list(context.view_layer.objects):
+        other.select_set(other == head)
+    context.view_layer.objects.active = head
+    return head
+
+
+def read_mesh(context, capture: Capture) -> bpy.types.Mesh:
+    """head.obj as mesh data: metres, +Z up, its one UV map named UVMap, smooth."""
+    before = set(context.scene.objects)
+    bpy.ops.wm.obj_import(filepath=str(capture.head), forward_axis='Y', up_axis='Z', import_vertex_groups=False, validate_meshes=False)
+    new = [o for o in context.scene.objects if o not in before]
+    if len(new) != 1 or new[0].type != 'MESH' or not new[0].data.uv_layers:
+        for o in new:
+            bpy.data.objects.remove(o)
+        raise Problem(f"{capture.head.name} is not one mesh with UVs.", "Reconstruct again, or restore the file.")
+    mesh = new[0].data
+    bpy.data.objects.remove(new[0])
+    for material in list(mesh.materials):
+        mesh.materials.clear()
+        if material is not None and material.users == 0:
+            bpy.data.materials.remove(material)
+    mesh.uv_layers[0].name = "UVMap"
+    mesh.shade_smooth()
+    return mesh
+
+
+def load_image(path, colour_space: str) -> bpy.types.Image:
+    """The image of a file, read anew if Blender has it already. `colour_space` is 'sRGB' or 'Non-Color'."""
+    image = bpy.data.images.load(str(path), check_existing=True)
+    image.reload()
+    if image.colorspace_settings.name != colour_space:
+        image.colorspace_settings.name = colour_space
+    return image
+
+
+def _show_texture(head, capture: Capture) -> None:
+    """A head without a material gets one that shows the texture, until Assemble Material builds the skin there."""
+    if not capture.texture_png.is_file():
+        return
+    image = load_image(capture.texture_png, 'sRGB')
+    if head.data.materials and head.data.materials[0] is not None:
+        return
+    material = bpy.data.materials.new(f"{head.name} Skin")
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    node = nodes.new('ShaderNodeTexImage')
+    node.name = node.label = "Texture"
+    node.location = (-320, 280)
+    node.image = image
+    shader = next(n for n in nodes if n.type == 'BSDF_PRINCIPLED')
+    links.new(node.outputs["Color"], shader.inputs["Base Color"])
+    shader.inputs["Roughness"].default_value = 0.6
+    nodes.active = node
+    material["wildcap_texture"] = True
+    head.data.materials.append(material)

@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The running jobs, one per capture: started by an operator, polled by a timer, stopped when Blender closes.
+
+Run-time state only, nothing of it reaches the .blend. A job belongs to its capture: opening another .blend changes nothing.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+
+from ..core import messages, stages
+from ..core.messages import Problem
+from ..core.worker.client import Worker
+from ..core.worker.job import write_job
+from . import captures, preferences, problems, properties, status
+
+INTERVAL_S = 0.2
+ROOT = Path(__file__).resolve().parent.parent  # the folder that holds core/, where the worker starts; nothing is written there
+
+
+@dataclass
+class Job:
+    """A worker at a capture, and the last thing it said. `previews` counts the preview pictures so far."""
+
+    goal: str  # 'reconstruct' or 'solve'
+    worker: Worker
+    progress: messages.Progress | None = None
+    stage: str = ""
+    previews: int = 0
+    log: list[str] = field(default_factory=list)
+
+
+_jobs: dict[str, Job] = {}  # capture folder -> its job
+
+
+def of(root: str) -> Job | None:
+    """The capture's running job."""
+    return _jobs.get(root)
+
+
+def start(item, goal: str, *, first: str | None = None, last: str | None = None) -> Job:
+    """Starts the stages from `first` (or from what is not fresh) to `last`. Raises Problem when it cannot."""
+    capture, root = captures.folder(item), captures.root(item)
+    if root in _jobs:
+        raise Problem("This capture is being worked on already.", "Wait for it, or click Cancel.")
+    python = preferences.python()
+    if python is None:
+        raise Problem("The solver is not set up on this machine.", "Click Set Up Solver and choose a Python that has the solver's packages.")
+    path = write_job(capture, first=first, last=last, settings=properties.values(item))
+    worker = Worker(python, ROOT, path, capture.logs / "worker.log")
+    worker.start()
+    problems.clear(root)
+    _jobs[root] = Job(goal, worker)
+    if not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=INTERVAL_S, persistent=True)
+    return _jobs[root]
+
+
+def cancel(root: str) -> None:
+    """Asks the capture's job to stop; it does so within two seconds."""
+    if root in _jobs:
+        _jobs[root].worker.cancel()
+
+
+def poll() -> bool:
+    """Takes in what the workers said. True while one is running. Makes no data-blocks; tests call it in place of the timer."""
+    for root, job in list(_jobs.items()):
+        for message in job.worker.poll():
+            _hear(root, job, message)
+        if not job.worker.running:
+            del _jobs[root]
+    return bool(_jobs)
+
+
+def _hear(root: str, job: Job, message: messages.Message) -> None:
+    match message:
+        case messages.Progress():
+            job.progress, job.stage = message, message.stage
+        case messages.Preview():
+            job.previews += 1
+        case messages.Log():
+            job.log = [*job.log[-99:], message.text]
+        case messages.StageDone():
+            job.progress = None
+        case messages.Failed():
+            problems.show(root, Problem(message.problem, message.remedy))
+        case messages.Cancelled():
+            problems.show(root, Problem("Cancelled.", "What was finished is kept; click again to continue."))
+
+
+def _tick() -> float | None:
+    running = poll()
+    status.redraw()
+    if not running:
+        _bring_in_results()
+    return INTERVAL_S if running else None
+
+
+def _bring_in_results() -> None:
+    """A new head comes in at once if the artist is in Object Mode; otherwise it waits for the next click."""
+    window = next(iter(bpy.context.window_manager.windows), None)
+    if window is None:
+        return
+    with bpy.context.temp_override(window=window):
+        status.refresh(bpy.context)
+        item = captures.active(bpy.context)
+        if bpy.context.mode == 'OBJECT' and item is not None and captures.head(bpy.context, item) is None and captures.folder(item).head.is_file():
+            bpy.ops.wildcap.bring_in_head('EXEC_DEFAULT', True)
+
+
+
+def eta(job: Job) -> str:
+    """What is left of the stage, in words; '' when unknown."""
+    seconds = job.progress.eta_s if job.progress else None
+    if seconds is None:
+        return ""
+    return f"{seconds:.0f} s left" if seconds < 90 else f"{seconds / 60:.0f} min left"
+
+
+def stage_label(job: Job) -> str:
+    return stages.by_name(job.stage).label if job.stage in stages.NAMES else "Starting"
+
+
+def register():
+    pass
+
+
+def unregister():
+    """Also when Blender closes: no worker outlives it (and if Blender dies, the end of its stdin stops the worker)."""
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    for job in _jobs.values():
+        job.worker.terminate()
+    _jobs.clear()

@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What to click next: one function from facts to a step. Knows no bpy, so that every state can be tested."""
+
+from dataclasses import dataclass
+
+from ..core import stages
+from .status import Status
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What the decision depends on. `status` None: no capture, or not looked at yet."""
+
+    has_capture: bool = False
+    has_python: bool = False
+    running: str = ""  # what the capture's job is doing: '', 'reconstruct' or 'solve'
+    painting: bool = False
+    head_time: float = -1.0  # modification time of the head.obj that is in the scene; -1: none
+    maps_time: float = -1.0  # of the maps that the material shows; -1: none assembled
+    status: Status | None = None
+
+
+@dataclass(frozen=True)
+class Step:
+    """One line of state, and the button below it (operator '' for none)."""
+
+    state: str
+    label: str
+    operator: str
+    icon: str
+
+
+SET_UP = Step("The solver is not set up on this machine.", "Set Up Solver", "wildcap.use_python", 'PREFERENCES')
+
+
+def next_step(facts: Facts) -> Step:
+    """The one thing to do now. A stale stage never drags the artist back before the mask; its row says so."""
+    if facts.painting:
+        return Step("White paint marks shadow; Ctrl paints skin.", "Save Mask and Leave", "wildcap.finish_mask", 'CHECKMARK')
+    if facts.running:
+        return Step("Solving ..." if facts.running == "solve" else "Reconstructing ...", "Cancel", "wildcap.cancel", 'CANCEL')
+    if not facts.has_capture:
+        return Step("No face yet.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE') if facts.has_python else SET_UP
+    status = facts.status
+    if status is None:
+        return Step("Looking at the capture ...", "", "", 'TIME')
+    if status.problem is not None:
+        return Step("This capture cannot be used.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
+    return _step_of(facts, status)
+
+
+def _step_of(facts: Facts, status: Status) -> Step:
+    before_mask = stages.NAMES[:stages.NAMES.index(stages.MASK_STAGE) + 1]
+    # A capture without a source (the sample head) came finished up to its mask; there is nothing to reconstruct it from.
+    missing = [name for name in before_mask if status.stages[name] == "to do"] if status.source or not status.has_head else []
+    if missing and not status.source:
+        return Step("This capture has no video yet.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
+    if missing:
+        begun = len(missing) < len(before_mask)
+        state = f"Stopped before {stages.by_name(missing[0]).label}." if begun else "The video is chosen."
+        return Step(state, "Continue Reconstruction" if begun else "Reconstruct", "wildcap.reconstruct", 'MESH_MONKEY') if facts.has_python else SET_UP
+    if facts.head_time < status.head_time:
+        return Step("The head is ready.", "Bring In Head", "wildcap.bring_in_head", 'IMPORT')
+    solved = status.has_maps and status.stages["solve"] in ("done", "absent")
+    if not solved and not status.has_mask:
+        return Step("Check the shadow mask, then Solve.", "Check Shadow Mask", "wildcap.paint_mask", 'BRUSH_DATA')
+    if not solved:
+        state = "The mask or the settings changed since the last solve." if status.stages["solve"] == "stale" else "The shadow mask is painted."
+        return Step(state, "Solve", "wildcap.solve", 'LIGHT') if facts.has_python else SET_UP
+    if facts.maps_time < status.maps_time:
+        return Step("The maps are ready.", "Assemble Material", "wildcap.assemble_material", 'MATERIAL')
+    state = f"Rendered to renders/{status.render}." if status.render else "The head can be relit."
+    return Step(state, "Render", "wildcap.render", 'RENDER_STILL')

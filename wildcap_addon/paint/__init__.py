@@ -1,0 +1,19 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The shadow mask, painted on the head or on a flat sheet of its texture."""
+
+import bpy
+
+from . import operators, panel, session
+
+_register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *panel.CLASSES))
+
+
+def register():
+    _register()
+    session.register()
+
+
+def unregister():
+    session.unregister()
+    _unregister()

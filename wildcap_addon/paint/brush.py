@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The mask brush, across Blender's versions: 4.2 assigns brushes, later ones activate them as assets.
+
+A MASK brush paints the stencil image: its weight where it goes, the opposite with Ctrl held.
+"""
+
+import contextlib
+
+import bpy
+
+NAME = "WildCap Mask"
+RADIUS_PX = 40
+
+
+def activate(context) -> dict:
+    """Makes the mask brush the active one in Texture Paint mode; returns what `restore` needs."""
+    paint = context.scene.tool_settings.image_paint
+    before = {"brush": paint.brush.name if paint.brush else "", "reference": _reference(paint)}
+    brush = bpy.data.brushes.get(NAME) or bpy.data.brushes.new(NAME, mode='TEXTURE_PAINT')
+    setattr(brush, _type_property(brush), 'MASK')
+    brush.weight = 1.0
+    brush.strength = 1.0
+    _use(context, brush)
+    unified = _unified(context.scene)
+    before["unified"] = {name: getattr(unified, name) for name in ("use_unified_size", "use_unified_strength", "use_unified_weight") if hasattr(unified, name)}
+    for name in before["unified"]:
+        setattr(unified, name, False)
+    brush.size = RADIUS_PX * (2 if bpy.app.version >= (5, 0, 0) else 1)  # 5.0 counts diameters
+    return before
+
+
+def restore(context, before: dict) -> None:
+    """The brush of before, in Texture Paint mode; ours is removed."""
+    unified = _unified(context.scene)
+    for name, value in before["unified"].items():
+        setattr(unified, name, value)
+    paint = context.scene.tool_settings.image_paint
+    reference = before["reference"]
+    with contextlib.suppress(RuntimeError):  # its library may be gone
+        if reference is not None and reference["relative_asset_identifier"]:
+            bpy.ops.brush.asset_activate(**reference)
+    if before["brush"] and (paint.brush is None or paint.brush.name != before["brush"]) and before["brush"] in bpy.data.brushes:
+        with contextlib.suppress(AttributeError):  # read-only since 5.0
+            paint.brush = bpy.data.brushes[before["brush"]]
+    ours = bpy.data.brushes.get(NAME)
+    if ours is not None:
+        bpy.data.brushes.remove(ours)
+
+
+def _use(context, brush) -> None:
+    paint = context.scene.tool_settings.image_paint
+    if bpy.app.version >= (4, 3, 0):
+        brush.asset_mark()
+        bpy.ops.brush.asset_activate(asset_library_type='LOCAL', relative_asset_identifier=f"Brush/{brush.name}")
+    else:
+        paint.brush = brush
+
+
+def _reference(paint) -> dict | None:
+    reference = getattr(paint, "brush_asset_reference", None)
+    names = ("asset_library_type", "asset_library_identifier", "relative_asset_identifier")
+    return {name: getattr(reference, name) for name in names} if reference is not None else None
+
+
+def _type_property(brush) -> str:
+    return "image_brush_type" if hasattr(brush, "image_brush_type") else "image_tool"
+
+
+def _unified(scene):
+    settings = scene.tool_settings
+    return getattr(settings, "unified_paint_settings", None) or settings.image_paint.unified_paint_settings

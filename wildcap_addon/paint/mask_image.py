@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The shadow mask as a Blender image, and back to the capture's shadow_mask.png.
+
+The one place of the add-on that turns rows: Blender counts an image's rows from the bottom, files count from the top.
+"""
+
+import struct
+import zlib
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core import mask_history
+from ...core.capture import Capture, replacing
+from ...core.messages import Problem
+
+
+def load(capture: Capture) -> bpy.types.Image:
+    """The artist's mask, else the proposal, as a Non-Color image of the texture's size that is ready to be painted on."""
+    path = capture.shadow_mask if capture.shadow_mask.is_file() else capture.shadow_mask_auto
+    if not path.is_file():
+        raise Problem("This capture has no shadow mask yet.", "Click Reconstruct first.")
+    name = f"{capture.root.stem} Shadow Mask"
+    image = bpy.data.images.get(name)
+    if image is not None:
+        bpy.data.images.remove(image)
+    image = bpy.data.images.load(str(path))
+    image.name = name
+    image.colorspace_settings.name = 'Non-Color'
+    if not image.has_data:
+        image.pixels  # noqa: B018  (reads the file)
+    if not image.has_data or not image.size[0]:
+        bpy.data.images.remove(image)
+        raise Problem(f"{path} is not a picture that can be read.", "Restore it from mask_history, or delete it to start from the proposal.")
+    # The proposal is never overwritten: should Blender save the image itself, it goes where masks of artists go.
+    image.filepath_raw = str(capture.shadow_mask)
+    return image
+
+
+def values(image: bpy.types.Image) -> np.ndarray:
+    """The mask float32 [H, W] in [0, 1], rows from the top."""
+    width, height = image.size
+    pixels = np.empty(width * height * image.channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    return np.flipud(pixels.reshape(height, width, image.channels)[..., 0])
+
+
+def save(image: bpy.types.Image, capture: Capture) -> None:
+    """Writes the image to shadow_mask.png (8 bit grey), atomically; the mask that was there goes to mask_history."""
+    content = grey_png(values(image))
+    if capture.shadow_mask.is_file() and capture.shadow_mask.read_bytes() == content:
+        return
+    mask_history.keep(capture, capture.shadow_mask)
+    write(capture.shadow_mask, content)
+
+
+def write(path: Path, content: bytes) -> None:
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def grey_png(mask: np.ndarray) -> bytes:
+    """A PNG file, 8 bit grey, of a mask [H, W] in [0, 1], rows from the top (PNG specification, ISO/IEC 15948)."""
+    height, width = mask.shape
+    rows = np.zeros((height, width + 1), np.uint8)  # a row starts with its filter type, 0
+    rows[:, 1:] = np.clip(np.round(mask * 255), 0, 255)
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows.tobytes(), 6)) + chunk(b"IEND", b"")

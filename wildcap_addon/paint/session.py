@@ -1,0 +1,212 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A painting session: from Paint Mask to the saved mask, with everything put back as it was.
+
+Its state is names and values, never references: an undo replaces every data-block. However the artist leaves
+(the button, Tab, opening or saving a file), the mask reaches the capture's folder.
+"""
+
+from dataclasses import dataclass, field
+
+import bpy
+
+from ...core.capture import Capture
+from ...core.messages import Problem
+from .. import captures, head, problems
+from . import brush, mask_image, sheet, view
+
+TINT = (1.0, 0.0, 0.0)
+WATCH_S = 0.5
+_SETTINGS = ("mode", "canvas", "use_stencil_layer", "stencil_image", "stencil_color", "invert_stencil")
+
+
+@dataclass
+class Session:
+    """What is being painted, and what was there before."""
+
+    root: str
+    scene: str
+    head: str
+    mask: str
+    on_sheet: bool = False
+    hidden: list[str] = field(default_factory=list)
+    paint: dict = field(default_factory=dict)
+    brush: dict = field(default_factory=dict)
+    views: list[dict] = field(default_factory=list)
+
+
+_session: Session | None = None
+
+
+def active() -> bool:
+    return _session is not None
+
+
+def on_sheet() -> bool:
+    return _session is not None and _session.on_sheet
+
+
+def begin(context, item, use_sheet: bool) -> None:
+    """Enters Texture Paint on the head or on the sheet, the mask as its red stencil and the mask brush in hand."""
+    global _session
+    if _session is not None:
+        _turn(context, use_sheet)
+        return
+    capture = captures.folder(item)
+    obj = captures.require_head(context, item)
+    texture = head.load_image(capture.texture_png, 'sRGB') if capture.texture_png.is_file() else None
+    if texture is None:
+        raise Problem("This capture has no texture to paint over.", "Click Reconstruct first.")
+    mask = mask_image.load(capture)
+    _session = Session(str(capture.root), context.scene.name, obj.name, mask.name)
+    paint = context.scene.tool_settings.image_paint
+    for name in _SETTINGS:
+        value = getattr(paint, name)
+        _session.paint[name] = value.name if isinstance(value, bpy.types.Image) else tuple(value) if name == "stencil_color" else value
+    if context.screen is not None:
+        _session.views = view.set_up(context.screen)
+    paint.mode = 'IMAGE'
+    paint.canvas = texture
+    paint.use_stencil_layer = True
+    paint.stencil_image = mask
+    paint.stencil_color = TINT
+    paint.invert_stencil = False
+    try:
+        _enter(context, use_sheet)
+        _session.brush = brush.activate(context)
+    except Exception:
+        view.restore(_session.views)
+        _session = None
+        raise
+    if not bpy.app.timers.is_registered(_watch):
+        bpy.app.timers.register(_watch, first_interval=WATCH_S, persistent=True)
+
+
+def end(context) -> None:
+    """Saves the mask and puts everything back. Safe to call when the artist has left the mode by other ways."""
+    global _session
+    session = _session
+    if session is None:
+        return
+    save()  # a Problem here leaves the session open, and nothing is lost
+    if context.mode != 'PAINT_TEXTURE':  # only in this mode does Blender let go of a brush
+        _enter(context, session.on_sheet)
+    brush.restore(context, session.brush)
+    _leave(context)
+    paint = context.scene.tool_settings.image_paint
+    for name, value in session.paint.items():
+        setattr(paint, name, bpy.data.images.get(value or "") if name in ("canvas", "stencil_image") else value)
+    view.restore(session.views)
+    mask = bpy.data.images.get(session.mask)
+    if mask is not None:
+        mask.reload()  # from shadow_mask.png, so that Blender does not ask to save it
+    _session = None
+
+
+def save() -> None:
+    """Writes the mask to the capture, atomically. Raises Problem when it cannot."""
+    mask = bpy.data.images.get(_session.mask) if _session else None
+    if mask is not None:
+        mask_image.save(mask, Capture(_session.root))
+
+
+def forget() -> None:
+    """Drops the session without touching Blender's data, for a file that is being replaced."""
+    global _session
+    _session = None
+
+
+def _turn(context, use_sheet: bool) -> None:
+    """From the head to the sheet or back."""
+    if use_sheet != _session.on_sheet:
+        _leave(context)
+        _enter(context, use_sheet)
+
+
+def _enter(context, use_sheet: bool) -> None:
+    if context.mode != 'OBJECT':
+        bpy.ops.object.mode_set(mode='OBJECT')
+    target = bpy.data.objects.get(_session.head)
+    if target is None or target.name not in context.scene.objects:
+        raise Problem("The head is not in this scene any more.", "Undo, or bring the head in again.")
+    _session.on_sheet = use_sheet
+    if use_sheet:
+        target = sheet.make(context, context.scene.tool_settings.image_paint.canvas)
+        _session.hidden = [o.name for o in context.view_layer.objects if o != target and not o.hide_get()]
+        for name in _session.hidden:
+            bpy.data.objects[name].hide_set(True)
+        view.face_sheet(_session.views, target.location, sheet.SIDE_M)
+    context.view_layer.objects.active = target
+    target.select_set(True)
+    bpy.ops.object.mode_set(mode='TEXTURE_PAINT')
+
+
+def _leave(context) -> None:
+    """Back to Object Mode on the head, the sheet gone."""
+    if context.mode != 'OBJECT':
+        bpy.ops.object.mode_set(mode='OBJECT')
+    if _session.on_sheet:
+        sheet.remove()
+        view.face_head(_session.views)
+        for name in _session.hidden:
+            if name in context.view_layer.objects:
+                context.view_layer.objects[name].hide_set(False)
+        _session.hidden, _session.on_sheet = [], False
+    obj = bpy.data.objects.get(_session.head)
+    if obj is not None and obj.name in context.view_layer.objects:
+        context.view_layer.objects.active = obj
+        obj.select_set(True)
+
+
+def _watch() -> float | None:
+    """Ends the session when the artist has left Texture Paint by another way."""
+    if _session is None:
+        return None
+    window = next((w for w in bpy.context.window_manager.windows if w.scene.name == _session.scene), None)
+    if window is None:
+        return WATCH_S
+    with bpy.context.temp_override(window=window):
+        if bpy.context.mode == 'OBJECT':
+            root = _session.root
+            try:
+                end(bpy.context)
+            except Problem as problem:
+                problems.show(root, problem)
+                return WATCH_S * 4
+    return WATCH_S
+
+
+@bpy.app.handlers.persistent
+def save_with_file(*_):
+    """Painted pixels are in no .blend: whoever saves the file wants the mask saved too."""
+    _save_or_show()
+
+
+@bpy.app.handlers.persistent
+def save_before_load(*_):
+    _save_or_show()
+    forget()
+
+
+def _save_or_show() -> None:
+    try:
+        save()
+    except Problem as problem:
+        problems.show(_session.root, problem)
+
+
+_HANDLERS = (("save_pre", save_with_file), ("load_pre", save_before_load))
+
+
+def register():
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister():
+    _save_or_show()
+    forget()
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).remove(handler)
+    if bpy.app.timers.is_registered(_watch):
+        bpy.app.timers.unregister(_watch)

@@ -1,0 +1,35 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The flat sheet: one square with the whole texture on it, looked at from straight above, to paint the mask in UV space."""
+
+import bpy
+
+SIDE_M = 0.4
+NAME = "WildCap Mask Sheet"
+
+
+def make(context, image: bpy.types.Image) -> bpy.types.Object:
+    """The sheet in the scene: SIDE_M wide, UV (0, 0) at its lower left, the texture in a material."""
+    remove()
+    mesh = bpy.data.meshes.new(NAME)
+    half = SIDE_M / 2
+    mesh.from_pydata([(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], [], [(0, 1, 2, 3)])
+    layer = mesh.uv_layers.new(name="UVMap")
+    layer.uv.foreach_set("vector", (0, 0, 1, 0, 1, 1, 0, 1))
+    material = bpy.data.materials.new(NAME)
+    material.use_nodes = True
+    node = material.node_tree.nodes.new('ShaderNodeTexImage')
+    node.image = image
+    material.node_tree.nodes.active = node
+    mesh.materials.append(material)
+    sheet = bpy.data.objects.new(NAME, mesh)
+    context.scene.collection.objects.link(sheet)
+    return sheet
+
+
+def remove() -> None:
+    """Takes the sheet and all it is made of away."""
+    for collection in (bpy.data.objects, bpy.data.meshes, bpy.data.materials):
+        block = collection.get(NAME)
+        if block is not None:
+            collection.remove(block)

@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The tab: a line of state, one large button for the next step, what a running job does, and a row per stage."""
+
+import bpy
+
+from ..core import stages
+from . import captures, jobs, next_step, preferences, problems, status
+from .base_panel import WildcapPanel
+from .paint import session
+
+STATE_ICONS = {"done": 'CHECKMARK', "absent": 'CHECKMARK', "stale": 'FILE_REFRESH', "to do": 'RADIOBUT_OFF', "running": 'PLAY'}
+
+
+class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
+    bl_label = "WildCap"
+
+    def draw(self, context):
+        layout = self.layout
+        item = captures.active(context)
+        root = captures.root(item)
+        step = next_step.next_step(gather(context, item))
+        if item is not None:
+            layout.label(text=item.name, icon='USER')
+        width = context.region.width if context.region else 300
+        for line in problems.wrapped(step.state, width):
+            layout.label(text=line)
+        job = jobs.of(root)
+        if job is not None:
+            draw_job(layout, job)
+        if step.operator:
+            row = layout.row()
+            row.scale_y = 2.0
+            row.operator(step.operator, text=step.label, icon=step.icon)
+        if item is None:
+            layout.operator("wildcap.open_sample_head")
+        found = status.of(item) if item is not None else None
+        problems.draw(layout, problems.of(root) or (found.problem if found else None), width)
+
+
+class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
+    bl_label = "Stages"
+    bl_parent_id = "WILDCAP_PT_main"
+
+    @classmethod
+    def poll(cls, context):
+        return captures.active(context) is not None
+
+    def draw(self, context):
+        item = captures.active(context)
+        found = status.of(item)
+        job = jobs.of(captures.root(item))
+        column = self.layout.column(align=True)
+        for stage in stages.STAGES:
+            state = "running" if job and job.stage == stage.name else found.stages.get(stage.name, "to do") if found else "to do"
+            row = column.row()
+            row.label(text=stage.label, icon=STATE_ICONS[state])
+            row.label(text=_words(state, found.seconds.get(stage.name) if found else None))
+
+
+def gather(context, item) -> next_step.Facts:
+    """What the next step depends on, from what is known already."""
+    if item is None:
+        return next_step.Facts(has_python=preferences.python() is not None)
+    head = captures.head(context, item)
+    job = jobs.of(captures.root(item))
+    return next_step.Facts(
+        has_capture=True, has_python=preferences.python() is not None, running=job.goal if job else "", painting=session.active(),
+        head_time=head.get("wildcap_head_time", 0.0) if head else -1.0, maps_time=head.get("wildcap_maps_time", -1.0) if head else -1.0,
+        status=status.of(item),
+    )
+
+
+def draw_job(layout, job: jobs.Job) -> None:
+    """Stage, how far it is, and how long it will take."""
+    progress = job.progress
+    factor = min(1.0, progress.done / progress.of) if progress and progress.of > 0 else 0.0
+    layout.progress(text=f"{jobs.stage_label(job)}  {factor:.0%}", factor=factor)
+    row = layout.row()
+    row.label(text=progress.text if progress else "")
+    row.label(text=jobs.eta(job))
+
+
+def _words(state: str, seconds: float | None) -> str:
+    if state == "done" and seconds is not None:
+        return f"done, {seconds:.0f} s"
+    return {"absent": "done", "stale": "out of date"}.get(state, state)
+
+
+register, unregister = bpy.utils.register_classes_factory((WILDCAP_PT_main, WILDCAP_PT_stages))

@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the .blend keeps: the list of captures and each one's settings. Groups are built from core.settings.
+
+Default, range, unit and tooltip of every setting are written there; run-time state lives in `jobs` and `status`.
+"""
+
+from dataclasses import fields
+from pathlib import Path
+
+import bpy
+
+from ..core import settings as core_settings
+from ..core import stages
+
+STAGE_KINDS = {stage.name: type(getattr(core_settings.Settings(), stage.name)) for stage in stages.STAGES}
+
+
+def settings_group(stage: str, kind: type) -> type:
+    """A PropertyGroup with one property per field of a stage's settings."""
+    annotations = {f.name: _property(f, core_settings.tooltips(kind)[f.name]) for f in fields(kind)}
+    return type(f"WILDCAP_PG_{stage}", (bpy.types.PropertyGroup,), {"__annotations__": annotations, "__doc__": kind.__doc__})
+
+
+def _property(field, tooltip: str):
+    unit = field.metadata.get("unit")
+    name = field.name.removesuffix(f"_{unit}").replace("_", " ").title() + (f" ({unit})" if unit else "")
+    common = {"name": name, "description": tooltip, "default": field.default}
+    limits = {k: field.metadata[k] for k in ("min", "max") if k in field.metadata}
+    if "choices" in field.metadata:
+        return bpy.props.EnumProperty(items=[(c, c.replace("_", " ").title(), "") for c in field.metadata["choices"]], **common)
+    if isinstance(field.default, bool):
+        return bpy.props.BoolProperty(**common)
+    if isinstance(field.default, int):
+        return bpy.props.IntProperty(**common, **limits)
+    if isinstance(field.default, float):
+        return bpy.props.FloatProperty(**common, **limits)
+    return bpy.props.StringProperty(**common, **({"subtype": 'DIR_PATH'} if field.name == "folder" else {}))
+
+
+GROUPS = {stage: settings_group(stage, kind) for stage, kind in STAGE_KINDS.items()}
+
+
+def _apply_quality(self, context):
+    preset = core_settings.preset(self.quality)
+    for stage, kind in STAGE_KINDS.items():
+        for f in fields(kind):
+            if f.name not in ("skin_tone", "folder", "delighter"):  # about the face, not about quality
+                setattr(getattr(self, stage), f.name, getattr(getattr(preset, stage), f.name))
+
+
+class WILDCAP_PG_capture(bpy.types.PropertyGroup):
+    """One capture folder in the scene's list."""
+
+    path: bpy.props.StringProperty(name="Capture Folder", subtype='DIR_PATH', description="The folder that holds everything about this face")
+    head: bpy.props.PointerProperty(name="Head", type=bpy.types.Object, description="The head object of this capture")
+    quality: bpy.props.EnumProperty(
+        name="Quality", items=[(q, q.title(), "") for q in core_settings.QUALITIES], default="standard", update=_apply_quality,
+        description="A set of settings: draft to look, standard to work, full to deliver",
+    )
+    device: bpy.props.EnumProperty(
+        name="Device", items=[("cpu", "CPU", ""), ("cuda", "CUDA", ""), ("mps", "Metal", "")], default="cpu",
+        description="Where the solver computes",
+    )
+    seed: bpy.props.IntProperty(name="Seed", min=0, default=0, description="The same seed gives the same maps")
+    use_skin_tone: bpy.props.BoolProperty(
+        name="Set Skin Tone", default=False, description="Use the colour below as the mean skin colour; off: it is estimated from the video",
+    )
+    skin_tone: bpy.props.FloatVectorProperty(
+        name="Skin Tone", subtype='COLOR_GAMMA', size=3, min=0, max=1, default=(0.69, 0.54, 0.45),
+        description="Mean colour of the facial skin without lips, brows and stubble, as the eye sees it (sRGB)",
+    )
+
+
+WILDCAP_PG_capture.__annotations__ |= {stage: bpy.props.PointerProperty(type=group) for stage, group in GROUPS.items()}
+
+
+class WILDCAP_PG_scene(bpy.types.PropertyGroup):
+    """The scene's captures and how they are lit."""
+
+    captures: bpy.props.CollectionProperty(type=WILDCAP_PG_capture)
+    active_index: bpy.props.IntProperty(name="Capture", description="The capture that the panel shows while no head is active")
+    light: bpy.props.EnumProperty(
+        name="Light", default='studio',
+        items=[('studio', "Studio", "Key, fill and rim from three soft boxes"), ('sun', "Sun", "A low sun under a clear sky"),
+               ('window', "Window", "One large window from the side")],
+        description="The light for Render",
+    )
+    resolution: bpy.props.IntProperty(name="Resolution", subtype='PIXEL', min=16, max=8192, default=1024, description="Side of the rendered picture")
+    samples: bpy.props.IntProperty(name="Samples", min=1, max=65536, default=128, description="Cycles samples per pixel")
+
+
+def values(item: WILDCAP_PG_capture) -> dict:
+    """The settings of a capture as a job file holds them: stage -> {name: value}, seed, device."""
+    found = {stage: {f.name: getattr(getattr(item, stage), f.name) for f in fields(kind)} for stage, kind in STAGE_KINDS.items()}
+    found["solve"]["skin_tone"] = ",".join(f"{c:.4f}" for c in item.skin_tone) if item.use_skin_tone else "auto"
+    if found["delight"]["folder"]:
+        found["delight"]["folder"] = str(Path(bpy.path.abspath(found["delight"]["folder"])))
+    return {**found, "seed": item.seed, "device": item.device}
+
+
+def settings(item: WILDCAP_PG_capture) -> core_settings.Settings:
+    return core_settings.from_json(values(item))
+
+
+_register, _unregister = bpy.utils.register_classes_factory((*GROUPS.values(), WILDCAP_PG_capture, WILDCAP_PG_scene))
+
+
+def register():
+    _register()
+    bpy.types.Scene.wildcap = bpy.props.PointerProperty(type=WILDCAP_PG_scene)
+
+
+def unregister():
+    del bpy.types.Scene.wildcap
+    _unregister()

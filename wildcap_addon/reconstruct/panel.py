@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panel: the settings of the stages up to the mask proposal."""
+
+import bpy
+
+from ...core import stages
+from .. import captures
+from ..base_panel import FoldedPanel, draw_settings
+
+
+class WILDCAP_PT_reconstruct(FoldedPanel, bpy.types.Panel):
+    bl_label = "Reconstruction"
+    bl_order = 20
+
+    @classmethod
+    def poll(cls, context):
+        return captures.active(context) is not None
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        item = captures.active(context)
+        layout.prop(item, "quality")
+        for stage in stages.STAGES[:stages.NAMES.index(stages.MASK_STAGE) + 1]:
+            column = layout.column(heading=stage.label)
+            column.label(text=stage.label)
+            draw_settings(column, item, stage.name)
+        row = layout.row(align=True)
+        row.operator("wildcap.reconstruct")
+        row.operator("wildcap.bring_in_head")
+
+
+CLASSES = (WILDCAP_PT_reconstruct,)

@@ -1,0 +1,19 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The maps in a material, under a light, in a picture."""
+
+import bpy
+
+from . import operators, panel, picture
+
+_register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *panel.CLASSES))
+
+
+def register():
+    _register()
+    picture.register()
+
+
+def unregister():
+    picture.unregister()
+    _unregister()

@@ -1,0 +1,49 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panel: quality, skin tone and the solver's settings; the preview while it runs."""
+
+import bpy
+
+from .. import captures, jobs
+from ..base_panel import FoldedPanel, WildcapPanel, draw_settings
+from . import preview
+
+
+class WILDCAP_PT_preview(WildcapPanel, bpy.types.Panel):
+    bl_label = "Preview"
+    bl_parent_id = "WILDCAP_PT_main"
+
+    @classmethod
+    def poll(cls, context):
+        job = jobs.of(captures.root(captures.active(context)))
+        return job is not None and job.goal == "solve" and job.previews > 0
+
+    def draw(self, context):
+        preview.draw(self.layout, captures.folder(captures.active(context)))
+
+
+class WILDCAP_PT_solve(FoldedPanel, bpy.types.Panel):
+    bl_label = "Solve"
+    bl_order = 40
+
+    @classmethod
+    def poll(cls, context):
+        return captures.active(context) is not None
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        item = captures.active(context)
+        layout.prop(item, "quality")
+        layout.prop(item, "use_skin_tone")
+        row = layout.row()
+        row.enabled = item.use_skin_tone
+        row.prop(item, "skin_tone", text="")
+        layout.prop(item, "device")
+        layout.prop(item, "seed")
+        draw_settings(layout, item, "solve", without=("skin_tone",))
+        draw_settings(layout, item, "upscale")
+        layout.operator("wildcap.solve")
+
+
+CLASSES = (WILDCAP_PT_preview, WILDCAP_PT_solve)

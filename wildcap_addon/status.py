@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is finished and fresh in a capture's folder, looked up outside of `draw` and kept until the folder or the settings change.
+
+A panel asks `of(item)`, which only reads the last answer and notes that somebody wants to know; a timer looks.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+
+from ..core import stages
+from ..core.capture import Capture
+from ..core.messages import Problem
+from . import captures, properties
+
+INTERVAL_S = 1.0
+
+
+@dataclass(frozen=True)
+class Status:
+    """What a capture's folder says. `stages`: name -> 'to do', 'done', 'stale' or 'absent' (outputs came without a record)."""
+
+    source: str = ""
+    stages: dict = field(default_factory=dict)
+    seconds: dict = field(default_factory=dict)
+    has_head: bool = False
+    head_time: float = 0.0
+    has_mask: bool = False
+    has_maps: bool = False
+    maps_time: float = 0.0
+    render: str = ""
+    problem: Problem | None = None
+
+
+_known: dict[str, tuple[tuple, Status]] = {}  # capture folder -> (stamp, status)
+_wanted: set[str] = set()
+
+
+def of(item) -> Status | None:
+    """The last known status of a list item, None before the first look."""
+    root = captures.root(item)
+    _wanted.add(root)
+    return _known[root][1] if root in _known else None
+
+
+def refresh(context) -> None:
+    """Looks at every capture of the scene that is wanted or active, where something changed since the last look."""
+    active = captures.active(context)
+    for item in context.scene.wildcap.captures:
+        root = captures.root(item)
+        if root in _wanted or item == active:
+            _look(root, item)
+
+
+def look(capture: Capture, settings) -> Status:
+    """Reads the folder; hashes only files that changed since they were last hashed."""
+    try:
+        record = capture.read()
+        states = {stage.name: _state(capture, stage, record, settings) for stage in stages.STAGES}
+    except Problem as problem:
+        return Status(problem=problem)
+    except OSError as error:
+        return Status(problem=Problem(f"The capture folder {capture.root} cannot be read ({error.strerror or error}).",
+                                      "Check the disk, or open the capture from where it is now."))
+    return Status(
+        source=record.get("source", ""), stages=states,
+        seconds={name: done["seconds"] for name, done in record["stages"].items()},
+        has_head=capture.head.is_file(), head_time=_time(capture.head), has_mask=capture.shadow_mask.is_file(),
+        has_maps=all(path.is_file() for path in delivered(capture)), maps_time=max(map(_time, delivered(capture))),
+        render=max((p for p in capture.renders.glob("*.png")), key=_time, default=Path()).name,
+    )
+
+
+def delivered(capture: Capture) -> list[Path]:
+    """The three maps a material needs: of the 4K folder if it is complete and not older, else of the solved ones."""
+    names = ("diffuse_albedo.png", "specular_albedo.png", "normal.png")
+    solved, enlarged = [capture.maps / n for n in names], [capture.maps_4k / n for n in names]
+    newer = all(p.is_file() for p in enlarged) and min(map(_time, enlarged)) >= max(map(_time, solved))
+    return enlarged if newer else solved
+
+
+def _state(capture: Capture, stage: stages.Stage, record: dict, settings) -> str:
+    if stage.name not in record["stages"]:
+        return "absent" if all(capture.has(name) for name in stage.writes) else "to do"
+    return capture.state(stage, settings)
+
+
+def _time(path: Path) -> float:
+    return path.stat().st_mtime if path.is_file() else 0.0
+
+
+def _look(root: str, item) -> bool:
+    capture = captures.folder(item)
+    values = properties.values(item)
+    watched = (capture.json, capture.head, capture.shadow_mask, capture.protect_mask, capture.texture, *delivered(capture), capture.renders)
+    stamp = (repr(values), *(p.stat().st_mtime_ns if p.exists() else 0 for p in watched))
+    if root in _known and _known[root][0] == stamp:
+        return False
+    _known[root] = (stamp, look(capture, properties.settings(item)))
+    return True
+
+
+def _tick() -> float:
+    for scene in bpy.data.scenes:
+        for item in scene.wildcap.captures:
+            root = captures.root(item)
+            if root in _wanted and _look(root, item):
+                redraw()
+    return INTERVAL_S
+
+
+def redraw() -> None:
+    """Asks the sidebars to draw again."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == 'VIEW_3D':
+                for region in area.regions:
+                    if region.type == 'UI':
+                        region.tag_redraw()
+
+
+def register():
+    bpy.app.timers.register(_tick, first_interval=INTERVAL_S, persistent=True)
+
+
+def unregister():
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    _known.clear()
+    _wanted.clear()
