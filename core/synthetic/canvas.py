@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The template's skin as something to paint on: which texel lies where on the head, in millimetres.
+
+Everything is painted at points in space, never at UV coordinates, so the two sides of a UV seam get the same paint.
+Values live in flat arrays over the N texels that the UV layout covers; `Canvas.spread` makes a picture of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+
+import cv2
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .. import raster, template
+from ..meshes import Mesh
+
+
+@dataclass(frozen=True)
+class Canvas:
+    """size S; covered bool [S, S], N of them true; position float32 [N, 3] in mm; metric float32 [N, 3]: with T the unit tangent along +u and B
+    the unit bitangent (orthogonal to T, towards +v), dP/du = (a, 0) and dP/dv = (b, c) in mm per texel, stored as (a, b, c);
+    masks name -> float32 [N] in [0, 1]; landmarks float64 [468, 3] in mm."""
+
+    size: int
+    covered: np.ndarray
+    position: np.ndarray
+    metric: np.ndarray
+    masks: dict[str, np.ndarray]
+    landmarks: np.ndarray
+    cache: dict[str, np.ndarray] = field(default_factory=dict)  # for what depends on nothing but the canvas
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        return cKDTree(self.position, balanced_tree=False, compact_nodes=False)
+
+    @cached_property
+    def area(self) -> np.ndarray:
+        """mm^2 of surface per texel, float32 [N]."""
+        return np.abs(self.metric[:, 0] * self.metric[:, 2])
+
+    @cached_property
+    def bled_position(self) -> np.ndarray:
+        """position everywhere, float32 [S, S, 3]: beyond a chart's border its nearest texel's."""
+        return self.spread(self.position)
+
+    @cached_property
+    def _nearest(self) -> np.ndarray:
+        index = np.zeros((self.size, self.size), np.int64)
+        index[self.covered] = np.arange(len(self.position))
+        return raster.bleed(index, self.covered)
+
+    def spread(self, values: np.ndarray) -> np.ndarray:
+        """Values [N(, C)] as a picture [S, S(, C)], bled beyond the charts."""
+        return values[self._nearest]
+
+    def soft(self, values_of: Callable[[np.ndarray], np.ndarray], step: int = 4) -> np.ndarray:
+        """A function of points [M, 3] in mm that varies slowly (over 5 mm or more), computed at every `step`-th texel and enlarged: [N]."""
+        shrunk = cv2.resize(self.bled_position, (self.size // step,) * 2, interpolation=cv2.INTER_AREA)
+        small = np.asarray(values_of(shrunk.reshape(-1, 3)), np.float32).reshape(self.size // step, -1)
+        return cv2.resize(small, (self.size,) * 2, interpolation=cv2.INTER_LINEAR)[self.covered]
+
+    def near(self, points: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """All texels closer than radius [M] mm to points [M, 3]: texel int [K], point int [K], distance [K] in mm."""
+        if not len(points):
+            return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
+        found = self.tree.query_ball_point(points, radius, return_sorted=False)
+        counts = np.fromiter(map(len, found), np.int64, len(found))
+        texel = np.concatenate([np.asarray(f, np.int64) for f in found if f] or [np.zeros(0, np.int64)])
+        point = np.repeat(np.arange(len(points)), counts)
+        return texel, point, np.linalg.norm(self.position[texel] - points[point], axis=1)
+
+
+@lru_cache(maxsize=4)
+def canvas(size: int) -> Canvas:
+    """The built-in template's canvas; made once per size and process."""
+    mesh = template.load()
+    face, bary = template.landmarks()
+    points = (mesh.vertices[mesh.faces[face]] * bary[..., None]).sum(1)
+    return make_canvas(mesh, size, points, lambda name: template.mask(name, size))
+
+
+def make_canvas(mesh: Mesh, size: int, landmarks: np.ndarray, mask: Callable[[str], np.ndarray]) -> Canvas:
+    """Of any head in metres (face towards -Y) with UVs, its MediaPipe landmarks [468, 3] in metres and masks [S, S] by name."""
+    face, bary = raster.rasterize_uv(mesh, size)
+    covered = face >= 0
+    position = raster.interpolate(mesh.vertices * 1000, mesh.faces, face[covered], bary[covered]).astype(np.float32)
+    masks = {name: np.asarray(mask(name), np.float32)[covered] for name in ("skin", "lips", "brows", "eyes", "ears", "neck", "scalp", "nose")}
+    return Canvas(size, covered, position, _metric(mesh, size)[face[covered]], masks, landmarks * 1000)
+
+
+def _metric(mesh: Mesh, size: int) -> np.ndarray:
+    """(a, b, c) of Canvas.metric per face, float32 [F, 3]."""
+    p, q = mesh.vertices[mesh.faces] * 1000, mesh.uvs[mesh.face_uvs] * size
+    edges = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], 1)  # [F, 2, 3] = uv_edges [F, 2, 2] @ derivative [F, 2, 3]
+    uv_edges = np.stack([q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]], 1)
+    sound = np.abs(np.linalg.det(uv_edges)) > 1e-9
+    derivative = np.zeros((len(p), 2, 3))
+    derivative[sound] = np.linalg.solve(uv_edges[sound], edges[sound])
+    du, dv = derivative[:, 0], derivative[:, 1]
+    a = np.maximum(np.linalg.norm(du, axis=1), 1e-9)
+    b = (du * dv).sum(1) / a
+    c = np.sqrt(np.maximum((dv * dv).sum(1) - b * b, 1e-12))
+    return np.stack([a, b, c], 1).astype(np.float32)

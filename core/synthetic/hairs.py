@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair as the texture shows it: brows of single strokes, the stubble of a beard and its blue shadow, a cropped scalp."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .canvas import Canvas
+from .noise import octaves
+from .spots import strew
+
+
+def brows(on: Canvas, ground: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
+    """How much of each texel brow hair covers, [N] in [0, 1]; `region` on the ground is where it grows, `density` 1 is a usual brow."""
+    roots, texel = strew(ground, 1.5 * density * np.clip(region * 1.5 - 0.35, 0, 1), rng)
+    outer = np.abs(roots[:, 0:1]) / np.abs(ground.landmarks[[70, 300], 0]).mean()  # 0 at the nose ... 1 at the tail
+    side = np.sign(roots[:, 0:1])
+    # near the nose hairs stand up, then lie along the brow, and at the tail point down
+    rise = np.clip(1.35 - 1.9 * outer, -0.35, 1.2) + rng.normal(0, 0.22, outer.shape)
+    direction = np.concatenate([side, 0.35 * np.ones_like(side), rise], 1)
+    length = rng.uniform(5, 9, len(roots)) * np.clip(region[texel] * 1.5, 0.6, 1)
+    return _strokes(on, roots, direction, length, 0.11, np.full(len(roots), -0.35), rng)
+
+
+def stubble(on: Canvas, ground: Canvas, region: np.ndarray, density: float, length: float, rng: np.random.Generator) -> np.ndarray:
+    """Cover [N] of beard hair of `length` mm (0.3: shaven yesterday) at `density` hairs per mm^2 in the full of `region` [N] on the ground."""
+    roots, _ = strew(ground, density * np.clip(region * 1.3 - 0.15, 0, 1) ** 1.5, rng)
+    down = np.array([[0, 0.15, -1.0]]) + rng.normal(0, 0.35, (len(roots), 3)) + np.sign(roots[:, 0:1]) * [[0.25, 0, 0]]
+    return _strokes(on, roots, down, length * rng.uniform(0.4, 1.3, len(roots)), 0.06, np.zeros(len(roots)), rng)
+
+
+def beard_shadow(albedo: np.ndarray, amount: np.ndarray) -> np.ndarray:
+    """albedo [N, 3] over hair below the surface, amount [N] in [0, 1]: red light reaches deeper and loses more, so the shade is bluish grey."""
+    return albedo * (1 - amount[:, None] * np.array([0.42, 0.30, 0.22], np.float32))
+
+
+def cropped(on: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
+    """Cover [N] of very short hair on the scalp; `region` [N] on this canvas."""
+    grain = octaves(on.position, [0.9, 1.8], rng)
+    patchy = octaves(on.position, [9.0], rng)
+    return np.clip(region ** 1.5 * density * (1 + 0.22 * grain + 0.06 * patchy), 0, 1)
+
+
+def _strokes(on: Canvas, roots: np.ndarray, direction: np.ndarray, length: np.ndarray, width: float, bend: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Cover [N] of hairs `width` mm thick and `length` [M] mm long from roots [M, 3] along direction [M, 3], sinking by `bend` (a share of the length)."""
+    cover = np.zeros(len(on.position), np.float32)
+    if not len(roots):
+        return cover
+    step = 0.25 * max(1.0, on.area.mean() ** 0.5 / 0.25) * 0.6
+    count = np.maximum(1, np.ceil(length / step).astype(int))
+    hair = np.repeat(np.arange(len(roots)), count)
+    along = (np.arange(len(hair)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[hair]
+    direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    points = roots[hair] + direction[hair] * (along * length[hair])[:, None]
+    points[:, 2] += bend[hair] * along**2 * length[hair]
+    finest = 0.55 * float(np.sqrt(np.median(on.area)))
+    _, nearest = on.tree.query(points, distance_upper_bound=8.0)  # lays the straight hair onto the surface
+    kept = nearest < len(cover)
+    hair, along, lifted = hair[kept], along[kept], points[kept] - on.position[nearest[kept]]
+    on_surface = on.position[nearest[kept]] + np.clip(lifted, -finest, finest)
+    radius = max(width, finest)
+    texel, point, distance = on.near(on_surface, np.full(len(on_surface), 1.5 * radius))
+    taper = (1 - 0.7 * along[point] ** 2) * rng.uniform(0.6, 1.0, len(roots))[hair[point]]
+    # each hair counts once per texel: the strongest of its samples, then hairs cover each other
+    share = np.clip(1 - distance / (1.5 * radius), 0, 1) * taper * min(1.0, 2 * width / radius)
+    order = np.lexsort((-share, texel, hair[point]))
+    key = hair[point][order].astype(np.int64) * len(cover) + texel[order]
+    first = np.concatenate([[True], key[1:] != key[:-1]]) if len(key) else np.zeros(0, bool)
+    left = np.zeros(len(cover), np.float64)
+    np.add.at(left, texel[order][first], np.log1p(-np.minimum(share[order][first], 0.95)))
+    return (1 - np.exp(left)).astype(np.float32)

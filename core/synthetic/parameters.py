@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The parameters of one subject's skin and their distribution: all tones, ages and sexes, by one seed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import pigment
+
+
+@dataclass(frozen=True)
+class SkinParameters:
+    """One subject. The four seeds are independent: another mole_seed moves moles and freckles and nothing else."""
+
+    melanin: float = 0.05  # volume fraction in the epidermis, 0.005 very light ... 0.6 very dark
+    blood: float = 0.015  # volume fraction in the dermis
+    oxygen: float = 0.75  # saturated share of the blood
+    scattering: float = 1.0  # factor on the dermis's scattering
+    slope: float = 2.4  # of melanin's absorption over wavelength: 2 olive ... 3 golden
+    age: float = 35.0  # years
+    redness: float = 1.0  # of cheeks, nose, ears and chin
+    eye_circles: float = 0.6  # pigment around the eyes
+    blotches: float = 1.0  # unevenness at all scales ...
+    mottling: float = 0.6  # ... and at those below 5 mm
+    lip_melanin: float = 0.7  # factor over the skin's melanin
+    lip_blood: float = 7.0  # factor over the skin's blood
+    pores: float = 1.0  # size
+    wrinkles: float = 1.0  # depth, beside what the age does
+    oiliness: float = 1.0
+    freckles: float = 0.0  # share of the possible density
+    freckle_contrast: float = 0.8  # in the logarithm of melanin
+    moles: float = 8.0  # expected number on face, ears and neck
+    beard: float = 0.0  # density of stubble: 0 none, 1 full
+    beard_length: float = 0.4  # mm
+    brow_density: float = 1.0
+    scalp_hair: float = 0.8  # cover of cropped hair
+    hair_colour: tuple[float, float, float] = (0.03, 0.02, 0.014)  # albedo, linear sRGB
+    tone_seed: int = 0
+    mole_seed: int = 0
+    pore_seed: int = 0
+    hair_seed: int = 0
+
+
+def sample_parameters(seed: int) -> SkinParameters:
+    """A subject at random: the typology angle of the tone is uniform from -55 (dark) to 62 degrees (very light), half of the subjects are men."""
+    rng = np.random.default_rng([seed, 0])
+    angle, blood = rng.uniform(-55, 62), float(np.exp(rng.uniform(np.log(0.007), np.log(0.045))))
+    oxygen, scattering = float(rng.uniform(0.6, 0.9)), float(rng.uniform(0.75, 1.4))
+    slope = float(rng.uniform(1.9, 2.9))
+    melanin = _melanin_of_angle(angle, blood, oxygen, scattering, slope)
+    lightness = np.clip((angle + 20) / 80, 0, 1)
+    male, age = rng.random() < 0.5, float(rng.uniform(18, 78))
+    beard = float(rng.choice([0.15, rng.uniform(0.3, 1.0)])) if male else 0.0
+    freckled = rng.random() < 0.15 + 0.35 * lightness
+    return SkinParameters(
+        melanin=melanin, blood=blood, oxygen=oxygen, scattering=scattering, slope=slope, age=age,
+        redness=float(rng.uniform(0.4, 1.5)), eye_circles=float(rng.uniform(0.1, 1.2)),
+        blotches=float(rng.uniform(0.6, 1.5)), mottling=float(np.exp(rng.uniform(np.log(0.25), np.log(1.2)))),
+        lip_melanin=float(1 - rng.uniform(0.1, 0.45) * (0.25 + 0.75 * lightness)), lip_blood=float(np.exp(rng.uniform(np.log(3.5), np.log(12)))),
+        pores=float(rng.uniform(0.6, 1.3) * (1.1 if male else 0.9)), wrinkles=float(rng.uniform(0.5, 1.3)), oiliness=float(rng.uniform(0.3, 1.4)),
+        freckles=float(rng.uniform(0.05, 1.0)) if freckled else 0.0, freckle_contrast=float(rng.uniform(0.3, 1.0)),
+        moles=float(rng.gamma(1.5, 6.0)), beard=beard, beard_length=float(np.exp(rng.uniform(np.log(0.25), np.log(3.0)))),
+        brow_density=float(rng.uniform(0.5, 1.4) * (1.15 if male else 0.85)), scalp_hair=float(rng.uniform(0.25, 1.0)),
+        hair_colour=_hair_colour(lightness, age, rng),
+        tone_seed=seed, mole_seed=seed, pore_seed=seed, hair_seed=seed)
+
+
+def _melanin_of_angle(angle: float, blood: float, oxygen: float, scattering: float, slope: float) -> float:
+    """The melanin that gives skin of this blood the typology angle, within the model's range."""
+    melanin = np.geomspace(0.004, 0.6, 400)
+    angles = pigment.typology_angle(pigment.reflectance(melanin, np.full(400, blood), oxygen, scattering, slope))
+    return float(np.interp(-angle, -angles, melanin))  # the angle falls with melanin
+
+
+def _hair_colour(lightness: float, age: float, rng: np.random.Generator) -> tuple[float, float, float]:
+    """Albedo from black through brown to blond or red where the skin is light, greying with age."""
+    fair = rng.random() ** 1.5 * lightness
+    dark, blond, red = np.array([0.016, 0.011, 0.009]), np.array([0.30, 0.19, 0.095]), np.array([0.16, 0.05, 0.018])
+    light = red if rng.random() < 0.12 else blond
+    colour = np.exp((1 - fair) * np.log(dark) + fair * np.log(light))
+    grey = np.clip((age - 38) / 40, 0, 1) * rng.random()
+    return tuple(float(c) for c in colour * (1 - grey) + 0.38 * grey)

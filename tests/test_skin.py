@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The procedural skin: what its colours, marks and normals must be."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from core.meshes import Mesh
+from core.synthetic import pigment
+from core.synthetic.canvas import canvas, make_canvas
+from core.synthetic.regions import regions
+from core.synthetic.relief import normals
+from core.synthetic.skin import SkinParameters, make_skin, sample_parameters
+
+SIZE = 256
+PLAIN = SkinParameters(melanin=0.04, freckles=0.5, moles=40, age=60)
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return make_skin(PLAIN, SIZE)
+
+
+def test_more_melanin_darkens_every_channel():
+    rgb = pigment.reflectance(np.geomspace(0.005, 0.6, 60), np.full(60, 0.015))
+    assert (np.diff(rgb, axis=0) < 0).all()
+    assert 0.02 < rgb.min(-1)[0] and rgb[0, 0] > 0.6 and rgb[-1].max() < 0.1  # very light ... very dark
+
+
+def test_more_blood_takes_green_before_red():
+    rgb = pigment.reflectance(np.full(2, 0.02), np.array([0.005, 0.05]))
+    loss = rgb[1] / rgb[0]
+    assert loss[1] < 0.75 * loss[0] and (loss < 1).all()
+
+
+def test_white_paint_is_white_and_the_typology_angle_orders_tones():
+    assert np.allclose(pigment._integrate(np.full((1, 31), 0.5)), 0.5, atol=1e-6)
+    angles = pigment.typology_angle(pigment.reflectance(np.array([0.01, 0.08, 0.4]), np.full(3, 0.015)))
+    assert angles[0] > 45 > angles[1] > 0 > angles[2]
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(plain):
+    again = make_skin(PLAIN, SIZE)
+    for name in ("diffuse", "specular", "height", "normal"):
+        assert getattr(plain, name).tobytes() == getattr(again, name).tobytes(), name
+        assert getattr(plain, name).dtype == np.float32
+    assert not np.allclose(make_skin(replace(PLAIN, tone_seed=1), SIZE).diffuse, plain.diffuse, atol=0.01)
+
+
+def test_a_mole_seed_moves_moles_and_nothing_else(plain):
+    other, without = make_skin(replace(PLAIN, mole_seed=9), SIZE), make_skin(replace(PLAIN, moles=0, freckles=0), SIZE)
+    assert np.array_equal(plain.specular, other.specular)
+    assert 0.002 < (plain.diffuse != other.diffuse).any(-1)[plain.covered].mean() < 0.4
+    darker = [(without.diffuse - skin.diffuse).max(-1) > 0.05 for skin in (plain, other)]
+    assert (darker[0] & ~darker[1]).sum() > 20 and (darker[1] & ~darker[0]).sum() > 20
+    assert (without.diffuse - plain.diffuse).min() > -1e-4  # a mole never lightens
+    assert plain.height.max() > without.height.max() + 0.1  # and some are raised
+
+
+def test_every_subject_is_plausible():
+    angles = []
+    for seed in range(5):
+        skin = make_skin(seed, 128)
+        inside = skin.diffuse[skin.covered]
+        assert 0.01 < inside.mean() < 0.9 and inside.min() > 0 and inside.max() < 1
+        assert 0.05 <= skin.specular.min() and skin.specular.max() <= 1 and np.abs(skin.height).max() < 3
+        assert np.allclose(np.linalg.norm(skin.normal, axis=-1), 1, atol=1e-5) and skin.normal[..., 2].min() > 0
+    angles = [pigment.typology_angle(pigment.reflectance(np.array([p.melanin]), np.array([p.blood]), p.oxygen, p.scattering, p.slope))[0]
+              for p in map(sample_parameters, range(200))]
+    counts, _ = np.histogram(angles, [-60, -30, 10, 28, 41, 55, 70])  # the six classes of skin colour
+    assert (counts > 5).all(), counts
+
+
+@pytest.mark.parametrize("melanin", [0.02, 0.3])
+def test_lips_are_redder_than_cheeks_and_glossier(melanin):
+    parameters = replace(PLAIN, melanin=melanin, lip_melanin=0.85)
+    skin, on = make_skin(parameters, SIZE), canvas(SIZE)
+    lips, cheeks = (regions(on)[name] > 0.8 for name in ("lips", "cheeks"))
+    lip, cheek = (skin.diffuse[on.covered][where].mean(0) for where in (lips, cheeks))
+    assert lip[0] / lip[1] > 1.15 * cheek[0] / cheek[1]
+    assert skin.specular[on.covered][lips].mean() > skin.specular[on.covered][cheeks].mean()
+
+
+def test_pores_brows_and_creases_act_on_all_maps(plain):
+    on = canvas(SIZE)
+    brows = regions(on)["brows"] > 0.9
+    bare = make_skin(replace(PLAIN, brow_density=0.0), SIZE)
+    assert plain.diffuse[on.covered][brows].mean() < 0.8 * bare.diffuse[on.covered][brows].mean()
+    assert plain.specular[on.covered][brows].mean() < 0.9 * bare.specular[on.covered][brows].mean()
+    young = make_skin(replace(PLAIN, age=20.0), SIZE)
+    assert plain.height.min() < young.height.min() - 0.05
+    assert plain.normal[..., 2].min() < young.normal[..., 2].min()
+
+
+def test_no_seam_texels_that_meet_on_the_head_agree(plain):
+    on = canvas(SIZE)
+    interior = np.zeros_like(on.covered)
+    interior[1:-1, 1:-1] = on.covered[:-2, 1:-1] & on.covered[2:, 1:-1] & on.covered[1:-1, :-2] & on.covered[1:-1, 2:]
+    row, column = np.nonzero(on.covered)
+    border = np.flatnonzero(~interior[on.covered])
+    first, second = cKDTree(on.position[border]).query_pairs(0.25, output_type="ndarray").T
+    first, second = border[first], border[second]
+    apart = np.hypot(row[first] - row[second], column[first] - column[second]) > 20
+    assert apart.sum() > 5, "the template has no seam left to test"
+    colour = np.log(plain.diffuse[on.covered])
+    across = np.abs(colour[first[apart]] - colour[second[apart]]).mean()
+    anywhere = np.abs(colour[border] - colour[np.random.default_rng(0).permutation(border)]).mean()
+    assert across < 0.06 and across < 0.3 * anywhere
+
+
+def test_the_normals_of_a_ramp_are_its_slope_whatever_the_uv_layout():
+    # a plane of 100 mm facing -Y; UVs turned by 30 degrees, scaled unevenly and sheared
+    corners = np.array([[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]])
+    turn = np.array([[np.cos(0.5), -np.sin(0.5)], [np.sin(0.5), np.cos(0.5)]]) @ np.array([[5.0, 1.0], [0.0, 3.0]])
+    uvs = (corners - 0.05) @ turn.T + 0.5
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    vertices = np.stack([corners[:, 0], np.zeros(4), corners[:, 1]], 1)
+    on = make_canvas(Mesh(vertices, faces, uvs, faces), 128, np.zeros((468, 3)), lambda name: np.zeros((128, 128)))
+    tangent = np.linalg.inv(turn)[:, 0] / np.linalg.norm(np.linalg.inv(turn)[:, 0])
+    bitangent = np.array([-tangent[1], tangent[0]])
+    gradient = np.array([0.1, 0.2])  # mm per mm along x and z
+    found = normals((on.position[:, [0, 2]] @ gradient).astype(np.float32), on)
+    expected = np.array([-gradient @ tangent, -gradient @ bitangent, 1.0])
+    right = np.isclose(found, expected / np.linalg.norm(expected), atol=2e-3).all(-1)
+    assert right.mean() > 0.995  # all but corner texels without a neighbour along one axis
+    assert np.isclose(on.area.sum(), 100 * 100, rtol=0.02)
