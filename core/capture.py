@@ -42,7 +42,8 @@ def replacing(path: Path):
     except OSError as error:
         raise storage_problem(error, path) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # it is not there, or its folder is none
+            temporary.unlink()
 
 
 @contextlib.contextmanager
@@ -136,9 +137,17 @@ class Capture:
         return record
 
     def set_source(self, source: str | Path) -> None:
+        """Records where the pictures come from, with a stamp that outlives them: a video may be put away once its frames are taken."""
         record = self.read()
-        if record.get("source") != str(source):
-            write_json(self.json, {**record, "source": str(source)})
+        changed = {**record, "source": str(source), "source_stamp": _source_stamp(str(source)) or record.get("source_stamp", [])}
+        if changed != record:
+            write_json(self.json, changed)
+
+    def made_from(self, source: str | Path) -> bool:
+        """Whether `source` is what this capture's frames were taken from, or there are none yet."""
+        record = self.read()
+        first = next(stage.name for stage in stages.STAGES if not stage.reads)
+        return first not in record["stages"] or _source_stamp(str(source)) in ([], record.get("source_stamp"))
 
     def finish(self, stage: stages.Stage, key: str, seconds: float, settings: Settings, figures: dict, version: str) -> None:
         """Records that a stage ended well; `key` is what `stage_key` gave before it began."""
@@ -162,7 +171,7 @@ class Capture:
         record = self.read()
         parts = [asdict(getattr(settings, stage.name)), {name: getattr(settings, name) for name in stage.shared}, _code_hash(stage.module)]
         if not stage.reads:
-            parts.append(_source_stamp(record.get("source", "")))
+            parts.append(_source_stamp(record.get("source", "")) or record.get("source_stamp", []))
         if stage.name == "delight" and settings.delight.delighter == "folder":
             parts.append(_source_stamp(settings.delight.folder))
         parts += [[name, _hash_tree(self.root / name)] for name in (*stage.reads, *stage.wishes)]
@@ -179,6 +188,18 @@ class Capture:
     def has(self, name: str) -> bool:
         path = self.root / name
         return any(path.iterdir()) if name.endswith("/") and path.is_dir() else path.is_file()
+
+    def tidy(self) -> None:
+        """Removes what killed writers left behind, and takes back a folder that one of them had just put aside. Only under the lock."""
+        for old in self.root.glob(".*.old"):
+            path = self.root / old.name[1:-len(".old")]
+            if not path.exists():
+                os.replace(old, path)
+        for left in [*self.root.glob(".*.old"), *self.root.glob("**/.*.tmp*")]:
+            if left.is_dir():
+                shutil.rmtree(left, ignore_errors=True)
+            else:
+                left.unlink(missing_ok=True)
 
     # -- lock
 
@@ -252,10 +273,10 @@ def _hash_tree(path: Path) -> str | dict:
 
 
 def _source_stamp(source: str) -> list:
-    """Name, size and time of a source's files: a long video is not read to see that it is the same."""
+    """Name, size and time of a source's files ([] when it is gone): a long video is not read to see that it is the same, nor its folder's name."""
     path = Path(source)
-    files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path] if path.is_file() else []
-    return [[str(p), p.stat().st_size, p.stat().st_mtime_ns] for p in files]
+    files = [] if not source else sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path] if path.is_file() else []
+    return [[p.name, p.stat().st_size, p.stat().st_mtime_ns] for p in files]
 
 
 def _code_hash(module: str) -> str:

@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""python -m core: run, stages, status, mask, doctor, train.
+
+The command line is one more host of the worker: it writes a job, starts the worker with this same Python and prints
+what it says. Failures are two lines, a problem and its remedy, and exit code 2; Ctrl-C ends with 130.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import sys
+from pathlib import Path
+
+from . import __version__, settings, stages
+from .capture import Capture
+from .messages import Problem
+from .worker import terminal
+from .worker.job import read_job, write_job
+
+ROOT = Path(__file__).resolve().parent.parent
+DELIGHTERS = next(f for f in settings.DelightSettings.__dataclass_fields__.values() if f.name == "delighter").metadata["choices"]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs one command line; returns its exit code: 0, 2 for a problem, 130 after Ctrl-C."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    try:
+        if arguments[:1] == ["train"]:  # its options are its own
+            return _train(arguments[1:])
+        options = _parser().parse_args(arguments)
+        return options.command(options)
+    except Problem as problem:
+        print(problem.problem, problem.remedy, sep="\n", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser("python -m core", description="From a phone video of a face to a relightable head.")
+    parser.add_argument("--version", action="version", version=f"WildCap {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    run = commands.add_parser("run", help="run the chain; a second run continues where the first stopped")
+    run.add_argument("source", metavar="SOURCE", help="a video, or a folder of photographs; - for the one the capture was made from")
+    run.add_argument("capture", metavar="CAPTURE", type=Path, help="the face's folder, usually NAME.wildcap; made if it is not there")
+    run.add_argument("--from", dest="first", metavar="STAGE", help="begin with this stage and run it even if nothing has changed")
+    run.add_argument("--until", dest="last", metavar="STAGE", help="end with this stage")
+    run.add_argument("--quality", choices=settings.QUALITIES, default="standard")
+    run.add_argument("--skin-tone", metavar="R,G,B", help="sRGB in 0..1, the linear mean over facial skin; or auto")
+    run.add_argument("--delighter", choices=DELIGHTERS, help="how the light is taken out of the frames")
+    run.add_argument("--folder", metavar="FOLDER", type=Path, help="delit pictures for the folder delighter, matched by name")
+    run.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
+    run.add_argument("--seed", type=int, default=0)
+    run.set_defaults(command=_run)
+
+    commands.add_parser("stages", help="list the stages of the chain").set_defaults(command=_stages)
+    status = commands.add_parser("status", help="say which stages of a capture are done")
+    status.add_argument("capture", metavar="CAPTURE", type=Path)
+    status.set_defaults(command=_status)
+    mask = commands.add_parser("mask", help="bring a painted shadow mask in").add_subparsers(required=True, metavar="import")
+    bring = mask.add_parser("import", help="make a picture the capture's shadow mask: white is shadow")
+    bring.add_argument("capture", metavar="CAPTURE", type=Path)
+    bring.add_argument("picture", metavar="PNG", type=Path)
+    bring.set_defaults(command=_mask_import)
+    commands.add_parser("doctor", help="say what is installed, what is missing and what to do").set_defaults(command=_doctor)
+    commands.add_parser("train", help="train a network (developers): train prior --help")
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    if options.folder and options.delighter != "folder":
+        raise Problem("--folder goes with --delighter folder only.", "Add --delighter folder, or leave --folder out.")
+    delight = {"delighter": options.delighter} if options.delighter else {}
+    if options.folder:
+        delight["folder"] = str(options.folder.absolute())
+    values = {"seed": options.seed, "device": options.device, "delight": delight}
+    if options.skin_tone:
+        values["solve"] = {"skin_tone": options.skin_tone}
+    capture = Capture(options.capture)
+    job = write_job(capture, source="" if options.source == "-" else options.source, first=options.first, last=options.last, settings=values,
+                    quality=options.quality)
+    return terminal.follow(ROOT, capture, job)
+
+
+def _stages(options: argparse.Namespace) -> int:
+    for stage in stages.STAGES:
+        print(f"{stage.name:13} {' '.join(stage.reads) or 'the video or photographs'} -> {' '.join(stage.writes)}")
+    return 0
+
+
+def _status(options: argparse.Namespace) -> int:
+    """States under the settings of the last job."""
+    capture = Capture(options.capture)
+    if not capture.root.is_dir():
+        raise Problem(f"There is no capture at {capture.root}.", "Check the name; `python -m core run SOURCE CAPTURE` makes one.")
+    record = capture.read()
+    chosen = read_job(capture.job).settings if capture.job.is_file() else settings.Settings()
+    print(f"source        {record.get('source') or 'none yet'}")
+    for stage in stages.STAGES:
+        finished = record["stages"].get(stage.name)
+        print(f"{stage.name:13} {capture.state(stage, chosen):6}" + (f" {finished['seconds']:8.1f} s  {finished['finished']}" if finished else ""))
+    if capture.shadow_mask.is_file():
+        print("shadow mask   painted")
+    return 0
+
+
+def _mask_import(options: argparse.Namespace) -> int:
+    from .worker.mask_import import import_mask  # needs OpenImageIO
+
+    print(f"{import_mask(Capture(options.capture), options.picture)} is now the shadow mask; solve comes next.")
+    return 0
+
+
+def _doctor(options: argparse.Namespace) -> int:
+    from .worker.doctor import examine
+
+    return examine(ROOT, Path(sys.executable))
+
+
+def _train(arguments: list[str]) -> int:
+    """Hands over to core/training, which is not part of the installed extension."""
+    name = arguments[0] if arguments else ""
+    if not name.isidentifier() or importlib.util.find_spec(f"{__package__}.training.{name}") is None:
+        raise Problem(f"There is nothing to train named {name!r}." if name else "The name of what to train is missing.",
+                      "Try `python -m core train prior --help` in a source checkout.")
+    return importlib.import_module(f".training.{name}", __package__).main(arguments[1:]) or 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Starts a worker and reads it without ever waiting: what Blender and the command line share.
+
+Ground floor: standard library only. A job file goes in; messages come out of `Worker.poll`, the last of them always
+Done, Cancelled or Failed. A reader thread only fills a queue, so nothing here touches the caller from a thread.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import subprocess
+import threading
+import time
+from pathlib import Path
+
+from ..capture import storage_problem
+from ..messages import FINAL, Cancelled, Failed, Log, Message, Problem, from_line
+
+GRACE_S = 1.5
+"""How long a cancelled worker may take to reach its next report before it is stopped."""
+
+THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+
+class Worker:
+    """One job in a process of its own. `poll` it several times a second until it is no longer `running`."""
+
+    def __init__(self, python: Path, root: Path, job: Path, log: Path):
+        """`python` runs the job file `job` with the code under `root` (the folder that holds core/); stderr goes to `log`."""
+        self.python = Path(python)
+        self.root = Path(root)
+        self.job = Path(job)
+        self.log = Path(log)
+        self._messages: queue.SimpleQueue[Message | int] = queue.SimpleQueue()
+        self._process: subprocess.Popen | None = None
+        self._stage = ""
+        self._cancelled_at: float | None = None
+        self._ended = False
+
+    @property
+    def running(self) -> bool:
+        """True from `start` until `poll` has handed out the final message."""
+        return self._process is not None and not self._ended
+
+    def start(self) -> None:
+        """Starts the process. Raises Problem when the log cannot be written or the Python cannot be started."""
+        assert self._process is None, "a Worker runs one job"
+        try:
+            self.log.parent.mkdir(parents=True, exist_ok=True)
+            log = open(self.log, "wb")
+        except OSError as error:
+            raise storage_problem(error, self.log) from error
+        command = [str(self.python), "-E", "-s", "-B", "-X", "utf8", "-m", f"{_package()}.worker", str(self.job.absolute())]
+        with log:
+            try:
+                self._process = subprocess.Popen(command, cwd=self.root, env=_environment(), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log,
+                                                 **_apart())
+            except OSError as error:
+                raise Problem(f"The worker's Python {self.python} could not be started ({error.strerror or error}).",
+                              "Install the solver again, or choose another Python.") from error
+        threading.Thread(target=self._read, name="wildcap-worker-reader", daemon=True).start()
+
+    def poll(self) -> list[Message]:
+        """The messages that came since the last call, without waiting. The last of all is a final one, exactly once."""
+        if not self.running:
+            return []
+        if self._cancelled_at is not None and time.monotonic() - self._cancelled_at > GRACE_S:
+            self._kill()
+        found: list[Message] = []
+        while not self._ended:
+            try:
+                message = self._messages.get_nowait()
+            except queue.Empty:
+                break
+            if isinstance(message, int):
+                message = self._without_farewell(message)
+            self._stage = getattr(message, "stage", self._stage)
+            self._ended = isinstance(message, FINAL)
+            found.append(message)
+        return found
+
+    def cancel(self) -> None:
+        """Asks the worker to stop at its next report; `poll` ends it after the grace time and then says Cancelled."""
+        if not self.running or self._cancelled_at is not None:
+            return
+        self._cancelled_at = time.monotonic()
+        try:
+            self._process.stdin.write(b"cancel\n")
+            self._process.stdin.flush()
+        except OSError:
+            pass  # it has just ended by itself; poll says how
+
+    def terminate(self) -> None:
+        """Ends the process at once, for a host that is closing. `poll` then says Cancelled."""
+        if self.running:
+            self._cancelled_at = self._cancelled_at or time.monotonic()
+            self._kill()
+
+    def _kill(self) -> None:
+        # Not SIGTERM: a stopped process, or one inside a C++ call that blocks signals, would outlive it.
+        if self._process.poll() is None:
+            self._process.kill()
+
+    def _read(self) -> None:
+        """The reader thread: lines to messages, then the exit code."""
+        with self._process.stdout as lines:
+            for line in lines:
+                try:
+                    self._messages.put(from_line(line.decode("utf-8", "replace")))
+                except ValueError:
+                    self._messages.put(Log(line.decode("utf-8", "replace").rstrip()))
+        code = self._process.wait()
+        try:
+            self._process.stdin.close()
+        except OSError:
+            pass
+        self._messages.put(code)
+
+    def _without_farewell(self, code: int) -> Message:
+        """The final message of a process that ended without one."""
+        if self._cancelled_at is not None:
+            return Cancelled(self._stage)
+        stage_log = self.log.parent / f"{self._stage}.log"
+        log = stage_log if self._stage and stage_log.is_file() else self.log
+        during = f" during the stage {self._stage}" if self._stage else " before its first stage"
+        if code in (-9, 137):
+            return Failed(self._stage, f"The worker was killed from outside{during}, most likely because memory ran out.",
+                          f"Close other programs or choose a lower quality, then run again: finished stages are kept. The log is {log}.")
+        return Failed(self._stage, f"The worker ended unexpectedly{during} (exit code {code}).",
+                      f"Run again: finished stages are kept. If it happens again, read {log}.")
+
+
+def _package() -> str:
+    """The name under which the worker imports this code: core, whatever it is called inside Blender."""
+    return __package__.split(".")[-2]
+
+
+def _environment() -> dict[str, str]:
+    """The caller's environment with the thread count of the libraries set, unless the user has set it."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
+    threads = str(cores if cores <= 2 else cores - 1)
+    return {**{name: threads for name in THREAD_VARIABLES}, **os.environ}
+
+
+def _apart() -> dict:
+    """Popen arguments: out of reach of the terminal's Ctrl-C, without a console window, below normal priority.
+
+    On POSIX the worker lowers its own priority, because a function run between fork and exec is unsafe with threads.
+    """
+    if os.name == "nt":
+        return {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.BELOW_NORMAL_PRIORITY_CLASS | subprocess.CREATE_NEW_PROCESS_GROUP}
+    return {"start_new_session": True}

@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The job file: all that a worker is told, and the record of what was asked. The same job gives the same maps.
+
+Ground floor: standard library only.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from .. import stages
+from ..capture import Capture, write_json
+from ..messages import Problem
+from ..settings import Settings, from_json, preset
+
+
+@dataclass(frozen=True)
+class Job:
+    """`source` is a video or a folder of photographs ('': the one the capture has); `chain` are the stages to run, in order;
+    `force` says that they run even where they are fresh."""
+
+    capture: Capture
+    source: str
+    chain: tuple[stages.Stage, ...]
+    force: bool
+    settings: Settings
+
+
+def write_job(capture: Capture, *, source: str | Path = "", first: str | None = None, last: str | None = None, settings: dict | None = None,
+              quality: str = "standard") -> Path:
+    """Writes the capture's job.json and returns its path.
+
+    `first` (a stage's name) begins with that stage and forces it and those after it; None begins with the first one and
+    skips what is fresh. `last` ends the job, None: the last stage. `settings` ({stage: {name: value}}, seed, device) lie
+    over the preset `quality`. Raises Problem for an unknown name or value, or when the folder cannot be written.
+    """
+    source = str(Path(source).absolute()) if str(source) else ""
+    values = {"capture": str(capture.root.absolute()), "source": source, "from": first, "until": last, "settings": settings or {}, "quality": quality}
+    _job(values)
+    write_json(capture.job, values)
+    return capture.job
+
+
+def read_job(path: Path) -> Job:
+    """The job of a file. Raises Problem when it is damaged or asks for what there is not."""
+    try:
+        return _job(json.loads(Path(path).read_text(encoding="utf-8")))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise Problem(f"The job file {path} cannot be read ({error}).", "Start the job again from Blender or with `python -m core run`.") from error
+
+
+def _job(values: dict) -> Job:
+    first, last = (stages.NAMES.index(stages.by_name(name).name) if name else default
+                   for name, default in ((values.get("from"), 0), (values.get("until"), len(stages.NAMES) - 1)))
+    if first > last:
+        raise Problem(f"The stage {stages.NAMES[first]} comes after {stages.NAMES[last]}.", "Name the first stage to run before the last one.")
+    settings = from_json(values.get("settings") or {}, preset(values.get("quality") or "standard"))
+    return Job(Capture(values["capture"]), values.get("source") or "", stages.STAGES[first:last + 1], bool(values.get("from")), settings)

@@ -1,0 +1,177 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs a job's stages over its capture: skips what is fresh, records what ended well, explains what did not.
+
+Every way a stage can end becomes one message. A traceback goes to the stage's log and nowhere else.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+
+from .. import __version__, report
+from ..capture import Capture, storage_problem
+from ..messages import Cancelled, CancelledError, Done, Failed, Log, Message, Problem, Progress, Reporter, StageDone
+from ..stages import Stage
+from .job import Job, read_job
+
+OUT_OF_MEMORY = ("out of memory", "can't allocate memory", "cannot allocate memory", "insufficient memory", "bad_alloc", "unable to allocate")
+
+
+def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None, cancelled: Callable[[], bool] = lambda: False) -> Message:
+    """Runs the job file `path`, sends what happens through `emit` and returns the final message, which is not sent.
+
+    The capture's lock is given back before the return, so whoever reads the final message may start the next job.
+    """
+    started = time.monotonic()
+    stage = ""
+    try:
+        job = read_job(path)
+        with job.capture.locked():
+            job.capture.tidy()
+            _take_source(job, emit)
+            _check_device(job.settings.device)
+            if job.force:
+                job.capture.forget(stage.name for stage in job.chain)
+            for step in job.chain:
+                stage = step.name
+                if cancelled():
+                    raise CancelledError(stage)
+                run_stage(step, job, emit, cancelled)
+    except CancelledError:
+        return Cancelled(stage)
+    except Exception as error:
+        if not stage:
+            traceback.print_exc()  # a stage's own log has it already
+        problem = explained(error, stage, path.parent / "logs" / f"{stage or 'worker'}.log")
+        return Failed(stage, problem.problem, problem.remedy)
+    return Done(round(time.monotonic() - started, 2))
+
+
+def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
+    """Runs one stage unless it is fresh, records it, and rebuilds the report. Raises whatever the stage raises."""
+    capture, settings = job.capture, job.settings
+    if capture.state(stage, settings) == "done":
+        finished = capture.read()["stages"][stage.name]
+        emit(StageDone(stage.name, finished["seconds"], True, finished["figures"]))
+        return
+    missing = [name for name in stage.reads if not capture.has(name)]
+    if missing:
+        raise Problem(f"The stage {stage.name} needs {missing[0]}, which this capture does not have.", "Run the stages before it first.")
+    emit(Progress(stage.name, 0, 1, "Starting"))
+    with _log_of(capture, stage) as log:
+        try:
+            # Outputs may be half new from here on: until the end, nobody may take them for the recorded result.
+            capture.forget([stage.name])
+            key = capture.stage_key(stage, settings)
+            reporter = Reporter(stage.name, _logging(emit, log), cancelled)
+            started = time.monotonic()
+            room = importlib.import_module("." + stage.module.split(".", 1)[1], __package__.rpartition(".")[0])
+            room.run(capture, settings, reporter)
+            seconds = time.monotonic() - started
+            lost = [name for name in stage.writes if not capture.has(name)]
+            if lost:
+                raise RuntimeError(f"the stage {stage.name} ended without writing {lost[0]}")
+            capture.finish(stage, key, seconds, settings, reporter.figures, __version__)
+            report.write(capture, settings)
+        except BaseException:
+            with contextlib.suppress(OSError):  # the disk may be full; that is said elsewhere
+                traceback.print_exc(file=log)
+            raise
+    emit(StageDone(stage.name, round(seconds, 2), False, reporter.figures))
+
+
+def explained(error: Exception, stage: str, log: Path) -> Problem:
+    """What any exception means to the user: a problem and a remedy, both whole sentences."""
+    if isinstance(error, Problem):
+        return error
+    during = f"the stage {stage}" if stage else "the job"
+    text = f"{error}".lower()
+    if isinstance(error, MemoryError) or any(words in text for words in OUT_OF_MEMORY):
+        return Problem(f"There was not enough memory for {during}.",
+                       "Close other programs or choose a lower quality, then run again: finished stages are kept.")
+    if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith(__package__.split(".")[0]):
+        return Problem(f"The worker's Python has no module named {error.name}, which {during} needs.",
+                       "Install the solver in WildCap's setup panel, or see what `python -m core doctor` says.")
+    if isinstance(error, OSError) and error.filename and not isinstance(error, FileNotFoundError):
+        return storage_problem(error, Path(os.fsdecode(error.filename)))
+    return Problem(f"An error inside WildCap stopped {during} ({type(error).__name__}: {_first_line(error)}).",
+                   f"Run again, and if it stays, report it with the log {log}. Finished stages are kept.")
+
+
+def _take_source(job: Job, emit: Callable[[Message], None]) -> None:
+    """Records the source where the job begins with the stage that reads it. Raises Problem when there is none, or another one than before."""
+    if job.chain[0].reads:
+        return
+    capture, first = job.capture, job.chain[0]
+    source = job.source or capture.read().get("source", "")
+    if not source:
+        raise Problem("This capture has no video yet.", "Choose a video or a folder of photographs.")
+    if not Path(source).exists():
+        if job.force or not capture.has(first.writes[0]) or first.name not in capture.read()["stages"]:
+            raise Problem(f"There is no video or folder at {source}.", "Check its name and whether the disk it is on is connected.")
+        emit(Log(f"{source} is not there any more; the frames taken from it are used."))
+        return
+    if not job.force and not capture.made_from(source):
+        raise Problem(f"This capture was made from {Path(capture.read()['source']).name}, not from this {Path(source).name}.",
+                      f"Choose another capture folder for another video, or run again from the stage {first.name} to replace everything but the painted masks.")
+    capture.set_source(source)
+
+
+def _check_device(device: str) -> None:
+    """Raises Problem for a device that this machine does not have. torch is imported for others than the CPU only."""
+    if device == "cpu":
+        return
+    import torch
+
+    found = {"cuda": torch.cuda.is_available, "mps": torch.backends.mps.is_available}.get(device)
+    if found is None or not found():
+        raise Problem(f"This machine has no device {device} that torch can use.", "Choose cpu, or see what `python -m core doctor` says.")
+
+
+@contextlib.contextmanager
+def _log_of(capture: Capture, stage: Stage):
+    """logs/STAGE.log as an open text file; stdout and stderr, also of C++ libraries, go there meanwhile."""
+    path = capture.logs / f"{stage.name}.log"
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        log = open(path, "w", encoding="utf-8", buffering=1)
+    except OSError as error:
+        raise storage_problem(error, path) from error
+    kept = [os.dup(1), os.dup(2)]
+    try:
+        for descriptor in (1, 2):
+            os.dup2(log.fileno(), descriptor)
+        yield log
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError):
+                stream.flush()
+        for descriptor, original in zip((1, 2), kept, strict=True):
+            os.dup2(original, descriptor)
+            os.close(original)
+        with contextlib.suppress(OSError):
+            log.close()
+
+
+def _logging(emit: Callable[[Message], None], log) -> Callable[[Message], None]:
+    """`emit` that also keeps the stage's log lines in its log."""
+    def both(message: Message) -> None:
+        if isinstance(message, Log):
+            with contextlib.suppress(OSError):
+                print(time.strftime("%H:%M:%S"), message.text, file=log)
+        emit(message)
+
+    return both
+
+
+def _first_line(error: Exception) -> str:
+    lines = str(error).strip().splitlines()
+    return lines[0][:200] if lines else "no message"

@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A worker followed in a terminal: one line of progress with the time that is left, one line per finished stage."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import time
+from pathlib import Path
+
+from .. import stages
+from ..capture import Capture
+from ..messages import Cancelled, Done, Failed, Log, Message, Progress, StageDone
+from .client import Worker
+
+POLL_S = 0.1
+
+
+def follow(root: Path, capture: Capture, job: Path) -> int:
+    """Runs a job with this Python and prints what it says; returns the exit code: 0, 2 for a problem, 130 after Ctrl-C."""
+    worker = Worker(Path(sys.executable), root, job, capture.logs / "worker.log")
+    line = _Line()
+    worker.start()
+    while True:
+        try:
+            for message in worker.poll():
+                code = _show(message, capture, line)
+            if not worker.running:
+                return code
+            time.sleep(POLL_S)
+        except KeyboardInterrupt:
+            line.show("Cancelling ...")
+            worker.cancel()
+
+
+def _show(message: Message, capture: Capture, line: _Line) -> int:
+    """Prints one message; returns the exit code if it is the last one."""
+    match message:
+        case Progress():
+            share = message.done / message.of if message.of else 0
+            left = f", {_duration(message.eta_s)} left" if message.eta_s and message.eta_s >= 1 else ""
+            line.show(f"{stages.by_name(message.stage).label:12} {share:4.0%}  {message.text}{left}", step=(message.stage, int(share * 4)))
+        case Log():
+            line.keep(message.text)
+        case StageDone():
+            line.keep(f"{stages.by_name(message.stage).label:12} " + ("unchanged" if message.skipped else f"done in {_duration(message.seconds)}"))
+        case Done():
+            line.keep(f"Finished in {_duration(message.seconds)}. {capture.report} has the pictures and figures.")
+            return 0
+        case Cancelled():
+            line.keep("Cancelled; finished stages are kept, the same command continues.")
+            return 130
+        case Failed():
+            line.clear()
+            print(message.problem, message.remedy, sep="\n", file=sys.stderr)
+            return 2
+    return 1
+
+
+class _Line:
+    """The line that is written over; where the output is no terminal, a new line per quarter of a stage."""
+
+    def __init__(self):
+        self._live = sys.stdout.isatty()
+        self._shown = ""
+        self._step = None
+
+    def show(self, text: str, step: object = None) -> None:
+        if self._live:
+            text = text[:shutil.get_terminal_size().columns - 1]
+            print("\r" + text.ljust(len(self._shown)), end="", flush=True)
+            self._shown = text
+        elif step is None or step != self._step:
+            print(text, flush=True)
+        self._step = step
+
+    def keep(self, text: str) -> None:
+        self.clear()
+        print(text, flush=True)
+
+    def clear(self) -> None:
+        if self._shown:
+            print("\r" + " " * len(self._shown) + "\r", end="", flush=True)
+            self._shown = ""
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.1f} s" if seconds < 10 else f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
