@@ -17,7 +17,8 @@ from pathlib import Path
 import pycolmap
 
 OVERLAP = 10
-CHUNK = 8
+CHUNK = 24
+"""Pictures handed to COLMAP at once: enough to keep its threads busy, few enough to show progress."""
 
 
 def reconstruct(job: dict) -> bool:

@@ -1,0 +1,35 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which frames are matched with each other: near enough to look alike, far enough to measure depth, from all around the head."""
+
+from __future__ import annotations
+
+import numpy as np
+
+BASELINES_DEG = ((4.0, 9.0), (2.5, 14.0), (1.5, 30.0))
+"""Angles between two cameras as seen from the head, from the best range to what a handful of photographs leaves."""
+
+
+def choose_pairs(centres: np.ndarray, sharpness: np.ndarray, count: int) -> list[tuple[int, int]]:
+    """At most `count` pairs of cameras at centres [N, 3] (the head at the origin), spread over the directions they look from,
+    the sharper [N] preferred. Wider or narrower baselines are taken only where the best range leaves a direction without a pair."""
+    directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
+    first, second = np.triu_indices(len(centres), 1)
+    angle = np.degrees(np.arccos(np.clip((directions[first] * directions[second]).sum(1), -1, 1)))
+    middle = directions[first] + directions[second]
+    middle /= np.linalg.norm(middle, axis=1, keepdims=True)
+    relative = sharpness / max(np.median(sharpness), 1e-9)
+    quality = np.minimum(np.minimum(relative[first], relative[second]), 1.5)
+    chosen: list[int] = []
+    reach = np.full(len(first), np.inf)  # angle from each candidate to the nearest chosen pair, in degrees
+    for low, high in BASELINES_DEG:
+        candidates = np.flatnonzero((angle >= low) & (angle <= high))
+        least = 0.0 if not chosen else 5.0  # a poorer baseline only where nothing better looks from
+        while len(chosen) < count and len(candidates):
+            score = np.minimum(reach[candidates], 90.0) * quality[candidates]
+            best = candidates[np.argmax(score)]
+            if reach[best] <= least:
+                break
+            chosen.append(int(best))
+            reach = np.minimum(reach, np.degrees(np.arccos(np.clip(middle @ middle[best], -1, 1))))
+    return [(int(first[k]), int(second[k])) for k in chosen]
