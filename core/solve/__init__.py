@@ -1,0 +1,119 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""I_UV and shadow mask -> reflectance maps: a clean albedo under a global light, and local dark ones where the mask is (paper, section 3).
+
+The stage reads the evidence, starts from a reference face of the subject's tone, samples reflectance and light jointly, and writes the maps.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict
+
+import numpy as np
+import torch
+
+from .. import images
+from ..capture import Capture
+from ..messages import Problem, Reporter
+from ..settings import Settings
+from . import checkpoint, initial, maps
+from .evidence import REFERENCE, Evidence, observations, read_evidence
+from .prior import WEIGHTS, Prior, load
+from .sampler import Recipe, State, albedo, sample
+
+FACE_CROP = 768
+"""Texels at 1024 over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels."""
+
+
+def run(capture: Capture, settings: Settings, report: Reporter) -> None:
+    """texture, confidence, head and masks -> maps/ (see maps.py for their colour spaces), preview/, and two pictures for the report.
+
+    The artist's mask wins over the proposal. Continues from its own checkpoint. Raises Problem for unusable inputs and for divergence.
+    """
+    options = settings.solve
+    report.progress(0, options.steps, "reading the texture, the head and the masks")
+    prior = load(WEIGHTS, settings.device)
+    size = max(options.size // 32, 4) * 32  # the network halves the map several times
+    evidence = read_evidence(capture, size)
+    lit = evidence.skin * evidence.weight * (1 - evidence.alpha)
+    if lit.sum() < 1:  # everything on the face is masked: the least evil is to trust it all
+        lit = evidence.skin * evidence.weight
+    if lit.sum() < 1:
+        raise Problem("No facial skin was seen in the texture.", "Look at the texture in the report; film the face from the front and from both sides.")
+    tone = initial.skin_tone(options.skin_tone, evidence.texture, lit, prior.tones)
+    prior.tone = tone
+    reference = initial.reference(prior.mean_face, tone, evidence.skin)
+    exposure = float(initial.mean_tone(albedo(reference), lit).mean() / initial.mean_tone(evidence.texture, lit).mean().clamp_min(1e-6))
+
+    recipe = Recipe(steps=options.steps, guidance=options.guidance)
+    seen = observations(evidence, exposure, FACE_CROP / options.grid_cells, prior.multiple)
+    state = _first_state(evidence, reference, exposure, seen[1].shader, recipe)
+    stored, key = capture.checkpoints / "solve.safetensors", _key(evidence, settings, tone)
+    stopped = checkpoint.read(stored, key)
+    if stopped is not None:
+        report.log(f"Going on after step {stopped.step} of {options.steps}.")
+        state = stopped
+
+    def on_step(state: State, steps: int) -> None:
+        report.progress(state.step, steps, f"sampling, step {state.step} of {steps}")
+        if state.step % options.checkpoint_every == 0:
+            checkpoint.write(stored, state, key)
+            maps.write_preview(capture, state, seen, report)
+
+    _check_often(prior, report)
+    state = sample(prior, seen, state, recipe, settings.seed, on_step)
+    result = maps.finished(state, evidence, seen[1].shader, exposure, tone)
+    maps.write(capture, result)
+    maps.write_preview(capture, state, seen, report)
+    _leave_figures(capture, evidence, result, tone, report)
+    stored.unlink(missing_ok=True)
+
+
+def _first_state(evidence: Evidence, reference: torch.Tensor, exposure: float, shader, recipe: Recipe) -> State:
+    weight = evidence.weight * (1 - evidence.alpha)
+    if weight.sum() < 1:
+        weight = evidence.weight
+    cells = shader.up_rows.shape[1], shader.up_columns.shape[1]
+    lights = initial.first_lights(evidence.texture * exposure, albedo(reference), evidence.normal, weight, cells, recipe.one_chroma)
+    return State(0, None, reference, lights)
+
+
+def _check_often(prior: Prior, report: Reporter) -> None:
+    """Lets a cancel stop the run between two blocks of the network, forward and backward: one step on a large map takes seconds."""
+    def after(module, inputs, output):
+        report.check()
+        if output.requires_grad:
+            output.register_hook(lambda gradient: report.check())
+
+    for blocks in (*prior.network.u_net["d_blocks"], *prior.network.u_net["u_blocks"]):
+        for layer in blocks:
+            layer.register_forward_hook(after)
+
+
+def _key(evidence: Evidence, settings: Settings, tone: torch.Tensor) -> str:
+    """Stands for everything a run's bytes depend on."""
+    digest = hashlib.blake2b(digest_size=16)
+    for tensor in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, tone):
+        digest.update(tensor.numpy().tobytes())
+    digest.update(json.dumps([asdict(settings.solve), settings.seed, settings.device]).encode())
+    digest.update(WEIGHTS.read_bytes())
+    return digest.hexdigest()
+
+
+def _leave_figures(capture: Capture, evidence: Evidence, result: maps.Maps, tone: torch.Tensor, report: Reporter) -> None:
+    texture, weight = evidence.texture.numpy(), evidence.weight.numpy()
+    explained = (result.diffuse * result.shading).transpose(2, 0, 1)
+    error = images.linear_to_srgb(explained) - images.linear_to_srgb(texture)
+    mean_square = float((error**2 * weight).sum() / max(3 * weight.sum(), 1e-6))
+    report.figure("residual_psnr_db", round(-10 * np.log10(max(mean_square, 1e-10)), 1))
+    report.figure("mask_share_of_face_percent", round(100 * float((evidence.alpha * evidence.skin).sum() / evidence.skin.sum()), 1))
+    report.figure("skin_tone_srgb", [round(float(v), 3) for v in images.linear_to_srgb(tone.numpy())])
+    side = min(evidence.size, REFERENCE // 2)
+    small = [images.resize(image, side, side) for image in (texture.transpose(1, 2, 0), result.diffuse, result.shading)]
+    small[0] = small[0] * (small[1].mean() / max(small[0].mean(), 1e-6))
+    small[2] = small[2] * (0.6 / max(np.percentile(small[2], 95), 1e-6))
+    images.write_srgb(capture.picture("solve", "texture_albedo_shading"), images.linear_to_srgb(np.hstack(small)))
+    aux = [result.normal, np.repeat(result.specular[..., None], 3, 2), np.repeat(result.confidence[..., None], 3, 2)]
+    images.write_srgb(capture.picture("solve", "normal_specular_confidence"), np.hstack([images.resize(image, side, side) for image in aux]))

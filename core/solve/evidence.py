@@ -1,0 +1,117 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the solver knows of a capture: texture, confidence, normals and masks at the size it solves, and the same again for its coarser maps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import torch
+
+from .. import images, meshes, raster, template
+from ..capture import Capture
+from ..messages import Problem
+from .lighting import Shader
+from .prior import coordinates
+from .sampler import Observation
+
+REFERENCE = 1024  # lengths in texels are given for maps of this size
+TRUSTED = 0.2  # confidence from which a texel counts in full: below, it was seen at a glancing angle only
+MASK_FADE = 2.0  # deviation in texels over which a hard mask's border fades
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """texture [3, S, S] linear; weight [S, S]: how far it counts, 0 where nobody looked; alpha [S, S]: the soft shadow mask M; normal [3, S, S], unit, world
+    space, N_c; covered bool [S, S]: texels of the head; skin [S, S]: facial skin without lips, brows and eyes."""
+
+    texture: torch.Tensor
+    weight: torch.Tensor
+    alpha: torch.Tensor
+    normal: torch.Tensor
+    covered: torch.Tensor
+    skin: torch.Tensor
+
+    @property
+    def size(self) -> int:
+        return self.alpha.shape[0]
+
+
+def read_evidence(capture: Capture, size: int) -> Evidence:
+    """The capture's texture, confidence, head and masks at size x size. Raises Problem for what is missing, empty or of another shape."""
+    texture = images.read_linear(capture.texture)
+    confidence = images.read_data(capture.texture_confidence)[..., 0]
+    if texture.shape[:2] != confidence.shape or texture.shape[0] != texture.shape[1]:
+        raise Problem("The texture and its confidence do not fit together.", "Run the texture stage again.")
+    known = np.isfinite(texture).all(-1) & np.isfinite(confidence)
+    confidence = np.where(known, np.clip(confidence, 0, 1), 0)
+    texture = np.where(known[..., None], np.clip(texture, 0, None), 0)
+    if confidence.max() < 1e-3:
+        raise Problem("No texel of the texture was seen by any frame.", "Run the chain again from the cameras, and look at its report.")
+    seen = _sized(confidence, size)
+    texture = _sized(texture * confidence[..., None], size) / np.maximum(seen, 1e-4)[..., None]  # what nobody saw must not darken its neighbours
+    head = meshes.read_obj(capture.head)
+    if head.uvs is None:
+        raise Problem("The head has no UV coordinates.", "Run the registration stage again.")
+    face, bary = raster.rasterize_uv(head, size)
+    covered = face >= 0
+    if not covered.any():
+        raise Problem("The head's UV coordinates cover no texel.", "Run the registration stage again.")
+    normal = raster.bleed(raster.interpolate(meshes.vertex_normals(head), head.faces, face, bary), covered)
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+    mask = images.read_mask(capture.shadow_mask if capture.shadow_mask.is_file() else capture.shadow_mask_auto)
+    protected = images.read_mask(capture.protect_mask) if capture.protect_mask.is_file() else np.zeros_like(mask)
+    alpha = softened(_sized(mask, size)) * (1 - _sized(protected, size))
+    skin = template.mask("skin", size) * template.mask("face", size)
+    skin = skin * (1 - template.mask("eyes", size))
+    weight = np.where(covered, np.clip(seen / TRUSTED, 0, 1), 0)
+    tensors = [np.ascontiguousarray(a, np.float32) for a in (texture.transpose(2, 0, 1), weight, np.where(covered, alpha, 0), normal.transpose(2, 0, 1))]
+    return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), torch.from_numpy(np.ascontiguousarray(skin, np.float32)))
+
+
+def softened(mask: np.ndarray) -> np.ndarray:
+    """A mask [S, S] in [0, 1] whose hard borders fade over a few texels, as the light's do; faint remains become zero."""
+    faded = cv2.GaussianBlur(mask, (0, 0), max(MASK_FADE * len(mask) / REFERENCE, 0.3))
+    return np.clip((faded - 0.02) / 0.96, 0, 1)
+
+
+def observations(evidence: Evidence, exposure: float, cell: float, multiple: int, centred: bool = True) -> dict[int, Observation]:
+    """The evidence as the sampler takes it, per coarsening factor. The texture is multiplied by `exposure`; `cell` is a grid cell in texels at REFERENCE.
+
+    Maps coarser than a quarter of REFERENCE are left out: the prior has not seen them.
+    """
+    cells = grid_cells(cell)
+    found = {}
+    for factor in (1, 2, 4):
+        size = evidence.size // factor
+        if factor > 1 and (size < REFERENCE // 4 or size % multiple or evidence.size % factor):
+            continue
+        weight, alpha = (torch.from_numpy(_sized(a.numpy(), size)) for a in (evidence.weight, evidence.alpha))
+        texture = _shrunk(evidence.texture * evidence.weight, size) / weight.clamp_min(1e-4) * exposure
+        normal = torch.nn.functional.normalize(_shrunk(evidence.normal, size), dim=0)
+        inside = (alpha > 0).numpy().astype(np.uint8)
+        ring = (cv2.dilate(inside, np.ones((5, 5))) > 0) & (alpha.numpy() < 0.5)
+        coords = coordinates(size, slice(0, size), slice(0, size), centred)
+        found[factor] = Observation(texture, weight, coords, Shader(normal, alpha, cells), torch.from_numpy(ring))
+    return found
+
+
+def grid_cells(cell: float) -> tuple[int, int]:
+    """Cells (rows, columns) of the light grid over the whole map."""
+    count = max(1, round(REFERENCE / cell))
+    return count, count
+
+
+def _shrunk(maps: torch.Tensor, size: int) -> torch.Tensor:
+    """[C, S, S] -> [C, size, size]."""
+    return torch.from_numpy(np.ascontiguousarray(_sized(maps.permute(1, 2, 0).numpy(), size).transpose(2, 0, 1)))
+
+
+def _sized(image: np.ndarray, size: int) -> np.ndarray:
+    """[S, S(, C)] at another size: areas averaged to shrink, bilinear to enlarge."""
+    if image.shape[:2] == (size, size):
+        return image
+    shrinks = size < image.shape[0]
+    return cv2.resize(np.ascontiguousarray(image), (size, size), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)

@@ -1,0 +1,82 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the sampling starts from: the skin tone, a reference face of that tone (x_0^ref), and a global light that fits it (paper, "Initialization")."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from .. import images
+from ..messages import Problem
+from .lighting import Lights, constant_light, fit_global, interpolation, sh_basis
+
+HUMAN_GREEN = 0.02, 0.45
+"""Range of linear green a skin's mean albedo can have; red and blue follow from the colour."""
+
+
+def skin_tone(setting: str, texture: torch.Tensor, weight: torch.Tensor, tones: list[list[float]]) -> torch.Tensor:
+    """The subject's skin tone, linear RGB [3].
+
+    'R,G,B' (sRGB in 0..1) is taken as it is. 'auto' takes the texture's [3, H, W] tone under `weight` [H, W] (unshadowed skin): the mean of the
+    brighter half, because shadows the mask missed only darken; its colour is drawn halfway to that of the training tones nearest to it (the delit
+    texture keeps some of the light's colour) and its lightness kept within the human range. Light and lightness cannot be told apart, so a
+    given tone is always better. Raises Problem for a setting that is neither.
+    """
+    if setting != "auto":
+        return _given_tone(setting)
+    values = texture[:, weight > 0.5 * weight.max().clamp_min(1e-6)]  # [3, N]
+    if values.shape[1] == 0:
+        return torch.tensor(np.median(tones, 0) if tones else [0.38, 0.23, 0.17], dtype=torch.float32)
+    bright = values[:, values[1] >= values[1].median()]
+    tone = bright[:, bright[1] <= bright[1].quantile(0.9)].mean(1) if bright.shape[1] < 2**24 else bright.mean(1)
+    tone = tone.clamp_min(1e-3)
+    if tones:
+        known = torch.tensor(tones).clamp_min(1e-3).log()
+        order = torch.tensor([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0], [0.0, 0.3, 0.0]])  # two chromaticities, and lightness with less weight
+        distance = ((known - tone.log()) @ order.T).norm(dim=1)
+        nearest = known[distance.argsort()[:5]].mean(0)
+        chroma = ((tone / tone[1]).log() + (nearest - nearest[1])) / 2
+        tone = tone[1] * chroma.exp()
+    return tone * (tone[1].clamp(*HUMAN_GREEN) / tone[1])
+
+
+def _given_tone(setting: str) -> torch.Tensor:
+    try:
+        values = [float(part) for part in setting.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != 3 or not all(0 < v <= 1 for v in values):
+        raise Problem(f"The skin tone {setting!r} is not a colour.", "Give three numbers between 0 and 1 as sRGB, such as 0.69,0.54,0.45, or auto.")
+    return torch.from_numpy(images.srgb_to_linear(np.array(values, np.float32)))
+
+
+def mean_tone(albedo: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
+    """Linear mean [3] of an albedo [3, H, W] under a weight [H, W]."""
+    return (albedo * weight).sum((1, 2)) / weight.sum().clamp_min(1e-6)
+
+
+def reference(mean_face: torch.Tensor | None, tone: torch.Tensor, skin: torch.Tensor) -> torch.Tensor:
+    """x_0^ref [1, 7, H, W]: the mean face with its skin colour-matched to the tone; without one, the tone everywhere. skin [H, W] in [0, 1]."""
+    height, width = skin.shape
+    if mean_face is None:
+        out = torch.zeros(7, height, width)
+        out[:3], out[5], out[6] = 2 * tone[:, None, None] - 1, 1.0, -0.3
+        return out[None]
+    out = interpolation(mean_face.shape[1], height) @ mean_face @ interpolation(mean_face.shape[2], width).T
+    albedo = (out[:3] + 1) / 2
+    out[:3] = 2 * albedo * (tone / mean_tone(albedo, skin))[:, None, None] - 1
+    return out[None]
+
+
+def first_lights(texture: torch.Tensor, albedo: torch.Tensor, normal: torch.Tensor, weight: torch.Tensor, cells: tuple[int, int], one_chroma: bool) -> Lights:
+    """theta to start with: gamma^g fitted to the reference outside the shadow (closed form, around the constant light), V zero.
+
+    texture, albedo, normal [3, H, W]; weight [H, W], zero inside M. `one_chroma` ties all local light to the global light's colour at first.
+    """
+    shade = mean_tone(texture, weight) / mean_tone(albedo, weight).clamp_min(1e-4)
+    constant = constant_light(shade)
+    basis = sh_basis(normal)
+    rest = texture - albedo * torch.einsum("ck,khw->chw", constant, basis)
+    glob = constant + fit_global(rest, albedo, basis, weight, ridge=0.02)
+    return Lights(glob, torch.zeros(1 if one_chroma else 3, 9, *cells), (shade / shade.mean()).clone())

@@ -1,0 +1,131 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The light: second-order spherical harmonics for the whole face, and a texel grid of local ones inside the shadow mask (paper, section 3.3).
+
+Shading is linear and multiplies the albedo. Coefficients are in the constants of the authors' code: relative to a Lambertian surface
+under radiance y_lm the three bands are scaled by 1, sqrt 3 and 2 sqrt 2, without 1 / pi, which only rescales gamma.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+BANDS = (0.8862269254527579, 1.7724538509055159, 2.4270323912447493)
+"""Factor of the polynomials of band 0, 1 and 2."""
+
+
+def sh_basis(normal: torch.Tensor) -> torch.Tensor:
+    """Shading of each unit coefficient for normals [3, ...] -> [9, ...]; lengths other than one enter the polynomials as they are."""
+    x, y, z = normal
+    one = torch.ones_like(x)
+    b0, b1, b2 = BANDS
+    second = [x * y, -y * z, (3 * z * z - 1) / (2 * 3**0.5), -x * z, (x * x - y * y) / 2]
+    return torch.stack([b0 * one, -b1 * y, b1 * z, -b1 * x, *(b2 * p for p in second)])
+
+
+@dataclass
+class Lights:
+    """theta: the parameters of Gamma, all float32.
+
+    glob: gamma^g [3, 9]. grid: V [G, 9, h, w] with G = 3 colours, or G = 1 where one learned `chroma` [3] colours all local light:
+    where the sun is blocked, light of one chromaticity is missing.
+    """
+
+    glob: torch.Tensor
+    grid: torch.Tensor
+    chroma: torch.Tensor
+
+    def parameters(self) -> list[torch.Tensor]:
+        return [self.glob, self.grid, self.chroma]
+
+    def requires_grad_(self, wanted: bool) -> Lights:
+        for parameter in self.parameters():
+            parameter.requires_grad_(wanted)
+        return self
+
+
+class Shader:
+    """Gamma_theta for one map: the fixed parts of the shading of every texel, prepared once.
+
+    normal [3, H, W], alpha [H, W] the soft shadow mask M, cells (h, w) of the grid. The grid covers the map edge to edge.
+    """
+
+    def __init__(self, normal: torch.Tensor, alpha: torch.Tensor, cells: tuple[int, int]):
+        self.basis = sh_basis(normal)  # [9, H, W]
+        self.alpha = alpha
+        height, width = alpha.shape
+        rows, columns = (torch.nonzero(alpha.sum(1 - axis) > 0)[:, 0] for axis in (0, 1))
+        self.empty = len(rows) == 0
+        # local light exists only where M does: everything about it is computed on M's bounding box, one texel wider for the ring's differences
+        self.box = (slice(0, 1), slice(0, 1)) if self.empty else tuple(
+            slice(max(int(i[0]) - 3, 0), min(int(i[-1]) + 4, size)) for i, size in ((rows, height), (columns, width)))
+        self.up_rows = interpolation(cells[0], height).to(normal)[self.box[0]]  # [h', h]
+        self.up_columns = interpolation(cells[1], width).to(normal)[self.box[1]]  # [w', w]
+        self.box_basis = self.basis[(slice(None), *self.box)]
+        self.box_alpha = alpha[self.box]
+
+    def main(self, lights: Lights) -> torch.Tensor:
+        """Shading by the global light [3, H, W]."""
+        return torch.einsum("ck,khw->chw", lights.glob, self.basis)
+
+    def local(self, lights: Lights) -> torch.Tensor:
+        """s^V, shading by the grid alone, modulated by M, on `box` [3, h', w'] (paper, equations 2 to 4)."""
+        coefficients = self.up_rows @ lights.grid @ self.up_columns.T  # [G, 9, h', w']
+        scalar = (coefficients * self.box_basis).sum(1) * self.box_alpha  # [G, h', w']
+        return scalar * lights.chroma[:, None, None] if len(scalar) == 1 else scalar
+
+    def total(self, lights: Lights) -> torch.Tensor:
+        """Shading [3, H, W]."""
+        shading = self.main(lights)
+        if not self.empty:
+            shading[(slice(None), *self.box)] += self.local(lights)
+        return shading
+
+
+def interpolation(cells: int, texels: int) -> torch.Tensor:
+    """The matrix [texels, cells] that resamples a line by the cubic kernel (a = -0.5), half-pixel centres, borders repeated.
+
+    To shrink, the kernel widens with the step (antialiasing).
+    """
+    step = cells / texels
+    wide = max(step, 1.0)
+    centres = (np.arange(texels) + 0.5) * step - 0.5
+    first = np.floor(centres - 2 * wide).astype(int)
+    index = first[:, None] + np.arange(int(np.ceil(4 * wide)) + 2)  # [texels, taps]
+    weight = _cubic((index - centres[:, None]) / wide)
+    weight /= weight.sum(1, keepdims=True)
+    mirrored = np.mod(index, 2 * cells)
+    mirrored = np.where(mirrored < cells, mirrored, 2 * cells - 1 - mirrored)
+    matrix = np.zeros((texels, cells))
+    np.add.at(matrix, (np.arange(texels)[:, None].repeat(index.shape[1], 1), mirrored), weight)
+    return torch.from_numpy(matrix).float()
+
+
+def fit_global(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor, weight: torch.Tensor, ridge: float = 1e-3) -> torch.Tensor:
+    """gamma^g [3, 9] that minimises sum weight^2 (texture - albedo * shading)^2 in closed form.
+
+    texture, albedo linear [3, H, W]; basis [9, H, W]; weight [H, W]. `ridge` times the mean diagonal keeps coefficients that no normal sees at zero.
+    """
+    columns = basis.reshape(9, -1).double()
+    w2 = weight.reshape(-1).double() ** 2
+    out = []
+    for t, a in zip(texture.reshape(3, -1).double(), albedo.reshape(3, -1).double(), strict=True):
+        normal_matrix = (columns * (w2 * a * a)) @ columns.T
+        damping = ridge * normal_matrix.diagonal().mean().clamp_min(1e-12) * torch.eye(9, dtype=torch.float64, device=basis.device)
+        out.append(torch.linalg.solve(normal_matrix + damping, (columns * (w2 * a)) @ t))
+    return torch.stack(out).float()
+
+
+def constant_light(shade: torch.Tensor) -> torch.Tensor:
+    """gamma^g [3, 9] whose shading is `shade` [3] for every normal."""
+    glob = torch.zeros(3, 9)
+    glob[:, 0] = shade / BANDS[0]
+    return glob
+
+
+def _cubic(t: np.ndarray) -> np.ndarray:
+    t = np.abs(t)
+    return np.where(t <= 1, 1.5 * t**3 - 2.5 * t**2 + 1, np.where(t < 2, -0.5 * t**3 + 2.5 * t**2 - 4 * t + 2, 0.0))

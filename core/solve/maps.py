@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From the sampler's last state to the maps of the capture folder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from .. import images
+from ..capture import Capture, replacing_folder
+from ..messages import Reporter
+from .evidence import Evidence
+from .initial import mean_tone
+from .lighting import Shader
+from .sampler import Observation, State, albedo
+
+DARKEST = 0.004  # linear albedo below which no skin or hair lies
+
+
+@dataclass(frozen=True)
+class Maps:
+    """[S, S(, 3)] float32. diffuse and shading linear, diffuse * shading = I_UV; normal packed into [0, 1], tangent space, OpenGL Y+;
+    specular and confidence in [0, 1]."""
+
+    diffuse: np.ndarray
+    specular: np.ndarray
+    normal: np.ndarray
+    shading: np.ndarray
+    confidence: np.ndarray
+
+
+def finished(state: State, evidence: Evidence, shader: Shader, exposure: float, tone: torch.Tensor) -> Maps:
+    """Reads the maps out of \\hat x_0. The albedo is rescaled once, in linear light, so that the mean of the confident facial skin is `tone`;
+    the shading takes the inverse, so that their product stays."""
+    x = state.denoised[0]
+    with torch.no_grad():
+        shading = shader.total(state.lights).clamp_min(1e-3) / exposure
+        main = shader.main(state.lights).clamp_min(1e-3) / exposure
+    diffuse = albedo(state.denoised).clamp_min(DARKEST)
+    gain = (tone / mean_tone(diffuse, evidence.skin * evidence.weight)).clamp(0.2, 5.0)[:, None, None]
+    normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
+    explained = (1 - (shading / main).mean(0)).clamp(0, 1)  # the share of the darkness that was called shadow
+    confidence = (evidence.weight * (1 - explained * evidence.alpha)).clamp(0, 1)
+    specular = ((x[6] + 1) / 2).clamp(0, 1).numpy()
+    return Maps(_picture((diffuse * gain).clamp(DARKEST, 1)), specular, _picture(normal), _picture(shading / gain), confidence.numpy())
+
+
+def write(capture: Capture, maps: Maps) -> None:
+    """The folder maps/, whole or not at all."""
+    with replacing_folder(capture.maps) as folder:
+        images.write_srgb(folder / "diffuse_albedo.png", images.linear_to_srgb(maps.diffuse), bits=16)
+        images.write_linear(folder / "diffuse_albedo.exr", maps.diffuse)
+        images.write_data(folder / "specular_albedo.png", maps.specular, bits=16)
+        images.write_data(folder / "normal.png", maps.normal, bits=16)
+        images.write_linear(folder / "shading.exr", maps.shading)
+        images.write_data(folder / "confidence.png", maps.confidence)
+
+
+def write_preview(capture: Capture, state: State, seen: dict[int, Observation], report: Reporter) -> None:
+    """preview/albedo.png and shading.png of a running solve, at the size it works at just now."""
+    o = next(o for o in seen.values() if o.weight.shape == state.denoised.shape[-2:])
+    with torch.no_grad():
+        shading = o.shader.total(state.lights).clamp_min(0)
+    scale = 0.6 / max(float(np.percentile(shading.numpy(), 95)), 1e-6)
+    for name, image in (("albedo", albedo(state.denoised)), ("shading", scale * shading)):
+        images.write_srgb(capture.preview / f"{name}.png", images.linear_to_srgb(_picture(image)))
+        report.preview(f"preview/{name}.png")
+
+
+def _picture(maps: torch.Tensor) -> np.ndarray:
+    """[3, H, W] -> [H, W, 3]."""
+    return np.ascontiguousarray(maps.permute(1, 2, 0).numpy(), np.float32)

@@ -1,0 +1,188 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The prior's network: a U-Net of modulated residual blocks, and EDM's preconditioning around it (Karras et al. 2022).
+
+Parameter names and arithmetic are those of the `image_v1` models the method's authors trained, so their state dict loads as it is.
+Two choices are ours: `norm: pixel` normalises each texel over its channels, so that a patch and a whole map are treated alike, and
+`patch_size: 2` works on 2x2 blocks of texels.
+"""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import nn
+from torch.nn import functional
+
+
+def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: torch.Tensor, mapping_condition: torch.Tensor | None = None) -> torch.Tensor:
+    """D(x; sigma): the preconditioned denoiser. x float32 [N, C, H, W], sigma [N], condition [N, K, H, W] -> [N, C, H, W].
+
+    The condition is not noised but scaled by c_in like the data, in training too. Only the network itself runs in low precision.
+    """
+    sigma_data = network.sigma_data
+    s = sigma.reshape(-1, 1, 1, 1)
+    total = (s * s + sigma_data**2).sqrt()
+    inner = network(torch.cat([x, condition], 1) / total, sigma, mapping_condition)
+    return inner.float() * (s * sigma_data / total) + x * (sigma_data / total) ** 2
+
+
+class UNet(nn.Module):
+    """F(x, sigma): depths and channels per level, finest first. Input [N, data + condition, H, W], output [N, data, H, W]."""
+
+    def __init__(self, data_channels: int, condition_channels: int, mapping_out: int, depths: list[int], channels: list[int],
+                 attention: list[bool] | None = None, patch_size: int = 1, mapping_cond_dim: int = 0, sigma_data: float = 0.5, norm: str = "group"):
+        super().__init__()
+        attention = attention or [False] * len(depths)
+        self.patch_size, self.sigma_data = patch_size, sigma_data
+        self.multiple = patch_size * 2 ** (len(depths) - 1)
+        self.timestep_embed = _Fourier(mapping_out)
+        self.mapping_cond = nn.Linear(mapping_cond_dim, mapping_out, bias=False) if mapping_cond_dim else None
+        self.mapping = nn.Sequential(nn.Linear(mapping_out, mapping_out), nn.GELU(), nn.Linear(mapping_out, mapping_out), nn.GELU())
+        self.proj_in = nn.Conv2d((data_channels + condition_channels) * patch_size**2, channels[0], 1)
+        self.proj_out = nn.Conv2d(channels[0], data_channels * patch_size**2, 1)
+        nn.init.zeros_(self.proj_out.weight)
+        nn.init.zeros_(self.proj_out.bias)
+        down, up = [], []
+        for level, (depth, width) in enumerate(zip(depths, channels, strict=True)):
+            above = channels[max(0, level - 1)]
+            deepest = level == len(depths) - 1
+            down.append(_block(mapping_out, [above] + [width] * (depth - 1), width, width, attention[level], norm, first=_Down() if level else nn.Identity()))
+            up.append(_block(mapping_out, [width if deepest else 2 * width] + [width] * (depth - 1), width, above, attention[level], norm,
+                             last=_Up() if level else nn.Identity()))
+        self.u_net = nn.ModuleDict({"d_blocks": nn.ModuleList(down), "u_blocks": nn.ModuleList(up[::-1])})
+
+    def lower(self, dtype: torch.dtype) -> UNet:
+        """Everything that works on maps in `dtype`, channels last; the noise level's few numbers stay as they are."""
+        for part in (self.proj_in, self.proj_out, self.u_net):
+            part.to(dtype=dtype, memory_format=torch.channels_last)
+        return self
+
+    def forward(self, x: torch.Tensor, sigma: torch.Tensor, mapping_condition: torch.Tensor | None = None) -> torch.Tensor:
+        height, width = x.shape[-2:]
+        if height % self.multiple or width % self.multiple:
+            raise ValueError(f"The network takes maps whose sides are multiples of {self.multiple}, not {width} x {height}.")
+        mapped = self.timestep_embed(sigma.log() / 4)
+        if mapping_condition is not None:
+            mapped = mapped + self.mapping_cond(mapping_condition)
+        dtype = self.proj_in.weight.dtype
+        mapped, x = self.mapping(mapped).to(dtype), x.to(dtype)
+        if self.patch_size > 1:
+            x = functional.pixel_unshuffle(x, self.patch_size)
+        x = self.proj_in(x.contiguous(memory_format=torch.channels_last))
+        skips = []
+        for blocks in self.u_net["d_blocks"]:
+            x = _run(blocks, x, mapped)
+            skips.append(x)
+        for level, blocks in enumerate(self.u_net["u_blocks"]):
+            skip = skips.pop()
+            x = _run(blocks, x if level == 0 else torch.cat([x, skip], 1), mapped)
+        x = self.proj_out(x)
+        return functional.pixel_shuffle(x, self.patch_size) if self.patch_size > 1 else x
+
+
+def _block(mapping: int, inputs: list[int], width: int, out: int, attention: bool, norm: str,
+           first: nn.Module | None = None, last: nn.Module | None = None) -> nn.ModuleList:
+    """Residual blocks (inputs[i] -> width, the last one -> out), each followed by attention if asked for; resampling first or last."""
+    layers = [] if first is None else [first]
+    for i, c_in in enumerate(inputs):
+        c_out = out if last is not None and i == len(inputs) - 1 else width
+        layers.append(_Residual(mapping, c_in, width, c_out, norm))
+        if attention:
+            layers.append(_Attention(mapping, c_out, out, norm))
+    return nn.ModuleList(layers if last is None else [*layers, last])
+
+
+def _run(blocks: nn.ModuleList, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
+    for layer in blocks:
+        x = layer(x, mapped) if isinstance(layer, _Residual | _Attention) else layer(x)
+    return x
+
+
+class _Residual(nn.Module):
+    """norm, GELU, conv 3x3, norm, GELU, conv 3x3, plus the input."""
+
+    def __init__(self, mapping: int, c_in: int, width: int, c_out: int, norm: str):
+        super().__init__()
+        self.main = nn.ModuleDict({"0": _Norm(mapping, c_in, max(1, c_in // 32), norm), "2": nn.Conv2d(c_in, width, 3, padding=1),
+                                   "4": _Norm(mapping, width, max(1, width // 32), norm), "6": nn.Conv2d(width, c_out, 3, padding=1)})
+        self.skip = nn.Conv2d(c_in, c_out, 1, bias=False) if c_in != c_out else nn.Identity()
+        nn.init.zeros_(self.main["6"].weight)
+        nn.init.zeros_(self.main["6"].bias)
+
+    def forward(self, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
+        y = self.main["2"](functional.gelu(self.main["0"](x, mapped)))
+        y = self.main["6"](functional.gelu(self.main["4"](y, mapped)))
+        return y + self.skip(x)
+
+
+class _Norm(nn.Module):
+    """Normalisation without weights of its own, then x (1 + w) + b with w, b from the mapped noise level."""
+
+    def __init__(self, mapping: int, channels: int, groups: int, kind: str):
+        super().__init__()
+        self.mapper = nn.Linear(mapping, 2 * channels)
+        self.groups, self.kind = groups, kind
+        nn.init.zeros_(self.mapper.weight)
+        nn.init.zeros_(self.mapper.bias)
+
+    def forward(self, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
+        weight, bias = self.mapper(mapped)[:, :, None, None].to(x.dtype).chunk(2, 1)
+        if self.kind == "pixel":
+            x = functional.layer_norm(x.permute(0, 2, 3, 1), x.shape[1:2], eps=1e-5).permute(0, 3, 1, 2)  # free of copies in channels-last
+        else:
+            x = functional.group_norm(x, self.groups, eps=1e-5)
+        return torch.addcmul(bias, x, 1 + weight)
+
+
+class _Attention(nn.Module):
+    """Self attention over all texels; heads of 64 channels."""
+
+    def __init__(self, mapping: int, channels: int, block_out: int, norm: str):
+        super().__init__()
+        self.heads = max(1, channels // 64)
+        self.norm_in = _Norm(mapping, channels, max(1, block_out // 32), norm)
+        self.qkv_proj = nn.Conv2d(channels, 3 * channels, 1)
+        self.out_proj = nn.Conv2d(channels, channels, 1)
+
+    def forward(self, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
+        n, c, h, w = x.shape
+        qkv = self.qkv_proj(self.norm_in(x, mapped)).reshape(n, 3 * self.heads, c // self.heads, h * w).transpose(2, 3)
+        y = functional.scaled_dot_product_attention(*qkv.chunk(3, 1))
+        return x + self.out_proj(y.transpose(2, 3).reshape(n, c, h, w))
+
+
+class _Fourier(nn.Module):
+    """Random Fourier features of a scalar: [N] -> [N, features]."""
+
+    def __init__(self, features: int):
+        super().__init__()
+        self.register_buffer("weight", torch.randn(features // 2, 1))
+
+    def forward(self, value: torch.Tensor) -> torch.Tensor:
+        phase = 2 * math.pi * value[:, None] @ self.weight.T
+        return torch.cat([phase.cos(), phase.sin()], -1)
+
+
+class _Down(nn.Module):
+    """Half the size by the separable kernel [1, 3, 3, 1] / 8, reflected at the border: the triangle filter."""
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=torch.channels_last)
+        kernel = torch.tensor([1.0, 3.0, 3.0, 1.0], device=x.device, dtype=x.dtype) / 8
+        return functional.conv2d(x, torch.outer(kernel, kernel).expand(x.shape[1], 1, 4, 4), stride=2, groups=x.shape[1])
+
+
+class _Up(nn.Module):
+    """Twice the size by the same kernel transposed, which is bilinear interpolation; reflected at the border."""
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=torch.channels_last)
+        return functional.interpolate(x, scale_factor=2.0, mode="bilinear", align_corners=False)[..., 2:-2, 2:-2]
+
+
+def from_state(state: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    """A released state dict's weights under our names: no wrapper prefix, no constant resampling kernels."""
+    state = {name.removeprefix("inner_model."): value for name, value in state.items()}
+    return {name: value for name, value in state.items() if not name.endswith(".kernel")}

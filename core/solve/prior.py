@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The slot for a diffusion prior of facial reflectance: `denoised = prior(x, sigma, coords)`.
+
+x is [N, 7, H, W]: 2 * diffuse_linear - 1 (3), tangent-space normal xyz (3), 2 * specular - 1 (1), plus noise of standard deviation sigma.
+Two priors fit: ours (NAME.safetensors with its card NAME.json) and a folder with the authors' config.json and ckpt.pth.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import torch
+from safetensors import safe_open
+
+from ..messages import Problem
+from .network import UNet, denoise, from_state
+
+WEIGHTS = Path(__file__).parent.parent / "weights" / "prior.safetensors"
+
+
+class Prior:
+    """A trained denoiser with what it is conditioned on.
+
+    `tone`, linear RGB [3], is the subject's skin tone: a dark patch alone cannot say whether its skin or its light is dark. Without a tone
+    the prior is unconditional. `mean_face` [7, S, S] is the mean of the training maps over the whole UV square, or None.
+    """
+
+    def __init__(self, network: UNet, kind: str, octaves: int = 0, mean_face: torch.Tensor | None = None, tones: list | None = None):
+        self.network = network.eval().requires_grad_(False)
+        self.kind, self.octaves, self.mean_face, self.tones = kind, octaves, mean_face, tones or []
+        self.tone: torch.Tensor | None = None
+        self.multiple = network.multiple
+        self._last: tuple[torch.Tensor, torch.Tensor] | None = None
+
+    def __call__(self, x: torch.Tensor, sigma: float, coords: torch.Tensor) -> torch.Tensor:
+        """The expected clean map given x at noise level sigma. coords [N, 2, H, W] from `coordinates`, one texel apart in the map's own scale."""
+        device = self.network.proj_in.weight.device  # the map may live elsewhere: the network is all that is slow
+        if self._last is None or self._last[0] is not coords:
+            self._last = coords, positional_encoding(coords, self.octaves).to(device) if self.octaves else coords.to(device)
+        mapping = None
+        if self.kind == "wildcap":
+            mapping = mapping_condition(self.tone, texel_size(coords)).to(device).expand(len(x), -1)
+        sigmas = torch.full((len(x),), float(sigma), device=device)
+        return denoise(self.network, x.to(device), sigmas, self._last[1], mapping).to(x.device)
+
+
+def load(path: Path = WEIGHTS, device: str = "cpu", dtype: torch.dtype | None = None) -> Prior:
+    """Our prior, or the authors' when `path` is a folder with config.json and ckpt.pth.
+
+    Map-sized work runs in `dtype`, by default bfloat16 where the processor has it. Raises Problem for files that are missing or of another kind.
+    """
+    path = Path(path)
+    try:
+        prior = _load_released(path) if path.is_dir() else _load_ours(path)
+    except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
+        raise Problem(f"The prior {path} cannot be loaded ({type(error).__name__}: {error}).",
+                      "Reinstall the extension, or choose a folder that holds config.json and ckpt.pth.") from error
+    prior.network.to(device).lower(dtype or fast_dtype(device))
+    return prior
+
+
+def fast_dtype(device: str) -> torch.dtype:
+    """bfloat16 on a GPU or a processor that multiplies it, else float32."""
+    if str(device).startswith("cuda"):
+        return torch.bfloat16
+    return torch.bfloat16 if str(device) == "cpu" and torch.cpu._is_avx512_bf16_supported() else torch.float32
+
+
+def build(config: dict) -> UNet:
+    """The network of a card's or config.json's `model` and `cond` entries."""
+    model, cond = config["model"], config.get("cond", {})
+    channels = {"coord": 2, "posenc": 2 + 4 * int(cond.get("pos_enc_freq", 0)), "noise": 3}[cond.get("type", "coord")]
+    augmented = 9 if model.get("augment_wrapper", True) else 0
+    return UNet(model["input_channels"], channels, model["mapping_out"], model["depths"], model["channels"], model.get("self_attn_depths"),
+                model.get("patch_size", 1), augmented + model.get("mapping_cond_dim", 0), model.get("sigma_data", 1.0), model.get("norm", "group"))
+
+
+def coordinates(size: int, rows: slice, columns: slice, centred: bool = True) -> torch.Tensor:
+    """UV coordinates [1, 2, h, w] in [-1, 1] of a window of a size x size map: channel 0 grows with the column, 1 with the row.
+
+    Ours are those of texel centres, so that they agree between scales; the released code's (`centred=False`) those of the upper left corners.
+    """
+    line = 2 * (torch.arange(size) + (0.5 if centred else 0.0)) / size - 1
+    return torch.stack(torch.meshgrid(line[columns], line[rows], indexing="xy"))[None]
+
+
+def positional_encoding(coords: torch.Tensor, octaves: int) -> torch.Tensor:
+    """[N, 2, H, W] -> [N, 2 + 4 octaves, H, W]: the coordinates, then sines and cosines of 1, 2, 4 ... times them."""
+    waves = [part for k in range(octaves) for part in (torch.sin(coords * 2**k), torch.cos(coords * 2**k))]
+    return torch.cat([coords, *waves], 1)
+
+
+def texel_size(coords: torch.Tensor) -> float:
+    """Side of a texel in texels of a 1024 map."""
+    return 512 * float(coords[0, 0, 0, 1] - coords[0, 0, 0, 0])
+
+
+def mapping_condition(tone: torch.Tensor | None, texel: float) -> torch.Tensor:
+    """[1, 5]: what our network knows of a patch besides its place: scale, whether the tone is given, and the tone (log, about -1 to 1)."""
+    known = [0.0] * 4 if tone is None else [1.0, *(torch.as_tensor(tone).clamp_min(1e-3).log() / 2 + 0.6).tolist()]
+    return torch.tensor([[math.log2(texel), *known]])
+
+
+def _load_ours(path: Path) -> Prior:
+    card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+    with safe_open(path, "pt") as file:
+        tensors = {name: file.get_tensor(name).float() for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
+    mean_face = tensors.pop("mean_face")
+    network = build(card)
+    network.load_state_dict(tensors)
+    return Prior(network, "wildcap", card["cond"]["pos_enc_freq"], mean_face, card["tones"])
+
+
+def _load_released(folder: Path) -> Prior:
+    config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
+    kind = config["model"].get("type", "image_v1")
+    if kind != "image_v1":
+        raise ValueError(f"models of type {kind} are not supported")
+    cond = config.get("cond", {})
+    if cond.get("type", "coord") == "noise":
+        raise ValueError("a prior conditioned on a fixed random map needs that map")
+    state = torch.load(folder / "ckpt.pth", map_location="cpu", weights_only=True)
+    network = build(config)
+    network.load_state_dict(from_state(state.get("model_ema", state)))
+    return Prior(network, "released", int(cond.get("pos_enc_freq", 0)) if cond.get("type") == "posenc" else 0)

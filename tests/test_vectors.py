@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parity with the authors' released modules, by input and output arrays alone. The folder is WILDCAP_VECTORS, or shared/vectors beside the checkout."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from core.solve import prior
+from core.solve.lighting import Lights, Shader, interpolation, sh_basis
+from core.solve.network import denoise
+from core.solve.sampler import Observation, Recipe, ancestral, blurred, karras, light_loss
+
+VECTORS = Path(os.environ.get("WILDCAP_VECTORS", Path(__file__).parents[2] / "shared" / "vectors"))
+pytestmark = pytest.mark.skipif(not VECTORS.is_dir(), reason=f"the parity vectors are not at {VECTORS}")
+
+
+def arrays(name: str) -> dict[str, torch.Tensor]:
+    path = VECTORS / name
+    if not path.is_file():
+        pytest.skip(f"{path} is missing")
+    with np.load(path) as file:
+        return {key: torch.from_numpy(file[key]) for key in file}
+
+
+def close(ours, theirs, tolerance=2e-5):
+    assert (torch.as_tensor(ours) - theirs).abs().max() < tolerance
+
+
+def test_vectors_sh_shading():
+    v = arrays("sh_shading.npz")
+    basis = sh_basis(v["normal"][0])
+    close(basis.permute(1, 2, 0), v["basis"])
+    close((basis.permute(1, 2, 0) * v["gamma_map"]).sum(-1), v["shading_map"])
+    close((sh_basis(v["normal_nonunit"][0]).permute(1, 2, 0) * v["gamma_map"]).sum(-1), v["shading_map_nonunit"])
+    shader = Shader(v["normal"][0], torch.zeros(16, 20), (1, 1))
+    close(shader.main(Lights(v["gamma_global"][:, 0, 0], torch.zeros(3, 9, 1, 1), torch.ones(3))), v["shading_global"])
+
+
+def test_vectors_resizer():
+    v = arrays("resizer.npz")
+    tags = [key.removesuffix("_in") for key in v if key.endswith("_in")]
+    assert tags
+    for tag in tags:
+        given, wanted = v[f"{tag}_in"], v[f"{tag}_out"]
+        rows, columns = (interpolation(given.shape[axis], wanted.shape[axis]) for axis in (-2, -1))
+        close(rows @ given @ columns.T, wanted)
+
+
+def test_vectors_schedule():
+    v = arrays("schedule.npz")
+    for key in v:
+        if not key.endswith("_sigmas"):
+            continue
+        tag = key.removesuffix("_sigmas")
+        low, high = (float(part[4:]) for part in tag.split("_"))
+        sigmas = karras(1000, low, high)
+        assert np.allclose(sigmas, v[key], rtol=2e-5, atol=1e-7)
+        pairs = np.array([ancestral(s, s_next) for s, s_next in zip(sigmas, sigmas[1:], strict=False)])
+        assert np.allclose(pairs[:, 0], v[f"{tag}_down_eta1"], rtol=1e-3, atol=2e-5)
+        assert np.allclose(pairs[:, 1], v[f"{tag}_up_eta1"], rtol=1e-3, atol=2e-5)
+
+
+def test_vectors_coordinates():
+    v = arrays("coord.npz")
+    whole = prior.coordinates(32, slice(0, 32), slice(0, 32), centred=False)
+    close(whole[0], v["coord32"])
+    close(prior.positional_encoding(whole, 4)[0], v["posenc32_f4"])
+    close(prior.coordinates(1024, slice(0, None, 97), slice(0, None, 89), centred=False)[0], v["coord1024_rows_97_cols_89"])
+
+
+def test_vectors_losses():
+    v = arrays("losses.npz")
+    close(blurred(v["blur_in"][0]), v["blur_out"][0])
+    # our light loss, made of the same terms: with the ring as given and weight zero only the regularisers remain
+    shade, main, ring = v["shade"][0], v["shade_main"][0], v["tv_ring_mask"][0, 0] > 0.5
+
+    class Given:
+        empty, box = False, (slice(None), slice(None))
+        total = staticmethod(lambda lights: shade)
+        local = staticmethod(lambda lights: shade - main)
+
+    o = Observation(torch.zeros_like(shade), torch.zeros_like(ring, dtype=torch.float32), torch.zeros(1), Given(), ring)
+    zero = torch.zeros(1, 7, *ring.shape)
+    assert light_loss(None, zero, o, Recipe(tv=0.0)).item() == pytest.approx(v["neg_reg"].item(), rel=1e-5)
+    assert light_loss(None, zero, o, Recipe(tv=1.0, neg=0.0)).item() == pytest.approx(v["tv_ring_of_shade"].item(), rel=1e-5)
+
+
+@pytest.mark.parametrize("folder", sorted(p.name for p in VECTORS.glob("prior_v1_*")) or ["prior_v1_coord"])
+def test_vectors_released_prior(folder):
+    """The authors' layout of config.json and ckpt.pth loads, and gives their values and gradients."""
+    v = arrays(f"{folder}/io.npz")
+    network = prior.load(VECTORS / folder, dtype=torch.float32).network
+    close(network(torch.cat([v["x"], v["cond"]], 1), v["sigma"]), v["inner_on_raw_input"])
+    x = v["x"].clone().requires_grad_(True)
+    denoised = denoise(network, x, v["sigma"], v["cond"])
+    close(denoised.detach(), v["denoised"])
+    close(torch.autograd.grad((denoised * v["w"]).sum(), x)[0], v["grad_x"], 2e-4)
