@@ -37,7 +37,8 @@ class SkinParameters:
     beard_length: float = 0.4  # mm
     brow_density: float = 1.0
     scalp_hair: float = 0.8  # cover of cropped hair
-    hair_colour: tuple[float, float, float] = (0.03, 0.02, 0.014)  # albedo, linear sRGB
+    hair_colour: tuple[float, float, float] = (0.03, 0.02, 0.014)  # albedo of scalp and beard, linear sRGB
+    brow_colour: tuple[float, float, float] = (0.03, 0.02, 0.014)
     tone_seed: int = 0
     mole_seed: int = 0
     pore_seed: int = 0
@@ -48,13 +49,14 @@ def sample_parameters(seed: int) -> SkinParameters:
     """A subject at random: the typology angle of the tone is uniform from -55 (dark) to 62 degrees (very light), half of the subjects are men."""
     rng = np.random.default_rng([seed, 0])
     angle, blood = rng.uniform(-55, 62), float(np.exp(rng.uniform(np.log(0.007), np.log(0.045))))
-    oxygen, scattering = float(rng.uniform(0.6, 0.9)), float(rng.uniform(0.75, 1.4))
+    oxygen, scattering = float(rng.uniform(0.6, 0.9)), float(rng.uniform(0.75, 1.7))
     slope = float(rng.uniform(1.9, 2.9))
     melanin = _melanin_of_angle(angle, blood, oxygen, scattering, slope)
     lightness = np.clip((angle + 20) / 80, 0, 1)
     male, age = rng.random() < 0.5, float(rng.uniform(18, 78))
     beard = float(rng.choice([0.15, rng.uniform(0.3, 1.0)])) if male else 0.0
     freckled = rng.random() < 0.15 + 0.35 * lightness
+    hair, grey = _hair_colour(lightness, rng), np.clip((age - 38) / 40, 0, 1) * rng.random()
     return SkinParameters(
         melanin=melanin, blood=blood, oxygen=oxygen, scattering=scattering, slope=slope, age=age,
         redness=float(rng.uniform(0.4, 1.5)), eye_circles=float(rng.uniform(0.1, 1.2)),
@@ -64,7 +66,7 @@ def sample_parameters(seed: int) -> SkinParameters:
         freckles=float(rng.uniform(0.05, 1.0)) if freckled else 0.0, freckle_contrast=float(rng.uniform(0.3, 1.0)),
         moles=float(rng.gamma(1.5, 6.0)), beard=beard, beard_length=float(np.exp(rng.uniform(np.log(0.25), np.log(3.0)))),
         brow_density=float(rng.uniform(0.5, 1.4) * (1.15 if male else 0.85)), scalp_hair=float(rng.uniform(0.25, 1.0)),
-        hair_colour=_hair_colour(lightness, age, rng),
+        hair_colour=_greyed(hair, grey), brow_colour=_greyed(hair * 0.8, 0.4 * grey**2),
         tone_seed=seed, mole_seed=seed, pore_seed=seed, hair_seed=seed)
 
 
@@ -75,11 +77,13 @@ def _melanin_of_angle(angle: float, blood: float, oxygen: float, scattering: flo
     return float(np.interp(-angle, -angles, melanin))  # the angle falls with melanin
 
 
-def _hair_colour(lightness: float, age: float, rng: np.random.Generator) -> tuple[float, float, float]:
-    """Albedo from black through brown to blond or red where the skin is light, greying with age."""
+def _hair_colour(lightness: float, rng: np.random.Generator) -> np.ndarray:
+    """Albedo [3] from black through brown to blond, or red, where the skin is light."""
     fair = rng.random() ** 1.5 * lightness
     dark, blond, red = np.array([0.016, 0.011, 0.009]), np.array([0.30, 0.19, 0.095]), np.array([0.16, 0.05, 0.018])
     light = red if rng.random() < 0.12 else blond
-    colour = np.exp((1 - fair) * np.log(dark) + fair * np.log(light))
-    grey = np.clip((age - 38) / 40, 0, 1) * rng.random()
+    return np.exp((1 - fair) * np.log(dark) + fair * np.log(light))
+
+
+def _greyed(colour: np.ndarray, grey: float) -> tuple[float, float, float]:
     return tuple(float(c) for c in colour * (1 - grey) + 0.38 * grey)

@@ -141,7 +141,7 @@ def _marks(p: SkinParameters, on: Canvas, ground: Canvas) -> tuple[np.ndarray, n
 def _hair(p: SkinParameters, on: Canvas, ground: Canvas, area: dict[str, np.ndarray], diffuse: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Cover of all hair [N], and the diffuse albedo with it."""
     rng, here = np.random.default_rng([p.hair_seed, 4]), regions(ground)
-    colour = np.asarray(p.hair_colour, np.float32)
+    colour, brow_colour = np.asarray(p.hair_colour, np.float32), np.asarray(p.brow_colour, np.float32)
     eyebrow = hairs.brows(on, ground, here["brows"], p.brow_density, rng)
     beard = np.zeros_like(eyebrow)
     if p.beard > 0:
@@ -150,9 +150,11 @@ def _hair(p: SkinParameters, on: Canvas, ground: Canvas, area: dict[str, np.ndar
         darkness = np.clip(1.3 - 2.5 * colour.mean(), 0, 1)  # fair hair casts no shade
         diffuse = hairs.beard_shadow(diffuse, np.clip(area["beard"] * p.beard * 0.7 * darkness * patchy, 0, 1))
     scalp = hairs.cropped(on, area["scalp"], p.scalp_hair, rng)
-    cover = 1 - (1 - eyebrow) * (1 - beard) * (1 - scalp)
     shade = np.exp(0.2 * noise(on.position, 1.2, rng))[:, None]
-    return cover, diffuse * (1 - cover[:, None]) + colour * shade * cover[:, None]
+    other = (1 - (1 - beard) * (1 - scalp))[:, None]
+    diffuse = diffuse * (1 - other) + colour * shade * other
+    diffuse = diffuse * (1 - eyebrow[:, None]) + brow_colour * shade * eyebrow[:, None]
+    return 1 - (1 - eyebrow) * (1 - other[:, 0]), diffuse
 
 
 def _specular(p: SkinParameters, on: Canvas, area: dict[str, np.ndarray], hollow: np.ndarray, dry: np.ndarray) -> np.ndarray:

@@ -1,0 +1,174 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light baked into the template's UV space with known truth: a smooth sky with its ambient occlusion, and a sun whose hard or soft
+shadows the head itself, leaves, blinds or a roof's edge cast. `uv_problem` is one texture as a capture would give it, with its answer.
+
+The sky is precomputed radiance transfer in second-order spherical harmonics (Sloan, Kautz and Snyder 2002); 1 is a white surface's light.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from .. import raster, template
+from ..meshes import Mesh, vertex_normals
+from .noise import noise
+from .parameters import sample_parameters
+from .skin import make_skin
+
+TRANSFER_RAYS = 192
+SUN_RAYS = 16
+LAMBERT = np.array([1.0] + [2 / 3] * 3 + [1 / 4] * 5)  # a Lambertian surface's response per coefficient, over pi (Ramamoorthi and Hanrahan 2001)
+
+
+@dataclass(frozen=True)
+class UvProblem:
+    """float32, linear. texture = albedo * shading [S, S, 3]; normal [S, S, 3] tangent space detail; world_normal [S, S, 3] of the smooth head;
+    shadow [S, S]: the blocked share of the sun's light where the surface faces it, 0 elsewhere; sky [9, 3] and sun_colour [3] are the light,
+    sun [3] points to the sun; covered bool [S, S]."""
+
+    texture: np.ndarray
+    albedo: np.ndarray
+    normal: np.ndarray
+    world_normal: np.ndarray
+    shading: np.ndarray
+    shadow: np.ndarray
+    sky: np.ndarray
+    sun: np.ndarray
+    sun_colour: np.ndarray
+    covered: np.ndarray
+
+
+def uv_problem(seed: int, size: int = 512, shadows: str | None = None) -> UvProblem:
+    """A random subject under random light. `shadows`: none, self, leaves, blinds or edge; drawn from the seed if not given."""
+    rng = np.random.default_rng([seed, 7])
+    kind = shadows or str(rng.choice(["self", "leaves", "blinds", "edge"]))
+    skin = make_skin(sample_parameters(seed), size)
+    sky, sun, colour, radius = random_light(rng)
+    if kind == "none":
+        colour = colour * 0
+    shading, shadow, world_normal = bake(template.load(), size, sky, sun, colour, radius, kind, rng)
+    exposure = 0.75 / np.percentile(shading[skin.covered].mean(-1), 90)
+    shading = shading * exposure
+    return UvProblem(skin.diffuse * shading, skin.diffuse, skin.normal, world_normal, shading, shadow,
+                     sky * exposure, sun, colour * exposure, skin.covered)
+
+
+def random_light(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Sky [9, 3] (coefficients of radiance), unit direction to the sun [3], its colour [3], its angular radius in radians."""
+    sky = np.zeros((9, 3))
+    for _ in range(4):  # broad lights from anywhere but below
+        towards = rng.normal(size=3) * [1, 1, 0.6] + [0, -0.3, 0.5]
+        tint = np.exp(rng.normal(0, 0.15, 3)) * rng.uniform(0.1, 0.5)
+        sky += (LAMBERT * sh_basis(towards / np.linalg.norm(towards)))[:, None] * tint
+    sky[0] += 0.2 / 0.282095 * np.exp(rng.normal(0, 0.1, 3))  # keeps the radiance positive
+    azimuth, elevation = rng.uniform(-1.2, 1.2), rng.uniform(0.1, 1.2)
+    sun = np.array([np.sin(azimuth) * np.cos(elevation), -np.cos(azimuth) * np.cos(elevation), np.sin(elevation)])
+    warmth = rng.uniform(0, 1)
+    colour = rng.uniform(0.5, 2.0) * np.array([1.0, 1 - 0.15 * warmth, 1 - 0.4 * warmth])
+    return sky, sun, colour, float(np.exp(rng.uniform(np.log(0.005), np.log(0.12))))
+
+
+def bake(mesh: Mesh, size: int, sky: np.ndarray, sun: np.ndarray, colour: np.ndarray, radius: float, shadows: str,
+         rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Shading [S, S, 3], shadow [S, S] and world normals [S, S, 3] of a mesh in its UVs, bled beyond the charts, under the light of `random_light`."""
+    face, bary = raster.rasterize_uv(mesh, size)
+    covered = face >= 0
+    face, bary = face[covered], bary[covered]
+    points = raster.interpolate(mesh.vertices, mesh.faces, face, bary)
+    normals = raster.interpolate(vertex_normals(mesh), mesh.faces, face, bary)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    caster = raster.RayCaster(mesh)
+    ambient = raster.interpolate(_transfer_of(mesh, caster) @ sky, mesh.faces, face, bary)
+    seen = _sun_seen(caster, points, normals, sun, radius, shadows, rng)
+    cosine = np.maximum(normals @ sun, 0)
+    shading = np.maximum(ambient, 0.005) + (cosine * seen)[:, None] * colour
+    shadow = np.where(cosine > 0.02, 1 - seen, 0) * (colour.sum() > 0)
+
+    def spread(values: np.ndarray) -> np.ndarray:
+        picture = np.zeros((size, size, *values.shape[1:]), np.float32)
+        picture[covered] = values
+        return raster.bleed(picture, covered)
+
+    return spread(shading), spread(shadow), spread(normals)
+
+
+def transfer(points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster, rays: int = TRANSFER_RAYS) -> np.ndarray:
+    """[N, 9]: shading of points [N, 3] per coefficient of the sky's radiance, blocked where the mesh is in the way; an open surface under radiance 1 gets 1."""
+    total = np.zeros((len(points), 9))
+    for direction in fibonacci_sphere(rays):
+        cosine = normals @ direction
+        facing = np.flatnonzero(cosine > 0)
+        free = facing[~caster.blocked(points[facing] + 1e-3 * normals[facing], np.repeat(direction[None], len(facing), 0))]
+        total[free] += cosine[free, None] * sh_basis(direction) * (4 / rays)
+    return total
+
+
+def sh_basis(directions: np.ndarray) -> np.ndarray:
+    """Real orthonormal spherical harmonics to the second order at unit directions [..., 3] -> [..., 9]."""
+    x, y, z = np.moveaxis(np.asarray(directions), -1, 0)
+    return np.stack([0.282095 * np.ones_like(x), 0.488603 * y, 0.488603 * z, 0.488603 * x, 1.092548 * x * y, 1.092548 * y * z,
+                     0.315392 * (3 * z * z - 1), 1.092548 * x * z, 0.546274 * (x * x - y * y)], -1)
+
+
+def fibonacci_sphere(count: int) -> np.ndarray:
+    """Evenly spread unit directions [count, 3]."""
+    i = np.arange(count) + 0.5
+    z, angle = 1 - 2 * i / count, np.pi * (1 + 5**0.5) * i
+    return np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z], -1)
+
+
+def _sun_seen(caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray, sun: np.ndarray, radius: float, shadows: str,
+              rng: np.random.Generator) -> np.ndarray:
+    """The share [N] of the sun's disc that each point sees past the head and past whatever else throws a shadow."""
+    right = np.cross(sun, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, sun)
+    turn, reach = rng.uniform(0, 2 * np.pi), np.sqrt((np.arange(SUN_RAYS) + 0.5) / SUN_RAYS) * radius
+    spiral = np.pi * (1 + 5**0.5) * np.arange(SUN_RAYS) + turn
+    directions = sun + (reach * np.cos(spiral))[:, None] * right + (reach * np.sin(spiral))[:, None] * up
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    seen = np.zeros((SUN_RAYS, len(points)), bool)
+    if shadows == "none":
+        return np.ones(len(points))
+    facing = np.flatnonzero(normals @ sun > 0)
+    for ray, direction in enumerate(directions):
+        seen[ray, facing] = ~caster.blocked(points[facing] + 1e-3 * normals[facing], np.repeat(direction[None], len(facing), 0))
+    if shadows != "self":
+        away = rng.uniform(0.25, 1.0)  # metres to what throws the shadow
+        at = points[None, facing] + away * directions[:, None]
+        seen[:, facing] &= ~_in_the_way(at @ right, at @ up, shadows, rng)
+    share = np.zeros(len(points))
+    share[facing] = seen[:, facing].mean(0)
+    return share
+
+
+def _in_the_way(x: np.ndarray, y: np.ndarray, kind: str, rng: np.random.Generator) -> np.ndarray:
+    """Whether an opaque sheet has no hole at (x, y) [...] in metres, in a plane across the sunlight."""
+    turn, shift = rng.uniform(0, np.pi), rng.uniform(-0.05, 0.05)
+    along = (x - x.mean()) * np.cos(turn) + (y - y.mean()) * np.sin(turn) + shift
+    if kind == "edge":
+        return along > 0
+    if kind == "blinds":
+        period = rng.uniform(0.03, 0.09)
+        return (along / period) % 1 < rng.uniform(0.3, 0.6)
+    flat = np.stack([x.ravel() * 1000, y.ravel() * 1000, np.zeros(x.size)], -1)
+    leaves = noise(flat, rng.uniform(18, 60), rng, smooth=True) + 0.35 * noise(flat, 9.0, rng, smooth=True)
+    return (leaves > rng.uniform(-0.4, 0.5)).reshape(x.shape)
+
+
+@lru_cache(maxsize=2)
+def _template_transfer() -> np.ndarray:
+    mesh = template.load()
+    return transfer(mesh.vertices, vertex_normals(mesh), raster.RayCaster(mesh))
+
+
+def _transfer_of(mesh: Mesh, caster: raster.RayCaster) -> np.ndarray:
+    """Per vertex [V, 9]; the template's is computed once per process."""
+    same = template.load()
+    if mesh.vertices.shape == same.vertices.shape and np.array_equal(mesh.vertices, same.vertices):
+        return _template_transfer()
+    return transfer(mesh.vertices, vertex_normals(mesh), caster)

@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Baked light whose answer is known: a white sky, a sun over a plane and over a plane with a sphere above it."""
+
+import numpy as np
+import trimesh
+
+from core.meshes import Mesh
+from core.raster import RayCaster
+from core.synthetic import light
+
+WHITE_SKY = np.zeros((9, 3))
+WHITE_SKY[0] = 1 / 0.282095
+
+
+def floor(half: float = 0.1, sphere: float | None = None) -> Mesh:
+    """A square floor facing +Z that fills the UV square, if wanted below a sphere of that height, whose UVs lie in one point."""
+    vertices = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * half
+    faces, uvs = np.array([[0, 1, 2], [0, 2, 3]]), np.array([[0, 0], [1, 0], [1, 1], [0, 1], [-1, -1]], float)
+    face_uvs = faces
+    if sphere:
+        ball = trimesh.creation.icosphere(4, radius=half / 4)
+        vertices = np.concatenate([vertices, ball.vertices + [0, 0, sphere]])
+        faces = np.concatenate([faces, ball.faces + 4])
+        face_uvs = np.concatenate([face_uvs, np.full_like(ball.faces, 4)])
+    return Mesh(vertices, faces, uvs, face_uvs)
+
+
+def test_an_open_surface_under_a_white_sky_is_shaded_one_whichever_way_it_faces():
+    ball = trimesh.creation.icosphere(2, radius=0.1)
+    found = light.transfer(ball.vertices, ball.vertices / 0.1, RayCaster(Mesh(ball.vertices, ball.faces)), rays=512) @ WHITE_SKY
+    assert np.allclose(found, 1, atol=0.03)
+
+
+def test_one_direction_of_the_sky_is_lambert_s_answer_to_it():
+    ball = trimesh.creation.icosphere(2, radius=0.1)
+    normals = ball.vertices / 0.1
+    found = light.transfer(ball.vertices, normals, RayCaster(Mesh(ball.vertices, ball.faces)), rays=512)
+    assert np.allclose(found, light.sh_basis(normals) * light.LAMBERT, atol=0.03)
+
+
+def test_the_sun_on_a_floor_follows_the_cosine_and_casts_no_shadow():
+    rng, sun = np.random.default_rng(0), np.array([0.6, 0, 0.8])
+    shading, shadow, normals = light.bake(floor(), 64, 0 * WHITE_SKY, sun, np.array([1.0, 0.5, 0.25]), 0.01, "self", rng)
+    assert np.allclose(shading, 0.8 * np.array([1.0, 0.5, 0.25]) + 0.005, atol=1e-3)
+    assert shadow.max() == 0 and np.allclose(normals, [0, 0, 1])
+
+
+def test_a_sphere_shades_a_disc_of_its_size_where_the_sun_says_so():
+    rng, sun = np.random.default_rng(0), np.array([0.6, 0, 0.8])
+    size, half, height = 128, 0.1, 0.08
+    _, shadow, _ = light.bake(floor(half, height), size, WHITE_SKY, sun, np.ones(3), 0.002, "self", rng)
+    row, column = np.nonzero(shadow > 0.5)
+    x, y = ((column + 0.5) / size * 2 - 1) * half, (1 - (row + 0.5) / size * 2) * half
+    assert abs(x.mean() + height * 0.6 / 0.8) < 0.002 and abs(y.mean()) < 0.002
+    area = len(row) * (2 * half / size) ** 2
+    assert np.isclose(area, np.pi * (half / 4) ** 2 / 0.8, rtol=0.05)  # the disc seen obliquely
+
+
+def test_a_larger_sun_softens_the_shadow_s_edge():
+    sun = np.array([0.6, 0, 0.8])
+    soft = [((s > 0.01) & (s < 0.99)).mean() for s in (light.bake(floor(0.1, 0.08), 96, WHITE_SKY, sun, np.ones(3), radius, "self", np.random.default_rng(0))[1]
+                                                       for radius in (0.002, 0.15))]
+    assert soft[1] > 3 * soft[0]
+
+
+def test_a_problem_holds_its_own_answer_and_repeats():
+    problem, again = light.uv_problem(3, 128, "leaves"), light.uv_problem(3, 128, "leaves")
+    assert np.array_equal(problem.texture, again.texture)
+    assert np.allclose(problem.texture, problem.albedo * problem.shading)
+    inside = problem.covered
+    assert 0.02 < (problem.shadow[inside] > 0.5).mean() < 0.9 and 0 <= problem.shadow.min() and problem.shadow.max() <= 1
+    # where nothing blocks the sun, shading is the sky's and the whole sun's; where all is blocked, it is darker than that by the sun's share
+    cosine = np.maximum(problem.world_normal @ problem.sun, 0)[..., None] * problem.sun_colour
+    open_sky = problem.shading - cosine * (1 - problem.shadow[..., None])
+    lit = inside & (cosine[..., 0] > 0.1)
+    assert (open_sky[lit] > -1e-4).all()
+    assert light.uv_problem(3, 128, "none").shadow.max() == 0
