@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""frames + cameras + head -> delit/NNNNN.png, the frames without most of their light (sRGB, 16 bit).
+
+Which frames: those the chosen delighter serves. Where it also says which light it made up for, delit/shadow/NNNNN.png
+holds that (grey, 8 bit), for the shadow_mask stage.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from .. import images
+from ..capture import Capture, replacing_folder
+from ..messages import Reporter
+from ..settings import Settings
+from .contract import Delighter
+from .folder import folder
+from .none import none
+from .shading import shading
+
+DELIGHTERS: dict[str, Delighter] = {"none": none, "folder": folder, "shading": shading}
+
+
+def run(capture: Capture, settings: Settings, report: Reporter) -> None:
+    """Runs the delighter of `settings.delight.delighter` and replaces the folder delit/ by what it yields."""
+    shown = []
+    with replacing_folder(capture.delit) as delit:
+        for result in DELIGHTERS[settings.delight.delighter](capture, settings, report):
+            stem = Path(result.view.name).stem
+            images.write_srgb(delit / f"{stem}.png", result.image, bits=16)
+            if result.shadow is not None:
+                images.write_data(delit / "shadow" / f"{stem}.png", result.shadow)
+            shown.append((result.view, _small(images.read_srgb(result.view.path)), _small(result.image)))
+            report.check()
+    report.figure("delighter", settings.delight.delighter)
+    report.figure("delit_views", len(shown))
+    middle = shown[:: max(1, len(shown) // 4)][:4]
+    images.write_srgb(capture.picture("delight", "views"), np.vstack([np.hstack([pair[i] for pair in middle]) for i in (1, 2)]))
+
+
+def _small(image: np.ndarray, height: int = 320) -> np.ndarray:
+    return images.resize(image, round(image.shape[1] * height / image.shape[0]), height)

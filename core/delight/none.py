@@ -1,0 +1,22 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The delighter that leaves the light in: for evenly lit captures, and to see what the others are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from .. import images
+from ..capture import Capture
+from ..messages import Reporter
+from ..settings import Settings
+from ..views import read_views
+from .contract import Delit
+
+
+def none(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
+    """The selected frames as they are."""
+    views = read_views(capture, selected_only=True)
+    for i, view in enumerate(views):
+        report.progress(i, len(views), "Copying frames")
+        yield Delit(view, images.read_srgb(view.path))

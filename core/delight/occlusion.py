@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which pixels of a frame the sun reaches: two possible shadings, one picture.
+
+Away from the edges of shadows the share of the sun is 0 or 1 and the skin's detail is untouched; in a band along them
+it is what the pixel's colour asks for, given the albedo on both sides, so that a penumbra or a blurred edge leaves no halo.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from .light import log_likelihood
+
+ALBEDO_PX = 0.03  # scale over which skin's albedo is taken for even, as a share of the frame's longer side
+COHERENCE = 3.0  # weight of the neighbourhood's opinion, in log odds
+BAND_PX = 0.004  # half width of the band along an edge
+
+
+def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free: np.ndarray, head: np.ndarray) -> np.ndarray:
+    """[H, W] in [0, 1]: how much of the sun each pixel gets.
+
+    linear, ambient, direct [H, W, 3]: the frame, the skin's colour under the sky, and what the sun would add; free [H, W]: 1 where
+    the head itself leaves the sun visible; head bool [H, W].
+    """
+    side = max(head.shape)
+    log = np.log(np.maximum(linear, 1e-3)).astype(np.float32)
+    shaded = np.log(np.maximum(ambient, 1e-4)).astype(np.float32)
+    sunlit = np.log(np.maximum(ambient + direct, 1e-4)).astype(np.float32)
+    prior = _log_odds(0.05 + 0.6 * cv2.GaussianBlur(free.astype(np.float32), (0, 0), 0.004 * side))
+    albedo = np.zeros_like(log)
+    share = np.full(head.shape, 0.5, np.float32)
+    for i in range(6):
+        evidence = np.clip(log_likelihood(log - sunlit - albedo) - log_likelihood(log - shaded - albedo), -12, 12) + prior
+        for _ in range(4):
+            around = _mean_over(share, head, 0.004 * side)
+            share = (1 / (1 + np.exp(-np.clip(evidence + COHERENCE * (2 * around - 1), -30, 30)))).astype(np.float32)
+        sharp = (share > 0.5)[..., None]
+        deviation = np.clip(log - np.where(sharp, sunlit, shaded), -0.8, 0.8)
+        albedo = _mean_over(deviation, head, ALBEDO_PX * side)
+    return _soften((share > 0.5) & head, log, np.where(sharp, sunlit, shaded), ambient, direct, head, max(1.5, BAND_PX * side))
+
+
+def _soften(lit: np.ndarray, log, log_light, ambient, direct, head, band: float) -> np.ndarray:
+    """The hard decision `lit` with its edges solved for: least squares of colour = albedo * (ambient + share * direct), relative to the noise of bright pixels."""
+    inner = cv2.distanceTransform(lit.astype(np.uint8), cv2.DIST_L2, 3)
+    outer = cv2.distanceTransform((~lit).astype(np.uint8), cv2.DIST_L2, 3)
+    edge = (inner + outer <= band + 0.5) & head
+    sure = head & ~edge
+    albedo = np.exp(_mean_over(log - log_light, sure, 2 * band))
+    near, far = ambient * albedo, direct * albedo
+    share = ((np.exp(log) - near) * far).sum(-1) / np.maximum((far * far).sum(-1), 1e-8)
+    return np.where(edge, np.clip(share, 0, 1), lit).astype(np.float32)
+
+
+def _mean_over(values: np.ndarray, where: np.ndarray, sigma: float) -> np.ndarray:
+    """Gaussian mean of [H, W(, C)] over the pixels `where`."""
+    weight = where.astype(np.float32)
+    total = cv2.GaussianBlur(np.asarray(values * (weight if values.ndim == 2 else weight[..., None]), np.float32), (0, 0), sigma)
+    norm = np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-4)
+    return total / (norm if values.ndim == 2 else norm[..., None])
+
+
+def _log_odds(share: np.ndarray) -> np.ndarray:
+    return np.log(share / (1 - share))

@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the views say about the head's surface: its smoothed normals, and the colour of each vertex over all views."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sparse
+
+from .. import images, template
+from ..meshes import Mesh, vertex_normals
+from ..messages import Problem, Reporter
+from ..raster import RayCaster, sample, visible_from
+from ..views import View
+
+GRAZING = 0.35  # cosine of the view angle under which a vertex's colour is not trusted
+NOT_SKIN = ("lips", "brows", "eyes")
+
+
+def smooth_normals(mesh: Mesh, rounds: int = 2) -> np.ndarray:
+    """Unit vertex normals [V, 3], averaged with their neighbours: a scan's noise would show as light."""
+    normals = vertex_normals(mesh)
+    edges = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
+    count = len(mesh.vertices)
+    graph = sparse.coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), (count, count)).tocsr()
+    graph = graph + graph.T + sparse.identity(count)
+    for _ in range(rounds):
+        normals = graph @ normals
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return normals
+
+
+def vertex_colours(mesh: Mesh, normals: np.ndarray, caster: RayCaster, views: list[View], report: Reporter) -> tuple[np.ndarray, np.ndarray]:
+    """Linear colour [V, 3], the median over the views that see a vertex well (so that highlights, which move, drop out), and their number [V].
+
+    Raises Problem when hardly any vertex is seen.
+    """
+    seen_colours = np.full((len(views), len(mesh.vertices), 3), np.nan, np.float32)
+    for i, view in enumerate(views):
+        report.progress(i, 4 * len(views), "Reading the skin's colour")
+        towards = view.centre - mesh.vertices
+        cosine = (towards * normals).sum(1) / np.linalg.norm(towards, axis=1)
+        pixels, _ = view.project(mesh.vertices)
+        inside = ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)
+        candidates = np.flatnonzero(inside & (cosine > GRAZING))
+        candidates = candidates[visible_from(caster, mesh.vertices[candidates], normals[candidates], view.centre)]
+        srgb = sample(images.read_srgb(view.path), pixels[candidates])
+        candidates, srgb = candidates[srgb.max(1) < 0.99], srgb[srgb.max(1) < 0.99]  # what is burnt out has lost its colour
+        seen_colours[i, candidates] = images.srgb_to_linear(srgb)
+    count = np.isfinite(seen_colours[..., 0]).sum(0)
+    if (count > 0).sum() < 100:
+        raise Problem("The selected frames hardly see the registered head.", "Look at the pictures of the stages cameras and registration in report.html.")
+    colours = np.zeros((len(mesh.vertices), 3))
+    colours[count > 0] = np.nanmedian(seen_colours[:, count > 0], 0)
+    return colours, count
+
+
+def skin_weights(mesh: Mesh) -> np.ndarray:
+    """[V]: 1 on skin, 0 on lips, brows and eyes, where the mesh has the template's topology; else 1 everywhere."""
+    if mesh.uvs is None or mesh.faces.shape != template.load().faces.shape:
+        return np.ones(len(mesh.vertices))
+    skin = template.mask("skin", 512)
+    for name in NOT_SKIN:
+        skin = skin * (1 - template.mask(name, 512))
+    uv = np.zeros((len(mesh.vertices), 2))
+    uv[mesh.faces] = mesh.uvs[mesh.face_uvs]
+    return sample(skin, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512)
