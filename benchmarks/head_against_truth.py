@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Distance of a capture's head (or scan) to the true mesh, in the facial skin, after a similarity of the camera centres.
+
+    python benchmarks/head_against_truth.py CAPTURE TRUTH MESH [--surface head.obj|scan.ply]
+
+TRUTH holds cameras.json ({"cameras": [{"frame", "matrix_world"}]}, Blender's convention) and face/NNNN.png; MESH is a
+glTF in that world turned Y up: (x, -z, y) of it is the world of cameras.json.
+"""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from scipy.spatial import cKDTree
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from core import images, meshes, raster  # noqa: E402
+from core.capture import Capture  # noqa: E402
+from core.registration.alignment import similarity  # noqa: E402
+from core.views import read_views  # noqa: E402
+
+
+def compare(capture: Capture, truth: Path, mesh: Path, surface: str = "head.obj") -> dict:
+    """Median, 90th and 95th percentile in mm over the face's pixels, as placed by the cameras and after ICP beside it."""
+    views = read_views(capture)
+    frames = {f["name"]: f["video_frame"] for f in json.loads(capture.frames_json.read_text())["frames"]}
+    cameras = {c["frame"]: np.array(c["matrix_world"])[:3, 3] for c in json.loads((truth / "cameras.json").read_text())["cameras"]}
+    shared = [v for v in views if frames[v.name] in cameras]
+    ours, theirs = np.stack([v.centre for v in shared]), np.stack([cameras[frames[v.name]] for v in shared])
+    pose = similarity(theirs, ours, np.ones(len(ours)))
+
+    points, normals = _surface(mesh)
+    points, normals = pose.apply(points), normals @ pose.rotation.T
+    ours_mesh = meshes.read_obj(capture.root / surface) if surface.endswith(".obj") else meshes.read_ply(capture.root / surface)
+    hits = _face_points(ours_mesh, shared, frames, truth)
+    tree = cKDTree(points)
+    figures = {"camera_centres_mm": _round(1e3 * np.median(np.linalg.norm(pose.apply(theirs) - ours, axis=1))), "points": len(hits)}
+    figures["by_cameras"] = _percentiles(_distances(hits, tree, points, normals))
+    for _ in range(20):
+        index = tree.query(hits, workers=-1)[1]
+        gap = ((hits - points[index]) * normals[index]).sum(1)
+        hits = _moved(hits, points[index], normals[index], np.abs(gap) < 3 * np.median(np.abs(gap)))
+    figures["after_icp"] = _percentiles(_distances(hits, tree, points, normals))
+    return figures
+
+
+def _surface(mesh: Path, count: int = 1_500_000) -> tuple[np.ndarray, np.ndarray]:
+    """Points and normals over the true surface, in the world of cameras.json."""
+    loaded = trimesh.load(mesh, force="mesh", process=False)
+    points, face = trimesh.sample.sample_surface(loaded, count, seed=0)
+    return (np.asarray(x)[:, [0, 2, 1]] * [1, -1, 1] for x in (points, loaded.face_normals[face]))
+
+
+def _face_points(mesh: meshes.Mesh, views: list, frames: dict, truth: Path) -> np.ndarray:
+    """Where the pixels of the facial-skin masks hit our surface [N, 3]."""
+    caster, hits = raster.RayCaster(mesh), []
+    for view in views:
+        path = truth / "face" / f"{frames[view.name]:04d}.png"
+        if path.is_file():
+            _, _, distance = raster.render_view(caster, view, 0.5)
+            mask = images.resize(images.read_mask(path), *distance.shape[::-1]) > 0.5
+            y, x = np.nonzero(mask & np.isfinite(distance))
+            hits.append(view.centre + view.rays(np.stack([x, y], -1) * 2 + 1.0) * distance[y, x, None])
+    return np.concatenate(hits)
+
+
+def _distances(hits, tree, points, normals):
+    distance, index = tree.query(hits, workers=-1)
+    plane = np.abs(((hits - points[index]) * normals[index]).sum(1))
+    return np.where(distance < 0.002, plane, distance)  # near: past the sampling of the surface
+
+
+def _moved(hits, targets, normals, used):
+    """One point-to-plane step of a rigid ICP."""
+    middle = hits.mean(0)
+    jacobian = np.concatenate([np.cross(hits - middle, normals), normals], 1)[used]
+    turn = np.linalg.lstsq(jacobian, ((targets - hits) * normals).sum(1)[used], rcond=None)[0]
+    return hits + np.cross(turn[:3], hits - middle) + turn[3:]
+
+
+def _percentiles(distances: np.ndarray) -> dict:
+    return {f"{name}_mm": _round(1e3 * np.percentile(distances, percent)) for name, percent in (("median", 50), ("p90", 90), ("p95", 95))}
+
+
+def _round(value: float) -> float:
+    return round(float(value), 3)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("capture", type=Path)
+    parser.add_argument("truth", type=Path)
+    parser.add_argument("mesh", type=Path)
+    parser.add_argument("--surface", default="head.obj")
+    args = parser.parse_args()
+    print(json.dumps(compare(Capture(args.capture), args.truth, args.mesh, args.surface), indent=1))
+
+
+if __name__ == "__main__":
+    main()
