@@ -194,6 +194,8 @@ def test_the_last_ten_masks_are_kept(addon, capture):
 @pytest.mark.parametrize("on", ["HEAD", "SHEET"])
 def test_painting_sets_everything_up_and_leaving_puts_it_back(addon, capture, on):
     bpy.ops.wildcap.bring_in_head()
+    for mode in ('TEXTURE_PAINT', 'OBJECT'):  # Blender gives the mode its first brush
+        bpy.ops.object.mode_set(mode=mode)
     paint = bpy.context.scene.tool_settings.image_paint
     before = {name: getattr(paint, name) for name in ("mode", "canvas", "use_stencil_layer", "stencil_image", "invert_stencil", "brush")}
     objects = {o.name for o in bpy.data.objects}

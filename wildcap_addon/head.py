@@ -37,6 +37,22 @@ def bring_in(context, item) -> bpy.types.Object:
     return head
 
 
+def look_at(context, head: bpy.types.Object) -> None:
+    """Turns the window's 3D views to the face, alone (Local View): a start-up cube would swallow a head of real size."""
+    if bpy.app.background or context.window is None:
+        return
+    for area in context.window.screen.areas:
+        if area.type == 'VIEW_3D':
+            region = next(r for r in area.regions if r.type == 'WINDOW')
+            with context.temp_override(area=area, region=region, selected_objects=[head]):
+                bpy.ops.view3d.view_axis(type='FRONT')
+                if area.spaces.active.local_view is None and len(context.view_layer.objects) > 1:
+                    bpy.ops.view3d.localview(frame_selected=True)
+                else:
+                    bpy.ops.view3d.view_selected()
+            area.spaces.active.shading.color_type = 'TEXTURE'
+
+
 def read_mesh(context, capture: Capture) -> bpy.types.Mesh:
     """head.obj as mesh data: metres, +Z up, its one UV map named UVMap, smooth."""
     before = set(context.scene.objects)

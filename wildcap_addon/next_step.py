@@ -31,13 +31,14 @@ class Step:
     icon: str
 
 
+BEFORE_MASK = stages.NAMES[:stages.NAMES.index(stages.MASK_STAGE) + 1]
 SET_UP = Step("The solver is not set up on this machine.", "Set Up Solver", "wildcap.use_python", 'PREFERENCES')
 
 
 def next_step(facts: Facts) -> Step:
     """The one thing to do now. A stale stage never drags the artist back before the mask; its row says so."""
     if facts.painting:
-        return Step("White paint marks shadow; Ctrl paints skin.", "Save Mask and Leave", "wildcap.finish_mask", 'CHECKMARK')
+        return Step("Red is shadow. Paint adds, Ctrl takes away.", "Save Mask and Leave", "wildcap.finish_mask", 'CHECKMARK')
     if facts.running:
         return Step("Solving ..." if facts.running == "solve" else "Reconstructing ...", "Cancel", "wildcap.cancel", 'CANCEL')
     if not facts.has_capture:
@@ -51,13 +52,12 @@ def next_step(facts: Facts) -> Step:
 
 
 def _step_of(facts: Facts, status: Status) -> Step:
-    before_mask = stages.NAMES[:stages.NAMES.index(stages.MASK_STAGE) + 1]
     # A capture without a source (the sample head) came finished up to its mask; there is nothing to reconstruct it from.
-    missing = [name for name in before_mask if status.stages[name] == "to do"] if status.source or not status.has_head else []
+    missing = [name for name in BEFORE_MASK if status.stages[name] == "to do"] if status.source or not status.has_head else []
     if missing and not status.source:
         return Step("This capture has no video yet.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
     if missing:
-        begun = len(missing) < len(before_mask)
+        begun = len(missing) < len(BEFORE_MASK)
         state = f"Stopped before {stages.by_name(missing[0]).label}." if begun else "The video is chosen."
         return Step(state, "Continue Reconstruction" if begun else "Reconstruct", "wildcap.reconstruct", 'MESH_MONKEY') if facts.has_python else SET_UP
     if facts.head_time < status.head_time:

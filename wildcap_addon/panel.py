@@ -9,7 +9,7 @@ from . import captures, jobs, next_step, preferences, problems, status
 from .base_panel import WildcapPanel
 from .paint import session
 
-STATE_ICONS = {"done": 'CHECKMARK', "absent": 'CHECKMARK', "stale": 'FILE_REFRESH', "to do": 'RADIOBUT_OFF', "running": 'PLAY'}
+STATE_ICONS = {"done": 'CHECKMARK', "absent": 'CHECKMARK', "stale": 'FILE_REFRESH', "to do": 'RADIOBUT_OFF', "not needed": 'BLANK1', "running": 'PLAY'}
 
 
 class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
@@ -23,8 +23,7 @@ class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
         if item is not None:
             layout.label(text=item.name, icon='USER')
         width = context.region.width if context.region else 300
-        for line in problems.wrapped(step.state, width):
-            layout.label(text=line)
+        problems.draw_text(layout, step.state, width)
         job = jobs.of(root)
         if job is not None:
             draw_job(layout, job)
@@ -40,6 +39,7 @@ class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
 
 class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
     bl_label = "Stages"
+    bl_order = 5
     bl_parent_id = "WILDCAP_PT_main"
 
     @classmethod
@@ -53,6 +53,8 @@ class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
         column = self.layout.column(align=True)
         for stage in stages.STAGES:
             state = "running" if job and job.stage == stage.name else found.stages.get(stage.name, "to do") if found else "to do"
+            if state == "to do" and found and not found.source and found.has_head and stage.name in next_step.BEFORE_MASK:
+                state = "not needed"  # the sample head came without what it was made from
             row = column.row()
             row.label(text=stage.label, icon=STATE_ICONS[state])
             row.label(text=_words(state, found.seconds.get(stage.name) if found else None))

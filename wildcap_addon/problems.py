@@ -2,6 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What went wrong last, and what to do about it: kept per capture until something works, shown under the next step."""
 
+import textwrap
+
+import bpy
+
 from ..core.messages import Problem
 
 _problems: dict[str, Problem] = {}  # capture folder ('' for none) -> its last problem
@@ -24,16 +28,22 @@ def draw(layout, problem: Problem | None, width: int) -> None:
     if problem is None:
         return
     box = layout.box()
-    box.alert = True
-    for i, line in enumerate(wrapped(problem.problem, width)):
-        box.label(text=line, icon='ERROR' if i == 0 else 'BLANK1')
-    box.alert = False
-    for i, line in enumerate(wrapped(problem.remedy, width)):
-        box.label(text=line, icon='INFO' if i == 0 else 'BLANK1')
+    column = box.column()
+    column.alert = True
+    draw_text(column, problem.problem, width, 'ERROR')
+    draw_text(box.column(), problem.remedy, width, 'INFO')
+
+
+def draw_text(layout, text: str, width: int, icon: str = 'NONE') -> None:
+    """A text over as many lines as it needs."""
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    lines = wrapped(text, width - (30 if icon != 'NONE' else 0))
+    for i, line in enumerate(lines):
+        column.label(text=line, icon=icon if i == 0 else 'BLANK1' if icon != 'NONE' else 'NONE')
 
 
 def wrapped(text: str, width: int) -> list[str]:
     """Lines that fit a panel `width` pixels wide; long words (paths) are broken, nothing is cut."""
-    import textwrap
-
-    return textwrap.wrap(text, max(20, (width - 60) // 7)) or [""]
+    scale = bpy.context.preferences.system.ui_scale or 1.0  # 0 without a window
+    return textwrap.wrap(text, max(20, int((width / scale - 50) / 6))) or [""]

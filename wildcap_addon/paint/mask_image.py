@@ -29,9 +29,7 @@ def load(capture: Capture) -> bpy.types.Image:
     image = bpy.data.images.load(str(path))
     image.name = name
     image.colorspace_settings.name = 'Non-Color'
-    if not image.has_data:
-        image.pixels  # noqa: B018  (reads the file)
-    if not image.has_data or not image.size[0]:
+    if not image.size[0]:  # asking for the size reads the file
         bpy.data.images.remove(image)
         raise Problem(f"{path} is not a picture that can be read.", "Restore it from mask_history, or delete it to start from the proposal.")
     # The proposal is never overwritten: should Blender save the image itself, it goes where masks of artists go.

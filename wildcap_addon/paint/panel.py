@@ -11,6 +11,7 @@ from . import session
 
 class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
     bl_label = "Painting"
+    bl_order = 1
     bl_parent_id = "WILDCAP_PT_main"
 
     @classmethod

@@ -5,7 +5,7 @@
 import bpy
 
 SHADING = {"type": 'SOLID', "light": 'FLAT', "color_type": 'TEXTURE'}
-TINT_OPACITY = 0.7
+TINT_OPACITY = 0.45
 
 
 def set_up(screen: bpy.types.Screen) -> list[dict]:

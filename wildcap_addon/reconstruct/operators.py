@@ -50,7 +50,11 @@ class WILDCAP_OT_bring_in_head(BaseOperator, bpy.types.Operator):
         return context.mode == 'OBJECT'
 
     def work(self, context):
-        head.bring_in(context, captures.require(context))
+        item = captures.require(context)
+        new = captures.head(context, item) is None
+        obj = head.bring_in(context, item)
+        if new:
+            head.look_at(context, obj)
 
 
 CLASSES = (WILDCAP_OT_reconstruct, WILDCAP_OT_cancel, WILDCAP_OT_bring_in_head)

@@ -45,12 +45,11 @@ class WILDCAP_OT_open_sample_head(BaseOperator, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     def work(self, context):
-        item = captures.add(context, copy_sample(preferences.captures_folder()).root)
+        captures.add(context, copy_sample(preferences.captures_folder()).root)
         if context.mode != 'OBJECT':
             bpy.ops.object.mode_set(mode='OBJECT')
         bpy.ops.wildcap.bring_in_head()
         bpy.ops.wildcap.assemble_material()
-        _look_at(context, captures.require_head(context, item))
 
 
 def interpreter(path: Path) -> Path:
@@ -91,19 +90,6 @@ def copy_sample(folder: Path) -> Capture:
         except shutil.Error as error:
             raise storage_problem(OSError(*error.args[0][0][2:]), capture.root) from error
     return capture
-
-
-def _look_at(context, head) -> None:
-    """Turns the 3D views of the window to the head's face."""
-    if bpy.app.background or context.window is None:
-        return
-    for area in context.window.screen.areas:
-        if area.type == 'VIEW_3D':
-            region = next(r for r in area.regions if r.type == 'WINDOW')
-            with context.temp_override(area=area, region=region):
-                bpy.ops.view3d.view_axis(type='FRONT')
-                bpy.ops.view3d.view_selected()
-            area.spaces.active.shading.color_type = 'TEXTURE'
 
 
 CLASSES = (WILDCAP_OT_use_python, WILDCAP_OT_open_sample_head)

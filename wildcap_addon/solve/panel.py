@@ -11,6 +11,7 @@ from . import preview
 
 class WILDCAP_PT_preview(WildcapPanel, bpy.types.Panel):
     bl_label = "Preview"
+    bl_order = 2
     bl_parent_id = "WILDCAP_PT_main"
 
     @classmethod

@@ -1,0 +1,187 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plays an artist in a real Blender window: moves the mouse, clicks, types, and looks at what the screen shows.
+
+A flow is a generator that yields seconds to wait: between two events Blender must get its event loop back, so one
+application timer runs the generator. Positions are window pixels from the lower left.
+"""
+
+import os
+import subprocess
+import sys
+import time
+import traceback
+from pathlib import Path
+
+import bpy
+
+OUT = Path(os.environ["WILDCAP_GUI_OUT"])
+TICK_S = 0.04
+STARTED = time.monotonic()
+
+
+def play(flow, limit_s: float = 600) -> None:
+    """Runs the generator to its end and leaves Blender: exit code 0 and FLOW PASSED, or 1, a traceback and a screenshot."""
+    bpy.context.preferences.view.show_splash = False
+    bpy.context.preferences.use_preferences_save = False
+
+    def step():
+        try:
+            if time.monotonic() - STARTED > limit_s:
+                raise TimeoutError(f"the flow took longer than {limit_s} s")
+            return next(flow) or TICK_S
+        except StopIteration:
+            say("FLOW PASSED")
+            leave(0)
+        except BaseException:
+            traceback.print_exc(file=sys.stdout)
+            screenshot("failure")
+            leave(1)
+
+    bpy.app.timers.register(step, first_interval=1.0, persistent=True)
+
+
+def leave(code: int) -> None:
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)  # wm.quit_blender always gives 0
+
+
+def say(*words) -> None:
+    print("|", f"{time.monotonic() - STARTED:6.1f} s", *words, flush=True)
+
+
+def screenshot(name: str) -> Path:
+    """What the X server shows; bpy.ops.screen.screenshot is black with a software renderer."""
+    path = OUT / f"{name}.png"
+    subprocess.run(["import", "-silent", "-window", "root", str(path)], timeout=30, check=False)
+    return path
+
+
+def window():
+    return bpy.context.window_manager.windows[0]
+
+
+def view():
+    return next(area for area in window().screen.areas if area.type == 'VIEW_3D')
+
+
+def region(kind: str = 'WINDOW'):
+    return next(r for r in view().regions if r.type == kind)
+
+
+def in_view(kind: str = 'WINDOW'):
+    return bpy.context.temp_override(window=window(), area=view(), region=region(kind))
+
+
+def event(kind: str, value: str, position, **keys) -> None:
+    window().event_simulate(type=kind, value=value, x=round(position[0]), y=round(position[1]), **keys)
+
+
+def move(position):
+    event('MOUSEMOVE', 'NOTHING', position)
+    yield
+
+
+def click(position):
+    yield from move(position)
+    yield from move((position[0] + 1, position[1]))
+    event('LEFTMOUSE', 'PRESS', position)
+    yield
+    event('LEFTMOUSE', 'RELEASE', position)
+    yield 0.2
+
+
+def key(kind: str, **keys):
+    """A key pressed over the middle of the 3D view."""
+    event(kind, 'PRESS', middle(), **keys)
+    event(kind, 'RELEASE', middle(), **keys)
+    yield 0.4
+
+
+def stroke(points, **keys):
+    """The left button held down along the points."""
+    first, *others = points
+    yield from move(first)
+    event('LEFTMOUSE', 'PRESS', first, **keys)
+    yield
+    for point in others:
+        event('MOUSEMOVE', 'NOTHING', point, **keys)
+        yield 0.02
+    event('LEFTMOUSE', 'RELEASE', others[-1], **keys)
+    yield 0.5
+
+
+def middle():
+    r = region()
+    return r.x + r.width / 2, r.y + r.height / 2
+
+
+def park():
+    """Takes the cursor off every button: a hovered one keeps its old state."""
+    x, y = middle()
+    yield from move((x - 200, y))
+    yield from move((x - 202, y))
+    yield 0.3
+
+
+def open_tab(name: str):
+    """Shows the sidebar on one tab; its tabs exist only after it was drawn once."""
+    view().spaces.active.show_region_ui = True
+    for _ in range(100):
+        yield
+        sidebar = region('UI')
+        if sidebar.width > 10:
+            try:
+                sidebar.active_panel_category = name
+            except TypeError:
+                pass
+            if sidebar.active_panel_category == name:
+                sidebar.tag_redraw()
+                yield 0.3
+                return
+            sidebar.tag_redraw()
+    raise AssertionError(f"the tab {name} never appeared")
+
+
+def press(command: str, options: str = ""):
+    """Clicks the first button of the sidebar that runs an operator, e.g. wildcap.solve, with `options` in its call."""
+    position = yield from find(command, options)
+    yield from click(position)
+    yield from park()
+
+
+def find(command: str, options: str = ""):
+    """Where that button is: the cursor goes down the sidebar and Blender says what would be copied at each place."""
+    for _ in range(3):
+        sidebar = region('UI')
+        for y in range(sidebar.y + sidebar.height - 4, sidebar.y + 4, -7):
+            for x in (sidebar.x + sidebar.width * 0.25, sidebar.x + sidebar.width * 0.75):  # two buttons may share a row
+                yield from move((x, y))
+                text = under_cursor()
+                if command in text and options in text:
+                    yield
+                    return x, y - 3
+        yield 0.5
+    raise AssertionError(f"there is no button for {command} {options} in the sidebar")
+
+
+def under_cursor() -> str:
+    """The Python call of the button under the cursor, '' if there is none."""
+    manager = bpy.context.window_manager
+    manager.clipboard = ""
+    with in_view('UI'):
+        if bpy.ops.ui.copy_python_command_button.poll():
+            try:
+                bpy.ops.ui.copy_python_command_button()
+            except RuntimeError:
+                pass
+    return manager.clipboard
+
+
+def until(condition, what: str, limit_s: float = 60):
+    """Waits until `condition()` is true."""
+    end = time.monotonic() + limit_s
+    while not condition():
+        assert time.monotonic() < end, f"{what} did not happen within {limit_s} s"
+        yield 0.2

@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs the flows, each in a Blender with an empty profile on a virtual screen; ends with the line N passed, N failed.
+
+    python3 suite.py ZIP [FLOW ...]        inside the chroot; a flow is flows/NAME.py
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+OUT = HERE.parents[1] / "dist" / "gui"
+SIZE = (1280, 800)
+LIMIT_S = 900
+
+
+def main() -> int:
+    archive, *names = sys.argv[1:]
+    flows = [HERE / "flows" / f"{name}.py" for name in names] or sorted((HERE / "flows").glob("*.py"))
+    display = start_screen()
+    results = {flow.stem: run(flow, Path(archive), display) for flow in flows}
+    for name, (passed, seconds) in results.items():
+        print(f"{'PASSED' if passed else 'FAILED'} {name} ({seconds:.0f} s)")
+    failed = sum(not passed for passed, _ in results.values())
+    print(f"{len(results) - failed} passed, {failed} failed")
+    return 1 if failed or not results else 0
+
+
+def start_screen() -> str:
+    """Starts a virtual X server that ends with this process; returns its display."""
+    reader, writer = os.pipe()
+    subprocess.Popen(["Xvfb", "-displayfd", str(writer), "-screen", "0", f"{SIZE[0]}x{SIZE[1]}x24", "-nolisten", "tcp"],
+                     pass_fds=[writer], stderr=subprocess.DEVNULL)
+    os.close(writer)
+    number = os.read(reader, 16).decode().strip()
+    if not number:
+        raise SystemExit("Xvfb did not start: there is no screen to open a window on.")
+    return f":{number}"
+
+
+def run(flow: Path, archive: Path, display: str) -> tuple[bool, float]:
+    """Installs the zip into an empty profile and runs one flow. True if it passed, and its seconds."""
+    started = time.monotonic()
+    with tempfile.TemporaryDirectory() as folder:
+        home = Path(folder) / "home"
+        (home / "Documents").mkdir(parents=True)
+        environment = {**os.environ, "DISPLAY": display, "HOME": str(home), "BLENDER_USER_RESOURCES": str(Path(folder) / "profile"),
+                       "WILDCAP_GUI_OUT": str(OUT), "PYTHONDONTWRITEBYTECODE": "1"}
+        install = subprocess.run(["blender", "--command", "extension", "install-file", "-r", "user_default", "-e", str(archive)],
+                                 env=environment, capture_output=True, text=True)
+        if install.returncode:
+            print(install.stdout, install.stderr, sep="\n")
+            return False, time.monotonic() - started
+        log = OUT / f"{flow.stem}.log"
+        with open(log, "w", encoding="utf-8") as file:
+            try:
+                code = subprocess.call(["blender", "--enable-event-simulate", "--no-window-focus", "-p", "0", "0", str(SIZE[0]), str(SIZE[1]), "-P", str(flow)],
+                                       env=environment, stdout=file, stderr=subprocess.STDOUT, timeout=LIMIT_S)
+            except subprocess.TimeoutExpired:
+                code = -1
+        text = log.read_text(encoding="utf-8", errors="replace")
+        if code or "FLOW PASSED" not in text:  # a Blender that never opened its window must not count as passed
+            print(text[-6000:])
+            return False, time.monotonic() - started
+        print("\n".join(line for line in text.splitlines() if line.startswith("| ")))
+
+        return True, time.monotonic() - started
+
+
+if __name__ == "__main__":
+    sys.exit(main())
