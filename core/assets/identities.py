@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The identity space: principal components of many random combinations of MakeHuman's macro and head targets."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from .makehuman import Base, HeadBuilder
+
+COMPONENTS = 40
+SAMPLES = 700
+_OPPOSITES = (("decr", "incr"), ("down", "up"), ("in", "out"), ("backward", "forward"), ("compress", "uncompress"), ("concave", "convex"))
+_FOLDERS = {"head": 0.17, "forehead": 0.25, "eyebrows": 0.25, "eyes": 0.2, "nose": 0.28, "mouth": 0.23, "cheek": 0.3, "chin": 0.27, "ears": 0.25}
+_LEFT_OUT = re.compile(r"head-trans|head-angle|head-scale-horiz|head-back|eye-scale|mouth-trans-(in|out)|nose-trans-(in|out)|head-age"
+                       r"|chin-jaw-drop|mouth-dimples|ear-trans|asym")
+
+
+def identity_space(base: Base, builder: HeadBuilder, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Mean head [V, 3] in metres, exactly symmetric, and displacements [K, V, 3] per standard deviation, largest first."""
+    rng = np.random.default_rng(seed)
+    controls = _controls(base)
+    macros = {name: base.target(name) for name in base.target_names("macrodetails") if re.search("young|old", name)}
+    heads = np.stack([builder.head(base.vertices + _macro(macros, rng) + _details(controls, rng)) for _ in range(SAMPLES)])
+    front = (heads[0, :, 1] < 0.045) & (heads[0, :, 2] > -0.12)
+    heads = np.stack([_aligned(head, heads[0], front) for head in heads])
+    mirrored = heads[:, builder.mirror] * [-1, 1, 1]
+    mean = (heads.mean(0) + mirrored.mean(0)) / 2
+    mean -= [0, *(mean[front].mean(0)[1:] - heads[0, front].mean(0)[1:])]
+    difference = (heads - heads.mean(0)).reshape(SAMPLES, -1)
+    values, vectors = np.linalg.eigh(difference @ difference.T / SAMPLES)
+    order = np.argsort(values)[::-1][:COMPONENTS]
+    components = (vectors[:, order].T @ difference / np.sqrt(SAMPLES)).reshape(COMPONENTS, -1, 3)
+    return mean, components
+
+
+def _controls(base: Base) -> list[tuple[float, list[np.ndarray]]]:
+    """Detail controls: standard deviation and the targets [low, high] (or [only]) of each; left and right ones summed into one control."""
+    controls = []
+    for folder, sigma in _FOLDERS.items():
+        found = {}
+        for name in base.target_names(folder):
+            stem = re.sub(r"/[lr]-", "/", name)
+            if not _LEFT_OUT.search(name):
+                found[stem] = found.get(stem, 0) + base.target(name)
+        for stem in list(found):
+            for low, high in _OPPOSITES:
+                if stem.endswith("-" + low) and stem[:-len(low)] + high in found:
+                    controls.append((sigma, [found[stem], found[stem[:-len(low)] + high]]))
+                    break
+                if stem.endswith("-" + high) and stem[:-len(high)] + low in found:
+                    break
+            else:
+                controls.append((sigma, [found[stem]]))
+    return controls
+
+
+def _details(controls: list, rng: np.random.Generator) -> np.ndarray:
+    """A random displacement of the body [N, 3], decimetres."""
+    total = np.zeros_like(controls[0][1][0])
+    for sigma, targets in controls:
+        value = float(np.clip(rng.normal(0, sigma), -0.9, 0.9))
+        total += abs(value) * targets[-1 if value > 0 else 0] * (1 if len(targets) == 2 else 0.7)
+    return total
+
+
+def _macro(macros: dict[str, np.ndarray], rng: np.random.Generator) -> np.ndarray:
+    """A random gender, age, ancestry, muscle and weight, blended as MakeHuman does: products of the factors' shares."""
+    gender = np.clip(rng.choice([0.1, 0.9]) + rng.normal(0, 0.15), 0, 1)
+    old = np.clip(abs(rng.normal(0, 0.4)), 0, 1)
+    share = {"female": 1 - gender, "male": gender, "young": 1 - old, "old": old}
+    share |= dict(zip(("african", "asian", "caucasian"), rng.dirichlet([0.5] * 3), strict=True))
+    for kind in ("muscle", "weight"):
+        level = float(np.clip(rng.normal(0, 0.4), -1, 1))
+        share |= {f"min{kind}": max(-level, 0), f"max{kind}": max(level, 0), f"average{kind}": 1 - abs(level)}
+    total = 0
+    for name, offset in macros.items():
+        factors = name.split("/")[1].removeprefix("universal-").split("-")
+        weight = np.prod([share[f] for f in factors])
+        total = total + weight * offset
+    return total
+
+
+def _aligned(head: np.ndarray, to: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """A head rotated and moved, never scaled, onto another: least squares over the vertices of `part`."""
+    a, b = head[part], to[part]
+    u, _, vt = np.linalg.svd((a - a.mean(0)).T @ (b - b.mean(0)))
+    rotation = u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt
+    return (head - a.mean(0)) @ rotation + b.mean(0)

