@@ -17,12 +17,20 @@ _NOSE = (168, 417, 465, 343, 437, 420, 279, 358, 327, 326, 2, 97, 98, 129, 49, 1
 
 
 def face_outline(points: np.ndarray) -> np.ndarray:
-    """The outline of the face [36, 2] in `around`'s coordinates: MediaPipe's oval, a little higher on the forehead and fuller under the chin."""
-    outline = around(points[list(OVAL)])
+    """The outline of the face [72, 2] in `around`'s coordinates: the hull of MediaPipe's oval, a little higher on the forehead and fuller under the chin."""
+    outline = cv2.convexHull(around(points[list(OVAL)]).astype(np.float32))[:, 0].astype(np.float64)
+    outline = _resampled(outline, 72)
     outline = (outline + np.roll(outline, 1, 0) + np.roll(outline, -1, 0)) / 3
     middle = outline.mean(0)
     up = np.clip((outline[:, 1] - 0.02) / 0.03, 0, 1)
     return middle + (outline - middle) * [1.03, 1.03] + np.stack([0 * up, 0.010 * up], -1)
+
+
+def _resampled(outline: np.ndarray, count: int) -> np.ndarray:
+    closed = np.concatenate([outline, outline[:1]])
+    length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    at = np.arange(count) / count * length[-1]
+    return np.stack([np.interp(at, length, closed[:, axis]) for axis in range(2)], -1)
 
 
 def around(points: np.ndarray) -> np.ndarray:
@@ -67,7 +75,7 @@ def draw_masks(mesh: Mesh, points: np.ndarray) -> dict[str, np.ndarray]:
     masks = {"face": soft * (1 - ears)}
     masks["lips"] = _filled(uv[list(LIPS)], size)
     masks["brows"] = np.maximum(*(_filled(uv[list(b)], size, grow=6) for b in BROWS))
-    masks["eyes"] = np.maximum(*(_filled(uv[list(e)], size, grow=8) for e in EYES))
+    masks["eyes"] = np.maximum(*(_filled(uv[list(e)], size, grow=14) for e in EYES))
     masks["nose"] = _filled(cv2.convexHull(uv[list(_NOSE)].astype(np.float32))[:, 0], size)
     masks["nostrils"] = _nostrils(mesh, position, masks["nose"])
     masks["ears"] = ears
@@ -75,7 +83,7 @@ def draw_masks(mesh: Mesh, points: np.ndarray) -> dict[str, np.ndarray]:
     masks["scalp"] = (1 - masks["face"]) * (1 - ears) * (1 - below)
     cover = np.maximum.reduce([masks[n] for n in ("lips", "brows", "nostrils")])
     masks["skin"] = masks["face"] * (1 - cover)
-    return {name: mask.astype(np.float32) for name, mask in masks.items()}
+    return {name: ((mask + mask[:, ::-1]) / 2).astype(np.float32) for name, mask in masks.items()}
 
 
 def position_to_texel(mesh: Mesh, points: np.ndarray, size: int) -> np.ndarray:

@@ -122,7 +122,7 @@ def _minimise(uv, faces, rest, fixed, twin, steps):
     rows, columns = np.repeat(dof, 6, 1).ravel(), np.tile(dof, (1, 6)).ravel()
     free = np.flatnonzero(~fixed.ravel())
     value = _energy(uv, faces, inverse, area)
-    for step in range(1, steps + 1):
+    for step in range(1, steps + 1):  # noqa: B007  (its last value is printed)
         jacobian = np.einsum("fka,fkb->fab", uv[faces], hats)
         u, sigma, vt = np.linalg.svd(jacobian)
         weight = (sigma + 1) * (sigma**2 + 1) / sigma**3
