@@ -2,10 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What to click next: one function from facts to a step. Knows no bpy, so that every state can be tested."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ..core import stages
-from .status import Status
+
+if TYPE_CHECKING:
+    from .status import Status
 
 
 @dataclass(frozen=True)

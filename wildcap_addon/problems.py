@@ -38,7 +38,7 @@ def draw_text(layout, text: str, width: int, icon: str = 'NONE') -> None:
     """A text over as many lines as it needs."""
     column = layout.column(align=True)
     column.scale_y = 0.8
-    lines = wrapped(text, width - (30 if icon != 'NONE' else 0))
+    lines = wrapped(text, width - (45 if icon != 'NONE' else 0))
     for i, line in enumerate(lines):
         column.label(text=line, icon=icon if i == 0 else 'BLANK1' if icon != 'NONE' else 'NONE')
 

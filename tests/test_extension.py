@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The extension as Blender's own tool sees it: the manifest is valid, and the zip holds what an artist needs and nothing else."""
+
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+ROOT = Path(__file__).resolve().parent.parent
+SCRIPTS = Path(bpy.utils.system_resource('SCRIPTS'))
+TOOL = SCRIPTS / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
+TAGS = SCRIPTS / "modules" / "_bpy_internal" / "extensions" / "tags.py"
+
+# Every file of the zip matches one of these.
+WANTED = (
+    r"__init__\.py", r"blender_manifest\.toml", r"LICENSE", r"README\.md", r"requirements/(worker|nets)\.txt",
+    r"wildcap_addon/([a-z_]+/)?[a-z_]+\.py",
+    r"core/README\.md", r"core/[a-z_]+\.py", r"core/(worker|frames|cameras|scan|registration|delight|texture|shadow_mask|solve|upscale)/[a-z0-9_]+\.py",
+    r"core/weights/[a-z0-9_]+\.(safetensors|json)", r"core/assets/([A-Z]+\.md|head\.obj|head\.json|identity\.npz|masks/[a-z_]+\.png)",
+    r"core/assets/[a-z_]+\.(png|json|npz|md)", r"core/assets/sample_head/.+\.(obj|png|exr|json)",
+    r"core/[a-z_]+/(README\.md|[a-z0-9_]+\.(npz|json))",
+)
+NEEDED = ("__init__.py", "blender_manifest.toml", "LICENSE", "requirements/worker.txt", "requirements/nets.txt", "wildcap_addon/__init__.py",
+          "wildcap_addon/relight/headless.py", "core/settings.py", "core/worker/__main__.py", "core/worker/client.py", "core/solve/__init__.py",
+          "core/assets/head.obj")
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("dist")
+    run("build", "--source-dir", str(ROOT), "--output-dir", str(folder))
+    return next(folder.glob("*.zip"))
+
+
+def run(*arguments: str) -> str:
+    result = subprocess.run([sys.executable, str(TOOL), *arguments], capture_output=True, text=True, cwd=ROOT)
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout + result.stderr
+
+
+def test_the_manifest_passes_blenders_strict_validation():
+    assert "Success" in run("validate", f"--valid-tags={TAGS}", ".")
+
+
+def test_the_manifest_asks_for_files_and_network_with_a_reason_each():
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    assert manifest["id"] == "wildcap"
+    assert set(manifest["permissions"]) == {"files", "network"}
+    assert all(len(reason) <= 64 and not reason.endswith(".") for reason in manifest["permissions"].values())
+    version = re.search(r'__version__ = "(.+)"', (ROOT / "core" / "__init__.py").read_text(encoding="utf-8"))
+    assert manifest["version"] == version[1]
+
+
+def test_the_zip_holds_what_it_should_and_nothing_else(archive):
+    with zipfile.ZipFile(archive) as file:
+        names = [info.filename for info in file.infolist() if not info.is_dir()]
+    assert [name for name in names if not any(re.fullmatch(pattern, name) for pattern in WANTED)] == []
+    assert [name for name in NEEDED if name not in names] == []
+
+
+def test_the_zip_is_smaller_than_100_mb(archive):
+    assert archive.stat().st_size < 100e6
+
+
+def test_the_built_zip_installs_and_registers_in_an_empty_profile(archive, tmp_path):
+    """In a process of its own: this one runs the extension from the checkout."""
+    code = f"""
+import os
+os.environ["BLENDER_USER_RESOURCES"] = {str(tmp_path / "profile")!r}
+import bpy, addon_utils
+assert bpy.ops.extensions.package_install_files(repo="user_default", filepath={str(archive)!r}, enable_on_install=True) == {{'FINISHED'}}
+name = "bl_ext.user_default.wildcap"
+assert name in bpy.context.preferences.addons, list(bpy.context.preferences.addons.keys())
+assert hasattr(bpy.types, "WILDCAP_PT_main")
+bpy.context.scene.wildcap.captures.add()
+addon_utils.disable(name, default_set=True)
+assert not hasattr(bpy.types, "WILDCAP_PT_main")
+print("WELL")
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, cwd=tmp_path)
+    assert "WELL" in result.stdout, result.stdout + result.stderr
