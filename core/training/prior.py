@@ -28,7 +28,7 @@ from .patches import SCALES, Batch, Skins, draw, make_skins, mean_map
 
 CONFIGS = {
     "cpu": {
-        "model": {"type": "image_v1", "input_channels": 7, "patch_size": 2, "mapping_out": 128, "depths": [1, 2, 2], "channels": [64, 128, 192],
+        "model": {"type": "image_v1", "input_channels": 7, "patch_size": 2, "mapping_out": 128, "depths": [1, 2, 2], "channels": [48, 96, 160],
                   "self_attn_depths": [False, False, False], "augment_wrapper": False, "mapping_cond_dim": 5, "norm": "pixel",
                   "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80},
         "cond": {"type": "posenc", "pos_enc_freq": 6},
