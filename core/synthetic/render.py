@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames of a synthetic subject, path-traced by Cycles. The one file of core that imports bpy; a process of its own:
+
+    python -m core.synthetic.render JOB.json
+
+The job (written by sample.py) names the head, its maps, the leaves, the sun, the sky, the cameras and the output folder.
+Frames that exist are not rendered again.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ..meshes import Mesh, read_obj
+
+
+def main() -> None:
+    job = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    _settings(scene, job)
+    _add(read_obj(Path(job["head"])), "head", _skin(job["maps"]))
+    _add(read_obj(Path(job["leaves"])), "leaves", _plain("leaves", (0.05, 0.13, 0.03)))
+    _light(scene, job)
+    _room(job["seed"])
+    _torso(job["seed"])
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    camera.data.sensor_fit = 'VERTICAL'
+    camera.data.sensor_height = 24
+    camera.data.lens = job["focal_px"] * 24 / job["height"]
+    camera.data.clip_start = 0.05
+    for number in job["frames"]:
+        path = Path(job["out"]) / f"{number:05d}.png"
+        if path.exists():
+            continue
+        camera.matrix_world = Matrix(job["cameras"][number])
+        scene.render.filepath = str(path.with_suffix(".part.png"))
+        bpy.ops.render.render(write_still=True)
+        os.replace(path.with_suffix(".part.png"), path)
+        print(f"frame {number}", flush=True)
+
+
+def _settings(scene: bpy.types.Scene, job: dict) -> None:
+    scene.render.engine = 'CYCLES'
+    scene.cycles.samples = job["samples"]
+    scene.cycles.use_denoising = True
+    scene.cycles.max_bounces = 4
+    scene.cycles.seed = job["seed"] % 65536
+    scene.render.resolution_x, scene.render.resolution_y = job["width"], job["height"]
+    scene.render.resolution_percentage = 100
+    scene.render.image_settings.file_format = 'PNG'
+    scene.render.use_persistent_data = True
+    scene.view_settings.view_transform = 'Standard'
+
+
+def _add(mesh: Mesh, name: str, material: bpy.types.Material) -> bpy.types.Object:
+    data = bpy.data.meshes.new(name)
+    data.from_pydata(mesh.vertices.tolist(), [], mesh.faces.tolist())
+    if mesh.uvs is not None:
+        layer = data.uv_layers.new(name="UVMap")
+        layer.data.foreach_set("uv", mesh.uvs[mesh.face_uvs].astype(np.float32).ravel())
+        data.shade_smooth()
+    data.materials.append(material)
+    thing = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(thing)
+    return thing
+
+
+def _skin(maps: dict) -> bpy.types.Material:
+    """Albedo, gloss and relief as the truth says; no subsurface scattering, so that albedo means the same in the picture and in the truth."""
+    material, nodes, links, shader = _principled("skin")
+
+    def texture(name: str, space: str) -> bpy.types.Node:
+        node = nodes.new("ShaderNodeTexImage")
+        node.image = bpy.data.images.load(maps[name])
+        node.image.colorspace_settings.name = space
+        return node
+
+    links.new(texture("diffuse", "sRGB").outputs["Color"], shader.inputs["Base Color"])
+    links.new(texture("specular", "Non-Color").outputs["Color"], shader.inputs["Specular IOR Level"])
+    normal = nodes.new("ShaderNodeNormalMap")
+    normal.uv_map = "UVMap"
+    links.new(texture("normal", "Non-Color").outputs["Color"], normal.inputs["Color"])
+    links.new(normal.outputs["Normal"], shader.inputs["Normal"])
+    shader.inputs["Roughness"].default_value = 0.5
+    return material
+
+
+def _plain(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
+    material, _, _, shader = _principled(name)
+    shader.inputs["Base Color"].default_value = (*colour, 1)
+    shader.inputs["Roughness"].default_value = 0.8
+    return material
+
+
+def _patterned(name: str, rng: np.random.Generator, scale: float) -> bpy.types.Material:
+    """Two colours mixed by a random texture: corners and blobs for structure from motion."""
+    material, nodes, links, shader = _principled(name)
+    kind = rng.choice(["ShaderNodeTexVoronoi", "ShaderNodeTexNoise", "ShaderNodeTexBrick", "ShaderNodeTexChecker"])
+    texture, ramp, place = nodes.new(kind), nodes.new("ShaderNodeValToRGB"), nodes.new("ShaderNodeTexCoord")
+    links.new(place.outputs["Object"], texture.inputs["Vector"])
+    texture.inputs["Scale"].default_value = scale
+    links.new(texture.outputs[1 if kind in ("ShaderNodeTexBrick", "ShaderNodeTexChecker") else 0], ramp.inputs["Fac"])
+    ramp.color_ramp.elements[0].position, ramp.color_ramp.elements[1].position = 0.42, 0.58
+    for element in ramp.color_ramp.elements:
+        element.color = (*(rng.uniform(0.02, 0.55) * rng.uniform(0.5, 1, 3)), 1)
+    links.new(ramp.outputs["Color"], shader.inputs["Base Color"])
+    shader.inputs["Roughness"].default_value = 0.8
+    return material
+
+
+def _principled(name: str):
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    nodes = material.node_tree.nodes
+    return material, nodes, material.node_tree.links, nodes["Principled BSDF"]
+
+
+def _light(scene: bpy.types.Scene, job: dict) -> None:
+    sun = bpy.data.lights.new("sun", 'SUN')
+    sun.energy, sun.angle, sun.color = job["sun"]["strength"], job["sun"]["angle"], job["sun"]["colour"]
+    thing = bpy.data.objects.new("sun", sun)
+    thing.rotation_euler = Vector(job["sun"]["direction"]).to_track_quat('Z', 'Y').to_euler()  # a lamp shines along its -z
+    scene.collection.objects.link(thing)
+    scene.world = bpy.data.worlds.new("sky")
+    scene.world.use_nodes = True
+    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (*job["sky"], 1)
+
+
+def _room(seed: int, count: int = 90) -> None:
+    """Boxes of all sizes around and behind the head, and a floor, all patterned."""
+    rng = np.random.default_rng([seed, 23])
+    materials = [_patterned(f"pattern{k}", rng, rng.uniform(8, 40)) for k in range(14)]
+    for k in range(count):
+        azimuth, radius = np.radians(rng.uniform(-205, 25)) + math.pi, rng.uniform(0.8, 2.4)
+        position = (radius * math.cos(azimuth), radius * math.sin(azimuth), rng.uniform(-1.0, 1.0))
+        bpy.ops.mesh.primitive_cube_add(size=1, location=position, rotation=rng.uniform(-0.6, 0.6, 3))
+        bpy.context.object.scale = rng.uniform(0.08, 0.45, 3) * radius / 1.5
+        bpy.context.object.data.materials.append(materials[k % len(materials)])
+    bpy.ops.mesh.primitive_plane_add(size=12, location=(0, 0, -1.2))
+    bpy.context.object.data.materials.append(_patterned("floor", rng, 6))
+
+
+def _torso(seed: int) -> None:
+    """A shirt of sorts: an ellipsoid under the neck."""
+    rng = np.random.default_rng([seed, 24])
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, location=(0, 0.06, -0.36))
+    bpy.context.object.scale = (0.24, 0.14, 0.19)
+    bpy.ops.object.shade_smooth()
+    bpy.context.object.data.materials.append(_patterned("shirt", rng, 60))
+
+
+if __name__ == "__main__":
+    main()

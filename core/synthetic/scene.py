@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What stands around a synthetic subject: a hand-held camera path, a sun behind leaves, a cluttered room without walls.
+
+World: metres, +Z up, the head's middle at the origin, its face towards -Y. The same numbers make the rendered video and its truth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..meshes import Mesh
+
+WIDTH, HEIGHT, FOCAL, RATE = 720, 960, 933.0, 24  # pixels, pixels, pixels, frames per second
+DISTANCE = 0.50  # metres from the camera to the head's middle
+
+
+@dataclass(frozen=True)
+class Sun:
+    """direction: unit vector towards the sun; strength: irradiance across the beam in W/m^2; angle: its diameter in radians; colour: linear sRGB."""
+
+    direction: np.ndarray
+    strength: float = 4.2
+    angle: float = 0.0093
+    colour: tuple[float, float, float] = (1.0, 0.93, 0.82)
+
+
+SKY = (0.42, 0.55, 0.80)
+"""Radiance of the sky, linear sRGB."""
+
+
+def sun_of(seed: int) -> Sun:
+    """High and to one side, in front of the face."""
+    rng = np.random.default_rng([seed, 20])
+    azimuth, height = np.radians(rng.uniform(20, 50)) * rng.choice([-1, 1]), np.radians(rng.uniform(38, 52))
+    return Sun(np.array([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)]))
+
+
+def leaves(seed: int, sun: Sun, distance: float = 0.45, count: int = 70, reach: float = 0.22) -> Mesh:
+    """A loose twig between head and sun: pointed leaves of 2 to 5 cm, strewn over a disc of radius `reach` across the beam.
+
+    From `distance` metres the sun's disc blurs their edges over 4 mm: hard shadows, as at noon under a tree.
+    """
+    rng = np.random.default_rng([seed, 21])
+    side, up = _across(sun.direction)
+    vertices, faces = [], []
+    for _ in range(count):
+        a, r = rng.uniform(0, 2 * np.pi), reach * np.sqrt(rng.uniform())
+        centre = sun.direction * (distance + rng.uniform(-0.06, 0.06)) + side * r * np.cos(a) + up * r * np.sin(a)
+        turn, length, width = rng.uniform(0, 2 * np.pi), rng.uniform(0.012, 0.028), rng.uniform(0.004, 0.010)
+        along, over = side * np.cos(turn) + up * np.sin(turn), up * np.cos(turn) - side * np.sin(turn)
+        over = over + sun.direction * rng.uniform(-0.6, 0.6)
+        outline = [(-1, 0), (-0.4, -0.9), (0.3, -0.8), (1, 0), (0.3, 0.8), (-0.4, 0.9)]
+        first = len(vertices)
+        vertices += [centre + along * length * x + over * width * y for x, y in outline]
+        faces += [(first, first + k, first + k + 1) for k in range(1, 5)]
+    return Mesh(np.array(vertices), np.array(faces))
+
+
+def camera_path(seed: int, frames: int) -> np.ndarray:
+    """Camera-to-world matrices [frames, 4, 4] (the camera looks along its -z, y up): from one ear past the nose to the other, up and down on the way,
+    with the slow drift and the tremble of a hand."""
+    rng = np.random.default_rng([seed, 22])
+    t = np.linspace(0, 1, frames)
+    azimuth = np.radians(58) * np.sin(np.pi * (t - 0.5)) * rng.choice([-1, 1])
+    height = np.radians(7 + 13 * np.sin(2 * np.pi * (1.5 * t + 0.1)))
+    distance = DISTANCE * (1 + 0.05 * np.sin(2 * np.pi * (1.2 * t + rng.uniform())))
+    position = distance[:, None] * np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)
+    position += _drift(rng, frames, 0.008, 9) + _drift(rng, frames, 0.0015, 2)
+    target = np.array([0, -0.01, -0.035]) + _drift(rng, frames, 0.010, 9) + _drift(rng, frames, 0.0015, 2)
+    roll = _drift(rng, frames, np.radians(1.5), 9)[:, 0]
+    back = position - target
+    back /= np.linalg.norm(back, axis=1, keepdims=True)
+    right = np.cross([0, 0, 1.0], back)
+    right /= np.linalg.norm(right, axis=1, keepdims=True)
+    up = np.cross(back, right)
+    c, s = np.cos(roll)[:, None], np.sin(roll)[:, None]
+    matrices = np.tile(np.eye(4), (frames, 1, 1))
+    matrices[:, :3, 0], matrices[:, :3, 1] = c * right + s * up, c * up - s * right
+    matrices[:, :3, 2], matrices[:, :3, 3] = back, position
+    return matrices
+
+
+def _drift(rng: np.random.Generator, frames: int, size: float, period: float) -> np.ndarray:
+    """Smooth random motion [frames, 3] of deviation `size`, correlated over `period` frames."""
+    from scipy.ndimage import gaussian_filter1d
+
+    noise = gaussian_filter1d(rng.normal(size=(frames + 40, 3)), period, axis=0)[20:-20]
+    return size * noise / noise.std()
+
+
+def _across(direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors perpendicular to a unit vector and to each other."""
+    side = np.cross(direction, [0, 0, 1.0])
+    side /= np.linalg.norm(side)
+    return side, np.cross(side, direction)
