@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
+from core import template
 from core.meshes import Mesh
+from core.raster import sample
 from core.synthetic import pigment
 from core.synthetic.canvas import canvas, make_canvas
 from core.synthetic.regions import regions
@@ -57,7 +58,7 @@ def test_a_mole_seed_moves_moles_and_nothing_else(plain):
     darker = [(without.diffuse - skin.diffuse).max(-1) > 0.05 for skin in (plain, other)]
     assert (darker[0] & ~darker[1]).sum() > 20 and (darker[1] & ~darker[0]).sum() > 20
     assert (without.diffuse - plain.diffuse).min() > -1e-4  # a mole never lightens
-    assert plain.height.max() > without.height.max() + 0.1  # and some are raised
+    assert (plain.height - without.height).max() > 0.1  # and some are raised
 
 
 def test_every_subject_is_plausible():
@@ -95,20 +96,18 @@ def test_pores_brows_and_creases_act_on_all_maps(plain):
     assert plain.normal[..., 2].min() < young.normal[..., 2].min()
 
 
-def test_no_seam_texels_that_meet_on_the_head_agree(plain):
-    on = canvas(SIZE)
-    interior = np.zeros_like(on.covered)
-    interior[1:-1, 1:-1] = on.covered[:-2, 1:-1] & on.covered[2:, 1:-1] & on.covered[1:-1, :-2] & on.covered[1:-1, 2:]
-    row, column = np.nonzero(on.covered)
-    border = np.flatnonzero(~interior[on.covered])
-    first, second = cKDTree(on.position[border]).query_pairs(0.25, output_type="ndarray").T
-    first, second = border[first], border[second]
-    apart = np.hypot(row[first] - row[second], column[first] - column[second]) > 20
-    assert apart.sum() > 5, "the template has no seam left to test"
-    colour = np.log(plain.diffuse[on.covered])
-    across = np.abs(colour[first[apart]] - colour[second[apart]]).mean()
-    anywhere = np.abs(colour[border] - colour[np.random.default_rng(0).permutation(border)]).mean()
-    assert across < 0.06 and across < 0.3 * anywhere
+def test_no_seam_both_sides_of_a_uv_cut_agree():
+    bare = make_skin(replace(PLAIN, scalp_hair=0.0, mottling=0.0, freckles=0.0), SIZE)  # what is finer than a texel there cannot agree
+    mesh = template.load()
+    used = np.unique(np.stack([mesh.faces.ravel(), mesh.face_uvs.ravel()], 1), axis=0)
+    vertex, count = np.unique(used[:, 0], return_counts=True)
+    twice = used[np.isin(used[:, 0], vertex[count == 2])]  # sorted by vertex: pairs
+    sides = mesh.uvs[twice[:, 1]].reshape(-1, 2, 2)
+    assert len(sides) > 20
+    colour = [sample(np.log(bare.diffuse), sides[:, i] * [SIZE, -SIZE] + [0, SIZE]) for i in range(2)]
+    across = np.abs(colour[0] - colour[1]).mean()
+    shuffled = np.abs(colour[0] - np.random.default_rng(0).permutation(colour[1])).mean()
+    assert across < 0.3 * shuffled, (across, shuffled)
 
 
 def test_the_normals_of_a_ramp_are_its_slope_whatever_the_uv_layout():

@@ -44,6 +44,11 @@ class Canvas:
         return np.abs(self.metric[:, 0] * self.metric[:, 2])
 
     @cached_property
+    def texel_mm(self) -> float:
+        """Width of the middling texel in mm."""
+        return float(np.sqrt(np.median(self.area)))
+
+    @cached_property
     def bled_position(self) -> np.ndarray:
         """position everywhere, float32 [S, S, 3]: beyond a chart's border its nearest texel's."""
         return self.spread(self.position)

@@ -37,9 +37,11 @@ def beard_shadow(albedo: np.ndarray, amount: np.ndarray) -> np.ndarray:
 
 def cropped(on: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
     """Cover [N] of very short hair on the scalp; `region` [N] on this canvas."""
-    grain = octaves(on.position, [0.9, 1.8], rng)
-    patchy = octaves(on.position, [9.0], rng)
-    return np.clip(region ** 1.5 * density * (1 + 0.22 * grain + 0.06 * patchy), 0, 1)
+    cover, there = np.zeros_like(region), region > 0.01
+    grain = octaves(on.position[there], [0.9, 1.8], rng)
+    patchy = octaves(on.position[there], [9.0], rng)
+    cover[there] = np.clip(region[there] ** 1.5 * density * (1 + 0.22 * grain + 0.06 * patchy), 0, 1)
+    return cover
 
 
 def _strokes(on: Canvas, roots: np.ndarray, direction: np.ndarray, length: np.ndarray, width: float, bend: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -47,14 +49,14 @@ def _strokes(on: Canvas, roots: np.ndarray, direction: np.ndarray, length: np.nd
     cover = np.zeros(len(on.position), np.float32)
     if not len(roots):
         return cover
-    step = 0.25 * max(1.0, on.area.mean() ** 0.5 / 0.25) * 0.6
+    finest = 0.55 * on.texel_mm
+    step = max(0.12, finest)
     count = np.maximum(1, np.ceil(length / step).astype(int))
     hair = np.repeat(np.arange(len(roots)), count)
     along = (np.arange(len(hair)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[hair]
     direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
     points = roots[hair] + direction[hair] * (along * length[hair])[:, None]
     points[:, 2] += bend[hair] * along**2 * length[hair]
-    finest = 0.55 * float(np.sqrt(np.median(on.area)))
     _, nearest = on.tree.query(points, distance_upper_bound=8.0)  # lays the straight hair onto the surface
     kept = nearest < len(cover)
     hair, along, lifted = hair[kept], along[kept], points[kept] - on.position[nearest[kept]]

@@ -20,7 +20,7 @@ from .parameters import sample_parameters
 from .skin import make_skin
 
 TRANSFER_RAYS = 192
-SUN_RAYS = 16
+SUN_RAYS = 20
 LAMBERT = np.array([1.0] + [2 / 3] * 3 + [1 / 4] * 5)  # a Lambertian surface's response per coefficient, over pi (Ramamoorthi and Hanrahan 2001)
 
 
@@ -51,7 +51,8 @@ def uv_problem(seed: int, size: int = 512, shadows: str | None = None) -> UvProb
     if kind == "none":
         colour = colour * 0
     shading, shadow, world_normal = bake(template.load(), size, sky, sun, colour, radius, kind, rng)
-    exposure = 0.75 / np.percentile(shading[skin.covered].mean(-1), 90)
+    bright = np.percentile((skin.diffuse * shading)[skin.covered].max(-1), 99.5)
+    exposure = min(rng.uniform(0.7, 1.1) / np.percentile(shading[skin.covered].mean(-1), 90), 1 / bright)
     shading = shading * exposure
     return UvProblem(skin.diffuse * shading, skin.diffuse, skin.normal, world_normal, shading, shadow,
                      sky * exposure, sun, colour * exposure, skin.covered)
@@ -65,7 +66,7 @@ def random_light(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.n
         tint = np.exp(rng.normal(0, 0.15, 3)) * rng.uniform(0.1, 0.5)
         sky += (LAMBERT * sh_basis(towards / np.linalg.norm(towards)))[:, None] * tint
     sky[0] += 0.2 / 0.282095 * np.exp(rng.normal(0, 0.1, 3))  # keeps the radiance positive
-    azimuth, elevation = rng.uniform(-1.2, 1.2), rng.uniform(0.1, 1.2)
+    azimuth, elevation = rng.uniform(-1.0, 1.0), rng.uniform(0.1, 1.2)
     sun = np.array([np.sin(azimuth) * np.cos(elevation), -np.cos(azimuth) * np.cos(elevation), np.sin(elevation)])
     warmth = rng.uniform(0, 1)
     colour = rng.uniform(0.5, 2.0) * np.array([1.0, 1 - 0.15 * warmth, 1 - 0.4 * warmth])
@@ -131,7 +132,7 @@ def _sun_seen(caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray,
     spiral = np.pi * (1 + 5**0.5) * np.arange(SUN_RAYS) + turn
     directions = sun + (reach * np.cos(spiral))[:, None] * right + (reach * np.sin(spiral))[:, None] * up
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    seen = np.zeros((SUN_RAYS, len(points)), bool)
+    seen = np.zeros((SUN_RAYS, len(points)), np.float32)
     if shadows == "none":
         return np.ones(len(points))
     facing = np.flatnonzero(normals @ sun > 0)
@@ -140,24 +141,28 @@ def _sun_seen(caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray,
     if shadows != "self":
         away = rng.uniform(0.25, 1.0)  # metres to what throws the shadow
         at = points[None, facing] + away * directions[:, None]
-        seen[:, facing] &= ~_in_the_way(at @ right, at @ up, shadows, rng)
+        seen[:, facing] *= 1 - _in_the_way(at @ right, at @ up, away * radius * 2 / SUN_RAYS**0.5, shadows, rng)
     share = np.zeros(len(points))
     share[facing] = seen[:, facing].mean(0)
     return share
 
 
-def _in_the_way(x: np.ndarray, y: np.ndarray, kind: str, rng: np.random.Generator) -> np.ndarray:
-    """Whether an opaque sheet has no hole at (x, y) [...] in metres, in a plane across the sunlight."""
+def _in_the_way(x: np.ndarray, y: np.ndarray, blur: float, kind: str, rng: np.random.Generator) -> np.ndarray:
+    """How far an opaque sheet with holes covers (x, y) [...] in metres, in a plane across the sunlight; edges are `blur` metres wide,
+    the distance between two of the sun's rays there, so that few rays make an even penumbra."""
     turn, shift = rng.uniform(0, np.pi), rng.uniform(-0.05, 0.05)
     along = (x - x.mean()) * np.cos(turn) + (y - y.mean()) * np.sin(turn) + shift
     if kind == "edge":
-        return along > 0
-    if kind == "blinds":
-        period = rng.uniform(0.03, 0.09)
-        return (along / period) % 1 < rng.uniform(0.3, 0.6)
-    flat = np.stack([x.ravel() * 1000, y.ravel() * 1000, np.zeros(x.size)], -1)
-    leaves = noise(flat, rng.uniform(18, 60), rng, smooth=True) + 0.35 * noise(flat, 9.0, rng, smooth=True)
-    return (leaves > rng.uniform(-0.4, 0.5)).reshape(x.shape)
+        inside = along
+    elif kind == "blinds":
+        period, share = rng.uniform(0.03, 0.09), rng.uniform(0.3, 0.6)
+        inside = period * (share / 2 - np.abs((along / period) % 1 - 0.5))  # metres into the slat
+    else:
+        wavelength = rng.uniform(18, 60)
+        flat = np.stack([x.ravel() * 1000, y.ravel() * 1000, np.zeros(x.size)], -1)
+        leaves = noise(flat, wavelength, rng, smooth=True) + 0.35 * noise(flat, 9.0, rng, smooth=True)
+        inside = ((leaves - rng.uniform(-0.4, 0.5)) * wavelength * 0.4e-3).reshape(x.shape)  # about metres: over the noise's usual slope
+    return np.clip(0.5 + inside / max(blur, 1e-4), 0, 1)
 
 
 @lru_cache(maxsize=2)

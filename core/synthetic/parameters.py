@@ -26,12 +26,12 @@ class SkinParameters:
     blotches: float = 1.0  # unevenness at all scales ...
     mottling: float = 0.6  # ... and at those below 5 mm
     lip_melanin: float = 0.7  # factor over the skin's melanin
-    lip_blood: float = 7.0  # factor over the skin's blood
+    lip_blood: float = 4.5  # factor over the skin's blood
     pores: float = 1.0  # size
     wrinkles: float = 1.0  # depth, beside what the age does
     oiliness: float = 1.0
     freckles: float = 0.0  # share of the possible density
-    freckle_contrast: float = 0.8  # in the logarithm of melanin
+    freckle_contrast: float = 0.7
     moles: float = 8.0  # expected number on face, ears and neck
     beard: float = 0.0  # density of stubble: 0 none, 1 full
     beard_length: float = 0.4  # mm
@@ -50,20 +50,20 @@ def sample_parameters(seed: int) -> SkinParameters:
     rng = np.random.default_rng([seed, 0])
     angle, blood = rng.uniform(-55, 62), float(np.exp(rng.uniform(np.log(0.007), np.log(0.045))))
     oxygen, scattering = float(rng.uniform(0.6, 0.9)), float(rng.uniform(0.75, 1.7))
-    slope = float(rng.uniform(1.9, 2.9))
-    melanin = _melanin_of_angle(angle, blood, oxygen, scattering, slope)
     lightness = np.clip((angle + 20) / 80, 0, 1)
+    slope = float(rng.uniform(2.0, 2.8) + 0.4 * lightness)
+    melanin = _melanin_of_angle(angle, blood, oxygen, scattering, slope)
     male, age = rng.random() < 0.5, float(rng.uniform(18, 78))
     beard = float(rng.choice([0.15, rng.uniform(0.3, 1.0)])) if male else 0.0
-    freckled = rng.random() < 0.15 + 0.35 * lightness
+    freckled = rng.random() < 0.05 + 0.35 * lightness
     hair, grey = _hair_colour(lightness, rng), np.clip((age - 38) / 40, 0, 1) * rng.random()
     return SkinParameters(
         melanin=melanin, blood=blood, oxygen=oxygen, scattering=scattering, slope=slope, age=age,
         redness=float(rng.uniform(0.4, 1.5)), eye_circles=float(rng.uniform(0.1, 1.2)),
         blotches=float(rng.uniform(0.6, 1.5)), mottling=float(np.exp(rng.uniform(np.log(0.25), np.log(1.2)))),
-        lip_melanin=float(1 - rng.uniform(0.1, 0.45) * (0.25 + 0.75 * lightness)), lip_blood=float(np.exp(rng.uniform(np.log(3.5), np.log(12)))),
+        lip_melanin=float(1 - rng.uniform(0.1, 0.45) * (0.25 + 0.75 * lightness)), lip_blood=float(np.exp(rng.uniform(np.log(2.5), np.log(7.5)))),
         pores=float(rng.uniform(0.6, 1.3) * (1.1 if male else 0.9)), wrinkles=float(rng.uniform(0.5, 1.3)), oiliness=float(rng.uniform(0.3, 1.4)),
-        freckles=float(rng.uniform(0.05, 1.0)) if freckled else 0.0, freckle_contrast=float(rng.uniform(0.3, 1.0)),
+        freckles=float(rng.uniform(0.05, 0.8)) if freckled else 0.0, freckle_contrast=float(rng.uniform(0.3, 0.9)),
         moles=float(rng.gamma(1.5, 6.0)), beard=beard, beard_length=float(np.exp(rng.uniform(np.log(0.25), np.log(3.0)))),
         brow_density=float(rng.uniform(0.5, 1.4) * (1.15 if male else 0.85)), scalp_hair=float(rng.uniform(0.25, 1.0)),
         hair_colour=_greyed(hair, grey), brow_colour=_greyed(hair * 0.8, 0.4 * grey**2),

@@ -16,6 +16,7 @@ JAW = [132, 58, 172, 136, 150, 149, 176, 148, 152, 377, 400, 378, 379, 365, 397,
 MOUSTACHE = [92, 165, 167, 164, 393, 391, 322]
 LOWER_CHEEK = [214, 434, 192, 416, 213, 433, 147, 376, 135, 364, 169, 394, 210, 430, 211, 431, 138, 367, 215, 435, 177, 401]
 GOATEE = [18, 200, 199, 201, 421, 204, 424, 202, 422, 212, 432, 57, 287, 43, 273, 83, 313]
+LIDS = [33, 7, 163, 144, 145, 153, 154, 155, 133], [362, 382, 381, 380, 374, 373, 390, 249, 263]
 SIDEBURNS = [127, 234, 93, 356, 454, 323]
 BLOBS = {  # name -> (landmark, radius in mm) ...
     "cheeks": [(50, 14), (205, 13), (280, 14), (425, 13)],
@@ -75,6 +76,11 @@ def creases(on: Canvas, rng: np.random.Generator) -> list[tuple[np.ndarray, floa
     return lines
 
 
+def lid_lines(on: Canvas) -> np.ndarray:
+    """Where the lids meet: points [M, 3] in mm along the lower lids' rims."""
+    return np.concatenate([_curve(on.landmarks[side]) for side in LIDS])
+
+
 def _blobs(points: np.ndarray, landmarks: np.ndarray, blobs: list[tuple[int, float]]) -> np.ndarray:
     """One minus the product of what each Gaussian leaves, [M]."""
     left = np.ones(len(points), np.float32)
@@ -97,7 +103,7 @@ def _gaussian(points: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarr
 
 def _softened(on: Canvas, name: str, radius: float) -> np.ndarray:
     """A mask blurred by `radius` mm (as a mean over the charts' scale), the charts' outside not counted."""
-    sigma = radius / float(np.sqrt(np.median(on.area)))
+    sigma = radius / on.texel_mm
     picture = np.zeros((on.size, on.size), np.float32)
     picture[on.covered] = on.masks[name]
     weight = cv2.GaussianBlur(on.covered.astype(np.float32), (0, 0), sigma)

@@ -16,7 +16,7 @@ from . import hairs, pigment
 from .canvas import Canvas, canvas
 from .noise import noise, octaves
 from .parameters import SkinParameters, sample_parameters
-from .regions import creases, regions
+from .regions import creases, lid_lines, regions
 from .relief import normals
 from .spots import patches, splat, strew
 
@@ -68,7 +68,7 @@ def _pigments(p: SkinParameters, on: Canvas, area: dict[str, np.ndarray]) -> tup
     flush = p.redness
     blood = (flush * (0.55 * area["cheeks"] + 0.70 * area["nose"] + 0.55 * area["ears"] + 0.35 * area["chin"] + 0.30 * area["eyelids"])
              - 0.25 * area["forehead"] - 0.20 * area["mouth_surround"] + 0.15 * area["under_eyes"] - 0.10 * area["neck"])
-    melanin = (0.12 * area["forehead"] + p.eye_circles * (0.40 * area["under_eyes"] + 0.25 * area["sockets"] + 0.25 * area["eyelids"])
+    melanin = (0.12 * area["forehead"] + p.eye_circles * min(1.0, _contrast(p)) * (0.40 * area["under_eyes"] + 0.25 * area["sockets"] + 0.25 * area["eyelids"])
                - 0.15 * area["neck"] - 0.12 * area["cheeks"] + 0.10 * area["mouth_surround"])
     slow = [on.soft(lambda points, wavelengths=w: octaves(points, wavelengths, rng, smooth=True)) for w in ([60.0, 30.0], [55.0, 22.0], [9.0], [12.0, 7.0])]
     fine = [octaves(on.position, wavelengths, rng) for wavelengths in ([3.2, 1.7], [4.5, 2.2], [0.8])]
@@ -108,17 +108,19 @@ def _relief(p: SkinParameters, on: Canvas, ground: Canvas, area: dict[str, np.nd
             ends = np.sin(np.linspace(0.05, np.pi - 0.05, len(curve))) ** 0.5
             folds = np.maximum(folds, splat(on, curve, np.full(len(curve), width / 2), deep * ends))
     height = height - folds * (1 - 0.5 * lips)
-    lines = _lip_lines(on, rng) * lips
+    lines = _lip_lines(on, lips, rng)
     height = height - 0.10 * lines
     hollow = np.clip(pores * smooth * 0.8 + 2.0 * folds + 0.5 * lines, 0, 1.5)
     return height, hollow, micro
 
 
-def _lip_lines(on: Canvas, rng: np.random.Generator) -> np.ndarray:
+def _lip_lines(on: Canvas, lips: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """The lips' vertical creases [N] in [0, 1]: ridged noise drawn out along the way in and out of the mouth."""
-    squeezed = on.position * np.float32([1.0, 0.28, 0.28])
+    lines, there = np.zeros_like(lips), lips > 0.01
+    squeezed = on.position[there] * np.float32([1.0, 0.28, 0.28])
     ridge = 1 - np.minimum(1, 1.4 * np.abs(octaves(squeezed, [1.5, 2.6], rng)))
-    return np.clip(ridge, 0, 1) ** 2
+    lines[there] = np.clip(ridge, 0, 1) ** 2 * lips[there]
+    return lines
 
 
 def _marks(p: SkinParameters, on: Canvas, ground: Canvas) -> tuple[np.ndarray, np.ndarray]:
@@ -127,7 +129,7 @@ def _marks(p: SkinParameters, on: Canvas, ground: Canvas) -> tuple[np.ndarray, n
     room = here["bald"] * (1 - here["ears"])
     sunny = np.clip(here["cheeks"] + here["nose"] + 0.35 * here["forehead"] + 0.05, 0, 1)
     points, _ = strew(ground, 0.22 * p.freckles * sunny * room, rng)
-    freckles = splat(on, points, rng.lognormal(np.log(0.45), 0.35, len(points)), p.freckle_contrast * rng.uniform(0.3, 1.0, len(points)))
+    freckles = splat(on, points, rng.lognormal(np.log(0.40), 0.35, len(points)), p.freckle_contrast * _contrast(p) * rng.uniform(0.3, 1.0, len(points)))
     points, _ = strew(ground, p.moles * room / float((ground.area * room).sum()), rng)
     radius = np.clip(rng.lognormal(np.log(0.75), 0.45, len(points)), 0.4, 2.5)
     # a dark stain needs more melanin on light skin; raised ones are often paler
@@ -143,6 +145,8 @@ def _hair(p: SkinParameters, on: Canvas, ground: Canvas, area: dict[str, np.ndar
     rng, here = np.random.default_rng([p.hair_seed, 4]), regions(ground)
     colour, brow_colour = np.asarray(p.hair_colour, np.float32), np.asarray(p.brow_colour, np.float32)
     eyebrow = hairs.brows(on, ground, here["brows"], p.brow_density, rng)
+    lids = lid_lines(ground)
+    eyebrow = np.maximum(eyebrow, splat(on, lids, np.full(len(lids), 0.45), rng.uniform(0.3, 0.75, len(lids))))  # lashes
     beard = np.zeros_like(eyebrow)
     if p.beard > 0:
         beard = hairs.stubble(on, ground, here["beard"], 0.75 * p.beard, p.beard_length, rng)

@@ -35,7 +35,7 @@ def splat(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarr
     """
     out = np.zeros(len(on.position), np.float32)
     if len(points):
-        finest = 0.6 * float(np.sqrt(np.median(on.area)))
+        finest = 0.6 * on.texel_mm
         wide = np.maximum(radius, finest)
         texel, point, distance = on.near(points, 2 * wide)
         bell = (1 - (distance / (2 * wide[point])) ** 2) ** 2
