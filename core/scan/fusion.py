@@ -12,6 +12,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 import trimesh
+from scipy.ndimage import binary_dilation
 from skimage.measure import marching_cubes
 
 from ..meshes import Mesh
@@ -58,14 +59,7 @@ def _blocks_seen(maps: list[DepthMap], low: np.ndarray, shape: np.ndarray, voxel
         cell = np.floor((local @ seen.rotation + seen.centre - low) / (voxel * SIDE)).astype(int)
         cell = cell[((cell >= 0) & (cell < shape)).all(1)]
         found[tuple(cell.T)] = True
-    return np.flatnonzero(cv2_dilate(found))
-
-
-def cv2_dilate(found: np.ndarray) -> np.ndarray:
-    """A boolean grid grown by one cell in every direction."""
-    from scipy.ndimage import binary_dilation
-
-    return binary_dilation(found, np.ones((3, 3, 3), bool))
+    return np.flatnonzero(binary_dilation(found, np.ones((3, 3, 3), bool)))
 
 
 def _integrate(seen: DepthMap, points: np.ndarray, voxel: float, distance: np.ndarray, weight: np.ndarray) -> None:

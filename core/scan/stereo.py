@@ -87,7 +87,7 @@ def _warp(view: View, picture: np.ndarray, mask: np.ndarray, rotation: np.ndarra
 
 def _match(a: np.ndarray, b: np.ndarray, mask_a: np.ndarray, mask_b: np.ndarray, count: int) -> tuple[np.ndarray, float]:
     """Disparities float32 [H, W] of `a` into `b` (0: unknown) and the median disagreement of the two directions."""
-    matcher = cv2.StereoSGBM_create(0, count, BLOCK, P1=8 * 3 * BLOCK**2, P2=32 * 3 * BLOCK**2, disp12MaxDiff=-1, preFilterCap=31,
+    matcher = cv2.StereoSGBM_create(0, count, BLOCK, P1=2 * 3 * BLOCK**2, P2=8 * 3 * BLOCK**2, disp12MaxDiff=-1, preFilterCap=31,
                                     uniquenessRatio=0, speckleWindowSize=0, speckleRange=0, mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY)
     back = cv2.ximgproc.createRightMatcher(matcher)
     left, right = matcher.compute(a, b), back.compute(b, a)
