@@ -9,12 +9,11 @@ import pytest
 
 from core import template
 from core.meshes import Mesh
-from core.raster import sample
 from core.synthetic import pigment
 from core.synthetic.canvas import canvas, make_canvas
 from core.synthetic.regions import regions
 from core.synthetic.relief import normals
-from core.synthetic.skin import SkinParameters, make_skin, sample_parameters
+from core.synthetic.skin import GROUND, SkinParameters, make_skin, paint_skin, sample_parameters
 
 SIZE = 256
 PLAIN = SkinParameters(melanin=0.04, freckles=0.5, moles=40, age=60)
@@ -96,18 +95,19 @@ def test_pores_brows_and_creases_act_on_all_maps(plain):
     assert plain.normal[..., 2].min() < young.normal[..., 2].min()
 
 
-def test_no_seam_both_sides_of_a_uv_cut_agree():
-    bare = make_skin(replace(PLAIN, scalp_hair=0.0, mottling=0.0, freckles=0.0), SIZE)  # what is finer than a texel there cannot agree
-    mesh = template.load()
-    used = np.unique(np.stack([mesh.faces.ravel(), mesh.face_uvs.ravel()], 1), axis=0)
-    vertex, count = np.unique(used[:, 0], return_counts=True)
-    twice = used[np.isin(used[:, 0], vertex[count == 2])]  # sorted by vertex: pairs
-    sides = mesh.uvs[twice[:, 1]].reshape(-1, 2, 2)
-    assert len(sides) > 20
-    colour = [sample(np.log(bare.diffuse), sides[:, i] * [SIZE, -SIZE] + [0, SIZE]) for i in range(2)]
-    across = np.abs(colour[0] - colour[1]).mean()
-    shuffled = np.abs(colour[0] - np.random.default_rng(0).permutation(colour[1])).mean()
-    assert across < 0.3 * shuffled, (across, shuffled)
+def test_the_paint_does_not_know_where_the_uvs_are_cut(plain):
+    mesh, on = template.load(), canvas(SIZE)
+    right = mesh.uvs[mesh.face_uvs][..., 0].mean(1) > 0.5
+    cut = replace(mesh, uvs=np.concatenate([mesh.uvs + [0.5, 0], mesh.uvs - [0.5, 0]]), face_uvs=mesh.face_uvs + right[:, None] * len(mesh.uvs))
+    moved = make_canvas(cut, SIZE, on.landmarks / 1000, lambda name: np.roll(template.mask(name, SIZE), SIZE // 2, 1))
+    other = paint_skin(PLAIN, moved, canvas(GROUND))
+    known = on.covered & np.roll(moved.covered, SIZE // 2, 1)
+    assert known.mean() > 0.95 * on.covered.mean()
+    beside = np.abs(np.arange(SIZE) + 0.5 - SIZE / 2) < 8  # columns at the new cut, which runs through the middle of the face
+    for name in ("diffuse", "specular", "height"):
+        there, here = np.roll(getattr(other, name), SIZE // 2, 1), getattr(plain, name)
+        apart = np.abs(there - here)[known & beside]
+        assert apart.mean() < 0.05 * here[known].std() and np.median(apart) < 1e-3, name
 
 
 def test_the_normals_of_a_ramp_are_its_slope_whatever_the_uv_layout():

@@ -17,18 +17,19 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .. import raster, template
-from ..meshes import Mesh
+from ..meshes import Mesh, vertex_normals
 
 
 @dataclass(frozen=True)
 class Canvas:
-    """size S; covered bool [S, S], N of them true; position float32 [N, 3] in mm; metric float32 [N, 3]: with T the unit tangent along +u and B
-    the unit bitangent (orthogonal to T, towards +v), dP/du = (a, 0) and dP/dv = (b, c) in mm per texel, stored as (a, b, c);
-    masks name -> float32 [N] in [0, 1]; landmarks float64 [468, 3] in mm."""
+    """size S; covered bool [S, S], N of them true; position float32 [N, 3] in mm; normal float32 [N, 3] unit; masks name -> float32 [N] in [0, 1];
+    landmarks float64 [468, 3] in mm. metric float32 [N, 3] in mm per texel: with T the unit tangent along +u and B the unit bitangent
+    (orthogonal to T, towards +v) the surface's derivatives are dP/du = a T and dP/dv = b T + c B, stored as (a, b, c)."""
 
     size: int
     covered: np.ndarray
     position: np.ndarray
+    normal: np.ndarray
     metric: np.ndarray
     masks: dict[str, np.ndarray]
     landmarks: np.ndarray
@@ -94,8 +95,10 @@ def make_canvas(mesh: Mesh, size: int, landmarks: np.ndarray, mask: Callable[[st
     face, bary = raster.rasterize_uv(mesh, size)
     covered = face >= 0
     position = raster.interpolate(mesh.vertices * 1000, mesh.faces, face[covered], bary[covered]).astype(np.float32)
+    normal = raster.interpolate(vertex_normals(mesh), mesh.faces, face[covered], bary[covered]).astype(np.float32)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-6)
     masks = {name: np.asarray(mask(name), np.float32)[covered] for name in ("skin", "lips", "brows", "eyes", "ears", "neck", "scalp", "nose")}
-    return Canvas(size, covered, position, _metric(mesh, size)[face[covered]], masks, landmarks * 1000)
+    return Canvas(size, covered, position, normal, _metric(mesh, size)[face[covered]], masks, landmarks * 1000)
 
 
 def _metric(mesh: Mesh, size: int) -> np.ndarray:

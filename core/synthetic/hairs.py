@@ -13,20 +13,19 @@ from .spots import strew
 
 def brows(on: Canvas, ground: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
     """How much of each texel brow hair covers, [N] in [0, 1]; `region` on the ground is where it grows, `density` 1 is a usual brow."""
-    roots, texel = strew(ground, 1.5 * density * np.clip(region * 1.5 - 0.35, 0, 1), rng)
+    roots, texel = strew(ground, 1.2 * density * np.clip(region * 2.2 - 0.5, 0, 1), rng)
     outer = np.abs(roots[:, 0:1]) / np.abs(ground.landmarks[[70, 300], 0]).mean()  # 0 at the nose ... 1 at the tail
-    side = np.sign(roots[:, 0:1])
     # near the nose hairs stand up, then lie along the brow, and at the tail point down
-    rise = np.clip(1.35 - 1.9 * outer, -0.35, 1.2) + rng.normal(0, 0.22, outer.shape)
-    direction = np.concatenate([side, 0.35 * np.ones_like(side), rise], 1)
-    length = rng.uniform(5, 9, len(roots)) * np.clip(region[texel] * 1.5, 0.6, 1)
-    return _strokes(on, roots, direction, length, 0.11, np.full(len(roots), -0.35), rng)
+    rise = np.clip(1.6 - 2.3 * outer, -0.3, 1.3) + rng.normal(0, 0.2, outer.shape)
+    direction = np.sign(roots[:, 0:1]) * _along(ground.normal[texel], [1.0, 0, 0]) + rise * _along(ground.normal[texel], [0, 0, 1.0])
+    return _strokes(on, roots, direction, rng.uniform(4.5, 8, len(roots)), 0.11, np.full(len(roots), -0.25), rng)
 
 
 def stubble(on: Canvas, ground: Canvas, region: np.ndarray, density: float, length: float, rng: np.random.Generator) -> np.ndarray:
     """Cover [N] of beard hair of `length` mm (0.3: shaven yesterday) at `density` hairs per mm^2 in the full of `region` [N] on the ground."""
-    roots, _ = strew(ground, density * np.clip(region * 1.3 - 0.15, 0, 1) ** 1.5, rng)
-    down = np.array([[0, 0.15, -1.0]]) + rng.normal(0, 0.35, (len(roots), 3)) + np.sign(roots[:, 0:1]) * [[0.25, 0, 0]]
+    roots, texel = strew(ground, density * np.clip(region * 1.3 - 0.15, 0, 1) ** 1.5, rng)
+    aside = np.sign(roots[:, 0:1]) * 0.25 + rng.normal(0, 0.35, (len(roots), 1))
+    down = aside * _along(ground.normal[texel], [1.0, 0, 0]) - _along(ground.normal[texel], [0, 0, 1.0])
     return _strokes(on, roots, down, length * rng.uniform(0.4, 1.3, len(roots)), 0.06, np.zeros(len(roots)), rng)
 
 
@@ -38,10 +37,16 @@ def beard_shadow(albedo: np.ndarray, amount: np.ndarray) -> np.ndarray:
 def cropped(on: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
     """Cover [N] of very short hair on the scalp; `region` [N] on this canvas."""
     cover, there = np.zeros_like(region), region > 0.01
-    grain = octaves(on.position[there], [0.9, 1.8], rng)
+    grain = octaves(on.position[there], [0.6, 1.1], rng)
     patchy = octaves(on.position[there], [9.0], rng)
-    cover[there] = np.clip(region[there] ** 1.5 * density * (1 + 0.22 * grain + 0.06 * patchy), 0, 1)
+    cover[there] = np.clip(region[there] ** 1.5 * density * (1 + 0.20 * grain + 0.05 * patchy), 0, 1)
     return cover
+
+
+def _along(normal: np.ndarray, way: list[float]) -> np.ndarray:
+    """The unit direction nearest to `way` [3] in the plane across each normal [M, 3]."""
+    flat = np.asarray(way) - (normal @ np.asarray(way))[:, None] * normal
+    return flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-3)
 
 
 def _strokes(on: Canvas, roots: np.ndarray, direction: np.ndarray, length: np.ndarray, width: float, bend: np.ndarray, rng: np.random.Generator) -> np.ndarray:

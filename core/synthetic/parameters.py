@@ -48,7 +48,7 @@ class SkinParameters:
 def sample_parameters(seed: int) -> SkinParameters:
     """A subject at random: the typology angle of the tone is uniform from -55 (dark) to 62 degrees (very light), half of the subjects are men."""
     rng = np.random.default_rng([seed, 0])
-    angle, blood = rng.uniform(-55, 62), float(np.exp(rng.uniform(np.log(0.007), np.log(0.045))))
+    angle, blood = rng.uniform(-55, 62), float(np.exp(rng.uniform(np.log(0.005), np.log(0.04))))
     oxygen, scattering = float(rng.uniform(0.6, 0.9)), float(rng.uniform(0.75, 1.7))
     lightness = np.clip((angle + 20) / 80, 0, 1)
     slope = float(rng.uniform(2.0, 2.8) + 0.4 * lightness)

@@ -146,7 +146,7 @@ def _hair(p: SkinParameters, on: Canvas, ground: Canvas, area: dict[str, np.ndar
     colour, brow_colour = np.asarray(p.hair_colour, np.float32), np.asarray(p.brow_colour, np.float32)
     eyebrow = hairs.brows(on, ground, here["brows"], p.brow_density, rng)
     lids = lid_lines(ground)
-    eyebrow = np.maximum(eyebrow, splat(on, lids, np.full(len(lids), 0.45), rng.uniform(0.3, 0.75, len(lids))))  # lashes
+    eyebrow = np.maximum(eyebrow, splat(on, lids, np.full(len(lids), 0.4), np.full(len(lids), 0.6)))  # lashes
     beard = np.zeros_like(eyebrow)
     if p.beard > 0:
         beard = hairs.stubble(on, ground, here["beard"], 0.75 * p.beard, p.beard_length, rng)

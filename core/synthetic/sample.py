@@ -1,0 +1,154 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A subject's hand-held video and its truth, in the layout that benchmarks read:
+
+    python -m core.synthetic.sample [--out FOLDER] [--work FOLDER] [--seed N] [--frames N] [--samples N] [--only 0,36,...]
+
+capture.mp4; cameras.json (Blender camera-to-world matrices, metres); albedo/NNNN.png (true diffuse albedo, sRGB with alpha), face/NNNN.png
+(facial skin), shadow/NNNN.png (255 where the sun does not reach) of some frames; skin_tone.txt (sRGB of the mean over the face masks).
+Rendered frames stay in the work folder: a second run goes on where the first stopped.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pycolmap
+
+from .. import images, meshes, raster, template
+from ..capture import replacing, write_json
+from ..meshes import Mesh, vertex_normals
+from ..views import View
+from . import scene
+from .identities import subject_mesh
+from .parameters import sample_parameters
+from .skin import Skin, make_skin
+
+RESERVED = json.loads((Path(__file__).parent / "reserved.json").read_text(encoding="utf-8"))
+SAMPLE = Path(__file__).parent / "sample"
+MAPS = 2048  # texels along a side of the subject's maps
+TRUTHS = 14  # frames whose truth is written
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m core.synthetic.sample", description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=SAMPLE)
+    parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_sample")
+    parser.add_argument("--seed", type=int, default=RESERVED["sample"])
+    parser.add_argument("--frames", type=int, default=72)
+    parser.add_argument("--samples", type=int, default=12)
+    parser.add_argument("--only", help="render these frames only, and write nothing else")
+    asked = parser.parse_args()
+    wanted = [int(n) for n in asked.only.split(",")] if asked.only else list(range(asked.frames))
+    skin = make_skin(sample_parameters(asked.seed), MAPS)
+    render_frames(asked.work, asked.seed, skin, scene.camera_path(asked.seed, asked.frames), wanted, asked.samples)
+    if not asked.only:
+        write_sample(asked.out, asked.work, asked.seed, skin, asked.frames)
+
+
+def render_frames(work: Path, seed: int, skin: Skin, cameras: np.ndarray, frames: list[int], samples: int, scale: float = 1.0) -> None:
+    """work/NNNNN.png of these frames (numbers into cameras [N, 4, 4]) by Cycles in a process of its own; files that exist are kept."""
+    work.mkdir(parents=True, exist_ok=True)
+    sun = scene.sun_of(seed)
+    meshes.write_obj(work / "head.obj", subject_mesh(seed))
+    meshes.write_obj(work / "leaves.obj", scene.leaves(seed, sun))
+    images.write_srgb(work / "diffuse.png", images.linear_to_srgb(skin.diffuse), bits=16)
+    images.write_data(work / "specular.png", skin.specular, bits=16)
+    images.write_data(work / "normal.png", skin.normal / 2 + 0.5, bits=16)
+    write_json(work / "job.json", {
+        "seed": seed, "head": str(work / "head.obj"), "leaves": str(work / "leaves.obj"), "out": str(work), "frames": frames, "samples": samples,
+        "maps": {name: str(work / f"{name}.png") for name in ("diffuse", "specular", "normal")}, "cameras": cameras.tolist(),
+        "sun": {"direction": sun.direction.tolist(), "strength": sun.strength, "angle": sun.angle, "colour": sun.colour}, "sky": scene.SKY,
+        "width": round(scene.WIDTH * scale), "height": round(scene.HEIGHT * scale), "focal_px": scene.FOCAL * scale})
+    subprocess.run([sys.executable, "-m", "core.synthetic.render", str(work / "job.json")], cwd=Path(__file__).parents[2], check=True)
+
+
+def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> None:
+    """The video and its truth from rendered frames."""
+    out.mkdir(parents=True, exist_ok=True)
+    cameras = scene.camera_path(seed, frames)
+    write_json(out / "cameras.json", {"name": "sample", "light": "sun", "focal_px": scene.FOCAL, "width": scene.WIDTH, "height": scene.HEIGHT,
+                                      "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
+    write_video(out / "capture.mp4", [work / f"{k:05d}.png" for k in range(frames)])
+    head, sun = subject_mesh(seed), scene.sun_of(seed)
+    opaque = _together(head, scene.leaves(seed, sun))
+    total, count = np.zeros(3), 0
+    for frame in truth_frames(frames):
+        albedo, alpha, face, shadow = frame_truth(head, opaque, skin, view_of(cameras[frame]), sun.direction)
+        name = f"{frame:04d}.png"
+        for folder in ("albedo", "face", "shadow"):
+            (out / folder).mkdir(exist_ok=True)
+        images.write_srgb(out / "albedo" / name, np.concatenate([images.linear_to_srgb(albedo), alpha[..., None]], -1))
+        images.write_data(out / "face" / name, face.astype(np.float32))
+        images.write_data(out / "shadow" / name, shadow.astype(np.float32))
+        total, count = total + albedo[face].sum(0, dtype=np.float64), count + int(face.sum())
+    tone = images.linear_to_srgb(total / count)
+    with replacing(out / "skin_tone.txt") as temporary:
+        temporary.write_text(",".join(f"{c:.4f}" for c in tone) + "\n", encoding="ascii")
+
+
+def truth_frames(frames: int) -> list[int]:
+    """Which frames get their truth: evenly spread, the outermost left out."""
+    return np.unique(np.linspace(3, frames - 4, TRUTHS).round().astype(int)).tolist()
+
+
+def view_of(matrix: np.ndarray) -> View:
+    """A Blender camera-to-world matrix [4, 4] (looks along -z, y up) as a view."""
+    rotation = np.diag([1, -1, -1]) @ matrix[:3, :3].T
+    camera = pycolmap.Camera(model="PINHOLE", width=scene.WIDTH, height=scene.HEIGHT, params=[scene.FOCAL, scene.FOCAL, scene.WIDTH / 2, scene.HEIGHT / 2])
+    return View("", Path(), camera, rotation, -rotation @ matrix[:3, 3], True)
+
+
+def frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarray, over: int = 2) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Linear albedo [h, w, 3], alpha [h, w], and bool [h, w] each: facial skin, and the part of the head that the sun (unit direction) does not reach.
+
+    `opaque` is all that throws shadows, the head included; `over`: rays along a pixel's side.
+    """
+    caster = raster.RayCaster(head)
+    face, bary, _ = raster.render_view(caster, view, over)
+    uv = raster.interpolate(head.uvs, head.face_uvs, face, bary)
+    hit = face >= 0
+    at = np.stack([uv[..., 0] * MAPS, (1 - uv[..., 1]) * MAPS], -1)[hit]
+    colour = np.zeros((*hit.shape, 3), np.float32)
+    colour[hit] = raster.sample(skin.diffuse, at)
+    cover = _shrunk(hit.astype(np.float32), over)
+    albedo = _shrunk(colour, over) / np.maximum(cover, 1e-6)[..., None]
+    in_face = np.zeros(hit.shape, np.float32)
+    in_face[hit] = raster.sample(template.mask("face", 1024), at * 1024 / MAPS)
+    points, normals = raster.interpolate(head.vertices, head.faces, face, bary), raster.interpolate(vertex_normals(head), head.faces, face, bary)
+    dark = np.zeros(hit.shape, np.float32)
+    away = (normals[hit] @ sun) <= 0
+    dark[hit] = away | raster.RayCaster(opaque).blocked(points[hit] + 5e-4 * normals[hit], np.repeat(sun[None], hit.sum(), 0))
+    return albedo, cover, (_shrunk(in_face, over) > 0.5) & (cover > 0.99), _shrunk(dark, over) > 0.5
+
+
+def write_video(path: Path, frames: list[Path]) -> None:
+    """H.264 at scene.RATE from PNG files, atomically."""
+    with replacing(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
+        stream = container.add_stream("libx264", rate=Fraction(scene.RATE), options={"crf": "18", "preset": "slow"})
+        stream.width, stream.height, stream.pix_fmt = scene.WIDTH, scene.HEIGHT, "yuv420p"
+        for frame in frames:
+            pixels = np.round(images.read_srgb(frame) * 255).astype(np.uint8)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
+        container.mux(stream.encode())
+
+
+def _together(a: Mesh, b: Mesh) -> Mesh:
+    return Mesh(np.concatenate([a.vertices, b.vertices]), np.concatenate([a.faces, b.faces + len(a.vertices)]))
+
+
+def _shrunk(image: np.ndarray, factor: int) -> np.ndarray:
+    """The mean of each factor x factor block."""
+    return images.resize(image, image.shape[1] // factor, image.shape[0] // factor)
+
+
+if __name__ == "__main__":
+    main()
