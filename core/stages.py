@@ -40,7 +40,7 @@ STAGES = (
           data=("assets/head.obj", "assets/head.json")),
     Stage("delight", "Delight", ("frames/", "cameras/", "head.obj"), ("delit/",), "core.delight"),
     Stage("texture", "Texture", ("delit/", "cameras/", "head.obj"), ("texture.exr", "texture.png", "texture_confidence.exr"), "core.texture"),
-    Stage("shadow_mask", "Shadow Mask", ("texture.exr", "texture_confidence.exr", "head.obj"), ("shadow_mask_auto.png",), "core.shadow_mask"),
+    Stage("shadow_mask", "Shadow Mask", ("delit/", "cameras/", "head.obj", "texture.exr", "texture_confidence.exr"), ("shadow_mask_auto.png",), "core.shadow_mask"),
     Stage("solve", "Solve", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
           tuple(f"maps/{name}" for name in MAPS), "core.solve", wishes=("shadow_mask.png", "protect_mask.png"), shared=("seed",),
           data=("weights/prior.safetensors",)),

@@ -75,7 +75,8 @@ def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray, re
     return Light(environment, best_direction, sun, FLOOR * np.median(ambient, 0)), reached, inlier
 
 
-def radiance_transfer(caster: RayCaster, points: np.ndarray, normals: np.ndarray, rays: int = 128, step: Callable[[int, int], None] = lambda done, of: None) -> np.ndarray:
+def radiance_transfer(caster: RayCaster, points: np.ndarray, normals: np.ndarray, rays: int = 128,
+                      step: Callable[[int, int], None] = lambda done, of: None) -> np.ndarray:
     """[N, 9]: irradiance / pi at surface points from each SH basis radiance, occluded by the mesh."""
     transfer = np.zeros((len(points), 9))
     directions = fibonacci_sphere(rays)

@@ -18,20 +18,19 @@ COHERENCE = 3.0  # weight of the neighbourhood's opinion, in log odds
 BAND_PX = 0.004  # half width of the band along an edge
 
 
-def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free: np.ndarray, head: np.ndarray) -> np.ndarray:
-    """[H, W] in [0, 1]: how much of the sun each pixel gets.
+def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free: np.ndarray, head: np.ndarray, side: int) -> np.ndarray:
+    """[H, W] in [0, 1]: how much of the sun each pixel gets. `side`: the longer side in pixels of the frame this is a part of.
 
     linear, ambient, direct [H, W, 3]: the frame, the skin's colour under the sky, and what the sun would add; free [H, W]: 1 where
     the head itself leaves the sun visible; head bool [H, W].
     """
-    side = max(head.shape)
     log = np.log(np.maximum(linear, 1e-3)).astype(np.float32)
     shaded = np.log(np.maximum(ambient, 1e-4)).astype(np.float32)
     sunlit = np.log(np.maximum(ambient + direct, 1e-4)).astype(np.float32)
     prior = _log_odds(0.05 + 0.6 * cv2.GaussianBlur(free.astype(np.float32), (0, 0), 0.004 * side))
     albedo = np.zeros_like(log)
     share = np.full(head.shape, 0.5, np.float32)
-    for i in range(6):
+    for _ in range(6):
         evidence = np.clip(log_likelihood(log - sunlit - albedo) - log_likelihood(log - shaded - albedo), -12, 12) + prior
         for _ in range(4):
             around = _mean_over(share, head, 0.004 * side)
@@ -43,7 +42,7 @@ def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free:
 
 
 def _soften(lit: np.ndarray, log, log_light, ambient, direct, head, band: float) -> np.ndarray:
-    """The hard decision `lit` with its edges solved for: least squares of colour = albedo * (ambient + share * direct), relative to the noise of bright pixels."""
+    """The hard decision `lit` with its edges solved for: least squares of colour = albedo * (ambient + share * direct)."""
     inner = cv2.distanceTransform(lit.astype(np.uint8), cv2.DIST_L2, 3)
     outer = cv2.distanceTransform((~lit).astype(np.uint8), cv2.DIST_L2, 3)
     edge = (inner + outer <= band + 0.5) & head
@@ -55,7 +54,15 @@ def _soften(lit: np.ndarray, log, log_light, ambient, direct, head, band: float)
 
 
 def _mean_over(values: np.ndarray, where: np.ndarray, sigma: float) -> np.ndarray:
-    """Gaussian mean of [H, W(, C)] over the pixels `where`."""
+    """Gaussian mean of [H, W(, C)] over the pixels `where`; a wide one at a quarter of the size."""
+    if sigma > 12:
+        height, width = where.shape
+        small = (max(width // 4, 1), max(height // 4, 1))
+        weight = cv2.resize(where.astype(np.float32), small, interpolation=cv2.INTER_AREA)
+        total = cv2.resize(np.asarray(values * (where if values.ndim == 2 else where[..., None]), np.float32), small, interpolation=cv2.INTER_AREA)
+        norm = np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma / 4), 1e-4)
+        mean = cv2.GaussianBlur(total, (0, 0), sigma / 4) / (norm if values.ndim == 2 else norm[..., None])
+        return cv2.resize(mean, (width, height), interpolation=cv2.INTER_LINEAR)
     weight = where.astype(np.float32)
     total = cv2.GaussianBlur(np.asarray(values * (weight if values.ndim == 2 else weight[..., None]), np.float32), (0, 0), sigma)
     norm = np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-4)

@@ -78,20 +78,32 @@ def _best_lit(light, normals, transfer, reached, count) -> np.ndarray:
 def _delight(view: View, mesh, normals, transfer, caster: RayCaster, light: Light, scale: np.ndarray) -> Delit:
     srgb = images.read_srgb(view.path)
     face, bary, _ = render_view(caster, view)
+    shadow = np.zeros(face.shape, np.float32)
+    if (face >= 0).any():
+        box = _box(face >= 0)  # the rest of the frame is never looked at
+        lit, share = _light_seen(images.srgb_to_linear(srgb[box]), mesh, normals, transfer, caster, light, face[box], bary[box], max(face.shape))
+        srgb[box] = images.linear_to_srgb(images.srgb_to_linear(srgb[box]) / np.maximum(lit, 1e-4) * scale)
+        shadow[box] = (1 - share) * (face[box] >= 0)
+    return Delit(view, srgb, shadow if light.has_sun else None)
+
+
+def _light_seen(linear, mesh, normals, transfer, caster, light, face, bary, side) -> tuple[np.ndarray, np.ndarray]:
+    """The skin's expected linear colour [h, w, 3], carried on past the head's edge, and the share of the sun [h, w]."""
     head = face >= 0
     normal = interpolate(normals, mesh.faces, face, bary)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
     ambient = light.ambient(interpolate(transfer, mesh.faces, face, bary))
     direct = light.direct(normal)
-    linear = images.srgb_to_linear(srgb)
-    share = np.ones(head.shape)
+    share = np.ones(head.shape, np.float32)
     if light.has_sun:
         free = np.zeros(head.shape)
         facing = head & (normal @ light.sun > 0)
         position = interpolate(mesh.vertices, mesh.faces, face, bary)[facing] + 1e-3 * normal[facing]
         free[facing] = ~caster.blocked(position, np.repeat(light.sun[None], len(position), 0))
-        share = sun_share(linear, ambient, direct, free, head)
-    light_seen = bleed((ambient + share[..., None] * direct).astype(np.float32), head)
-    delit = linear / np.maximum(light_seen, 1e-4) * scale
-    shadow = ((1 - share) * head).astype(np.float32) if light.has_sun else None
-    return Delit(view, images.linear_to_srgb(delit), shadow)
+        share = sun_share(linear, ambient, direct, free, head, side)
+    return bleed((ambient + share[..., None] * direct).astype(np.float32), head), share
+
+
+def _box(where: np.ndarray, margin: int = 8) -> tuple[slice, slice]:
+    rows, columns = np.flatnonzero(where.any(1)), np.flatnonzero(where.any(0))
+    return slice(max(rows[0] - margin, 0), rows[-1] + margin + 1), slice(max(columns[0] - margin, 0), columns[-1] + margin + 1)
