@@ -108,7 +108,7 @@ def _status(options: argparse.Namespace) -> int:
 
 
 def _mask_import(options: argparse.Namespace) -> int:
-    from .worker.mask_import import import_mask  # needs OpenImageIO
+    from .mask_import import import_mask  # needs OpenImageIO
 
     print(f"{import_mask(Capture(options.capture), options.picture)} is now the shadow mask; solve comes next.")
     return 0

@@ -146,6 +146,8 @@ def from_json(values: dict, base: Settings | None = None) -> Settings:
             raise Problem(f"There is no setting named {name!r}.", "Remove it from the job or update the add-on.")
         if hasattr(current, "__dataclass_fields__"):
             value = replace(current, **{k: _checked(type(current), name, k, v) for k, v in value.items()})
+        elif type(value) is not type(current):
+            raise Problem(f"{name} is {value!r}, which is not a {type(current).__name__}.", f"Its default is {current!r}.")
         settings = replace(settings, **{name: value})
     return settings
 

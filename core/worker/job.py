@@ -8,6 +8,7 @@ Ground floor: standard library only.
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,7 +38,7 @@ def write_job(capture: Capture, *, source: str | Path = "", first: str | None = 
     skips what is fresh. `last` ends the job, None: the last stage. `settings` ({stage: {name: value}}, seed, device) lie
     over the preset `quality`. Raises Problem for an unknown name or value, or when the folder cannot be written.
     """
-    source = str(Path(source).absolute()) if str(source) else ""
+    source = os.path.abspath(source) if str(source) else ""
     values = {"capture": str(capture.root.absolute()), "source": source, "from": first, "until": last, "settings": settings or {}, "quality": quality}
     _job(values)
     write_json(capture.job, values)
