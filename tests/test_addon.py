@@ -305,10 +305,9 @@ def test_headless_renders_through_the_same_functions(addon, capture):
 
 
 def test_the_sample_head_opens_relightable_within_ten_seconds(addon, tmp_path, monkeypatch):
-    setup = addon("setup.operators")
-    shipped = (setup.SAMPLE / "head.obj").is_file()
-    if not shipped:
-        monkeypatch.setattr(setup, "SAMPLE", standin.make(tmp_path / "shipped"))
+    sample_head = addon("capture.sample_head")
+    if not (sample_head.SHIPPED / "head.obj").is_file():
+        monkeypatch.setattr(sample_head, "SHIPPED", standin.make(tmp_path / "shipped"))
     addon("preferences").get().captures = str(tmp_path / "captures")
     started = time.monotonic()
     bpy.ops.wildcap.open_sample_head()
@@ -326,7 +325,7 @@ def test_a_python_that_lacks_packages_is_refused_by_name(addon, tmp_path):
     import venv as venv_module
 
     venv_module.create(venv, with_pip=False, symlinks=True)
-    with pytest.raises(RuntimeError, match="lacks torch"):
+    with pytest.raises(RuntimeError, match="torch .* is missing"):
         bpy.ops.wildcap.use_python(filepath=str(venv))
     assert addon("preferences").get().python == ""
 
@@ -412,3 +411,47 @@ def test_every_panel_draws_in_every_state(addon, capture):
     bpy.ops.wildcap.finish_mask()
     bpy.ops.wildcap.assemble_material()
     assert "Render" in draw_all()
+
+
+def test_the_solver_is_not_downloaded_while_blender_works_offline(addon):
+    assert not bpy.app.online_access
+    with pytest.raises(RuntimeError, match="work offline"):
+        bpy.ops.wildcap.install_solver()
+    assert addon("jobs").of("") is None
+
+
+def test_an_installation_is_polled_like_a_job_and_sets_the_python(addon, tmp_path):
+    jobs, preferences = addon("jobs"), addon("preferences")
+    messages = jobs.messages
+
+    class Installation:
+        """Says what a real one says, without a download."""
+
+        running = True
+
+        def start(self):
+            self.waiting = [messages.Progress("environment", 1, 2, "Collecting torch"), messages.Done(1.0)]
+
+        def poll(self):
+            said = [self.waiting.pop(0)]
+            self.running = bool(self.waiting)
+            return said
+
+    jobs.begin("", "install", Installation(), lambda: preferences.set_python(Path(sys.executable)))
+    assert jobs.poll() and jobs.of("").progress.text == "Collecting torch"
+    assert not jobs.poll()
+    assert preferences.python() == Path(sys.executable)
+    preferences.set_python(None)
+
+
+def test_the_solver_goes_to_the_extensions_user_folder_and_only_environments_are_removed(addon, tmp_path):
+    preferences = addon("preferences")
+    assert preferences.environment_folder().parts[-4:] == (".user", "user_default", "wildcap", "solver")
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    (mine / "novel.txt").write_text("", encoding="utf-8")
+    preferences.get().environment = str(mine)
+    with pytest.raises(RuntimeError, match="is not a Python environment"):
+        bpy.ops.wildcap.remove_solver()
+    preferences.get().environment = ""
+    assert (mine / "novel.txt").is_file()

@@ -36,7 +36,7 @@ def test_the_chain_from_nothing_to_a_picture(step):
         step(done=(*BEFORE, "solve"), head=5.0, has_mask=True, maps=9.0, **head, **maps),
     ]
     assert [s.operator.split(".")[1] for s in chain] == [
-        "use_python", "choose_video", "reconstruct", "bring_in_head", "paint_mask", "solve", "assemble_material", "render"]
+        "install_solver", "choose_video", "reconstruct", "bring_in_head", "paint_mask", "solve", "assemble_material", "render"]
     assert all(s.state and s.label for s in chain)
 
 
@@ -68,5 +68,5 @@ def test_the_sample_head_needs_no_solver(step):
 
 
 def test_without_a_solver_whatever_needs_one_leads_to_its_set_up(step):
-    assert step(python=False).operator == "wildcap.use_python"
-    assert step(python=False, done=BEFORE, has_head=True, head_time=5.0, head=5.0, has_mask=True).operator == "wildcap.use_python"
+    assert step(python=False).operator == "wildcap.install_solver"
+    assert step(python=False, done=BEFORE, has_head=True, head_time=5.0, head=5.0, has_mask=True).operator == "wildcap.install_solver"

@@ -23,8 +23,8 @@ class BaseOperator:
             traceback.print_exc()
             return self._refuse(root, Problem(f"{self.bl_label} failed unexpectedly: {type(error).__name__}: {error}",
                                               "Nothing was deleted. Try again; if it stays, report it with the text of the system console."))
-        problems.clear(root)
-        problems.clear(captures.root(captures.active(context)))
+        for key in ("", root, captures.root(captures.active(context))):
+            problems.clear(key)
         status.refresh(context)
         return {'FINISHED'}
 

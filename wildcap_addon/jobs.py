@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The running jobs, one per capture: started by an operator, polled by a timer, stopped when Blender closes.
+"""The running jobs, one per capture, and the solver's installation: started by an operator, polled by a timer, stopped when Blender closes.
 
 Run-time state only, nothing of it reaches the .blend. A job belongs to its capture: opening another .blend changes nothing.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import bpy
 from ..core import messages, stages
 from ..core.messages import Problem
 from ..core.worker.client import Worker
+from ..core.worker.environment import Installation
 from ..core.worker.job import write_job
 from . import captures, preferences, problems, properties, status
 
@@ -24,15 +26,16 @@ ROOT = Path(__file__).resolve().parent.parent  # the folder that holds core/, wh
 class Job:
     """A worker at a capture, and the last thing it said. `previews` counts the preview pictures so far."""
 
-    goal: str  # 'reconstruct' or 'solve'
-    worker: Worker
+    goal: str  # 'reconstruct', 'solve' or 'install'
+    worker: Worker | Installation
+    then: Callable[[], None] | None = None  # called when it ended well
     progress: messages.Progress | None = None
     stage: str = ""
     previews: int = 0
     log: list[str] = field(default_factory=list)
 
 
-_jobs: dict[str, Job] = {}  # capture folder -> its job
+_jobs: dict[str, Job] = {}  # capture folder -> its job; '' -> the installation
 
 
 def of(root: str) -> Job | None:
@@ -47,19 +50,23 @@ def start(item, goal: str, *, first: str | None = None, last: str | None = None)
         raise Problem("This capture is being worked on already.", "Wait for it, or click Cancel.")
     python = preferences.python()
     if python is None:
-        raise Problem("The solver is not set up on this machine.", "Click Set Up Solver and choose a Python that has the solver's packages.")
+        raise Problem("The solver is not set up on this machine.", "Click Install Solver in the Setup panel, or Use an Existing Python.")
     path = write_job(capture, first=first, last=last, settings=properties.values(item))
-    worker = Worker(python, ROOT, path, capture.logs / "worker.log")
+    return begin(root, goal, Worker(python, ROOT, path, capture.logs / "worker.log"))
+
+
+def begin(root: str, goal: str, worker: Worker | Installation, then: Callable[[], None] | None = None) -> Job:
+    """Starts a worker and listens to it. Raises Problem when it cannot."""
     worker.start()
     problems.clear(root)
-    _jobs[root] = Job(goal, worker)
+    _jobs[root] = Job(goal, worker, then)
     if not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=INTERVAL_S, persistent=True)
     return _jobs[root]
 
 
 def cancel(root: str) -> None:
-    """Asks the capture's job to stop; it does so within two seconds."""
+    """Asks the capture's job ('': the installation) to stop; it does so within two seconds."""
     if root in _jobs:
         _jobs[root].worker.cancel()
 
@@ -84,6 +91,9 @@ def _hear(root: str, job: Job, message: messages.Message) -> None:
             job.log = [*job.log[-99:], message.text]
         case messages.StageDone():
             job.progress = None
+        case messages.Done():
+            if job.then is not None:
+                job.then()
         case messages.Failed():
             problems.show(root, Problem(message.problem, message.remedy))
         case messages.Cancelled():
@@ -120,7 +130,7 @@ def eta(job: Job) -> str:
 
 
 def stage_label(job: Job) -> str:
-    return stages.by_name(job.stage).label if job.stage in stages.NAMES else "Starting"
+    return stages.by_name(job.stage).label if job.stage in stages.NAMES else "Installing" if job.goal == "install" else "Starting"
 
 
 def register():
@@ -132,5 +142,5 @@ def unregister():
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     for job in _jobs.values():
-        job.worker.terminate()
+        (job.worker.cancel if job.goal == "install" else job.worker.terminate)()
     _jobs.clear()

@@ -19,7 +19,7 @@ class Facts:
 
     has_capture: bool = False
     has_python: bool = False
-    running: str = ""  # what the capture's job is doing: '', 'reconstruct' or 'solve'
+    running: str = ""  # what the capture's job is doing: '', 'reconstruct', 'solve' or 'install'
     painting: bool = False
     head_time: float = -1.0  # modification time of the head.obj that is in the scene; -1: none
     maps_time: float = -1.0  # of the maps that the material shows; -1: none assembled
@@ -37,7 +37,8 @@ class Step:
 
 
 BEFORE_MASK = stages.NAMES[:stages.NAMES.index(stages.MASK_STAGE) + 1]
-SET_UP = Step("The solver is not set up on this machine.", "Set Up Solver", "wildcap.use_python", 'PREFERENCES')
+SET_UP = Step("The solver is not set up on this machine.", "Install Solver", "wildcap.install_solver", 'IMPORT')
+WORDS = {"reconstruct": "Reconstructing ...", "solve": "Solving ...", "install": "Installing the solver ..."}
 
 
 def next_step(facts: Facts) -> Step:
@@ -45,7 +46,7 @@ def next_step(facts: Facts) -> Step:
     if facts.painting:
         return Step("Red is shadow. Paint adds, Ctrl takes away.", "Save Mask and Leave", "wildcap.finish_mask", 'CHECKMARK')
     if facts.running:
-        return Step("Solving ..." if facts.running == "solve" else "Reconstructing ...", "Cancel", "wildcap.cancel", 'CANCEL')
+        return Step(WORDS[facts.running], "Cancel", "wildcap.cancel", 'CANCEL')
     if not facts.has_capture:
         return Step("No face yet.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE') if facts.has_python else SET_UP
     status = facts.status

@@ -24,17 +24,19 @@ class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
             layout.label(text=item.name, icon='USER')
         width = context.region.width if context.region else 300
         problems.draw_text(layout, step.state, width)
-        job = jobs.of(root)
+        job = jobs.of(root) or jobs.of("")
         if job is not None:
             draw_job(layout, job)
         if step.operator:
             row = layout.row()
             row.scale_y = 2.0
             row.operator(step.operator, text=step.label, icon=step.icon)
+        if step == next_step.SET_UP:
+            layout.operator("wildcap.use_python", icon='FILE_FOLDER')
         if item is None:
-            layout.operator("wildcap.open_sample_head")
+            layout.operator("wildcap.open_sample_head", icon='USER')
         found = status.of(item) if item is not None else None
-        problems.draw(layout, problems.of(root) or (found.problem if found else None), width)
+        problems.draw(layout, problems.of(root) or problems.of("") or (found.problem if found else None), width)
 
 
 class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
@@ -63,9 +65,9 @@ class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
 def gather(context, item) -> next_step.Facts:
     """What the next step depends on, from what is known already."""
     if item is None:
-        return next_step.Facts(has_python=preferences.python() is not None)
+        return next_step.Facts(has_python=preferences.python() is not None, running="install" if jobs.of("") else "")
     head = captures.head(context, item)
-    job = jobs.of(captures.root(item))
+    job = jobs.of(captures.root(item)) or jobs.of("")
     return next_step.Facts(
         has_capture=True, has_python=preferences.python() is not None, running=job.goal if job else "", painting=session.active(),
         head_time=head.get("wildcap_head_time", 0.0) if head else -1.0, maps_time=head.get("wildcap_maps_time", -1.0) if head else -1.0,

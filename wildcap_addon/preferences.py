@@ -16,6 +16,10 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
         name="Solver Python", subtype='FILE_PATH',
         description="Python that runs the solver, with the packages of requirements/worker.txt installed",
     )
+    environment: bpy.props.StringProperty(
+        name="Solver Folder", subtype='DIR_PATH',
+        description="Where Install Solver puts its packages; empty: in the extension's own user folder",
+    )
     captures: bpy.props.StringProperty(
         name="Captures Folder", subtype='DIR_PATH',
         description="Where new captures go while the .blend is not saved; empty: WildCap in the documents folder",
@@ -25,6 +29,7 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "python")
+        layout.prop(self, "environment")
         layout.prop(self, "captures")
 
 
@@ -36,6 +41,17 @@ def python() -> Path | None:
     """The solver's Python, if it is set and there."""
     path = bpy.path.abspath(get().python)
     return Path(path) if path and Path(path).is_file() else None
+
+
+def set_python(path: Path | None) -> None:
+    get().python = str(path or "")
+    bpy.context.preferences.is_dirty = True  # Blender saves preferences on exit
+
+
+def environment_folder() -> Path:
+    """Where Install Solver makes its environment: kept across updates, outside the extension's own files."""
+    chosen = get().environment
+    return Path(bpy.path.abspath(chosen) if chosen else bpy.utils.extension_path_user(base_package, path="solver"))
 
 
 def captures_folder() -> Path:

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which face: a new capture from a video, or one that exists."""
+"""Which face: a new capture from a video, one that exists, or the sample head."""
 
 import bpy
 
-from . import operators, panel
+from . import operators, panel, sample_head
 
-register, unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *panel.CLASSES))
+register, unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *sample_head.CLASSES, *panel.CLASSES))

@@ -32,10 +32,11 @@ class WILDCAP_OT_cancel(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return jobs.of(captures.root(captures.active(context))) is not None
+        return jobs.of(captures.root(captures.active(context))) is not None or jobs.of("") is not None
 
     def work(self, context):
-        jobs.cancel(captures.root(captures.require(context)))
+        root = captures.root(captures.active(context))
+        jobs.cancel(root if jobs.of(root) else "")
 
 
 class WILDCAP_OT_bring_in_head(BaseOperator, bpy.types.Operator):

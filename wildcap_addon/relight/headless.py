@@ -11,7 +11,7 @@ from .. import captures, head
 from . import lights, material, picture
 
 
-def render_relit(capture_folder: Path, presets: Iterable[str] = tuple(lights.PRESETS), resolution: int = 768, samples: int = 64) -> list[Path]:
+def render_relit(capture_folder: Path, presets: Iterable[str] = tuple(lights.PRESETS), resolution: int = 640, samples: int = 32) -> list[Path]:
     """Brings in the head, assembles its material and renders renders/PRESET.png for each light. Returns the pictures.
 
     Empties the open file first. Raises Problem when the capture has no head or no maps.

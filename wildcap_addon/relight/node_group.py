@@ -14,12 +14,15 @@ SCATTERING_M = 0.0037
 """Mean free path of red light in skin, 3.7 mm (Jensen et al. 2001, skin1: 3.67, 1.37 and 0.68 mm)"""
 SCATTERING_RGB = (1.0, 0.37, 0.19)
 
+SPECULAR_AMOUNT = 1.44
+"""The specular map holds levels for an IOR of 1.5 (4 % at normal incidence); at skin's 1.4 (2.8 %) the same light needs 4 / 2.8 as much"""
+
 # name, socket type, default, range; what the maps feed comes first
 INPUTS = (
     ("Albedo", 'NodeSocketColor', (0.5, 0.35, 0.28, 1.0), None),
     ("Specular", 'NodeSocketFloat', 0.5, (0.0, 1.0)),
     ("Normal", 'NodeSocketVector', (0.0, 0.0, 0.0), None),
-    ("Specular Amount", 'NodeSocketFloat', 1.0, (0.0, 4.0)),
+    ("Specular Amount", 'NodeSocketFloat', SPECULAR_AMOUNT, (0.0, 4.0)),
     ("Roughness", 'NodeSocketFloat', 0.45, (0.0, 1.0)),
     ("IOR", 'NodeSocketFloat', 1.4, (1.0, 3.0)),
     ("Subsurface", 'NodeSocketFloat', 1.0, (0.0, 1.0)),

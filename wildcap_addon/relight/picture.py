@@ -81,7 +81,7 @@ def _camera(scene, frame: Matrix, radius: float) -> None:
     camera.data.lens = FOCAL_LENGTH_MM
     direction = Vector(CAMERA_DIRECTION).normalized()
     distance = radius * 1.12 / tan(camera.data.angle / 2)
-    camera.matrix_world = frame @ Matrix.Translation(direction * (distance + radius * 0.5)) @ direction.to_track_quat('Z', 'Y').to_matrix().to_4x4()
+    camera.matrix_world = frame @ Matrix.Translation(direction * (distance + radius * 0.2)) @ direction.to_track_quat('Z', 'Y').to_matrix().to_4x4()
     camera.data.clip_start, camera.data.clip_end = distance * 0.01, distance * 100
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""First steps: the solver's Python, and the sample head that needs none."""
+"""First steps: the solver, in an environment of its own or in an existing Python."""
 
 import bpy
 

@@ -1,28 +1,51 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators of the first steps: choose the solver's Python; open the sample head."""
+"""Operators of the first steps: install the solver into an environment of its own, use an existing Python, remove it."""
 
 import os
-import shutil
-import subprocess
+import sys
 from pathlib import Path
 
 import bpy
 
-from ...core.capture import Capture, replacing_folder, storage_problem
 from ...core.messages import Problem
-from .. import captures, preferences
+from ...core.worker import environment
+from .. import jobs, preferences
 from ..base_operator import BaseOperator
 
-SAMPLE = Path(__file__).resolve().parents[2] / "core" / "assets" / "sample_head"
-PACKAGES = ("torch", "numpy", "scipy", "cv2", "OpenImageIO", "pycolmap", "trimesh", "skimage", "av", "safetensors", "mediapipe")
+REQUIREMENTS = jobs.ROOT / "requirements"
+SIZE = "up to 3 GB to download and 7 GB on disk" if sys.platform == "linux" else "about 1 GB to download and 2 GB on disk"
+"""PyPI's torch for Linux brings CUDA; without it the environment measures 1.6 GB"""
+
+
+class WILDCAP_OT_install_solver(BaseOperator, bpy.types.Operator):
+    """Download the solver's packages from PyPI into a folder of their own; Blender's Python stays as it is"""
+
+    bl_idname = "wildcap.install_solver"
+    bl_label = "Install Solver"
+
+    @classmethod
+    def poll(cls, context):
+        return jobs.of("") is None
+
+    def invoke(self, context, event):
+        return context.window_manager.invoke_confirm(self, event, title="Install the Solver?", confirm_text="Install",
+                                                     message=f"PyTorch and other packages from PyPI, {SIZE}, into {preferences.environment_folder()}")
+
+    def work(self, context):
+        if not bpy.app.online_access:
+            where = "" if bpy.app.online_access_override else " (Preferences, System, Network)"
+            raise Problem("Blender is set to work offline.", f"Allow online access{where}, or use a Python that has the packages already.")
+        folder = preferences.environment_folder()
+        installation = environment.Installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"))
+        jobs.begin("", "install", installation, lambda: preferences.set_python(environment.python_of(folder)))
 
 
 class WILDCAP_OT_use_python(BaseOperator, bpy.types.Operator):
     """Choose a Python, or the folder of a virtual environment, that has the solver's packages"""
 
     bl_idname = "wildcap.use_python"
-    bl_label = "Set Up Solver"
+    bl_label = "Use an Existing Python"
 
     filepath: bpy.props.StringProperty(subtype='FILE_PATH')
 
@@ -32,64 +55,39 @@ class WILDCAP_OT_use_python(BaseOperator, bpy.types.Operator):
 
     def work(self, context):
         python = interpreter(Path(bpy.path.abspath(self.filepath)))
-        check(python)
-        preferences.get().python = str(python)
-        context.preferences.is_dirty = True
+        problems = environment.verify(python, REQUIREMENTS)
+        if problems:
+            raise Problem(f"{python} cannot run the solver. {' '.join(problems[:3])}",
+                          f"Install what {REQUIREMENTS / 'worker.txt'} lists, then nets.txt beside it with --no-deps; or click Install Solver.")
+        preferences.set_python(python)
 
 
-class WILDCAP_OT_open_sample_head(BaseOperator, bpy.types.Operator):
-    """Copy the finished sample head to your captures and show it; needs no solver"""
+class WILDCAP_OT_remove_solver(BaseOperator, bpy.types.Operator):
+    """Delete the folder that Install Solver made; captures stay"""
 
-    bl_idname = "wildcap.open_sample_head"
-    bl_label = "Open Sample Head"
-    bl_options = {'REGISTER', 'UNDO'}
+    bl_idname = "wildcap.remove_solver"
+    bl_label = "Remove Solver"
+
+    @classmethod
+    def poll(cls, context):
+        return jobs.of("") is None and preferences.environment_folder().is_dir()
+
+    def invoke(self, context, event):
+        return context.window_manager.invoke_confirm(self, event, title="Remove the Solver?", message=f"Deletes {preferences.environment_folder()}")
 
     def work(self, context):
-        captures.add(context, copy_sample(preferences.captures_folder()).root)
-        if context.mode != 'OBJECT':
-            bpy.ops.object.mode_set(mode='OBJECT')
-        bpy.ops.wildcap.bring_in_head()
-        bpy.ops.wildcap.assemble_material()
+        folder = preferences.environment_folder()
+        environment.remove(folder)
+        if not preferences.python():
+            preferences.set_python(None)
 
 
 def interpreter(path: Path) -> Path:
     """The Python meant by a file or by a virtual environment's folder. Raises Problem when there is none."""
-    for candidate in (path, path / "bin" / "python", path / "Scripts" / "python.exe", path / "python.exe"):
+    for candidate in (path, environment.python_of(path), path / "python.exe"):
         if candidate.is_file() and os.access(candidate, os.X_OK):
             return candidate
     raise Problem(f"There is no Python at {path}.", "Choose the python file itself, or the folder of a virtual environment.")
 
 
-def check(python: Path) -> None:
-    """Raises Problem unless the Python is new enough and has every package; imports none of them, which would take long."""
-    code = ("import sys, importlib.util as u; "
-            f"print(sys.version_info >= (3, 11), *(n for n in {PACKAGES!r} if u.find_spec(n) is None))")
-    try:
-        result = subprocess.run([str(python), "-E", "-s", "-c", code], capture_output=True, text=True, timeout=30)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise Problem(f"{python} cannot be run ({error}).", "Choose another Python.") from error
-    if result.returncode or not result.stdout.split():
-        raise Problem(f"{python} is not a working Python.", "Choose another Python.")
-    new_enough, *missing = result.stdout.split()
-    if new_enough != "True":
-        raise Problem(f"{python} is older than Python 3.11.", "Choose a newer one.")
-    if missing:
-        raise Problem(f"{python} lacks {', '.join(missing)}.",
-                      f"Install them with: {python} -m pip install -r requirements/worker.txt, then the same with --no-deps for requirements/nets.txt.")
-
-
-def copy_sample(folder: Path) -> Capture:
-    """A writable copy of the shipped sample head in `folder`; one that is there already is kept with the artist's work in it."""
-    if not (SAMPLE / "head.obj").is_file():
-        raise Problem("The sample head is missing from this installation.", "Install the extension's zip again.")
-    capture = Capture(folder / "sample_head.wildcap")
-    if not capture.head.is_file():
-        try:
-            with replacing_folder(capture.root) as temporary:
-                shutil.copytree(SAMPLE, temporary, dirs_exist_ok=True, copy_function=shutil.copyfile)
-        except shutil.Error as error:
-            raise storage_problem(OSError(*error.args[0][0][2:]), capture.root) from error
-    return capture
-
-
-CLASSES = (WILDCAP_OT_use_python, WILDCAP_OT_open_sample_head)
+CLASSES = (WILDCAP_OT_install_solver, WILDCAP_OT_use_python, WILDCAP_OT_remove_solver)

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sample head: a finished capture that is shipped, copied to where the artist may write, and shown; needs no solver."""
+
+import shutil
+from pathlib import Path
+
+import bpy
+
+from ...core.capture import Capture, replacing_folder, storage_problem
+from ...core.messages import Problem
+from .. import captures, preferences
+from ..base_operator import BaseOperator
+
+SHIPPED = Path(__file__).resolve().parents[2] / "core" / "assets" / "sample_head"
+
+
+class WILDCAP_OT_open_sample_head(BaseOperator, bpy.types.Operator):
+    """Copy the finished sample head to your captures and show it; needs no solver"""
+
+    bl_idname = "wildcap.open_sample_head"
+    bl_label = "Open Sample Head"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    def work(self, context):
+        captures.add(context, copy_to(preferences.captures_folder()).root)
+        if context.mode != 'OBJECT':
+            bpy.ops.object.mode_set(mode='OBJECT')
+        bpy.ops.wildcap.bring_in_head()
+        bpy.ops.wildcap.assemble_material()
+
+
+def copy_to(folder: Path) -> Capture:
+    """A writable copy of the sample head in `folder`; one that is there already is kept with the artist's work in it."""
+    if not (SHIPPED / "head.obj").is_file():
+        raise Problem("The sample head is missing from this installation.", "Install the extension's zip again.")
+    capture = Capture(folder / "sample_head.wildcap")
+    if not capture.head.is_file():
+        try:
+            with replacing_folder(capture.root) as temporary:
+                shutil.copytree(SHIPPED, temporary, dirs_exist_ok=True, copy_function=shutil.copyfile)
+        except shutil.Error as error:  # a list of (source, target, reason)
+            raise storage_problem(OSError(0, str(error.args[0][0][2])), capture.root) from error
+    return capture
+
+
+CLASSES = (WILDCAP_OT_open_sample_head,)
