@@ -161,7 +161,7 @@ def _weighted_fit(transfer, cosine, values, lit, weights, has_sun) -> tuple[np.n
     w1, w0 = weights * lit, weights * (1 - lit)
     normal = a_lit.T @ (a_lit * w1[:, None]) + a_shade.T @ (a_shade * w0[:, None])
     right = a_lit.T @ (target * w1) + a_shade.T @ (target * w0)
-    ridge = np.diag([0.0, *[1e-3] * 3, *[4e-3] * 5, 0.0]) * weights.sum()
+    ridge = np.diag([0.0, *[2e-4] * 3, *[5e-4] * 5, 0.0]) * weights.sum()
     if not has_sun:
         ridge[9, 9] = 1.0
     solution = np.linalg.solve(normal + ridge + 1e-9 * np.eye(10), right)
