@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Face landmarks: found in several frames, lifted to the world by robust triangulation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import faces, images
+from ..messages import Problem, Reporter
+from ..views import View
+
+MOST_VIEWS = 32
+BEHIND_FACE_M = 0.06
+"""How far behind the mean landmark the middle of the head is taken to be; says which side of the face a view sees."""
+
+
+@dataclass(frozen=True)
+class Landmarks:
+    """points [468, 3] in metres (nan: not lifted), trust [468] in [0, 1], error_px the median reprojection error;
+    images maps a frame's name to what was found in it: pixels [468, 2], and used bool [468]."""
+
+    points: np.ndarray
+    trust: np.ndarray
+    error_px: float
+    images: dict[str, tuple[np.ndarray, np.ndarray]]
+
+
+def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
+    """Landmarks of the face all views look at. Raises Problem when fewer than three frames show one.
+
+    `steps` is the stage's total for the progress bar, of which detection is the first tenth.
+    """
+    chosen, found = spread(views, MOST_VIEWS), []
+    for i, view in enumerate(chosen):
+        report.progress(0.1 * steps * i / len(chosen), steps, f"looking for the face in {view.name}")
+        srgb = images.read_srgb(view.path)
+        face = faces.detect(srgb)
+        if face is not None:
+            found.append((view, face.landmarks[:, :2] * [view.width / srgb.shape[1], view.height / srgb.shape[0]]))
+    if len(found) < 3:
+        raise Problem(f"A face was found in only {len(found)} of the {len(chosen)} frames that were looked at.",
+                      "Film the face larger, in better light and from the front too, then start again from the video.")
+    return triangulate([view for view, _ in found], np.stack([pixels for _, pixels in found]))
+
+
+def spread(views: list[View], count: int) -> list[View]:
+    """At most `count` views, evenly spread over the angle around the vertical through the point that they all look at."""
+    if len(views) <= count:
+        return views
+    centres, axes = np.stack([v.centre for v in views]), np.stack([v.axis for v in views])
+    middle = _nearest_to_rays(centres[None], axes[None], np.ones((1, len(views))))[0]
+    azimuth = np.arctan2(*(centres - middle)[:, :2].T)
+    order = np.argsort(azimuth)
+    wanted = np.linspace(azimuth[order[0]], azimuth[order[-1]], count)
+    picked = {int(order[np.abs(azimuth[order] - angle).argmin()]) for angle in wanted}
+    rest = [i for i in np.linspace(0, len(views) - 1, count).astype(int) if i not in picked]
+    return [views[i] for i in sorted([*picked, *rest[:count - len(picked)]])]
+
+
+def triangulate(views: list[View], pixels: np.ndarray, rounds: int = 12) -> Landmarks:
+    """Lifts pixels [V, 468, 2] to points: iteratively reweighted (Geman-McClure) rays, the far side of the face left out."""
+    count, landmarks = pixels.shape[:2]
+    origins = np.stack([np.repeat(v.centre[None], landmarks, 0) for v in views], 1)  # [468, V, 3]
+    rays = np.stack([v.rays(p) for v, p in zip(views, pixels, strict=True)], 1)
+    weights = np.ones((landmarks, count))
+    points = _nearest_to_rays(origins, rays, weights)
+    for step in range(rounds):
+        errors = _errors(views, points, pixels)
+        facing = _facing(points, origins)
+        width = max(3 * np.median(errors[facing > 0]), 1.0) if (facing > 0).any() else 5.0
+        robust = 1 / np.maximum(errors, 0.5) if step < 3 else (width ** 2 / (width ** 2 + errors ** 2)) ** 2  # the first rounds: least absolute
+        distance = np.linalg.norm(origins - points[:, None], axis=-1)
+        weights = np.where(np.isfinite(errors), robust, 0) * np.maximum(facing, 1e-4) * _view_trust(errors, facing) / distance ** 2
+        points = _nearest_to_rays(origins, rays, weights)
+    errors = _errors(views, points, pixels)
+    facing = _facing(points, origins)
+    used = (facing > 0) & (errors < 2 * width) & (_view_trust(errors, facing) > 0.1)
+    lifted = (used.sum(1) >= 2) & (_widest_angle(points, origins, used) > np.radians(5))
+    typical = np.sqrt((np.where(used, errors, 0) ** 2).sum(1) / np.maximum(used.sum(1), 1))
+    trust = np.where(lifted, np.minimum(used.sum(1) / 4, 1) / (1 + (typical / width) ** 2), 0)
+    points[~lifted] = np.nan
+    median = float(np.median(errors[used])) if used.any() else float("nan")
+    return Landmarks(points, trust, median, {v.name: (p, used[:, i]) for i, (v, p) in enumerate(zip(views, pixels, strict=True))})
+
+
+def to_json(found: Landmarks) -> dict:
+    """What landmarks.json holds: points by index in metres, and by frame the pixels they were lifted from."""
+    points = {str(i): [round(float(x), 6) for x in p] for i, p in enumerate(found.points) if np.isfinite(p).all()}
+    seen = {name: {str(i): [round(float(x), 2) for x in pixels[i]] for i in np.flatnonzero(used)} for name, (pixels, used) in found.images.items()}
+    return {"points": points, "images": seen}
+
+
+def _nearest_to_rays(origins: np.ndarray, rays: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Per row the point nearest to its weighted rays: origins, unit rays [N, V, 3], weights [N, V] -> [N, 3]."""
+    across = np.eye(3) - rays[..., :, None] * rays[..., None, :]
+    across = across * (weights / weights.sum(1, keepdims=True))[..., None, None]
+    return np.linalg.solve(across.sum(1) + 1e-12 * np.eye(3), (across @ origins[..., None]).sum(1))[..., 0]
+
+
+def _errors(views, points, pixels) -> np.ndarray:
+    """Reprojection errors [468, V] in pixels; infinite behind a camera."""
+    errors = np.stack([np.linalg.norm(v.project(points)[0] - p, axis=1) for v, p in zip(views, pixels, strict=True)], 1)
+    return np.where(np.isfinite(errors), errors, np.inf)
+
+
+def _view_trust(errors: np.ndarray, facing: np.ndarray) -> np.ndarray:
+    """[V] in [0, 1]: the net fails as a whole where a head is turned far, so a view's typical error is held against the better views'."""
+    typical = np.nanmedian(np.where((facing > 0) | ~(facing > 0).any(0), errors, np.nan), axis=0)
+    return 1 / (1 + (typical / (1.5 * np.percentile(typical, 30) + 1e-9)) ** 4)
+
+
+def _facing(points: np.ndarray, origins: np.ndarray) -> np.ndarray:
+    """[468, V] in [0, 1]: how squarely a view sees the side of the head that a landmark lies on (0: beyond 70 degrees)."""
+    face = np.median(points, axis=0)
+    backwards = face - origins.mean((0, 1))
+    backwards[2] = 0
+    middle = face + BEHIND_FACE_M * backwards / np.linalg.norm(backwards)
+    outwards, towards = points - middle, origins - points[:, None]
+    outwards, towards = (x / np.linalg.norm(x, axis=-1, keepdims=True) for x in (outwards, towards))
+    least = np.cos(np.radians(70))
+    return np.clip(((outwards[:, None] * towards).sum(-1) - least) / (1 - least), 0, 1)
+
+
+def _widest_angle(points: np.ndarray, origins: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """[468]: about the widest angle between two used rays, in radians: twice the largest from their mean."""
+    towards = origins - points[:, None]
+    towards /= np.linalg.norm(towards, axis=-1, keepdims=True)
+    mean = (towards * used[..., None]).sum(1)
+    mean /= np.maximum(np.linalg.norm(mean, axis=-1, keepdims=True), 1e-12)
+    cosines = np.where(used, (towards * mean[:, None]).sum(-1), 1)
+    return 2 * np.arccos(np.clip(cosines.min(1), -1, 1))

@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The last millimetres: a smooth displacement of every vertex onto the scan, stiff to soft.
+
+Minimises data + thin-plate bending of the displacement by sparse least squares, as optimal-step non-rigid ICP does
+(Amberg, Romdhani, Vetter 2007). A vertex is drawn to its scan patch along the patch's normal only, so the mesh
+slides along the surface; where there is no data (ears, scalp, neck, holes) stiffness stays high and the shape follows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sparse
+from scipy.sparse.linalg import splu
+
+from ..meshes import Mesh, vertex_normals
+from ..messages import Reporter
+from .alignment import Model
+from .correspondence import Scan, trimmed
+
+STIFF_M, SOFT_M = 0.030, 0.0022
+"""Length over which the displacement is held together, at the first and the last step, metres."""
+BLIND_M = 0.020
+"""The same where the scan is not followed; it never softens below this."""
+FAR_M, NEAR_M = 0.030, 0.0015
+"""Distance beyond which a scan patch is no partner: at the first step, and from two thirds of the way on."""
+PULL, BLIND_PULL = 1e-3, 2e-2
+"""Weight of staying where the identity fit is, against data of weight one; and where the scan is not followed, lest the crown overshoot."""
+LANDMARK_AREA_M2 = (4e-5, 4e-7)
+"""Surface area that one landmark counts for, at the first and the last step."""
+
+
+def fit(model: Model, start: np.ndarray, scan: Scan, follow: np.ndarray, hold: np.ndarray, points: np.ndarray, trust: np.ndarray,
+        iterations: int, report: Reporter, first: float, steps: float) -> np.ndarray:
+    """Vertices [V, 3] in metres. start [V, 3]: the aligned head; follow [V] in [0, 1]: how far the scan is believed;
+    hold [468]: how much longer a landmark counts than the others (lips and lids); points [468, 3], trust [468] as in Landmarks.
+
+    Progress goes from `first` to `steps`.
+    """
+    area, laplacian = _operators(model.mesh.moved(start))
+    anchors = _anchors(model)
+    known = np.isfinite(points).all(1) & (trust * model.landmark_weight > 0)
+    vertices = start.copy()
+    for step in range(iterations):
+        report.progress(first + (steps - first) * step / iterations, steps, "fitting the head to the scan")
+        part = step / max(iterations - 1, 1)
+        length = STIFF_M * (SOFT_M / STIFF_M) ** part
+        normals = vertex_normals(model.mesh.moved(vertices))
+        reach = FAR_M * (NEAR_M / FAR_M) ** min(1.0, 1.5 * part)
+        signed, scan_normals = scan.match(vertices, normals, 1.5 * reach)
+        data = trimmed(np.where(follow > 0.02, signed, np.nan), reach) * follow
+        aim = vertices + scan_normals * np.nan_to_num(signed)[:, None]
+
+        at = anchors @ vertices
+        miss = np.nan_to_num(points - at)
+        surface = anchors @ normals
+        surface /= np.linalg.norm(surface, axis=1, keepdims=True)
+        seen = (anchors @ data)[:, None]
+        miss -= seen * (miss * surface).sum(1, keepdims=True) * surface  # in depth the scan knows better
+        robust = 1 / (1 + (np.linalg.norm(miss, axis=1) / 0.005) ** 2)
+        pin = LANDMARK_AREA_M2[0] * (LANDMARK_AREA_M2[1] / LANDMARK_AREA_M2[0]) ** part * np.maximum(1, hold * part)
+        pin = np.where(known, pin * robust * trust * model.landmark_weight, 0)
+
+        bending = np.maximum(length, BLIND_M * (1 - data)) ** 4
+        pull = PULL + (BLIND_PULL - PULL) * (1 - follow)
+        matrix = (sparse.diags(area * (data + pull)) + anchors.T @ sparse.diags(pin) @ anchors
+                  + laplacian.T @ sparse.diags(bending / area) @ laplacian)
+        right = (area * data)[:, None] * (aim - start) + anchors.T @ (pin[:, None] * (at + miss - anchors @ start))
+        # positive definite, so no pivoting: with it the factors fill up and take fifty times as long
+        vertices = start + splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve(right)
+    return vertices
+
+
+def flipped_triangles(before: Mesh, after: Mesh) -> int:
+    """How many triangles turned over between two shapes of one topology."""
+    from ..meshes import face_normals
+
+    return int(((face_normals(before) * face_normals(after)).sum(1) < 0).sum())
+
+
+def _operators(mesh: Mesh) -> tuple[np.ndarray, sparse.csr_matrix]:
+    """Area of each vertex [V] in square metres, and the cotangent Laplacian [V, V] (integrated: divide by the area for a mean)."""
+    count = len(mesh.vertices)
+    area, rows, columns, values = np.zeros(count), [], [], []
+    for i in range(3):
+        a, b, c = (mesh.faces[:, (i + k) % 3] for k in range(3))
+        u, v = mesh.vertices[b] - mesh.vertices[a], mesh.vertices[c] - mesh.vertices[a]
+        double = np.maximum(np.linalg.norm(np.cross(u, v), axis=1), 1e-12)
+        np.add.at(area, a, double / 6)
+        rows.append(b)
+        columns.append(c)
+        values.append(np.clip((u * v).sum(1) / double, 0.02, 5) / 2)  # thin triangles must not turn stiffness into tearing
+    rows, columns, values = (np.concatenate(x) for x in (rows, columns, values))
+    half = sparse.coo_matrix((values, (rows, columns)), (count, count)).tocsr()
+    weights = half + half.T
+    floor = np.median(area[area > 0]) * 0.05
+    return np.maximum(area, floor), (sparse.diags(np.asarray(weights.sum(1)).ravel()) - weights).tocsr()
+
+
+def _anchors(model: Model) -> sparse.csr_matrix:
+    """[468, V]: takes vertices to landmarks."""
+    corners = model.mesh.faces[model.landmark_face]
+    rows = np.repeat(np.arange(len(corners)), 3)
+    return sparse.coo_matrix((model.landmark_bary.ravel(), (rows, corners.ravel())), (len(corners), len(model.mesh.vertices))).tocsr()
