@@ -32,4 +32,5 @@ def choose_pairs(centres: np.ndarray, sharpness: np.ndarray, count: int) -> list
                 break
             chosen.append(int(best))
             reach = np.minimum(reach, np.degrees(np.arccos(np.clip(middle @ middle[best], -1, 1))))
+            reach[best] = -1.0
     return [(int(first[k]), int(second[k])) for k in chosen]

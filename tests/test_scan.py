@@ -1,0 +1,147 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scan: a known surface seen by known cameras comes back, whichever way the camera moved and whatever its lens bends."""
+
+import json
+
+import numpy as np
+import pycolmap
+import pytest
+import trimesh
+
+from core import images, meshes, raster, scan
+from core.capture import Capture
+from core.meshes import Mesh
+from core.messages import CancelledError, Problem, Reporter
+from core.scan.pairs import choose_pairs
+from core.settings import from_json
+from core.views import read_views
+
+WIDTH, HEIGHT, FOCAL = 360, 480, 460.0
+CENTRE, RADII = np.array([0.0, 0.06, -0.02]), np.array([0.075, 0.09, 0.11])
+"""An egg where a head would be, in metres."""
+
+
+def egg() -> Mesh:
+    ball = trimesh.creation.icosphere(5)
+    return Mesh(np.asarray(ball.vertices) * RADII + CENTRE, np.asarray(ball.faces))
+
+
+def paint(points: np.ndarray) -> np.ndarray:
+    """Random, band-limited colour of surface points [N, 3] -> [N, 3] in [0.1, 0.9]: waves of 4 to 30 mm."""
+    rng = np.random.default_rng(0)
+    waves = rng.normal(0, 1, (60, 3))
+    waves *= (2 * np.pi / rng.uniform(0.004, 0.03, 60) / np.linalg.norm(waves, axis=1))[:, None]
+    return np.clip(0.5 + 0.12 * np.cos(points @ waves.T + rng.uniform(0, 6, 60)) @ rng.normal(0, 0.6, (60, 3)), 0.1, 0.9)
+
+
+def photograph(capture: Capture, centres: np.ndarray, radial: float = 0.0) -> None:
+    """Writes frames/ and cameras/ of the egg seen from `centres` [N, 3]."""
+    model = pycolmap.Reconstruction()
+    camera = pycolmap.Camera(model="SIMPLE_RADIAL", width=WIDTH, height=HEIGHT, params=[FOCAL, WIDTH / 2, HEIGHT / 2, radial], camera_id=1)
+    model.add_camera_with_trivial_rig(camera)
+    records = []
+    for i, centre in enumerate(centres):
+        z = CENTRE - centre
+        z = z / np.linalg.norm(z)
+        x = np.cross(z, [0, 0, 1])
+        x /= np.linalg.norm(x)
+        rotation = np.stack([x, np.cross(z, x), z])
+        image = pycolmap.Image(name=f"{i:05d}.jpg", camera_id=1, image_id=i + 1)
+        model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(pycolmap.Rotation3d(rotation), -rotation @ centre))
+        records.append({"name": f"{i:05d}.jpg", "video_frame": i, "time_s": None, "sharpness": 1.0, "selected": True})
+    capture.cameras.mkdir(parents=True)
+    model.write_binary(str(capture.cameras))
+    capture.frames.mkdir()
+    capture.frames_json.write_text(json.dumps({"frames": records}), encoding="utf-8")
+    mesh = egg()
+    caster = raster.RayCaster(mesh)
+    for view in read_views(capture):
+        face, bary, _ = raster.render_view(caster, view)
+        points = raster.interpolate(mesh.vertices, mesh.faces, face, bary)
+        picture = np.where((face >= 0)[..., None], paint(points.reshape(-1, 3)).reshape(*face.shape, 3), 0.2)
+        images.write_srgb(view.path, picture.astype(np.float32), quality=95)
+
+
+def around(yaws, heights=(0.0,)) -> np.ndarray:
+    """Cameras 0.45 m from the egg, at angles in degrees from straight ahead."""
+    return np.array([CENTRE + 0.45 * np.array([np.sin(a) * np.cos(e), -np.cos(a) * np.cos(e), np.sin(e)])
+                     for e in np.radians(heights) for a in np.radians(yaws)])
+
+
+def off_the_egg_mm(points: np.ndarray) -> np.ndarray:
+    """Distance of points [N, 3] along the egg's normal, to first order, in millimetres; positive outside."""
+    q = (points - CENTRE) / RADII
+    gradient = q / RADII
+    return ((q**2).sum(1) - 1) / (2 * np.linalg.norm(gradient, axis=1)) * 1000
+
+
+@pytest.fixture
+def capture(tmp_path, monkeypatch) -> Capture:
+    monkeypatch.setattr(scan.faces, "segment_person", lambda srgb: (np.abs(srgb - 0.2).max(-1) > 0.04).astype(np.float32))  # an egg is no person
+    return Capture(tmp_path / "œuf peint.wildcap")
+
+
+@pytest.mark.parametrize(("centres", "radial"), [(around(np.arange(-32, 33, 8)), -0.08), (around([0], np.arange(-24, 25, 8)), 0.0)],
+                         ids=["horizontal path, bent lens", "vertical path"])
+def test_known_surface_comes_back(capture, centres, radial):
+    photograph(capture, centres, radial)
+    report = Reporter("scan")
+    scan.run(capture, from_json({"scan": {"pairs": 6}}), report)
+    mesh = meshes.read_ply(capture.scan)
+    off = off_the_egg_mm(mesh.vertices)
+    assert np.median(np.abs(off)) < 0.4 and np.percentile(np.abs(off), 95) < 1.5
+    assert abs(np.median(off)) < 0.25  # neither swollen nor shrunk
+    front = raster.RayCaster(mesh).blocked(np.repeat(centres[len(centres) // 2][None], 200, 0), _towards_front(centres[len(centres) // 2]))
+    assert front.mean() > 0.97  # hardly a hole where all cameras look
+    outward = (meshes.face_normals(mesh) * (mesh.vertices[mesh.faces].mean(1) - CENTRE)).sum(1) > 0
+    assert outward.mean() > 0.98
+    assert report.figures["points"] == len(mesh.vertices) and report.figures["left_right_disagreement_px"] < 0.5
+    assert capture.picture("scan", "surface").is_file()
+
+
+def _towards_front(centre: np.ndarray) -> np.ndarray:
+    """Unit directions [200, 3] from a camera to the front of the egg as it sees it."""
+    rng = np.random.default_rng(0)
+    axis = (centre - CENTRE) / np.linalg.norm(centre - CENTRE)
+    spots = rng.normal(0, 1, (5000, 3))
+    spots /= np.linalg.norm(spots, axis=1, keepdims=True)
+    spots = spots[spots @ axis > 0.75][:200]
+    directions = spots * RADII + CENTRE - centre
+    return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+def test_pairs_keep_their_baseline_and_go_all_around():
+    angles = np.linspace(-75, 75, 96)
+    centres = np.array([(np.sin(a), -np.cos(a), 0) for a in np.radians(angles)])
+    sharpness = np.where(np.arange(96) % 2, 1.0, 0.5)
+    pairs = choose_pairs(centres, sharpness, 12)
+    assert len(set(pairs)) == 12
+    gaps = np.array([abs(angles[a] - angles[b]) for a, b in pairs])
+    assert gaps.min() >= 4 and gaps.max() <= 9
+    middles = np.sort([(angles[a] + angles[b]) / 2 for a, b in pairs])
+    assert middles[0] < -55 and middles[-1] > 55 and np.diff(middles).max() < 25
+    assert np.mean([sharpness[a] + sharpness[b] for a, b in pairs]) > 1.8
+
+
+def test_few_photographs_far_apart_still_pair_up():
+    centres = np.array([(np.sin(a), -np.cos(a), 0) for a in np.radians([-40, -20, 0, 20, 40])])
+    assert sorted(choose_pairs(centres, np.ones(5), 24)) == [(0, 1), (1, 2), (2, 3), (3, 4)]
+    assert choose_pairs(centres[[0, 4]], np.ones(2), 24) == []
+
+
+def test_nothing_to_match_is_told(capture, monkeypatch):
+    photograph(capture, around([-6, 0, 6]))
+    monkeypatch.setattr(scan.faces, "segment_person", lambda srgb: np.zeros(srgb.shape[:2], np.float32))
+    with pytest.raises(Problem, match="No surface") as caught:
+        scan.run(capture, from_json({}), Reporter("scan"))
+    assert caught.value.remedy and not capture.scan.exists()
+
+
+def test_cancel_keeps_the_old_scan(capture):
+    photograph(capture, around([-6, 0, 6]))
+    capture.scan.write_bytes(b"the old one")
+    calls = iter([False] + [True] * 100)
+    with pytest.raises(CancelledError):
+        scan.run(capture, from_json({}), Reporter("scan", cancelled=lambda: next(calls)))
+    assert capture.scan.read_bytes() == b"the old one"
