@@ -55,7 +55,9 @@ def _settings(scene: bpy.types.Scene, job: dict) -> None:
     scene.render.engine = 'CYCLES'
     scene.cycles.samples = job["samples"]
     scene.cycles.use_denoising = True
-    scene.cycles.max_bounces = 4
+    scene.cycles.max_bounces = scene.cycles.diffuse_bounces = 2
+    scene.cycles.glossy_bounces = 1
+    scene.cycles.use_adaptive_sampling = False
     scene.cycles.seed = job["seed"] % 65536
     scene.render.resolution_x, scene.render.resolution_y = job["width"], job["height"]
     scene.render.resolution_percentage = 100
@@ -107,11 +109,13 @@ def _plain(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
 def _patterned(name: str, rng: np.random.Generator, scale: float) -> bpy.types.Material:
     """Two colours mixed by a random texture: corners and blobs for structure from motion."""
     material, nodes, links, shader = _principled(name)
-    kind = rng.choice(["ShaderNodeTexVoronoi", "ShaderNodeTexNoise", "ShaderNodeTexBrick", "ShaderNodeTexChecker"])
+    kind = rng.choice(["ShaderNodeTexVoronoi", "ShaderNodeTexNoise"])  # neither repeats: what repeats misleads the matching of features
     texture, ramp, place = nodes.new(kind), nodes.new("ShaderNodeValToRGB"), nodes.new("ShaderNodeTexCoord")
     links.new(place.outputs["Object"], texture.inputs["Vector"])
     texture.inputs["Scale"].default_value = scale
-    links.new(texture.outputs[1 if kind in ("ShaderNodeTexBrick", "ShaderNodeTexChecker") else 0], ramp.inputs["Fac"])
+    if kind == "ShaderNodeTexNoise":
+        texture.inputs["Detail"].default_value = 1
+    links.new(texture.outputs[0], ramp.inputs["Fac"])
     ramp.color_ramp.elements[0].position, ramp.color_ramp.elements[1].position = 0.42, 0.58
     for element in ramp.color_ramp.elements:
         element.color = (*(rng.uniform(0.02, 0.55) * rng.uniform(0.5, 1, 3)), 1)
@@ -155,10 +159,10 @@ def _room(seed: int, count: int = 90) -> None:
 def _torso(seed: int) -> None:
     """A shirt of sorts: an ellipsoid under the neck."""
     rng = np.random.default_rng([seed, 24])
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, location=(0, 0.06, -0.36))
-    bpy.context.object.scale = (0.24, 0.14, 0.19)
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, location=(0, 0.07, -0.35))
+    bpy.context.object.scale = (0.21, 0.12, 0.165)
     bpy.ops.object.shade_smooth()
-    bpy.context.object.data.materials.append(_patterned("shirt", rng, 60))
+    bpy.context.object.data.materials.append(_patterned("shirt", rng, 90))
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ import numpy as np
 from ..meshes import Mesh
 
 WIDTH, HEIGHT, FOCAL, RATE = 720, 960, 933.0, 24  # pixels, pixels, pixels, frames per second
-DISTANCE = 0.50  # metres from the camera to the head's middle
+DISTANCE = 0.46  # metres from the camera to the head's middle
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ def sun_of(seed: int) -> Sun:
     return Sun(np.array([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)]))
 
 
-def leaves(seed: int, sun: Sun, distance: float = 0.45, count: int = 70, reach: float = 0.22) -> Mesh:
+def leaves(seed: int, sun: Sun, distance: float = 0.45, count: int = 90, reach: float = 0.20) -> Mesh:
     """A loose twig between head and sun: pointed leaves of 2 to 5 cm, strewn over a disc of radius `reach` across the beam.
 
     From `distance` metres the sun's disc blurs their edges over 4 mm: hard shadows, as at noon under a tree.

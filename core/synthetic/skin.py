@@ -48,13 +48,14 @@ def paint_skin(parameters: SkinParameters, on: Canvas, ground: Canvas) -> Skin:
     area = regions(on)
     melanin, blood = _pigments(parameters, on, area)
     height, hollow, dry = _relief(parameters, on, ground, area)
-    blood = blood * np.exp(0.15 * hollow)
-    melanin = melanin * np.exp(0.30 * _contrast(parameters) * hollow)
+    blood = blood * np.exp(0.12 * hollow)
+    melanin = melanin * np.exp(0.20 * _contrast(parameters) * hollow)
     stain, dome = _marks(parameters, on, ground)
     melanin = melanin * np.exp(stain)
     height = height + dome
 
-    diffuse = pigment.reflectance(melanin, blood, parameters.oxygen, parameters.scattering, parameters.slope) * (1 - 0.10 * np.clip(hollow, 0, 1))[:, None]
+    p = parameters
+    diffuse = pigment.reflectance(melanin, blood, p.oxygen, p.scattering, p.slope, p.chroma) * (1 - 0.07 * np.clip(hollow, 0, 1))[:, None]
     hair, diffuse = _hair(parameters, on, ground, area, diffuse)
     specular = _specular(parameters, on, area, hollow, dry) * (1 - 0.55 * hair)
     height = height + 0.05 * hair
@@ -84,7 +85,7 @@ def _pigments(p: SkinParameters, on: Canvas, area: dict[str, np.ndarray]) -> tup
 
 def _contrast(p: SkinParameters) -> float:
     """The darker the skin, the more one percent of melanin darkens it: a factor on its relative variation that keeps the visible one alike."""
-    return (0.05 / (p.melanin + 0.02)) ** 0.5
+    return (0.05 / (p.melanin + 0.02)) ** 0.4
 
 
 def _relief(p: SkinParameters, on: Canvas, ground: Canvas, area: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
