@@ -28,7 +28,9 @@ SUN_COLOUR = np.array([1.5, 1.25, 0.95])
 def write_cameras(capture: Capture, angles=(-30, -10, 10, 30), size=(240, 320)) -> None:
     """Cameras on an arc in front of the head, which looks along -Y, 0.5 m away."""
     model = pycolmap.Reconstruction()
-    model.add_camera_with_trivial_rig(pycolmap.Camera(model="SIMPLE_PINHOLE", width=size[0], height=size[1], params=[1.3 * size[1], size[0] / 2, size[1] / 2], camera_id=1))
+    width, height = size
+    camera = pycolmap.Camera(model="SIMPLE_PINHOLE", width=width, height=height, params=[1.3 * height, width / 2, height / 2], camera_id=1)
+    model.add_camera_with_trivial_rig(camera)
     target = np.array([0.0, -0.05, 0.0])
     for i, angle in enumerate(np.radians(angles)):
         centre = target + 0.5 * np.array([np.sin(angle), -np.cos(angle), 0.05])

@@ -29,7 +29,7 @@ def find_shadow(colours: np.ndarray, normals: np.ndarray, skin: np.ndarray) -> t
     log = np.log(np.maximum(colours, 1e-4))
     basis = _smooth_basis(normals)
     drawn = np.flatnonzero(skin)
-    drawn = drawn[:: max(1, len(drawn) // 20000)]
+    drawn = drawn[:: max(1, len(drawn) // 6000)]
     none = (np.zeros(len(log)) - 12, log - np.median(log, 0), np.zeros(3))
     if len(drawn) < 200:
         return none

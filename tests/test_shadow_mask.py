@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The proposal of the shadow mask against painted shadows: found where they are, and nothing found where there are none."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import cv2
+import numpy as np
+import pycolmap
+import pytest
+
+from core import images, meshes, raster, template
+from core.capture import Capture, write_json
+from core.messages import Reporter
+from core.settings import from_json
+from core.shadow_mask import run
+from core.shadow_mask.tidy import tidy
+
+SIZE = 256
+SKIN = np.array([0.42, 0.25, 0.18])
+SHADOW = np.array([0.40, 0.50, 0.60])  # what is left of the light: the sky's part, bluish
+
+
+@pytest.fixture
+def capture(tmp_path) -> Capture:
+    """A capture with a head, no frames, and a texture yet to be written."""
+    capture = Capture(tmp_path / "face.wildcap")
+    meshes.write_obj(capture.head, template.load())
+    capture.cameras.mkdir()
+    pycolmap.Reconstruction().write_binary(str(capture.cameras))
+    write_json(capture.frames_json, {"frames": []})
+    images.write_data(capture.texture_confidence, np.ones((SIZE, SIZE), np.float32))
+    return capture
+
+
+@cache
+def skin_texture(seed: int = 0) -> np.ndarray:
+    """Linear [S, S, 3]: mottled skin with dark brows and red lips under an even, slightly slanted light."""
+    rng = np.random.default_rng(seed)
+    mottle = cv2.GaussianBlur(rng.normal(0, 1, (SIZE, SIZE)).astype(np.float32), (0, 0), 4)
+    texture = SKIN * np.exp(0.06 * mottle / mottle.std())[..., None]
+    head = template.load()
+    face, bary = raster.rasterize_uv(head, SIZE)
+    normal = raster.interpolate(meshes.vertex_normals(head), head.faces, face, bary)
+    texture = texture * (1 + 0.2 * normal[..., :1] - 0.15 * normal[..., 1:2] + 0.15 * normal[..., 2:])
+    lips, brows = (template.mask(name, SIZE)[..., None] for name in ("lips", "brows"))
+    return texture * (1 - lips) * (1 - 0.8 * brows) + lips * [0.33, 0.12, 0.11]
+
+
+def proposed(capture: Capture, texture: np.ndarray, **settings) -> np.ndarray:
+    images.write_linear(capture.texture, texture)
+    run(capture, from_json({"shadow_mask": settings}), Reporter("shadow_mask"))
+    return images.read_mask(capture.shadow_mask_auto)
+
+
+def painted_blob(centre: tuple[float, float], radius: float) -> np.ndarray:
+    """Soft disc [S, S]; centre (column, row) and radius as shares of the map."""
+    y, x = np.mgrid[0:SIZE, 0:SIZE]
+    return np.clip((radius * SIZE - np.hypot(x - centre[0] * SIZE, y - centre[1] * SIZE)) / 3 + 0.5, 0, 1)
+
+
+def cheek(side: int) -> tuple[float, float]:
+    """UV place (column, row) of the person's left (+1) or right (-1) cheek, from the head's geometry alone."""
+    head = template.load()
+    face, bary = template.landmarks()
+    points = (head.vertices[head.faces[face]] * bary[..., None]).sum(1)
+    uv = (head.uvs[head.face_uvs[face]] * bary[..., None]).sum(1)
+    nose, mouth = points[4], points[13]
+    target = np.array([nose[0] + side * 0.045, nose[1] + 0.03, (nose[2] + mouth[2]) / 2])
+    u, v = uv[np.linalg.norm(points - target, axis=1).argmin()]
+    return u, 1 - v
+
+
+def test_painted_shadow_is_found(capture):
+    blob = np.maximum(painted_blob(cheek(1), 0.10), painted_blob((0.5, 0.25), 0.09))
+    texture = skin_texture()
+    found = proposed(capture, texture * (1 - blob[..., None] * (1 - SHADOW)), dilate_px=0) > 0.5
+    truth = (blob > 0.5) & (template.mask("face", SIZE) > 0.5)
+    assert (found & truth).sum() / (found | truth).sum() > 0.6
+
+
+def test_even_skin_of_every_tone_gives_an_almost_empty_mask(capture):
+    face = template.mask("face", SIZE) > 0.5
+    for tone in (0.25, 0.6, 1.4):
+        assert proposed(capture, tone * skin_texture())[face].mean() < 0.02
+
+
+def test_shadow_on_the_left_cheek_is_masked_on_the_left_cheek(capture):
+    masks = {side: proposed(capture, skin_texture() * (1 - painted_blob(cheek(side), 0.11)[..., None] * (1 - SHADOW))) for side in (-1, 1)}
+    for side, mask in masks.items():
+        columns = mask[:, SIZE // 2:].sum(), mask[:, :SIZE // 2].sum()  # the person's left is at u > 0.5
+        assert columns[0 if side > 0 else 1] > 20 * columns[1 if side > 0 else 0]
+
+
+def test_dilation_grows_with_the_setting_and_nothing_else_changes(capture):
+    texture = skin_texture() * (1 - painted_blob(cheek(1), 0.10)[..., None] * (1 - SHADOW))
+    areas = [proposed(capture, texture, dilate_px=px).sum() for px in (0, 8, 32)]
+    assert areas[0] < areas[1] < areas[2]
+    assert not capture.shadow_mask.exists()  # the artist's file is not ours to write
+
+
+def test_specks_go_and_edges_are_soft():
+    hard = np.zeros((512, 512), bool)
+    hard[100:104, 100:104] = True  # a mole
+    hard[200:300, 200:300] = True
+    mask = tidy(hard, np.ones_like(hard), 4)
+    assert mask[102, 102] == 0 and mask[250, 250] == 1
+    edge = mask[250, 180:205]
+    assert ((edge > 0.1) & (edge < 0.9)).any() and mask[250, 197] == 1
