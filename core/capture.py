@@ -14,6 +14,7 @@ import os
 import shutil
 import socket
 import time
+from collections.abc import Collection
 from dataclasses import asdict
 from pathlib import Path
 
@@ -158,11 +159,12 @@ class Capture:
         }
         write_json(self.json, record)
 
-    def forget(self, names) -> None:
+    def forget(self, names: Collection[str]) -> None:
         """Marks stages as not done; their files stay until they are written again."""
         record = self.read()
-        if any(record["stages"].pop(name, None) for name in names):
-            write_json(self.json, record)
+        kept = {name: finished for name, finished in record["stages"].items() if name not in names}
+        if kept != record["stages"]:
+            write_json(self.json, {**record, "stages": kept})
 
     # -- freshness
 

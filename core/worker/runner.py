@@ -39,7 +39,7 @@ def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None, 
             _take_source(job, emit)
             _check_device(job.settings.device)
             if job.force:
-                job.capture.forget(stage.name for stage in job.chain)
+                job.capture.forget([stage.name for stage in job.chain])
             for step in job.chain:
                 stage = step.name
                 if cancelled():
@@ -129,10 +129,12 @@ def _check_device(device: str) -> None:
     """Raises Problem for a device that this machine does not have. torch is imported for others than the CPU only."""
     if device == "cpu":
         return
-    import torch
+    found = False
+    if device in ("cuda", "mps"):
+        import torch
 
-    found = {"cuda": torch.cuda.is_available, "mps": torch.backends.mps.is_available}.get(device)
-    if found is None or not found():
+        found = torch.cuda.is_available() if device == "cuda" else torch.backends.mps.is_available()
+    if not found:
         raise Problem(f"This machine has no device {device} that torch can use.", "Choose cpu, or see what `python -m core doctor` says.")
 
 

@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The capture folder: what makes a stage stale, who may work in it, and that no file is ever half written."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+from core import stages
+from core.capture import FORMAT, Capture, _code_hash, replacing, replacing_folder, write_json
+from core.messages import Problem
+from core.settings import Settings, from_json
+
+CAMERAS, FRAMES, UPSCALE = stages.by_name("cameras"), stages.by_name("frames"), stages.by_name("upscale")
+
+
+@pytest.fixture
+def capture(tmp_path) -> Capture:
+    """With frames and cameras that were made from them."""
+    capture = Capture(tmp_path / "Zoë & Åse.wildcap")
+    video = tmp_path / "film.mp4"
+    video.write_bytes(b"film")
+    capture.set_source(video)
+    for folder in (capture.frames, capture.cameras):
+        folder.mkdir()
+        (folder / "a.bin").write_bytes(b"1")
+    for stage in (FRAMES, CAMERAS):
+        capture.finish(stage, capture.stage_key(stage, Settings()), 1.5, Settings(), {"count": 3}, "0.1.0")
+    return capture
+
+
+def states(capture: Capture, settings: Settings | None = None) -> list[str]:
+    return [capture.state(stage, settings or Settings()) for stage in (FRAMES, CAMERAS)]
+
+
+def test_what_was_made_from_the_same_things_is_fresh(capture):
+    assert states(capture) == ["done", "done"]
+    assert states(Capture(capture.root)) == ["done", "done"]
+
+
+def test_a_changed_input_makes_stale(capture):
+    (capture.frames / "a.bin").write_bytes(b"2")
+    assert states(capture) == ["done", "stale"]
+
+
+def test_a_changed_setting_makes_its_own_stage_stale(capture):
+    assert states(capture, from_json({"cameras": {"matching": "exhaustive"}})) == ["done", "stale"]
+    assert states(capture, from_json({"scan": {"pairs": 7}})) == ["done", "done"]
+
+
+def test_a_shared_setting_matters_where_it_is_named(capture):
+    assert states(capture, replace(Settings(), seed=7)) == ["done", "stale"]  # frames draws no random numbers
+
+
+def test_changed_code_makes_stale(capture, monkeypatch):
+    monkeypatch.setattr("core.capture._code_hash", lambda module: "other" if module == CAMERAS.module else _code_hash(module))
+    assert states(capture) == ["done", "stale"]
+
+
+def test_another_video_makes_the_frames_stale_and_one_that_was_moved_does_not(capture, tmp_path):
+    moved = tmp_path / "archive" / "film.mp4"
+    moved.parent.mkdir()
+    shutil.move(tmp_path / "film.mp4", moved)
+    assert states(capture) == ["done", "done"], "gone: the frames are what is left of it"
+    capture.set_source(moved)
+    assert states(capture) == ["done", "done"]
+    moved.write_bytes(b"another film")
+    assert states(capture)[0] == "stale" and not capture.made_from(moved)
+
+
+def test_a_painted_mask_is_a_wish_of_the_solver(capture):
+    solve = stages.by_name("solve")
+    before = capture.stage_key(solve, Settings())
+    capture.shadow_mask.write_bytes(b"painted")
+    assert capture.stage_key(solve, Settings()) != before
+
+
+def test_a_missing_output_is_to_do_and_a_forgotten_stage_too(capture):
+    (capture.cameras / "a.bin").unlink()
+    capture.forget(["frames"])
+    assert states(capture) == ["to do", "to do"]
+
+
+def test_records_keep_what_was_used(capture):
+    record = capture.read()["stages"]["cameras"]
+    assert record["settings"]["interpupillary_mm"] == 63.0 and record["figures"] == {"count": 3} and record["seconds"] == 1.5 and record["version"] == "0.1.0"
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"stages": 3}', "\0\0"])
+def test_a_damaged_record_is_told_and_left_alone(capture, text):
+    capture.json.write_text(text)
+    with pytest.raises(Problem):
+        capture.read()
+    assert capture.json.read_text() == text
+
+
+def test_a_capture_of_a_newer_version_is_refused_and_left_alone(capture):
+    write_json(capture.json, {**capture.read(), "format": FORMAT + 1})
+    before = capture.json.read_bytes()
+    for attempt in (capture.read, lambda: capture.set_source("x"), lambda: capture.forget(["frames"])):
+        with pytest.raises(Problem, match="newer version"):
+            attempt()
+    assert capture.json.read_bytes() == before
+
+
+def test_a_living_lock_is_refused_by_name_and_a_dead_one_taken_over(capture):
+    with capture.locked():
+        with pytest.raises(Problem, match=f"process {os.getpid()}"), Capture(capture.root).locked():
+            pass
+        assert json.loads(capture.lock.read_text())["pid"] == os.getpid()
+    assert not capture.lock.exists()
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    with capture.locked():
+        owner = json.loads(capture.lock.read_text())
+    for text in (json.dumps({**owner, "pid": dead.pid}), "", '{"pid": 1'):
+        capture.lock.write_text(text)
+        with capture.locked():
+            pass
+    capture.lock.write_text(json.dumps({**owner, "pid": dead.pid, "host": "another machine"}))
+    with pytest.raises(Problem, match="another machine"), capture.locked():
+        pass
+
+
+def test_replacing_keeps_the_old_file_until_the_new_one_is_complete(tmp_path):
+    path = tmp_path / "file.txt"
+    path.write_text("old")
+    with pytest.raises(KeyError), replacing(path) as temporary:
+        temporary.write_text("half")
+        raise KeyError
+    assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
+    with replacing(path) as temporary:
+        temporary.write_text("new")
+        assert path.read_text() == "old"
+    assert path.read_text() == "new" and list(tmp_path.iterdir()) == [path]
+
+
+def test_replacing_a_folder_is_all_or_nothing(tmp_path):
+    path = tmp_path / "frames"
+    with replacing_folder(path) as folder:
+        (folder / "1").write_text("old")
+    with pytest.raises(KeyError), replacing_folder(path) as folder:
+        (folder / "1").write_text("half")
+        raise KeyError
+    assert (path / "1").read_text() == "old"
+    with replacing_folder(path) as folder:
+        (folder / "2").write_text("new")
+    assert [file.name for file in path.iterdir()] == ["2"] and list(tmp_path.iterdir()) == [path]
+
+
+def test_tidying_takes_back_a_folder_that_was_put_aside_and_drops_the_rest(capture):
+    os.replace(capture.frames, capture.root / ".frames.old")  # killed between the two renames
+    (capture.root / ".scan.123.tmp.ply").write_bytes(b"half")
+    (capture.root / ".delit.123.tmp").mkdir()
+    (capture.frames.parent / ".cameras.old").mkdir()
+    capture.tidy()
+    assert states(capture) == ["done", "done"]
+    assert not list(capture.root.glob(".*"))
+
+
+def test_a_file_in_the_way_of_the_folder_is_told(tmp_path):
+    (tmp_path / "x.wildcap").write_text("a file")
+    with pytest.raises(Problem), Capture(tmp_path / "x.wildcap").locked():
+        pass
+    with pytest.raises(Problem):
+        write_json(Capture(tmp_path / "x.wildcap").job, {})

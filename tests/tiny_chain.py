@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The real worker over rooms of a few lines: how jobs end is tested in seconds, on every stage alike.
+
+`build` copies the ground floor of core/ and puts a tiny room in each stage's place. Such a room digests its inputs into
+its outputs, in steps, and misbehaves as CAPTURE/mood.json ({stage: mood}) tells it to; the file is no stage's input.
+"""
+
+import json
+import shutil
+import sys
+import time
+from pathlib import Path
+
+from core import stages
+from core.capture import Capture
+from core.messages import Message
+from core.worker.client import Worker
+from core.worker.job import write_job
+
+ROOT = Path(__file__).resolve().parent.parent
+GROUND = ("__init__.py", "__main__.py", "capture.py", "settings.py", "stages.py", "messages.py", "mask_history.py", "report.py")
+
+ROOM = '''
+import errno, hashlib, json, os, sys, time
+from .. import stages
+from ..capture import replacing, replacing_folder
+
+def run(capture, settings, report):
+    stage = stages.by_name(__name__.rsplit(".", 1)[1])
+    mood = json.loads((capture.root / "mood.json").read_text()).get(stage.name, "")
+    digest = hashlib.sha256(stage.name.encode())
+    for name in stage.reads:
+        path = capture.root / name
+        for file in sorted(path.iterdir()) if path.is_dir() else [path]:
+            digest.update(file.read_bytes())
+    for step in range(4):
+        report.progress(step, 4, "working")
+        time.sleep(0.005)
+    if mood == "print":
+        print("a library talks"); os.write(1, b"{raw bytes\\n"); sys.stdout.flush()
+    if mood == "bug":
+        raise ZeroDivisionError("division by zero")
+    if mood == "memory":
+        raise MemoryError
+    if mood == "full":
+        raise OSError(errno.ENOSPC, "No space left on device", str(capture.root / "x.bin"))
+    if mood == "module":
+        import a_module_that_is_not_there
+    if mood == "die":
+        os._exit(9)
+    if mood == "nothing":
+        return
+    for name in stage.writes:
+        path = capture.root / name
+        if name.endswith("/"):
+            with replacing_folder(path) as folder:
+                (folder / "a.txt").write_text(digest.hexdigest())
+                _dwell(mood, report)
+        else:
+            with replacing(path) as temporary:
+                temporary.write_text(digest.hexdigest())
+                _dwell(mood, report)
+    report.figure("size_px", 64)
+
+def _dwell(mood, report):
+    """Half way through an output: for ever with reports, or for ever without."""
+    while mood == "slow":
+        report.progress(1, 2, "half written")
+        time.sleep(0.02)
+    while mood == "deaf":
+        time.sleep(0.02)
+'''
+
+
+def build(folder: Path) -> Path:
+    """Makes the code tree under `folder` and returns it: the worker's root."""
+    core = folder / "core"
+    core.mkdir(parents=True)
+    for name in GROUND:
+        shutil.copyfile(ROOT / "core" / name, core / name)
+    shutil.copytree(ROOT / "core" / "worker", core / "worker", ignore=shutil.ignore_patterns("__pycache__"))
+    for stage in stages.STAGES:
+        (core / stage.name).mkdir()
+        (core / stage.name / "__init__.py").write_text(ROOM, encoding="utf-8")
+    return folder
+
+
+def start(root: Path, capture: Capture, mood: dict | None = None, **job) -> Worker:
+    """Writes the job and starts the worker, with this Python."""
+    capture.root.mkdir(parents=True, exist_ok=True)
+    (capture.root / "mood.json").write_text(json.dumps(mood or {}))
+    worker = Worker(Path(sys.executable), root, write_job(capture, **job), capture.logs / "worker.log")
+    worker.start()
+    return worker
+
+
+def follow(worker: Worker, until=lambda message: False, timeout_s: float = 30) -> list[Message]:
+    """Polls to the end, or to the first message that `until` accepts."""
+    messages, deadline = [], time.monotonic() + timeout_s
+    while worker.running and time.monotonic() < deadline:
+        for message in worker.poll():
+            messages.append(message)
+            if until(message):
+                return messages
+        time.sleep(0.01)
+    assert not worker.running, f"the worker did not end within {timeout_s} s: {messages[-3:]}"
+    return messages
+
+
+def contents(capture: Capture) -> dict[str, str]:
+    """Relative name -> text, of all that the stages wrote."""
+    made = [capture.root / name for stage in stages.STAGES for name in stage.writes]
+    files = [file for path in made for file in (sorted(path.iterdir()) if path.is_dir() else [path])]
+    return {file.relative_to(capture.root).as_posix(): file.read_text() for file in files}
