@@ -13,7 +13,7 @@ from .spots import strew
 
 def brows(on: Canvas, ground: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
     """How much of each texel brow hair covers, [N] in [0, 1]; `region` on the ground is where it grows, `density` 1 is a usual brow."""
-    roots, texel = strew(ground, 1.2 * density * np.clip(region * 2.2 - 0.5, 0, 1), rng)
+    roots, texel = strew(ground, 1.2 * density * np.clip(region * 2.2 - 1.3 + 0.8 * min(density, 1.2), 0, 1), rng)  # a sparse brow is a narrow one
     outer = np.abs(roots[:, 0:1]) / np.abs(ground.landmarks[[70, 300], 0]).mean()  # 0 at the nose ... 1 at the tail
     # near the nose hairs stand up, then lie along the brow, and at the tail point down
     rise = np.clip(1.6 - 2.3 * outer, -0.3, 1.3) + rng.normal(0, 0.2, outer.shape)

@@ -49,11 +49,11 @@ class SkinParameters:
 def sample_parameters(seed: int) -> SkinParameters:
     """A subject at random: the typology angle of the tone is uniform from -55 (dark) to 62 degrees (very light), half of the subjects are men."""
     rng = np.random.default_rng([seed, 0])
-    angle, blood = rng.uniform(-55, 62), float(np.exp(rng.uniform(np.log(0.005), np.log(0.04))))
+    angle, blood = rng.uniform(-55, 62), float(np.exp(rng.uniform(np.log(0.009), np.log(0.04))))
     oxygen, scattering = float(rng.uniform(0.6, 0.9)), float(rng.uniform(0.7, 1.8))
     lightness = np.clip((angle + 20) / 80, 0, 1)
-    slope = float(rng.uniform(2.0, 2.9) + 0.6 * lightness)
-    chroma = float(rng.uniform(0.95, 1.4))
+    slope = float(rng.uniform(2.0, 2.8) + 0.5 * lightness)
+    chroma = float(rng.uniform(0.95, 1.28))
     melanin = _melanin_of_angle(angle, blood, oxygen, scattering, slope)
     male, age = rng.random() < 0.5, float(rng.uniform(18, 78))
     beard = float(rng.choice([0.15, rng.uniform(0.3, 1.0)])) if male else 0.0
@@ -63,7 +63,7 @@ def sample_parameters(seed: int) -> SkinParameters:
         melanin=melanin, blood=blood, oxygen=oxygen, scattering=scattering, slope=slope, chroma=chroma, age=age,
         redness=float(rng.uniform(0.4, 1.5)), eye_circles=float(rng.uniform(0.1, 1.2)),
         blotches=float(rng.uniform(0.6, 1.5)), mottling=float(np.exp(rng.uniform(np.log(0.25), np.log(1.2)))),
-        lip_melanin=float(1 - rng.uniform(0.1, 0.45) * (0.25 + 0.75 * lightness)), lip_blood=float(np.exp(rng.uniform(np.log(2.5), np.log(7.5)))),
+        lip_melanin=float(1 - rng.uniform(0.05, 0.35) * (0.25 + 0.75 * lightness)), lip_blood=float(np.exp(rng.uniform(np.log(2.5), np.log(7.5)))),
         pores=float(rng.uniform(0.4, 1.2) * (1.1 if male else 0.9)), wrinkles=float(rng.uniform(0.5, 1.3)), oiliness=float(rng.uniform(0.3, 1.4)),
         freckles=float(rng.uniform(0.05, 0.8)) if freckled else 0.0, freckle_contrast=float(rng.uniform(0.3, 0.9)),
         moles=float(rng.gamma(1.5, 6.0)), beard=beard, beard_length=float(np.exp(rng.uniform(np.log(0.25), np.log(3.0)))),
@@ -88,4 +88,4 @@ def _hair_colour(lightness: float, rng: np.random.Generator) -> np.ndarray:
 
 
 def _greyed(colour: np.ndarray, grey: float) -> tuple[float, float, float]:
-    return tuple(float(c) for c in colour * (1 - grey) + 0.38 * grey)
+    return tuple(float(c) for c in colour * (1 - grey) + grey * np.array([0.37, 0.34, 0.31]))

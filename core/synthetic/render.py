@@ -159,8 +159,8 @@ def _room(seed: int, count: int = 90) -> None:
 def _torso(seed: int) -> None:
     """A shirt of sorts: an ellipsoid under the neck."""
     rng = np.random.default_rng([seed, 24])
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, location=(0, 0.07, -0.35))
-    bpy.context.object.scale = (0.21, 0.12, 0.165)
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, location=(0, 0.07, -0.34))
+    bpy.context.object.scale = (0.21, 0.13, 0.19)
     bpy.ops.object.shade_smooth()
     bpy.context.object.data.materials.append(_patterned("shirt", rng, 90))
 

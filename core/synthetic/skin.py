@@ -75,7 +75,7 @@ def _pigments(p: SkinParameters, on: Canvas, area: dict[str, np.ndarray]) -> tup
     fine = [octaves(on.position, wavelengths, rng) for wavelengths in ([3.2, 1.7], [4.5, 2.2], [0.8])]
     grain = noise(on.position, 0.5, rng)
     contrast = p.blotches * _contrast(p)
-    melanin = melanin + contrast * (0.16 * slow[0] + 0.07 * slow[2] + p.mottling * (0.055 * fine[0] + 0.05 * fine[2] + 0.03 * grain))
+    melanin = melanin + contrast * (0.11 * slow[0] + 0.06 * slow[2] + p.mottling * (0.055 * fine[0] + 0.05 * fine[2] + 0.03 * grain))
     blood = blood + p.blotches * (0.14 * slow[1] + 0.10 * slow[3] + p.mottling * (0.10 * fine[1] + 0.06 * fine[2]))
     lips = np.clip(area["lips"] * (1 + 0.15 * slow[2]), 0, 1)
     melanin = melanin + lips * np.log(p.lip_melanin)
