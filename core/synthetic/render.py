@@ -54,7 +54,7 @@ def main() -> None:
 def _settings(scene: bpy.types.Scene, job: dict) -> None:
     scene.render.engine = 'CYCLES'
     scene.cycles.samples = job["samples"]
-    scene.cycles.use_denoising = True
+    scene.cycles.use_denoising, scene.cycles.denoising_quality, scene.cycles.denoising_prefilter = True, 'FAST', 'FAST'
     scene.cycles.max_bounces = scene.cycles.diffuse_bounces = 2
     scene.cycles.glossy_bounces = 1
     scene.cycles.use_adaptive_sampling = False
