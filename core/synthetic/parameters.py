@@ -62,7 +62,7 @@ def sample_parameters(seed: int) -> SkinParameters:
     return SkinParameters(
         melanin=melanin, blood=blood, oxygen=oxygen, scattering=scattering, slope=slope, chroma=chroma, age=age,
         redness=float(rng.uniform(0.4, 1.5)), eye_circles=float(rng.uniform(0.1, 1.2)),
-        blotches=float(rng.uniform(0.6, 1.5)), mottling=float(np.exp(rng.uniform(np.log(0.25), np.log(1.2)))),
+        blotches=float(rng.uniform(0.6, 1.5)), mottling=float(np.exp(rng.uniform(np.log(0.15), np.log(0.9)))),
         lip_melanin=float(1 - rng.uniform(0.05, 0.35) * (0.25 + 0.75 * lightness)), lip_blood=float(np.exp(rng.uniform(np.log(2.5), np.log(7.5)))),
         pores=float(rng.uniform(0.4, 1.2) * (1.1 if male else 0.9)), wrinkles=float(rng.uniform(0.5, 1.3)), oiliness=float(rng.uniform(0.3, 1.4)),
         freckles=float(rng.uniform(0.05, 0.8)) if freckled else 0.0, freckle_contrast=float(rng.uniform(0.3, 0.9)),
