@@ -8,9 +8,11 @@ Ground floor: standard library only. A file that exists is complete: everything 
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import json
 import os
+import re
 import shutil
 import socket
 import time
@@ -70,8 +72,7 @@ def replacing_folder(path: Path):
 
 def storage_problem(error: OSError, path: Path) -> Problem:
     """The Problem of a failed write: disk full, read-only, or what the system says."""
-    import errno
-
+    path = Path(*(re.sub(r"^\.(.+)\.\d+\.tmp", r"\1", part) for part in path.parts))  # the name it would have had
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return Problem(f"The disk is full: {path} could not be written.",
                        "Free some space (a capture needs about 1 GB) and run again; finished stages are kept.")

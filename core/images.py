@@ -8,6 +8,8 @@ Arrays are float32, rows from the top, [H, W, C]. *sRGB* means encoded with the 
 
 from __future__ import annotations
 
+import errno
+import shutil
 from pathlib import Path
 
 import cv2
@@ -112,17 +114,19 @@ def _read(path: Path) -> np.ndarray:
 
 
 def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str, quality: int = 92) -> None:
+    path = Path(path)
     pixels = np.ascontiguousarray(pixels if pixels.ndim == 3 else pixels[..., None], np.float32)
     height, width, channels = pixels.shape
     spec = oiio.ImageSpec(width, height, channels, kind)
     spec.attribute("oiio:ColorSpace", colour_space)
     if _is_linear(path):
         spec.attribute("compression", "zip")
-    elif Path(path).suffix.lower() in (".jpg", ".jpeg"):
+    elif path.suffix.lower() in (".jpg", ".jpeg"):
         spec.attribute("Compression", f"jpeg:{quality}")
     else:
         spec.attribute("png:compressionLevel", 3)
     with replacing(path) as temporary:
+        _need_space(temporary.parent, pixels.size * (1 if kind == "uint8" else 2))
         output = oiio.ImageOutput.create(str(temporary))
         if output is None or not output.open(str(temporary), spec) or not output.write_image(pixels) or not output.close():
             error = (output.geterror() if output else oiio.geterror()) or "unknown error"
@@ -131,3 +135,20 @@ def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str, quality
                 file.write(b"\0" * 65536)
                 file.flush()
             raise OSError(0, error.strip())
+        if path.suffix.lower() == ".png" and not _has_end(temporary):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def _need_space(folder: Path, size: int) -> None:
+    """Raises OSError where `size` bytes, a picture's size without compression, do not fit: on a full disk libjpeg ends
+    the whole process and libpng's error is lost on its way through OpenImageIO."""
+    usage = shutil.disk_usage(folder)
+    if usage.total and usage.free < size:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def _has_end(png: Path) -> bool:
+    """Whether a PNG was written to its end; a quota is not seen by _need_space."""
+    with open(png, "rb") as file:
+        file.seek(-12, 2)
+        return file.read()[4:8] == b"IEND"

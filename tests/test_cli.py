@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""python -m core: what each command prints and how it exits. `run` is tested over tiny rooms, with the real worker."""
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+
+from core import images, stages
+from core.capture import Capture
+from core.mask_import import import_mask
+from core.messages import Problem
+
+from . import tiny_chain
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def core(*words, cwd=ROOT, **options) -> subprocess.CompletedProcess:
+    return subprocess.run([sys.executable, "-B", "-m", "core", *map(str, words)], cwd=cwd, capture_output=True, text=True, timeout=120, **options)
+
+
+def refused(*words, cwd=ROOT) -> list[str]:
+    """The two lines of a failure."""
+    result = core(*words, cwd=cwd)
+    lines = result.stderr.strip().splitlines()
+    assert result.returncode == 2 and len(lines) == 2 and all(line.endswith(".") for line in lines), (result.returncode, result.stderr)
+    return lines
+
+
+@pytest.fixture(scope="module")
+def tiny(tmp_path_factory) -> Path:
+    return tiny_chain.build(tmp_path_factory.mktemp("tiny"))
+
+
+@pytest.fixture
+def film(tmp_path) -> Path:
+    path = tmp_path / "mon film é.mp4"
+    path.write_bytes(b"film")
+    return path
+
+
+@pytest.fixture
+def capture(tmp_path) -> Capture:
+    capture = Capture(tmp_path / "Ich & du.wildcap")
+    capture.root.mkdir()
+    (capture.root / "mood.json").write_text("{}")
+    return capture
+
+
+def test_stages_lists_the_chain():
+    lines = core("stages").stdout.splitlines()
+    assert [line.split()[0] for line in lines] == list(stages.NAMES) and "maps/normal.png" in lines[7]
+
+
+def test_run_until_then_on_then_status(tiny, capture, film):
+    result = core("run", film, capture.root, "--until", "cameras", "--quality", "draft", cwd=tiny)
+    assert result.returncode == 0 and "Cameras      done in" in result.stdout and "Scan" not in result.stdout, result.stderr
+    assert "report.html" in result.stdout.splitlines()[-1] and capture.report.is_file()
+    result = core("run", "-", capture.root, "--seed", "0", "--quality", "draft", cwd=tiny)
+    assert result.returncode == 0 and "Frames       unchanged" in result.stdout and "4K Maps      done in" in result.stdout, result.stderr
+    status = core("status", capture.root, cwd=tiny).stdout
+    assert str(film) in status and status.count("done") == len(stages.STAGES)
+    (capture.root / "texture.exr").write_text("edited")
+    status = dict(line.split()[:2] for line in core("status", capture.root, cwd=tiny).stdout.splitlines())
+    assert (status["delight"], status["texture"], status["shadow_mask"], status["upscale"]) == ("done", "done", "stale", "done")
+    assert core("run", film, capture.root, "--from", "delight", "--until", "delight", "--quality", "draft", cwd=tiny).stdout.count("done in") == 1
+
+
+def test_options_reach_the_stages(tiny, capture, film, tmp_path):
+    core("run", film, capture.root, "--skin-tone", "0.6,0.5,0.4", "--delighter", "folder", "--folder", tmp_path, "--seed", "7", "--quality", "full", cwd=tiny)
+    record = capture.read()["stages"]
+    assert record["solve"]["settings"]["skin_tone"] == "0.6,0.5,0.4" and record["solve"]["seed"] == 7 and record["solve"]["settings"]["steps"] == 150
+    assert record["delight"]["settings"] == {"delighter": "folder", "folder": str(tmp_path)}
+
+
+def test_ctrl_c_cancels_cleanly(tiny, capture, film):
+    (capture.root / "mood.json").write_text('{"scan": "slow"}')
+    command = [sys.executable, "-B", "-m", "core", "run", str(film), str(capture.root)]
+    with subprocess.Popen(command, cwd=tiny, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        while not list(capture.root.glob(".scan*")):
+            assert process.poll() is None
+            time.sleep(0.02)
+        asked = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=20)
+    assert process.returncode == 130 and err == "" and "Cancelled" in out
+    assert time.monotonic() - asked < 2
+    assert not capture.lock.exists() and not list(capture.root.glob(".*"))
+    assert list(capture.read()["stages"]) == ["frames", "cameras"]
+
+
+def test_a_failure_is_two_lines(tiny, capture, film):
+    (capture.root / "mood.json").write_text('{"scan": "bug"}')
+    problem, remedy = refused("run", film, capture.root, cwd=tiny)
+    assert "ZeroDivisionError" in problem and "scan.log" in remedy
+
+
+@pytest.mark.parametrize("words", [
+    ("run", "a", "b", "--from", "solve", "--until", "frames"), ("run", "a", "b", "--until", "lunch"), ("run", "/no/such/video.mp4", "CAPTURE"),
+    ("run", "-", "CAPTURE"), ("run", "a", "b", "--folder", "c"), ("status", "/no/such/capture"), ("mask", "import", "CAPTURE", "mask.png"), ("train",),
+    ("train", "patience"),
+])
+def test_what_cannot_be_is_refused_in_two_lines(capture, words):
+    refused(*(capture.root if word == "CAPTURE" else word for word in words))
+
+
+def test_a_capture_of_a_newer_version_is_refused(capture, film):
+    capture.json.write_text('{"format": 99, "source": "", "stages": {}}')
+    before = capture.json.read_bytes()
+    for words in (("run", film, capture.root), ("status", capture.root)):
+        assert "newer version" in refused(*words)[0]
+    assert capture.json.read_bytes() == before
+
+
+def test_the_command_line_loads_nothing_heavy():
+    code = "import sys; import core.__main__; print(sorted({'numpy', 'torch', 'cv2', 'OpenImageIO', 'pycolmap'} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True).stdout.strip() == "[]"
+
+
+# -- mask import
+
+
+@pytest.fixture
+def painted(capture) -> Capture:
+    capture.set_source("x")
+    images.write_srgb(capture.texture_png, np.zeros((64, 64, 3), np.float32))
+    return capture
+
+
+def half(height: int, width: int) -> np.ndarray:
+    """Black above, white below."""
+    mask = np.zeros((height, width), np.float32)
+    mask[height // 2:] = 1
+    return mask
+
+
+def test_any_size_and_depth_becomes_the_mask(painted, tmp_path):
+    images.write_data(tmp_path / "16 bit.png", half(128, 128), bits=16)
+    images.write_data(tmp_path / "small.exr", half(16, 16))
+    images.write_srgb(tmp_path / "colour.jpg", np.repeat(half(100, 60)[..., None], 3, 2))
+    images.write_srgb(tmp_path / "alpha.png", np.dstack([half(64, 64)] * 3 + [np.ones((64, 64), np.float32)]))
+    for picture in sorted(tmp_path.glob("*.*g")) + [tmp_path / "small.exr"]:
+        result = core("mask", "import", painted.root, picture)
+        assert result.returncode == 0, result.stderr
+        spec = oiio.ImageBuf(str(painted.shadow_mask)).spec()
+        assert (spec.width, spec.height, spec.nchannels, str(spec.format)) == (64, 64, 1, "uint8")
+        mask = images.read_mask(painted.shadow_mask)
+        assert mask[:28].max() < 0.05 and mask[36:].min() > 0.95, picture.name
+
+
+def test_the_last_ten_masks_are_kept(painted, tmp_path):
+    for value in range(13):
+        images.write_data(tmp_path / "mask.png", np.full((64, 64), value / 20, np.float32))
+        import_mask(painted, tmp_path / "mask.png")
+        time.sleep(0.002)  # the names of the history count milliseconds
+    kept = [images.read_mask(path)[0, 0] for path in sorted(painted.mask_history.iterdir())]
+    assert np.allclose(kept, np.arange(2, 12) / 20, atol=0.01) and np.isclose(images.read_mask(painted.shadow_mask)[0, 0], 0.6, atol=0.01)
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b"\x89PNG\r\n\x1a\n cut off"])
+def test_what_is_no_picture_is_refused_and_the_mask_stays(painted, tmp_path, content):
+    images.write_data(painted.shadow_mask, half(64, 64))
+    before = painted.shadow_mask.read_bytes()
+    picture = tmp_path / "mask.png"
+    picture.write_bytes(content)
+    with pytest.raises(Problem):
+        import_mask(painted, picture)
+    assert painted.shadow_mask.read_bytes() == before and not painted.mask_history.exists()

@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The protocol's lines, and how a stage reports."""
+
+import pytest
+
+from core.messages import KINDS, Cancelled, CancelledError, Done, Failed, Log, Preview, Progress, Reporter, StageDone, from_line, to_line
+
+EVERY = (Progress("scan", 3.0, 24.0, "Paar 3 é 顔\n", 12.5), Log("line\u2028 \0"), Preview("solve", "preview/albedo.png"),
+         StageDone("frames", 4.2, False, {"share": 0.9, "names": ["a", None]}), Done(3.5), Cancelled("solve"), Failed("frames", "No video.", "Choose one."))
+
+
+def test_every_kind_survives_the_pipe():
+    assert {type(message) for message in EVERY} == set(KINDS.values())
+    for message in EVERY:
+        line = to_line(message)
+        assert from_line(line) == message and "\n" not in line and line.isascii()
+
+
+@pytest.mark.parametrize("line", ["", "hello", "3", "{}", '{"kind": "Party"}', '{"kind": "Done"}', '{"kind": "Done", "seconds": 1, "more": 2}', '["Done"]'])
+def test_what_is_no_message_is_refused(line):
+    with pytest.raises(ValueError):
+        from_line(line)
+
+
+def test_the_time_left_is_the_elapsed_time_scaled():
+    now = [100.0]
+    sent = []
+    report = Reporter("scan", sent.append, clock=lambda: now[0])
+    report.progress(0, 10)
+    now[0] = 104.0
+    report.progress(4, 10, "fusing")
+    assert sent == [Progress("scan", 0.0, 10.0, "", None), Progress("scan", 4.0, 10.0, "fusing", 6.0)]
+
+
+def test_every_report_hears_of_a_cancel():
+    asked = [False]
+    report = Reporter("scan", cancelled=lambda: asked[0])
+    report.check()
+    asked[0] = True
+    for call in (report.check, lambda: report.progress(1, 2), lambda: report.log("x"), lambda: report.preview("x.png")):
+        with pytest.raises(CancelledError):
+            call()
+    report.figure("count", 3)
+    assert report.figures == {"count": 3}
