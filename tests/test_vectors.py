@@ -83,7 +83,8 @@ def test_vectors_losses():
         total = staticmethod(lambda lights: shade)
         local = staticmethod(lambda lights: shade - main)
 
-    o = Observation(torch.zeros_like(shade), torch.zeros_like(ring, dtype=torch.float32), torch.zeros(1), Given(), ring)
+    none = torch.zeros_like(ring, dtype=torch.float32)
+    o = Observation(torch.zeros_like(shade), none, none, torch.zeros(1), Given(), ring)
     zero = torch.zeros(1, 7, *ring.shape)
     assert light_loss(None, zero, o, Recipe(tv=0.0)).item() == pytest.approx(v["neg_reg"].item(), rel=1e-5)
     assert light_loss(None, zero, o, Recipe(tv=1.0, neg=0.0)).item() == pytest.approx(v["tv_ring_of_shade"].item(), rel=1e-5)

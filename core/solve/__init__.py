@@ -43,8 +43,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     if lit.sum() < 1:
         raise Problem("No facial skin was seen in the texture.", "Look at the texture in the report; film the face from the front and from both sides.")
     tone = initial.skin_tone(options.skin_tone, evidence.texture, lit, prior.tones)
-    prior.tone = tone
-    reference = initial.reference(prior.mean_face, tone, evidence.skin)
+    prior.use_tone(tone)
+    reference = initial.reference(prior, tone, evidence.skin)
     exposure = float(initial.mean_tone(albedo(reference), lit).mean() / initial.mean_tone(evidence.texture, lit).mean().clamp_min(1e-6))
 
     recipe = Recipe(steps=options.steps, guidance=options.guidance)
@@ -72,9 +72,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
 
 def _first_state(evidence: Evidence, reference: torch.Tensor, exposure: float, shader, recipe: Recipe) -> State:
-    weight = evidence.weight * (1 - evidence.alpha)
+    weight = evidence.weight * evidence.trust * (1 - evidence.alpha)
     if weight.sum() < 1:
-        weight = evidence.weight
+        weight = evidence.weight * evidence.trust
     cells = shader.up_rows.shape[1], shader.up_columns.shape[1]
     lights = initial.first_lights(evidence.texture * exposure, albedo(reference), evidence.normal, weight, cells, recipe.one_chroma)
     return State(0, None, reference, lights)

@@ -19,13 +19,15 @@ from .sampler import Observation
 
 REFERENCE = 1024  # lengths in texels are given for maps of this size
 TRUSTED = 0.2  # confidence from which a texel counts in full: below, it was seen at a glancing angle only
+FEATURE_TRUST = 0.2  # of brows, lips, lids and hair: they vary between people more than skin does, and light must not explain them away
 MASK_FADE = 2.0  # deviation in texels over which a hard mask's border fades
 
 
 @dataclass(frozen=True)
 class Evidence:
     """texture [3, S, S] linear; weight [S, S]: how far it counts, 0 where nobody looked; alpha [S, S]: the soft shadow mask M; normal [3, S, S], unit, world
-    space, N_c; covered bool [S, S]: texels of the head; skin [S, S]: facial skin without lips, brows and eyes."""
+    space, N_c; covered bool [S, S]: texels of the head; skin [S, S]: facial skin without lips, brows and eyes; trust [S, S]: 1, less where a texel's
+    colour says little of the light."""
 
     texture: torch.Tensor
     weight: torch.Tensor
@@ -33,6 +35,7 @@ class Evidence:
     normal: torch.Tensor
     covered: torch.Tensor
     skin: torch.Tensor
+    trust: torch.Tensor
 
     @property
     def size(self) -> int:
@@ -68,7 +71,9 @@ def read_evidence(capture: Capture, size: int) -> Evidence:
     skin = skin * (1 - template.mask("eyes", size))
     weight = np.where(covered, np.clip(seen / TRUSTED, 0, 1), 0)
     tensors = [np.ascontiguousarray(a, np.float32) for a in (texture.transpose(2, 0, 1), weight, np.where(covered, alpha, 0), normal.transpose(2, 0, 1))]
-    return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), torch.from_numpy(np.ascontiguousarray(skin, np.float32)))
+    unlike_skin = np.maximum.reduce([template.mask(name, size) for name in ("brows", "lips", "eyes", "nostrils", "scalp")])
+    parts = [torch.from_numpy(np.ascontiguousarray(a, np.float32)) for a in (skin, 1 - (1 - FEATURE_TRUST) * unlike_skin)]
+    return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts)
 
 
 def softened(mask: np.ndarray) -> np.ndarray:
@@ -88,13 +93,13 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
         size = evidence.size // factor
         if factor > 1 and (size < REFERENCE // 4 or size % multiple or evidence.size % factor):
             continue
-        weight, alpha = (torch.from_numpy(_sized(a.numpy(), size)) for a in (evidence.weight, evidence.alpha))
+        weight, alpha, trust = (torch.from_numpy(_sized(a.numpy(), size)) for a in (evidence.weight, evidence.alpha, evidence.trust))
         texture = _shrunk(evidence.texture * evidence.weight, size) / weight.clamp_min(1e-4) * exposure
         normal = torch.nn.functional.normalize(_shrunk(evidence.normal, size), dim=0)
         inside = (alpha > 0).numpy().astype(np.uint8)
         ring = (cv2.dilate(inside, np.ones((5, 5))) > 0) & (alpha.numpy() < 0.5)
         coords = coordinates(size, slice(0, size), slice(0, size), centred)
-        found[factor] = Observation(texture, weight, coords, Shader(normal, alpha, cells), torch.from_numpy(ring))
+        found[factor] = Observation(texture, weight, trust, coords, Shader(normal, alpha, cells), torch.from_numpy(ring))
     return found
 
 

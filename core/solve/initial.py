@@ -9,7 +9,8 @@ import torch
 
 from .. import images
 from ..messages import Problem
-from .lighting import Lights, constant_light, fit_global, interpolation, sh_basis
+from .lighting import Lights, constant_light, fit_global, sh_basis
+from .prior import Prior, coordinates, mean_at
 
 HUMAN_GREEN = 0.02, 0.45
 """Range of linear green a skin's mean albedo can have; red and blue follow from the colour."""
@@ -56,17 +57,18 @@ def mean_tone(albedo: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
     return (albedo * weight).sum((1, 2)) / weight.sum().clamp_min(1e-6)
 
 
-def reference(mean_face: torch.Tensor | None, tone: torch.Tensor, skin: torch.Tensor) -> torch.Tensor:
-    """x_0^ref [1, 7, H, W]: the mean face with its skin colour-matched to the tone; without one, the tone everywhere. skin [H, W] in [0, 1]."""
-    height, width = skin.shape
-    if mean_face is None:
-        out = torch.zeros(7, height, width)
-        out[:3], out[5], out[6] = 2 * tone[:, None, None] - 1, 1.0, -0.3
-        return out[None]
-    out = interpolation(mean_face.shape[1], height) @ mean_face @ interpolation(mean_face.shape[2], width).T
-    albedo = (out[:3] + 1) / 2
-    out[:3] = 2 * albedo * (tone / mean_tone(albedo, skin))[:, None, None] - 1
-    return out[None]
+def reference(prior: Prior, tone: torch.Tensor, skin: torch.Tensor) -> torch.Tensor:
+    """x_0^ref [1, 7, S, S]: the prior's mean face, its skin colour-matched to the tone; for a prior without one the tone everywhere. skin [S, S]."""
+    size = skin.shape[0]
+    if prior.mean_face is None:
+        out = torch.zeros(1, 7, size, size)
+        out[:, :3], out[:, 5], out[:, 6] = 2 * tone[:, None, None] - 1, 1.0, -0.3
+        return out
+    coords = coordinates(size, slice(0, size), slice(0, size))
+    out = mean_at(prior.mean_face, coords, tone[None])
+    albedo = (out[0, :3] + 1) / 2
+    out[0, :3] = 2 * albedo * (tone / mean_tone(albedo, skin))[:, None, None] - 1
+    return out
 
 
 def first_lights(texture: torch.Tensor, albedo: torch.Tensor, normal: torch.Tensor, weight: torch.Tensor, cells: tuple[int, int], one_chroma: bool) -> Lights:

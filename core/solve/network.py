@@ -16,16 +16,21 @@ from torch import nn
 from torch.nn import functional
 
 
-def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: torch.Tensor, mapping_condition: torch.Tensor | None = None) -> torch.Tensor:
+def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: torch.Tensor, mapping_condition: torch.Tensor | None = None,
+            mean: torch.Tensor | None = None, spread: torch.Tensor | None = None) -> torch.Tensor:
     """D(x; sigma): the preconditioned denoiser. x float32 [N, C, H, W], sigma [N], condition [N, K, H, W] -> [N, C, H, W].
 
-    The condition is not noised but scaled by c_in like the data, in training too. Only the network itself runs in low precision.
+    The released priors take data of mean 0 and deviation sigma_data, and scale the condition, which is not noised, by c_in like the data.
+    With `mean` [N, C, H, W] and `spread` [N, C, 1, 1] the network sees what differs from the mean in units of its spread, and the condition as it is:
+    where it has nothing to say, D is then the best estimate of a Gaussian of that mean and spread. Only the network itself runs in low precision.
     """
-    sigma_data = network.sigma_data
     s = sigma.reshape(-1, 1, 1, 1)
-    total = (s * s + sigma_data**2).sqrt()
-    inner = network(torch.cat([x, condition], 1) / total, sigma, mapping_condition)
-    return inner.float() * (s * sigma_data / total) + x * (sigma_data / total) ** 2
+    if mean is None:
+        mean, spread = torch.zeros_like(x), torch.full((1, 1, 1, 1), network.sigma_data, device=x.device)
+        condition = condition / (s * s + spread**2).sqrt()
+    total = (s * s + spread**2).sqrt()
+    inner = network(torch.cat([(x - mean) / total, condition], 1), sigma, mapping_condition)
+    return mean + inner.float() * (s * spread / total) + (x - mean) * (spread / total) ** 2
 
 
 class UNet(nn.Module):

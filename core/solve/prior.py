@@ -9,7 +9,6 @@ Two priors fit: ours (NAME.safetensors with its card NAME.json) and a folder wit
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 
 import torch
@@ -24,27 +23,47 @@ WEIGHTS = Path(__file__).parent.parent / "weights" / "prior.safetensors"
 class Prior:
     """A trained denoiser with what it is conditioned on.
 
-    `tone`, linear RGB [3], is the subject's skin tone: a dark patch alone cannot say whether its skin or its light is dark. Without a tone
-    the prior is unconditional. `mean_face` [7, S, S] is the mean of the training maps over the whole UV square, or None.
+    Ours models what differs from the mean face of the subject's skin tone (`tone`, linear RGB [3]): a dark patch alone cannot say whether its skin
+    or its light is dark. mean_face [7, S, S] covers the UV square: albedo over skin tone, normal, 2 * specular - 1; spread [7]: deviation of skins
+    from it, of the albedo in units of the tone. The released priors have neither and take no tone.
     """
 
-    def __init__(self, network: UNet, kind: str, octaves: int = 0, mean_face: torch.Tensor | None = None, tones: list | None = None):
+    def __init__(self, network: UNet, octaves: int = 0, mean_face: torch.Tensor | None = None, spread: torch.Tensor | None = None, tones: list | None = None):
         self.network = network.eval().requires_grad_(False)
-        self.kind, self.octaves, self.mean_face, self.tones = kind, octaves, mean_face, tones or []
-        self.tone: torch.Tensor | None = None
+        self.octaves, self.mean_face, self.spread, self.tones = octaves, mean_face, spread, tones or []
+        self.tone = torch.tensor(tones).float().median(0).values if tones else None
         self.multiple = network.multiple
-        self._last: tuple[torch.Tensor, torch.Tensor] | None = None
+        self._known: dict[str, torch.Tensor] = {}
 
     def __call__(self, x: torch.Tensor, sigma: float, coords: torch.Tensor) -> torch.Tensor:
         """The expected clean map given x at noise level sigma. coords [N, 2, H, W] from `coordinates`, one texel apart in the map's own scale."""
         device = self.network.proj_in.weight.device  # the map may live elsewhere: the network is all that is slow
-        if self._last is None or self._last[0] is not coords:
-            self._last = coords, positional_encoding(coords, self.octaves).to(device) if self.octaves else coords.to(device)
-        mapping = None
-        if self.kind == "wildcap":
-            mapping = mapping_condition(self.tone, texel_size(coords)).to(device).expand(len(x), -1)
+        if self._known.get("coords") is not coords:
+            known = condition(coords, self.octaves, self.mean_face, self.spread, self.tone[None]) if self.mean_face is not None else {
+                "condition": positional_encoding(coords, self.octaves)}
+            self._known = {"coords": coords, **{name: value.to(device) for name, value in known.items()}}
         sigmas = torch.full((len(x),), float(sigma), device=device)
-        return denoise(self.network, x.to(device), sigmas, self._last[1], mapping).to(x.device)
+        return denoise(self.network, x.to(device), sigmas, **{k: v for k, v in self._known.items() if k != "coords"}).to(x.device)
+
+    def use_tone(self, tone: torch.Tensor) -> None:
+        """Conditions the prior on a skin tone, linear RGB [3]."""
+        self.tone, self._known = tone, {}
+
+
+def condition(coords: torch.Tensor, octaves: int, mean_face: torch.Tensor, spread: torch.Tensor, tone: torch.Tensor) -> dict[str, torch.Tensor]:
+    """What our network is told of maps at coords [N, 2, H, W] of skins of tone [N, 3]: `denoise`'s arguments by name."""
+    texel = 512 * (coords[:, 0, 0, 1] - coords[:, 0, 0, 0]).abs()  # side of a texel in texels of a 1024 map
+    scale = torch.cat([spread[:3] * tone, spread[3:].expand(len(tone), -1)], 1)
+    mapping = torch.cat([texel.log2()[:, None], tone.clamp_min(1e-3).log() / 2 + 0.6], 1)  # logarithms of about -1 to 1
+    return {"condition": positional_encoding(coords, octaves), "mapping_condition": mapping,
+            "mean": mean_at(mean_face, coords, tone), "spread": scale[:, :, None, None]}
+
+
+def mean_at(mean_face: torch.Tensor, coords: torch.Tensor, tone: torch.Tensor) -> torch.Tensor:
+    """The mean face of skins of tone [N, 3] at coords [N, 2, H, W]: x's seven channels [N, 7, H, W]."""
+    grid = coords.permute(0, 2, 3, 1)
+    mean = torch.nn.functional.grid_sample(mean_face.expand(len(coords), -1, -1, -1), grid, align_corners=False, padding_mode="border")
+    return torch.cat([2 * mean[:, :3] * tone[:, :, None, None] - 1, mean[:, 3:]], 1)
 
 
 def load(path: Path = WEIGHTS, device: str = "cpu", dtype: torch.dtype | None = None) -> Prior:
@@ -93,25 +112,14 @@ def positional_encoding(coords: torch.Tensor, octaves: int) -> torch.Tensor:
     return torch.cat([coords, *waves], 1)
 
 
-def texel_size(coords: torch.Tensor) -> float:
-    """Side of a texel in texels of a 1024 map."""
-    return 512 * float(coords[0, 0, 0, 1] - coords[0, 0, 0, 0])
-
-
-def mapping_condition(tone: torch.Tensor | None, texel: float) -> torch.Tensor:
-    """[1, 5]: what our network knows of a patch besides its place: scale, whether the tone is given, and the tone (log, about -1 to 1)."""
-    known = [0.0] * 4 if tone is None else [1.0, *(torch.as_tensor(tone).clamp_min(1e-3).log() / 2 + 0.6).tolist()]
-    return torch.tensor([[math.log2(texel), *known]])
-
-
 def _load_ours(path: Path) -> Prior:
     card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     with safe_open(path, "pt") as file:
         tensors = {name: file.get_tensor(name).float() for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
-    mean_face = tensors.pop("mean_face")
+    mean_face, spread = tensors.pop("mean_face"), tensors.pop("spread")
     network = build(card)
     network.load_state_dict(tensors)
-    return Prior(network, "wildcap", card["cond"]["pos_enc_freq"], mean_face, card["tones"])
+    return Prior(network, card["cond"]["pos_enc_freq"], mean_face, spread, card["tones"])
 
 
 def _load_released(folder: Path) -> Prior:
@@ -125,4 +133,4 @@ def _load_released(folder: Path) -> Prior:
     state = torch.load(folder / "ckpt.pth", map_location="cpu", weights_only=True)
     network = build(config)
     network.load_state_dict(from_state(state.get("model_ema", state)))
-    return Prior(network, "released", int(cond.get("pos_enc_freq", 0)) if cond.get("type") == "posenc" else 0)
+    return Prior(network, int(cond.get("pos_enc_freq", 0)) if cond.get("type") == "posenc" else 0)

@@ -47,11 +47,13 @@ class Observation:
     """What is known of the map at one size.
 
     texture I_UV [3, H, W], scaled so that its shading is about one; weight [H, W] in [0, 1]: how far a texel's observation counts;
-    coords [1, 2, H, W] for the prior; shader Gamma with N_c and M; ring bool [H, W]: where M fades out.
+    trust [H, W] in [0, 1]: how far what is seen there may be explained as light (less for brows, lips and hair); coords [1, 2, H, W] for the prior;
+    shader Gamma with N_c and M; ring [H, W]: where L_TV counts.
     """
 
     texture: torch.Tensor
     weight: torch.Tensor
+    trust: torch.Tensor
     coords: torch.Tensor
     shader: Shader
     ring: torch.Tensor
@@ -94,13 +96,13 @@ def sample(prior: Callable, observations: dict[int, Observation], state: State, 
             shading = o.shader.total(state.lights)
         guided, gradient = denoised.detach(), torch.zeros(())
         if recipe.guidance == "dps":
-            loss = photometric(denoised, shading, o)  # equation 1
+            loss = photometric(denoised, shading, o, o.weight)  # equation 1
             gradient = clipped(torch.autograd.grad(loss, x)[0] * o.weight, recipe.clip)
         else:
             guided = proximal(guided, shading, o, s, recipe.residual)
         if i < light_steps:
             for _ in range(updates_per_step):  # equation 9
-                update_lights(state, guided, o, recipe)
+                update_lights(state, denoised.detach(), o, recipe)
 
         with torch.no_grad():
             s_down, s_up = ancestral(s, s_next)
@@ -136,9 +138,9 @@ def ancestral(s: float, s_next: float) -> tuple[float, float]:
     return (s_next**2 - s_up**2) ** 0.5, s_up
 
 
-def photometric(denoised: torch.Tensor, shading: torch.Tensor, o: Observation) -> torch.Tensor:
+def photometric(denoised: torch.Tensor, shading: torch.Tensor, o: Observation, weight: torch.Tensor) -> torch.Tensor:
     """L_pho: the weighted sum of squares over the map (paper, equation 1)."""
-    return ((o.weight * (albedo(denoised) * shading - o.texture)) ** 2).sum()
+    return ((weight * (albedo(denoised) * shading - o.texture)) ** 2).sum()
 
 
 def albedo(denoised: torch.Tensor) -> torch.Tensor:
@@ -164,7 +166,7 @@ def proximal(denoised: torch.Tensor, shading: torch.Tensor, o: Observation, s: f
 def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> torch.Tensor:
     """L_pho + L_neg + 0.1 L_TV of theta. L_TV is the L1 variation of the shading on the ring, which makes M's border seamless."""
     shading = o.shader.total(lights)
-    loss = photometric(denoised, shading, o)
+    loss = photometric(denoised, shading, o, o.weight * o.trust)
     if not o.shader.empty:
         loss = loss + recipe.neg * (o.shader.local(lights).clamp_min(0) ** 2).sum()
         inner, ring = shading[(slice(None), *o.shader.box)], o.ring[o.shader.box]

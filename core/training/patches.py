@@ -17,7 +17,7 @@ import torch
 from .. import template
 from ..capture import replacing
 from ..messages import Reporter
-from ..solve.prior import coordinates, mapping_condition, positional_encoding
+from ..solve.prior import coordinates, mean_at
 from ..synthetic.skin import make_skin
 
 SIZE = 1024
@@ -36,11 +36,11 @@ class Skins:
 
 @dataclass(frozen=True)
 class Batch:
-    """clean [N, 7, P, P], condition [N, K, P, P], mapping [N, 5], scale [N]; float32."""
+    """clean [N, 7, P, P], coords [N, 2, P, P], tone [N, 3], scale [N]; float32."""
 
     clean: torch.Tensor
-    condition: torch.Tensor
-    mapping: torch.Tensor
+    coords: torch.Tensor
+    tone: torch.Tensor
     scale: torch.Tensor
 
 
@@ -80,9 +80,9 @@ def shrink(full: np.ndarray, scale: int) -> np.ndarray:
     return small.astype(full.dtype)
 
 
-def draw(skins: Skins, count: int, patch: int, octaves: int, rng: np.random.Generator, augment: bool = True) -> Batch:
+def draw(skins: Skins, count: int, patch: int, rng: np.random.Generator, augment: bool = True) -> Batch:
     """`count` random windows: a third of each scale, three quarters of them on the face; mirrored and re-toned when `augment`."""
-    clean, conditions, mapping, scales = [], [], [], []
+    clean, places, tones, scales = [], [], [], []
     for _ in range(count):
         scale = SCALES[rng.integers(len(SCALES))]
         index = rng.integers(len(skins.tones))
@@ -103,19 +103,25 @@ def draw(skins: Skins, count: int, patch: int, octaves: int, rng: np.random.Gene
             window[:3] = (window[:3] + 1) * gain[:, None, None] - 1
             tone = tone * gain * torch.from_numpy(np.exp(rng.normal(0, 0.06) + rng.normal(0, 0.02, 3))).float()  # a tone is never known exactly
         clean.append(window)
-        conditions.append(positional_encoding(coords, octaves)[0])
-        mapping.append(mapping_condition(None if augment and rng.random() < 0.1 else tone, scale)[0])
+        places.append(coords[0])
+        tones.append(tone)
         scales.append(scale)
-    return Batch(torch.stack(clean), torch.stack(conditions), torch.stack(mapping), torch.tensor(scales))
+    return Batch(torch.stack(clean), torch.stack(places), torch.stack(tones), torch.tensor(scales))
 
 
 def mean_map(skins: Skins, size: int = 256) -> torch.Tensor:
-    """The mean face [7, size, size]: geometric mean of the albedos, each divided by its tone, times the mean tone; mean normals and specular."""
+    """The mean face [7, size, size], symmetric: geometric mean of albedo over tone, mean normal (of length one), mean 2 * specular - 1."""
     small = [torch.from_numpy(shrink(m.numpy(), SIZE // SCALES[1] // size)).float() for m in skins.maps[SCALES[1]]]
-    relative = torch.stack([((m[:3] + 1) / 2).clamp_min(1e-3).log() - tone.log()[:, None, None] for m, tone in zip(small, skins.tones, strict=True)]).mean(0)
-    albedo = (relative + skins.tones.log().mean(0)[:, None, None]).exp()
-    rest = torch.stack([m[3:] for m in small]).mean(0)
-    mean = torch.cat([2 * albedo - 1, rest])
-    mean = (mean + torch.stack([mean[0], mean[1], mean[2], -mean[3], *mean[4:]]).flip(2)) / 2
+    relative = torch.stack([((m[:3] + 1) / 2).clamp_min(1e-3).log() - tone.log()[:, None, None] for m, tone in zip(small, skins.tones, strict=True)])
+    mean = torch.cat([relative.mean(0).exp(), torch.stack([m[3:] for m in small]).mean(0)])
+    mean = (mean + torch.stack([*mean[:3], -mean[3], *mean[4:]]).flip(2)) / 2
     mean[3:6] /= mean[3:6].norm(dim=0).clamp_min(1e-6)
     return mean
+
+
+def spread_about(skins: Skins, mean: torch.Tensor, patch: int) -> torch.Tensor:
+    """Deviation [7] of random patches from the mean face of their tone; of the albedo in units of the tone."""
+    batch = draw(skins, 256, patch, np.random.default_rng(3), augment=False)
+    difference = batch.clean - mean_at(mean, batch.coords, batch.tone)
+    difference[:, :3] /= batch.tone[:, :, None, None]
+    return (difference**2).mean((0, 2, 3)).sqrt()

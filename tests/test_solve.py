@@ -1,0 +1,150 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The solve stage on a small capture with the shipped prior: its maps, the tone control, cancel and resume, what bad inputs give."""
+
+import json
+
+import numpy as np
+import pytest
+import torch
+
+from core import images, meshes, solve, template
+from core.capture import Capture
+from core.messages import CancelledError, Problem, Reporter
+from core.settings import from_json
+from core.solve import initial
+from core.solve.evidence import softened
+from core.solve.prior import WEIGHTS, load
+from core.stages import MAPS
+
+SIZE = 128
+TONE = np.array([0.42, 0.26, 0.18], np.float32)  # linear
+
+
+@pytest.fixture
+def capture(tmp_path):
+    """The mean face of TONE in a little light from the left, with a soft shadow on one cheek."""
+    made = Capture(tmp_path / "Zoë's face.wildcap")
+    skin = torch.from_numpy(template.mask("skin", SIZE).copy())
+    face = initial.reference(load(), torch.from_numpy(TONE), skin)
+    y, x = np.mgrid[:SIZE, :SIZE] / SIZE
+    shadow = 1 / (1 + np.exp((np.hypot(x - 0.66, y - 0.55) - 0.09) / 0.006))
+    light = (0.7 + 0.3 * x) * (1 - 0.5 * shadow)
+    albedo = (face[0, :3].permute(1, 2, 0).numpy() + 1) / 2
+    images.write_linear(made.texture, albedo * light[..., None].astype(np.float32))
+    images.write_data(made.texture_confidence, np.ones((SIZE, SIZE), np.float32))
+    images.write_data(made.shadow_mask_auto, (shadow > 0.05).astype(np.float32))
+    meshes.write_obj(made.head, template.load())
+    return made
+
+
+def settings(**options):
+    tone = ",".join(f"{v:.5f}" for v in images.linear_to_srgb(TONE))
+    return from_json({"solve": {"size": SIZE, "steps": 8, "guidance": "proximal", "skin_tone": tone, "checkpoint_every": 2, **options}})
+
+
+def maps_of(capture):
+    return {name: (capture.maps / name).read_bytes() for name in MAPS}
+
+
+def test_solve_writes_all_maps_of_the_asked_tone(capture):
+    report = Reporter("solve")
+    solve.run(capture, settings(), report)
+    for name in MAPS:
+        values = images.read_data(capture.maps / name)
+        assert values.shape[:2] == (SIZE, SIZE) and np.isfinite(values).all(), name
+    albedo = images.read_linear(capture.maps / "diffuse_albedo.exr")
+    skin = template.mask("skin", SIZE) * (1 - template.mask("eyes", SIZE))
+    assert np.abs((albedo * skin[..., None]).sum((0, 1)) / skin.sum() / TONE - 1).max() < 0.01
+    assert np.abs(images.read_linear(capture.maps / "diffuse_albedo.png") - albedo).max() < 0.002
+    shading, texture = images.read_linear(capture.maps / "shading.exr"), images.read_linear(capture.texture)
+    explained = (albedo * shading - texture)[skin > 0.5]
+    assert np.abs(explained).mean() < 0.05 * texture[skin > 0.5].mean()
+    normal = images.read_data(capture.maps / "normal.png")[..., :3] * 2 - 1
+    assert np.abs(np.linalg.norm(normal, axis=-1) - 1).max() < 0.01 and (normal[..., 2] > 0.5).mean() > 0.95
+    assert (capture.preview / "albedo.png").is_file() and (capture.preview / "shading.png").is_file()
+    assert capture.picture("solve", "texture_albedo_shading").is_file()
+    assert not (capture.checkpoints / "solve.safetensors").exists()
+    json.dumps(report.figures)
+
+
+@pytest.mark.parametrize("factor", [0.7, 1.4])
+def test_the_tone_is_the_users_whatever_the_exposure(capture, factor):
+    images.write_linear(capture.texture, images.read_linear(capture.texture) * factor)
+    solve.run(capture, settings(steps=4), Reporter("solve"))
+    albedo = images.read_linear(capture.maps / "diffuse_albedo.exr")
+    skin = template.mask("skin", SIZE) * (1 - template.mask("eyes", SIZE))
+    assert np.abs((albedo * skin[..., None]).sum((0, 1)) / skin.sum() / TONE - 1).max() < 0.01
+
+
+def test_cancel_then_run_again_gives_the_same_bytes(capture):
+    solve.run(capture, settings(guidance="dps"), Reporter("solve"))
+    unbroken = maps_of(capture)
+    steps = []
+    report = Reporter("solve", emit=lambda message: steps.append(message), cancelled=lambda: any("step 5 of" in getattr(m, "text", "") for m in steps))
+    with pytest.raises(CancelledError):
+        solve.run(capture, settings(guidance="dps"), report)
+    assert (capture.checkpoints / "solve.safetensors").is_file()
+    logged = []
+    solve.run(capture, settings(guidance="dps"), Reporter("solve", emit=lambda message: logged.append(getattr(message, "text", ""))))
+    assert "Going on after step 4 of 8." in logged
+    assert maps_of(capture) == unbroken
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0])
+def test_empty_and_full_masks(capture, value):
+    images.write_data(capture.shadow_mask, np.full((SIZE, SIZE), value, np.float32))
+    solve.run(capture, settings(steps=4), Reporter("solve"))
+    albedo = images.read_linear(capture.maps / "diffuse_albedo.exr")
+    face = template.mask("face", SIZE) > 0.5
+    assert np.isfinite(albedo).all() and 0.5 < albedo[face].mean() / TONE.mean() < 1.5
+
+
+def test_the_artists_masks_win(capture):
+    """The painted mask replaces the proposal, and what is protected is no shadow."""
+    def albedo_under(**pictures):
+        for name, value in pictures.items():
+            images.write_data(getattr(capture, name), value)
+        solve.run(capture, settings(steps=6), Reporter("solve"))
+        return images.read_linear(capture.maps / "diffuse_albedo.exr")
+
+    proposal = images.read_mask(capture.shadow_mask_auto)
+    with_proposal = albedo_under()
+    painted_empty = albedo_under(shadow_mask=np.zeros_like(proposal))
+    protected = albedo_under(shadow_mask=proposal, protect_mask=np.ones_like(proposal))
+    assert np.abs(with_proposal - painted_empty).max() > 0.02
+    assert np.abs(protected - painted_empty).max() < 1e-3
+
+
+def test_unusable_inputs_are_problems(capture):
+    with pytest.raises(Problem, match="not a colour"):
+        solve.run(capture, settings(skin_tone="pink"), Reporter("solve"))
+    images.write_data(capture.texture_confidence, np.zeros((SIZE, SIZE), np.float32))
+    with pytest.raises(Problem, match="seen by any frame"):
+        solve.run(capture, settings(), Reporter("solve"))
+
+
+def test_auto_tone_ignores_what_is_masked_and_stays_human():
+    texture = torch.from_numpy(TONE)[:, None, None].expand(3, 20, 20).clone()
+    weight = torch.ones(20, 20)
+    texture[:, :5], weight[:5] = 0.01, 0.0
+    assert torch.allclose(initial.skin_tone("auto", texture, weight, []), torch.from_numpy(TONE), atol=1e-4)
+    assert initial.skin_tone("auto", texture * 10, weight, [])[1] <= initial.HUMAN_GREEN[1] + 1e-6
+    assert torch.allclose(initial.skin_tone("1,1,1", texture, weight, []), torch.ones(3))
+
+
+def test_a_hard_mask_gets_a_soft_border():
+    mask = np.zeros((256, 256), np.float32)
+    mask[64:128, 64:128] = 1
+    soft = softened(mask)
+    assert soft[96, 96] == 1 and soft[0, 0] == 0 and 0.3 < soft[96, 64] < 0.7
+
+
+def test_the_card_names_its_seeds_and_they_are_not_the_sample_subjects():
+    card = json.loads(WEIGHTS.with_suffix(".json").read_text(encoding="utf-8"))
+    assert card["seeds"] and card["held_out_seeds"] and not set(card["seeds"]) & set(card["held_out_seeds"])
+    from core.synthetic import parameters
+
+    reserved = set(getattr(parameters, "RESERVED_SEEDS", ()))
+    assert not reserved & set(card["seeds"] + card["held_out_seeds"])
+    assert WEIGHTS.stat().st_size < 15e6
