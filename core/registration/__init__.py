@@ -23,15 +23,16 @@ FOLLOWED = "face"
 """UV mask of the template whose region is drawn to the scan; ears, scalp and neck come by identity and stiffness alone."""
 SHAPED = {"face": 1.0, "neck": 0.3, "scalp": 0.15}
 """UV masks of what says which identity it is, and how loudly: hair and collars speak there, too."""
-HELD = ("lips", "eyes")
-"""UV masks whose landmarks keep their say to the end: the scan alone would let lips and lids slide."""
+HELD = ("lips", "eyes", "brows")
+"""UV masks whose landmarks keep their say to the end: the scan alone would let them slide."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """frames/, cameras/, scan.ply -> head.obj, landmarks.json. Raises Problem where no face is found or the fit does not hold."""
     views = read_views(capture)
-    scan = Scan(meshes.read_ply(capture.scan))
-    found = landmarks.find(views, report, STEPS)
+    surface = meshes.read_ply(capture.scan)
+    scan = Scan(surface)
+    found = landmarks.onto_surface(landmarks.find(views, report, STEPS), views, surface)
     model = load_model()
     follow, shaped, hold = weights_of(model)
 

@@ -16,9 +16,10 @@ from ..meshes import Mesh, vertex_normals
 from .correspondence import Scan, trimmed
 
 LANDMARK_SIGMA_M = 0.002
-SCAN_SIGMA_M = 0.001
-INDEPENDENT = 400
-"""Scan samples that count as independent; neighbours on a surface err together."""
+SCAN_SIGMA_M = 0.002
+"""No scan is that bad: this is how near the identity space comes to a person."""
+INDEPENDENT = {"landmarks": 120, "scan": 100}
+"""How many of each count as independent; neighbours err together, and a brow must not slide up a smooth forehead."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def fit_scan(model: Model, pose: Similarity, coefficients: np.ndarray, points: n
         reach = np.interp(step, [0, rounds - 1], [0.030, 0.010])  # the identity space is no closer to a person than this
         signed, scan_normals = scan.match(vertices[index], normals, 1.5 * reach)
         weight = trimmed(signed, reach) * shaped[index]
-        weight *= min(1.0, INDEPENDENT / max(weight.sum(), 1)) / SCAN_SIGMA_M ** 2
+        weight *= min(1.0, INDEPENDENT["scan"] / max(weight.sum(), 1)) / SCAN_SIGMA_M ** 2
         pose, coefficients = _step(model, pose, coefficients, points, trust, (index, np.nan_to_num(signed), scan_normals, weight))
     return pose, coefficients
 
@@ -104,7 +105,7 @@ def _step(model, pose, coefficients, points, trust, planes=None) -> tuple[Simila
     residual = points[known] - at
     error = np.linalg.norm(residual, axis=1)
     weights = weights / (1 + (error / (2.5 * LANDMARK_SIGMA_M)) ** 2) / LANDMARK_SIGMA_M ** 2
-    weights = weights * min(1.0, 120 / len(weights))  # the net's errors hang together, too
+    weights = weights * min(1.0, INDEPENDENT["landmarks"] / len(weights))
     basis = model.at_landmarks(model.identity)[:, known] @ turn  # [K, N, 3]
     jacobian = _jacobian(at, pose.translation, basis).reshape(-1, 7 + len(coefficients))
     rows = [(jacobian, residual.reshape(-1), np.repeat(weights, 3))]

@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .. import faces, images
+from ..meshes import Mesh
 from ..messages import Problem, Reporter
+from ..raster import RayCaster
 from ..views import View
 
 MOST_VIEWS = 32
@@ -86,6 +88,33 @@ def triangulate(views: list[View], pixels: np.ndarray, rounds: int = 12) -> Land
     return Landmarks(points, trust, median, {v.name: (p, used[:, i]) for i, (v, p) in enumerate(zip(views, pixels, strict=True))})
 
 
+def onto_surface(found: Landmarks, views: list[View], mesh: Mesh, farthest: float = 0.02) -> Landmarks:
+    """The same landmarks where their rays meet the scan, averaged over the views that see that side squarely.
+
+    The net moves its marks over the skin as a head turns, so rays cross behind the skin; the template's marks were found
+    on its surface in this way, too. A landmark whose rays miss the scan, or meet it `farthest` metres away, stays where it was.
+    """
+    caster, seen = RayCaster(mesh), [view for view in views if view.name in found.images]
+    hits, weights = [], []
+    for view in seen:
+        pixels, used = found.images[view.name]
+        origins = np.repeat(view.centre[None], len(pixels), 0)
+        rays = view.rays(pixels)
+        _, _, distance = caster.first_hits(origins, rays)
+        hit = origins + rays * np.where(np.isfinite(distance), distance, 0)[:, None]
+        near = np.isfinite(distance) & (np.linalg.norm(hit - found.points, axis=1) < farthest)
+        hits.append(hit)
+        weights.append(used * near * _facing(found.points, origins[:, None])[:, 0] ** 2)
+    hits, weights = np.stack(hits, 1), np.stack(weights, 1)  # [468, V, 3], [468, V]
+    total = weights.sum(1)
+    points = np.where((total > 0)[:, None], (hits * weights[..., None]).sum(1) / np.maximum(total, 1e-9)[:, None], found.points)
+    for _ in range(8):  # towards the geometric median: one view's slip does not count
+        robust = weights / np.maximum(np.linalg.norm(hits - points[:, None], axis=-1), 5e-4)
+        mean = (hits * robust[..., None]).sum(1) / np.maximum(robust.sum(1), 1e-9)[:, None]
+        points = np.where((total > 0)[:, None], mean, found.points)
+    return replace(found, points=points)
+
+
 def to_json(found: Landmarks) -> dict:
     """What landmarks.json holds: points by index in metres, and by frame the pixels they were lifted from."""
     points = {str(i): [round(float(x), 6) for x in p] for i, p in enumerate(found.points) if np.isfinite(p).all()}
@@ -114,7 +143,7 @@ def _view_trust(errors: np.ndarray, facing: np.ndarray) -> np.ndarray:
 
 def _facing(points: np.ndarray, origins: np.ndarray) -> np.ndarray:
     """[468, V] in [0, 1]: how squarely a view sees the side of the head that a landmark lies on (0: beyond 70 degrees)."""
-    face = np.median(points, axis=0)
+    face = np.nanmedian(points, axis=0)
     backwards = face - origins.mean((0, 1))
     backwards[2] = 0
     middle = face + BEHIND_FACE_M * backwards / np.linalg.norm(backwards)

@@ -22,11 +22,11 @@ STIFF_M, SOFT_M = 0.030, 0.0022
 """Length over which the displacement is held together, at the first and the last step, metres."""
 BLIND_M = 0.020
 """The same where the scan is not followed; it never softens below this."""
-FAR_M, NEAR_M = 0.030, 0.0015
-"""Distance beyond which a scan patch is no partner: at the first step, and from two thirds of the way on."""
+FAR_M, NEAR_M = 0.030, 0.002
+"""Distance beyond which a scan patch is no partner: at the first and the last step."""
 PULL, BLIND_PULL = 1e-3, 2e-2
 """Weight of staying where the identity fit is, against data of weight one; and where the scan is not followed, lest the crown overshoot."""
-LANDMARK_AREA_M2 = (4e-5, 4e-7)
+LANDMARK_AREA_M2 = (3e-4, 3e-6)
 """Surface area that one landmark counts for, at the first and the last step."""
 
 
@@ -46,7 +46,7 @@ def fit(model: Model, start: np.ndarray, scan: Scan, follow: np.ndarray, hold: n
         part = step / max(iterations - 1, 1)
         length = STIFF_M * (SOFT_M / STIFF_M) ** part
         normals = vertex_normals(model.mesh.moved(vertices))
-        reach = FAR_M * (NEAR_M / FAR_M) ** min(1.0, 1.5 * part)
+        reach = FAR_M * (NEAR_M / FAR_M) ** part
         signed, scan_normals = scan.match(vertices, normals, 1.5 * reach)
         data = trimmed(np.where(follow > 0.02, signed, np.nan), reach) * follow
         aim = vertices + scan_normals * np.nan_to_num(signed)[:, None]
@@ -61,7 +61,8 @@ def fit(model: Model, start: np.ndarray, scan: Scan, follow: np.ndarray, hold: n
         pin = LANDMARK_AREA_M2[0] * (LANDMARK_AREA_M2[1] / LANDMARK_AREA_M2[0]) ** part * np.maximum(1, hold * part)
         pin = np.where(known, pin * robust * trust * model.landmark_weight, 0)
 
-        bending = np.maximum(length, BLIND_M * (1 - data)) ** 4
+        blind = 1 - follow * np.isfinite(signed)
+        bending = np.maximum(length, BLIND_M * blind) ** 4
         pull = PULL + (BLIND_PULL - PULL) * (1 - follow)
         matrix = (sparse.diags(area * (data + pull)) + anchors.T @ sparse.diags(pin) @ anchors
                   + laplacian.T @ sparse.diags(bending / area) @ laplacian)
