@@ -5,7 +5,9 @@
 The bpy wheel hangs at exit when a class stays registered, so the fixture disables the extension at the end.
 """
 
+import atexit
 import os
+import shutil
 import tempfile
 from pathlib import Path
 
@@ -16,6 +18,7 @@ MODULE = "bl_ext.user_default.wildcap"
 
 # Blender reads this when it starts, and any test may be the one that imports bpy first.
 os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="wildcap-test-")
+atexit.register(shutil.rmtree, os.environ["BLENDER_USER_RESOURCES"], ignore_errors=True)
 
 
 @pytest.fixture(scope="session")

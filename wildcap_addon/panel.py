@@ -80,9 +80,11 @@ def draw_job(layout, job: jobs.Job) -> None:
     progress = job.progress
     factor = min(1.0, progress.done / progress.of) if progress and progress.of > 0 else 0.0
     layout.progress(text=f"{jobs.stage_label(job)}  {factor:.0%}", factor=factor)
-    row = layout.row()
-    row.label(text=progress.text if progress else "")
-    row.label(text=jobs.eta(job))
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for line in (progress.text if progress else "", jobs.eta(job)):
+        if line:
+            column.label(text=line[:1].upper() + line[1:])
 
 
 def _words(state: str, seconds: float | None) -> str:

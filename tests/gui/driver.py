@@ -155,13 +155,12 @@ def find(command: str, options: str = ""):
     """Where that button is: the cursor goes down the sidebar and Blender says what would be copied at each place."""
     for _ in range(3):
         sidebar = region('UI')
-        for y in range(sidebar.y + sidebar.height - 4, sidebar.y + 4, -7):
-            for x in (sidebar.x + sidebar.width * 0.25, sidebar.x + sidebar.width * 0.75):  # two buttons may share a row
+        for x in (sidebar.x + sidebar.width * 0.25, sidebar.x + sidebar.width * 0.75):  # two buttons may share a row
+            for y in range(sidebar.y + sidebar.height - 4, sidebar.y + 4, -11):
                 yield from move((x, y))
                 text = under_cursor()
                 if command in text and options in text:
-                    yield
-                    return x, y - 3
+                    return x, y
         yield 0.5
     raise AssertionError(f"there is no button for {command} {options} in the sidebar")
 

@@ -24,7 +24,7 @@ if [ "${mounts[0]}" = /usr/bin ]; then
 fi
 
 export root checkout zip
-exec unshare --mount --pid --fork --propagation private bash -c '
+exec unshare --mount --pid --fork --kill-child --propagation private bash -c '
     set -euo pipefail
     mount -t proc proc "$root/proc"
     mount --rbind /sys "$root/sys"
