@@ -22,6 +22,9 @@ from ..messages import FINAL, Cancelled, Done, Failed, Message, Problem, Progres
 
 PYTHONS = ((3, 11), (3, 12))
 """Versions of Python for which every pinned requirement has a wheel."""
+DISK_GB = 1.7
+"""Size of the finished environment, measured on Linux with torch for the CPU; the CUDA build of torch, which is what PyPI has for Linux,
+brings NVIDIA's libraries and takes several times as much."""
 MODULES = {"opencv-contrib-python-headless": "cv2", "openimageio": "OpenImageIO", "scikit-image": "skimage"}
 """Modules of the packages that are called otherwise."""
 

@@ -1,0 +1,82 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""report.html: whole, escaped, and in need of nothing from elsewhere."""
+
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from core import images, report, stages
+from core.capture import Capture
+from core.settings import Settings, from_json
+
+
+class Page(HTMLParser):
+    """The elements of a page, with the texts between them, and whether every element that was opened is closed."""
+
+    VOID = {"meta", "img", "br"}
+
+    def __init__(self, text: str):
+        super().__init__()
+        self.elements, self.texts, self._open = [], [], []
+        self.feed(text)
+        assert not self._open
+
+    def handle_starttag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes)))
+        if tag not in self.VOID:
+            self._open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self._open.pop() == tag
+
+    def handle_data(self, data):
+        self.texts.append(data.strip())
+
+    def attributes(self, tag: str) -> list[dict]:
+        return [attributes for name, attributes in self.elements if name == tag]
+
+
+@pytest.fixture
+def capture(tmp_path) -> Capture:
+    """With frames and cameras done, one with odd figures, and pictures."""
+    capture = Capture(tmp_path / "Tom & <Jerry>.wildcap")
+    (tmp_path / "a <b>.mp4").write_bytes(b"1")
+    capture.set_source(tmp_path / "a <b>.mp4")
+    settings = from_json({"cameras": {"features": "skin"}})
+    for name in ("frames", "cameras"):
+        (capture.root / name).mkdir()
+        (capture.root / name / "a").write_bytes(b"1")
+        stage = stages.by_name(name)
+        figures = {"registered_share": 0.96875, "lens": ["a", 1.5, None], "text": "<script>alert(1)</script>", "by_view": {"0001": True}}
+        capture.finish(stage, capture.stage_key(stage, settings), 75.0, settings, figures, "0.1.0")
+    grey = np.full((8, 8, 3), 0.5, np.float32)
+    images.write_srgb(capture.picture("cameras", "around_the_head"), grey)
+    images.write_srgb(capture.renders / "three lights.png", grey)
+    return capture
+
+
+def test_the_page_shows_every_stage_with_state_pictures_and_figures(capture):
+    report.write(capture, Settings())
+    page = Page(capture.report.read_text(encoding="utf-8"))
+    assert [section["id"] for section in page.attributes("section") if "id" in section] == list(stages.NAMES)
+    assert [a["class"] for a in page.attributes("small")] == ["done", "stale"] + ["to-do"] * 7, "features is auto again, so cameras are out of date"
+    assert {"0.9688", "registered share", "a, 1.5, -", "0001: yes", "1 min 15 s, ", "skin", "around the head", "three lights"} <= {
+        text if not text.startswith("1 min") else text[:12] for text in page.texts}
+    assert "<script>alert(1)</script>" in page.texts, "escaped, and read back as text"
+    assert [image["src"].split(";")[0] for image in page.attributes("img")] == ["data:image/jpeg", "data:image/png"]
+
+
+def test_the_page_loads_nothing(capture):
+    report.write(capture, Settings())
+    text = capture.report.read_text(encoding="utf-8")
+    page = Page(text)
+    assert not {"script", "link", "iframe"} & {tag for tag, _ in page.elements} and "http" not in text and "url(" not in text
+    assert all(image["src"].startswith("data:") and image["alt"] for image in page.attributes("img"))
+
+
+def test_a_capture_without_anything_has_a_page_too(tmp_path):
+    capture = Capture(tmp_path / "new.wildcap")
+    report.write(capture, Settings())
+    assert "0 of 9 stages finished" in capture.report.read_text(encoding="utf-8")
