@@ -119,6 +119,7 @@ def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str, quality
     height, width, channels = pixels.shape
     spec = oiio.ImageSpec(width, height, channels, kind)
     spec.attribute("oiio:ColorSpace", colour_space)
+    spec.attribute("DateTime", "2000:01:01 00:00:00")  # an EXR would carry the hour, and the same pixels would not be the same file
     if _is_linear(path):
         spec.attribute("compression", "zip")
     elif path.suffix.lower() in (".jpg", ".jpeg"):

@@ -99,7 +99,7 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
         inside = (alpha > 0).numpy().astype(np.uint8)
         ring = (cv2.dilate(inside, np.ones((5, 5))) > 0) & (alpha.numpy() < 0.5)
         coords = coordinates(size, slice(0, size), slice(0, size), centred)
-        found[factor] = Observation(texture, weight, trust, coords, Shader(normal, alpha, cells), torch.from_numpy(ring))
+        found[factor] = Observation(texture, weight, trust, coords, Shader(normal, alpha, cells), torch.from_numpy(ring), REFERENCE / size)
     return found
 
 

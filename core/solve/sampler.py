@@ -37,6 +37,7 @@ class Recipe:
     light_updates: int = 300  # updates of theta in all ...
     light_share: float = 0.5  # ... over this share of the steps; then the light is frozen
     tv: float = 0.1
+    smooth: float = 0.1  # L1 variation of s^V inside M, per texel of a 1024 map: brows and moles are not worth their outline, a shadow is
     neg: float = 1.0
     one_chroma: bool = True  # all local light has one learned colour; False: 27 free numbers per cell, as in the paper
     coarse: tuple[tuple[int, float], ...] = ((4, 1.0), (2, 0.3))  # (factor, sigma): above this noise the map is sampled at 1 / factor of its size
@@ -48,7 +49,7 @@ class Observation:
 
     texture I_UV [3, H, W], scaled so that its shading is about one; weight [H, W] in [0, 1]: how far a texel's observation counts;
     trust [H, W] in [0, 1]: how far what is seen there may be explained as light (less for brows, lips and hair); coords [1, 2, H, W] for the prior;
-    shader Gamma with N_c and M; ring [H, W]: where L_TV counts.
+    shader Gamma with N_c and M; ring [H, W]: where L_TV counts; texel: side of a texel in texels of a 1024 map.
     """
 
     texture: torch.Tensor
@@ -57,6 +58,7 @@ class Observation:
     coords: torch.Tensor
     shader: Shader
     ring: torch.Tensor
+    texel: float = 1.0
 
 
 @dataclass
@@ -168,10 +170,16 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
     shading = o.shader.total(lights)
     loss = photometric(denoised, shading, o, o.weight * o.trust)
     if not o.shader.empty:
-        loss = loss + recipe.neg * (o.shader.local(lights).clamp_min(0) ** 2).sum()
-        inner, ring = shading[(slice(None), *o.shader.box)], o.ring[o.shader.box]
-        loss = loss + recipe.tv * ((inner.diff(dim=1).abs() * ring[1:]).sum() + (inner.diff(dim=2).abs() * ring[:, 1:]).sum())
+        local = o.shader.local(lights)
+        loss = loss + recipe.neg * (local.clamp_min(0) ** 2).sum()
+        loss = loss + recipe.tv * variation(shading[(slice(None), *o.shader.box)], o.ring[o.shader.box])
+        loss = loss + recipe.smooth / o.texel * variation(local, o.shader.box_alpha)
     return loss
+
+
+def variation(image: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
+    """The weighted L1 norm of forward differences of [3, H, W]; the weight [H, W] is taken at the later texel."""
+    return (image.diff(dim=1).abs() * weight[1:]).sum() + (image.diff(dim=2).abs() * weight[:, 1:]).sum()
 
 
 def update_lights(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> None:
