@@ -20,6 +20,7 @@ SIGMA_LUMINANCE = 0.2  # spread of skin about its tone, in log units: common to 
 SIGMA_CHROMA = 0.08  # ... and of the differences between channels
 OUTLIER = 0.05  # share of points that are neither (hair, highlights, misregistration)
 BOX = 3.0  # log units over which an outlier may lie, per channel
+SUN_GAIN = 0.15  # log likelihood per point that a sun must be worth, or uneven skin passes for a shadow
 FLOOR = 0.15  # the environment's shading never falls below this share of its median
 
 
@@ -70,7 +71,7 @@ def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray, re
             found = _expectation_maximisation(log, colours, transfer, cosine, reaches(direction), weights, best[5] if spread else None)
             if found[0] > best[0]:
                 best, best_direction = found, direction
-    _, environment, sun, reached, inlier, _ = best if best[0] - none[0] > 0.02 * weights.sum() else none
+    _, environment, sun, reached, inlier, _ = best if best[0] - none[0] > SUN_GAIN * weights.sum() else none
     ambient = transfer @ environment
     return Light(environment, best_direction, sun, FLOOR * np.median(ambient, 0)), reached, inlier
 

@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which stage costs what: a solved capture's score beside the scores with one stage replaced by the truth or switched off.
+
+    python -m benchmarks.whole_chain CAPTURE TRUTH [--rows NAME ...]
+
+CAPTURE has been run from TRUTH/capture.mp4 with the true skin tone; TRUTH is laid out as benchmarks/albedo_score.py says. Prints one JSON:
+  chain         the capture's own maps
+  solve_off     its texture, scaled to the tone, taken for the albedo
+  raw_texture   the same without any delighting: what geometry and light leave
+  true_frames   the true albedo frames through the folder delighter: what geometry, texture and solver cost
+  true_mask     the true shadow as shadow_mask.png: what the automatic mask costs
+  mask          recall and intersection over union of the automatic mask with the true shadow, over texels of the face
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import shutil
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from core import images, meshes, raster, template
+from core.capture import Capture
+from core.messages import Reporter
+from core.settings import Settings, from_json
+from core.shadow_mask.lift import lift_shadows
+
+from .albedo_score import score_capture
+
+ROWS = ("chain", "solve_off", "raw_texture", "true_frames", "true_mask", "mask")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("capture", type=Path)
+    parser.add_argument("truth", type=Path)
+    parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS)
+    arguments = parser.parse_args()
+    capture = Capture(arguments.capture.resolve())
+    tone = (arguments.truth / "skin_tone.txt").read_text(encoding="ascii").split("#")[0].replace(" ", "").strip()
+    settings = from_json({"solve": {**_solve_settings(capture), "skin_tone": tone}})
+    print(json.dumps({row: _row(row, capture, arguments.truth, settings) for row in arguments.rows}, indent=1))
+
+
+def _row(row: str, capture: Capture, truth: Path, settings: Settings) -> dict:
+    if row == "chain":
+        return score_capture(capture, truth)
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Capture(Path(folder) / "copy.wildcap")
+        shutil.copytree(capture.root, copy.root, ignore=shutil.ignore_patterns("maps*", "preview", "checkpoints", "renders", "lock"))
+        copy.shadow_mask.unlink(missing_ok=True)
+        if row == "solve_off":
+            return _score_texture(copy, truth, settings)
+        if row == "raw_texture":
+            settings = from_json({"delight": {"delighter": "none"}}, settings)
+            _run(copy, settings, "delight", "texture")
+            return _score_texture(copy, truth, settings)
+        if row == "true_frames":
+            _run(copy, from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings), "delight", "texture", "shadow_mask", "solve")
+            return {**score_capture(copy, truth), "solve_off": _score_texture(copy, truth, settings)}
+        shadow, seen = _true_shadow(copy, truth, 512)
+        if row == "mask":
+            found = images.resize(images.read_mask(copy.shadow_mask_auto), 512, 512) > 0.5
+            both = (found & shadow)[seen].sum()
+            return {"recall": float(both / shadow[seen].sum()), "iou": float(both / (found | shadow)[seen].sum()),
+                    "true_share": float(shadow[seen].mean()), "masked_share": float(found[seen].mean())}
+        images.write_data(copy.shadow_mask, images.resize(shadow.astype(np.float32), 1024, 1024).clip(0, 1))
+        _run(copy, settings, "solve")
+        return score_capture(copy, truth)
+
+
+def _run(capture: Capture, settings: Settings, *stages: str) -> None:
+    for stage in stages:
+        importlib.import_module(f"core.{stage}").run(capture, settings, Reporter(stage))
+
+
+def _score_texture(capture: Capture, truth: Path, settings: Settings) -> dict:
+    """The score of the texture whose confident facial skin has been brought to the skin tone."""
+    texture = images.read_linear(capture.texture)
+    skin = images.read_data(capture.texture_confidence)[..., 0] * template.mask("skin", len(texture))
+    tone = images.srgb_to_linear(np.array([float(v) for v in settings.solve.skin_tone.split(",")]))
+    scaled = texture * (tone * skin.sum() / (texture * skin[..., None]).sum((0, 1)))
+    path = capture.root / "texture_as_albedo.png"
+    images.write_srgb(path, images.linear_to_srgb(scaled), bits=16)
+    return score_capture(capture, truth, texture=path)
+
+
+def _true_shadow(capture: Capture, truth: Path, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """The true shadow in UV and the texels of facial skin that are judged, both bool [size, size]."""
+    shutil.rmtree(capture.delit, ignore_errors=True)
+    numbers = {f["video_frame"]: f["name"] for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
+    for path in (truth / "shadow").glob("*.png"):
+        if int(path.stem) in numbers:
+            images.write_data(capture.delit / "shadow" / f"{Path(numbers[int(path.stem)]).stem}.png", images.read_mask(path))
+    head = meshes.read_obj(capture.head)
+    face, bary = raster.rasterize_uv(head, size)
+    confidence = images.resize(images.read_data(capture.texture_confidence)[..., 0], size, size)
+    return lift_shadows(capture, head, face, bary, Reporter("shadow_mask")) > 0.5, (template.mask("skin", size) > 0.5) & (confidence > 0.1)
+
+
+def _solve_settings(capture: Capture) -> dict:
+    return capture.read()["stages"].get("solve", {}).get("settings", asdict(Settings().solve))
+
+
+if __name__ == "__main__":
+    main()
