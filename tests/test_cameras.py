@@ -3,6 +3,7 @@
 """Cameras: known ones found again, the head upright and in metres, and what cannot be solved told in a sentence."""
 
 import json
+import shutil
 import time
 from pathlib import Path
 
@@ -107,6 +108,16 @@ def test_world_is_the_heads(solved):
         eyes = np.array([face.landmarks[list(eye), :2].mean(0) for eye in (faces.RIGHT_EYE, faces.LEFT_EYE)])
         expected, _ = view.project(np.array([[-0.0315, 0, 0], [0.0315, 0, 0]]))
         assert np.linalg.norm(eyes - expected, axis=1).max() < 0.1 * np.linalg.norm(eyes[1] - eyes[0])
+
+
+def test_same_seed_gives_the_same_cameras(solved, tmp_path):
+    capture, _, _ = solved
+    again = Capture(tmp_path / "again.wildcap")
+    again.root.mkdir()
+    shutil.copytree(capture.frames, again.frames)
+    cameras.run(again, from_json({}), Reporter("cameras"))
+    for first, second in zip(read_views(capture), read_views(again), strict=True):
+        assert np.allclose(first.centre, second.centre, atol=1e-9), first.name
 
 
 def test_rays_meet_robustly():

@@ -82,6 +82,7 @@ def _map(job: dict) -> dict[int, pycolmap.Reconstruction]:
     options.random_seed = job["seed"]
     options.mapper.random_seed = job["seed"]
     options.triangulation.random_seed = job["seed"]
+    options.num_threads = 1  # sums in a fixed order: the same seed gives the same cameras, and the mapper gains little from a second thread
     options.min_model_size = 3
     options.extract_colors = True
     total = sum(len(group["names"]) for group in job["groups"])

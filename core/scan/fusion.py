@@ -22,8 +22,8 @@ SIDE = 8
 """Voxels along a block's edge."""
 TRUNCATION = 5
 """Reach of the distance field on either side of the surface, in voxels."""
-LEAST_WEIGHT = 2.0
-"""Maps that must agree for a voxel to count (a head-on view weighs 1)."""
+LEAST_WEIGHT, LEAST_SHARE = 2.0, 0.15
+"""Maps that must agree for a voxel to count (a head-on view weighs 1), fewer where a handful of photographs makes few maps."""
 
 
 def fuse(maps: list[DepthMap], box: np.ndarray, voxel: float, tick: Callable[[int], None] = lambda done: None) -> Mesh | None:
@@ -45,7 +45,7 @@ def fuse(maps: list[DepthMap], box: np.ndarray, voxel: float, tick: Callable[[in
     known = np.zeros(shape * SIDE, bool)
     index = tuple(voxels.T)
     field[index] = distance / np.maximum(weight, 1e-6)
-    known[index] = weight >= min(LEAST_WEIGHT, 0.5 * len(maps))
+    known[index] = weight >= min(LEAST_WEIGHT, LEAST_SHARE * len(maps))
     return _surface(field, known, low, voxel)
 
 

@@ -15,6 +15,8 @@ import numpy as np
 from ..views import View
 
 BLOCK = 5
+EASY_DEG = 8.0
+"""Up to this baseline neighbouring frames look alike; beyond, matching leans more on smoothness, with the square of the angle up to four times."""
 AGREE_PX = 1.0
 """Most a pixel's disparity may differ between the matches from left to right and from right to left."""
 
@@ -58,7 +60,8 @@ def match_pair(first: View, second: View, pictures: tuple, masks: tuple, box: np
     b, mask_b = _warp(second, pictures[1], masks[1], rotation, focal, origin - (shift, 0), width, height)
     if min(mask_a.sum(), mask_b.sum()) < 500:
         return None
-    disparity, disagreement = _match(a, b, mask_a, mask_b, count)
+    angle = np.degrees(np.arctan2(length, left[:, 2].mean()))
+    disparity, disagreement = _match(a, b, mask_a, mask_b, count, float(np.clip((angle / EASY_DEG) ** 2, 1, 4)))
     depth = np.where(disparity > 0, focal * length / (disparity + shift), np.nan).astype(np.float32)
     return DepthMap(rotation, first.centre, focal, origin, depth, length, disagreement)
 
@@ -85,9 +88,10 @@ def _warp(view: View, picture: np.ndarray, mask: np.ndarray, rotation: np.ndarra
     return np.round(np.clip(warped, 0, 1) * 255).astype(np.uint8), inside > 0
 
 
-def _match(a: np.ndarray, b: np.ndarray, mask_a: np.ndarray, mask_b: np.ndarray, count: int) -> tuple[np.ndarray, float]:
+def _match(a: np.ndarray, b: np.ndarray, mask_a: np.ndarray, mask_b: np.ndarray, count: int, stiffness: float) -> tuple[np.ndarray, float]:
     """Disparities float32 [H, W] of `a` into `b` (0: unknown) and the median disagreement of the two directions."""
-    matcher = cv2.StereoSGBM_create(0, count, BLOCK, P1=2 * 3 * BLOCK**2, P2=8 * 3 * BLOCK**2, disp12MaxDiff=-1, preFilterCap=31,
+    penalty = round(2 * 3 * BLOCK**2 * stiffness)  # a quarter of what is usual: stronger ones flatten the nose
+    matcher = cv2.StereoSGBM_create(0, count, BLOCK, P1=penalty, P2=4 * penalty, disp12MaxDiff=-1, preFilterCap=31,
                                     uniquenessRatio=0, speckleWindowSize=0, speckleRange=0, mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY)
     back = cv2.ximgproc.createRightMatcher(matcher)
     left, right = matcher.compute(a, b), back.compute(b, a)
@@ -105,5 +109,5 @@ def _match(a: np.ndarray, b: np.ndarray, mask_a: np.ndarray, mask_b: np.ndarray,
     seen = inside & mask_a & mask_b[rows, other] & (left > 0)
     good = seen & (difference <= AGREE_PX) & (np.abs(smooth - left) <= AGREE_PX)
     good[:, :count] = False
-    good = cv2.morphologyEx(good.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
+    good = cv2.morphologyEx(good.astype(np.uint8), cv2.MORPH_OPEN, np.ones((5, 5), np.uint8)) > 0
     return np.where(good, smooth, 0), float(np.median(difference[seen])) if seen.any() else float("nan")
