@@ -37,7 +37,7 @@ class Recipe:
     light_updates: int = 300  # updates of theta in all ...
     light_share: float = 0.5  # ... over this share of the steps; then the light is frozen
     tv: float = 0.1
-    smooth: float = 0.1  # L1 variation of s^V inside M, per texel of a 1024 map: brows and moles are not worth their outline, a shadow is
+    smooth: float = 0.7  # L1 variation of s^V inside M, per texel of a 1024 map and mean squared albedo: a brow is not worth its outline, a shadow is
     neg: float = 1.0
     one_chroma: bool = True  # all local light has one learned colour; False: 27 free numbers per cell, as in the paper
     coarse: tuple[tuple[int, float], ...] = ((4, 1.0), (2, 0.3))  # (factor, sigma): above this noise the map is sampled at 1 / factor of its size
@@ -173,7 +173,8 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
         local = o.shader.local(lights)
         loss = loss + recipe.neg * (local.clamp_min(0) ** 2).sum()
         loss = loss + recipe.tv * variation(shading[(slice(None), *o.shader.box)], o.ring[o.shader.box])
-        loss = loss + recipe.smooth / o.texel * variation(local, o.shader.box_alpha)
+        brightness = (o.weight * albedo(denoised) ** 2).mean()  # L_pho is larger on light skin
+        loss = loss + recipe.smooth * brightness / o.texel * variation(local, o.shader.box_alpha)
     return loss
 
 
