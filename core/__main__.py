@@ -80,6 +80,9 @@ def _run(options: argparse.Namespace) -> int:
     if options.skin_tone:
         values["solve"] = {"skin_tone": options.skin_tone}
     capture = Capture(options.capture)
+    strangers = [path.name for path in capture.root.iterdir() if path not in vars(capture).values()] if capture.root.is_dir() else []
+    if strangers and not capture.json.is_file():
+        raise Problem(f"{capture.root} is no capture: it holds {strangers[0]}.", "Name a new folder, as NAME.wildcap, and it will be made.")
     job = write_job(capture, source="" if options.source == "-" else options.source, first=options.first, last=options.last, settings=values,
                     quality=options.quality)
     return terminal.follow(ROOT, capture, job)

@@ -49,7 +49,7 @@ def film(tmp_path) -> Path:
 @pytest.fixture
 def capture(tmp_path) -> Capture:
     capture = Capture(tmp_path / "Ich & du.wildcap")
-    capture.root.mkdir()
+    capture.set_source("")
     (capture.root / "mood.json").write_text("{}")
     return capture
 
@@ -109,6 +109,13 @@ def test_a_failure_is_two_lines(tiny, capture, film):
 ])
 def test_what_cannot_be_is_refused_in_two_lines(capture, words):
     refused(*(capture.root if word == "CAPTURE" else word for word in words))
+
+
+def test_a_folder_of_other_things_is_no_capture(tmp_path, film):
+    (tmp_path / "frames").mkdir()
+    (tmp_path / "frames" / "holiday.jpg").write_bytes(b"1")
+    assert film.name in refused("run", film, tmp_path)[0]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["frames", film.name]) and (tmp_path / "frames" / "holiday.jpg").is_file()
 
 
 def test_a_capture_of_a_newer_version_is_refused(capture, film):
