@@ -9,6 +9,7 @@ import atexit
 import os
 import shutil
 import tempfile
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -42,3 +43,21 @@ def wildcap(enabled_extension):
 
     bpy.ops.wm.read_homefile(use_empty=True)
     return enabled_extension
+
+
+@pytest.fixture
+def addon(wildcap):
+    """import_module inside the add-on."""
+    return lambda name: import_module(f"{wildcap}.wildcap_addon.{name}")
+
+
+@pytest.fixture
+def capture(tmp_path, wildcap):
+    """An open, solved capture in a folder with a space and an accent."""
+    import bpy
+
+    from . import standin
+
+    root = standin.make(tmp_path / "Zoë et moi" / "head.wildcap")
+    bpy.ops.wildcap.open_capture(directory=str(root))
+    return root

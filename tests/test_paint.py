@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Painting the shadow mask, as far as it goes without a window: files, orientation, set-up and leaving. Strokes are tests/gui/."""
+
+import numpy as np
+import pytest
+
+from . import standin
+
+bpy = pytest.importorskip("bpy")
+
+
+def test_the_mask_painted_on_the_left_cheek_is_saved_on_the_left_cheek(addon, capture):
+    mask_image = addon("paint.mask_image")
+    core_capture = addon("captures").Capture(capture)
+    image = mask_image.load(core_capture)
+    u, v = standin.LEFT_CHEEK_UV
+    width, height = image.size
+    pixels = np.zeros((height, width, 4), np.float32)  # Blender's rows, from the bottom
+    pixels[..., 3] = 1
+    pixels[round(v * height), round(u * width)] = 1
+    image.pixels.foreach_set(pixels.ravel())
+    mask_image.save(image, core_capture)
+
+    header = (capture / "shadow_mask.png").read_bytes()[24:26]
+    assert header == b"\x08\x00", "8 bit grey"
+    read = bpy.data.images.load(str(capture / "shadow_mask.png"))
+    read.colorspace_settings.name = 'Non-Color'
+    again = mask_image.values(read)
+    row, column = np.argwhere(again > 0.5)[0]
+    assert column > width / 2, "the person's left is right of the middle of the map"
+    assert row > height / 2, "the cheek is below the middle"
+    assert (row, column) == (height - 1 - round(v * height), round(u * width))
+    assert (again > 0.5).sum() == 1
+
+
+def test_the_last_ten_masks_are_kept(addon, capture):
+    mask_image = addon("paint.mask_image")
+    core_capture = addon("captures").Capture(capture)
+    image = mask_image.load(core_capture)
+    for i in range(14):
+        pixels = np.full(len(image.pixels), i / 14, np.float32)
+        image.pixels.foreach_set(pixels)
+        mask_image.save(image, core_capture)
+    assert len(list((capture / "mask_history").iterdir())) == 10
+    mask_image.save(image, core_capture)
+    assert len(list((capture / "mask_history").iterdir())) == 10, "an unchanged mask is no new one"
+
+
+@pytest.mark.parametrize("on", ["HEAD", "SHEET"])
+def test_painting_sets_everything_up_and_leaving_puts_it_back(addon, capture, on):
+    bpy.ops.wildcap.bring_in_head()
+    for mode in ('TEXTURE_PAINT', 'OBJECT'):  # Blender gives the mode its first brush
+        bpy.ops.object.mode_set(mode=mode)
+    paint = bpy.context.scene.tool_settings.image_paint
+    before = {name: getattr(paint, name) for name in ("mode", "canvas", "use_stencil_layer", "stencil_image", "invert_stencil", "brush")}
+    objects = {o.name for o in bpy.data.objects}
+    bpy.ops.wildcap.paint_mask(on=on)
+    assert bpy.context.mode == 'PAINT_TEXTURE'
+    assert paint.canvas.name.startswith("texture") and paint.stencil_image.name.endswith("Shadow Mask")
+    assert paint.use_stencil_layer and tuple(paint.stencil_color) == (1, 0, 0)
+    assert getattr(paint.brush, "image_brush_type", None) == 'MASK' or paint.brush.image_tool == 'MASK'
+    bpy.ops.wildcap.paint_mask(on='HEAD' if on == 'SHEET' else 'SHEET')
+    assert bpy.context.mode == 'PAINT_TEXTURE'
+    bpy.ops.wildcap.finish_mask()
+    assert bpy.context.mode == 'OBJECT'
+    assert {name: getattr(paint, name) for name in before} == before
+    assert {o.name for o in bpy.data.objects} == objects
+    assert not any(o.hide_get() for o in bpy.context.view_layer.objects)
+    assert (capture / "shadow_mask.png").is_file()
+    assert "WildCap Mask" not in bpy.data.brushes
+
+
+def test_a_mask_is_not_lost_when_another_file_is_opened(addon, capture):
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.paint_mask()
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert (capture / "shadow_mask.png").is_file()
+    assert not addon("paint.session").active()
