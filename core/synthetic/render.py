@@ -29,7 +29,8 @@ def main() -> None:
     scene = bpy.context.scene
     _settings(scene, job)
     _add(read_obj(Path(job["head"])), "head", _skin(job["maps"]))
-    _add(read_obj(Path(job["leaves"])), "leaves", _plain("leaves", (0.05, 0.13, 0.03))).visible_camera = False  # they are nearer than the camera
+    if job["leaves"]:
+        _add(read_obj(Path(job["leaves"])), "leaves", _plain("leaves", (0.05, 0.13, 0.03))).visible_camera = False  # they are nearer than the camera
     _light(scene, job)
     _room(job["seed"])
     _torso(job["seed"])

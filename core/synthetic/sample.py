@@ -54,17 +54,23 @@ def main() -> None:
         write_sample(asked.out, asked.work, asked.seed, skin, asked.frames)
 
 
-def render_frames(work: Path, seed: int, skin: Skin, cameras: np.ndarray, frames: list[int], samples: int, scale: float = 1.0) -> None:
-    """work/NNNNN.png of these frames (numbers into cameras [N, 4, 4]) by Cycles in a process of its own; files that exist are kept."""
+def render_frames(work: Path, seed: int, skin: Skin, cameras: np.ndarray, frames: list[int], samples: int, scale: float = 1.0,
+                  leaves: bool = True) -> None:
+    """work/NNNNN.png of these frames (numbers into cameras [N, 4, 4]) by Cycles in a process of its own; files that exist are kept.
+
+    `scale`: of the pictures' size; `leaves`: whether they stand between the sun and the head.
+    """
     work.mkdir(parents=True, exist_ok=True)
     sun = scene.sun_of(seed)
     meshes.write_obj(work / "head.obj", subject_mesh(seed))
-    meshes.write_obj(work / "leaves.obj", scene.leaves(seed, sun))
+    if leaves:
+        meshes.write_obj(work / "leaves.obj", scene.leaves(seed, sun))
     images.write_srgb(work / "diffuse.png", images.linear_to_srgb(skin.diffuse), bits=16)
     images.write_data(work / "specular.png", skin.specular, bits=16)
     images.write_data(work / "normal.png", skin.normal / 2 + 0.5, bits=16)
     write_json(work / "job.json", {
-        "seed": seed, "head": str(work / "head.obj"), "leaves": str(work / "leaves.obj"), "out": str(work), "frames": frames, "samples": samples,
+        "seed": seed, "head": str(work / "head.obj"), "leaves": str(work / "leaves.obj") if leaves else None,
+        "out": str(work), "frames": frames, "samples": samples,
         "maps": {name: str(work / f"{name}.png") for name in ("diffuse", "specular", "normal")}, "cameras": cameras.tolist(),
         "sun": {"direction": sun.direction.tolist(), "strength": sun.strength, "angle": sun.angle, "colour": sun.colour}, "sky": scene.SKY,
         "width": round(scene.WIDTH * scale), "height": round(scene.HEIGHT * scale), "focal_px": scene.FOCAL * scale})

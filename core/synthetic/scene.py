@@ -19,7 +19,7 @@ DISTANCE = 0.46  # metres from the camera to the head's middle
 
 @dataclass(frozen=True)
 class Sun:
-    """direction: unit vector towards the sun; strength: irradiance across the beam in W/m^2; angle: its diameter in radians (a clear, small sun); colour: linear sRGB."""
+    """direction: unit vector towards the sun; strength: irradiance across the beam in W/m^2; angle: its diameter in radians; colour: linear sRGB."""
 
     direction: np.ndarray
     strength: float = 4.2
@@ -38,7 +38,7 @@ def sun_of(seed: int) -> Sun:
     return Sun(np.array([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)]))
 
 
-def leaves(seed: int, sun: Sun, distance: float = 0.40, count: int = 80, reach: float = 0.15) -> Mesh:
+def leaves(seed: int, sun: Sun, distance: float = 0.40, count: int = 28, reach: float = 0.15) -> Mesh:
     """A loose twig between head and sun: pointed leaves of 2 to 5 cm, strewn over a disc of radius `reach` across the beam.
 
     From `distance` metres the sun blurs their edges over 2 mm: hard shadows, as at noon under a tree.
@@ -64,7 +64,7 @@ def camera_path(seed: int, frames: int) -> np.ndarray:
     with the slow drift and the tremble of a hand."""
     rng = np.random.default_rng([seed, 22])
     t = np.linspace(0, 1, frames)
-    azimuth = np.radians(52) * (0.8 * (2 * t - 1) + 0.2 * np.sin(np.pi * (t - 0.5))) * rng.choice([-1, 1])
+    azimuth = np.radians(46) * (0.8 * (2 * t - 1) + 0.2 * np.sin(np.pi * (t - 0.5))) * rng.choice([-1, 1])
     height = np.radians(7 + 13 * np.sin(2 * np.pi * (1.5 * t + 0.1)))
     distance = DISTANCE * (1 + 0.05 * np.sin(2 * np.pi * (1.2 * t + rng.uniform())))
     position = distance[:, None] * np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)
