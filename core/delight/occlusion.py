@@ -16,6 +16,8 @@ from .light import log_likelihood
 ALBEDO_PX = 0.03  # scale over which skin's albedo is taken for even, as a share of the frame's longer side
 COHERENCE = 3.0  # weight of the neighbourhood's opinion, in log odds
 BAND_PX = 0.004  # half width of the band along an edge
+ZONE_PX = 0.008  # and of the zone about it that must be no darker or lighter than its surroundings
+FINE_PX = 0.0025  # skin's detail below this scale is kept even there
 
 
 def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free: np.ndarray, head: np.ndarray, side: int) -> np.ndarray:
@@ -39,6 +41,22 @@ def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free:
         deviation = np.clip(log - np.where(sharp, sunlit, shaded), -0.8, 0.8)
         albedo = _mean_over(deviation, head, ALBEDO_PX * side)
     return _soften((share > 0.5) & head, log, np.where(sharp, sunlit, shaded), ambient, direct, head, max(1.5, BAND_PX * side))
+
+
+def seamless(log_albedo: np.ndarray, share: np.ndarray, head: np.ndarray, side: int) -> np.ndarray:
+    """[H, W, 3]: what to take from a log albedo [H, W, 3] along the edges of `share` so that no outline of the shadow stays.
+
+    Bounces, subsurface light and the video's chroma make a penumbra that one share cannot explain. Near an edge the coarse part of the albedo is
+    carried over from both sides; its fine part stays.
+    """
+    lit = (share > 0.5).astype(np.uint8)
+    distance = cv2.distanceTransform(lit, cv2.DIST_L2, 5) + cv2.distanceTransform(1 - lit, cv2.DIST_L2, 5)
+    zone = ZONE_PX * side
+    sure = head & (distance > zone)
+    known = cv2.GaussianBlur(sure.astype(np.float32), (0, 0), 0.7 * zone)
+    excess = _mean_over(log_albedo, head, FINE_PX * side) - _mean_over(log_albedo, sure, 0.7 * zone)
+    ramp = np.clip(2 * (1 - distance / zone), 0, 1) * np.clip(known / 0.05, 0, 1)
+    return np.clip(excess, -0.7, 0.7) * ramp[..., None]
 
 
 def _soften(lit: np.ndarray, log, log_light, ambient, direct, head, band: float) -> np.ndarray:

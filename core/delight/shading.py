@@ -20,7 +20,7 @@ from ..settings import Settings
 from ..views import View, read_views
 from .contract import Delit
 from .light import Light, fit_light, radiance_transfer
-from .occlusion import sun_share
+from .occlusion import seamless, sun_share
 from .surface import skin_weights, smooth_normals, vertex_colours
 
 BRIGHTEST = 0.85  # a tone's largest channel: more than skin reflects, so a brighter picture was over-exposed
@@ -82,7 +82,7 @@ def _delight(view: View, mesh, normals, transfer, caster: RayCaster, light: Ligh
     if (face >= 0).any():
         box = _box(face >= 0)  # the rest of the frame is never looked at
         lit, share = _light_seen(images.srgb_to_linear(srgb[box]), mesh, normals, transfer, caster, light, face[box], bary[box], max(face.shape))
-        srgb[box] = images.linear_to_srgb(images.srgb_to_linear(srgb[box]) / np.maximum(lit, 1e-4) * scale)
+        srgb[box] = images.linear_to_srgb(images.srgb_to_linear(srgb[box]) / lit * scale)
         shadow[box] = (1 - share) * (face[box] >= 0)
     return Delit(view, srgb, shadow if light.has_sun else None)
 
@@ -101,7 +101,10 @@ def _light_seen(linear, mesh, normals, transfer, caster, light, face, bary, side
         position = interpolate(mesh.vertices, mesh.faces, face, bary)[facing] + 1e-3 * normal[facing]
         free[facing] = ~caster.blocked(position, np.repeat(light.sun[None], len(position), 0))
         share = sun_share(linear, ambient, direct, free, head, side)
-    return bleed((ambient + share[..., None] * direct).astype(np.float32), head), share
+    lit = np.maximum(bleed((ambient + share[..., None] * direct).astype(np.float32), head), 1e-4)
+    if light.has_sun:
+        lit = lit * np.exp(seamless(np.log(np.maximum(linear, 1e-3) / lit), share, head, side))
+    return lit, share
 
 
 def _box(where: np.ndarray, margin: int = 8) -> tuple[slice, slice]:
