@@ -64,7 +64,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
     _check_often(prior, report)
     state = sample(prior, seen, state, recipe, settings.seed, on_step)
-    result = maps.finished(state, evidence, seen[1].shader, exposure, tone)
+    result = maps.finished(state, evidence, reference, seen[1].shader, exposure, tone)
     maps.write(capture, result)
     maps.write_preview(capture, state, seen, report)
     _leave_figures(capture, evidence, result, tone, report)

@@ -32,14 +32,15 @@ class Maps:
     confidence: np.ndarray
 
 
-def finished(state: State, evidence: Evidence, shader: Shader, exposure: float, tone: torch.Tensor) -> Maps:
+def finished(state: State, evidence: Evidence, reference: torch.Tensor, shader: Shader, exposure: float, tone: torch.Tensor) -> Maps:
     """Reads the maps out of \\hat x_0. The albedo is rescaled once, in linear light, so that the mean of the confident facial skin is `tone`;
-    the shading takes the inverse, so that their product stays."""
-    x = state.denoised[0]
+    the shading takes the inverse, so that their product stays. What nobody saw is `reference`, the mean face of that tone [1, 7, S, S]: a drawn
+    sample would be as likely, but would look like something that was measured."""
+    x = torch.lerp(reference, state.denoised, evidence.weight.sqrt())[0]
     with torch.no_grad():
         shading = shader.total(state.lights).clamp_min(1e-3) / exposure
         main = shader.main(state.lights).clamp_min(1e-3) / exposure
-    diffuse = albedo(state.denoised).clamp_min(DARKEST)
+    diffuse = albedo(x[None]).clamp_min(DARKEST)
     gain = (tone / mean_tone(diffuse, evidence.skin * evidence.weight)).clamp(0.2, 5.0)[:, None, None]
     normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
     explained = (1 - (shading / main).mean(0)).clamp(0, 1)  # the share of the darkness that was called shadow

@@ -37,7 +37,7 @@ class Recipe:
     light_updates: int = 300  # updates of theta in all ...
     light_share: float = 0.5  # ... over this share of the steps; then the light is frozen
     tv: float = 0.1
-    smooth: float = 0.7  # L1 variation of s^V inside M, per texel of a 1024 map and mean squared albedo: a brow is not worth its outline, a shadow is
+    smooth: float = 1.4  # L1 variation of s^V inside M, per texel of a 1024 map and mean squared albedo: a brow is not worth its outline, a shadow is
     neg: float = 1.0
     one_chroma: bool = True  # all local light has one learned colour; False: 27 free numbers per cell, as in the paper
     coarse: tuple[tuple[int, float], ...] = ((4, 1.0), (2, 0.3))  # (factor, sigma): above this noise the map is sampled at 1 / factor of its size
