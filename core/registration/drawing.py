@@ -22,7 +22,7 @@ def overlay(views: list[View], mesh: Mesh, found: Landmarks, height: int = 640) 
 
 def three_views(views: list[View], found: Landmarks) -> list[View]:
     """The leftmost, the middle and the rightmost of the views whose landmarks were used."""
-    seen = [view for view in views if view.name in found.images]
+    seen = [view for view in views if view.name in found.images and found.images[view.name][1].any()] or views
     middle = np.nanmean(found.points, axis=0)
     ordered = sorted(seen, key=lambda view: np.arctan2(view.centre[0] - middle[0], middle[1] - view.centre[1]))
     return [ordered[0], ordered[len(ordered) // 2], ordered[-1]]
