@@ -93,7 +93,7 @@ def deviation(capture: Capture, share: float) -> float:
 def test_light_of_the_sky_is_divided_out(capture):
     render_frames(capture, sun=0 * SUN_COLOUR)
     run(capture, from_json({"delight": {"delighter": "shading"}}), Reporter("delight"))
-    assert deviation(capture, 0.9) < 0.03
+    assert deviation(capture, 0.8) < 0.03 and deviation(capture, 0.95) < 0.08
     assert not list((capture.delit / "shadow").glob("*.png"))  # no sun, so nothing was in shadow
 
 

@@ -20,6 +20,7 @@ SIGMA_LUMINANCE = 0.2  # spread of skin about its tone, in log units: common to 
 SIGMA_CHROMA = 0.08  # ... and of the differences between channels
 OUTLIER = 0.05  # share of points that are neither (hair, highlights, misregistration)
 BOX = 3.0  # log units over which an outlier may lie, per channel
+RIDGE = 1.0  # skin varies in patches: a few dozen independent samples, against environments whose bands are a few tenths of their mean
 SUN_GAIN = 0.15  # log likelihood per point that a sun must be worth, or uneven skin passes for a shadow
 FLOOR = 0.15  # the environment's shading never falls below this share of its median
 
@@ -71,7 +72,10 @@ def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray, re
             found = _expectation_maximisation(log, colours, transfer, cosine, reaches(direction), weights, best[5] if spread else None)
             if found[0] > best[0]:
                 best, best_direction = found, direction
-    _, environment, sun, reached, inlier, _ = best if best[0] - none[0] > SUN_GAIN * weights.sum() else none
+    if best[0] - none[0] <= SUN_GAIN * weights.sum():
+        best, best_direction = none, np.array([0.0, 0.0, 1.0])
+    cosine, visible = (np.maximum(normals @ best_direction, 0), reaches(best_direction)) if best is not none else (np.zeros(len(colours)),) * 2
+    _, environment, sun, reached, inlier, _ = _expectation_maximisation(log, colours, transfer, cosine, visible, weights, best[5], iterations=30)
     ambient = transfer @ environment
     return Light(environment, best_direction, sun, FLOOR * np.median(ambient, 0)), reached, inlier
 
@@ -135,26 +139,33 @@ def _expectation_maximisation(log, colours, transfer, cosine, visible, weights, 
     inlier = np.ones(count) if start is None else start[1]
     scale = np.average(colours, axis=0, weights=weights)
     has_sun = bool(cosine.any())
+    spread = SIGMA_LUMINANCE**2 if start is None else start[2]
     for _ in range(iterations):
         environment, sun = np.zeros((9, 3)), np.zeros(3)
         for k in range(3):
-            environment[:, k], sun[k] = _weighted_fit(transfer, cosine, colours[:, k] / scale[k], lit, inlier * weights, has_sun)
+            environment[:, k], sun[k] = _weighted_fit(transfer, cosine, colours[:, k] / scale[k], lit, inlier * weights, has_sun, spread)
         environment, sun = environment * scale, sun * scale
         ambient = transfer @ environment
         ambient = np.maximum(ambient, FLOOR * np.median(ambient, 0))
-        shaded = log_likelihood(log - np.log(np.maximum(ambient, 1e-4)))
-        sunlit = log_likelihood(log - np.log(np.maximum(ambient + cosine[:, None] * sun, 1e-4))) if has_sun else shaded
+        in_shade = log - np.log(np.maximum(ambient, 1e-4))
+        in_sun = log - np.log(np.maximum(ambient + cosine[:, None] * sun, 1e-4))
+        shaded, sunlit = log_likelihood(in_shade), log_likelihood(in_sun)
         terms = np.stack([np.log(prior * (1 - OUTLIER)) + sunlit, np.log((1 - prior) * (1 - OUTLIER)) + shaded,
                           np.full(count, np.log(OUTLIER) - 3 * np.log(BOX))])  # [3, N]
         peak = terms.max(0)
         shares = np.exp(terms - peak)
         total = shares.sum(0)
         lit, inlier = shares[0] / np.maximum(shares[0] + shares[1], 1e-30), 1 - shares[2] / total
-    return float(((peak + np.log(total)) * weights).sum()), environment, sun, lit, inlier, (lit, inlier)
+        spread = np.average(lit * (in_sun**2).mean(1) + (1 - lit) * (in_shade**2).mean(1), weights=inlier * weights + 1e-9)
+    return float(((peak + np.log(total)) * weights).sum()), environment, sun, lit, inlier, (lit, inlier, spread)
 
 
-def _weighted_fit(transfer, cosine, values, lit, weights, has_sun) -> tuple[np.ndarray, float]:
-    """Relative least squares of values [N] ~ transfer @ e + lit * cosine * sun, each point once as sunlit and once as shaded; ridge on the higher bands."""
+def _weighted_fit(transfer, cosine, values, lit, weights, has_sun, spread) -> tuple[np.ndarray, float]:
+    """Relative least squares of values [N] ~ transfer @ e + lit * cosine * sun, each point once as sunlit and once as shaded.
+
+    The higher bands have a prior (a ridge) whose weight grows with the `spread` of the skin about its tone, a variance in log units: freckled,
+    flushed or bearded skin must not be told as light.
+    """
     relative = 1 / np.maximum(values, 0.1)
     a_lit = np.concatenate([transfer, cosine[:, None]], 1) * relative[:, None]
     a_shade = np.concatenate([transfer, np.zeros((len(values), 1))], 1) * relative[:, None]
@@ -162,7 +173,7 @@ def _weighted_fit(transfer, cosine, values, lit, weights, has_sun) -> tuple[np.n
     w1, w0 = weights * lit, weights * (1 - lit)
     normal = a_lit.T @ (a_lit * w1[:, None]) + a_shade.T @ (a_shade * w0[:, None])
     right = a_lit.T @ (target * w1) + a_shade.T @ (target * w0)
-    ridge = np.diag([0.0, *[2e-4] * 3, *[5e-4] * 5, 0.0]) * weights.sum()
+    ridge = np.diag([0.0, *[RIDGE] * 3, *[4 * RIDGE] * 5, 0.0]) * weights.sum() * spread
     if not has_sun:
         ridge[9, 9] = 1.0
     solution = np.linalg.solve(normal + ridge + 1e-9 * np.eye(10), right)
