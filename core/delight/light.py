@@ -20,7 +20,7 @@ SIGMA_LUMINANCE = 0.2  # spread of skin about its tone, in log units: common to 
 SIGMA_CHROMA = 0.08  # ... and of the differences between channels
 OUTLIER = 0.05  # share of points that are neither (hair, highlights, misregistration)
 BOX = 3.0  # log units over which an outlier may lie, per channel
-RIDGE = 1.0  # skin varies in patches: a few dozen independent samples, against environments whose bands are a few tenths of their mean
+RIDGE = 0.5  # skin varies in patches: a few dozen independent samples, against environments whose bands are a few tenths of their mean
 SUN_GAIN = 0.15  # log likelihood per point that a sun must be worth, or uneven skin passes for a shadow
 FLOOR = 0.15  # the environment's shading never falls below this share of its median
 
