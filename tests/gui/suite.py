@@ -15,7 +15,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 OUT = HERE.parents[1] / "dist" / "gui"
 SIZE = (1280, 800)
-LIMIT_S = 900
+LIMIT_S = 1800
 
 
 def main() -> int:

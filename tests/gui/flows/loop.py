@@ -103,21 +103,22 @@ def paint(root: Path):
 def solve(root: Path):
     """The real worker, as a draft; its progress is seen in the panel."""
     bpy.ops.wildcap.use_python(filepath=str(CHECKOUT / ".venv"))  # a file browser otherwise
-    bpy.context.scene.wildcap.captures[0].quality = "draft"
-    bpy.context.scene.wildcap.captures[0].solve.size = 256  # minutes matter here, detail does not
-    bpy.context.scene.wildcap.captures[0].upscale.size = 1024
+    settings = bpy.context.scene.wildcap.captures[0]
+    settings.quality = "draft"
+    settings.solve.size, settings.solve.steps, settings.solve.checkpoint_every = 128, 12, 3  # minutes matter here, detail does not
+    settings.upscale.size = 1024
     yield 1.5
     yield from d.press("wildcap.solve")
     jobs = sys.modules["bl_ext.user_default.wildcap.wildcap_addon.jobs"]
     problems = sys.modules["bl_ext.user_default.wildcap.wildcap_addon.problems"]
     assert jobs.of(str(root)) is not None, problems.of(str(root))
     started = time.monotonic()
-    yield from d.until(lambda: jobs.of(str(root)) is None or jobs.of(str(root)).previews > 0, "the first preview", 300)
+    yield from d.until(lambda: jobs.of(str(root)) is None or jobs.of(str(root)).previews > 0, "the first preview", 600)
     assert jobs.of(str(root)) is not None, str(problems.of(str(root)))
     assert 0 < jobs.of(str(root)).progress.done < jobs.of(str(root)).progress.of
     yield 1.5
     d.screenshot("6_solve_running")
-    yield from d.until(lambda: jobs.of(str(root)) is None, "the solver's end", 600)
+    yield from d.until(lambda: jobs.of(str(root)) is None, "the solver's end", 900)
     assert problems.of(str(root)) is None, str(problems.of(str(root)))
     assert (root / "maps" / "diffuse_albedo.png").is_file()
     d.say(f"Solved after {time.monotonic() - started:.0f} s")
@@ -194,4 +195,4 @@ def texel_under(position) -> tuple[int, int]:
     return int((1 - uv.y) * height), int(uv.x * width)
 
 
-d.play(flow(), limit_s=840)
+d.play(flow(), limit_s=1700)
