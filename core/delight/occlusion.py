@@ -20,11 +20,12 @@ ZONE_PX = 0.008  # and of the zone about it that must be no darker or lighter th
 FINE_PX = 0.0025  # skin's detail below this scale is kept even there
 
 
-def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free: np.ndarray, head: np.ndarray, side: int) -> np.ndarray:
+def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free: np.ndarray, skin: np.ndarray, head: np.ndarray,
+              side: int) -> np.ndarray:
     """[H, W] in [0, 1]: how much of the sun each pixel gets. `side`: the longer side in pixels of the frame this is a part of.
 
     linear, ambient, direct [H, W, 3]: the frame, the skin's colour under the sky, and what the sun would add; free [H, W]: 1 where
-    the head itself leaves the sun visible; head bool [H, W].
+    the head itself leaves the sun visible; skin [H, W]: 0 on lips, brows and eyes, whose darkness is their own; head bool [H, W].
     """
     log = np.log(np.maximum(linear, 1e-3)).astype(np.float32)
     shaded = np.log(np.maximum(ambient, 1e-4)).astype(np.float32)
@@ -33,7 +34,7 @@ def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free:
     albedo = np.zeros_like(log)
     share = np.full(head.shape, 0.5, np.float32)
     for _ in range(6):
-        evidence = np.clip(log_likelihood(log - sunlit - albedo) - log_likelihood(log - shaded - albedo), -12, 12) + prior
+        evidence = skin * np.clip(log_likelihood(log - sunlit - albedo) - log_likelihood(log - shaded - albedo), -12, 12) + prior
         for _ in range(4):
             around = _mean_over(share, head, 0.004 * side)
             share = (1 / (1 + np.exp(-np.clip(evidence + COHERENCE * (2 * around - 1), -30, 30)))).astype(np.float32)
