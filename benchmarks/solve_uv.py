@@ -57,7 +57,7 @@ def _solve_one(capture: Capture, seed: int, options: argparse.Namespace):
     images.write_data(capture.texture_confidence, np.ones((size, size), np.float32))
     images.write_data(capture.shadow_mask_auto, mask)
     meshes.write_obj(capture.head, template.load())
-    settings = from_json({"solve": {"size": size, "steps": options.steps, "guidance": options.guidance,
+    settings = from_json({"delight": {"delighter": "none"}, "solve": {"size": size, "steps": options.steps, "guidance": options.guidance,
                                     "skin_tone": "auto" if options.auto_tone else ",".join(f"{v:.5f}" for v in tone)}})
     began = time.monotonic()
     solve.run(capture, settings, Reporter("solve"))

@@ -71,7 +71,8 @@ def reference(prior: Prior, tone: torch.Tensor, skin: torch.Tensor) -> torch.Ten
     return out
 
 
-def first_lights(texture: torch.Tensor, albedo: torch.Tensor, normal: torch.Tensor, weight: torch.Tensor, cells: tuple[int, int], one_chroma: bool) -> Lights:
+def first_lights(texture: torch.Tensor, albedo: torch.Tensor, normal: torch.Tensor, weight: torch.Tensor, cells: tuple[int, int],
+                 one_chroma: bool, even: float) -> Lights:
     """theta to start with: gamma^g fitted to the reference outside the shadow (closed form, around the constant light), V zero.
 
     texture, albedo, normal [3, H, W]; weight [H, W], zero inside M. `one_chroma` ties all local light to the global light's colour at first.
@@ -80,5 +81,5 @@ def first_lights(texture: torch.Tensor, albedo: torch.Tensor, normal: torch.Tens
     constant = constant_light(shade)
     basis = sh_basis(normal)
     rest = texture - albedo * torch.einsum("ck,khw->chw", constant, basis)
-    glob = constant + fit_global(rest, albedo, basis, weight, ridge=0.02)
+    glob = constant + fit_global(rest, albedo, basis, weight, ridge=max(even, 0.02))
     return Lights(glob, torch.zeros(1 if one_chroma else 3, 9, *cells), (shade / shade.mean()).clone())

@@ -15,9 +15,10 @@ import torch
 from torch.nn import functional
 
 from ..messages import Problem
-from .lighting import Lights, Shader, interpolation
+from .lighting import BANDS, Lights, Shader, interpolation
 
 BETAS = 0.9, 0.999
+BAND_OF = torch.tensor([BANDS[0]] + [BANDS[1]] * 3 + [BANDS[2]] * 5)
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class Recipe:
     tv: float = 0.1
     smooth: float = 1.4  # L1 variation of s^V inside M, per texel of a 1024 map and mean squared albedo: a brow is not worth its outline, a shadow is
     neg: float = 1.0
+    even: float = 0.0  # pull of gamma^g towards an even light, per texel and mean squared albedo
     one_chroma: bool = True  # all local light has one learned colour; False: 27 free numbers per cell, as in the paper
     coarse: tuple[tuple[int, float], ...] = ((4, 1.0), (2, 0.3))  # (factor, sigma): above this noise the map is sampled at 1 / factor of its size
 
@@ -169,11 +171,13 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
     """L_pho + L_neg + 0.1 L_TV of theta. L_TV is the L1 variation of the shading on the ring, which makes M's border seamless."""
     shading = o.shader.total(lights)
     loss = photometric(denoised, shading, o, o.weight * o.trust)
+    brightness = (o.weight * albedo(denoised) ** 2).mean()  # L_pho is larger on light skin
+    if recipe.even:
+        loss = loss + recipe.even * brightness * o.weight.sum() * ((lights.glob * BAND_OF)[:, 1:] ** 2).sum()
     if not o.shader.empty:
         local = o.shader.local(lights)
         loss = loss + recipe.neg * (local.clamp_min(0) ** 2).sum()
         loss = loss + recipe.tv * variation(shading[(slice(None), *o.shader.box)], o.ring[o.shader.box])
-        brightness = (o.weight * albedo(denoised) ** 2).mean()  # L_pho is larger on light skin
         loss = loss + recipe.smooth * brightness / o.texel * variation(local, o.shader.box_alpha)
     return loss
 
