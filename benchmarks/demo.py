@@ -17,7 +17,7 @@ from pathlib import Path
 
 from core import report
 from core.capture import Capture, write_json
-from core.settings import QUALITIES
+from core.settings import QUALITIES, from_json, preset
 
 from .albedo_score import score_capture, score_floors
 
@@ -39,12 +39,12 @@ def main() -> int:
     if code:
         return code
     print("Rendering the head under three lights with Cycles ...", flush=True)
-    code = subprocess.call([sys.executable, "-m", "benchmarks.render_capture", str(capture.root), *LIGHTS], cwd=ROOT)
-    if code:
+    code = subprocess.call([sys.executable, "-m", "benchmarks.render_capture", str(capture.root), *LIGHTS], cwd=ROOT, stdout=subprocess.DEVNULL)
+    if code:  # Cycles fills standard output with its progress; what went wrong is on standard error
         return code
     rows = {"WildCap": score_capture(capture, SAMPLE), **score_floors(SAMPLE)}
     write_json(capture.root / "score.json", rows)
-    report.write(capture)
+    report.write(capture, from_json({"solve": {"skin_tone": tone}}, preset(arguments.quality)))  # once more, with the renders
     print(f"\n{'':16}{'PSNR':>9}{'SSIM':>8}{'FLIP':>8}{'detail':>8}{'shadow_step':>13}")
     for name, row in rows.items():
         raw = row["raw"]
