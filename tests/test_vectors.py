@@ -79,7 +79,7 @@ def test_vectors_losses():
     shade, main, ring = v["shade"][0], v["shade_main"][0], v["tv_ring_mask"][0, 0] > 0.5
 
     class Given:
-        empty, box = False, (slice(None), slice(None))
+        empty, box, box_alpha = False, (slice(None), slice(None)), torch.zeros(ring.shape)
         total = staticmethod(lambda lights: shade)
         local = staticmethod(lambda lights: shade - main)
 
