@@ -2,12 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Jobs and the solver's Python, seen from Blender. Timers do not fire in the wheel, so the tests poll."""
 
+import os
 import sys
 import time
 import venv
 from pathlib import Path
 
 import pytest
+
+from . import standin
 
 bpy = pytest.importorskip("bpy")
 
@@ -105,3 +108,16 @@ def test_the_solver_goes_to_the_extensions_user_folder_and_only_environments_are
         bpy.ops.wildcap.remove_solver()
     preferences.get().environment = ""
     assert (mine / "novel.txt").is_file()
+
+
+def test_the_preview_is_read_again_when_it_is_newer(addon, tmp_path):
+    preview = addon("solve.preview")
+    picture = tmp_path / "albedo.png"
+    seen = []
+    for number, colour in enumerate([(255, 0, 0), (0, 255, 0), (0, 0, 255)]):
+        picture.write_bytes(standin.plain(colour))
+        os.utime(picture, (1e9 + number, 1e9 + number))  # Blender tells thumbnails apart by whole seconds
+        seen.append((preview.icon(picture), tuple(round(c) for c in preview._icons[str(picture)].image_pixels_float[:3])))
+    preview.forget()
+    assert len({icon for icon, _ in seen}) == 1
+    assert [colour for _, colour in seen] == [(1, 0, 0), (0, 1, 0), (0, 0, 1)]

@@ -64,12 +64,13 @@ def look(capture: Capture, settings) -> Status:
     except OSError as error:
         return Status(problem=Problem(f"The capture folder {capture.root} cannot be read ({error.strerror or error}).",
                                       "Check the disk, or open the capture from where it is now."))
+    maps_time = max(map(_time, delivered(capture)))
+    render = max(capture.renders.glob("[!.]*.png"), key=_time, default=Path())
     return Status(
         source=record.get("source", ""), stages=states,
         seconds={name: done["seconds"] for name, done in record["stages"].items()},
         has_head=capture.head.is_file(), head_time=_time(capture.head), has_mask=capture.shadow_mask.is_file(),
-        has_maps=all(path.is_file() for path in delivered(capture)), maps_time=max(map(_time, delivered(capture))),
-        render=max((p for p in capture.renders.glob("*.png")), key=_time, default=Path()).name,
+        has_maps=all(path.is_file() for path in delivered(capture)), maps_time=maps_time, render=render.name if _time(render) >= maps_time else "",
     )
 
 

@@ -63,7 +63,8 @@ def run(flow: Path, archive: Path, display: str) -> tuple[bool, float]:
             except subprocess.TimeoutExpired:
                 code = -1
         text = log.read_text(encoding="utf-8", errors="replace")
-        if code or "FLOW PASSED" not in text:  # a Blender that never opened its window must not count as passed
+        # A Blender that never opened its window must not count as passed, nor one whose panels failed to draw.
+        if code or "FLOW PASSED" not in text or "Traceback" in text:
             print(text[-6000:])
             return False, time.monotonic() - started
         print("\n".join(line for line in text.splitlines() if line.startswith("| ")))

@@ -31,7 +31,8 @@ def icon(path) -> int:
         _icons = bpy.utils.previews.new()
     key, time = str(path), path.stat().st_mtime_ns
     if _loaded.get(key) != time:
-        _icons.load(key, key, 'IMAGE', force_reload=key in _icons)
+        _icons.pop(key, None)  # or load refuses; the icon keeps its number
+        _icons.load(key, key, 'IMAGE', force_reload=True)
         _loaded[key] = time
     return _icons[key].icon_id
 

@@ -48,7 +48,8 @@ def open_sample_head():
 
 def paint(root: Path):
     """From a capture that is finished up to its mask: strokes in 3D and on the sheet arrive in shadow_mask.png where they were painted."""
-    shutil.rmtree(root / "maps")
+    for folder in ("maps", "renders"):
+        shutil.rmtree(root / folder, ignore_errors=True)
     brushes = {b.name for b in bpy.data.brushes}
     shading = d.view().spaces.active.shading.type, d.view().spaces.active.shading.light, d.view().spaces.active.shading.color_type
     yield 1.5
