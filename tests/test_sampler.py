@@ -48,7 +48,8 @@ def observation(texture, alpha=None, cells=(4, 4), weight=None):
     normal = torch.nn.functional.normalize(torch.stack([x, -torch.ones_like(x), -y]), dim=0)
     ring = (torch.nn.functional.max_pool2d((alpha > 0).float()[None, None], 5, 1, 2)[0, 0] > 0) & (alpha < 0.5)
     weight = torch.ones(size, size) if weight is None else weight
-    return Observation(texture, weight, torch.ones(size, size), coordinates(size, slice(0, size), slice(0, size)), Shader(normal, alpha, cells), ring, 1024 / size)
+    coords = coordinates(size, slice(0, size), slice(0, size))
+    return Observation(texture, weight, torch.ones(size, size), coords, Shader(normal, alpha, cells), ring, 1024 / size)
 
 
 def start(value=0.0, size=SIZE, light=1.0, cells=(4, 4)):
