@@ -14,7 +14,7 @@ test: .venv/installed
 	$(BIN)/python -m pytest tests --ignore=tests/gui
 
 test-gui: .venv/installed zip
-	tests/gui/run.sh
+	$(BIN)/python -m pytest tests/gui -s
 
 # Blender's own extension tool, from the bpy wheel.
 zip: .venv/installed
