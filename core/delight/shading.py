@@ -35,12 +35,12 @@ def shading(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
     normals = smooth_normals(mesh)
     colours, count = vertex_colours(mesh, normals, caster, views, report)
     transfer = radiance_transfer(caster, mesh.vertices, normals, step=lambda done, of: report.progress(of + done, 4 * of, "Casting rays at the sky"))
-    skin = skin_weights(mesh)
+    skin, not_brows = skin_weights(mesh)
     light, reached = _fit(mesh, normals, transfer, caster, colours, skin * (count >= min(2, len(views))), report)
     scale = _best_lit(light, normals, transfer, reached, count)
     for i, view in enumerate(views):
         report.progress(2 * len(views) + 2 * i, 4 * len(views), f"Delighting frame {i + 1} of {len(views)}")
-        yield _delight(view, mesh, normals, transfer, skin, caster, light, scale)
+        yield _delight(view, mesh, normals, transfer, not_brows, caster, light, scale)
 
 
 def _fit(mesh, normals, transfer, caster, colours, weights, report) -> tuple[Light, np.ndarray]:
@@ -76,19 +76,19 @@ def _best_lit(light, normals, transfer, reached, count) -> np.ndarray:
     return tone * min(1.0, BRIGHTEST / tone.max())
 
 
-def _delight(view: View, mesh, normals, transfer, skin, caster: RayCaster, light: Light, scale: np.ndarray) -> Delit:
+def _delight(view: View, mesh, normals, transfer, not_brows, caster: RayCaster, light: Light, scale: np.ndarray) -> Delit:
     srgb = images.read_srgb(view.path)
     face, bary, _ = render_view(caster, view)
     shadow = np.zeros(face.shape, np.float32)
     if (face >= 0).any():
         box = _box(face >= 0)  # the rest of the frame is never looked at
-        lit, share = _light_seen(images.srgb_to_linear(srgb[box]), mesh, normals, transfer, skin, caster, light, face[box], bary[box], max(face.shape))
+        lit, share = _light_seen(images.srgb_to_linear(srgb[box]), mesh, normals, transfer, not_brows, caster, light, face[box], bary[box], max(face.shape))
         srgb[box] = images.linear_to_srgb(images.srgb_to_linear(srgb[box]) / lit * scale)
         shadow[box] = (1 - share) * (face[box] >= 0)
     return Delit(view, srgb, shadow if light.has_sun else None)
 
 
-def _light_seen(linear, mesh, normals, transfer, skin, caster, light, face, bary, side) -> tuple[np.ndarray, np.ndarray]:
+def _light_seen(linear, mesh, normals, transfer, not_brows, caster, light, face, bary, side) -> tuple[np.ndarray, np.ndarray]:
     """The skin's expected linear colour [h, w, 3], carried on past the head's edge, and the share of the sun [h, w]."""
     head = face >= 0
     normal = interpolate(normals, mesh.faces, face, bary)
@@ -101,7 +101,7 @@ def _light_seen(linear, mesh, normals, transfer, skin, caster, light, face, bary
         facing = head & (normal @ light.sun > 0)
         position = interpolate(mesh.vertices, mesh.faces, face, bary)[facing] + 1e-3 * normal[facing]
         free[facing] = ~caster.blocked(position, np.repeat(light.sun[None], len(position), 0))
-        share = sun_share(linear, ambient, direct, free, interpolate(skin[:, None], mesh.faces, face, bary)[..., 0], head, side)
+        share = sun_share(linear, ambient, direct, free, interpolate(not_brows[:, None], mesh.faces, face, bary)[..., 0], head, side)
     lit = np.maximum(bleed((ambient + share[..., None] * direct).astype(np.float32), head), 1e-4)
     if light.has_sun:
         lit = lit * np.exp(seamless(np.log(np.maximum(linear, 1e-3) / lit), share, head, side))

@@ -55,13 +55,14 @@ def vertex_colours(mesh: Mesh, normals: np.ndarray, caster: RayCaster, views: li
     return colours, count
 
 
-def skin_weights(mesh: Mesh) -> np.ndarray:
-    """[V]: 1 on skin, 0 on lips, brows and eyes, where the mesh has the template's topology; else 1 everywhere."""
+def skin_weights(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """([V], [V]): 1 on plain facial skin, 0 on lips, brows, eyes and off the face; and 0 on the brows, 1 elsewhere. All 1 on a mesh of another topology."""
     if mesh.uvs is None or mesh.faces.shape != template.load().faces.shape:
-        return np.ones(len(mesh.vertices))
+        return np.ones(len(mesh.vertices)), np.ones(len(mesh.vertices))
     skin = template.mask("skin", 512)
     for name in NOT_SKIN:
         skin = skin * (1 - template.mask(name, 512))
     uv = np.zeros((len(mesh.vertices), 2))
     uv[mesh.faces] = mesh.uvs[mesh.face_uvs]
-    return sample(skin, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512)
+    texels = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512
+    return sample(skin, texels), sample(1 - template.mask("brows", 512), texels)
