@@ -27,9 +27,9 @@ FACE_CROP = 768
 """Texels at 1024 over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels."""
 
 
-DELIT_EVEN = 0.1
-"""After a delighter little smooth light is left, and the global light would rather explain how this face differs from the mean one: on a texture
-without any light, 0, 0.02, 0.1 and 0.5 leave an albedo of 26.1, 28.4, 31.2 and 32.7 dB; on raw light every pull costs."""
+DELIT = {"even": 0.4, "faint": 2.0}
+"""After a delighter little light is left, global or local, and the lights would rather explain how this face (its beard, its cheeks) differs from the
+mean one. On a texture without any light `even` of 0, 0.02, 0.1 and 0.5 leaves an albedo of 26.1, 28.4, 31.2 and 32.7 dB; on raw light every pull costs."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
@@ -52,7 +52,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     reference = initial.reference(prior, tone, evidence.skin)
     exposure = float(initial.mean_tone(albedo(reference), lit).mean() / initial.mean_tone(evidence.texture, lit).mean().clamp_min(1e-6))
 
-    recipe = Recipe(steps=options.steps, guidance=options.guidance, even=0.0 if settings.delight.delighter == "none" else DELIT_EVEN)
+    recipe = Recipe(steps=options.steps, guidance=options.guidance, **({} if settings.delight.delighter == "none" else DELIT))
     seen = observations(evidence, exposure, FACE_CROP / options.grid_cells, prior.multiple)
     state = _first_state(evidence, reference, exposure, seen[1].shader, recipe)
     stored, key = capture.checkpoints / "solve.safetensors", _key(evidence, settings, tone)

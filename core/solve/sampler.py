@@ -41,6 +41,7 @@ class Recipe:
     smooth: float = 1.4  # L1 variation of s^V inside M, per texel of a 1024 map and mean squared albedo: a brow is not worth its outline, a shadow is
     neg: float = 1.0
     even: float = 0.0  # pull of gamma^g towards an even light, per texel and mean squared albedo
+    faint: float = 0.0  # pull of s^V towards zero, likewise
     one_chroma: bool = True  # all local light has one learned colour; False: 27 free numbers per cell, as in the paper
     coarse: tuple[tuple[int, float], ...] = ((4, 1.0), (2, 0.3))  # (factor, sigma): above this noise the map is sampled at 1 / factor of its size
 
@@ -178,6 +179,7 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
         local = o.shader.local(lights)
         loss = loss + recipe.neg * (local.clamp_min(0) ** 2).sum()
         loss = loss + recipe.tv * variation(shading[(slice(None), *o.shader.box)], o.ring[o.shader.box])
+        loss = loss + recipe.faint * brightness * (local**2).sum()
         loss = loss + recipe.smooth * brightness / o.texel * variation(local, o.shader.box_alpha)
     return loss
 
