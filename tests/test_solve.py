@@ -16,6 +16,7 @@ from core.solve import initial
 from core.solve.evidence import softened
 from core.solve.prior import WEIGHTS, load
 from core.stages import MAPS
+from core.synthetic.identities import reserved_seeds
 
 SIZE = 128
 TONE = np.array([0.42, 0.26, 0.18], np.float32)  # linear
@@ -144,8 +145,6 @@ def test_a_hard_mask_gets_a_soft_border():
 def test_the_card_names_its_seeds_and_they_are_not_the_sample_subjects():
     card = json.loads(WEIGHTS.with_suffix(".json").read_text(encoding="utf-8"))
     assert card["seeds"] and card["held_out_seeds"] and not set(card["seeds"]) & set(card["held_out_seeds"])
-    from core.synthetic import parameters
-
-    reserved = set(getattr(parameters, "RESERVED_SEEDS", ()))
-    assert not reserved & set(card["seeds"] + card["held_out_seeds"])
+    reserved = reserved_seeds()
+    assert reserved and not reserved & set(card["seeds"] + card["held_out_seeds"])
     assert WEIGHTS.stat().st_size < 15e6
