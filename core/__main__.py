@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import signal
 import sys
 from pathlib import Path
 
@@ -76,6 +77,8 @@ def _run(options: argparse.Namespace) -> int:
     delight = {"delighter": options.delighter} if options.delighter else {}
     if options.folder:
         delight["folder"] = str(options.folder.absolute())
+    # A shell that starts a job in the background has it ignore Ctrl-C's signal; here the signal means cancel, whoever sends it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     values = {"seed": options.seed, "device": options.device, "delight": delight}
     if options.skin_tone:
         values["solve"] = {"skin_tone": options.skin_tone}
