@@ -23,7 +23,8 @@ def keep(capture: Capture, mask: Path) -> Path | None:
     """
     if not mask.is_file():
         return None
-    stamp = f"{time.strftime('%Y%m%d_%H%M%S')}_{time.time_ns() // 1_000_000 % 1000:03d}"
+    seconds, milliseconds = divmod(time.time_ns() // 1_000_000, 1000)  # read once: two readings may fall on both sides of a second
+    stamp = f"{time.strftime('%Y%m%d_%H%M%S', time.localtime(seconds))}_{milliseconds:03d}"
     copy = capture.mask_history / f"{mask.stem}_{stamp}{mask.suffix}"
     with replacing(copy) as temporary:
         shutil.copyfile(mask, temporary)

@@ -48,15 +48,17 @@ def _extract(job: dict) -> None:
         options.sift.max_num_features = 8000
     total = sum(len(group["names"]) for group in job["groups"])
     done = 0
+    pycolmap.Database.open(job["database"]).close()  # makes the file
     for camera_id, group in enumerate(job["groups"], 1):
+        reader = pycolmap.ImageReaderOptions()
+        reader.camera_model = "SIMPLE_RADIAL"
+        reader.default_focal_length_factor = 1.0  # between a phone's wide (0.8) and its portrait lens (1.4)
+        if group["focal_px"]:
+            reader.camera_params = f"{group['focal_px']},{group['width'] / 2},{group['height'] / 2},0"
+        # Entered in order: extraction would number the pictures as its threads finish, and the mapper's path depends on the numbers.
+        pycolmap.import_images(job["database"], job["images"], pycolmap.CameraMode.SINGLE, group["names"], reader)
+        reader.existing_camera_id = camera_id
         for start in range(0, len(group["names"]), CHUNK):
-            reader = pycolmap.ImageReaderOptions()
-            reader.camera_model = "SIMPLE_RADIAL"
-            reader.default_focal_length_factor = 1.0  # between a phone's wide (0.8) and its portrait lens (1.4)
-            if start:
-                reader.existing_camera_id = camera_id
-            elif group["focal_px"]:
-                reader.camera_params = f"{group['focal_px']},{group['width'] / 2},{group['height'] / 2},0"
             names = group["names"][start:start + CHUNK]
             _aside(pycolmap.extract_features, job["database"], job["images"], names, pycolmap.CameraMode.SINGLE, reader, options, pycolmap.Device.cpu)
             done += len(names)
