@@ -29,7 +29,7 @@ FACE_CROP = 768
 
 DELIT = {"even": 0.4, "faint": 2.0}
 """After a delighter little light is left, global or local, and the lights would rather explain how this face (its beard, its cheeks) differs from the
-mean one. On a texture without any light `even` of 0, 0.02, 0.1 and 0.5 leaves an albedo of 26.1, 28.4, 31.2 and 32.7 dB; on raw light every pull costs."""
+mean one; on raw light every pull costs. Chosen on one head scan, so to be confirmed on others (docs/results.md)."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
