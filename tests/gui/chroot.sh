@@ -17,7 +17,10 @@ fi
 # The Debian mirror that this machine's apt uses, so that a site's own mirror is honoured.
 mirror=$(cat /etc/apt/sources.list /etc/apt/sources.list.d/*.sources /etc/apt/sources.list.d/*.list 2>/dev/null |
     grep -oE '(https?|mirror\+file)://[^ ]+/debian/?( |$)' | head -n 1 | tr -d ' ' || true)
-mirror=${mirror:-http://deb.debian.org/debian}
+if [ -z "$mirror" ]; then
+    echo "No Debian mirror is named in this machine's apt sources: run this on Debian, or add one there." >&2
+    exit 1
+fi
 
 if ! command -v mmdebstrap > /dev/null; then
     apt-get update -qq >&2
