@@ -6,6 +6,7 @@ A flow is a generator that yields seconds to wait: between two events Blender mu
 application timer runs the generator. Positions are window pixels from the lower left.
 """
 
+import ctypes
 import os
 import subprocess
 import sys
@@ -22,6 +23,7 @@ STARTED = time.monotonic()
 
 def play(flow, limit_s: float = 600) -> None:
     """Runs the generator to its end and leaves Blender: exit code 0 and FLOW PASSED, or 1, a traceback and a screenshot."""
+    survive_lost_contexts()
     bpy.context.preferences.view.show_splash = False
     bpy.context.preferences.use_preferences_save = False
 
@@ -39,6 +41,19 @@ def play(flow, limit_s: float = 600) -> None:
             leave(1)
 
     bpy.app.timers.register(step, first_interval=1.0, persistent=True)
+
+
+def survive_lost_contexts() -> None:
+    """Lets an X error pass instead of ending Blender, as Xlib does by default.
+
+    While Cycles shows a render in a window, its thread and the main one change OpenGL contexts at once, and with Mesa's software
+    renderer the X server now and then answers GLXBadContext: a race of theirs, seen in one render of three on some machines.
+    The handler is a C function that takes no notice of its arguments: one in Python would need the interpreter's lock.
+    """
+    passing = ctypes.cast(ctypes.CDLL(None).sched_yield, ctypes.c_void_p)
+    xlib = ctypes.CDLL("libX11.so.6")
+    xlib.XSetErrorHandler.argtypes, xlib.XSetErrorHandler.restype = [ctypes.c_void_p], ctypes.c_void_p
+    xlib.XSetErrorHandler(passing)
 
 
 def leave(code: int) -> None:
