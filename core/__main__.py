@@ -14,7 +14,7 @@ import signal
 import sys
 from pathlib import Path
 
-from . import __version__, settings, stages
+from . import __version__, report, settings, stages
 from .capture import Capture
 from .messages import Problem
 from .worker import terminal
@@ -110,6 +110,8 @@ def _status(options: argparse.Namespace) -> int:
         print(f"{stage.name:13} {capture.state(stage, chosen):6}" + (f" {finished['seconds']:8.1f} s  {finished['finished']}" if finished else ""))
     if capture.shadow_mask.is_file():
         print("shadow mask   painted")
+    for finding in report.findings(record):
+        print(f"{'stopped' if finding['stopped'] else 'finding':13} {finding['problem']} {finding['remedy']}")
     return 0
 
 

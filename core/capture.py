@@ -151,21 +151,30 @@ class Capture:
         first = next(stage.name for stage in stages.STAGES if not stage.reads)
         return first not in record["stages"] or _source_stamp(str(source)) in ([], record.get("source_stamp"))
 
-    def finish(self, stage: stages.Stage, key: str, seconds: float, settings: Settings, figures: dict, version: str) -> None:
-        """Records that a stage ended well; `key` is what `stage_key` gave before it began."""
+    def finish(self, stage: stages.Stage, key: str, seconds: float, settings: Settings, figures: dict, version: str,
+               findings: Collection[dict] = ()) -> None:
+        """Records that a stage ended well; `key` is what `stage_key` gave before it began, `findings` are the Reporter's."""
         record = self.read()
         record["stages"][stage.name] = {
             "key": key, "seconds": round(seconds, 2), "finished": time.strftime("%Y-%m-%dT%H:%M:%S"), "version": version,
             "settings": asdict(getattr(settings, stage.name)), "seed": settings.seed, "device": settings.device, "figures": figures,
+            "findings": list(findings),
         }
         write_json(self.json, record)
+
+    def stop(self, stage: str, problem: Problem, findings: Collection[dict] = ()) -> None:
+        """Records why a stage could not end, for the report; gone as soon as that stage is begun again."""
+        record = self.read()
+        write_json(self.json, {**record, "stopped": {"stage": stage, "problem": problem.problem, "remedy": problem.remedy, "findings": list(findings)}})
 
     def forget(self, names: Collection[str]) -> None:
         """Marks stages as not done; their files stay until they are written again."""
         record = self.read()
-        kept = {name: finished for name, finished in record["stages"].items() if name not in names}
-        if kept != record["stages"]:
-            write_json(self.json, {**record, "stages": kept})
+        kept = {**record, "stages": {name: finished for name, finished in record["stages"].items() if name not in names}}
+        if kept.get("stopped", {}).get("stage") in names:
+            del kept["stopped"]
+        if kept != record:
+            write_json(self.json, kept)
 
     # -- freshness
 

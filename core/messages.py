@@ -8,7 +8,7 @@ Ground floor: standard library only. A job ends with exactly one of Done, Cancel
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import asdict, dataclass
 
 
@@ -119,6 +119,7 @@ class Reporter:
 
         self.stage = stage
         self.figures: dict = {}
+        self.findings: list[dict] = []
         self._emit = emit
         self._cancelled = cancelled
         self._clock = clock or time.monotonic
@@ -148,3 +149,11 @@ class Reporter:
     def figure(self, name: str, value) -> None:
         """A quality figure (JSON value) for capture.json and the report; a name of lower_case words with its unit last."""
         self.figures[name] = value
+
+    def finding(self, problem: str, remedy: str, frames: Collection[str] = ()) -> None:
+        """What is wrong with this capture though it can be used, how to shoot it better (both whole sentences), and the frames it is seen in.
+
+        Kept in capture.json, listed at the top of the report, and logged.
+        """
+        self.findings.append({"problem": problem, "remedy": remedy, "frames": list(frames)})
+        self.log(f"{problem} {remedy}")

@@ -25,9 +25,43 @@ def write(capture: Capture, settings: Settings) -> None:
     sections = "\n".join(_section(capture, stage, record["stages"].get(stage.name), settings) for stage in stages.STAGES)
     renders = _pictures(sorted(p for p in capture.renders.glob("*") if p.suffix.lower() in (".jpg", ".jpeg", ".png")), "Render")
     page = PAGE.format(title=html.escape(capture.root.stem), source=html.escape(record.get("source", "")), summary=_summary(record), style=STYLE,
-                       sections=sections, renders=f"<section><h2>Renders</h2>{renders}</section>" if renders else "", version=__version__)
+                       doctor=_doctor(record), sections=sections,
+                       renders=f"<section><h2>Renders</h2>{renders}</section>" if renders else "", version=__version__)
     with replacing(capture.report) as temporary:
         temporary.write_text(page, encoding="utf-8")
+
+
+def findings(record: dict) -> list[dict]:
+    """What capture.json says is wrong with a capture, worst first: [{"stage", "problem", "remedy", "frames"}].
+
+    First the problem that stopped the chain, if any, then what the stages found, in their order.
+    """
+    stopped = record.get("stopped")
+    found = [{"stage": stopped["stage"], "problem": stopped["problem"], "remedy": stopped["remedy"], "frames": [], "stopped": True}] if stopped else []
+    for name in stages.NAMES:
+        here = record["stages"].get(name, {}).get("findings", []) + (stopped["findings"] if stopped and stopped["stage"] == name else [])
+        found += [{"stage": name, **finding, "stopped": False} for finding in here]
+    return found
+
+
+def _doctor(record: dict) -> str:
+    """The section on what is wrong with the video and how to shoot it again."""
+    found = findings(record)
+    if not found:
+        return ""
+    return f'<section id="doctor"><h2>What is wrong with this capture</h2><ul>{"".join(map(_finding, found))}</ul></section>'
+
+
+def _finding(finding: dict) -> str:
+    stage = html.escape(stages.by_name(finding["stage"]).label)
+    frames = _ranges([Path(name).stem for name in finding["frames"]])
+    return (f'<li{" class=stopped" if finding["stopped"] else ""}>{html.escape(finding["problem"])} <b>{html.escape(finding["remedy"])}</b> '
+            f'<small>{"Stopped at: " if finding["stopped"] else ""}{stage}{f"; frames {html.escape(frames)}" if frames else ""}</small></li>')
+
+
+def _ranges(names: list[str], most: int = 12) -> str:
+    """A short list of names: the first `most`, and how many more there are."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def _summary(record: dict) -> str:
@@ -101,6 +135,7 @@ figure { display: inline-block; margin: .7rem .8rem 0 0; max-width: 100%; vertic
 img { max-width: 100%; max-height: 34rem; border-radius: 4px; display: block; }
 table { border-collapse: collapse; font-size: .92rem; }
 th { font-weight: 400; text-align: left; padding: .18rem 1.6rem .18rem 0; color: var(--faint); vertical-align: top; }
+#doctor li { margin: .5rem 0; } #doctor li.stopped { color: var(--stale); } #doctor b { font-weight: 500; display: block; }
 td { font-variant-numeric: tabular-nums; padding: .18rem 0; }
 """
 
@@ -108,6 +143,7 @@ PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1"><title>{title} - WildCap</title>
 <style>{style}</style></head>
 <body><header><h1>{title}</h1><p>{source}</p><p>{summary}</p></header>
+{doctor}
 {sections}
 {renders}
 <footer><p>WildCap for Blender {version}</p></footer></body></html>

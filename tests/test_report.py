@@ -9,6 +9,7 @@ import pytest
 
 from core import images, report, stages
 from core.capture import Capture
+from core.messages import Problem, Reporter
 from core.settings import Settings, from_json
 
 
@@ -80,3 +81,23 @@ def test_a_capture_without_anything_has_a_page_too(tmp_path):
     capture = Capture(tmp_path / "new.wildcap")
     report.write(capture, Settings())
     assert "0 of 9 stages finished" in capture.report.read_text(encoding="utf-8")
+
+
+def test_findings_of_all_stages_and_what_stopped_it_come_first(capture):
+    assert 'id="doctor"' not in _page_text(capture)
+    reporter = Reporter("scan")
+    reporter.finding("The light <changed>.", "Lock the exposure.", [f"{i:05d}.jpg" for i in range(14)])
+    scan = stages.by_name("scan")
+    capture.finish(scan, "key", 1.0, Settings(), {}, "0.1.0", reporter.findings)
+    capture.stop("cameras", Problem("The frames do not fit together.", "Film again."), [{"problem": "Too few.", "remedy": "Take more.", "frames": []}])
+    assert [f["problem"] for f in report.findings(capture.read())] == ["The frames do not fit together.", "Too few.", "The light <changed>."]
+    text = _page_text(capture)
+    assert "The light &lt;changed&gt;." in text and "00011 and 2 more" in text and text.index('id="doctor"') < text.index('id="frames"')
+    Page(text)
+    capture.forget(["cameras"])
+    assert [f["problem"] for f in report.findings(capture.read())] == ["The light <changed>."], "begun again"
+
+
+def _page_text(capture) -> str:
+    report.write(capture, Settings())
+    return capture.report.read_text(encoding="utf-8")

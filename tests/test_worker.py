@@ -19,6 +19,7 @@ import pytest
 from core import stages
 from core.capture import Capture
 from core.messages import Cancelled, Done, Failed, Log, Problem, Progress, StageDone
+from core.report import findings
 from core.worker.client import GRACE_S, Worker
 
 from . import tiny_chain
@@ -122,6 +123,7 @@ def test_the_worker_ends_when_its_starter_is_gone(root, capture, video):
 
 
 @pytest.mark.parametrize(("mood", "problem"), [
+    ("finding", "The face is not there."),
     ("bug", "An error inside WildCap stopped the stage scan (ZeroDivisionError: division by zero)."),
     ("memory", "There was not enough memory for the stage scan."),
     ("full", "The disk is full"),
@@ -133,6 +135,7 @@ def test_every_way_to_fail_is_a_problem_with_a_remedy(root, capture, video, mood
     final = follow(start(root, capture, {"scan": mood}, source=video))[-1]
     assert isinstance(final, Failed) and final.stage == "scan" and final.problem.startswith(problem)
     assert final.remedy.endswith((".", ".log")) and "Traceback" not in final.problem + final.remedy
+    assert [f["problem"] for f in findings(capture.read())] == ([final.problem] if mood == "finding" else [])
     if mood == "bug":
         log = (capture.logs / "scan.log").read_text(encoding="utf-8")
         assert "Traceback" in log and "ZeroDivisionError" in log and str(capture.logs / "scan.log") in final.remedy

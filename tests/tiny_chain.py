@@ -25,6 +25,7 @@ ROOM = '''
 import errno, hashlib, json, os, sys, time
 from .. import stages
 from ..capture import replacing, replacing_folder
+from ..messages import Problem
 
 def run(capture, settings, report):
     stage = stages.by_name(__name__.rsplit(".", 1)[1])
@@ -39,6 +40,8 @@ def run(capture, settings, report):
         time.sleep(0.005)
     if mood == "print":
         print("a library talks"); os.write(1, b"{raw bytes\\n"); sys.stdout.flush()
+    if mood == "finding":
+        raise Problem("The face is not there.", "Film it.")
     if mood == "bug":
         raise ZeroDivisionError("division by zero")
     if mood == "memory":

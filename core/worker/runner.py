@@ -67,11 +67,11 @@ def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled
         raise Problem(f"The stage {stage.name} needs {missing[0]}, which this capture does not have.", "Run the stages before it first.")
     emit(Progress(stage.name, 0, 1, "Starting"))
     with _log_of(capture, stage) as log:
+        reporter = Reporter(stage.name, _logging(emit, log), cancelled)
         try:
             # Outputs may be half new from here on: until the end, nobody may take them for the recorded result.
             capture.forget([stage.name])
             key = capture.stage_key(stage, settings)
-            reporter = Reporter(stage.name, _logging(emit, log), cancelled)
             started = time.monotonic()
             room = importlib.import_module("." + stage.module.split(".", 1)[1], __package__.rpartition(".")[0])
             room.run(capture, settings, reporter)
@@ -79,11 +79,15 @@ def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled
             lost = [name for name in stage.writes if not capture.has(name)]
             if lost:
                 raise RuntimeError(f"the stage {stage.name} ended without writing {lost[0]}")
-            capture.finish(stage, key, seconds, settings, reporter.figures, __version__)
+            capture.finish(stage, key, seconds, settings, reporter.figures, __version__, reporter.findings)
             report.write(capture, settings)
-        except BaseException:
+        except BaseException as error:
             with contextlib.suppress(OSError):  # the disk may be full; that is said elsewhere
                 traceback.print_exc(file=log)
+            if isinstance(error, Problem):
+                with contextlib.suppress(OSError, Problem):
+                    capture.stop(stage.name, error, reporter.findings)
+                    report.write(capture, settings)
             raise
     emit(StageDone(stage.name, round(seconds, 2), False, reporter.figures))
 
