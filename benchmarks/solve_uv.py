@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The solver alone, on UV-space problems with known truth: a held-out synthetic skin under a sky and a sun, with cast shadows.
 
-    python -m benchmarks.solve_uv [--seeds 9000 9001 9002] [--size 512] [--steps 75] [--guidance dps] [--pictures DIR]
+    python -m benchmarks.solve_uv [--seeds 9000 9001 9002] [--size 512] [--steps 75] [--guidance dps] [--recipe wildcap] [--pictures DIR]
 
 Prints PSNR (sRGB, after one gain per channel) inside the shadow, in a band of 12 texels about its border, and outside; the input beside the result.
 """
@@ -22,6 +22,7 @@ from core import images, meshes, solve, template
 from core.capture import Capture
 from core.messages import Reporter
 from core.settings import from_json
+from core.solve.recipes import RECIPES
 from core.synthetic.light import uv_problem
 
 
@@ -32,6 +33,7 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=512)
     parser.add_argument("--steps", type=int, default=75)
     parser.add_argument("--guidance", default="dps")
+    parser.add_argument("--recipe", default="wildcap", choices=tuple(RECIPES))
     parser.add_argument("--auto-tone", action="store_true", help="do not tell the solver the true skin tone")
     parser.add_argument("--pictures", type=Path)
     options = parser.parse_args()
@@ -58,7 +60,7 @@ def _solve_one(capture: Capture, seed: int, options: argparse.Namespace):
     images.write_data(capture.shadow_mask_auto, mask)
     meshes.write_obj(capture.head, template.load())
     settings = from_json({"delight": {"delighter": "none"}, "solve": {"size": size, "steps": options.steps, "guidance": options.guidance,
-                                    "skin_tone": "auto" if options.auto_tone else ",".join(f"{v:.5f}" for v in tone)}})
+                                    "recipe": options.recipe, "skin_tone": "auto" if options.auto_tone else ",".join(f"{v:.5f}" for v in tone)}})
     began = time.monotonic()
     solve.run(capture, settings, Reporter("solve"))
     seconds = time.monotonic() - began

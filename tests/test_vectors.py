@@ -3,6 +3,7 @@
 """Parity with the authors' released modules, by input and output arrays alone. The folder is WILDCAP_VECTORS, or shared/vectors beside the checkout."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,12 @@ import pytest
 import torch
 
 from core.solve import prior
+from core.solve.light_fit import light_loss
 from core.solve.lighting import Lights, Shader, interpolation, sh_basis
 from core.solve.network import denoise
-from core.solve.sampler import Observation, Recipe, ancestral, blurred, karras, light_loss
+from core.solve.problem import Observation, State, albedo, blurred
+from core.solve.recipes import RECIPES, Recipe
+from core.solve.sampler import ancestral, karras, sample
 
 VECTORS = Path(os.environ.get("WILDCAP_VECTORS", Path(__file__).parents[2] / "shared" / "vectors"))
 pytestmark = pytest.mark.skipif(not VECTORS.is_dir(), reason=f"the parity vectors are not at {VECTORS}")
@@ -100,3 +104,40 @@ def test_vectors_released_prior(folder):
     denoised = denoise(network, x, v["sigma"], v["cond"])
     close(denoised.detach(), v["denoised"])
     close(torch.autograd.grad((denoised * v["w"]).sum(), x)[0], v["grad_x"], 2e-4)
+
+
+@pytest.mark.parametrize("run", ["pho0_prior_only", "pho1"])
+def test_vectors_miniloop(run):
+    """The whole released loop, step by step: proximal candidates, decade clip, lights in stages, and the traces of x, denoised and both lights."""
+    v = arrays(f"miniloop/{run}.npz")
+    rows, columns = slice(2, 34), slice(4, 36)
+    network = prior.load(VECTORS / "prior_v1_coord", dtype=torch.float32)
+
+    def crop(name):
+        return v[name][0][:, rows, columns]
+
+    normal, weight = crop("in_obj_normal"), crop("in_face_mask")[0]
+    shader = Shader(normal, v["in_light_support"][0, 0], (8, 8))
+    o = Observation(crop("in_texture_linear_blurred"), weight, torch.ones_like(weight), prior.coordinates(40, rows, columns, centred=False), shader,
+                    v["in_tv_ring"][0, 0] > 0.5)
+    reference = torch.cat([2 * crop("in_init_diff") - 1, crop("in_init_normal"), 2 * crop("in_init_spec") - 1])[None]
+    recipe = replace(RECIPES["released"], steps=12, start=0.6, candidates=3, phases=(("main", 0.0, 5 / 12), ("grid", 5 / 12, 10 / 12)),
+                     zeta=1.0 if run == "pho1" else 0.0)
+
+    def noise(step):
+        drawn = [*([v["init_noise"]] if step == 0 else []), *(v["cand_noise"][step, :, None] if step < 11 else [])]
+        return lambda *shape: drawn.pop(0)
+
+    def compare(state, steps):
+        k = state.step
+        close(state.denoised, v["denoised"][k - 1], 2e-4)
+        if k < steps:
+            close(state.x.detach(), v["xt"][k], 5e-4)
+        close(state.lights.glob, v["gamma_main"][k][:, 0, 0], 2e-4)
+        close(state.lights.grid, v["grid"][k], 2e-4)
+
+    first = Lights(v["gamma_main"][0][:, 0, 0].clone(), torch.zeros(3, 9, 8, 8), torch.ones(3))
+    last = sample(network, {1: o}, State(0, None, reference, first), recipe, noise, compare)
+    with torch.no_grad():
+        close(albedo(last.denoised), v["out_diff"][0], 2e-4)
+        close(blurred(albedo(last.denoised) * shader.total(last.lights)), v["out_shading"][0], 4e-4)

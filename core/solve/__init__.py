@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import torch
@@ -21,7 +21,9 @@ from ..settings import Settings
 from . import checkpoint, initial, maps
 from .evidence import REFERENCE, Evidence, observations, read_evidence
 from .prior import WEIGHTS, Prior, load
-from .sampler import Recipe, State, albedo, sample
+from .problem import State, albedo
+from .recipes import RECIPES, Recipe
+from .sampler import sample, seeded
 
 FACE_CROP = 768
 """Texels at 1024 over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels."""
@@ -38,7 +40,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     The artist's mask wins over the proposal. Continues from its own checkpoint. Raises Problem for unusable inputs and for divergence.
     """
     options = settings.solve
-    report.progress(0, options.steps, "reading the texture, the head and the masks")
+    recipe = _recipe(settings)
+    report.progress(0, recipe.steps, "reading the texture, the head and the masks")
     prior = load(WEIGHTS, settings.device)
     size = max(options.size // 32, 4) * 32  # the network halves the map several times
     evidence = read_evidence(capture, size)
@@ -49,16 +52,15 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         raise Problem("No facial skin was seen in the texture.", "Look at the texture in the report; film the face from the front and from both sides.")
     tone = initial.skin_tone(options.skin_tone, evidence.texture, lit, prior.tones)
     prior.use_tone(tone)
-    reference = initial.reference(prior, tone, evidence.skin)
+    reference = initial.reference(prior, tone, evidence.skin, recipe.uniform_start)
     exposure = float(initial.mean_tone(albedo(reference), lit).mean() / initial.mean_tone(evidence.texture, lit).mean().clamp_min(1e-6))
 
-    recipe = Recipe(steps=options.steps, guidance=options.guidance, **({} if settings.delight.delighter == "none" else DELIT))
-    seen = observations(evidence, exposure, FACE_CROP / options.grid_cells, prior.multiple)
+    seen = observations(evidence, exposure, FACE_CROP / options.grid_cells, prior.multiple, recipe)
     state = _first_state(evidence, reference, exposure, seen[1].shader, recipe)
     stored, key = capture.checkpoints / "solve.safetensors", _key(evidence, settings, tone)
     stopped = checkpoint.read(stored, key)
     if stopped is not None:
-        report.log(f"Going on after step {stopped.step} of {options.steps}.")
+        report.log(f"Going on after step {stopped.step} of {recipe.steps}.")
         state = stopped
 
     def on_step(state: State, steps: int) -> None:
@@ -68,20 +70,29 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             maps.write_preview(capture, state, seen, report)
 
     _check_often(prior, report)
-    state = sample(prior, seen, state, recipe, settings.seed, on_step)
-    result = maps.finished(state, evidence, reference, seen[1].shader, exposure, tone)
+    state = sample(prior, seen, state, recipe, seeded(settings.seed), on_step)
+    result = maps.finished(state, evidence, reference, seen[1].shader, exposure, tone, recipe)
     maps.write(capture, result)
     maps.write_preview(capture, state, seen, report)
     _leave_figures(capture, evidence, result, tone, report)
     stored.unlink(missing_ok=True)
 
 
+def _recipe(settings: Settings) -> Recipe:
+    """The chosen recipe. Ours takes the number of steps and the guidance from the settings; the others come with their own."""
+    recipe = RECIPES[settings.solve.recipe]
+    if settings.solve.recipe != "wildcap":
+        return recipe
+    return replace(recipe, steps=settings.solve.steps, guidance=settings.solve.guidance, **({} if settings.delight.delighter == "none" else DELIT))
+
+
 def _first_state(evidence: Evidence, reference: torch.Tensor, exposure: float, shader, recipe: Recipe) -> State:
-    weight = evidence.weight * evidence.trust * (1 - evidence.alpha)
+    trusted = evidence.weight * (1 if recipe.trusting else evidence.trust)
+    weight = trusted * (1 - evidence.alpha)
     if weight.sum() < 1:
-        weight = evidence.weight * evidence.trust
+        weight = trusted
     cells = shader.up_rows.shape[1], shader.up_columns.shape[1]
-    lights = initial.first_lights(evidence.texture * exposure, albedo(reference), evidence.normal, weight, cells, recipe.one_chroma, recipe.even)
+    lights = initial.first_lights(evidence.texture * exposure, albedo(reference), evidence.normal, weight, cells, recipe)
     return State(0, None, reference, lights)
 
 

@@ -13,7 +13,7 @@ from safetensors.torch import save_file
 
 from ..capture import replacing
 from .lighting import Lights
-from .sampler import State
+from .problem import State
 
 
 def write(path: Path, state: State, key: str) -> None:
@@ -24,7 +24,7 @@ def write(path: Path, state: State, key: str) -> None:
     tensors |= {f"moment{k}": moment for k, moment in enumerate(state.moments)}
     tensors = {name: tensor.detach().cpu().clone().contiguous() for name, tensor in tensors.items()}
     with replacing(path) as temporary:
-        save_file(tensors, temporary, metadata={"key": key, "numbers": json.dumps({"step": state.step, "updates": state.updates})})
+        save_file(tensors, temporary, metadata={"key": key, "numbers": json.dumps({"step": state.step})})
 
 
 def read(path: Path, key: str) -> State | None:
@@ -38,6 +38,6 @@ def read(path: Path, key: str) -> State | None:
         numbers = json.loads(metadata["numbers"])
         moments = [tensors[f"moment{k}"] for k in range(sum(name.startswith("moment") for name in tensors))]
         lights = Lights(tensors["glob"], tensors["grid"], tensors["chroma"])
-        return State(numbers["step"], tensors.get("x"), tensors["denoised"], lights, moments, numbers["updates"])
+        return State(numbers["step"], tensors.get("x"), tensors["denoised"], lights, moments)
     except (OSError, SafetensorError, KeyError, ValueError):
         return None

@@ -15,7 +15,8 @@ from ..capture import Capture
 from ..messages import Problem
 from .lighting import Shader
 from .prior import coordinates
-from .sampler import Observation
+from .problem import Observation
+from .recipes import Recipe
 
 REFERENCE = 1024  # lengths in texels are given for maps of this size
 TRUSTED = 0.2  # confidence from which a texel counts in full: below, it was seen at a glancing angle only
@@ -82,7 +83,7 @@ def softened(mask: np.ndarray) -> np.ndarray:
     return np.clip((faded - 0.02) / 0.96, 0, 1)
 
 
-def observations(evidence: Evidence, exposure: float, cell: float, multiple: int, centred: bool = True) -> dict[int, Observation]:
+def observations(evidence: Evidence, exposure: float, cell: float, multiple: int, recipe: Recipe, centred: bool = True) -> dict[int, Observation]:
     """The evidence as the sampler takes it, per coarsening factor. The texture is multiplied by `exposure`; `cell` is a grid cell in texels at REFERENCE.
 
     Maps coarser than a quarter of REFERENCE are left out: the prior has not seen them.
@@ -96,10 +97,13 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
         weight, alpha, trust = (torch.from_numpy(_sized(a.numpy(), size)) for a in (evidence.weight, evidence.alpha, evidence.trust))
         texture = _shrunk(evidence.texture * evidence.weight, size) / weight.clamp_min(1e-4) * exposure
         normal = torch.nn.functional.normalize(_shrunk(evidence.normal, size), dim=0)
-        inside = (alpha > 0).numpy().astype(np.uint8)
-        ring = (cv2.dilate(inside, np.ones((5, 5))) > 0) & (alpha.numpy() < 0.5)
+        inside = (alpha > (0.5 if recipe.hard_mask else 0)).numpy().astype(np.uint8)
+        support = cv2.dilate(inside, np.ones((5, 5)))  # M and two texels around it
+        ring = (support > 0) & ((inside == 0) if recipe.hard_mask else (alpha.numpy() < 0.5))
+        modulation = torch.from_numpy(support.astype(np.float32)) if recipe.hard_mask else alpha
         coords = coordinates(size, slice(0, size), slice(0, size), centred)
-        found[factor] = Observation(texture, weight, trust, coords, Shader(normal, alpha, cells), torch.from_numpy(ring), REFERENCE / size)
+        shader = Shader(normal, modulation, cells, recipe.bilinear)
+        found[factor] = Observation(texture, weight, trust, coords, shader, torch.from_numpy(ring), REFERENCE / size)
     return found
 
 

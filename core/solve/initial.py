@@ -11,6 +11,7 @@ from .. import images
 from ..messages import Problem
 from .lighting import Lights, constant_light, fit_global, sh_basis
 from .prior import Prior, coordinates, mean_at
+from .recipes import Recipe
 
 HUMAN_GREEN = 0.02, 0.45
 """Range of linear green a skin's mean albedo can have; red and blue follow from the colour."""
@@ -57,10 +58,10 @@ def mean_tone(albedo: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
     return (albedo * weight).sum((1, 2)) / weight.sum().clamp_min(1e-6)
 
 
-def reference(prior: Prior, tone: torch.Tensor, skin: torch.Tensor) -> torch.Tensor:
-    """x_0^ref [1, 7, S, S]: the prior's mean face, its skin colour-matched to the tone; for a prior without one the tone everywhere. skin [S, S]."""
+def reference(prior: Prior, tone: torch.Tensor, skin: torch.Tensor, uniform: bool = False) -> torch.Tensor:
+    """x_0^ref [1, 7, S, S]: the prior's mean face, its skin colour-matched to the tone; the tone everywhere if `uniform` or the prior has none. skin [S, S]."""
     size = skin.shape[0]
-    if prior.mean_face is None:
+    if uniform or prior.mean_face is None:
         out = torch.zeros(1, 7, size, size)
         out[:, :3], out[:, 5], out[:, 6] = 2 * tone[:, None, None] - 1, 1.0, -0.3
         return out
@@ -72,14 +73,15 @@ def reference(prior: Prior, tone: torch.Tensor, skin: torch.Tensor) -> torch.Ten
 
 
 def first_lights(texture: torch.Tensor, albedo: torch.Tensor, normal: torch.Tensor, weight: torch.Tensor, cells: tuple[int, int],
-                 one_chroma: bool, even: float) -> Lights:
-    """theta to start with: gamma^g fitted to the reference outside the shadow (closed form, around the constant light), V zero.
+                 recipe: Recipe) -> Lights:
+    """theta to start with: gamma^g fitted to the reference outside the shadow (closed form, around the constant light) or the constant light, V zero.
 
-    texture, albedo, normal [3, H, W]; weight [H, W], zero inside M. `one_chroma` ties all local light to the global light's colour at first.
+    texture, albedo, normal [3, H, W]; weight [H, W], zero inside M. One chroma for all local light is the global light's at first.
     """
     shade = mean_tone(texture, weight) / mean_tone(albedo, weight).clamp_min(1e-4)
-    constant = constant_light(shade)
-    basis = sh_basis(normal)
-    rest = texture - albedo * torch.einsum("ck,khw->chw", constant, basis)
-    glob = constant + fit_global(rest, albedo, basis, weight, ridge=max(even, 0.02))
-    return Lights(glob, torch.zeros(1 if one_chroma else 3, 9, *cells), (shade / shade.mean()).clone())
+    glob = constant_light(shade)
+    if recipe.fitted:
+        basis = sh_basis(normal)
+        rest = texture - albedo * torch.einsum("ck,khw->chw", glob, basis)
+        glob = glob + fit_global(rest, albedo, basis, weight, ridge=max(recipe.even, 0.02))
+    return Lights(glob, torch.zeros(1 if recipe.one_chroma else 3, 9, *cells), (shade / shade.mean()).clone())

@@ -50,10 +50,11 @@ class Lights:
 class Shader:
     """Gamma_theta for one map: the fixed parts of the shading of every texel, prepared once.
 
-    normal [3, H, W], alpha [H, W] the soft shadow mask M, cells (h, w) of the grid. The grid covers the map edge to edge.
+    normal [3, H, W], alpha [H, W] the soft shadow mask M, cells (h, w) of the grid. The grid covers the map edge to edge and is read by a
+    cubic kernel, or a bilinear one.
     """
 
-    def __init__(self, normal: torch.Tensor, alpha: torch.Tensor, cells: tuple[int, int]):
+    def __init__(self, normal: torch.Tensor, alpha: torch.Tensor, cells: tuple[int, int], bilinear: bool = False):
         self.basis = sh_basis(normal)  # [9, H, W]
         self.alpha = alpha
         height, width = alpha.shape
@@ -62,8 +63,8 @@ class Shader:
         # local light exists only where M does: everything about it is computed on M's bounding box, one texel wider for the ring's differences
         self.box = (slice(0, 1), slice(0, 1)) if self.empty else tuple(
             slice(max(int(i[0]) - 3, 0), min(int(i[-1]) + 4, size)) for i, size in ((rows, height), (columns, width)))
-        self.up_rows = interpolation(cells[0], height).to(normal)[self.box[0]]  # [h', h]
-        self.up_columns = interpolation(cells[1], width).to(normal)[self.box[1]]  # [w', w]
+        self.up_rows = interpolation(cells[0], height, bilinear).to(normal)[self.box[0]]  # [h', h]
+        self.up_columns = interpolation(cells[1], width, bilinear).to(normal)[self.box[1]]  # [w', w]
         self.box_basis = self.basis[(slice(None), *self.box)]
         self.box_alpha = alpha[self.box]
 
@@ -73,9 +74,12 @@ class Shader:
 
     def local(self, lights: Lights) -> torch.Tensor:
         """s^V, shading by the grid alone, modulated by M, on `box` [3, h', w'] (paper, equations 2 to 4)."""
-        coefficients = self.up_rows @ lights.grid @ self.up_columns.T  # [G, 9, h', w']
-        scalar = (coefficients * self.box_basis).sum(1) * self.box_alpha  # [G, h', w']
+        scalar = (self.coefficients(lights) * self.box_basis).sum(1) * self.box_alpha  # [G, h', w']
         return scalar * lights.chroma[:, None, None] if len(scalar) == 1 else scalar
+
+    def coefficients(self, lights: Lights) -> torch.Tensor:
+        """gamma^V of every texel of `box` [G, 9, h', w'], read from V."""
+        return self.up_rows @ lights.grid @ self.up_columns.T
 
     def total(self, lights: Lights) -> torch.Tensor:
         """Shading [3, H, W]."""
@@ -85,8 +89,8 @@ class Shader:
         return shading
 
 
-def interpolation(cells: int, texels: int) -> torch.Tensor:
-    """The matrix [texels, cells] that resamples a line by the cubic kernel (a = -0.5), half-pixel centres, borders repeated.
+def interpolation(cells: int, texels: int, bilinear: bool = False) -> torch.Tensor:
+    """The matrix [texels, cells] that resamples a line by the cubic kernel (a = -0.5) or the linear one, half-pixel centres, borders repeated.
 
     To shrink, the kernel widens with the step (antialiasing).
     """
@@ -95,7 +99,7 @@ def interpolation(cells: int, texels: int) -> torch.Tensor:
     centres = (np.arange(texels) + 0.5) * step - 0.5
     first = np.floor(centres - 2 * wide).astype(int)
     index = first[:, None] + np.arange(int(np.ceil(4 * wide)) + 2)  # [texels, taps]
-    weight = _cubic((index - centres[:, None]) / wide)
+    weight = (_linear if bilinear else _cubic)((index - centres[:, None]) / wide)
     weight /= weight.sum(1, keepdims=True)
     mirrored = np.mod(index, 2 * cells)
     mirrored = np.where(mirrored < cells, mirrored, 2 * cells - 1 - mirrored)
@@ -124,6 +128,10 @@ def constant_light(shade: torch.Tensor) -> torch.Tensor:
     glob = torch.zeros(3, 9)
     glob[:, 0] = shade / BANDS[0]
     return glob
+
+
+def _linear(t: np.ndarray) -> np.ndarray:
+    return np.maximum(1 - np.abs(t), 0)
 
 
 def _cubic(t: np.ndarray) -> np.ndarray:

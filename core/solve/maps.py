@@ -15,7 +15,8 @@ from ..messages import Reporter
 from .evidence import Evidence
 from .initial import mean_tone
 from .lighting import Shader
-from .sampler import Observation, State, albedo
+from .problem import Observation, State, albedo
+from .recipes import Recipe
 
 DARKEST = 0.004  # linear albedo below which no skin or hair lies
 
@@ -32,8 +33,9 @@ class Maps:
     confidence: np.ndarray
 
 
-def finished(state: State, evidence: Evidence, reference: torch.Tensor, shader: Shader, exposure: float, tone: torch.Tensor) -> Maps:
-    """Reads the maps out of \\hat x_0. The albedo is rescaled once, in linear light, so that the mean of the confident facial skin is `tone`;
+def finished(state: State, evidence: Evidence, reference: torch.Tensor, shader: Shader, exposure: float, tone: torch.Tensor,
+             recipe: Recipe) -> Maps:
+    """Reads the maps out of \\hat x_0. The albedo is rescaled once so that the mean of the confident facial skin is `tone` (linear RGB [3]);
     the shading takes the inverse, so that their product stays. What nobody saw is `reference`, the mean face of that tone [1, 7, S, S]: a drawn
     sample would be as likely, but would look like something that was measured."""
     x = torch.lerp(reference, state.denoised, evidence.weight.sqrt())[0]
@@ -41,12 +43,20 @@ def finished(state: State, evidence: Evidence, reference: torch.Tensor, shader: 
         shading = shader.total(state.lights).clamp_min(1e-3) / exposure
         main = shader.main(state.lights).clamp_min(1e-3) / exposure
     diffuse = albedo(x[None]).clamp_min(DARKEST)
-    gain = (tone / mean_tone(diffuse, evidence.skin * evidence.weight)).clamp(0.2, 5.0)[:, None, None]
+    gain = _gain(diffuse, evidence.skin * evidence.weight, tone, recipe.rescale)[:, None, None]
     normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
     explained = (1 - (shading / main).mean(0)).clamp(0, 1)  # the share of the darkness that was called shadow
     confidence = (evidence.weight * (1 - explained * evidence.alpha)).clamp(0, 1)
     specular = ((x[6] + 1) / 2).clamp(0, 1).numpy()
     return Maps(_picture((diffuse * gain).clamp(DARKEST, 1)), specular, _picture(normal), _picture(shading / gain), confidence.numpy())
+
+
+def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, rescale: str) -> torch.Tensor:
+    """Linear factors [3] that bring the mean under `weight` to `tone`: the mean of linear values, or ("srgb") of values to the power 1 / 2.2."""
+    if rescale == "none":
+        return torch.ones(3)
+    gamma = 1.0 if rescale == "linear" else 2.2
+    return (tone ** (1 / gamma) / mean_tone(diffuse ** (1 / gamma), weight)).pow(gamma).clamp(0.2, 5.0)
 
 
 def write(capture: Capture, maps: Maps) -> None:

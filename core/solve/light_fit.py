@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""theta follows the reflectance: what a light costs, and Adam's steps on it (paper, equations 9 and 10)."""
+
+from __future__ import annotations
+
+import torch
+
+from .lighting import BANDS, Lights
+from .problem import Observation, State, albedo, photometric
+from .recipes import Recipe
+
+BETAS = 0.9, 0.999
+BAND_OF = torch.tensor([BANDS[0]] + [BANDS[1]] * 3 + [BANDS[2]] * 5)
+MOVING = {"both": (0, 1, 2), "main": (0,), "grid": (1, 2)}
+"""Which of Lights.parameters() a phase moves."""
+
+
+def update_lights(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe, step: int, steps: int) -> None:
+    """The light updates that belong to one sampling step, in place: none, one or several of the phase that this step is in.
+
+    How many there were before follows from the step's number, so a stored state continues exactly.
+    """
+    for phase, begin, end in recipe.phases:
+        first, last = round(begin * steps), max(round(end * steps), round(begin * steps) + 1)
+        if first <= step < last:
+            per_step = max(1, round(recipe.updates / (last - first)))
+            for k in range(per_step):
+                _adam(state, denoised, o, recipe, MOVING[phase], (step - first) * per_step + k)
+
+
+def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> torch.Tensor:
+    """L_pho + L_neg + 0.1 L_TV of theta, and what our recipe adds. L_TV makes M's border seamless."""
+    shading = o.shader.total(lights)
+    loss = photometric(denoised, shading, o, o.weight if recipe.trusting else o.weight * o.trust, recipe.blur)
+    brightness = (o.weight * albedo(denoised) ** 2).mean()  # L_pho is larger on light skin
+    if recipe.even:
+        loss = loss + recipe.even * brightness * o.weight.sum() * ((lights.glob * BAND_OF)[:, 1:] ** 2).sum()
+    if o.shader.empty:
+        return loss
+    local = o.shader.local(lights)
+    loss = loss + recipe.neg * (local.clamp_min(0) ** 2).sum()
+    if recipe.tv_of_gamma:
+        gamma = o.shader.coefficients(lights)
+        loss = loss + recipe.tv * ((gamma.diff(dim=-1) ** 2).sum() + (gamma.diff(dim=-2) ** 2).sum())
+    elif recipe.tv:
+        loss = loss + recipe.tv * variation(shading[(slice(None), *o.shader.box)], o.ring[o.shader.box])
+    if recipe.faint:
+        loss = loss + recipe.faint * brightness * (local**2).sum()
+    if recipe.smooth:
+        loss = loss + recipe.smooth * brightness / o.texel * variation(local, o.shader.box_alpha)
+    return loss
+
+
+def variation(image: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
+    """The weighted L1 norm of forward differences of [3, H, W]; the weight [H, W] is taken at the later texel."""
+    return (image.diff(dim=1).abs() * weight[1:]).sum() + (image.diff(dim=2).abs() * weight[:, 1:]).sum()
+
+
+def _adam(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe, moving: tuple[int, ...], before: int) -> None:
+    """One step of Adam on the parameters `moving`, the `before`+1st of its phase, with an exponentially decaying rate."""
+    lights = state.lights.requires_grad_(True)
+    parameters = lights.parameters()
+    gradients = torch.autograd.grad(light_loss(lights, denoised, o, recipe), [parameters[k] for k in moving], allow_unused=True)
+    lights.requires_grad_(False)
+    if not state.moments:
+        state.moments = [torch.zeros_like(p) for p in parameters for _ in range(2)]
+    rate = recipe.rate * recipe.decay**before
+    for k, gradient in zip(moving, gradients, strict=True):
+        if gradient is None:
+            continue
+        mean, square = state.moments[2 * k], state.moments[2 * k + 1]
+        mean.lerp_(gradient, 1 - BETAS[0])
+        square.lerp_(gradient * gradient, 1 - BETAS[1])
+        mean_hat, square_hat = mean / (1 - BETAS[0] ** (before + 1)), square / (1 - BETAS[1] ** (before + 1))
+        parameters[k].sub_(rate * mean_hat / (square_hat.sqrt() + 1e-8))

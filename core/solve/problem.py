@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the sampler is given and where it stands: the observation, the state, and the rendering equation between them (paper, equations 1 to 4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import torch
+from torch.nn import functional
+
+from .lighting import Lights, Shader
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What is known of the map at one size.
+
+    texture I_UV [3, H, W], scaled so that its shading is about one; weight [H, W] in [0, 1]: how far a texel's observation counts;
+    trust [H, W] in [0, 1]: how far what is seen there may be explained as light (less for brows, lips and hair); coords [1, 2, H, W] for the prior;
+    shader Gamma with N_c and M; ring [H, W]: where L_TV counts; texel: side of a texel in texels of a 1024 map.
+    """
+
+    texture: torch.Tensor
+    weight: torch.Tensor
+    trust: torch.Tensor
+    coords: torch.Tensor
+    shader: Shader
+    ring: torch.Tensor
+    texel: float = 1.0
+
+
+@dataclass
+class State:
+    """Where the sampling stands before step `step`. x [1, 7, H, W] is x_t; denoised is \\hat x of the step before (first: x_0^ref); moments are Adam's."""
+
+    step: int
+    x: torch.Tensor | None
+    denoised: torch.Tensor
+    lights: Lights
+    moments: list[torch.Tensor] = field(default_factory=list)
+
+
+def albedo(denoised: torch.Tensor) -> torch.Tensor:
+    """The linear diffuse albedo [3, H, W] of a map [1, 7, H, W]."""
+    return (denoised[0, :3] + 1) / 2
+
+
+def photometric(denoised: torch.Tensor, shading: torch.Tensor, o: Observation, weight: torch.Tensor, blur: bool = False) -> torch.Tensor:
+    """L_pho: the weighted sum of squares over the map (paper, equation 1); `blur` puts the rendering through a small Gaussian."""
+    rendered = albedo(denoised) * shading
+    return ((weight * ((blurred(rendered) if blur else rendered) - o.texture)) ** 2).sum()
+
+
+def blurred(image: torch.Tensor, sigma: float = 0.8) -> torch.Tensor:
+    """[3, H, W] under a 3 x 3 Gaussian, reflected at the border: the released code compares textures through it."""
+    line = torch.exp(-torch.tensor([-1.0, 0.0, 1.0]) ** 2 / (2 * sigma**2))
+    line = line / line.sum()
+    padded = functional.pad(image[:, None], (1, 1, 1, 1), mode="reflect")
+    return functional.conv2d(padded, torch.outer(line, line)[None, None].to(image))[:, 0]
