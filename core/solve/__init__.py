@@ -16,12 +16,12 @@ import torch
 
 from .. import images
 from ..capture import Capture
-from ..messages import Problem, Reporter
+from ..messages import Reporter
 from ..settings import Settings
 from . import checkpoint, initial, maps
-from .evidence import REFERENCE, Evidence, observations, read_evidence
+from .evidence import REFERENCE, Evidence, read_evidence
 from .prior import WEIGHTS, Prior, load
-from .problem import State, albedo
+from .problem import State
 from .recipes import RECIPES, Recipe
 from .sampler import sample, seeded
 
@@ -45,19 +45,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     prior = load(WEIGHTS, settings.device)
     size = max(options.size // 32, 4) * 32  # the network halves the map several times
     evidence = read_evidence(capture, size)
-    lit = evidence.skin * evidence.weight * (1 - evidence.alpha)
-    if lit.sum() < 1:  # everything on the face is masked: the least evil is to trust it all
-        lit = evidence.skin * evidence.weight
-    if lit.sum() < 1:
-        raise Problem("No facial skin was seen in the texture.", "Look at the texture in the report; film the face from the front and from both sides.")
-    tone = initial.skin_tone(options.skin_tone, evidence.texture, lit, prior.tones)
-    prior.use_tone(tone)
-    reference = initial.reference(prior, tone, evidence.skin, recipe.uniform_start)
-    exposure = float(initial.mean_tone(albedo(reference), lit).mean() / initial.mean_tone(evidence.texture, lit).mean().clamp_min(1e-6))
-
-    seen = observations(evidence, exposure, FACE_CROP / options.grid_cells, prior.multiple, recipe)
-    state = _first_state(evidence, reference, exposure, seen[1].shader, recipe)
-    stored, key = capture.checkpoints / "solve.safetensors", _key(evidence, settings, tone)
+    start = initial.start(prior, evidence, options.skin_tone, FACE_CROP / options.grid_cells, recipe)
+    state, seen = start.state, start.observations
+    stored, key = capture.checkpoints / "solve.safetensors", _key(evidence, settings, start.tone)
     stopped = checkpoint.read(stored, key)
     if stopped is not None:
         report.log(f"Going on after step {stopped.step} of {recipe.steps}.")
@@ -71,10 +61,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
     _check_often(prior, report)
     state = sample(prior, seen, state, recipe, seeded(settings.seed), on_step)
-    result = maps.finished(state, evidence, reference, seen[1].shader, exposure, tone, recipe)
+    result = maps.finished(state, evidence, start, recipe)
     maps.write(capture, result)
     maps.write_preview(capture, state, seen, report)
-    _leave_figures(capture, evidence, result, tone, report)
+    _leave_figures(capture, evidence, result, start.tone, report)
     stored.unlink(missing_ok=True)
 
 
@@ -84,16 +74,6 @@ def _recipe(settings: Settings) -> Recipe:
     if settings.solve.recipe != "wildcap":
         return recipe
     return replace(recipe, steps=settings.solve.steps, guidance=settings.solve.guidance, **({} if settings.delight.delighter == "none" else DELIT))
-
-
-def _first_state(evidence: Evidence, reference: torch.Tensor, exposure: float, shader, recipe: Recipe) -> State:
-    trusted = evidence.weight * (1 if recipe.trusting else evidence.trust)
-    weight = trusted * (1 - evidence.alpha)
-    if weight.sum() < 1:
-        weight = trusted
-    cells = shader.up_rows.shape[1], shader.up_columns.shape[1]
-    lights = initial.first_lights(evidence.texture * exposure, albedo(reference), evidence.normal, weight, cells, recipe)
-    return State(0, None, reference, lights)
 
 
 def _check_often(prior: Prior, report: Reporter) -> None:

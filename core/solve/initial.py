@@ -4,17 +4,54 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
 
 from .. import images
 from ..messages import Problem
+from .evidence import Evidence, grid_cells, observations
 from .lighting import Lights, constant_light, fit_global, sh_basis
 from .prior import Prior, coordinates, mean_at
+from .problem import Observation, State
+from .problem import albedo as albedo_of
 from .recipes import Recipe
 
 HUMAN_GREEN = 0.02, 0.45
 """Range of linear green a skin's mean albedo can have; red and blue follow from the colour."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """tone: linear RGB [3]; reference x_0^ref [1, 7, S, S]; exposure: what the texture is multiplied by in `observations` (by coarsening factor),
+    so that its shading is about one; state: before the first step."""
+
+    tone: torch.Tensor
+    reference: torch.Tensor
+    exposure: float
+    observations: dict[int, Observation]
+    state: State
+
+
+def start(prior: Prior, evidence: Evidence, tone: str, cell: float, recipe: Recipe) -> Start:
+    """All that a run begins with. `tone` as in `skin_tone`, which the prior is told; `cell` is a cell of V in texels of a 1024 map.
+
+    Raises Problem where no facial skin was seen.
+    """
+    lit = evidence.skin * evidence.weight * (1 - evidence.alpha)
+    if lit.sum() < 1:  # everything on the face is masked: the least evil is to trust it all
+        lit = evidence.skin * evidence.weight
+    if lit.sum() < 1:
+        raise Problem("No facial skin was seen in the texture.", "Look at the texture in the report; film the face from the front and from both sides.")
+    tone = skin_tone(tone, evidence.texture, lit, prior.tones)
+    prior.use_tone(tone)
+    x_ref = reference(prior, tone, evidence.skin, recipe.uniform_start)
+    exposure = float(mean_tone(albedo_of(x_ref), lit).mean() / mean_tone(evidence.texture, lit).mean().clamp_min(1e-6))
+    trusted = evidence.weight * (1 if recipe.trusting else evidence.trust)
+    weight = trusted * (1 - evidence.alpha)
+    lights = first_lights(evidence.texture * exposure, albedo_of(x_ref), evidence.normal, weight if weight.sum() >= 1 else trusted, grid_cells(cell), recipe)
+    return Start(tone, x_ref, exposure, observations(evidence, exposure, cell, prior.multiple, recipe), State(0, None, x_ref, lights))
 
 
 def skin_tone(setting: str, texture: torch.Tensor, weight: torch.Tensor, tones: list[list[float]]) -> torch.Tensor:

@@ -13,8 +13,7 @@ from .. import images
 from ..capture import Capture, replacing_folder
 from ..messages import Reporter
 from .evidence import Evidence
-from .initial import mean_tone
-from .lighting import Shader
+from .initial import Start, mean_tone
 from .problem import Observation, State, albedo
 from .recipes import Recipe
 
@@ -33,17 +32,17 @@ class Maps:
     confidence: np.ndarray
 
 
-def finished(state: State, evidence: Evidence, reference: torch.Tensor, shader: Shader, exposure: float, tone: torch.Tensor,
-             recipe: Recipe) -> Maps:
-    """Reads the maps out of \\hat x_0. The albedo is rescaled once so that the mean of the confident facial skin is `tone` (linear RGB [3]);
-    the shading takes the inverse, so that their product stays. What nobody saw is `reference`, the mean face of that tone [1, 7, S, S]: a drawn
+def finished(state: State, evidence: Evidence, start: Start, recipe: Recipe) -> Maps:
+    """Reads the maps out of \\hat x_0. The albedo is rescaled once so that the mean of the confident facial skin is the skin tone;
+    the shading takes the inverse, so that their product stays. What nobody saw is the mean face of that tone: a drawn
     sample would be as likely, but would look like something that was measured."""
-    x = torch.lerp(reference, state.denoised, evidence.weight.sqrt())[0]
+    shader = start.observations[1].shader
+    x = torch.lerp(start.reference, state.denoised, evidence.weight.sqrt())[0]
     with torch.no_grad():
-        shading = shader.total(state.lights).clamp_min(1e-3) / exposure
-        main = shader.main(state.lights).clamp_min(1e-3) / exposure
+        shading = shader.total(state.lights).clamp_min(1e-3) / start.exposure
+        main = shader.main(state.lights).clamp_min(1e-3) / start.exposure
     diffuse = albedo(x[None]).clamp_min(DARKEST)
-    gain = _gain(diffuse, evidence.skin * evidence.weight, tone, recipe.rescale)[:, None, None]
+    gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone, recipe.rescale)[:, None, None]
     normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
     explained = (1 - (shading / main).mean(0)).clamp(0, 1)  # the share of the darkness that was called shadow
     confidence = (evidence.weight * (1 - explained * evidence.alpha)).clamp(0, 1)
