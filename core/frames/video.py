@@ -1,45 +1,79 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Videos: any that FFmpeg reads through PyAV, at equal intervals, turned upright, HDR brought to sRGB.
+"""Videos: any that FFmpeg reads through PyAV, at equal intervals of time, upright and never mirrored, HDR brought to sRGB.
 
-A damaged or cut-off file gives what can be decoded of it.
+A damaged or cut-off file gives what can be decoded of it. One frame at a time is in memory, shrunk as it leaves the decoder, and stretches
+between two wanted frames are jumped over where the file allows it, so an hour of 8K is read as well as four seconds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import av
 import numpy as np
 
-from .. import images
 from ..messages import Problem, Reporter
-from .source import Picture, evenly, fit
+from .colour import HLG, PQ, REC709, to_srgb
+from .source import Picture, evenly_in_time, fitted
 
-HLG, PQ = 18, 16  # ITU-T H.273 transfer characteristics
-UNSPECIFIED = 2
-REC2020_TO_REC709 = np.array([[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]], np.float32)
+UNSPECIFIED, FULL_RANGE = 2, 2
+LARGE = 2560 * 1440
+"""Pixels above which the decoder works on few frames at a time: each of its threads keeps one, of 100 MB in 8K."""
 
 
 def read_video(path: Path, most: int, long_side: int, report: Reporter) -> Iterator[Picture]:
-    """At most `most` frames of a video, evenly spread. Raises Problem for what is not a video that can be read."""
-    total = _count(path, report)
-    wanted = set(evenly(total, most).tolist())
-    index = -1
+    """At most `most` frames of a video, evenly spread in time. Raises Problem for what is not a video that can be read."""
+    index = _index(path, report)
+    wanted = evenly_in_time(index.times, most)
+    given, corrupt = 0, 0
     with _open(path) as container:
         stream = container.streams.video[0]
-        stream.thread_type = "AUTO"
-        transfer = stream.codec_context.color_trc
-        if transfer in (HLG, PQ):
-            report.log("The video is HDR; its highlights are compressed into sRGB.")
-        for index, frame in enumerate(_decode(container, stream, report)):
-            if index in wanted:
-                yield Picture(fit(_srgb(frame, transfer), long_side), index, frame.time, "", None, index + 1, total)
-            else:
-                report.check()
-    if index + 1 < 0.9 * total:
-        report.log(f"Only {index + 1} of {total} frames could be decoded; the file seems damaged or cut off.")
+        large = stream.codec_context.width * stream.codec_context.height > LARGE
+        stream.thread_type, stream.thread_count = "AUTO", 2 if large else 0
+        for number, frame in _frames(container, stream, index, wanted, report):
+            if frame.is_corrupt:
+                corrupt += 1
+                continue
+            transfer, primaries = stream.codec_context.color_trc, stream.codec_context.color_primaries  # known for sure once a frame is decoded
+            if not given and transfer in (HLG, PQ):
+                report.log("The video is HDR; its highlights are compressed into sRGB.")
+            turns, mirrored = orientation(frame)
+            if not given and mirrored:
+                report.finding("The video is marked to be shown as in a mirror, as selfie cameras do; it was turned back, so that left is left.",
+                               "If moles end up on the wrong side, switch off the mirroring of the front camera, or film with the back camera.")
+            size = fitted(frame.width * (stream.sample_aspect_ratio or 1), frame.height, long_side)
+            given += 1
+            yield Picture(np.ascontiguousarray(np.rot90(_srgb(frame, size, transfer, primaries), turns)), number, frame.time, "", None, number + 1,
+                          len(index.times))
+    if given < 0.9 * len(wanted):
+        report.finding(f"Only {given} of {len(wanted)} frames could be read; the file seems damaged or cut off.", "Copy the video again from the phone.")
+
+
+@dataclass(frozen=True)
+class _Index:
+    """What a video's packets tell: time stamps in order of showing [N] in units of the stream (consecutive numbers where there are none),
+    and those of frames that decoding can begin with (none: from the start only)."""
+
+    times: np.ndarray
+    keys: np.ndarray
+
+
+def orientation(frame: av.VideoFrame) -> tuple[int, bool]:
+    """How a frame is shown as its display matrix says: quarter turns counter-clockwise, and whether mirrored after that.
+
+    Only the turns are to be followed: a phone's front camera stores what it saw and marks it to be shown as in a mirror.
+    """
+    data = frame.side_data.get("DISPLAYMATRIX")
+    if data is None:
+        return 0, False
+    a, b, _, c, d = np.frombuffer(bytes(data), np.int32)[:5].astype(float)  # (x, y) is shown at (ax + cy, bx + dy), y down
+    mirrored = a * d - b * c < 0
+    if mirrored:
+        a = -a  # shown from behind once more
+    return -round(float(np.degrees(np.arctan2(b, a))) / 90) % 4, mirrored
 
 
 def _open(path: Path):
@@ -56,20 +90,57 @@ def _open(path: Path):
     return container
 
 
-def _count(path: Path, report: Reporter) -> int:
-    """Frames in the video, counted by its packets: containers' own counts are often missing or wrong."""
+def _index(path: Path, report: Reporter) -> _Index:
+    """The index of a video, from its packets alone: containers' own counts and rates are often missing or wrong."""
+    times, keys, count = [], [], 0
     with _open(path) as container:
-        count = 0
         try:
             for packet in container.demux(container.streams.video[0]):
-                count += packet.size > 0
+                if packet.size > 0 and not packet.is_discard:
+                    count += 1
+                    if packet.pts is not None:
+                        times.append(packet.pts)
+                        if packet.is_keyframe:
+                            keys.append(packet.pts)
                 if count % 100 == 0:
                     report.check()
         except av.FFmpegError:
             report.log("The video ends in damaged data; what comes before is used.")
     if count == 0:
         raise Problem(f"{path.name} holds no frames.", "Copy it again from the phone, or choose another video.")
-    return count
+    if len(set(times)) < count:  # old AVI files and raw streams
+        return _Index(np.arange(count), np.array([], int))
+    return _Index(np.array(sorted(times)), np.array(sorted(keys), int))
+
+
+def _frames(container, stream, index: _Index, wanted: np.ndarray, report: Reporter) -> Iterator[tuple[int, av.VideoFrame]]:
+    """The frames of these numbers, or where one is lost the next that can be decoded, with their numbers."""
+    for first, numbers in _stretches(index, wanted):
+        if first is not None:
+            container.seek(int(first), stream=stream)
+        targets = list(numbers)
+        for count, frame in enumerate(_decode(container, stream, report)):
+            number = int(np.searchsorted(index.times, frame.pts)) if len(index.keys) and frame.pts is not None else count
+            if number < targets[0]:
+                report.check()
+                continue
+            while targets and targets[0] <= number:
+                targets.pop(0)
+            yield number, frame
+            if not targets:
+                break
+
+
+def _stretches(index: _Index, wanted: np.ndarray) -> list[tuple[int | None, list[int]]]:
+    """Wanted numbers in stretches that are decoded in one go, each with the time stamp to jump to (None: read on from the start)."""
+    begin = np.searchsorted(index.keys, index.times[wanted], side="right") - 1  # the key frame each needs
+    stretches: list[tuple[int | None, list[int]]] = []
+    for i, number in enumerate(wanted.tolist()):
+        if i and begin[i] <= begin[i - 1] + 1:
+            stretches[-1][1].append(number)
+        else:
+            stretches.append((index.keys[begin[i]] if begin[i] > 0 else None, [number]))
+    return stretches
 
 
 def _decode(container, stream, report: Reporter) -> Iterator[av.VideoFrame]:
@@ -86,24 +157,14 @@ def _decode(container, stream, report: Reporter) -> Iterator[av.VideoFrame]:
             report.check()
 
 
-def _srgb(frame: av.VideoFrame, transfer: int) -> np.ndarray:
-    """A decoded frame as upright sRGB float32 [H, W, 3]."""
-    # Unless told, swscale takes Rec. 601 for every matrix, and a phone's Rec. 709 skin turns greenish
-    matrix = {} if frame.colorspace == UNSPECIFIED else {"src_colorspace": frame.colorspace, "dst_colorspace": "DEFAULT"}
-    if transfer in (HLG, PQ):
-        pixels = _tone_map(frame.reformat(format="rgb48le", **matrix).to_ndarray().astype(np.float32) / 65535, transfer)
-    else:
-        pixels = frame.reformat(format="rgb24", **matrix).to_ndarray().astype(np.float32) / 255
-    return np.ascontiguousarray(np.rot90(pixels, round(frame.rotation / 90)))  # both count counter-clockwise
-
-
-def _tone_map(signal: np.ndarray, transfer: int) -> np.ndarray:
-    """An HLG or PQ signal in Rec. 2020 (ITU-R BT.2100) -> sRGB; diffuse white at 1, a soft shoulder above 0.8."""
-    if transfer == HLG:
-        scene = np.where(signal <= 0.5, signal**2 / 3, (np.exp((signal - 0.55991073) / 0.17883277) + 0.28466892) / 12)
-        linear = scene / 0.2650  # HLG reference white is a signal of 75 %
-    else:
-        root = np.maximum(signal, 0) ** (1 / 78.84375)
-        linear = (np.maximum(root - 0.8359375, 0) / (18.8515625 - 18.6875 * root)) ** (1 / 0.1593017578125) * 10000 / 203
-    linear = np.maximum(linear @ REC2020_TO_REC709.T, 0)
-    return images.linear_to_srgb(np.where(linear > 0.8, 0.8 + 0.2 * (1 - np.exp(-(linear - 0.8) / 0.2)), linear))
+def _srgb(frame: av.VideoFrame, size: tuple[int, int], transfer: int, primaries: int) -> np.ndarray:
+    """A decoded frame as sRGB float32 [H, W, 3] of that width and height, not yet turned."""
+    how = {"width": size[0], "height": size[1], "interpolation": "AREA"} if size != (frame.width, frame.height) else {}
+    # Unless told, swscale takes Rec. 601 for every matrix, and a phone's Rec. 709 skin turns greenish; and full-range values for the narrow range
+    if frame.colorspace != UNSPECIFIED:
+        how |= {"src_colorspace": frame.colorspace, "dst_colorspace": "DEFAULT"}
+    if frame.color_range == FULL_RANGE:
+        how |= {"src_color_range": FULL_RANGE, "dst_color_range": FULL_RANGE}
+    if transfer not in (HLG, PQ) and primaries in (REC709, UNSPECIFIED):
+        return frame.reformat(format="rgb24", **how).to_ndarray().astype(np.float32) / 255
+    return to_srgb(frame.reformat(format="rgb48le", **how).to_ndarray().astype(np.float32) / 65535, transfer, primaries)

@@ -1,0 +1,201 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Videos as phones record them: HDR and wide gamut in known colours, any orientation, mirrored, variable frame rate, long and large."""
+
+import struct
+import tracemalloc
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+
+from core import images
+from core.frames import video
+from core.frames.colour import HLG, P3, PQ, REC709, REC2020, to_srgb
+from core.frames.source import evenly_in_time
+from core.messages import Reporter
+
+WEIGHTS = {1: (0.2126, 0.0722), 9: (0.2627, 0.0593)}  # Kr and Kb of the matrices Rec. 709 and Rec. 2020
+
+
+def planes(signal: np.ndarray, matrix: int, bits: int, full: bool) -> list[np.ndarray]:
+    """A signal [H, W, 3] as Y, Cb, Cr of 4:2:0, by the standards' own formulas: no library is trusted here."""
+    red, blue = WEIGHTS[matrix]
+    y = signal @ np.array([red, 1 - red - blue, blue])
+    cb, cr = (signal[..., 2] - y) / (2 - 2 * blue), (signal[..., 0] - y) / (2 - 2 * red)
+    step, top = 2 ** (bits - 8), 2**bits - 1
+    scale, low, chroma = (top, 0, top) if full else (219 * step, 16 * step, 224 * step)
+    kind = np.uint16 if bits > 8 else np.uint8
+    return [np.round(p).astype(kind) for p in (low + scale * y, 128 * step + chroma * cb[::2, ::2], 128 * step + chroma * cr[::2, ::2])]
+
+
+def write(path, signals, trc=1, primaries=1, matrix=1, bits=8, full=False, codec="libx265", times=None, base=1000, **options):
+    """A video of full-range R'G'B' signals; `times` in units of 1/base second."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(codec, rate=Fraction(24), options={"preset": "ultrafast", "crf": "1", "x265-params": "log-level=none", **options})
+        stream.height, stream.width = signals[0].shape[:2]
+        stream.pix_fmt = f"yuv420p{bits}le" if bits > 8 else "yuv420p"
+        stream.time_base = stream.codec_context.time_base = Fraction(1, base)
+        context = stream.codec_context
+        context.color_trc, context.color_primaries, context.colorspace, context.color_range = trc, primaries, matrix, 2 if full else 1
+        for i, signal in enumerate(signals):
+            frame = av.VideoFrame(stream.width, stream.height, stream.pix_fmt)
+            for plane, values in zip(frame.planes, planes(signal, matrix, bits, full), strict=True):
+                rows = np.zeros((plane.height, plane.line_size // values.itemsize), values.dtype)
+                rows[:, :values.shape[1]] = values
+                plane.update(rows.tobytes())
+            frame.pts, frame.time_base = times[i] if times is not None else round(i * base / 24), Fraction(1, base)
+            frame.colorspace, frame.color_range = matrix, 2 if full else 1
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    return path
+
+
+def patches(colours) -> np.ndarray:
+    """A row of squares [64, 64 n, 3]."""
+    return np.repeat(np.repeat(np.array(colours, float)[None], 64, 0), 64, 1)
+
+
+def read(path, most=300, long_side=960, report=None) -> list:
+    return list(video.read_video(path, most, long_side, report or Reporter("frames")))
+
+
+def shown(path) -> np.ndarray:
+    """The squares' colours [n, 3] as read."""
+    return read(path)[0].srgb[32, 32::64]
+
+
+def pq(nits: float) -> float:
+    """The signal of SMPTE ST 2084 for a luminance."""
+    y = (nits / 10000) ** (2610 / 16384)
+    return ((3424 / 4096 + 2413 / 128 * y) / (1 + 2392 / 128 * y)) ** (2523 / 32)
+
+
+HDR = [
+    # BT.2408, table 1: an 18 % grey card is a signal of 38 % in both, 26 nits; white is 203 nits, at 75 % and 58 %. 26 / 203 of linear light is sRGB 0.394
+    ("grey card", HLG, [0.38] * 3, [0.394] * 3),
+    ("grey card", PQ, [0.38] * 3, [0.394] * 3),
+    ("reference white", HLG, [0.75] * 3, [0.955] * 3),  # 0.9 of linear light: the shoulder keeps the last tenth for highlights
+    ("reference white", PQ, [0.5807] * 3, [0.955] * 3),
+    ("1000 nits", HLG, [1.0] * 3, [0.996] * 3),
+    ("1000 nits", PQ, [0.7518] * 3, [0.996] * 3),
+    ("black", HLG, [0.0] * 3, [0.0] * 3),
+    # A red of Rec. 709 at 100 and 20 nits is (70.2, 25.5, 21.3) nits of Rec. 2020 (BT.2087); 100 / 203 and 20 / 203 are sRGB 0.731 and 0.347
+    ("red of Rec. 709", PQ, [pq(70.2), pq(25.5), pq(21.3)], [0.731, 0.347, 0.347]),
+]
+
+
+@pytest.mark.parametrize("codec", ["libx265", "libx264"])
+def test_hdr_of_ten_bits_shows_known_patches_in_known_colours(tmp_path, codec):
+    for transfer in (HLG, PQ):
+        known = [(signal, srgb) for _, kind, signal, srgb in HDR if kind == transfer]
+        path = write(tmp_path / f"{transfer}.mov", [patches([signal for signal, _ in known])] * 4, transfer, REC2020, 9, 10, codec=codec)
+        assert np.abs(shown(path) - [srgb for _, srgb in known]).max() < 0.015
+
+
+def test_saturated_colours_keep_luminance_and_hue_and_nothing_leaves_the_gamut():
+    pure = 0.38 * np.eye(3, dtype=np.float32)  # far outside sRGB
+    srgb = to_srgb(pure, PQ, REC2020)
+    light = images.srgb_to_linear(srgb)
+    nits = 26 / 203 * np.array([0.2627, 0.6780, 0.0593])
+    assert np.allclose(light @ [0.2126, 0.7152, 0.0722], nits, rtol=0.02), "BT.2020's luminance weights"
+    assert (srgb.argmax(1) == [0, 1, 2]).all() and srgb.min() >= 0 and srgb.max() <= 1
+    every = np.stack(np.meshgrid(*[np.linspace(0, 1, 9, dtype=np.float32)] * 3), -1)
+    for transfer in (HLG, PQ):
+        srgb = to_srgb(every, transfer, REC2020)
+        assert np.isfinite(srgb).all() and srgb.min() >= 0 and srgb.max() <= 1
+        ramp = to_srgb(np.linspace(0, 1, 200, dtype=np.float32)[:, None].repeat(3, 1), transfer, REC2020)
+        assert (np.diff(ramp[:, 1]) >= 0).all() and np.ptp(ramp, axis=1).max() < 1e-5, "grey stays grey"
+
+
+def test_wide_gamut_without_hdr_is_converted(tmp_path):
+    # Display P3's (0.8, 0.5, 0.4) is sRGB's (0.838, 0.486, 0.374), by the matrices of both standards
+    path = write(tmp_path / "p3.mov", [patches([[0.8, 0.5, 0.4], [0.5] * 3])] * 3, primaries=P3, bits=10)
+    linear = ((np.array([0.8, 0.5, 0.4]) + 0.055) / 1.055) ** 2.4 @ np.array([[1.2249, -0.2249, 0], [-0.0421, 1.0421, 0], [-0.0196, -0.0786, 1.0983]]).T
+    assert np.abs(shown(path) - [1.055 * linear ** (1 / 2.4) - 0.055, [0.5] * 3]).max() < 0.012
+
+
+@pytest.mark.parametrize("full", [False, True])
+def test_full_and_narrow_range_are_told_apart(tmp_path, full):
+    colours = [[0.2] * 3, [0.8] * 3, [0.7, 0.5, 0.4], [0.1, 0.3, 0.2]]
+    assert np.abs(shown(write(tmp_path / "a.mp4", [patches(colours)] * 3, full=full, codec="libx264")) - colours).max() < 0.012
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("turn", [0, 90, 180, 270])
+def test_a_video_is_turned_as_a_player_turns_it_but_never_mirrored(tmp_path, turn, mirrored):
+    stored = patches([[0.9, 0.1, 0.1], [0.1, 0.9, 0.1], [0.1, 0.1, 0.9]])
+    stored[:8] = 1
+    path = write(tmp_path / "turned.mp4", [stored] * 3, codec="libx264")
+    c, s = round(np.cos(np.radians(turn))), round(np.sin(np.radians(turn)))
+    a, b, d, e = (-c, s, s, c) if mirrored else (c, s, -s, c)  # clockwise by `turn`; then left and right exchanged
+    data = bytearray(path.read_bytes())
+    at = data.index(b"tkhd") + 44
+    data[at:at + 36] = struct.pack(">9i", a * 65536, b * 65536, 0, d * 65536, e * 65536, 0, 0, 0, 0x40000000)
+    path.write_bytes(data)
+    report = Reporter("frames")
+    picture = read(path, report=report)[0].srgb
+    expected = np.rot90(stored, -turn // 90)
+    assert picture.shape == expected.shape and np.abs(picture - expected).mean() < 0.02
+    assert [f["problem"][:28] for f in report.findings] == (["The video is marked to be sh"] if mirrored else [])
+
+
+def test_frames_of_a_variable_rate_are_even_in_time(tmp_path):
+    times = np.concatenate([np.arange(0, 1000, 10), np.arange(1000, 3000, 100), [3000]])  # 100 a second, then 10
+    signals = [np.full((64, 64, 3), i / 130) for i in range(len(times))]
+    path = write(tmp_path / "vfr.mkv", signals, times=times.tolist(), codec="libx264", crf="8")
+    pictures = read(path, 13)
+    assert [p.time_s for p in pictures] == pytest.approx(np.arange(13) / 4, abs=0.051)
+    assert [p.time_s for p in pictures] == pytest.approx([times[p.index] / 1000 for p in pictures], abs=0.002)
+    assert [p.srgb.mean() for p in pictures] == pytest.approx([p.index / 130 for p in pictures], abs=0.01), "the frames they say they are"
+
+
+def test_a_pause_in_the_recording_takes_no_frames():
+    times = np.concatenate([np.arange(50), 100000 + np.arange(50)])
+    assert len(evenly_in_time(times, 20)) > 13 and np.diff(evenly_in_time(times, 20)).max() < 10, "of 20, as many as the pause's 30 frames leave"
+    assert evenly_in_time(np.arange(1000) * 512, 300).tolist() == np.round(np.linspace(0, 999, 300)).astype(int).tolist()
+
+
+def test_what_lies_between_wanted_frames_is_jumped_over(tmp_path, monkeypatch):
+    """An hour of video: key frames every second, of which few are needed."""
+    signals = [np.full((64, 64, 3), (i % 200) / 220) for i in range(1200)]
+    path = write(tmp_path / "long.mp4", signals, codec="libx264", g="24", crf="15")
+    decoded = []
+    decode = video._decode
+    monkeypatch.setattr(video, "_decode", lambda *a: (decoded.append(1) or frame for frame in decode(*a)))
+    pictures = read(path, 12)
+    assert [p.index for p in pictures] == np.round(np.linspace(0, 1199, 12)).astype(int).tolist()
+    assert [p.srgb.mean() for p in pictures] == pytest.approx([p.index % 200 / 220 for p in pictures], abs=0.015)
+    assert len(decoded) < 12 * 25
+
+
+def test_8k_is_shrunk_before_it_becomes_an_array(tmp_path):
+    path = tmp_path / "8k.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=Fraction(24))
+        stream.width, stream.height, stream.pix_fmt = 7680, 4320, "yuv420p"
+        frame = av.VideoFrame(7680, 4320, "yuv420p")
+        for plane in frame.planes:
+            plane.update(bytes([128]) * plane.buffer_size)
+        for i in range(2):
+            frame.pts, frame.time_base = i, Fraction(1, 24)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    tracemalloc.start()
+    pictures = [p.srgb.shape for p in video.read_video(path, 300, 960, Reporter("frames"))]
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert pictures == [(540, 960, 3)] * 2 and peak < 60e6, peak
+
+
+def test_a_shrunk_frame_is_the_mean_of_what_it_covers(tmp_path):
+    signal = np.random.default_rng(0).random((96, 128, 1)).repeat(12, 0).repeat(12, 1).repeat(3, 2)
+    path = write(tmp_path / "big.mp4", [signal] * 2, codec="libx264", full=True)
+    small = read(path, long_side=128)[0].srgb
+    assert small.shape == (96, 128, 3) and np.abs(small - signal[6::12, 6::12]).mean() < 0.01
+
+
+def test_unknown_tags_are_read_as_plain_video():
+    signal = np.random.default_rng(1).random((4, 4, 3), np.float32)
+    assert to_srgb(signal, 1, REC709) is signal and to_srgb(signal, 13, 2) is signal
