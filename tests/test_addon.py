@@ -151,6 +151,51 @@ class FakeLayout:
         object.__setattr__(self, name, value)
 
 
+def drawn(panel) -> list[tuple]:
+    layout = FakeLayout()
+    panel.draw(type("Panel", (), {"layout": layout})(), bpy.context)
+    return layout.drawn
+
+
+def test_what_is_wrong_with_a_video_stands_in_the_tab(addon, capture):
+    from core.capture import Capture
+    from core.messages import Problem
+
+    doctor, status = addon("panel").WILDCAP_PT_doctor, addon("status")
+    status.refresh(bpy.context)
+    assert not doctor.poll(bpy.context)
+    Capture(capture).stop("cameras", Problem("Nothing was seen from the left.", "Film from ear to ear."))
+    status.refresh(bpy.context)
+    assert doctor.poll(bpy.context)
+    texts = " ".join(kwargs.get("text", "") for _, _, kwargs in drawn(doctor))
+    assert "Nothing was seen from the left." in texts and "Film from ear to ear." in texts
+    with pytest.raises(RuntimeError, match="no report yet"):
+        bpy.ops.wildcap.open_report()
+
+
+def test_a_finished_stage_can_be_done_again_from_its_row(addon, capture, monkeypatch):
+    from core.capture import Capture
+
+    with pytest.raises(RuntimeError, match="no video"):
+        bpy.ops.wildcap.reconstruct(first="scan")
+    video = capture.parent / "face.mp4"
+    video.write_bytes(b"0")
+    Capture(capture).set_source(video)
+    monkeypatch.setattr(addon("status").Capture, "state", lambda *_: "stale")
+    record = Capture(capture).read()
+    record["stages"]["scan"] = {"seconds": 12.0, "findings": []}
+    addon("status")._known.clear()
+    (capture / "capture.json").write_text(json.dumps(record), encoding="utf-8")
+    addon("status").refresh(bpy.context)
+    rows = drawn(addon("panel").WILDCAP_PT_stages)
+    assert [args[0] for name, args, _ in rows if name == "operator"] == ["wildcap.reconstruct"]
+    started = []
+    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **span: started.append((goal, span)))
+    bpy.ops.wildcap.reconstruct(first="scan")
+    bpy.ops.wildcap.reconstruct()
+    assert started == [("reconstruct", {"first": "scan", "last": "shadow_mask"}), ("reconstruct", {"first": None, "last": "shadow_mask"})]
+
+
 def test_every_panel_draws_in_every_state(addon, capture):
     status = addon("status")
     base = addon("base_panel").WildcapPanel
@@ -161,9 +206,7 @@ def test_every_panel_draws_in_every_state(addon, capture):
         seen = []
         for cls in classes:
             if not hasattr(cls, "poll") or cls.poll(bpy.context):
-                layout = FakeLayout()
-                cls.draw(type("Panel", (), {"layout": layout})(), bpy.context)
-                seen += layout.drawn
+                seen += drawn(cls)
         return [kwargs.get("text", args[1] if len(args) > 1 else "") for name, args, kwargs in seen if name == "operator"]
 
     draw_all()

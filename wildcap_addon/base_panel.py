@@ -4,6 +4,7 @@
 
 from dataclasses import fields
 
+from . import captures
 from .properties import STAGE_KINDS
 
 
@@ -20,6 +21,14 @@ class FoldedPanel(WildcapPanel):
 
     bl_parent_id = "WILDCAP_PT_main"
     bl_options = {'DEFAULT_CLOSED'}
+
+
+class CapturePanel(FoldedPanel):
+    """Mixin: a folded panel that needs a capture."""
+
+    @classmethod
+    def poll(cls, context):
+        return captures.active(context) is not None
 
 
 def draw_settings(layout, item, stage: str, without: tuple[str, ...] = ()) -> None:

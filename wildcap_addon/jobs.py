@@ -43,6 +43,18 @@ def of(root: str) -> Job | None:
     return _jobs.get(root)
 
 
+def can_start(operator, context) -> bool:
+    """Whether there is a capture that no job works on; says in the tooltip of a greyed-out button why not."""
+    item = captures.active(context)
+    if item is None:
+        operator.poll_message_set("There is no face to work on yet: choose a video, or open the sample head")
+    elif of(captures.root(item)) is not None:
+        operator.poll_message_set("This capture is being worked on: wait for it, or click Cancel")
+    else:
+        return True
+    return False
+
+
 def start(item, goal: str, *, first: str | None = None, last: str | None = None) -> Job:
     """Starts the stages from `first` (or from what is not fresh) to `last`. Raises Problem when it cannot."""
     capture, root = captures.folder(item), captures.root(item)
@@ -118,7 +130,6 @@ def _bring_in_results() -> None:
         item = captures.active(bpy.context)
         if bpy.context.mode == 'OBJECT' and item is not None and captures.head(bpy.context, item) is None and captures.folder(item).head.is_file():
             bpy.ops.wildcap.bring_in_head('EXEC_DEFAULT', True)
-
 
 
 def eta(job: Job) -> str:

@@ -60,6 +60,30 @@ class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
             row = column.row()
             row.label(text=stage.label, icon=STATE_ICONS[state])
             row.label(text=_words(state, found.seconds.get(stage.name) if found else None))
+            if stage.name in next_step.BEFORE_MASK and state in ("done", "stale") and job is None:
+                row.operator("wildcap.reconstruct", text="", icon='FILE_REFRESH', emboss=False).first = stage.name
+
+
+class WILDCAP_PT_doctor(WildcapPanel, bpy.types.Panel):
+    """What is wrong with the video and how to shoot it again, as the report tells it."""
+
+    bl_label = "Video Doctor"
+    bl_order = 4
+    bl_parent_id = "WILDCAP_PT_main"
+
+    @classmethod
+    def poll(cls, context):
+        item = captures.active(context)
+        found = status.of(item) if item is not None else None
+        return found is not None and bool(found.findings)
+
+    def draw(self, context):
+        layout = self.layout
+        width = context.region.width if context.region else 300
+        for finding in status.of(captures.active(context)).findings:
+            problems.draw_text(layout.column(), finding["problem"], width, 'CANCEL' if finding["stopped"] else 'ERROR')
+            problems.draw_text(layout.column(), finding["remedy"], width, 'INFO')
+        layout.operator("wildcap.open_report", icon='URL')
 
 
 def gather(context, item) -> next_step.Facts:
@@ -93,4 +117,4 @@ def _words(state: str, seconds: float | None) -> str:
     return {"absent": "done", "stale": "out of date"}.get(state, state)
 
 
-register, unregister = bpy.utils.register_classes_factory((WILDCAP_PT_main, WILDCAP_PT_stages))
+register, unregister = bpy.utils.register_classes_factory((WILDCAP_PT_main, WILDCAP_PT_doctor, WILDCAP_PT_stages))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import bpy
 
-from ..core import stages
+from ..core import report, stages
 from ..core.capture import Capture
 from ..core.messages import Problem
 from . import captures, properties
@@ -31,6 +31,7 @@ class Status:
     has_maps: bool = False
     maps_time: float = 0.0
     render: str = ""
+    findings: tuple[dict, ...] = ()  # what is wrong with the capture, as core.report.findings tells it
     problem: Problem | None = None
 
 
@@ -70,6 +71,7 @@ def look(capture: Capture, settings) -> Status:
         source=record.get("source", ""), stages=states,
         seconds={name: done["seconds"] for name, done in record["stages"].items()},
         has_head=capture.head.is_file(), head_time=_time(capture.head), has_mask=capture.shadow_mask.is_file(),
+        findings=tuple(report.findings(record)),
         has_maps=all(path.is_file() for path in delivered(capture)), maps_time=maps_time, render=render.name if _time(render) >= maps_time else "",
     )
 

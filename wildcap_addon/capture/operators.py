@@ -72,6 +72,23 @@ class WILDCAP_OT_close_capture(BaseOperator, bpy.types.Operator):
         props.active_index = max(0, min(index, len(props.captures) - 1))
 
 
+class WILDCAP_OT_open_report(BaseOperator, bpy.types.Operator):
+    """Open the report in the browser: a picture and the figures of every stage, and what is wrong with the video"""
+
+    bl_idname = "wildcap.open_report"
+    bl_label = "Open Report"
+
+    @classmethod
+    def poll(cls, context):
+        return captures.active(context) is not None
+
+    def work(self, context):
+        report = captures.folder(captures.require(context)).report
+        if not report.is_file():
+            raise Problem("There is no report yet.", "Click Reconstruct: the report is written as its stages finish.")
+        bpy.ops.wm.url_open(url=report.absolute().as_uri())
+
+
 def new_folder(parent: Path, source: Path) -> Path:
     """parent/NAME.wildcap for a source; the same source finds its folder again, another one of the same name gets a number."""
     name = re.sub(r'[<>:"/\\|?*\x00-\x1f]', "_", source.stem if source.is_file() else source.name).strip(" .") or "face"
@@ -82,4 +99,4 @@ def new_folder(parent: Path, source: Path) -> Path:
     raise Problem(f"{parent} holds a thousand captures named {name}.", "Choose another captures folder in the preferences.")
 
 
-CLASSES = (WILDCAP_OT_choose_video, WILDCAP_OT_open_capture, WILDCAP_OT_close_capture)
+CLASSES = (WILDCAP_OT_choose_video, WILDCAP_OT_open_capture, WILDCAP_OT_close_capture, WILDCAP_OT_open_report)

@@ -29,6 +29,7 @@ class WILDCAP_PT_capture(FoldedPanel, bpy.types.Panel):
         item = captures.active(context)
         if item is not None:
             layout.prop(item, "path", text="")
+            layout.operator("wildcap.open_report", icon='URL')
 
 
 CLASSES = (WILDCAP_UL_captures, WILDCAP_PT_capture)

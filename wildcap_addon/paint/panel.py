@@ -4,8 +4,7 @@
 
 import bpy
 
-from .. import captures
-from ..base_panel import FoldedPanel, WildcapPanel
+from ..base_panel import CapturePanel, WildcapPanel
 from . import session
 
 
@@ -30,13 +29,9 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
         layout.prop(context.scene.tool_settings.image_paint, "use_symmetry_x", text="Mirror Left and Right")
 
 
-class WILDCAP_PT_mask(FoldedPanel, bpy.types.Panel):
+class WILDCAP_PT_mask(CapturePanel, bpy.types.Panel):
     bl_label = "Shadow Mask"
     bl_order = 30
-
-    @classmethod
-    def poll(cls, context):
-        return captures.active(context) is not None
 
     def draw(self, context):
         column = self.layout.column()

@@ -5,6 +5,7 @@
 import bpy
 
 from ...core import stages
+from ...core.messages import Problem
 from .. import captures, head, jobs
 from ..base_operator import BaseOperator
 
@@ -15,13 +16,22 @@ class WILDCAP_OT_reconstruct(BaseOperator, bpy.types.Operator):
     bl_idname = "wildcap.reconstruct"
     bl_label = "Reconstruct"
 
+    first: bpy.props.StringProperty(name="From", description="The stage to begin with, done again even if it is fresh; empty: what is not done yet",
+                                    options={'SKIP_SAVE'})
+
+    @classmethod
+    def description(cls, context, properties):
+        return f"Do the stage {stages.by_name(properties.first).label} again, and what follows from it up to the mask" if properties.first else cls.__doc__
+
     @classmethod
     def poll(cls, context):
-        item = captures.active(context)
-        return item is not None and jobs.of(captures.root(item)) is None
+        return jobs.can_start(cls, context)
 
     def work(self, context):
-        jobs.start(captures.require(context), "reconstruct", last=stages.MASK_STAGE)
+        item = captures.require(context)
+        if not captures.folder(item).read().get("source"):
+            raise Problem("This capture has no video: there is nothing to reconstruct it from.", "Choose the video of your own face.")
+        jobs.start(item, "reconstruct", first=self.first or None, last=stages.MASK_STAGE)
 
 
 class WILDCAP_OT_cancel(BaseOperator, bpy.types.Operator):

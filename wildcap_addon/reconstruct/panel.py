@@ -6,16 +6,12 @@ import bpy
 
 from ...core import stages
 from .. import captures
-from ..base_panel import FoldedPanel, draw_settings
+from ..base_panel import CapturePanel, draw_settings
 
 
-class WILDCAP_PT_reconstruct(FoldedPanel, bpy.types.Panel):
+class WILDCAP_PT_reconstruct(CapturePanel, bpy.types.Panel):
     bl_label = "Reconstruction"
     bl_order = 20
-
-    @classmethod
-    def poll(cls, context):
-        return captures.active(context) is not None
 
     def draw(self, context):
         layout = self.layout

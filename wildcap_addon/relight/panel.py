@@ -4,17 +4,12 @@
 
 import bpy
 
-from .. import captures
-from ..base_panel import FoldedPanel
+from ..base_panel import CapturePanel
 
 
-class WILDCAP_PT_relight(FoldedPanel, bpy.types.Panel):
+class WILDCAP_PT_relight(CapturePanel, bpy.types.Panel):
     bl_label = "Relight"
     bl_order = 50
-
-    @classmethod
-    def poll(cls, context):
-        return captures.active(context) is not None
 
     def draw(self, context):
         layout = self.layout

@@ -18,8 +18,7 @@ class WILDCAP_OT_solve(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        item = captures.active(context)
-        return item is not None and jobs.of(captures.root(item)) is None
+        return jobs.can_start(cls, context)
 
     def work(self, context):
         item = captures.require(context)

@@ -5,7 +5,7 @@
 import bpy
 
 from .. import captures, jobs
-from ..base_panel import FoldedPanel, WildcapPanel, draw_settings
+from ..base_panel import CapturePanel, WildcapPanel, draw_settings
 from . import preview
 
 
@@ -23,13 +23,9 @@ class WILDCAP_PT_preview(WildcapPanel, bpy.types.Panel):
         preview.draw(self.layout, captures.folder(captures.active(context)))
 
 
-class WILDCAP_PT_solve(FoldedPanel, bpy.types.Panel):
+class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
     bl_label = "Solve"
     bl_order = 40
-
-    @classmethod
-    def poll(cls, context):
-        return captures.active(context) is not None
 
     def draw(self, context):
         layout = self.layout
