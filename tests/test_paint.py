@@ -71,6 +71,32 @@ def test_painting_sets_everything_up_and_leaving_puts_it_back(addon, capture, on
     assert "WildCap Mask" not in bpy.data.brushes
 
 
+def test_strokes_reach_the_capture_while_the_artist_paints_on(addon, capture, monkeypatch):
+    session, mask_image = addon("paint.session"), addon("paint.mask_image")
+    bpy.ops.wildcap.bring_in_head()
+    (capture / "shadow_mask.png").write_bytes(standin.plain((77,)))
+    bpy.ops.wildcap.paint_mask()
+    image = bpy.context.scene.tool_settings.image_paint.stencil_image
+
+    def file():
+        return (capture / "shadow_mask.png").read_bytes()
+
+    before = file()
+    session.keep_up(stroking=False)
+    assert file() == before, "nothing was painted"
+    for i in range(3):
+        image.pixels.foreach_set(np.full(len(image.pixels), 0.2 + 0.1 * i, np.float32))
+        session.keep_up(stroking=True)
+        assert file() == before
+        monkeypatch.setattr(session, "KEEP_UP_S", 0.0)
+        session.keep_up(stroking=False)
+        assert file() == mask_image.grey_png(mask_image.values(image)) != before
+        before = file()
+    assert [p.read_bytes() for p in (capture / "mask_history").iterdir()] == [standin.plain((77,))], "one session is one step of the history"
+    bpy.ops.wildcap.finish_mask()
+    assert file() == before
+
+
 def test_a_mask_is_not_lost_when_another_file_is_opened(addon, capture):
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.paint_mask()

@@ -45,13 +45,18 @@ def values(image: bpy.types.Image) -> np.ndarray:
     return np.flipud(pixels.reshape(height, width, image.channels)[..., 0])
 
 
-def save(image: bpy.types.Image, capture: Capture) -> None:
-    """Writes the image to shadow_mask.png (8 bit grey), atomically; the mask that was there goes to mask_history."""
+def save(image: bpy.types.Image, capture: Capture, keep: bool = True) -> bool:
+    """Writes the image to shadow_mask.png (8 bit grey), atomically, and with `keep` the mask that was there to mask_history.
+
+    False, and nothing is written, where the file holds that mask already.
+    """
     content = grey_png(values(image))
     if capture.shadow_mask.is_file() and capture.shadow_mask.read_bytes() == content:
-        return
-    mask_history.keep(capture, capture.shadow_mask)
+        return False
+    if keep:
+        mask_history.keep(capture, capture.shadow_mask)
     write(capture.shadow_mask, content)
+    return True
 
 
 def write(path: Path, content: bytes) -> None:

@@ -3,9 +3,10 @@
 """A painting session: from Paint Mask to the saved mask, with everything put back as it was.
 
 Its state is names and values, never references: an undo replaces every data-block. However the artist leaves
-(the button, Tab, opening or saving a file), the mask reaches the capture's folder.
+(the button, Tab, opening or saving a file), the mask reaches the capture's folder, and within seconds of a stroke's end anyway: Blender may be killed.
 """
 
+import time
 from dataclasses import dataclass, field
 
 import bpy
@@ -17,6 +18,8 @@ from . import brush, mask_image, sheet, view
 
 TINT = (1.0, 0.0, 0.0)
 WATCH_S = 0.5
+KEEP_UP_S = 3.0
+"""Between two looks at whether the mask changed; a look costs the reading of its pixels."""
 _SETTINGS = ("mode", "canvas", "use_stencil_layer", "stencil_image", "stencil_color", "invert_stencil")
 
 
@@ -33,6 +36,8 @@ class Session:
     paint: dict = field(default_factory=dict)
     brush: dict = field(default_factory=dict)
     views: list[dict] = field(default_factory=list)
+    looked: float = 0.0  # when the mask was last looked at (time.monotonic)
+    kept: bool = False  # whether the mask of before the session is in the history already
 
 
 _session: Session | None = None
@@ -104,10 +109,18 @@ def end(context) -> None:
 
 
 def save() -> None:
-    """Writes the mask to the capture, atomically. Raises Problem when it cannot."""
+    """Writes the mask to the capture, atomically, if it changed; only the mask of before the session goes to the history. Raises Problem when it cannot."""
     mask = bpy.data.images.get(_session.mask) if _session else None
-    if mask is not None:
-        mask_image.save(mask, Capture(_session.root))
+    if mask is not None and mask_image.save(mask, Capture(_session.root), keep=not _session.kept):
+        _session.kept = True
+
+
+def keep_up(stroking: bool) -> None:
+    """Saves a mask that was painted on, every few seconds, but not in the middle of a stroke."""
+    mask = bpy.data.images.get(_session.mask)
+    if not stroking and mask is not None and mask.is_dirty and time.monotonic() - _session.looked >= KEEP_UP_S:
+        _session.looked = time.monotonic()
+        _save_or_show()
 
 
 def forget() -> None:
@@ -173,6 +186,8 @@ def _watch() -> float | None:
             except Problem as problem:
                 problems.show(root, problem)
                 return WATCH_S * 4
+        else:
+            keep_up(any(operator.bl_idname == 'PAINT_OT_image_paint' for operator in window.modal_operators))
     return WATCH_S
 
 

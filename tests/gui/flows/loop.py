@@ -70,6 +70,11 @@ def paint(root: Path):
     changed = np.argwhere(np.abs(after - before) > 0.5)
     d.say(f"3D stroke changed {len(changed)} texels around {np.round(changed.mean(0))}, aimed at {texel}")
     d.screenshot("4_stroke_on_head")
+    stroked = time.monotonic()
+    kept = root / "shadow_mask.png"
+    yield from d.until(lambda: kept.is_file() and np.abs(read_grey(kept) - after).max() < 0.01, "the mask in the capture", 5)
+    assert bpy.context.mode == 'PAINT_TEXTURE'
+    d.say(f"The stroke was in shadow_mask.png after {time.monotonic() - stroked:.1f} s, with the brush still in hand")
 
     yield from d.key('Z', ctrl=True)
     assert np.abs(mask_in_blender() - before).max() < 0.01, "Ctrl-Z takes the stroke back"
