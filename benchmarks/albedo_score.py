@@ -69,13 +69,13 @@ def score_capture(capture: Capture, truth: Path, pictures: Path | None = None, t
             continue
         predicted, hit = _render(caster, albedo, views[true.frame], true.face.shape)
         coverage.append((hit & true.face).sum() / true.face.sum())
-        results.append(_compare(predicted, true, true.face & hit))
+        results.append(compare(predicted, true, true.face & hit))
         if pictures:
             mask = (true.face & hit)[..., None]
             images.write_srgb(pictures / f"{true.frame:04d}.jpg", np.hstack([true.albedo * mask, predicted * mask]))
     if not results:
         raise Problem("None of the frames with a known albedo was registered.", "Look at the cameras stage in the report.")
-    return {"views": len(results), "frames_not_registered": missing, "face_coverage": float(np.mean(coverage)), **_mean(results)}
+    return {"views": len(results), "frames_not_registered": missing, "face_coverage": float(np.mean(coverage)), **mean_scores(results)}
 
 
 def score_floors(truth: Path) -> dict:
@@ -84,10 +84,10 @@ def score_floors(truth: Path) -> dict:
     raw, flat = [], []
     for number, image in enumerate(_video(truth / "capture.mp4")):
         if (true := frames.get(number)) is not None:
-            raw.append(_compare(image, true, true.face))
+            raw.append(compare(image, true, true.face))
             tone = images.linear_to_srgb(images.srgb_to_linear(true.albedo[true.face]).mean(0))
-            flat.append(_compare(np.broadcast_to(tone, true.albedo.shape), true, true.face))
-    return {"raw video": _mean(raw), "flat true tone": _mean(flat)}
+            flat.append(compare(np.broadcast_to(tone, true.albedo.shape), true, true.face))
+    return {"raw video": mean_scores(raw), "flat true tone": mean_scores(flat)}
 
 
 def _video(path: Path) -> Iterator[np.ndarray]:
@@ -107,7 +107,8 @@ def _render(caster: raster.RayCaster, texture: np.ndarray, view: View, shape: tu
     return picture, hit
 
 
-def _compare(predicted: np.ndarray, true: Truth, mask: np.ndarray) -> dict:
+def compare(predicted: np.ndarray, true: Truth, mask: np.ndarray) -> dict:
+    """One frame's figures: predicted albedo sRGB [H, W, 3] against the truth over the pixels of `mask`."""
     rows, columns = (np.flatnonzero(mask.any(axis)) for axis in (1, 0))
     box = tuple(slice(max(side[0] - 40, 0), side[-1] + 41) for side in (rows, columns))  # wider than any of the measures' filters
     predicted, mask = predicted[box], mask[box]
@@ -147,7 +148,8 @@ def _shadow_step(residual: np.ndarray, mask: np.ndarray, shadow: np.ndarray) -> 
     return float(np.median(sides[0]) - np.median(sides[1])) if min(map(len, sides)) > 500 else math.nan
 
 
-def _mean(results: list[dict]) -> dict:
+def mean_scores(results: list[dict]) -> dict:
+    """The mean over frames of what `compare` gives."""
     figures = {kind: {name: float(np.mean([r[kind][name] for r in results])) for name in results[0][kind]} for kind in ("raw", "gain")}
     for name in ("detail", "shadow_step"):
         values = [r[name] for r in results if not math.isnan(r[name])]

@@ -59,6 +59,11 @@ def template_hash(mesh: Mesh) -> str:
     return digest.hexdigest()
 
 
+def is_built_in(mesh: Mesh) -> bool:
+    """Whether a mesh has this head's topology and UVs, so that its masks hold for it."""
+    return mesh.uvs is not None and template_hash(mesh) == _record()["hash"]
+
+
 @cache
 def _record() -> dict:
     return json.loads((ASSETS / "head.json").read_text(encoding="utf-8"))

@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("flip_evaluator")
 
-from benchmarks.albedo_score import Truth, _compare  # noqa: E402
+from benchmarks.albedo_score import Truth, compare  # noqa: E402
 from core import images  # noqa: E402
 
 
@@ -23,20 +23,20 @@ def truth():
 
 
 def test_a_constant_error_of_a_tenth_is_twenty_decibels(truth):
-    assert _compare(truth.albedo - 0.1, truth, truth.face)["raw"]["psnr"] == pytest.approx(20, abs=1e-3)
+    assert compare(truth.albedo - 0.1, truth, truth.face)["raw"]["psnr"] == pytest.approx(20, abs=1e-3)
 
 
 def test_a_gain_per_channel_is_free_where_the_score_says_so(truth):
     tinted = images.linear_to_srgb(images.srgb_to_linear(truth.albedo) * np.float32([0.5, 0.8, 0.9]))
-    figures = _compare(tinted, truth, truth.face)
+    figures = compare(tinted, truth, truth.face)
     assert figures["raw"]["psnr"] < 25 and 50 < figures["gain"]["psnr"]
     assert figures["detail"] == pytest.approx(1, abs=1e-3)
 
 
 def test_a_baked_shadow_is_a_step_of_its_logarithm(truth):
     shaded = images.srgb_to_linear(truth.albedo) * np.where(truth.shadow, 0.5, 1)[..., None]
-    assert _compare(images.linear_to_srgb(shaded), truth, truth.face)["shadow_step"] == pytest.approx(np.log(2), abs=0.02)
+    assert compare(images.linear_to_srgb(shaded), truth, truth.face)["shadow_step"] == pytest.approx(np.log(2), abs=0.02)
 
 
 def test_a_flat_colour_has_no_detail(truth):
-    assert _compare(np.full_like(truth.albedo, 0.5), truth, truth.face)["detail"] == 0
+    assert compare(np.full_like(truth.albedo, 0.5), truth, truth.face)["detail"] == 0

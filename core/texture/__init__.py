@@ -8,10 +8,13 @@ that the tone comes from all views and the pores from the one that saw them best
 
 from __future__ import annotations
 
+import json
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
-from .. import images, meshes
+from .. import images, meshes, template
 from ..capture import Capture
 from ..messages import Problem, Reporter
 from ..settings import Settings
@@ -19,7 +22,7 @@ from ..views import read_views
 from .align import align
 from .blend import bands_of, blend, equalise, robust_weights
 from .fill import fill
-from .projection import Surface, observe
+from .projection import Observation, Surface, observe
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
@@ -27,34 +30,35 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
     Raises Problem where no view was delit or none of them sees the head.
     """
-    size = settings.texture.size
     head = meshes.read_obj(capture.head)
     if head.uvs is None:
         raise Problem("The registered head has no UVs.", "Run the stage registration again.")
-    observations, surface = _observe_all(capture, head, size, report)
-
-    gains = equalise(observations)
-    report.log("Exposure gains of the views: " + ", ".join(f"{gain:.2f}" for gain in np.exp(gains.mean(1))))
-    shift = align(observations, surface, report)
-    robust_weights(observations)
-    log_texture = blend(observations, report)
-
-    seen = 1 - np.prod([1 - o.quality for o in observations], axis=0)
-    confidence = np.where(surface.covered, seen, 0).astype(np.float32)
-    if confidence[surface.covered].max(initial=0) <= 0:
+    observations, surface = observe_all(capture, head, settings.texture.size, report)
+    built = build(observations, surface, settings, report)
+    if built.confidence[surface.covered].max(initial=0) <= 0:
         raise Problem("No delit frame sees the head.", "Check the cameras' and the head's pictures in the report, and run those stages again.")
-    texture = fill(np.exp(log_texture), confidence, surface.covered)
+    texture = fill(np.exp(built.log_texture), built.confidence, surface.covered)
 
     images.write_linear(capture.texture, texture)
     images.write_srgb(capture.texture_png, images.linear_to_srgb(texture))
-    images.write_data(capture.texture_confidence, confidence)
-    _leave_figures(capture, report, observations, log_texture, texture, confidence, surface.covered, shift, gains)
+    images.write_data(capture.texture_confidence, built.confidence)
+    _leave_figures(capture, report, observations, built, texture, surface.covered)
 
 
-def _observe_all(capture, head, size, report):
-    """What each delit view sees of the surface: (list of Observation, Surface)."""
-    import json
+@dataclass
+class Built:
+    """log_texture [S, S, 3] natural logarithm of linear colour; confidence [S, S] in [0, 1]; log gains [V, 3]; mean warp in texels;
+    losses of the perceptual step before and after ({} where it is off)."""
 
+    log_texture: np.ndarray
+    confidence: np.ndarray
+    gains: np.ndarray
+    shift: float
+    losses: dict
+
+
+def observe_all(capture: Capture, head: meshes.Mesh, size: int, report: Reporter) -> tuple[list[Observation], Surface]:
+    """What each delit view sees of the head on a map of `size`; the frame's own sharpness counts. Raises Problem where no view was delit."""
     sharpness = {f["name"]: f["sharpness"] for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
     views = [(view, path) for view in read_views(capture) if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
     if not views:
@@ -70,7 +74,28 @@ def _observe_all(capture, head, size, report):
     return observations, surface
 
 
-def _leave_figures(capture, report, observations, log_texture, texture, confidence, covered, shift, gains):
+def build(observations: list[Observation], surface: Surface, settings: Settings, report: Reporter, aligned: bool = True) -> Built:
+    """One map from what the views see; changes the observations (gains, warps, weights). `aligned`: off for measurements only."""
+    gains = equalise(observations)
+    report.log("Exposure gains of the views: " + ", ".join(f"{gain:.2f}" for gain in np.exp(gains.mean(1))))
+    shift = align(observations, surface, report) if aligned else 0.0
+    robust_weights(observations)
+    log_texture, losses = blend(observations, report), {}
+    seen = 1 - np.prod([1 - o.quality for o in observations], axis=0)
+    confidence = np.where(surface.covered, seen, 0).astype(np.float32)
+    if settings.texture.perceptual > 0:
+        from .features import load_features  # torch is only needed here
+        from .perceptual import refine
+
+        features = load_features(settings.texture.perceptual_network, settings.device)
+        wanted = (confidence > 0.3) & (template.mask("face", len(confidence)) > 0.5 if template.is_built_in(surface.caster.mesh) else True)
+        log_texture, losses = refine(log_texture, observations, surface, wanted, features, settings.texture.perceptual, report, settings.device)
+        report.figure("perceptual_network", features.name)
+    return Built(log_texture, confidence, gains, shift, losses)
+
+
+def _leave_figures(capture, report, observations, built, texture, covered):
+    log_texture, confidence = built.log_texture, built.confidence
     height = min(512, len(texture))
     sheet = [images.resize(images.linear_to_srgb(texture), height, height), np.repeat(images.resize(confidence, height, height)[..., None], 3, 2)]
     images.write_srgb(capture.picture("texture", "map_and_confidence"), np.hstack(sheet))
@@ -79,6 +104,9 @@ def _leave_figures(capture, report, observations, log_texture, texture, confiden
     report.figure("views", len(observations))
     report.figure("seen_percent", round(100 * float((confidence[covered] > 0.05).mean()), 1))
     report.figure("disagreement_percent", round(100 * float(np.median(np.concatenate(residuals))), 2))
-    report.figure("alignment_shift_texels", round(shift, 2))
-    report.figure("gain_spread_percent", round(100 * float(np.std(gains)), 2))
+    report.figure("alignment_shift_texels", round(built.shift, 2))
+    report.figure("gain_spread_percent", round(100 * float(np.std(built.gains)), 2))
     report.figure("fine_contrast_percent", round(100 * float(np.std(fine[cv2.erode((confidence > 0.3).astype(np.uint8), np.ones((9, 9))) > 0])), 2))
+    if built.losses:
+        report.figure("perceptual_loss_before", round(built.losses["before"], 5))
+        report.figure("perceptual_loss_after", round(built.losses["after"], 5))

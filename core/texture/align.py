@@ -41,7 +41,7 @@ def align(observations: list[Observation], surface: Surface, report: Reporter) -
         for warp, pixels, observation in zip(warps, start, observations, strict=True):
             warp -= drift  # the views may move against each other, not the texture over the surface
             _limit(warp, LARGEST * size)
-            observation.resample(_moved(pixels, warp))
+            observation.resample(_moved(pixels, warp), warp)
     lengths = [np.linalg.norm(warp, axis=-1)[o.weight > 0.25 * o.weight.max()] for warp, o in zip(warps, observations, strict=True)]
     return float(np.concatenate(lengths).mean())
 

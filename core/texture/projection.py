@@ -43,16 +43,21 @@ class Surface:
 class Observation:
     """One view in UV space, float32 [S, S, ...]; zero weight where it sees nothing."""
 
-    name: str
+    view: View
     picture: np.ndarray  # linear [H, W, 3]
     pixels: np.ndarray  # [S, S, 2] where in the picture each texel is seen
     log_colour: np.ndarray  # [S, S, 3] natural logarithm of linear colour
     quality: np.ndarray  # [S, S] in [0, 1]: angle and silhouette only; makes the confidence map
     weight: np.ndarray  # [S, S] quality with distance and sharpness: who wins where
+    warp: np.ndarray | None = None  # [S, S, 2] texels by which the alignment moved it: `pixels` here is what was there, one warp further
 
-    def resample(self, pixels: np.ndarray) -> None:
+    @property
+    def name(self) -> str:
+        return self.view.name
+
+    def resample(self, pixels: np.ndarray, warp: np.ndarray) -> None:
         """Reads the picture anew, at other pixels [S, S, 2]; one resampling from the original, never two."""
-        self.pixels = pixels
+        self.pixels, self.warp = pixels, warp
         self.log_colour = log_colours(self.picture, pixels)
 
 
@@ -76,7 +81,7 @@ def observe(view: View, picture: np.ndarray, surface: Surface, sharpness: float)
     pixels = _scatter(np.nan_to_num(xy, nan=-1) * scale, covered)
     reference = np.median(distance[seen]) if seen.any() else 1.0
     weight = quality ** 2 * sharpness * (reference / distance) ** 2
-    return Observation(view.name, picture, pixels, log_colours(picture, pixels), _scatter(quality, covered), _scatter(weight, covered))
+    return Observation(view, picture, pixels, log_colours(picture, pixels), _scatter(quality, covered), _scatter(weight, covered))
 
 
 def log_colours(picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
