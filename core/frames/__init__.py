@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stage frames: a video or a folder of photographs becomes frames/, with the sharpness and the turn of the head in each.
+"""Stage frames: a video or a folder of photographs becomes frames/: sharp ones, in one exposure, with the turn of the head in each.
 
-frames.json: {"kind": "video" or "photographs", "frames": [{name, video_frame, time_s, source, sharpness, selected,
-face_box (px) or null, face_score, yaw_deg or null, focal_px or null}]}. Pixels are those of the written frame.
+frames.json: {"kind": "video" or "photographs", "frames": [{name, video_frame, time_s, source, size [w, h], sharpness, selected,
+face_box (px) or null, face_score, yaw_deg or null, focal_px or null, blur, brightness, clipped, noise, eyes_open [right, left] or null,
+blink, other_face, gain [3]}]}. Pixels are those of the written frame, to which the gains have been applied already: every stage, and any tool
+that is given the folder, sees one exposure. The mask of the person is not stored: faces.segment_person gives it in the time a file is read in.
 """
 
 from __future__ import annotations
@@ -16,20 +18,25 @@ from .. import faces, images
 from ..capture import Capture, replacing_folder, write_json
 from ..messages import Problem, Reporter
 from ..settings import Settings
+from .doctor import FEW, blurred, diagnose, examine
+from .drift import content_of, gains_of
+from .eyes import blinks
 from .photographs import read_photographs
 from .select import select_views, sharpness, turns
 from .source import Picture
 from .video import read_video
 
 FEWEST = 3
-FEW = 12
-"""Below this many frames the result is accepted but the report warns."""
 STILL = 0.004
 """Mean difference of two small frames, in [0, 1], below which the camera has not moved: above compression noise, far below a step aside."""
+RIVAL = 1.5
+"""A face this much more prominent than the one that was followed takes its place."""
+READING = 0.9
+"""Share of the stage's time that reading takes, for the progress."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Writes capture.frames. Raises Problem where there are fewer than three readable frames, no face, or no motion."""
+    """Writes capture.frames. Raises Problem where there are fewer than three readable frames, no face, two equal ones, or no motion."""
     source = capture.read()["source"]
     path = Path(source)
     if not source or not path.exists():
@@ -39,38 +46,93 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     read = read_photographs if photographs else read_video
     pictures = read(path, settings.frames.max_frames, settings.frames.long_side, report)
     with replacing_folder(capture.frames) as folder:
-        records, thumbnails = _write_frames(pictures, folder, report)
+        records, thumbnails, contents = _write_frames(pictures, folder, report)
         _check(records, thumbnails, photographs)
-        turn = turns(records)
-        for record in records:
-            record["selected"] = False
-        for index in select_views(np.array([r["sharpness"] for r in records]), turn, settings.frames.views):
-            records[index]["selected"] = True
+        records, contents, dropped = _drop_blurred(records, contents, folder)
+        _even_out(records, contents, folder, report)
+        for record, blink in zip(records, blinks([r["eyes_open"] for r in records], [r["time_s"] for r in records]), strict=True):
+            record["blink"] = bool(blink)
+        diagnose(records, dropped, photographs, report)
+        _select(records, settings.frames.views)
         write_json(folder / "frames.json", {"kind": "photographs" if photographs else "video", "frames": records})
         report.check()
-    _report(capture, records, report)
+    _report(capture, records, dropped, report)
 
 
-def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[dict], np.ndarray]:
-    """Consumes the pictures; their records and thumbnails [N, 32, 32]."""
-    records, thumbnails, last = [], [], None
+def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[dict], np.ndarray, list]:
+    """Consumes the pictures; their records, thumbnails [N, 32, 32] and what the exposure is compared by."""
+    records, thumbnails, contents, last = [], [], [], None
     for picture in pictures:
         name = f"{picture.index:05d}.jpg"
         images.write_srgb(folder / name, picture.srgb, quality=95)
-        last = face = faces.detect(picture.srgb, last)
-        records.append(_record(picture, name, face))
+        face, rival = _subject(picture.srgb, last)
+        last = face or last
+        records.append(_record(picture, name, face, last, rival))
         thumbnails.append(images.resize(picture.srgb.mean(-1), 32, 32))
-        report.progress(picture.done, picture.of, f"frame {len(records)}, {'face found' if face else 'no face'}")
-    return records, np.array(thumbnails)
+        contents.append(content_of(picture.srgb))
+        report.progress(READING * picture.done, picture.of, f"frame {len(records)}, {'face found' if face else 'no face'}")
+    return records, np.array(thumbnails), contents
 
 
-def _record(picture: Picture, name: str, face: faces.Face | None) -> dict:
+def _subject(srgb: np.ndarray, last: faces.Face | None) -> tuple[faces.Face | None, float]:
+    """The face of the subject, the one followed so far unless another is far more prominent, and how prominent the next is beside it."""
+    height, width = srgb.shape[:2]
+    face = faces.detect(srgb, last)
+    if face is None:
+        return None, 0.0
+    others = faces.detect_others(srgb, face)
+    weigh = lambda each: faces.prominence(each, width, height)  # noqa: E731
+    rival = max(others, key=weigh, default=None)
+    if rival is None:
+        return face, 0.0
+    if weigh(rival) > RIVAL * weigh(face):
+        face, rival = rival, face
+    return face, weigh(rival) / weigh(face)
+
+
+def _record(picture: Picture, name: str, face: faces.Face | None, last: faces.Face | None, rival: float) -> dict:
+    """`last` tells where the head is, more or less, where no face is found."""
     return {
         "name": name, "video_frame": picture.index, "time_s": None if picture.time_s is None else round(picture.time_s, 4), "source": picture.source,
+        "size": [picture.srgb.shape[1], picture.srgb.shape[0]],
         "sharpness": round(sharpness(picture.srgb, face.box if face else None), 5), "selected": False,
         "face_box": [round(x, 1) for x in face.box] if face else None, "face_score": round(face.score, 4) if face else 0.0,
         "yaw_deg": round(face.yaw_deg, 1) if face else None, "focal_px": picture.focal_px,
+        **examine(picture.srgb, last.box if last else None),
+        "eyes_open": [round(x, 3) for x in faces.eye_openness(picture.srgb, face)] if face else None, "blink": False,
+        "other_face": round(rival, 3), "gain": [1.0, 1.0, 1.0],
     }
+
+
+def _drop_blurred(records: list[dict], contents: list, folder: Path) -> tuple[list[dict], list, list[str]]:
+    """Without the frames that are blurred by comparison, whose files go too; and their names."""
+    bad = blurred(records)
+    dropped = [r["name"] for r, out in zip(records, bad, strict=True) if out]
+    for name in dropped:
+        (folder / name).unlink()
+    return [r for r, out in zip(records, bad, strict=True) if not out], [c for c, out in zip(contents, bad, strict=True) if not out], dropped
+
+
+def _even_out(records: list[dict], contents: list, folder: Path, report: Reporter) -> None:
+    """Brings all frames to the exposure and white balance of the median frame; those that have it stay byte for byte."""
+    gains = gains_of(contents, report.check)
+    for done, (record, gain) in enumerate(zip(records, gains, strict=True)):
+        if np.abs(np.log(gain)).max() < 0.005:
+            continue
+        report.progress(READING * len(records) + (1 - READING) * done, len(records), "evening out the exposure")
+        record["gain"] = [round(float(g), 4) for g in gain]
+        path = folder / record["name"]
+        images.write_srgb(path, images.linear_to_srgb(images.read_linear(path) * gain.astype(np.float32)), quality=95)
+
+
+def _select(records: list[dict], count: int) -> None:
+    """Marks the V views. A blink is none of them as long as there are other frames to choose from."""
+    turn = turns(records)
+    open_ = np.array([not r["blink"] for r in records])
+    if (np.isfinite(turn) & open_).sum() >= min(count, FEWEST):
+        turn = np.where(open_, turn, np.nan)
+    for index in select_views(np.array([r["sharpness"] for r in records]), turn, count):
+        records[index]["selected"] = True
 
 
 def _check(records: list[dict], thumbnails: np.ndarray, photographs: bool) -> None:
@@ -86,19 +148,23 @@ def _check(records: list[dict], thumbnails: np.ndarray, photographs: bool) -> No
                       "Let the person sit still and move the camera from one ear around the face to the other.")
 
 
-def _report(capture: Capture, records: list[dict], report: Reporter) -> None:
+def _report(capture: Capture, records: list[dict], dropped: list[str], report: Reporter) -> None:
     found = [r for r in records if r["face_box"]]
     yaws = [r["yaw_deg"] for r in found]
+    gains = np.array([r["gain"] for r in records])
     report.figure("frames", len(records))
+    report.figure("frames_dropped_as_blurred", len(dropped))
+    report.figure("frames_with_a_blink", sum(r["blink"] for r in records))
     report.figure("views_selected", sum(r["selected"] for r in records))
     report.figure("share_with_face", round(len(found) / len(records), 3))
     report.figure("median_sharpness", round(float(np.median([r["sharpness"] for r in found])), 4))
+    report.figure("median_blur", round(float(np.median([r["blur"] for r in found])), 3))
+    report.figure("face_width_px", round(float(np.median([r["face_box"][2] - r["face_box"][0] for r in found]))))
+    report.figure("exposure_drift_percent", round(100 * float((gains.max(0) / gains.min(0)).max() - 1), 1))
     report.figure("yaw_from_deg", min(yaws))
     report.figure("yaw_to_deg", max(yaws))
     if len(records) < FEW:
         report.figure("expected_quality", "rough: few frames")
-        report.log(f"Only {len(records)} frames: expect a rough head with holes at the sides and a texture from few directions. "
-                   "60 or more frames around the face give a full one.")
     chosen = [images.read_srgb(capture.frames / r["name"]) for r in records if r["selected"]]
     images.write_srgb(capture.picture("frames", "selected"), _contact_sheet(chosen))
 
