@@ -97,6 +97,36 @@ def test_strokes_reach_the_capture_while_the_artist_paints_on(addon, capture, mo
     assert file() == before
 
 
+def test_the_buttons_change_the_mask_as_they_say(addon, capture):
+    edits = addon("paint.edits")
+    spot = np.zeros((256, 256), np.float32)
+    spot[100:130, 40:80] = 1
+    grown = edits.grow(spot)
+    assert grown[99, 60] == 1 and grown[98, 60] == 0 and grown.sum() > spot.sum()
+    large = np.kron(spot, np.ones((4, 4), np.float32))
+    assert np.array_equal(edits.shrink(edits.grow(large)), large), "a rectangle is whole again"
+    assert edits.grow(large)[100 * 4 - 4, 60 * 4] == 1 and edits.grow(large)[100 * 4 - 5, 60 * 4] == 0
+    soft = edits.soften(large)
+    assert 0.3 < soft[100 * 4, 60 * 4] < 0.7 and soft[110 * 4, 60 * 4] == 1 and soft[0, 0] == 0
+    assert np.array_equal(edits.mirror(spot)[:, ::-1], edits.mirror(spot)) and edits.mirror(spot)[110, 255 - 60] == 1
+
+    bpy.ops.wildcap.bring_in_head()
+    assert not bpy.ops.wildcap.edit_mask.poll()
+    bpy.ops.wildcap.paint_mask()
+    image = bpy.context.scene.tool_settings.image_paint.stencil_image
+    mask_image = addon("paint.mask_image")
+    first = np.zeros((image.size[1], image.size[0]), np.float32)
+    first[5:9, 40:50] = 1
+    mask_image.set_values(image, first)
+    assert np.array_equal(mask_image.values(image), first)
+    bpy.ops.wildcap.edit_mask(kind='INVERT')
+    assert np.array_equal(mask_image.values(image), 1 - first)
+    bpy.ops.wildcap.edit_mask(kind='PROPOSAL')
+    assert mask_image.values(image).max() == 0
+    bpy.ops.wildcap.finish_mask()
+    assert (capture / "shadow_mask.png").read_bytes() == mask_image.grey_png(np.zeros_like(first))
+
+
 def test_a_mask_is_not_lost_when_another_file_is_opened(addon, capture):
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.paint_mask()

@@ -16,6 +16,10 @@ from ..core import stages
 STAGE_KINDS = {stage.name: type(getattr(core_settings.Settings(), stage.name)) for stage in stages.STAGES}
 
 
+PATHS = {"folder": {"subtype": 'DIR_PATH'}, "template": {"subtype": 'FILE_PATH'}}
+"""Settings that name a place on the disk, and how they are chosen."""
+
+
 def settings_group(stage: str, kind: type) -> type:
     """A PropertyGroup with one property per field of a stage's settings."""
     annotations = {f.name: _property(f, core_settings.tooltips(kind)[f.name]) for f in fields(kind)}
@@ -35,7 +39,7 @@ def _property(field, tooltip: str):
         return bpy.props.IntProperty(**common, **limits)
     if isinstance(field.default, float):
         return bpy.props.FloatProperty(**common, **limits)
-    return bpy.props.StringProperty(**common, **({"subtype": 'DIR_PATH'} if field.name == "folder" else {}))
+    return bpy.props.StringProperty(**common, **PATHS.get(field.name, {}))
 
 
 GROUPS = {stage: settings_group(stage, kind) for stage, kind in STAGE_KINDS.items()}
@@ -45,7 +49,7 @@ def _apply_quality(self, context):
     preset = core_settings.preset(self.quality)
     for stage, kind in STAGE_KINDS.items():
         for f in fields(kind):
-            if f.name not in ("skin_tone", "folder", "delighter"):  # about the face, not about quality
+            if f.name not in ("skin_tone", "folder", "delighter", "template", "new_atlas"):  # about the face, not about quality
                 setattr(getattr(self, stage), f.name, getattr(getattr(preset, stage), f.name))
 
 
@@ -94,8 +98,9 @@ def values(item: WILDCAP_PG_capture) -> dict:
     """The settings of a capture as a job file holds them: stage -> {name: value}, seed, device."""
     found = {stage: {f.name: getattr(getattr(item, stage), f.name) for f in fields(kind)} for stage, kind in STAGE_KINDS.items()}
     found["solve"]["skin_tone"] = ",".join(f"{c:.4f}" for c in item.skin_tone) if item.use_skin_tone else "auto"
-    if found["delight"]["folder"]:
-        found["delight"]["folder"] = str(Path(bpy.path.abspath(found["delight"]["folder"])))
+    for stage, name in (("delight", "folder"), ("registration", "template")):
+        if found[stage][name]:
+            found[stage][name] = str(Path(bpy.path.abspath(found[stage][name])))
     return {**found, "seed": item.seed, "device": item.device}
 
 

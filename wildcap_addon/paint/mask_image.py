@@ -45,6 +45,29 @@ def values(image: bpy.types.Image) -> np.ndarray:
     return np.flipud(pixels.reshape(height, width, image.channels)[..., 0])
 
 
+def set_values(image: bpy.types.Image, mask: np.ndarray) -> None:
+    """Puts a mask [H, W] in [0, 1], rows from the top, into the image."""
+    width, height = image.size
+    pixels = np.ones((height, width, image.channels), np.float32)
+    pixels[..., :min(3, image.channels)] = np.flipud(mask)[..., None]
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+
+
+def proposal(image: bpy.types.Image, capture: Capture) -> np.ndarray:
+    """The mask that the capture proposes [H, W], of the image's size. Raises Problem where there is none, or one of another size."""
+    if not capture.shadow_mask_auto.is_file():
+        raise Problem("This capture has no proposal for its shadow mask.", "Click Reconstruct, or paint the mask by hand.")
+    other = bpy.data.images.load(str(capture.shadow_mask_auto))
+    try:
+        other.colorspace_settings.name = 'Non-Color'
+        if tuple(other.size) != tuple(image.size):
+            other.scale(*image.size)
+        return values(other).copy()
+    finally:
+        bpy.data.images.remove(other)
+
+
 def save(image: bpy.types.Image, capture: Capture, keep: bool = True) -> bool:
     """Writes the image to shadow_mask.png (8 bit grey), atomically, and with `keep` the mask that was there to mask_history.
 

@@ -4,9 +4,12 @@
 
 import bpy
 
+from ...core.capture import Capture
 from .. import captures
 from ..base_operator import BaseOperator
-from . import session
+from . import edits, mask_image, session
+
+EDITS = {"GROW": edits.grow, "SHRINK": edits.shrink, "SOFTEN": edits.soften, "MIRROR": edits.mirror, "INVERT": edits.invert, "CLEAR": edits.clear}
 
 
 class WILDCAP_OT_paint_mask(BaseOperator, bpy.types.Operator):
@@ -39,4 +42,36 @@ class WILDCAP_OT_finish_mask(BaseOperator, bpy.types.Operator):
         session.end(context)
 
 
-CLASSES = (WILDCAP_OT_paint_mask, WILDCAP_OT_finish_mask)
+class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
+    """Change the whole mask at once; Ctrl-Z takes it back as it does a stroke"""
+
+    bl_idname = "wildcap.edit_mask"
+    bl_label = "Edit Mask"
+    bl_options = {'REGISTER'}  # a step of the image's own undo is pushed below: the global one knows nothing of pixels
+
+    kind: bpy.props.EnumProperty(name="Change", options={'SKIP_SAVE'}, items=[
+        ('GROW', "Grow", "Wider by a few texels"), ('SHRINK', "Shrink", "Narrower by a few texels"), ('SOFTEN', "Soften", "Fade the borders"),
+        ('MIRROR', "Mirror", "What is masked on one side is masked on the other, too"), ('INVERT', "Invert", "Shadow where there was none"),
+        ('CLEAR', "Clear", "No shadow anywhere"), ('PROPOSAL', "Back to Proposal", "Start again from the mask that was found by itself")])
+
+    @classmethod
+    def description(cls, context, properties):
+        return cls.bl_rna.properties["kind"].enum_items[properties.kind].description + "; Ctrl-Z takes it back"
+
+    @classmethod
+    def poll(cls, context):
+        if not session.active():
+            cls.poll_message_set("Click Paint Mask first: the mask is changed while it is painted")
+        return session.active()
+
+    def work(self, context):
+        image = session.mask()
+        mask = mask_image.values(image)
+        changed = mask_image.proposal(image, Capture(session.root())) if self.kind == 'PROPOSAL' else EDITS[self.kind](mask)
+        if not image.is_dirty:  # the session's first change: the step that Ctrl-Z comes back to
+            session.push_undo(context)
+        mask_image.set_values(image, changed)
+        session.push_undo(context)
+
+
+CLASSES = (WILDCAP_OT_paint_mask, WILDCAP_OT_finish_mask, WILDCAP_OT_edit_mask)

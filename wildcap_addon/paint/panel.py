@@ -6,6 +6,7 @@ import bpy
 
 from ..base_panel import CapturePanel, WildcapPanel
 from . import session
+from .operators import EDITS
 
 
 class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
@@ -27,6 +28,10 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
             layout.prop(brush, "size", slider=True)
             layout.prop(brush, "strength", slider=True)
         layout.prop(context.scene.tool_settings.image_paint, "use_symmetry_x", text="Mirror Left and Right")
+        grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
+        for kind in EDITS:
+            grid.operator("wildcap.edit_mask", text=kind.capitalize()).kind = kind
+        layout.operator("wildcap.edit_mask", text="Back to Proposal", icon='LOOP_BACK').kind = 'PROPOSAL'
 
 
 class WILDCAP_PT_mask(CapturePanel, bpy.types.Panel):

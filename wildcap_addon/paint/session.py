@@ -51,6 +51,27 @@ def on_sheet() -> bool:
     return _session is not None and _session.on_sheet
 
 
+def root() -> str:
+    """The folder of the capture whose mask is painted."""
+    return _session.root
+
+
+def mask() -> bpy.types.Image:
+    """The image that is painted. Raises Problem when it is gone."""
+    image = bpy.data.images.get(_session.mask) if _session else None
+    if image is None:
+        raise Problem("The mask is not in this file any more.", "Leave the painting, and click Paint Mask again.")
+    return image
+
+
+def push_undo(context) -> None:
+    """A step of the mask's own undo. Pixels written by a script are in no undo step; an operator of Blender's that changes nothing,
+    run after them, makes them one among the strokes."""
+    if not bpy.app.background:  # without a window the operator crashes, and there is nobody to press Ctrl-Z
+        with context.temp_override(edit_image=mask()):
+            bpy.ops.image.invert(invert_r=False, invert_g=False, invert_b=False, invert_a=False)
+
+
 def begin(context, item, use_sheet: bool) -> None:
     """Enters Texture Paint on the head or on the sheet, the mask as its red stencil and the mask brush in hand."""
     global _session
@@ -62,8 +83,8 @@ def begin(context, item, use_sheet: bool) -> None:
     texture = head.load_image(capture.texture_png, 'sRGB') if capture.texture_png.is_file() else None
     if texture is None:
         raise Problem("This capture has no texture to paint over.", "Click Reconstruct first.")
-    mask = mask_image.load(capture)
-    _session = Session(str(capture.root), context.scene.name, obj.name, mask.name)
+    image = mask_image.load(capture)
+    _session = Session(str(capture.root), context.scene.name, obj.name, image.name)
     paint = context.scene.tool_settings.image_paint
     for name in _SETTINGS:
         value = getattr(paint, name)
@@ -73,7 +94,7 @@ def begin(context, item, use_sheet: bool) -> None:
     paint.mode = 'IMAGE'
     paint.canvas = texture
     paint.use_stencil_layer = True
-    paint.stencil_image = mask
+    paint.stencil_image = image
     paint.stencil_color = TINT
     paint.invert_stencil = False
     try:
@@ -102,23 +123,23 @@ def end(context) -> None:
     for name, value in session.paint.items():
         setattr(paint, name, bpy.data.images.get(value or "") if name in ("canvas", "stencil_image") else value)
     view.restore(session.views)
-    mask = bpy.data.images.get(session.mask)
-    if mask is not None:
-        mask.reload()  # from shadow_mask.png, so that Blender does not ask to save it
+    image = bpy.data.images.get(session.mask)
+    if image is not None:
+        image.reload()  # from shadow_mask.png, so that Blender does not ask to save it
     _session = None
 
 
 def save() -> None:
     """Writes the mask to the capture, atomically, if it changed; only the mask of before the session goes to the history. Raises Problem when it cannot."""
-    mask = bpy.data.images.get(_session.mask) if _session else None
-    if mask is not None and mask_image.save(mask, Capture(_session.root), keep=not _session.kept):
+    image = bpy.data.images.get(_session.mask) if _session else None
+    if image is not None and mask_image.save(image, Capture(_session.root), keep=not _session.kept):
         _session.kept = True
 
 
 def keep_up(stroking: bool) -> None:
     """Saves a mask that was painted on, every few seconds, but not in the middle of a stroke."""
-    mask = bpy.data.images.get(_session.mask)
-    if not stroking and mask is not None and mask.is_dirty and time.monotonic() - _session.looked >= KEEP_UP_S:
+    image = bpy.data.images.get(_session.mask)
+    if not stroking and image is not None and image.is_dirty and time.monotonic() - _session.looked >= KEEP_UP_S:
         _session.looked = time.monotonic()
         _save_or_show()
 

@@ -40,6 +40,8 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         layout.prop(item, "seed")
         draw_settings(layout, item, "solve", without=("skin_tone",))
         draw_settings(layout, item, "upscale")
+        layout.label(text="Delivery")
+        draw_settings(layout, item, "transfer")
         layout.operator("wildcap.solve")
 
 
