@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Distance of a capture's head (or scan) to the true mesh, in the facial skin, after a similarity of the camera centres.
 
-    python benchmarks/head_against_truth.py CAPTURE TRUTH MESH [--surface head.obj|scan.ply]
+    python benchmarks/head_against_truth.py CAPTURE TRUTH [MESH] [--surface head.obj|scan.ply]
 
-TRUTH holds cameras.json ({"cameras": [{"frame", "matrix_world"}]}, Blender's convention) and face/NNNN.png; MESH is a
-glTF in that world turned Y up: (x, -z, y) of it is the world of cameras.json.
+TRUTH holds cameras.json ({"cameras": [{"frame", "matrix_world"}]}, Blender's convention) and face/NNNN.png. MESH is an OBJ or PLY in
+that world, or a glTF in it turned Y up: (x, -z, y) of it is the world of cameras.json. Without MESH the truth is the sample's subject.
 """
 
 import argparse
@@ -21,10 +21,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from core import images, meshes, raster  # noqa: E402
 from core.capture import Capture  # noqa: E402
 from core.registration.alignment import similarity  # noqa: E402
+from core.synthetic.identities import subject_mesh  # noqa: E402
+from core.synthetic.sample import RESERVED  # noqa: E402
 from core.views import read_views  # noqa: E402
 
 
-def compare(capture: Capture, truth: Path, mesh: Path, surface: str = "head.obj") -> dict:
+def compare(capture: Capture, truth: Path, mesh: Path | None, surface: str = "head.obj") -> dict:
     """Median, 90th and 95th percentile in mm over the face's pixels, as placed by the cameras and after ICP beside it."""
     views = read_views(capture)
     frames = {f["name"]: f["video_frame"] for f in json.loads(capture.frames_json.read_text())["frames"]}
@@ -48,11 +50,18 @@ def compare(capture: Capture, truth: Path, mesh: Path, surface: str = "head.obj"
     return figures
 
 
-def _surface(mesh: Path, count: int = 1_500_000) -> tuple[np.ndarray, np.ndarray]:
+def _surface(mesh: Path | None, count: int = 1_500_000) -> tuple[np.ndarray, np.ndarray]:
     """Points and normals over the true surface, in the world of cameras.json."""
-    loaded = trimesh.load(mesh, force="mesh", process=False)
+    if mesh is None:
+        subject = subject_mesh(RESERVED["sample"])
+        loaded = trimesh.Trimesh(subject.vertices, subject.faces, process=False)
+    else:
+        loaded = trimesh.load(mesh, force="mesh", process=False)
     points, face = trimesh.sample.sample_surface(loaded, count, seed=0)
-    return (np.asarray(x)[:, [0, 2, 1]] * [1, -1, 1] for x in (points, loaded.face_normals[face]))
+    points, normals = np.asarray(points), np.asarray(loaded.face_normals[face])
+    if mesh is not None and Path(mesh).suffix.lower() in (".glb", ".gltf"):
+        points, normals = (x[:, [0, 2, 1]] * [1, -1, 1] for x in (points, normals))
+    return points, normals
 
 
 def _face_points(mesh: meshes.Mesh, views: list, frames: dict, truth: Path) -> np.ndarray:
@@ -94,7 +103,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("capture", type=Path)
     parser.add_argument("truth", type=Path)
-    parser.add_argument("mesh", type=Path)
+    parser.add_argument("mesh", type=Path, nargs="?")
     parser.add_argument("--surface", default="head.obj")
     args = parser.parse_args()
     print(json.dumps(compare(Capture(args.capture), args.truth, args.mesh, args.surface), indent=1))

@@ -78,7 +78,7 @@ def off_the_egg_mm(points: np.ndarray) -> np.ndarray:
 
 @pytest.fixture
 def capture(tmp_path, monkeypatch) -> Capture:
-    monkeypatch.setattr(scan.faces, "segment_person", lambda srgb: (np.abs(srgb - 0.2).max(-1) > 0.04).astype(np.float32))  # an egg is no person
+    monkeypatch.setattr(scan.rounds.faces, "segment_person", lambda srgb: (np.abs(srgb - 0.2).max(-1) > 0.04).astype(np.float32))  # an egg is no person
     return Capture(tmp_path / "œuf peint.wildcap")
 
 
@@ -132,7 +132,7 @@ def test_few_photographs_far_apart_still_pair_up():
 
 def test_nothing_to_match_is_told(capture, monkeypatch):
     photograph(capture, around([-6, 0, 6]))
-    monkeypatch.setattr(scan.faces, "segment_person", lambda srgb: np.zeros(srgb.shape[:2], np.float32))
+    monkeypatch.setattr(scan.rounds.faces, "segment_person", lambda srgb: np.zeros(srgb.shape[:2], np.float32))
     with pytest.raises(Problem, match="No surface") as caught:
         scan.run(capture, from_json({}), Reporter("scan"))
     assert caught.value.remedy and not capture.scan.exists()

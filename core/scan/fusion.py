@@ -8,6 +8,7 @@ Curless and Levoy, A Volumetric Method for Building Complex Models from Range Im
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -24,10 +25,28 @@ TRUNCATION = 5
 """Reach of the distance field on either side of the surface, in voxels."""
 LEAST_WEIGHT, LEAST_SHARE = 2.0, 0.15
 """Maps that must agree for a voxel to count (a head-on view weighs 1), fewer where a handful of photographs makes few maps."""
+MOST_SPREAD = 0.6
+"""Deviation of the maps' distances, in truncations, beyond which they do not speak of one surface: hair, a hand that moved, a highlight that wandered."""
+
+LEAST_PIECE = 0.05
+"""Pieces of fewer triangles, as a share of the largest one's, float: background seen through hair, a flap of a collar."""
 
 
-def fuse(maps: list[DepthMap], box: np.ndarray, voxel: float, tick: Callable[[int], None] = lambda done: None) -> Mesh | None:
-    """The surface of depth maps within the box [2, 3], with voxels of `voxel` metres; its largest piece, or None where there is none."""
+@dataclass(frozen=True)
+class Fused:
+    """mesh: the surface; disagreeing: share of the voxels at it that the maps disagree about and that were left out;
+    floating: share of the triangles that hung loose and were left out."""
+
+    mesh: Mesh
+    disagreeing: float
+    floating: float
+
+
+def fuse(maps: list[DepthMap], box: np.ndarray, voxel: float, tick: Callable[[int], None] = lambda done: None) -> Fused | None:
+    """The surface of depth maps within the box [2, 3], with voxels of `voxel` metres; None where there is none.
+
+    A map counts with the square of its baseline: so much finer does it measure depth.
+    """
     low = box[0]
     shape = np.ceil((box[1] - low) / (voxel * SIDE)).astype(int)
     blocks = _blocks_seen(maps, low, shape, voxel)
@@ -36,17 +55,23 @@ def fuse(maps: list[DepthMap], box: np.ndarray, voxel: float, tick: Callable[[in
     base = np.stack(np.unravel_index(blocks, shape), -1) * SIDE
     corner = np.stack(np.meshgrid(*[np.arange(SIDE)] * 3, indexing="ij"), -1).reshape(-1, 3)
     voxels = (base[:, None] + corner[None]).reshape(-1, 3)
-    distance, weight = np.zeros(len(voxels), np.float32), np.zeros(len(voxels), np.float32)
+    sums = np.zeros((4, len(voxels)), np.float32)  # facing, weight, weight x distance, weight x distance squared
     points = (low + voxels * voxel).astype(np.float32)
+    usual = np.median([seen.baseline for seen in maps])
     for done, seen in enumerate(maps):
-        _integrate(seen, points, voxel, distance, weight)
+        _integrate(seen, points, voxel, float(np.clip(seen.baseline / usual, 0.25, 2) ** 2), sums)
         tick(done + 1)
+    facing, weight = sums[0], np.maximum(sums[1], 1e-6)
+    mean = sums[2] / weight
+    agreeing = np.sqrt(np.maximum(sums[3] / weight - mean**2, 0)) < MOST_SPREAD
+    enough = facing >= min(LEAST_WEIGHT, LEAST_SHARE * len(maps))
+    at_surface = enough & (np.abs(mean) < 0.5)
     field = np.ones(shape * SIDE, np.float32)
     known = np.zeros(shape * SIDE, bool)
     index = tuple(voxels.T)
-    field[index] = distance / np.maximum(weight, 1e-6)
-    known[index] = weight >= min(LEAST_WEIGHT, LEAST_SHARE * len(maps))
-    return _surface(field, known, low, voxel)
+    field[index], known[index] = mean, enough & agreeing
+    found = _surface(field, known, low, voxel)
+    return None if found is None else Fused(found[0], float((at_surface & ~agreeing).sum() / max(at_surface.sum(), 1)), found[1])
 
 
 def _blocks_seen(maps: list[DepthMap], low: np.ndarray, shape: np.ndarray, voxel: float) -> np.ndarray:
@@ -62,8 +87,8 @@ def _blocks_seen(maps: list[DepthMap], low: np.ndarray, shape: np.ndarray, voxel
     return np.flatnonzero(binary_dilation(found, np.ones((3, 3, 3), bool)))
 
 
-def _integrate(seen: DepthMap, points: np.ndarray, voxel: float, distance: np.ndarray, weight: np.ndarray) -> None:
-    """Adds one map's signed distances (in truncations, positive in front of the surface) where it sees the voxels or just behind."""
+def _integrate(seen: DepthMap, points: np.ndarray, voxel: float, precision: float, sums: np.ndarray) -> None:
+    """Adds one map's signed distances (in truncations, positive in front of the surface) to sums [4, N] where it sees the voxels or just behind."""
     local = (points - seen.centre.astype(np.float32)) @ seen.rotation.T.astype(np.float32)
     u = np.floor(seen.focal * local[:, 0] / local[:, 2] - seen.origin[0]).astype(np.int32)
     v = np.floor(seen.focal * local[:, 1] / local[:, 2] - seen.origin[1]).astype(np.int32)
@@ -76,9 +101,8 @@ def _integrate(seen: DepthMap, points: np.ndarray, voxel: float, distance: np.nd
     near = np.isfinite(gap) & (gap > -reach) & (facing > 0.2)
     index, value = inside[near], np.minimum(gap[near] / reach, 1)
     share = facing[near] ** 2
-    total = weight[index] + share
-    distance[index] += value * share
-    weight[index] = total
+    for row, term in zip(sums, (share, precision * share, precision * share * value, precision * share * value**2), strict=True):
+        row[index] += term
 
 
 def _cosine(seen: DepthMap) -> np.ndarray:
@@ -100,7 +124,8 @@ def _cosine(seen: DepthMap) -> np.ndarray:
     return np.nan_to_num(cosine, nan=0.0)
 
 
-def _surface(field: np.ndarray, known: np.ndarray, low: np.ndarray, voxel: float) -> Mesh | None:
+def _surface(field: np.ndarray, known: np.ndarray, low: np.ndarray, voxel: float) -> tuple[Mesh, float] | None:
+    """The zero of the field: its large pieces, and the share of the triangles in small ones."""
     if not known.any():
         return None
     try:
@@ -111,7 +136,8 @@ def _surface(field: np.ndarray, known: np.ndarray, low: np.ndarray, voxel: float
     pieces = trimesh.graph.connected_component_labels(solid.face_adjacency, node_count=len(solid.faces))
     if not len(pieces):
         return None
-    solid.update_faces(pieces == np.bincount(pieces).argmax())
+    kept = np.isin(pieces, np.flatnonzero(np.bincount(pieces) >= LEAST_PIECE * np.bincount(pieces).max()))
+    solid.update_faces(kept)
     solid.remove_unreferenced_vertices()
     trimesh.smoothing.filter_taubin(solid, iterations=4)
-    return Mesh(np.asarray(solid.vertices, np.float64), np.asarray(solid.faces, np.int64))
+    return Mesh(np.asarray(solid.vertices, np.float64), np.asarray(solid.faces, np.int64)), 1 - float(kept.mean())

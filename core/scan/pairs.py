@@ -10,7 +10,7 @@ BASELINES_DEG = ((4.0, 9.0), (2.5, 14.0), (1.5, 30.0))
 """Angles between two cameras as seen from the head, from the best range to what a handful of photographs leaves."""
 
 
-def choose_pairs(centres: np.ndarray, sharpness: np.ndarray, count: int) -> list[tuple[int, int]]:
+def choose_pairs(centres: np.ndarray, sharpness: np.ndarray, count: int, baselines: tuple = BASELINES_DEG) -> list[tuple[int, int]]:
     """At most `count` pairs of cameras at centres [N, 3] (the head at the origin), spread over the directions they look from,
     the sharper [N] preferred. Wider or narrower baselines are taken only where the best range leaves a direction without a pair."""
     directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
@@ -22,7 +22,7 @@ def choose_pairs(centres: np.ndarray, sharpness: np.ndarray, count: int) -> list
     quality = np.minimum(np.minimum(relative[first], relative[second]), 1.5)
     chosen: list[int] = []
     reach = np.full(len(first), np.inf)  # angle from each candidate to the nearest chosen pair, in degrees
-    for low, high in BASELINES_DEG:
+    for low, high in baselines:
         candidates = np.flatnonzero((angle >= low) & (angle <= high))
         least = 0.0 if not chosen else 5.0  # a poorer baseline only where nothing better looks from
         while len(chosen) < count and len(candidates):
