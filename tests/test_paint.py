@@ -127,6 +127,30 @@ def test_the_buttons_change_the_mask_as_they_say(addon, capture):
     assert (capture / "shadow_mask.png").read_bytes() == mask_image.grey_png(np.zeros_like(first))
 
 
+def test_what_is_protected_is_a_mask_of_its_own(addon, capture):
+    session, mask_image = addon("paint.session"), addon("paint.mask_image")
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.paint_mask(mask='PROTECT')
+    bpy.ops.wildcap.finish_mask()
+    assert not (capture / "protect_mask.png").exists(), "nothing was painted, so nothing is to be solved again"
+    bpy.ops.wildcap.paint_mask(mask='PROTECT')
+    paint = bpy.context.scene.tool_settings.image_paint
+    assert paint.stencil_image.name.endswith("Protect Mask") and paint.stencil_color[1] > paint.stencil_color[0]
+    spot = np.zeros((paint.stencil_image.size[1], paint.stencil_image.size[0]), np.float32)
+    spot[10:14, 20:24] = 1
+    mask_image.set_values(paint.stencil_image, spot)
+    bpy.ops.wildcap.paint_mask(mask='SHADOW', on='SHEET')
+    assert (capture / "protect_mask.png").read_bytes() == mask_image.grey_png(spot), "turning to the other mask saves this one"
+    assert session.which() == 'SHADOW' and session.on_sheet() and paint.stencil_image.name.endswith("Shadow Mask")
+    bpy.ops.wildcap.finish_mask()
+    bpy.ops.wildcap.paint_mask(mask='PROTECT')
+    assert np.array_equal(mask_image.values(paint.stencil_image), spot)
+    with pytest.raises(RuntimeError, match="never proposed"):
+        bpy.ops.wildcap.edit_mask(kind='PROPOSAL')
+    bpy.ops.wildcap.finish_mask()
+    assert (capture / "protect_mask.png").read_bytes() == mask_image.grey_png(spot)
+
+
 def test_a_mask_is_not_lost_when_another_file_is_opened(addon, capture):
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.paint_mask()

@@ -44,7 +44,7 @@ WORDS = {"reconstruct": "Reconstructing ...", "solve": "Solving ...", "install":
 def next_step(facts: Facts) -> Step:
     """The one thing to do now. A stale stage never drags the artist back before the mask; its row says so."""
     if facts.painting:
-        return Step("Red is shadow. Paint adds, Ctrl takes away.", "Save Mask and Leave", "wildcap.finish_mask", 'CHECKMARK')
+        return Step("Red is shadow, green is protected. Paint adds, Ctrl takes away.", "Save Mask and Leave", "wildcap.finish_mask", 'CHECKMARK')
     if facts.running:
         return Step(WORDS[facts.running], "Cancel", "wildcap.cancel", 'CANCEL')
     if not facts.has_capture:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shadow mask as a Blender image, and back to the capture's shadow_mask.png.
+"""The artist's masks as Blender images, and back to the capture's shadow_mask.png and protect_mask.png.
 
 The one place of the add-on that turns rows: Blender counts an image's rows from the bottom, files count from the top.
 """
@@ -17,12 +17,19 @@ from ...core.capture import Capture, replacing
 from ...core.messages import Problem
 
 
-def load(capture: Capture) -> bpy.types.Image:
-    """The artist's mask, else the proposal, as a Non-Color image of the texture's size that is ready to be painted on."""
-    path = capture.shadow_mask if capture.shadow_mask.is_file() else capture.shadow_mask_auto
+def file_of(capture: Capture, which: str) -> Path:
+    """Where the mask SHADOW or PROTECT is kept."""
+    return capture.protect_mask if which == 'PROTECT' else capture.shadow_mask
+
+
+def load(capture: Capture, which: str = 'SHADOW') -> bpy.types.Image:
+    """The artist's mask as a Non-Color image of the texture's size that is ready to be painted on; where there is none yet the
+    proposal for the shadow, and nothing for what is to be protected."""
+    kept = file_of(capture, which)
+    path = kept if kept.is_file() else capture.shadow_mask_auto
     if not path.is_file():
         raise Problem("This capture has no shadow mask yet.", "Click Reconstruct first.")
-    name = f"{capture.root.stem} Shadow Mask"
+    name = f"{capture.root.stem} {which.capitalize()} Mask"
     image = bpy.data.images.get(name)
     if image is not None:
         bpy.data.images.remove(image)
@@ -33,7 +40,9 @@ def load(capture: Capture) -> bpy.types.Image:
         bpy.data.images.remove(image)
         raise Problem(f"{path} is not a picture that can be read.", "Restore it from mask_history, or delete it to start from the proposal.")
     # The proposal is never overwritten: should Blender save the image itself, it goes where masks of artists go.
-    image.filepath_raw = str(capture.shadow_mask)
+    image.filepath_raw = str(kept)
+    if which == 'PROTECT' and not kept.is_file():
+        set_values(image, np.zeros_like(values(image)))
     return image
 
 
@@ -68,17 +77,18 @@ def proposal(image: bpy.types.Image, capture: Capture) -> np.ndarray:
         bpy.data.images.remove(other)
 
 
-def save(image: bpy.types.Image, capture: Capture, keep: bool = True) -> bool:
-    """Writes the image to shadow_mask.png (8 bit grey), atomically, and with `keep` the mask that was there to mask_history.
+def save(image: bpy.types.Image, capture: Capture, which: str = 'SHADOW', keep: bool = True) -> bool:
+    """Writes the image to the mask's file (8 bit grey), atomically, and with `keep` the mask that was there to mask_history.
 
-    False, and nothing is written, where the file holds that mask already.
+    False, and nothing is written, where the file holds that mask already, or there is nothing to protect and never was.
     """
-    content = grey_png(values(image))
-    if capture.shadow_mask.is_file() and capture.shadow_mask.read_bytes() == content:
+    path, mask = file_of(capture, which), values(image)
+    content = grey_png(mask)
+    if path.read_bytes() == content if path.is_file() else which == 'PROTECT' and not mask.any():
         return False
     if keep:
-        mask_history.keep(capture, capture.shadow_mask)
-    write(capture.shadow_mask, content)
+        mask_history.keep(capture, path)
+    write(path, content)
     return True
 
 

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: paint the shadow mask on the head or on the flat sheet, and leave with the mask saved."""
+"""Operators: paint a mask on the head or on the flat sheet, change it as a whole, and leave with it saved."""
 
 import bpy
 
 from ...core.capture import Capture
+from ...core.messages import Problem
 from .. import captures
 from ..base_operator import BaseOperator
 from . import edits, mask_image, session
@@ -13,7 +14,7 @@ EDITS = {"GROW": edits.grow, "SHRINK": edits.shrink, "SOFTEN": edits.soften, "MI
 
 
 class WILDCAP_OT_paint_mask(BaseOperator, bpy.types.Operator):
-    """Paint where the shadow is: red is shadow, Ctrl takes it away; on the head or on a flat sheet of its texture"""
+    """Paint where the shadow is (red), or what must be kept as skin (green): Ctrl takes away; on the head or on a flat sheet of its texture"""
 
     bl_idname = "wildcap.paint_mask"
     bl_label = "Paint Mask"
@@ -22,9 +23,13 @@ class WILDCAP_OT_paint_mask(BaseOperator, bpy.types.Operator):
     on: bpy.props.EnumProperty(
         name="On", items=[('HEAD', "Head", "Paint on the head"), ('SHEET', "Sheet", "Paint on the flat texture")], default='HEAD', options={'SKIP_SAVE'},
     )
+    mask: bpy.props.EnumProperty(
+        name="Mask", default='SHADOW', options={'SKIP_SAVE'},
+        items=[('SHADOW', "Shadow", "Where a shadow is baked into the texture"),
+               ('PROTECT', "Protect", "Moles, scars and make-up that the solver must not take for shadow; it wins over the shadow mask")])
 
     def work(self, context):
-        session.begin(context, captures.require(context), self.on == 'SHEET')
+        session.begin(context, captures.require(context), self.on == 'SHEET', self.mask)
 
 
 class WILDCAP_OT_finish_mask(BaseOperator, bpy.types.Operator):
@@ -65,6 +70,8 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
         return session.active()
 
     def work(self, context):
+        if self.kind == 'PROPOSAL' and session.which() == 'PROTECT':
+            raise Problem("What is to be protected is never proposed.", "Paint it by hand, or click Clear.")
         image = session.mask()
         mask = mask_image.values(image)
         changed = mask_image.proposal(image, Capture(session.root())) if self.kind == 'PROPOSAL' else EDITS[self.kind](mask)

@@ -20,9 +20,14 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
 
     def draw(self, context):
         layout = self.layout
-        row = layout.row(align=True)
-        row.operator("wildcap.paint_mask", text="On the Head", depress=not session.on_sheet()).on = 'HEAD'
-        row.operator("wildcap.paint_mask", text="On the Flat Sheet", depress=session.on_sheet()).on = 'SHEET'
+        column = layout.column(align=True)
+        here = 'SHEET' if session.on_sheet() else 'HEAD'
+        for name, values in (("mask", (("Shadow", 'SHADOW'), ("Protect", 'PROTECT'))), ("on", (("On the Head", 'HEAD'), ("On the Flat Sheet", 'SHEET')))):
+            row = column.row(align=True)
+            for text, value in values:
+                options = {"mask": session.which(), "on": here, name: value}
+                button = row.operator("wildcap.paint_mask", text=text, depress=options == {"mask": session.which(), "on": here})
+                button.mask, button.on = options["mask"], options["on"]
         brush = context.scene.tool_settings.image_paint.brush
         if brush is not None:
             layout.prop(brush, "size", slider=True)
@@ -31,17 +36,19 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
         for kind in EDITS:
             grid.operator("wildcap.edit_mask", text=kind.capitalize()).kind = kind
-        layout.operator("wildcap.edit_mask", text="Back to Proposal", icon='LOOP_BACK').kind = 'PROPOSAL'
+        if session.which() == 'SHADOW':
+            layout.operator("wildcap.edit_mask", text="Back to Proposal", icon='LOOP_BACK').kind = 'PROPOSAL'
 
 
 class WILDCAP_PT_mask(CapturePanel, bpy.types.Panel):
-    bl_label = "Shadow Mask"
+    bl_label = "Masks"
     bl_order = 30
 
     def draw(self, context):
         column = self.layout.column()
         column.operator("wildcap.paint_mask", text="Paint on the Head", icon='BRUSH_DATA').on = 'HEAD'
         column.operator("wildcap.paint_mask", text="Paint on the Flat Sheet", icon='MESH_PLANE').on = 'SHEET'
+        column.operator("wildcap.paint_mask", text="Protect Moles and Scars", icon='LOCKED').mask = 'PROTECT'
 
 
 CLASSES = (WILDCAP_PT_painting, WILDCAP_PT_mask)

@@ -16,7 +16,7 @@ from ...core.messages import Problem
 from .. import captures, head, problems
 from . import brush, mask_image, sheet, view
 
-TINT = (1.0, 0.0, 0.0)
+TINTS = {"SHADOW": (1.0, 0.0, 0.0), "PROTECT": (0.0, 0.6, 0.1)}
 WATCH_S = 0.5
 KEEP_UP_S = 3.0
 """Between two looks at whether the mask changed; a look costs the reading of its pixels."""
@@ -31,6 +31,7 @@ class Session:
     scene: str
     head: str
     mask: str
+    which: str = 'SHADOW'  # or 'PROTECT'
     on_sheet: bool = False
     hidden: list[str] = field(default_factory=list)
     paint: dict = field(default_factory=dict)
@@ -49,6 +50,11 @@ def active() -> bool:
 
 def on_sheet() -> bool:
     return _session is not None and _session.on_sheet
+
+
+def which() -> str:
+    """The mask that is painted: SHADOW or PROTECT; '' for none."""
+    return _session.which if _session else ""
 
 
 def root() -> str:
@@ -72,19 +78,20 @@ def push_undo(context) -> None:
             bpy.ops.image.invert(invert_r=False, invert_g=False, invert_b=False, invert_a=False)
 
 
-def begin(context, item, use_sheet: bool) -> None:
-    """Enters Texture Paint on the head or on the sheet, the mask as its red stencil and the mask brush in hand."""
+def begin(context, item, use_sheet: bool, which: str = 'SHADOW') -> None:
+    """Enters Texture Paint on the head or on the sheet, the mask as its tinted stencil and the mask brush in hand."""
     global _session
-    if _session is not None:
+    if _session is not None and _session.which == which:
         _turn(context, use_sheet)
         return
+    end(context)
     capture = captures.folder(item)
     obj = captures.require_head(context, item)
     texture = head.load_image(capture.texture_png, 'sRGB') if capture.texture_png.is_file() else None
     if texture is None:
         raise Problem("This capture has no texture to paint over.", "Click Reconstruct first.")
-    image = mask_image.load(capture)
-    _session = Session(str(capture.root), context.scene.name, obj.name, image.name)
+    image = mask_image.load(capture, which)
+    _session = Session(str(capture.root), context.scene.name, obj.name, image.name, which)
     paint = context.scene.tool_settings.image_paint
     for name in _SETTINGS:
         value = getattr(paint, name)
@@ -95,7 +102,7 @@ def begin(context, item, use_sheet: bool) -> None:
     paint.canvas = texture
     paint.use_stencil_layer = True
     paint.stencil_image = image
-    paint.stencil_color = TINT
+    paint.stencil_color = TINTS[which]
     paint.invert_stencil = False
     try:
         _enter(context, use_sheet)
@@ -124,15 +131,17 @@ def end(context) -> None:
         setattr(paint, name, bpy.data.images.get(value or "") if name in ("canvas", "stencil_image") else value)
     view.restore(session.views)
     image = bpy.data.images.get(session.mask)
-    if image is not None:
-        image.reload()  # from shadow_mask.png, so that Blender does not ask to save it
+    if image is not None and mask_image.file_of(Capture(session.root), session.which).is_file():
+        image.reload()  # from the file, so that Blender does not ask to save it
+    elif image is not None:
+        bpy.data.images.remove(image)
     _session = None
 
 
 def save() -> None:
     """Writes the mask to the capture, atomically, if it changed; only the mask of before the session goes to the history. Raises Problem when it cannot."""
     image = bpy.data.images.get(_session.mask) if _session else None
-    if image is not None and mask_image.save(image, Capture(_session.root), keep=not _session.kept):
+    if image is not None and mask_image.save(image, Capture(_session.root), _session.which, keep=not _session.kept):
         _session.kept = True
 
 
