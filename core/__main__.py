@@ -53,6 +53,8 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--skin-tone", metavar="R,G,B", help="sRGB in 0..1, the linear mean over facial skin; or auto")
     run.add_argument("--delighter", choices=DELIGHTERS, help="how the light is taken out of the frames")
     run.add_argument("--folder", metavar="FOLDER", type=Path, help="delit pictures for the folder delighter, matched by name")
+    run.add_argument("--template", metavar="MESH", type=Path, help="your own head mesh, fitted too: an OBJ, or a folder with a neutral OBJ and its shapes")
+    run.add_argument("--new-atlas", action="store_true", help="give that mesh new UVs where its own are missing or overlap")
     run.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
     run.add_argument("--seed", type=int, default=0)
     run.set_defaults(command=_run)
@@ -80,6 +82,10 @@ def _run(options: argparse.Namespace) -> int:
     # A shell that starts a job in the background has it ignore Ctrl-C's signal; here the signal means cancel, whoever sends it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     values = {"seed": options.seed, "device": options.device, "delight": delight}
+    if options.new_atlas and not options.template:
+        raise Problem("--new-atlas goes with --template only.", "Name your head mesh with --template, or leave --new-atlas out.")
+    if options.template:
+        values["registration"] = {"template": str(options.template.absolute()), "new_atlas": options.new_atlas}
     if options.skin_tone:
         values["solve"] = {"skin_tone": options.skin_tone}
     capture = Capture(options.capture)

@@ -100,6 +100,8 @@ class Capture:
         self.scan = self.root / "scan.ply"
         self.landmarks = self.root / "landmarks.json"
         self.head = self.root / "head.obj"
+        self.own_head = self.root / "own_head.obj"
+        self.own_head_skin = self.root / "own_head.json"
         self.delit = self.root / "delit"
         self.texture = self.root / "texture.exr"
         self.texture_png = self.root / "texture.png"
@@ -110,6 +112,7 @@ class Capture:
         self.mask_history = self.root / "mask_history"
         self.maps = self.root / "maps"
         self.maps_4k = self.root / "maps_4k"
+        self.delivery = self.root / "delivery"
         self.preview = self.root / "preview"
         self.checkpoints = self.root / "checkpoints"
         self.logs = self.root / "logs"
@@ -184,8 +187,8 @@ class Capture:
         parts = [asdict(getattr(settings, stage.name)), {name: getattr(settings, name) for name in stage.shared}, _code_hash(stage.module)]
         if not stage.reads:
             parts.append(_source_stamp(record.get("source", "")) or record.get("source_stamp", []))
-        if stage.name == "delight" and settings.delight.delighter == "folder":
-            parts.append(_source_stamp(settings.delight.folder))
+        named = {"delight": settings.delight.folder, "cameras": settings.cameras.import_from, "registration": settings.registration.template}.get(stage.name)
+        parts += [_hash_tree(Path(named).expanduser())] if named else []  # what the artist keeps elsewhere
         parts += [[name, _hash_tree(self.root / name)] for name in (*stage.reads, *stage.wishes)]
         parts += [_hash_tree(Path(__file__).parent / name) for name in stage.data]
         return hashlib.blake2b(json.dumps(parts, sort_keys=True).encode(), digest_size=16).hexdigest()
@@ -208,10 +211,7 @@ class Capture:
             if not path.exists():
                 os.replace(old, path)
         for left in [*self.root.glob(".*.old"), *self.root.glob("**/.*.tmp*")]:
-            if left.is_dir():
-                shutil.rmtree(left, ignore_errors=True)
-            else:
-                left.unlink(missing_ok=True)
+            shutil.rmtree(left, ignore_errors=True) if left.is_dir() else left.unlink(missing_ok=True)
 
     # -- lock
 
@@ -257,11 +257,10 @@ def _alive(pid: int) -> bool:
             ctypes.windll.kernel32.CloseHandle(handle)
         return bool(handle)
     try:
-        os.kill(pid, 0)
+        with contextlib.suppress(PermissionError):
+            os.kill(pid, 0)
     except ProcessLookupError:
         return False
-    except PermissionError:
-        pass
     return True
 
 

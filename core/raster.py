@@ -17,13 +17,17 @@ from .meshes import Mesh
 from .views import View
 
 
-def rasterize_uv(mesh: Mesh, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which triangle covers each texel's centre: face index int32 [S, S] (-1: none) and barycentric coordinates float32 [S, S, 3]."""
-    corners = mesh.uvs[mesh.face_uvs] * [size, -size] + [-0.5, size - 0.5]  # [F, 3, 2] in texels: x = column, y = row
-    face = np.full((size, size), -1, np.int32)
-    bary = np.zeros((size, size, 3), np.float32)
+def rasterize_uv(mesh: Mesh, size: int, rows: tuple[int, int] | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Which triangle covers each texel's centre: face index int32 [S, S] (-1: none) and barycentric coordinates float32 [S, S, 3].
+
+    `rows` (first, end): that strip of the map only, [end - first, S].
+    """
+    first, end = rows or (0, size)
+    corners = mesh.uvs[mesh.face_uvs] * [size, -size] + [-0.5, size - 0.5 - first]  # [F, 3, 2] in texels: x = column, y = row
+    face = np.full((end - first, size), -1, np.int32)
+    bary = np.zeros((end - first, size, 3), np.float32)
     low = np.maximum(np.ceil(corners.min(1)), 0).astype(int)
-    high = np.minimum(np.floor(corners.max(1)), size - 1).astype(int)
+    high = np.minimum(np.floor(corners.max(1)), [size - 1, end - first - 1]).astype(int)
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
     for f in np.flatnonzero((np.abs(area) > 1e-12) & (high >= low).all(1)):

@@ -36,8 +36,10 @@ class CamerasSettings:
     """Distance between the pupils; sets the scale of the head"""
     matching: str = setting("auto", choices=("auto", "sequential", "exhaustive"))
     """Which frames are matched with each other; auto: neighbours in a video, all pairs in a few photographs"""
-    features: str = setting("auto", choices=("auto", "plain", "skin"))
-    """Feature settings; skin holds on low-contrast faces and costs ten times as much; auto tries plain first"""
+    features: str = setting("auto", choices=("auto", "plain", "skin", "face"))
+    """What the cameras are found by; skin holds on low-contrast faces and costs ten times as much, face uses its landmarks alone; auto tries plain first"""
+    import_from: str = setting("")
+    """Cameras of another program: COLMAP's folder, Metashape's .xml, RealityScan's .csv, Blender's .json; empty: solve them here"""
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,10 @@ class ScanSettings:
 class RegistrationSettings:
     iterations: int = setting(30, min=1, max=200)
     """Steps of the non-rigid fit, stiff to soft"""
+    template: str = setting("")
+    """A head mesh of your own, fitted beside the built-in one: an OBJ, or a folder with a neutral OBJ and its shapes (as ICT-FaceKit)"""
+    new_atlas: bool = setting(False)
+    """Make new UVs for your own head mesh where its own are missing or overlap"""
 
 
 @dataclass(frozen=True)
@@ -66,6 +72,10 @@ class DelightSettings:
 class TextureSettings:
     size: int = setting(1024, min=256, max=4096, unit="px")
     """Side of the texture"""
+    perceptual: int = setting(0, min=0, max=2000)
+    """Steps that sharpen the texture until the head looks like the frames to a network, as the paper does; 0 is off"""
+    perceptual_network: str = setting("")
+    """VGG16 file, or folder with it and LPIPS's weights, for these steps; empty takes the small network of an installed package"""
 
 
 @dataclass(frozen=True)
@@ -101,6 +111,18 @@ class UpscaleSettings:
 
 
 @dataclass(frozen=True)
+class TransferSettings:
+    size: int = setting(4096, min=256, max=8192, unit="px")
+    """Side of each map that is baked into the UVs of your own head mesh"""
+    scan: bool = setting(True)
+    """Deliver the scan as well, with UVs, lit and albedo texture, and the head's displacement"""
+    scan_size: int = setting(1024, min=256, max=8192, unit="px")
+    """Side of the scan's textures and of the displacement map"""
+    scan_detail_mm: float = setting(3.0, min=1.0, max=10.0, unit="mm")
+    """Size of the delivered scan's triangles"""
+
+
+@dataclass(frozen=True)
 class Settings:
     """All stages' settings, with what they share."""
 
@@ -115,6 +137,7 @@ class Settings:
     shadow_mask: ShadowMaskSettings = field(default_factory=ShadowMaskSettings)
     solve: SolveSettings = field(default_factory=SolveSettings)
     upscale: UpscaleSettings = field(default_factory=UpscaleSettings)
+    transfer: TransferSettings = field(default_factory=TransferSettings)
 
 
 QUALITIES = ("draft", "standard", "full")

@@ -46,6 +46,8 @@ STAGES = (
           tuple(f"maps/{name}" for name in MAPS), "core.solve", wishes=("shadow_mask.png", "protect_mask.png"), shared=("seed",),
           data=("weights/prior.safetensors",)),
     Stage("upscale", "4K Maps", tuple(f"maps/{name}" for name in MAPS), tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale"),
+    Stage("transfer", "Delivery", ("head.obj", *(f"maps/{name}" for name in MAPS)), ("delivery/",), "core.transfer",
+          wishes=(*(f"maps_4k/{name}" for name in MAPS), "own_head.obj", "own_head.json", "scan.ply", "frames/", "cameras/")),
 )
 
 NAMES = tuple(stage.name for stage in STAGES)

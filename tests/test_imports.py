@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 GROUND = {"capture", "settings", "stages", "messages", "mask_history", "report", "worker"}
 """Standard library only: what Blender may import."""
-SHARED = {"images", "meshes", "raster", "views", "template", "faces", "mask_import"}
+SHARED = {"images", "meshes", "raster", "surfaces", "atlas", "views", "template", "faces", "mask_import"}
 """What the rooms of the upper floor may import beside the ground floor."""
 LATE = {"core/__main__.py", "core/worker/runner.py"}
 """Ground floor files that import heavy things inside a function, once there is something for them to do."""

@@ -15,7 +15,7 @@ from ..capture import Capture, write_json
 from ..messages import Problem, Reporter
 from ..settings import Settings
 from ..views import read_views
-from . import alignment, drawing, landmarks, nonrigid
+from . import alignment, drawing, landmarks, nonrigid, own_template
 from .correspondence import Scan
 
 STEPS = 100.0
@@ -51,6 +51,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
                       "Look at the scan's picture in the report; film again slower, with the whole face in view, if it is torn or not a face.")
     meshes.write_obj(capture.head, head)
     write_json(capture.landmarks, landmarks.to_json(found))
+    own_template.run(capture, settings, head, hold, report)
     images.write_srgb(capture.picture("registration", "wireframe"), drawing.overlay(drawing.three_views(views, found), head, found))
 
 

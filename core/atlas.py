@@ -1,0 +1,119 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""UVs for a mesh that has none worth using, by xatlas (MIT), and what is wrong with those it has.
+
+A UV tile is the unit square at whole (u, v); tile (0, 0) is UDIM 1001, (1, 0) is 1002, (0, 1) is 1011.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from . import raster
+from .meshes import Mesh
+
+CHECK_SIZE = 512
+FULL = 0.6
+"""Share of the square that charts of a face with their margins are taken to fill: decides the scale at which they are packed."""
+MOST_OVERLAP = 0.01
+"""Share of the covered texels that may lie under two triangles: charts touch, and fans of tiny triangles fold."""
+
+
+def unwrap(mesh: Mesh, size: int, gap_px: int = 2) -> Mesh:
+    """The same vertices and triangles with new UVs in one square, charts about 2 `gap_px` texels apart in a map of that size.
+
+    The same mesh gives the same UVs. Triangles without area end up in a corner.
+    """
+    import xatlas  # here, because only jobs that unwrap need it
+
+    atlas, charts, packing = xatlas.Atlas(), xatlas.ChartOptions(), xatlas.PackOptions()
+    packing.padding, packing.bilinear = gap_px, True
+    packing.texels_per_unit = size * np.sqrt(FULL / _areas(mesh).sum())  # a fixed resolution would leave room for a third of the texels
+    atlas.add_mesh(np.ascontiguousarray(mesh.vertices - mesh.vertices.mean(0), np.float32), np.ascontiguousarray(mesh.faces, np.uint32))
+    atlas.generate(charts, packing)
+    _, faces, uvs = atlas[0]
+    side = max(atlas.width, atlas.height)  # the packed area is no square, texels are
+    return replace(mesh, uvs=np.asarray(uvs, np.float64) * [atlas.width / side, atlas.height / side], face_uvs=np.asarray(faces, np.int64))
+
+
+def tiles(mesh: Mesh) -> np.ndarray:
+    """The tile each triangle lies in, whole numbers [F, 2]: that of its middle, for a chart may end on its tile's edge."""
+    return np.floor(mesh.uvs[mesh.face_uvs].mean(1)).astype(np.int64)
+
+
+def udim(tile) -> int:
+    """The UDIM number of a tile (u, v). Those left of or below the first have none (ValueError)."""
+    u, v = (int(x) for x in tile)
+    if not (0 <= u < 10 and v >= 0):
+        raise ValueError(f"tile {u}, {v} has no UDIM number")
+    return 1001 + u + 10 * v
+
+
+def in_tile(mesh: Mesh, tile, where: np.ndarray) -> Mesh:
+    """The triangles of bool [F] with their UVs moved from `tile` to the unit square."""
+    return replace(mesh, faces=mesh.faces[where], uvs=mesh.uvs - np.asarray(tile), face_uvs=mesh.face_uvs[where])
+
+
+def faults(mesh: Mesh) -> list[str]:
+    """What keeps a map from being painted in a mesh's UVs, one sentence each; [] when nothing does."""
+    if mesh.uvs is None:
+        return ["It has no UVs, or some of its polygons have none."]
+    of = tiles(mesh)
+    found = []
+    if of.min() < 0 or of[:, 0].max() > 9:
+        found.append("Some UVs lie left of, below or more than ten tiles right of the first tile.")
+    collapsed = (np.abs(_double_areas(mesh.uvs[mesh.face_uvs])) < 1e-12).mean()
+    if collapsed > 0.05:
+        found.append(f"{100 * collapsed:.0f} percent of its triangles have no area in the UVs.")
+    overlap = overlap_share(mesh)
+    if overlap > MOST_OVERLAP:
+        found.append(f"{100 * overlap:.0f} percent of its UVs overlap.")
+    return found
+
+
+def overlap_share(mesh: Mesh, size: int = CHECK_SIZE) -> float:
+    """Share of the covered texels that lie in two triangles or more."""
+    of = tiles(mesh)
+    covered = doubled = 0
+    for tile in np.unique(of, axis=0):
+        part = in_tile(mesh, tile, (of == tile).all(1))
+        first, _ = raster.rasterize_uv(part, size)
+        last, _ = raster.rasterize_uv(replace(part, faces=part.faces[::-1], face_uvs=part.face_uvs[::-1]), size)
+        last = np.where(last >= 0, len(part.faces) - 1 - last, -1)
+        covered += (first >= 0).sum()
+        doubled += (first != last).sum()
+    return float(doubled / max(covered, 1))
+
+
+def packing(mesh: Mesh, size: int = CHECK_SIZE) -> float:
+    """Share of the first tile that its charts cover."""
+    return float((raster.rasterize_uv(mesh, size)[0] >= 0).mean())
+
+
+def stretch(mesh: Mesh) -> np.ndarray:
+    """Per triangle the larger of its stretches [F]: 1 for one that keeps its shape and the mean scale of the map, 2 for one drawn out to twice
+    in some direction or shrunk to half in one (the singular values of Sander et al. 2001, over the mean scale)."""
+    corners, uvs = mesh.vertices[mesh.faces], mesh.uvs[mesh.face_uvs]
+    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    length = np.maximum(np.linalg.norm(e1, axis=1), 1e-12)
+    x, y = (e2 * e1).sum(1) / length, np.linalg.norm(np.cross(e1, e2), axis=1) / length
+    area = length * y / 2
+    flat = np.stack([np.stack([length, np.zeros_like(length)], -1), np.stack([x, np.maximum(y, 1e-12)], -1)], 1)  # rows: edges in the plane
+    mapped = np.linalg.solve(flat, np.stack([uvs[:, 1] - uvs[:, 0], uvs[:, 2] - uvs[:, 0]], 1))
+    singular = np.linalg.svd(mapped, compute_uv=False)
+    scale = np.sqrt((np.abs(_double_areas(uvs)) / 2).sum() / area.sum())
+    return np.maximum(singular[:, 0] / scale, scale / np.maximum(singular[:, 1], 1e-12))
+
+
+def _areas(mesh: Mesh) -> np.ndarray:
+    """Areas [F] of the triangles in the units of the mesh."""
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+
+
+def _double_areas(uvs: np.ndarray) -> np.ndarray:
+    """Twice the signed areas [F] of UV triangles [F, 3, 2]."""
+    a, b = uvs[:, 1] - uvs[:, 0], uvs[:, 2] - uvs[:, 0]
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]

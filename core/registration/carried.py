@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Eyes, teeth, sockets, lashes: parts of the artist's mesh with no counterpart on the scan go where the skin around them goes.
+
+The displacement of the skin is interpolated by a biharmonic radial basis function, which is linear far away and exact
+at its centres (Carr et al. 2001); a ball stays a ball, so that an eye still turns in its socket.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import RBFInterpolator
+from scipy.spatial import cKDTree
+
+from ..messages import Reporter
+from .alignment import similarity
+
+MOST_CENTRES = 2200
+ROUND = 0.06
+"""Deviation from a sphere, as a share of its radius, below which a part is a ball."""
+
+
+def along(start: np.ndarray, faces: np.ndarray, label: np.ndarray, skin: np.ndarray, fitted: np.ndarray, report: Reporter) -> np.ndarray:
+    """Final vertices [V, 3]. start [V, 3]: all as placed by the similarity; label [V]: connected part of each; skin [S]: indices of the fitted ones,
+    fitted [S, 3]: where they went."""
+    final = start.copy()
+    final[skin] = fitted
+    others = np.setdiff1d(np.arange(len(start)), skin)
+    if not len(others):
+        return final
+    report.progress(0, 1, "carrying eyes, teeth and other parts along")
+    centres = _centres(start, skin, others)
+    shift = np.zeros_like(start)
+    shift[skin] = fitted - start[skin]
+    field = RBFInterpolator(start[centres], shift[centres], kernel="linear", smoothing=1e-6)
+    for i in range(0, len(others), 4000):
+        report.progress(i, len(others), "carrying eyes, teeth and other parts along")
+        part = others[i:i + 4000]
+        final[part] += field(start[part])
+    for part in np.unique(label[others]):
+        index = np.flatnonzero(label == part)
+        if len(index) > 30 and _is_ball(start[index]):
+            final[index] = similarity(start[index], final[index], np.ones(len(index))).apply(start[index])
+    return final
+
+
+def _centres(start: np.ndarray, skin: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Vertices of the skin that carry the rest: those nearest to the other parts, and an even choice of all."""
+    distance, _ = cKDTree(start[others]).query(start[skin])
+    near = skin[np.argsort(distance, kind="stable")[:MOST_CENTRES // 2]]
+    even = skin[np.linspace(0, len(skin) - 1, MOST_CENTRES // 2).astype(int)]
+    chosen = np.union1d(near, even)
+    _, first = np.unique(np.round(start[chosen] * 1e5), axis=0, return_index=True)  # two centres at one place have no solution
+    return chosen[np.sort(first)]
+
+
+def _is_ball(points: np.ndarray) -> bool:
+    """Whether points lie on most of a sphere."""
+    system = np.column_stack([2 * points, np.ones(len(points))])
+    solution, *_ = np.linalg.lstsq(system, (points ** 2).sum(1), rcond=None)
+    centre = solution[:3]
+    distance = np.linalg.norm(points - centre, axis=1)
+    radius = np.median(distance)
+    return bool(np.std(distance) < ROUND * radius and np.ptp(points, axis=0).min() > radius)

@@ -1,0 +1,219 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The artist's own head mesh, fitted to the registered built-in head: own_head.obj.
+
+The registered head is clean and complete where a scan is neither, so it is what the artist's mesh is drawn to. Nothing here
+knows a topology: landmarks are found by rendering, what is skin by following the surface from them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from scipy.spatial import cKDTree
+
+from .. import images, raster, surfaces, template
+from ..capture import Capture, write_json
+from ..meshes import Mesh, vertex_normals
+from ..messages import Problem, Reporter
+from ..settings import Settings
+from . import alignment, carried, nonrigid, own_mesh, render_landmarks
+from .correspondence import Scan
+
+ITERATIONS = 14
+SOURCE_SPACING_M = 0.0012
+OPEN = (0.25, 0.5)
+"""Share of free sky over a vertex below which it lies inside the mouth, a nostril or a socket, and above which it is certainly outside."""
+REACH_M = (0.006, 0.015)
+"""Distance of an aligned vertex to the head up to which it belongs to it, and from which it is another thing: shoulders, clothes."""
+RIM_M = (0.005, 0.045)
+"""Distance to the edge where the built-in head ends at which it begins to draw, and from which it draws fully: a neck must not show a step."""
+PAINTED_M = 0.010
+"""Distance of the fitted skin to the head up to which the head's maps hold for it."""
+LOOSE_EARS = 0.15
+"""No two meshes fold an ear alike: it is drawn to the head by this much only."""
+SHUT = 0.12
+"""Gap of the lids, as a share of the eye's width, under which an eye counts as closed."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """vertices [V, 3] metres, of all of the artist's mesh; skin bool [F]: triangles with a counterpart on the head; distances [M] in metres from the
+    skin that was drawn to the head; flipped triangles; pictures (sRGB) in which the face was found."""
+
+    vertices: np.ndarray
+    skin: np.ndarray
+    distances: np.ndarray
+    flipped: int
+    pictures: list[np.ndarray]
+
+
+def run(capture: Capture, settings: Settings, head: Mesh, hold: np.ndarray, report: Reporter) -> None:
+    """Writes own_head.obj, or removes that of another template where none is chosen. hold [468]: how much longer a landmark counts than others."""
+    if not settings.registration.template:
+        for path in (capture.own_head, capture.own_head_skin, capture.picture("registration", "own_template")):
+            path.unlink(missing_ok=True)
+        return
+    own = own_mesh.read(settings.registration.template, report)
+    fitted = fit(own, head, hold, report)
+    own, uvs = own_mesh.with_usable_uvs(own, fitted.skin, settings.registration.new_atlas, settings.transfer.size)
+    own_mesh.write(capture.own_head, own, fitted.vertices)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], fitted.skin, [0]])))
+    write_json(capture.own_head_skin, {"template": own.path.name, "uvs": uvs, "skin_triangles": edges.reshape(-1, 2).tolist()})
+    report.figure("own_template", Path(settings.registration.template).stem)
+    report.figure("own_shapes", len(own.shapes))
+    report.figure("own_uvs", uvs)
+    report.figure("own_to_head_median_mm", round(1e3 * float(np.median(fitted.distances)), 3))
+    report.figure("own_to_head_p95_mm", round(1e3 * float(np.percentile(fitted.distances, 95)), 3))
+    report.figure("own_flipped_triangles", fitted.flipped)
+    images.write_srgb(capture.picture("registration", "own_template"), _drawn(head, own.mesh.moved(fitted.vertices), fitted.pictures[0]))
+
+
+def fit(own: own_mesh.OwnMesh, head: Mesh, hold: np.ndarray, report: Reporter) -> Fitted:
+    """Lays the artist's mesh over the head. Raises Problem where no face is found on it or the fit does not hold."""
+    whole, index = surfaces.welded(own.mesh)
+    first = np.full(len(whole.vertices), -1)
+    first[index[::-1]] = np.arange(len(index))[::-1]  # an old vertex of each welded one
+    pose, found, pictures = render_landmarks.find(_outwards(whole), report)
+    whole = _outwards(whole.moved(render_landmarks.to_ours(whole.vertices, pose)))
+    shapes = (own.shapes[:, first] @ pose.turn.T.astype(np.float32)) * np.float32(render_landmarks.FACE_M / pose.width)
+
+    known = np.flatnonzero(np.isfinite(found.points).all(1))
+    at, bary = surfaces.Surface(whole, 0.004).nearest(found.points[known], _facing_camera(whole, found.points[known]), 0.02, -1.0)
+    label = _components(whole)
+    main = np.bincount(label[whole.faces[at[at >= 0], 0]]).argmax()
+    used = np.flatnonzero(label == main)
+    report.log(f"{len(used)} of {len(label)} vertices hang together with the face; the others are carried along.")
+
+    skin = Mesh(whole.vertices[used], np.searchsorted(used, whole.faces[label[whole.faces[:, 0]] == main]))
+    good = (at >= 0) & (label[whole.faces[np.maximum(at, 0), 0]] == main)
+    of_skin = np.cumsum(label[whole.faces[:, 0]] == main) - 1  # triangle of the whole -> of the skin
+    weight, marks_at, marks_bary = np.zeros(len(found.points)), np.zeros(len(found.points), int), np.full((len(found.points), 3), 1 / 3)
+    weight[known[good]], marks_at[known[good]], marks_bary[known[good]] = found.trust[known[good]], of_skin[at[good]], bary[good]
+    model = alignment.Model(skin, shapes[:, used], marks_at, marks_bary, weight)
+
+    target = _at_landmarks(head)
+    trust = template.landmark_weights().copy()
+    eyes = _open_eyes(found.points) != _open_eyes(target)
+    if eyes and not len(shapes):
+        trust[_lid_marks()] = 0
+    report.progress(0, 1, "placing the artist's mesh")
+    surface = surfaces.Surface(head, SOURCE_SPACING_M)
+    dense = Scan(_dense(head))
+    placed, coefficients = alignment.fit_landmarks(model, target, trust)
+    follow = _follow(model, placed, coefficients, surface, eyes)
+    for _ in range(2):
+        placed, coefficients = alignment.fit_scan(model, placed, coefficients, target, trust, dense, follow)
+        follow = _follow(model, placed, coefficients, surface, eyes)
+    if eyes:
+        trust[_lid_marks()] = 0
+    start = placed.apply(model.shape(coefficients))
+    vertices = nonrigid.fit(model, start, dense, follow, hold, target, trust, ITERATIONS, report, 0, 1)
+
+    final = skin.moved(vertices)
+    drawn = follow > 0.5
+    distances = dense.distances(vertices[drawn], vertex_normals(final)[drawn], 0.01)
+    if len(distances) < 0.5 * drawn.sum() or not len(distances) or np.median(distances) > 0.002:
+        raise Problem(f"{own.path.name} could not be laid over the head.",
+                      "Choose a head in a neutral pose with its mouth closed, or leave the template empty; the built-in head is not affected.")
+    everything = placed.apply(whole.vertices + np.tensordot(coefficients, shapes, 1))
+    everything = carried.along(everything, whole.faces, label, used, vertices, report)
+    counterpart = np.zeros(len(whole.vertices), bool)
+    normals = vertex_normals(final)
+    counterpart[used] = (surface.nearest(vertices, normals, PAINTED_M)[0] >= 0) & (_free_sky(final, normals) > OPEN[0])
+    return Fitted(everything[index], counterpart[whole.faces].any(1), distances, nonrigid.flipped_triangles(skin.moved(start), final), pictures)
+
+
+def _follow(model: alignment.Model, placed: alignment.Similarity, coefficients: np.ndarray, surface: surfaces.Surface, eyes: bool) -> np.ndarray:
+    """How far each vertex of the placed skin is drawn to the head [V] in [0, 1]."""
+    at = model.mesh.moved(placed.apply(model.shape(coefficients)))
+    normals = vertex_normals(at)
+    face, bary = surface.nearest(at.vertices, normals, REACH_M[1])
+    there = face >= 0
+    distance = np.full(len(face), np.inf)
+    distance[there] = np.linalg.norm(raster.interpolate(surface.mesh.vertices, surface.mesh.faces, face[there], bary[there]) - at.vertices[there], axis=1)
+    follow = np.interp(distance, REACH_M, (1, 0)) * np.interp(_free_sky(at, normals), OPEN, (0, 1))
+    follow *= np.interp(cKDTree(_rim(surface.mesh)).query(at.vertices)[0], RIM_M, (0, 1))
+    uv = np.zeros((len(face), 2))
+    uv[there] = (surface.mesh.uvs[surface.mesh.face_uvs[face[there]]] * bary[there, :, None]).sum(1)
+    for name, least in (("ears", LOOSE_EARS), *((("eyes", 0.0),) if eyes else ())):
+        masked = raster.sample(template.mask(name, 512), np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512)
+        follow *= 1 - (1 - least) * masked
+    return follow
+
+
+def _rim(mesh: Mesh) -> np.ndarray:
+    """The vertices [N, 3] on open edges."""
+    edges, count = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
+    return mesh.vertices[np.unique(edges[count == 1])]
+
+
+def _free_sky(mesh: Mesh, normals: np.ndarray, rays: int = 24) -> np.ndarray:
+    """Share [V] of directions around each normal (cosine-weighted) in which the mesh does not meet itself."""
+    directions = trimesh.sample.sample_surface(trimesh.creation.icosphere(3, 0.999), rays, seed=1)[0]
+    caster, free = raster.RayCaster(mesh), np.zeros(len(normals))
+    for direction in directions:
+        towards = normals + direction
+        towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
+        free += ~caster.blocked(mesh.vertices + 2e-4 * normals, towards)
+    return free / rays
+
+
+def _outwards(mesh: Mesh) -> Mesh:
+    """The mesh with its triangles counter-clockwise from outside: a mirrored export has them the other way round."""
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] - mesh.vertices.mean(0) for i in range(3))
+    if (np.cross(a, b) * c).sum() >= 0:
+        return mesh
+    return replace(mesh, faces=mesh.faces[:, ::-1], face_uvs=None if mesh.face_uvs is None else mesh.face_uvs[:, ::-1])
+
+
+def _components(mesh: Mesh) -> np.ndarray:
+    """Which connected part each vertex belongs to [V]."""
+    edges = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
+    return trimesh.graph.connected_component_labels(edges, len(mesh.vertices))
+
+
+def _facing_camera(mesh: Mesh, points: np.ndarray) -> np.ndarray:
+    """Unit vectors [N, 3] towards the front: any side of the surface will do."""
+    return np.repeat([[0.0, -1.0, 0.0]], len(points), 0)
+
+
+def _at_landmarks(head: Mesh) -> np.ndarray:
+    """The landmarks [468, 3] of the registered built-in head."""
+    face, bary = template.landmarks()
+    return (head.vertices[head.faces[face]] * bary[..., None]).sum(1)
+
+
+def _lid_marks() -> list[int]:
+    """The marks along the lids, their corners left out: those stay put when an eye closes."""
+    corners = (*render_landmarks.faces.LEFT_EYE, *render_landmarks.faces.RIGHT_EYE)
+    return [mark for line in render_landmarks.EYE_LINES for mark in line if mark not in corners]
+
+
+def _open_eyes(points: np.ndarray) -> bool:
+    width = np.linalg.norm(points[263] - points[362]) + np.linalg.norm(points[133] - points[33])
+    gap = sum(np.linalg.norm(points[upper] - points[lower]) for upper, lower in render_landmarks.EYE_LIDS)
+    return bool(np.isfinite(gap) and gap > SHUT * width)
+
+
+def _dense(head: Mesh) -> Mesh:
+    """The same surface with triangles so small that the mean of a few of its points still lies on it."""
+    vertices, faces = head.vertices, head.faces
+    for _ in range(2):
+        vertices, faces = trimesh.remesh.subdivide(vertices, faces)
+    return Mesh(vertices, faces)
+
+
+def _drawn(head: Mesh, own: Mesh, picture: np.ndarray, size: int = 480) -> np.ndarray:
+    """The picture the face was found in, then the built-in head and the artist's from the front, and the artist's from the side."""
+    shots = [images.resize(picture, size, size)]
+    middle = np.nanmean(_at_landmarks(head), axis=0)
+    for mesh, yaw in ((head, 0), (own, 0), (own, 50)):
+        moved = mesh.moved(mesh.vertices - middle)
+        view = render_landmarks.view_from(yaw, 5, size, 0.30)
+        shots.append(render_landmarks.shaded(raster.RayCaster(moved), vertex_normals(surfaces.welded(moved)[0])[surfaces.welded(moved)[1]],
+                                             np.tile(render_landmarks.SKIN, (len(mesh.vertices), 1)), view))
+    return np.hstack(shots)

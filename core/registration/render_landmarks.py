@@ -1,0 +1,204 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Face landmarks on any mesh, whatever its units and axes: it is rendered from several sides, the face found in the
+pictures as in frames of a video, and the marks cast back onto its surface.
+
+Which way is up and where the face looks is found by trying the 24 ways a mesh can stand along the axes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import permutations, product
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+
+from .. import faces, images, raster
+from ..meshes import Mesh, vertex_normals
+from ..messages import Problem, Reporter
+from ..views import View
+from .landmarks import Landmarks, onto_surface, triangulate
+
+FIRST_SIZE, SIZE = 256, 512
+"""Sides of the pictures in which the face is looked for, and in which its marks are found, pixels."""
+FOCAL = 2.2
+"""Focal length in picture sides: an angle of view of 26 degrees, as a portrait's."""
+SIDES = ((0, 0), (-18, 0), (18, 0), (-35, 0), (35, 0), (0, 12), (0, -12), (-18, 10), (18, 10))
+"""Yaw and pitch of the views, degrees."""
+SKIN, LIPS, BROWS = (0.55, 0.36, 0.28), (0.42, 0.14, 0.13), (0.08, 0.05, 0.04)
+"""Linear colours: plain heads are found, painted ones are marked better."""
+LIP_LINE = (61, 146, 91, 181, 84, 17, 314, 405, 321, 375, 291, 409, 270, 269, 267, 0, 37, 39, 40, 185)
+BROW_LINES = ((276, 283, 282, 295, 285, 336, 296, 334, 293, 300), (46, 53, 52, 65, 55, 107, 66, 105, 63, 70))
+EYE_LINES = ((263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 387, 388, 466),
+             (33, 7, 163, 144, 145, 153, 154, 155, 133, 173, 157, 158, 159, 160, 161, 246))
+EYE_LIDS = ((386, 374), (159, 145))
+"""Middle of the upper and the lower lid of the person's left and right eye."""
+SURE = 0.8
+FACE_M = 0.11
+"""How far apart the outermost marks at the temples lie on a person, metres: the first guess of the scale."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """turn [3, 3] takes the mesh's axes to ours (+Z up, face towards -Y); face [3] is the middle of the face in the mesh's own
+    coordinates; width is that of the face, in the mesh's units."""
+
+    turn: np.ndarray
+    face: np.ndarray
+    width: float
+
+
+def find(mesh: Mesh, report: Reporter | None = None) -> tuple[Pose, Landmarks, list[np.ndarray]]:
+    """The pose of the face, its landmarks in metres and our axes around the middle of the face (`to_ours`), and the pictures they were found in,
+    sRGB. Raises Problem where no face is found."""
+    pose = _find_pose(mesh, report)
+    posed = mesh.moved(to_ours(mesh.vertices, pose))
+    colours, found, pictures = np.tile(SKIN, (len(mesh.vertices), 1)), None, []
+    for _ in range(2):
+        views, pixels, pictures = [], [], []
+        caster, normals = raster.RayCaster(posed), vertex_normals(posed)
+        for yaw, pitch in SIDES:
+            if report is not None:
+                report.progress(0, 1, "finding the face on the artist's mesh")
+            view = view_from(yaw, pitch, SIZE, FACE_M * 2.6)
+            picture = shaded(caster, normals, colours, view)
+            face = faces.detect(picture)
+            if face is not None:
+                views.append(replace(view, name=f"{yaw}_{pitch}"))
+                pixels.append(face.landmarks[:, :2])
+                pictures.append(picture)
+        if len(views) < 4:
+            raise _no_face()
+        found = onto_surface(triangulate(views, np.stack(pixels)), views, posed)
+        colours = _painted(posed, found.points)
+    return pose, found, pictures
+
+
+def to_ours(points: np.ndarray, pose: Pose) -> np.ndarray:
+    """Points of the mesh [N, 3] in our axes, in metres, around the middle of its face."""
+    return (points - pose.face) @ pose.turn.T * (FACE_M / pose.width)
+
+
+def from_ours(points: np.ndarray, pose: Pose) -> np.ndarray:
+    """The inverse of to_ours."""
+    return points @ pose.turn * (pose.width / FACE_M) + pose.face
+
+
+def _find_pose(mesh: Mesh, report: Reporter | None) -> Pose:
+    """The way to hold the mesh in which it shows the surest upright face from the front."""
+    used = mesh.vertices[np.unique(mesh.faces)]
+    low, high = used.min(0), used.max(0)
+    best = (0.0, None)
+    turns = _turns()
+    for i, turn in enumerate(turns):
+        if report is not None:
+            report.progress(0, 1, "finding out which way the artist's mesh looks")
+        sides = np.abs(turn @ (high - low))
+        middle = (low + high) / 2
+        for centre, extent in _windows(turn, middle, sides):
+            seen = _look(mesh, turn, centre, extent)
+            if seen is not None and seen[0] > best[0]:
+                best = seen
+        if i % 4 == 3 and best[0] > SURE:  # the four ways to face, with one way up
+            break
+    if best[1] is None:
+        raise _no_face()
+    return best[1]
+
+
+def _windows(turn: np.ndarray, middle: np.ndarray, sides: np.ndarray) -> list[tuple[np.ndarray, float]]:
+    """Middles, in the mesh's coordinates, and sides of the squares in which a face may lie: all of the mesh, its upper half, or, in a figure with a body
+    or arms, what is round the top of its middle. sides [3]: its extents in our axes."""
+    whole = 1.05 * max(sides[0], sides[2])
+    windows = [(0.0, whole), (0.2 * sides[2], 0.75 * whole)]
+    for side in (1.2 * sides[2], 0.35 * sides[2], 0.2 * sides[2]):
+        if side < 0.7 * whole:
+            windows.append((max(0.5 * sides[2] - 0.42 * side, 0.0), side))
+    return [(middle + turn.T @ [0, 0, lift], side) for lift, side in windows]
+
+
+def _look(mesh: Mesh, turn: np.ndarray, centre: np.ndarray, extent: float) -> tuple[float, Pose] | None:
+    """How sure an upright face is seen in a square of side `extent` around `centre`, and where it is."""
+    posed = mesh.moved((mesh.vertices - centre) @ turn.T / extent)  # the square has side 1
+    caster, normals = raster.RayCaster(posed), vertex_normals(posed)
+    view = view_from(0, 0, FIRST_SIZE, 1.0)
+    face = faces.detect(shaded(caster, normals, np.tile(SKIN, (len(mesh.vertices), 1)), view))
+    if face is None:
+        return None
+    marks = face.landmarks[:, :2].astype(np.float64)
+    across = marks[list(faces.LEFT_EYE)].mean(0) - marks[list(faces.RIGHT_EYE)].mean(0)
+    roll = np.degrees(np.arctan2(across[1], across[0]))
+    if abs(roll) > 30 or abs(face.yaw_deg) > 30:
+        return None
+    hit, _, distance = caster.first_hits(np.repeat(view.centre[None], len(marks), 0), view.rays(marks))
+    if (hit >= 0).mean() < 0.8:
+        return None
+    points = view.centre + view.rays(marks) * np.where(hit >= 0, distance, np.nan)[:, None]
+    width = np.nanmax(points[:, 0]) - np.nanmin(points[:, 0])
+    # a face is about as deep as it is wide: the back of a head, where nets see faces too, has no nose in front of its sides
+    bulge = np.nanmedian(points[[10, 152, 127, 356], 1]) - points[faces.NOSE, 1]
+    if not 0.15 < bulge / width < 1.2:
+        return None
+    score = face.score * np.cos(np.radians(roll)) * np.cos(np.radians(face.yaw_deg)) * min(1.0, 0.5 + (marks[:, 0].max() - marks[:, 0].min()) / FIRST_SIZE)
+    return score, Pose(turn, centre + np.nanmedian(points, 0) * extent @ turn, float(width * extent * 0.8))
+
+
+def _turns() -> list[np.ndarray]:
+    """The 24 rotations along the axes, those with +Z up first, then +Y up, then the odd ones."""
+    turns = []
+    for order in permutations(range(3)):
+        for signs in product((1, -1), repeat=3):
+            turn = np.zeros((3, 3))
+            turn[range(3), order] = signs
+            if np.linalg.det(turn) > 0:
+                turns.append(turn)
+
+    def rank(turn):  # rows of `turn` are our axes in the mesh's: turn[2] is its up
+        up = tuple(np.round(turn[2]).astype(int))
+        return ((0, 0, 1), (0, 1, 0), (0, 0, -1), (0, -1, 0), (1, 0, 0), (-1, 0, 0)).index(up)
+
+    return sorted(turns, key=rank)
+
+
+def view_from(yaw: float, pitch: float, size: int, extent: float) -> View:
+    """A camera that sees a square of side `extent` around the origin, from `yaw` and `pitch` degrees off the front."""
+    yaw, pitch = np.radians(yaw), np.radians(pitch)
+    towards = np.array([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)])
+    right = np.array([np.cos(yaw), np.sin(yaw), 0])
+    rotation = np.stack([right, np.cross(-towards, right), -towards])
+    camera = pycolmap.Camera(model="SIMPLE_PINHOLE", width=size, height=size, params=[FOCAL * size, size / 2, size / 2])
+    return View("render", Path(), camera, rotation, -rotation @ (towards * extent * FOCAL), False)
+
+
+def shaded(caster: raster.RayCaster, normals: np.ndarray, colours: np.ndarray, view: View) -> np.ndarray:
+    """A Lambert picture, sRGB [S, S, 3], lit from above the camera; surfaces are lit on the side that is seen."""
+    face, bary, _ = raster.render_view(caster, view)
+    normal = raster.interpolate(normals, caster.mesh.faces, face, bary)
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
+    normal *= np.where((normal @ view.axis) > 0, -1, 1)[..., None]
+    key = -0.75 * view.axis + 0.55 * np.array([0, 0, 1]) + 0.35 * view.rotation[0]
+    light = 0.75 * np.clip(normal @ (key / np.linalg.norm(key)), 0, 1) + 0.2 + 0.15 * np.clip(-(normal @ view.axis), 0, 1)
+    colour = raster.interpolate(colours, caster.mesh.faces, face, bary)
+    return images.linear_to_srgb(np.where((face >= 0)[..., None], colour * light[..., None], 0.2))
+
+
+def _painted(mesh: Mesh, points: np.ndarray) -> np.ndarray:
+    """Vertex colours [V, 3] (linear) with brows and lips inside the landmarks' outlines as seen from the front."""
+    import cv2
+
+    colours = np.tile(SKIN, (len(mesh.vertices), 1))
+    front = mesh.vertices[:, 1] < np.nanmax(points[:, 1])
+    for outline, colour in ((LIP_LINE, LIPS), *((line, BROWS) for line in BROW_LINES)):
+        polygon = points[list(outline)][:, [0, 2]].astype(np.float32)
+        if np.isfinite(polygon).all():
+            near = np.flatnonzero(front & (mesh.vertices[:, [0, 2]] >= polygon.min(0)).all(1) & (mesh.vertices[:, [0, 2]] <= polygon.max(0)).all(1))
+            inside = [cv2.pointPolygonTest(polygon, (float(mesh.vertices[v, 0]), float(mesh.vertices[v, 2])), False) >= 0 for v in near]
+            colours[near[np.array(inside, bool)]] = colour
+    return colours
+
+
+def _no_face() -> Problem:
+    return Problem("No face was found on the template mesh, seen from any side.",
+                   "Choose an OBJ of a head in a neutral pose, without hair or glasses over the face, or leave the template empty.")

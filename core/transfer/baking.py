@@ -1,0 +1,168 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Maps of one surface baked into the UVs of another that lies on it.
+
+For every texel of the target its partner on the source gives the place to read. Work goes by strips of rows and one map
+after the other, so that memory is a few maps of the target's size, whatever the meshes are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from .. import atlas, images, raster, surfaces
+from ..meshes import Mesh, vertex_normals
+
+STRIP = 128
+BLEED_PX = 16
+"""Bleed at a map of 4096; smaller maps have less in proportion, but no less than two."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """For each texel [S, S] of a tile where its partner lies in the source's maps.
+
+    uv float32 [S, S, 2] (nan: no partner), turn float32 [S, S]: the angle in radians that takes directions of the source's tangent plane to the
+    target's, mirrored bool [S, S]: whether one of the two is a mirror image, covered bool [S, S]: texels inside a triangle.
+    """
+
+    uv: np.ndarray
+    turn: np.ndarray
+    mirrored: np.ndarray
+    covered: np.ndarray
+
+    @property
+    def known(self) -> np.ndarray:
+        return np.isfinite(self.uv[..., 0])
+
+
+class Source:
+    """The surface whose maps are read, ready to be searched."""
+
+    def __init__(self, mesh: Mesh):
+        self.mesh = surfaces.welded(mesh)[0]
+        self.surface = surfaces.Surface(self.mesh)
+        self.tangent, self.hand = surfaces.tangents(self.mesh)
+
+
+def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick: Callable[[float], None], painted: np.ndarray | None = None) -> Places:
+    """Partners, up to `farthest` metres away, of the texels of a tile (u, v) of the target's UVs, in a map of `size`.
+
+    painted bool [F]: the triangles that count (all by default). `tick` is called with the share done, per strip.
+    """
+    whole = surfaces.welded(target)[0]
+    where = (atlas.tiles(whole) == np.asarray(tile)).all(1) & (True if painted is None else painted)
+    tangent, hand = surfaces.tangents(whole)
+    tangent, hand, normals = tangent[where], hand[where], vertex_normals(whole)
+    part = atlas.in_tile(whole, tile, where)
+    low, high = _rows(part, size)
+    uv = np.full((size, size, 2), np.nan, np.float32)
+    turn, mirrored, covered = np.zeros((size, size), np.float32), np.zeros((size, size), bool), np.zeros((size, size), bool)
+    for row in range(0, size, STRIP):
+        tick(row / size)
+        end = min(row + STRIP, size)
+        crossing = (high >= row) & (low <= end)
+        if not crossing.any():
+            continue
+        strip = atlas.in_tile(part, (0, 0), crossing)
+        face, bary = raster.rasterize_uv(strip, size, (row, end))
+        inside = face >= 0
+        covered[row:end] = inside
+        face, bary = np.flatnonzero(crossing)[face[inside]], bary[inside].astype(np.float64)
+        points = raster.interpolate(part.vertices, part.faces, face, bary)
+        t, b, n = surfaces.frames(normals, part.faces, tangent, hand, face, bary)
+        there, at = source.surface.partners(points, n, farthest)
+        found = there >= 0
+        read = (source.mesh.uvs[source.mesh.face_uvs[there[found]]] * at[found, :, None]).sum(1)
+        angle = _turn(source, there[found], at[found], t[found], b[found], n[found])
+        mirror = source.hand[there[found]] != hand[face[found]]
+        for array, values in ((uv, read), (turn, angle), (mirrored, mirror)):
+            view = array[row:end]
+            flat = view[inside]
+            flat[found] = values
+            view[inside] = flat
+    return Places(uv, turn, mirrored, covered)
+
+
+def bake(image: np.ndarray, at: Places) -> np.ndarray:
+    """A source map [H, W(, C)] read at the places, bicubic, [S, S(, C)] float32; the gaps filled and bled."""
+    image = _matched(np.asarray(image, np.float32), at)
+    height, width = image.shape[:2]
+    out = np.empty((*at.covered.shape, *image.shape[2:]), np.float32)
+    low, high = image.min(), image.max()
+    for row in range(0, len(out), STRIP):
+        uv = np.nan_to_num(at.uv[row:row + STRIP])
+        x, y = uv[..., 0] * width - 0.5, (1 - uv[..., 1]) * height - 0.5
+        out[row:row + STRIP] = np.clip(cv2.remap(image, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE), low, high)  # cubic overshoots at edges
+    return bled(out, at)
+
+
+def bake_normals(packed: np.ndarray, at: Places) -> np.ndarray:
+    """A tangent space normal map [H, W, 3] packed into [0, 1], OpenGL Y+, turned from the source's tangent frames into the target's.
+
+    What it tells is how the skin leaves its own smooth surface; that is kept, for the target brings a smooth surface of its own.
+    """
+    out = bake(packed, at)
+    for row in range(0, len(out), STRIP):
+        part = np.s_[row:row + STRIP]
+        vectors = out[part] * 2 - 1
+        turn, known = at.turn[part], at.known[part]
+        x, y = vectors[..., 0].copy(), vectors[..., 1] * np.where(at.mirrored[part], -1, 1)
+        c, s = np.cos(turn), np.sin(turn)
+        vectors[..., 0], vectors[..., 1] = c * x - s * y, s * x + c * y
+        vectors = np.where(known[..., None], vectors, [0, 0, 1])
+        out[part] = vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-6) * 0.5 + 0.5
+    return bled(out, at)
+
+
+def bled(image: np.ndarray, at: Places) -> np.ndarray:
+    """The map with a margin around what is known that repeats its nearest texel, and a smooth continuation of it beyond, over the rest of the tile."""
+    known = at.known
+    if known.all() or not known.any():
+        return image
+    margin = max(2, round(BLEED_PX * len(image) / 4096))
+    near = cv2.distanceTransform((~known).astype(np.uint8), cv2.DIST_L2, 5) <= margin + 1
+    small = min(512, len(image))
+    weight = images.resize(known.astype(np.float32), small, small)
+    mean = images.resize(np.where(known[..., None], image.reshape(*known.shape, -1), 0).astype(np.float32), small, small).reshape(small, small, -1)
+    smooth = cv2.resize(_continued(mean, weight), known.shape[::-1], interpolation=cv2.INTER_LINEAR).reshape(image.shape)
+    nearest = raster.bleed(image, known)
+    return np.where(near.reshape(near.shape + (1,) * (image.ndim - 2)), nearest, smooth)
+
+
+def _continued(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Values times weights [h, w, C] and weights [h, w] in [0, 1] -> values everywhere, from ever coarser means where the weight is low
+    (pull-push, Gortler et al. 1996)."""
+    if min(weight.shape) <= 2:
+        return np.broadcast_to(weighted.sum((0, 1)) / max(weight.sum(), 1e-6), weighted.shape).astype(np.float32)
+    half = (weight.shape[1] + 1) // 2, (weight.shape[0] + 1) // 2
+    down = cv2.resize(weighted, half, interpolation=cv2.INTER_AREA).reshape(*half[::-1], -1), cv2.resize(weight, half, interpolation=cv2.INTER_AREA)
+    gain = np.minimum(4 * down[1], 1) / np.maximum(down[1], 1e-6)  # one known texel of four is enough
+    coarse = cv2.resize(_continued(down[0] * gain[..., None], down[1] * gain), weight.shape[::-1], interpolation=cv2.INTER_LINEAR)
+    return (weighted + coarse.reshape(weighted.shape) * (1 - weight[..., None])).astype(np.float32)
+
+
+def _matched(image: np.ndarray, at: Places) -> np.ndarray:
+    """The source map made smaller where it is finer than the target's texels, lest they skip some of it."""
+    step = np.linalg.norm(np.diff(at.uv[::2], axis=1) * [image.shape[1], image.shape[0]], axis=-1)
+    step = float(np.nanmedian(step)) if np.isfinite(step).any() else 1.0
+    return images.resize(image, round(image.shape[1] / step), round(image.shape[0] / step)) if step > 1.3 else image
+
+
+def _rows(mesh: Mesh, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """The first and the last row [F] that each triangle can touch."""
+    v = (1 - mesh.uvs[mesh.face_uvs][..., 1]) * size
+    return np.floor(v.min(1)) - 1, np.ceil(v.max(1)) + 1
+
+
+def _turn(source: Source, face: np.ndarray, bary: np.ndarray, t: np.ndarray, b: np.ndarray, n: np.ndarray) -> np.ndarray:
+    """Angles [N] from the target's tangent t to the source's at face, bary, towards b; the source's normal is first taken to the target's n [N, 3]
+    by the smallest rotation."""
+    tangent, _, normal = surfaces.frames(source.surface.normals, source.mesh.faces, source.tangent, source.hand, face, bary)
+    lean = (tangent * n).sum(1, keepdims=True) / np.maximum(1 + (normal * n).sum(1, keepdims=True), 1e-6)
+    tangent = tangent - lean * (normal + n)
+    return np.arctan2((tangent * b).sum(1), (tangent * t).sum(1))

@@ -1,0 +1,40 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the report shows of the delivery."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import images, raster
+from ..capture import Capture
+from ..meshes import Mesh
+from ..views import View
+
+
+def own_map(capture: Capture, number: int, srgb: np.ndarray, side: int = 512) -> None:
+    """The baked albedo of a tile, small."""
+    images.write_srgb(capture.picture("transfer", f"own_{number}"), images.resize(srgb, side, side))
+
+
+def scan_sheet(capture: Capture, mesh: Mesh, colours: np.ndarray, albedo: np.ndarray, views: list[View], height: int = 420) -> None:
+    """A frame, and the textured scan through the same camera: lit, then albedo; both linear maps [S, S, 3]."""
+    around = sorted(views, key=lambda view: abs(np.arctan2(view.centre[0], -view.centre[1])))
+    view = around[0]
+    frame = images.read_srgb(view.path)
+    width = round(frame.shape[1] * height / frame.shape[0])
+    shots = [images.resize(frame, width, height)]
+    caster = raster.RayCaster(mesh)
+    for texture in (colours, albedo):
+        shots.append(images.resize(images.linear_to_srgb(textured(caster, texture, view, height / view.height)), width, height))
+    images.write_srgb(capture.picture("transfer", "scan"), np.hstack(shots))
+
+
+def textured(caster: raster.RayCaster, texture: np.ndarray, view: View, scale: float) -> np.ndarray:
+    """The mesh with a texture [S, S, C] through a camera, unlit; grey behind it."""
+    mesh = caster.mesh
+    face, bary, _ = raster.render_view(caster, view, scale)
+    uv = raster.interpolate(mesh.uvs, mesh.face_uvs, face, bary)
+    pixels = np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * [texture.shape[1], texture.shape[0]]
+    colour = raster.sample(texture, pixels).reshape(*face.shape, -1)
+    return np.where((face >= 0)[..., None], colour, 0.2)
