@@ -1,85 +1,120 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stage cameras: frames become cameras/, a COLMAP model in the head's world: metres, +Z up, face towards -Y,
-origin midway between the eyes. Plain feature settings come first; those that hold on skin only where the plain ones fail.
+origin midway between the eyes. Solved from what matches between the frames and from the face, or imported from another program.
 """
 
 from __future__ import annotations
 
 import json
 import time
+from pathlib import Path
 
 import numpy as np
-import pycolmap
 
 from .. import images
 from ..capture import Capture, replacing_folder
 from ..messages import Problem, Reporter
 from ..settings import Settings
+from . import coverage
+from .calibration import import_cameras
 from .drawing import draw_cameras
-from .structure import solve_structure
+from .landmarks import find_landmarks
+from .motion import expression_changes
+from .solving import FEW, MOST_FACES, Solved, solve
 from .world import find_head
 
-LEAST_SHARE = 0.6
-LEAST_VIEWS = 3
 LEAST_COVERAGE_DEG = 15.0
-MOST_ERROR_PX = 2.0
+IMPORT_MISS = 0.05
+"""Share of the face's width by which landmarks may miss in imported cameras: those of another capture, or read by other conventions, miss by far more."""
+BLURRED = 0.6
+"""Sharpness, as a share of that of the frames that fit, below which a frame was left out for its blur."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Writes capture.cameras. Raises Problem where too few frames fit together, the camera hardly moved, or the head moved on its own."""
+    """Writes capture.cameras. Raises Problem where too few frames fit together, the camera hardly moved, or the head moved on its own; or where
+    imported cameras cannot be read or do not fit the frames."""
     started = time.monotonic()
     frames = json.loads(capture.frames_json.read_text(encoding="utf-8"))
-    model, features = _solve(frames, capture, settings, report)
-    head = find_head(model, frames["frames"], capture.frames, settings.cameras.interpupillary_mm / 1000, report)
-    model.transform(head.world_from_model)
-    coverage = coverage_deg(_centres(model))
-    if coverage < LEAST_COVERAGE_DEG:
-        raise Problem(f"The camera moved only {coverage:.0f} degrees around the head; {LEAST_COVERAGE_DEG:.0f} are the least.",
+    chosen = settings.cameras.import_from.strip()
+    solved = _imported(Path(chosen).expanduser(), frames, capture, settings, report) if chosen else solve(frames, capture, settings, report)
+    model = solved.model
+    model.transform(solved.head.world_from_model)
+    centres = np.array([image.projection_center() for image in model.images.values() if image.has_pose])
+    widest = coverage.widest_deg(centres)
+    if widest < LEAST_COVERAGE_DEG:
+        raise Problem(f"The camera moved only {widest:.0f} degrees around the head; {LEAST_COVERAGE_DEG:.0f} are the least.",
                       "Film again while you walk around the face from one ear to the other.")
     with replacing_folder(capture.cameras) as folder:
         model.write_binary(str(folder))
         report.check()
     images.write_srgb(capture.picture("cameras", "world"), draw_cameras(model, frames["frames"], capture.frames))
-    registered = model.num_reg_images()
+    _findings(solved, frames["frames"], centres, report)
+    registered, azimuth = model.num_reg_images(), coverage.angles(centres)[0]
     for name, value in (("frames_registered", registered), ("share_registered", round(registered / len(frames["frames"]), 3)),
-                        ("reprojection_error_px", round(model.compute_mean_reprojection_error(), 3)), ("sparse_points", model.num_points3D()),
-                        ("angular_coverage_deg", round(coverage, 1)), ("landmark_error_px", round(head.error_px, 2)),
+                        ("reprojection_error_px", round(model.compute_mean_reprojection_error(), 3) if model.num_points3D() else None),
+                        ("sparse_points", model.num_points3D()), ("angular_coverage_deg", round(widest, 1)),
+                        ("from_person_right_deg", round(float(-azimuth.min()), 1)), ("to_person_left_deg", round(float(azimuth.max()), 1)),
+                        ("landmark_error_px", round(solved.head.error_px, 2)),
                         ("focal_px", round(float(np.mean([c.mean_focal_length() for c in model.cameras.values()])), 1)),
-                        ("features", features), ("solve_s", round(time.monotonic() - started, 1))):
+                        ("features", solved.way), ("solve_s", round(time.monotonic() - started, 1))):
         report.figure(name, value)
+    if chosen:
+        report.figure("pupils_apart_in_imported_units", round(solved.head.pupils_apart, 5))
+    if solved.way == "face":
+        report.figure("tracks", solved.tracks)
 
 
-def _solve(frames: dict, capture: Capture, settings: Settings, report: Reporter) -> tuple[pycolmap.Reconstruction, str]:
-    """The first model that passes the gate. Raises Problem with the best attempt's shortcoming."""
-    attempts = ("plain", "skin") if settings.cameras.features == "auto" else (settings.cameras.features,)
-    for features in attempts:
-        model = solve_structure(frames, capture.frames, features == "skin", settings.cameras.matching, settings.seed, report)
-        shortcoming = _shortcoming(model, len(frames["frames"]))
-        if shortcoming is None:
-            return model, features
-        report.log(f"With {features} features: {shortcoming}")
-    raise Problem(shortcoming, "Film again: the person sits still, the camera moves slowly around the face at arm's length, "
-                               "and the background is busy rather than a white wall.")
+def _imported(path: Path, frames: dict, capture: Capture, settings: Settings, report: Reporter) -> Solved:
+    """Another program's cameras, checked by the face's landmarks."""
+    model = import_cameras(path, frames, capture.frames, report)
+    names = {image.name for image in model.images.values()}
+    records = [record for record in frames["frames"] if record["name"] in names and record["yaw_deg"] is not None]
+    records = [records[i] for i in np.unique(np.linspace(0, len(records) - 1, min(MOST_FACES, len(records))).round().astype(int))] if records else []
+    found = find_landmarks(records, capture.frames, report)
+    head = find_head(model, found, settings.cameras.interpupillary_mm / 1000)
+    width = float(np.median([face.box[2] - face.box[0] for face in found.values()]))
+    if not max(head.miss, head.error_px / width) < IMPORT_MISS:
+        raise Problem(f"The cameras in {path.name} do not fit these pictures: the face's landmarks miss each other by {head.error_px:.0f} px "
+                      f"({100 * head.error_px / width:.0f} % of the face's width).",
+                      "Import the cameras that were solved from these very pictures, not cropped, under the same names; or empty the setting.")
+    return Solved(model, "imported", head, found)
 
 
-def _shortcoming(model: pycolmap.Reconstruction | None, frames: int) -> str | None:
-    registered = model.num_reg_images() if model else 0
-    if registered < LEAST_VIEWS:
-        return "The frames do not fit together: no common structure was found in three of them."
-    if registered < LEAST_SHARE * frames:
-        return f"Only {registered} of {frames} frames fit together."
-    error = model.compute_mean_reprojection_error()
-    if error > MOST_ERROR_PX:
-        return f"The frames fit together only roughly ({error:.1f} px off on average)."
-    return None
+def _findings(solved: Solved, records: list[dict], centres: np.ndarray, report: Reporter) -> None:
+    """What is wrong with a capture that can be used, and how to shoot it again."""
+    shown = {record["name"]: record.get("source") or record["name"] for record in records}
+    if solved.way == "face":
+        rough = "to a few degrees only" if solved.tracks < 30 else "refined by what little matches"
+        report.finding(f"The frames do not overlap enough to be matched: the cameras come from the face's landmarks, {rough}. Expect a rough head.",
+                       "Take a photograph every ten degrees around the face, from ear to ear, with a busy background.")
+    elif len(records) < FEW:
+        report.finding(f"There are only {len(records)} frames: expect a rough head.", "30 or more around the face, from ear to ear, give a full one.")
+    if solved.stood_still:
+        report.finding("The head turned while the camera stood still. The cameras hold for the head, but light and shadows slide over the face as it turns.",
+                       "Let the person sit still and walk around them with the camera.")
+    elif solved.head_moved:
+        report.finding("The head moved against its background during the capture; only what matches on the head itself was used.",
+                       "Let the person lean the head against a wall or a chair, look at one point, and keep still.")
+    changed = expression_changes(solved.found)
+    if len(changed) > 0.1 * len(solved.found):
+        report.finding(f"The expression changes: in {len(changed)} of {len(solved.found)} frames the mouth is opened or drawn otherwise than in the rest.",
+                       "Ask for a relaxed face with closed mouth, without talking, until the end.", [shown[name] for name in changed])
+    if solved.mirrored:
+        report.finding(f"Mirrored pictures were left out: {', '.join(shown[name] for name in solved.mirrored)}.",
+                       "Flip them back; on a phone, switch off the mirroring of the front camera.", [shown[name] for name in solved.mirrored])
+    _left_out(solved, records, shown, report)
+    for problem, remedy in coverage.missing(centres):
+        report.finding(problem, remedy)
 
 
-def _centres(model: pycolmap.Reconstruction) -> np.ndarray:
-    return np.array([image.projection_center() for image in model.images.values() if image.has_pose])
-
-
-def coverage_deg(centres: np.ndarray) -> float:
-    """The widest angle between two cameras [N, 3] as seen from the head (the origin)."""
-    directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
-    return float(np.degrees(np.arccos(np.clip(directions @ directions.T, -1, 1)).max()))
+def _left_out(solved: Solved, records: list[dict], shown: dict[str, str], report: Reporter) -> None:
+    fits = {image.name for image in solved.model.images.values() if image.has_pose}
+    rest = [record for record in records if record["name"] not in fits and record["name"] not in solved.mirrored]
+    if not rest:
+        return
+    sharp = np.median([record["sharpness"] for record in records if record["name"] in fits])
+    blurred = sum(record["sharpness"] < BLURRED * sharp for record in rest)
+    why, remedy = ((f"; {blurred} of them are blurred", "Move the camera slower, or add light, so that each frame is sharp.") if blurred > len(rest) / 2
+                   else ("", "Move the camera slower past the places where frames were lost, and keep the whole head in the picture."))
+    report.finding(f"{len(rest)} of {len(records)} frames did not fit the others and were left out{why}.", remedy, [shown[record["name"]] for record in rest])

@@ -24,7 +24,7 @@ CHUNK = 24
 
 def reconstruct(job: dict) -> bool:
     """Runs a job: images (folder), groups [{names, width, height, focal_px or null}] of one camera each, skin (feature settings), sequential,
-    seed, database and output (paths). Writes the largest model to output; False where there is none."""
+    seed, masks (folder or null), database and output (paths). Writes the largest model to output; False where there is none."""
     pycolmap.set_random_seed(job["seed"])
     _extract(job)
     _match(job)
@@ -55,6 +55,8 @@ def _extract(job: dict) -> None:
         reader.default_focal_length_factor = 1.0  # between a phone's wide (0.8) and its portrait lens (1.4)
         if group["focal_px"]:
             reader.camera_params = f"{group['focal_px']},{group['width'] / 2},{group['height'] / 2},0"
+        if job["masks"]:
+            reader.mask_path = job["masks"]
         # Entered in order: extraction would number the pictures as its threads finish, and the mapper's path depends on the numbers.
         pycolmap.import_images(job["database"], job["images"], pycolmap.CameraMode.SINGLE, group["names"], reader)
         reader.existing_camera_id = camera_id

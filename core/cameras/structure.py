@@ -16,6 +16,7 @@ import pycolmap
 
 from .. import images
 from ..messages import Problem, Reporter
+from .matches import Matches, read_matches
 
 ALL_PAIRS = 40
 """Up to this many frames all pairs are matched; beyond, those near each other in the video."""
@@ -23,20 +24,23 @@ STEPS = {"finding features": (0.0, 0.4), "matching features": (0.4, 0.6), "placi
 NO_MODEL = 3
 
 
-def solve_structure(frames: dict, folder: Path, skin: bool, matching: str, seed: int, report: Reporter) -> pycolmap.Reconstruction | None:
-    """The largest model of frames.json's `frames`, whose pictures lie in `folder`, in COLMAP's own world; None where nothing fits together."""
+def solve_structure(frames: dict, folder: Path, skin: bool, matching: str, seed: int, report: Reporter,
+                    masks: Path | None = None) -> tuple[pycolmap.Reconstruction | None, Matches]:
+    """The largest model of frames.json's `frames`, whose pictures lie in `folder`, in COLMAP's own world (None where nothing fits together),
+    and all matches. `masks`: folder with NAME.png, where black hides what moves otherwise."""
     records = frames["frames"]
     sequential = matching == "sequential" or (matching == "auto" and frames.get("kind") == "video" and len(records) > ALL_PAIRS)
     with tempfile.TemporaryDirectory(prefix="wildcap_") as temporary:
-        job = {"images": str(folder.resolve()), "groups": _groups(records, folder), "skin": skin, "sequential": sequential, "seed": seed,
-               "database": str(Path(temporary) / "database.db"), "output": str(Path(temporary) / "model")}
+        job = {"images": str(folder.resolve()), "groups": camera_groups(records, folder), "skin": skin, "sequential": sequential,
+               "masks": str(masks) if masks else None, "seed": seed, "database": str(Path(temporary) / "database.db"), "output": str(Path(temporary) / "model")}
         path = Path(temporary) / "job.json"
         path.write_text(json.dumps(job), encoding="utf-8")
-        return pycolmap.Reconstruction(job["output"]) if _follow(path, report) else None
+        model = pycolmap.Reconstruction(job["output"]) if _follow(path, report) else None
+        return model, read_matches(Path(job["database"]))
 
 
-def _groups(records: list[dict], folder: Path) -> list[dict]:
-    """Frames that share a camera: those of one size and one focal length."""
+def camera_groups(records: list[dict], folder: Path) -> list[dict]:
+    """Frames that share a camera, those of one size and one focal length: [{names, width, height, focal_px or None}]."""
     groups = {}
     for record in records:
         width, height = images.size(folder / record["name"])

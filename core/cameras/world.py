@@ -1,22 +1,21 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From structure from motion's arbitrary world to the head's: metres, +Z up, face towards -Y, origin midway between the eyes.
+"""From any world of cameras to the head's: metres, +Z up, face towards -Y, origin midway between the eyes.
 
-Face landmarks of several frames are intersected as rays; the corners of the eyes give scale and left-right, brow and chin give up.
+Face landmarks of several frames are rays; the template's head laid against them gives upright and, by its pupils, scale.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pycolmap
 
-from .. import faces, images
-from ..messages import Problem, Reporter
+from .. import faces
+from ..messages import Problem
+from .landmarks import fit_rays, pupils
 
-MOST_FRAMES = 24
 FRONTAL_DEG = 45.0
 """Landmarks slide along the silhouette of a turned head, so frames within this yaw are taken where there are enough."""
 MOVED = 0.08
@@ -25,41 +24,48 @@ MOVED = 0.08
 
 @dataclass(frozen=True)
 class HeadFrame:
-    """The similarity into the head's world, and how well the landmarks' rays meet [px, median over frames and landmarks]."""
+    """The similarity into the head's world; by how much the landmarks' rays miss each other [px, median over frames and landmarks], and that as a
+    share of the face's width in the quarter of the frames where it is most; the distance of the pupils in the units of the cameras' own world."""
 
     world_from_model: pycolmap.Sim3d
     error_px: float
-    frames: int
+    miss: float
+    pupils_apart: float
+
+    @property
+    def still(self) -> bool:
+        """Whether the head kept still with respect to what the cameras were found from."""
+        return self.miss <= MOVED
 
 
-def find_head(model: pycolmap.Reconstruction, records: list[dict], folder: Path, interpupillary_m: float, report: Reporter) -> HeadFrame:
-    """Raises Problem where fewer than two registered frames show a face, or where its rays do not meet (the head moved on its own)."""
-    seen = _registered_with_face(model, records)
+def find_head(model: pycolmap.Reconstruction, found: dict[str, faces.Face], interpupillary_m: float) -> HeadFrame:
+    """`found`: name -> face. Raises Problem where fewer than two registered frames show a face."""
+    seen = _registered_with_face(model, found)
     if len(seen) < 2:
         raise Problem("The face is seen in fewer than two of the frames whose cameras were found.",
                       "Film so that eyes, nose and mouth stay visible in most of the frames.")
-    origins, directions, focal, widths = [], [], [], []
-    for done, (image, record) in enumerate(seen):
-        report.progress(done, len(seen), "finding the face in the cameras")
-        face = faces.detect(images.read_srgb(folder / record["name"]))
-        if face is None:
-            continue
-        pose = image.cam_from_world() if callable(image.cam_from_world) else image.cam_from_world
-        rotation, camera = pose.rotation.matrix(), model.cameras[image.camera_id]
-        plane = np.asarray(camera.cam_from_img(face.landmarks[:, :2].astype(np.float64)))
-        rays = np.concatenate([plane, np.ones((len(plane), 1))], 1) @ rotation
-        directions.append(rays / np.linalg.norm(rays, axis=1, keepdims=True))
-        origins.append(-rotation.T @ np.asarray(pose.translation))
-        focal.append(camera.mean_focal_length())
-        widths.append(face.box[2] - face.box[0])
-    if len(origins) < 2:
-        raise Problem("The face could not be found again in two frames.", "Film so that eyes, nose and mouth stay visible in most of the frames.")
-    points, angles = intersect_rays(np.array(origins), np.array(directions))
-    errors = np.median(angles * np.array(focal)[:, None], axis=1)  # per frame, so that a head that sat elsewhere in a quarter of them shows
-    if np.percentile(errors, 75) > MOVED * np.median(widths):
-        raise Problem("The face is not still with respect to its surroundings: the cameras follow the background, and the head moved.",
-                      "Let the person sit still, look at one point, and move the camera instead.")
-    return HeadFrame(_similarity(points, interpupillary_m), float(np.median(errors)), len(origins))
+    origins, directions = zip(*(rays(image, model.cameras[image.camera_id], face) for image, face in seen), strict=True)
+    origins, directions = np.array(origins), np.array(directions)
+    points, angles = intersect_rays(origins, directions)
+    focal = np.array([model.cameras[image.camera_id].mean_focal_length() for image, _ in seen])
+    width = np.median([face.box[2] - face.box[0] for _, face in seen])
+    errors = np.median(angles * focal[:, None], axis=1)  # per frame, so that a head that sat elsewhere in a quarter of them shows
+    scale, rotation, translation, coefficients = fit_rays(origins, directions, points)
+    right, left = pupils(coefficients)
+    apart = scale * float(np.linalg.norm(left - right))
+    size = interpupillary_m / apart
+    middle = scale * rotation @ ((left + right) / 2) + translation
+    similarity = pycolmap.Sim3d(size, pycolmap.Rotation3d(rotation.T), -size * rotation.T @ middle)
+    return HeadFrame(similarity, float(np.median(errors)), float(np.percentile(errors, 75) / width), apart)
+
+
+def rays(image: pycolmap.Image, camera: pycolmap.Camera, face: faces.Face) -> tuple[np.ndarray, np.ndarray]:
+    """Centre [3] of a registered image and unit directions [468, 3] of its landmarks, in the model's world."""
+    pose = image.cam_from_world() if callable(image.cam_from_world) else image.cam_from_world
+    rotation = pose.rotation.matrix()
+    plane = np.asarray(camera.cam_from_img(face.landmarks[:, :2].astype(np.float64)))
+    directions = np.concatenate([plane, np.ones((len(plane), 1))], 1) @ rotation
+    return -rotation.T @ np.asarray(pose.translation), directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
 def intersect_rays(origins: np.ndarray, directions: np.ndarray, rounds: int = 10) -> tuple[np.ndarray, np.ndarray]:
@@ -79,25 +85,8 @@ def intersect_rays(origins: np.ndarray, directions: np.ndarray, rounds: int = 10
     return points, angle
 
 
-def _registered_with_face(model: pycolmap.Reconstruction, records: list[dict]) -> list[tuple]:
-    """Registered images with their records: those that face the camera most, spread over the sequence."""
-    by_name = {record["name"]: record for record in records}
-    seen = [(image, by_name[image.name]) for image in model.images.values() if image.has_pose and by_name.get(image.name, {}).get("yaw_deg") is not None]
-    seen.sort(key=lambda pair: pair[0].name)
-    frontal = [pair for pair in seen if abs(pair[1]["yaw_deg"]) < FRONTAL_DEG]
-    if len(frontal) >= 4:
-        seen = frontal
-    return [seen[i] for i in np.unique(np.linspace(0, len(seen) - 1, min(MOST_FRAMES, len(seen))).round().astype(int))] if seen else []
-
-
-def _similarity(points: np.ndarray, interpupillary_m: float) -> pycolmap.Sim3d:
-    """Landmarks [468, 3] -> the similarity that puts the eyes' middle at the origin, the person's left at +X, up at +Z."""
-    right, left = points[list(faces.RIGHT_EYE)].mean(0), points[list(faces.LEFT_EYE)].mean(0)
-    x = left - right
-    scale = interpupillary_m / np.linalg.norm(x)
-    x /= np.linalg.norm(x)
-    up = points[faces.BROW] - points[faces.CHIN]
-    z = up - x * (up @ x)
-    z /= np.linalg.norm(z)
-    rotation = np.stack([x, np.cross(z, x), z])  # rows: the new axes in the old world
-    return pycolmap.Sim3d(scale, pycolmap.Rotation3d(rotation), -scale * rotation @ ((left + right) / 2))
+def _registered_with_face(model: pycolmap.Reconstruction, found: dict[str, faces.Face]) -> list[tuple]:
+    """Registered images with their faces: those that face the camera most."""
+    seen = [(image, found[image.name]) for image in sorted(model.images.values(), key=lambda image: image.name) if image.has_pose and image.name in found]
+    frontal = [pair for pair in seen if abs(pair[1].yaw_deg) < FRONTAL_DEG]
+    return frontal if len(frontal) >= 4 else seen

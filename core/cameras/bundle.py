@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bundle adjustment of cameras over face landmarks and feature tracks at once, small enough for plain arrays.
+
+The landmarks' places are free, with a prior towards the template's head of the person's own identity, itself free with prior N(0, 1): so a face
+unlike the template does not bend the cameras. Points are eliminated first. Triggs et al., Bundle Adjustment: A Modern Synthesis (2000).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from .landmarks import INDEPENDENT, SIGMA_M, template_landmarks
+
+OFFSET_M = 0.002
+"""How far a landmark of a person strays from the nearest head of the identity space."""
+FOCAL_SPREAD = 0.35
+"""Deviation of the logarithm of an unknown focal length from its prior: from a phone's wide to its portrait lens."""
+FEATURE_PX = 1.5
+TURNED_AWAY = 0.15
+"""Cosine between a landmark's normal and the camera below which the landmark has slid onto the silhouette."""
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """State: rotations [N, 3, 3] and translations [N, 3] into the cameras; focal [G] px with prior [G] and known [G]; lens [N], the camera's focal;
+    centre [N, 2], principal points px; coefficients [K]; points [P, 3] metres in the head's frame, the first 468 the landmarks."""
+
+    rotations: np.ndarray
+    translations: np.ndarray
+    focal: np.ndarray
+    focal_prior: np.ndarray
+    focal_known: np.ndarray
+    lens: np.ndarray
+    centre: np.ndarray
+    coefficients: np.ndarray
+    points: np.ndarray
+
+    def local(self, camera: np.ndarray, point: np.ndarray) -> np.ndarray:
+        """Points in the frames of cameras [M, 3]."""
+        return np.einsum("mij,mj->mi", self.rotations[camera], self.points[point]) + self.translations[camera]
+
+    def project(self, camera: np.ndarray, point: np.ndarray) -> np.ndarray:
+        """Pixels [M, 2] of observations: camera [M], point [M]."""
+        local = self.local(camera, point)
+        return self.focal[self.lens[camera], None] * local[:, :2] / np.maximum(local[:, 2:], 1e-3) + self.centre[camera]
+
+
+@dataclass(frozen=True)
+class Observations:
+    """camera [M], point [M], pixel [M, 2]; a landmark where point < 468."""
+
+    camera: np.ndarray
+    point: np.ndarray
+    pixel: np.ndarray
+
+
+def adjust(bundle: Bundle, seen: Observations, rounds: int = 15) -> Bundle:
+    """Levenberg-Marquardt with the weights of the last residuals (Geman-McClure)."""
+    damping, cost = 1e-3, np.inf
+    for _ in range(rounds):
+        weights = _weights(bundle, seen)
+        stepped = _step(bundle, seen, weights, damping)
+        now = _cost(stepped, seen, weights)
+        cost = _cost(bundle, seen, weights)
+        if not now < cost:
+            damping *= 10
+            if damping > 1e3:
+                break
+            continue
+        bundle, damping = stepped, max(damping / 5, 1e-7)
+        if cost - now < 1e-5 * cost:
+            break
+    return bundle
+
+
+def _sigma_px(bundle: Bundle, seen: Observations) -> np.ndarray:
+    """Expected deviation of each observation [M] in pixels: a landmark's is a length on the head."""
+    depth = np.maximum(bundle.local(seen.camera, seen.point)[:, 2], 0.05)
+    return np.where(seen.point < len(template_landmarks().mean), SIGMA_M * bundle.focal[bundle.lens[seen.camera]] / depth, FEATURE_PX)
+
+
+def _weights(bundle: Bundle, seen: Observations) -> np.ndarray:
+    """1 / px^2 [M]."""
+    model = template_landmarks()
+    sigma = _sigma_px(bundle, seen)
+    error = np.linalg.norm(bundle.project(seen.camera, seen.point) - seen.pixel, axis=1) / sigma
+    landmark = seen.point < len(model.mean)
+    trust = np.ones(len(error))
+    trust[landmark] = model.trust[seen.point[landmark]] * INDEPENDENT / model.trust.sum()
+    centres = -np.einsum("nij,ni->nj", bundle.rotations, bundle.translations)
+    towards = centres[seen.camera[landmark]] - bundle.points[seen.point[landmark]]
+    facing = (model.normals[seen.point[landmark]] * towards).sum(1) / np.linalg.norm(towards, axis=1)
+    trust[landmark] *= np.clip((facing - TURNED_AWAY) / 0.3, 0, 1)
+    return trust / (1 + (error / 3) ** 2) ** 2 / sigma**2
+
+
+def _priors(bundle: Bundle) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals of the landmarks against the head of the identity space [468, 3], and of the logarithms of the focal lengths [G], in deviations."""
+    model = template_landmarks()
+    return (bundle.points[:len(model.mean)] - model.shape(bundle.coefficients)) / OFFSET_M, np.log(bundle.focal / bundle.focal_prior) / FOCAL_SPREAD
+
+
+def _cost(bundle: Bundle, seen: Observations, weights: np.ndarray) -> float:
+    offset, focal = _priors(bundle)
+    error = ((bundle.project(seen.camera, seen.point) - seen.pixel) ** 2).sum(1)
+    return float(weights @ error + (offset**2).sum() * _offset_weight() + (bundle.coefficients**2).sum() + (focal[~bundle.focal_known] ** 2).sum())
+
+
+def _offset_weight() -> float:
+    return INDEPENDENT / len(template_landmarks().mean)
+
+
+def _step(bundle: Bundle, seen: Observations, weights: np.ndarray, damping: float) -> Bundle:
+    model = template_landmarks()
+    marks, count, views, groups = len(model.mean), len(bundle.points), len(bundle.rotations), len(bundle.focal)
+    shared = 6 * views + groups + len(bundle.coefficients)
+    local = bundle.local(seen.camera, seen.point)
+    depth, focal = np.maximum(local[:, 2], 1e-3), bundle.focal[bundle.lens[seen.camera]]
+    residual = focal[:, None] * local[:, :2] / depth[:, None] + bundle.centre[seen.camera] - seen.pixel
+    by_local = np.zeros((len(local), 2, 3))  # d pixel / d local
+    by_local[:, 0, 0] = by_local[:, 1, 1] = focal / depth
+    by_local[:, :, 2] = -focal[:, None] * local[:, :2] / depth[:, None] ** 2
+    by_camera = np.zeros((len(local), 2, 7))  # turn about the camera, translation, log focal
+    turned = local - bundle.translations[seen.camera]
+    for axis in range(3):
+        by_camera[:, :, axis] = (by_local @ np.cross(np.eye(3)[axis], turned)[..., None])[..., 0]
+    by_camera[:, :, 3:6] = by_local
+    by_camera[:, :, 6] = focal[:, None] * local[:, :2] / depth[:, None]
+    by_camera[bundle.focal_known[bundle.lens[seen.camera]], :, 6] = 0
+    by_point = by_local @ bundle.rotations[seen.camera]
+
+    columns = np.concatenate([6 * seen.camera[:, None] + np.arange(6), 6 * views + bundle.lens[seen.camera][:, None]], 1)  # [M, 7]
+    heavy = weights[:, None, None]
+    u, g = np.zeros((shared, shared)), np.zeros(shared)
+    np.add.at(u, (columns[:, :, None], columns[:, None, :]), np.einsum("mia,mib->mab", by_camera * heavy, by_camera))
+    np.add.at(g, columns, np.einsum("mia,mi->ma", by_camera * heavy, residual))
+    v, h = np.zeros((count, 3, 3)), np.zeros((count, 3))
+    np.add.at(v, seen.point, np.einsum("mia,mib->mab", by_point * heavy, by_point))
+    np.add.at(h, seen.point, np.einsum("mia,mi->ma", by_point * heavy, residual))
+    w = np.zeros((count, 3, shared))
+    np.add.at(w, (seen.point[:, None, None], np.arange(3)[None, :, None], columns[:, None, :]), np.einsum("mia,mib->mab", by_point * heavy, by_camera))
+
+    offset, focal_off = _priors(bundle)
+    tail, strength = slice(6 * views + groups, shared), _offset_weight() / OFFSET_M**2
+    v[:marks] += strength * np.eye(3)
+    h[:marks] += strength * OFFSET_M * offset
+    basis = model.basis.transpose(1, 2, 0)  # [468, 3, K]
+    w[:marks, :, tail] -= strength * basis
+    flat = basis.reshape(-1, basis.shape[-1])
+    u[tail, tail] += strength * flat.T @ flat + np.eye(flat.shape[1])
+    g[tail] += bundle.coefficients - strength * OFFSET_M * flat.T @ offset.ravel()
+    lenses = np.arange(6 * views, 6 * views + groups)
+    u[lenses, lenses] += 1 / FOCAL_SPREAD**2
+    g[lenses] += np.where(bundle.focal_known, 0, focal_off / FOCAL_SPREAD)
+
+    u[np.diag_indices(shared)] *= 1 + damping
+    u[np.diag_indices(shared)] += 1e-9
+    v += damping * np.eye(3) * np.trace(v, axis1=1, axis2=2)[:, None, None] / 3 + 1e-6 * np.eye(3)
+    inverse = np.linalg.inv(v)
+    folded = np.einsum("pij,pjs->pis", inverse, w)
+    reduced = u - w.reshape(-1, shared).T @ folded.reshape(-1, shared)
+    step = -np.linalg.solve(reduced, g - np.einsum("pis,pi->s", folded, h))
+    points = bundle.points - np.einsum("pij,pj->pi", inverse, h) - folded @ step
+    turns = step[:6 * views].reshape(views, 6)
+    rotations = np.array([cv2.Rodrigues(turn[:3])[0] @ rotation for turn, rotation in zip(turns, bundle.rotations, strict=True)])
+    return replace(bundle, rotations=rotations, translations=bundle.translations + turns[:, 3:], points=points,
+                   focal=bundle.focal * np.exp(np.clip(step[lenses], -0.3, 0.3)), coefficients=bundle.coefficients + step[tail])

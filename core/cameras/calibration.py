@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cameras that another program has solved: read, matched to the frames by name, and made a COLMAP model.
+
+Inside, as everywhere here: a camera looks along its +z, x to the right, y down; pixel (0.5, 0.5) is the centre of the upper left one;
+lens distortion is OpenCV's (COLMAP's FULL_OPENCV: fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+
+import numpy as np
+import pycolmap
+
+from .. import images
+from ..messages import Problem, Reporter
+
+PIXELS = {"SIMPLE_PINHOLE": 3, "PINHOLE": 4, "SIMPLE_RADIAL": 3, "RADIAL": 3, "OPENCV": 4, "FULL_OPENCV": 4}
+"""How many of a model's parameters, from the first, are lengths in pixels."""
+FEWEST = 3
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """One camera. name: of its picture or of the camera itself; frame: number of the video's frame, or None; model and params: COLMAP's,
+    for a picture of width x height pixels, or, where these are 0, with lengths as shares of the picture's longer side counted from its middle;
+    rotation [3, 3] and translation [3] take points of the program's world into the camera."""
+
+    name: str
+    frame: int | None
+    model: str
+    params: tuple[float, ...]
+    width: int
+    height: int
+    rotation: np.ndarray
+    translation: np.ndarray
+
+    def camera(self, number: int, width: int, height: int) -> pycolmap.Camera:
+        """For a picture of this size. Raises Problem where its shape is not the calibration's."""
+        params = np.array(self.params, float)
+        lengths = PIXELS[self.model]
+        if not self.width:
+            params[:lengths] *= max(width, height)
+            params[lengths - 2:lengths] += width / 2, height / 2
+        elif abs(self.width / self.height / (width / height) - 1) > 0.01:
+            turned = abs(self.height / self.width / (width / height) - 1) < 0.01
+            raise Problem(f"The camera of {self.name} was solved for a picture of {self.width} x {self.height} pixels; here it is {width} x {height}.",
+                          "Solve the cameras from pictures that were saved upright, without a rotation in their EXIF data, and give the same ones here."
+                          if turned else "Give the very pictures the cameras were solved from: not cropped, not undistorted.")
+        else:
+            across, down = width / self.width, height / self.height
+            params[:lengths] *= [down if i in ((1, lengths - 1) if lengths == 4 else (lengths - 1,)) else across for i in range(lengths)]
+        return pycolmap.Camera(camera_id=number, model=self.model, width=width, height=height, params=params)
+
+
+def import_cameras(path: Path, frames: dict, folder: Path, report: Reporter) -> pycolmap.Reconstruction:
+    """A model, in the program's own world, of those of frames.json's `frames` that `path` (file or folder) has a camera for.
+    Raises Problem for what cannot be read, is no such file, or names fewer than three of the frames."""
+    cameras = read_cameras(path)
+    matched = _match(cameras, frames)
+    if len(matched) < FEWEST:
+        here = ", ".join(_known_as(record)[0] for record in frames["frames"][:3])
+        raise Problem(f"{path.name} has cameras for {len(matched)} of the {len(frames['frames'])} frames; three are the least. "
+                      f"It names {', '.join(camera.name for camera in cameras[:3])}; the frames are {here}.",
+                      "Solve the cameras from these very pictures, under the same file names; for a video, name each camera by its frame's number.")
+    model = pycolmap.Reconstruction()
+    for number, (record, calibrated) in enumerate(matched, 1):
+        width, height = images.size(folder / record["name"])
+        model.add_camera_with_trivial_rig(calibrated.camera(number, width, height))
+        pose = pycolmap.Rigid3d(np.concatenate([calibrated.rotation, calibrated.translation[:, None]], 1))
+        model.add_image_with_trivial_frame(pycolmap.Image(name=record["name"], camera_id=number, image_id=number), pose)
+    left_out = len(frames["frames"]) - len(matched)
+    if left_out:
+        report.log(f"{left_out} frames have no camera in {path.name} and are left out.")
+    return model
+
+
+def read_cameras(path: Path) -> list[Calibrated]:
+    """By what it is: a folder (COLMAP), .xml (Metashape), .csv (RealityScan, RealityCapture), .json (Blender). Raises Problem."""
+    from . import blender_cameras, colmap_folder, metashape, realityscan
+
+    readers = {".xml": metashape.read, ".csv": realityscan.read, ".json": blender_cameras.read}
+    if not path.exists():
+        raise Problem(f"There is no file or folder of cameras at {path}.", "Check the path in the setting, or empty it to solve the cameras here.")
+    if not path.is_dir() and path.suffix.lower() not in readers:
+        raise Problem(f"{path.name} is no kind of camera file that is known here.",
+                      "Choose a COLMAP folder, Metashape's cameras (.xml), RealityScan's internal/external camera parameters (.csv), or Blender's (.json).")
+    try:
+        cameras = colmap_folder.read(path) if path.is_dir() else readers[path.suffix.lower()](path.read_text(encoding="utf-8-sig"), path.name)
+    except (OSError, UnicodeDecodeError) as error:
+        raise Problem(f"{path.name} cannot be read ({error}).", "Export the cameras again.") from error
+    if not cameras:
+        raise Problem(f"{path.name} holds no solved camera.", "Align the pictures in the program it comes from, then export the cameras again.")
+    for camera in cameras:
+        if not (np.isfinite(camera.params).all() and np.isfinite(camera.rotation).all() and np.isfinite(camera.translation).all() and camera.params[0] > 0
+                and np.allclose(camera.rotation @ camera.rotation.T, np.eye(3), atol=1e-4) and np.linalg.det(camera.rotation) > 0):
+            raise Problem(f"The camera of {camera.name} in {path.name} is no camera: its rotation or focal length makes no sense.",
+                          "Export the cameras again; a file that was edited by hand may be damaged.")
+    return cameras
+
+
+def rigid(matrix: np.ndarray, what: str) -> tuple[np.ndarray, np.ndarray]:
+    """Camera-to-world [4, 4], any uniform scale in its axes taken out -> rotation [3, 3] and translation [3] into the camera. Raises Problem."""
+    size = np.linalg.norm(matrix[:3, :3], axis=0)
+    if not (np.isfinite(matrix).all() and size.min() > 0 and size.max() / size.min() < 1.001):
+        raise Problem(f"The camera of {what} is stretched or has no rotation.", "Export the cameras again from an object without scale.")
+    rotation = (matrix[:3, :3] / size).T
+    return rotation, -rotation @ matrix[:3, 3]
+
+
+def _match(cameras: list[Calibrated], frames: dict) -> list[tuple[dict, Calibrated]]:
+    """Frames with their cameras: by file name without its ending, or by the number of the video's frame."""
+    by_name = {PurePath(camera.name.replace("\\", "/")).stem.lower(): camera for camera in cameras}
+    by_name |= {camera.name.lower(): camera for camera in cameras}
+    by_frame = {camera.frame: camera for camera in cameras if camera.frame is not None}
+    found = []
+    for record in frames["frames"]:
+        camera = next((by_name[known] for known in _known_as(record) if known in by_name), None)
+        if camera is None and frames.get("kind") == "video":
+            camera = by_frame.get(record.get("video_frame"))
+        if camera is not None:
+            found.append((record, camera))
+    return found
+
+
+def _known_as(record: dict) -> list[str]:
+    """The names a frame may go by, lower case, without ending: its photograph's, its own."""
+    return [PurePath(name).stem.lower() for name in (record.get("source"), record["name"]) if name]
+
+
+def trailing_number(name: str) -> int | None:
+    """The number a name ends with, without its ending: frame_0012.png -> 12."""
+    stem = PurePath(name.replace("\\", "/")).stem
+    digits = stem[len(stem.rstrip("0123456789")):]
+    return int(digits) if digits else None

@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Face landmarks: in the frames, on the template as a head of its identity space, and what lies between, a similarity.
+
+All 432 trusted landmarks have their say on scale and upright, not the corners of the eyes alone, which a net puts elsewhere
+when lids are closed. Umeyama, Least-squares Estimation of Transformation Parameters (1991).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from .. import faces, images, meshes, template
+from ..messages import Reporter
+
+RIGHT_LIDS = (33, 7, 163, 144, 145, 153, 154, 155, 133, 173, 157, 158, 159, 160, 161, 246)
+LEFT_LIDS = (263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 387, 388, 466)
+PUPILS_PER_LIDS = 63.0 / 62.156 / 1.019
+"""The template's pupils are 63 mm apart, the middles of its lids' outlines a little less; and the head that fits a net's landmarks came out
+1.9 % too large over six synthetic heads of known size (0 to 4.6 %)."""
+SIGMA_M = 0.003
+"""How far a landmark of the net lies from the same point of a person's head, roughly."""
+INDEPENDENT = 120
+"""How many of the landmarks count as independent: neighbours err together."""
+
+
+@dataclass(frozen=True)
+class Landmarks:
+    """The template's landmarks: mean [468, 3] and identity basis [K, 468, 3] in metres, outward normals [468, 3], trust [468] in [0, 1]."""
+
+    mean: np.ndarray
+    basis: np.ndarray
+    normals: np.ndarray
+    trust: np.ndarray
+
+    def shape(self, coefficients: np.ndarray) -> np.ndarray:
+        """The landmarks [468, 3] of the head with these identity coefficients [K]."""
+        return self.mean + np.tensordot(coefficients, self.basis, 1)
+
+
+@cache
+def template_landmarks() -> Landmarks:
+    mesh, (face, bary) = template.load(), template.landmarks()
+
+    def at(values: np.ndarray) -> np.ndarray:
+        return (values[..., mesh.faces[face], :] * bary[..., None]).sum(-2)
+
+    normals = at(meshes.vertex_normals(mesh))
+    return Landmarks(at(mesh.vertices), at(template.identity()).astype(np.float64), normals / np.linalg.norm(normals, axis=1, keepdims=True),
+                     template.landmark_weights())
+
+
+def find_landmarks(records: list[dict], folder: Path, report: Reporter, text: str = "finding the face") -> dict[str, faces.Face]:
+    """Name -> face of each of frames.json's `records` where one is found; a turned head is followed from the frame after it, too."""
+    found: dict[str, faces.Face] = {}
+    last = None
+    for done, record in enumerate(records):
+        report.progress(done, len(records), text)
+        last = faces.detect(images.read_srgb(folder / record["name"]), last)
+        if last is not None:
+            found[record["name"]] = last
+    for record, following in zip(records[-2::-1], records[:0:-1], strict=True):
+        if record["name"] not in found and following["name"] in found:
+            face = faces.detect(images.read_srgb(folder / record["name"]), found[following["name"]])
+            if face is not None:
+                found[record["name"]] = face
+        report.check()
+    return found
+
+
+def fit_rays(origins: np.ndarray, directions: np.ndarray, points: np.ndarray, rounds: int = 20) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+    """The template's head laid against landmarks seen along unit directions [N, 468, 3] from origins [N, 3]; points [468, 3]: roughly where they lie.
+
+    Gives scale, rotation [3, 3], translation [3] from the head's metres into the world of the rays, and identity coefficients [K] with prior N(0, 1).
+    Measured across the rays: a net's landmarks slide as the head turns, so that the depths at which they intersect are exaggerated.
+    Gauss-Newton; outliers are weighted down by their distance (Geman-McClure).
+    """
+    model = template_landmarks()
+    across = np.eye(3) - directions[..., :, None] * directions[..., None, :]  # [N, 468, 3, 3]
+    scale, rotation, translation = similarity(model.mean, points, model.trust)
+    count = len(model.basis)
+    coefficients = np.zeros(count)
+    prior = np.concatenate([np.full(7, 1e-9), np.ones(count)])
+    for _ in range(rounds):
+        at = scale * model.shape(coefficients) @ rotation.T + translation
+        miss = (across @ (at[None] - origins[:, None])[..., None])[..., 0] / scale  # [N, 468, 3] metres on the head
+        weights = robust_weights(np.linalg.norm(miss, axis=-1), model.trust)
+        jacobian = np.zeros((len(at), 3, 7 + count))  # d point / d (rotation, translation, log scale, coefficients), in metres on the head
+        arm = (at - translation) / scale
+        for axis in range(3):
+            jacobian[:, :, axis] = np.cross(np.eye(3)[axis], arm)
+            jacobian[:, axis, 3 + axis] = 1
+        jacobian[:, :, 6] = arm
+        jacobian[:, :, 7:] = np.einsum("kpi,ji->pjk", model.basis, rotation)
+        information = np.einsum("np,npij->pij", weights, across)
+        normal = np.einsum("pia,pij,pjb->ab", jacobian, information, jacobian, optimize=True) + np.diag(prior)
+        right = -np.einsum("pia,pi->a", jacobian, np.einsum("np,npi->pi", weights, miss)) - prior * np.concatenate([np.zeros(7), coefficients])
+        step = np.linalg.solve(normal, right)
+        rotation = cv2.Rodrigues(step[:3])[0] @ rotation
+        translation = translation + scale * step[3:6]
+        scale *= float(np.exp(step[6]))
+        coefficients = coefficients + step[7:]
+    return scale, rotation, translation, coefficients
+
+
+def robust_weights(miss_m: np.ndarray, trust: np.ndarray) -> np.ndarray:
+    """Weights [N, 468] of landmarks that miss by so much [N, 468], in 1 / m^2: INDEPENDENT of them in all count."""
+    weights = trust / (1 + (miss_m / (2.5 * np.maximum(np.median(miss_m, axis=1, keepdims=True), 1e-4))) ** 2) ** 2
+    return weights * INDEPENDENT / weights.sum() / SIGMA_M**2
+
+
+def pupils(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The right and the left pupil [3] of the template's head with these coefficients, in its metres."""
+    shape = template_landmarks().shape(coefficients)
+    right, left = shape[list(RIGHT_LIDS)].mean(0), shape[list(LEFT_LIDS)].mean(0)
+    middle, half = (right + left) / 2, PUPILS_PER_LIDS * (left - right) / 2
+    return middle - half, middle + half
+
+
+def similarity(source: np.ndarray, target: np.ndarray, weights: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """scale, rotation [3, 3], translation [3] that take source [N, 3] to target in the weighted least-squares sense."""
+    weights = weights / weights.sum()
+    a, b = source - weights @ source, target - weights @ target
+    u, s, vt = np.linalg.svd((b * weights[:, None]).T @ a)
+    sign = np.array([1, 1, np.sign(np.linalg.det(u @ vt))])
+    rotation = u * sign @ vt
+    scale = float((s * sign).sum() / (weights @ (a**2).sum(1)))
+    return scale, rotation, weights @ target - scale * rotation @ (weights @ source)

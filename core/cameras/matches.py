@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Feature matches between frames, as COLMAP found them before it chose one motion for them all; and tracks of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+
+@dataclass(frozen=True)
+class Matches:
+    """keypoints: name -> pixels [K, 2], centres at +0.5; pairs: (name, name) -> indices [M, 2] into the keypoints of the two."""
+
+    keypoints: dict[str, np.ndarray] = field(default_factory=dict)
+    pairs: dict[tuple[str, str], np.ndarray] = field(default_factory=dict)
+
+    def between(self, first: str, second: str) -> tuple[np.ndarray, np.ndarray]:
+        """The pixels [M, 2] in either frame of a pair that is in `pairs`."""
+        index = self.pairs[first, second]
+        return self.keypoints[first][index[:, 0]], self.keypoints[second][index[:, 1]]
+
+    def kept(self, keep: dict[tuple[str, str], np.ndarray]) -> Matches:
+        """Only those matches of each pair that `keep` [M] says."""
+        return Matches(self.keypoints, {pair: index[keep[pair]] for pair, index in self.pairs.items() if pair in keep})
+
+
+def read_matches(database: Path) -> Matches:
+    """All matches of a COLMAP database, verified or not."""
+    with pycolmap.Database.open(str(database)) as stored:
+        names = {image.image_id: image.name for image in stored.read_all_images()}
+        keypoints = {name: np.asarray(stored.read_keypoints(number), np.float64)[:, :2] for number, name in names.items()}
+        numbers, indices = stored.read_all_matches()
+        pairs = {}
+        for number, index in zip(numbers, indices, strict=True):
+            first, second = pycolmap.pair_id_to_image_pair(number)
+            if len(index):
+                pairs[names[first], names[second]] = np.asarray(index, np.int64)
+    return Matches(keypoints, pairs)
+
+
+def tracks(matches: Matches) -> list[list[tuple[str, int]]]:
+    """Keypoints that are one point, as lists of (name, keypoint): what is matched hangs together. One that meets a frame twice is ambiguous and left out."""
+    names = sorted({name for pair in matches.pairs for name in pair})
+    start = dict(zip(names, np.cumsum([0] + [len(matches.keypoints[name]) for name in names])[:-1], strict=True))
+    total = sum(len(matches.keypoints[name]) for name in names)
+    links = [index + [start[first], start[second]] for (first, second), index in matches.pairs.items()]
+    if not links:
+        return []
+    links = np.concatenate(links)
+    _, label = connected_components(coo_array((np.ones(len(links)), links.T), (total, total)), directed=False)
+    owner = np.repeat(np.arange(len(names)), [len(matches.keypoints[name]) for name in names])
+    found: dict[int, list[tuple[str, int]]] = {}
+    for node in np.unique(links):
+        found.setdefault(int(label[node]), []).append((names[owner[node]], int(node - start[names[owner[node]]])))
+    return [track for track in found.values() if len({name for name, _ in track}) == len(track) > 1]

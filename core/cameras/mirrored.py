@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Mirrored pictures among others: one whose mirror image matches the others where it does not itself. A set that is mirrored as a whole
+cannot be told from its geometry. Lowe, Distinctive Image Features (2004); Arandjelovic and Zisserman's RootSIFT (2012).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from .. import images
+from ..messages import Reporter
+
+SIDE = 640
+FEATURES = 1500
+LEAST = 20
+"""Matches on one epipolar geometry that two views of one scene have at least."""
+MOST_PAIRS = 60
+
+
+def find_mirrored(suspects: list[str], trusted: list[str], folder: Path, report: Reporter) -> list[str]:
+    """Names among `suspects` that are mirrored with respect to `trusted` pictures, or, where there are none, to most of themselves."""
+    pairs = [(a, b) for a in suspects for b in trusted] or [(a, b) for i, a in enumerate(suspects) for b in suspects[i + 1:]]
+    if len(pairs) > MOST_PAIRS:
+        pairs = [pairs[i] for i in np.linspace(0, len(pairs) - 1, MOST_PAIRS).round().astype(int)]
+    described: dict[tuple, tuple] = {}
+
+    def features(name: str, flip: bool) -> tuple:
+        if (name, flip) not in described:
+            described[name, flip] = _describe(images.read_srgb(folder / name), flip)
+        return described[name, flip]
+
+    relation: dict[tuple[str, str], int] = {}
+    for done, (a, b) in enumerate(pairs):
+        report.progress(done, len(pairs), "looking for mirrored pictures")
+        plain, flipped = (_agreeing(features(a, flip), features(b, False)) for flip in (False, True))
+        if max(plain, flipped) >= LEAST and max(plain, flipped) > 2 * min(plain, flipped):
+            relation[a, b] = 1 if plain > flipped else -1
+    return _minority(relation, suspects, trusted)
+
+
+def _minority(relation: dict[tuple[str, str], int], suspects: list[str], trusted: list[str]) -> list[str]:
+    """Names that stand to the trusted ones, or to the larger part, as a mirror image does."""
+    side = dict.fromkeys(trusted, 1)
+    if not side and relation:
+        side[max(suspects, key=lambda name: sum(name in pair for pair in relation))] = 1
+    while True:
+        known = {a if b in side else b: sign * side[b if b in side else a] for (a, b), sign in relation.items() if (a in side) != (b in side)}
+        if not known:
+            break
+        side |= known
+    less = -1 if trusted or sum(s < 0 for s in side.values()) <= len(side) / 2 else 1
+    return sorted(name for name in suspects if side.get(name) == less)
+
+
+def _describe(srgb: np.ndarray, flip: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Keypoints [K, 2] and RootSIFT descriptors [K, 128] of a picture, mirrored first where `flip`."""
+    scale = min(1.0, SIDE / max(srgb.shape[:2]))
+    grey = images.resize(srgb @ np.array([0.299, 0.587, 0.114], np.float32), round(srgb.shape[1] * scale), round(srgb.shape[0] * scale))
+    grey = np.ascontiguousarray((np.clip(grey[:, ::-1] if flip else grey, 0, 1) * 255).astype(np.uint8))
+    points, values = cv2.SIFT_create(FEATURES, contrastThreshold=0.02).detectAndCompute(grey, None)
+    if values is None:
+        return np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32)
+    return np.array([point.pt for point in points], np.float32), np.sqrt(values / np.maximum(values.sum(1, keepdims=True), 1e-9))
+
+
+def _agreeing(a: tuple, b: tuple) -> int:
+    """How many matches between two pictures lie on one epipolar geometry."""
+    if min(len(a[0]), len(b[0])) < LEAST:
+        return 0
+    found = [pair[0] for pair in cv2.BFMatcher(cv2.NORM_L2).knnMatch(a[1], b[1], k=2) if len(pair) == 2 and pair[0].distance < 0.8 * pair[1].distance]
+    if len(found) < LEAST:
+        return 0
+    cv2.setRNGSeed(0)
+    _, good = cv2.findFundamentalMat(a[0][[m.queryIdx for m in found]], b[0][[m.trainIdx for m in found]], cv2.FM_RANSAC, 1.5, 0.999)
+    return 0 if good is None else int(good.sum())

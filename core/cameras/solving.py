@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From frames to cameras in the order of what it costs and gives: plain features, features that hold on skin, the face's landmarks;
+and on the head alone where it did not keep still. The first model that passes the gate is taken.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+
+from .. import faces
+from ..capture import Capture
+from ..messages import Problem, Reporter
+from ..settings import Settings
+from .landmarks import find_landmarks
+from .matches import Matches
+from .mirrored import find_mirrored
+from .motion import camera_stood_still, head_masks
+from .resection import resect
+from .structure import camera_groups, solve_structure
+from .world import HeadFrame, find_head
+
+LEAST_SHARE = 0.6
+LEAST_VIEWS = 3
+MOST_ERROR_PX = 2.0
+MOST_LANDMARK_MISS = 0.06
+"""Share of the face's width by which landmarks may miss in cameras found from them."""
+FEW = 12
+"""Up to this many photographs the face's landmarks are tried before the costly features."""
+MOST_FACES = 24
+"""Frames in which the face is looked for where structure from motion has found the cameras."""
+FILM_AGAIN = ("Film again: the person sits still, the camera moves slowly around the face at arm's length, and the background is busy rather than a white "
+              "wall; or take a photograph every ten degrees around the face.")
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A model in a world of its own; how it was found: plain, skin or face; the head in it; the faces it was found by; whether the head moved
+    before its background, and whether the camera stood still then; mirrored frames that were left out; tracks that refined a model from the face."""
+
+    model: pycolmap.Reconstruction
+    way: str
+    head: HeadFrame
+    found: dict[str, faces.Face]
+    head_moved: bool = False
+    stood_still: bool = False
+    mirrored: tuple[str, ...] = ()
+    tracks: int = 0
+
+
+def solve(frames: dict, capture: Capture, settings: Settings, report: Reporter) -> Solved:
+    """Raises Problem with what is wrong, as precisely as can be told."""
+    records = frames["frames"]
+    few = len(records) <= FEW
+    ways = {"auto": ("plain", "face", "skin", "face") if few else ("plain", "skin", "face")}.get(settings.cameras.features, (settings.cameras.features,))
+    found = find_landmarks(records if few else _spread(records), capture.frames, report)
+    matches, faults, moved, stood = Matches(), [], False, False
+    for turn, way in enumerate(ways):
+        if way == "face":
+            if len(found) < len(records) <= 5 * MOST_FACES and not few:
+                found = find_landmarks(records, capture.frames, report)
+            solved, fault = _by_face(records, capture, found, matches, settings, report)
+            if solved and few and solved.tracks < 30 and "skin" in ways[turn:]:
+                report.log("The face gives cameras, but too little else matches to refine them; features that hold on skin are tried.")
+                continue
+        else:
+            solved, matches, fault = _by_features(way == "skin", frames, capture, found, settings, report)
+            stood = stood or bool(camera_stood_still(matches, found))
+            if stood or (fault and solved):  # what matches is not one motion: the head's alone
+                moved = True
+                alone, head_matches, alone_fault = _by_features(way == "skin", frames, capture, found, settings, report, alone=True)
+                matches = head_matches
+                solved, fault = alone, alone_fault
+        if solved and not fault:
+            rest = sorted({record["name"] for record in records} - {image.name for image in solved.model.images.values() if image.has_pose})
+            mirrored = _mirrored(frames, rest, solved.model, capture, report) if way != "face" else ()
+            return Solved(solved.model, way, solved.head, solved.found, moved, stood, tuple(mirrored), solved.tracks)
+        faults.append(fault)
+        report.log(f"By {way} features: {fault}" if way != "face" else f"By the face: {fault}")
+    raise _explained(frames, faults, moved, stood, capture, report)
+
+
+def _by_features(skin: bool, frames: dict, capture: Capture, found: dict, settings: Settings, report: Reporter,
+                 alone: bool = False) -> tuple[Solved | None, Matches, str | None]:
+    """The model of one kind of features, the matches, and its shortcoming; `alone`: on the head only. A model whose head moved is given, with that fault."""
+    with tempfile.TemporaryDirectory(prefix="wildcap_") as temporary:
+        if alone:
+            found = found if len(found) > len(frames["frames"]) / 2 else find_landmarks(frames["frames"], capture.frames, report)
+            head_masks(found, frames["frames"], capture.frames, Path(temporary), report)
+        model, matches = solve_structure(frames, capture.frames, skin, settings.cameras.matching, settings.seed, report, Path(temporary) if alone else None)
+    fault = shortcoming(model, len(frames["frames"]))
+    if fault:
+        return None, matches, fault
+    head = find_head(model, found, settings.cameras.interpupillary_mm / 1000)
+    solved = Solved(model, "skin" if skin else "plain", head, found)
+    return solved, matches, None if head.still else "The face is not still with respect to its surroundings."
+
+
+def shortcoming(model: pycolmap.Reconstruction | None, frames: int) -> str | None:
+    """What keeps a model of structure from motion from the gate."""
+    registered = model.num_reg_images() if model else 0
+    if registered < LEAST_VIEWS:
+        return "The frames do not fit together: no common structure was found in three of them."
+    if registered < LEAST_SHARE * frames:
+        return f"Only {registered} of {frames} frames fit together."
+    error = model.compute_mean_reprojection_error()
+    if error > MOST_ERROR_PX:
+        return f"The frames fit together only roughly ({error:.1f} px off on average)."
+    return None
+
+
+def _by_face(records: list[dict], capture: Capture, found: dict, matches: Matches, settings: Settings, report: Reporter) -> tuple[Solved | None, str | None]:
+    mirrored = find_mirrored(sorted(found), [], capture.frames, report) if len(records) <= FEW else []
+    result = resect(camera_groups(records, capture.frames), {name: face for name, face in found.items() if name not in mirrored}, matches, report)
+    registered = result.model.num_reg_images() if result else 0
+    if registered < LEAST_VIEWS:
+        without = f"A face is found in only {len(found)} of {len(records)} frames" + (f", and {', '.join(mirrored)} is mirrored" if mirrored else "")
+        return None, f"{without}; the landmarks of three could have placed the cameras."
+    if result.landmark_miss > MOST_LANDMARK_MISS:
+        return None, f"The face does not look like one still face in these frames: its landmarks miss by {100 * result.landmark_miss:.0f} % of its width."
+    head = find_head(result.model, found, settings.cameras.interpupillary_mm / 1000)
+    return Solved(result.model, "face", head, found, mirrored=tuple(mirrored), tracks=result.tracks), None
+
+
+def _mirrored(frames: dict, rest: list[str], model: pycolmap.Reconstruction, capture: Capture, report: Reporter) -> list[str]:
+    """Among photographs that did not fit, those that are mirrored."""
+    if not rest or frames.get("kind") == "video" or len(rest) > 2 * FEW:
+        return []
+    trusted = sorted(image.name for image in model.images.values() if image.has_pose)
+    some = [trusted[i] for i in np.unique(np.linspace(0, len(trusted) - 1, min(8, len(trusted))).round().astype(int))]
+    return find_mirrored(rest, some, capture.frames, report)
+
+
+def _spread(records: list[dict]) -> list[dict]:
+    """At most MOST_FACES frames with a face, those that face the camera first, spread over the sequence."""
+    seen = [record for record in records if record["yaw_deg"] is not None]
+    frontal = [record for record in seen if abs(record["yaw_deg"]) < 45]
+    seen = frontal if len(frontal) >= 4 else seen
+    return [seen[i] for i in np.unique(np.linspace(0, len(seen) - 1, min(MOST_FACES, len(seen))).round().astype(int))] if seen else []
+
+
+def _explained(frames: dict, faults: list[str], moved: bool, stood: bool, capture: Capture, report: Reporter) -> Problem:
+    """The Problem that fits best what was tried."""
+    records = frames["frames"]
+    names = {record["name"]: record.get("source") or record["name"] for record in records}
+    mirrored = find_mirrored(sorted(names), [], capture.frames, report) if frames.get("kind") != "video" and len(names) <= FEW else []
+    if mirrored:
+        they = "is mirrored: it fits" if len(mirrored) == 1 else "are mirrored: they fit"
+        return Problem(f"{', '.join(names[name] for name in mirrored)} {they} the other pictures only when flipped left to right.",
+                       "Flip them back, or leave them out; on a phone, switch off the mirroring of the front camera.")
+    if moved or stood:
+        return Problem("The head turned in front of a camera that stood still, and the face alone does not give its motion." if stood
+                       else "The face is not still with respect to its surroundings: the cameras follow the background, and the head moved.",
+                       "Let the person sit still, look at one point, and move the camera instead.")
+    return Problem(" ".join(dict.fromkeys([faults[0], faults[-1]])), FILM_AGAIN)

@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A synthetic person before a busy wall, photographed by known cameras without a renderer: what cameras, motion and import are tested on.
+
+World: metres, +Z up, the face towards -Y. Azimuth 0 is in front, positive on the person's left.
+"""
+
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pycolmap
+
+from core import images, meshes, raster
+from core.synthetic.identities import subject_mesh
+from core.synthetic.parameters import sample_parameters
+from core.synthetic.skin import make_skin
+from core.views import View
+
+WIDTH, HEIGHT, FOCAL = 360, 480, 560.0
+WALL_M, WALL_AT = 6.0, 1.2
+SEED = 5
+
+
+@cache
+def person(seed: int = SEED) -> tuple[raster.RayCaster, np.ndarray, np.ndarray]:
+    """The head's mesh, ready for rays, its vertex normals, and its diffuse albedo, linear [512, 512, 3]."""
+    mesh = subject_mesh(seed)
+    return raster.RayCaster(mesh), meshes.vertex_normals(mesh), make_skin(sample_parameters(seed), 512).diffuse
+
+
+def camera(azimuth_deg: float, height: float = 0.0, distance: float = 0.55, target=(0, -0.01, -0.035)) -> View:
+    """A camera that looks at the head; `height` above the eyes in metres."""
+    a = np.radians(azimuth_deg)
+    centre, target = np.array([np.sin(a) * distance, -np.cos(a) * distance, height]), np.array(target)
+    z = (target - centre) / np.linalg.norm(target - centre)
+    x = np.cross(z, [0, 0, 1])
+    x /= np.linalg.norm(x)
+    rotation = np.stack([x, np.cross(z, x), z])
+    pinhole = pycolmap.Camera(camera_id=1, model="PINHOLE", width=WIDTH, height=HEIGHT, params=[FOCAL, FOCAL, WIDTH / 2, HEIGHT / 2])
+    return View("", Path(), pinhole, rotation, -rotation @ centre, True)
+
+
+def photograph(view: View, turned_deg: float = 0.0, wall: bool = True, seed: int = SEED) -> np.ndarray:
+    """sRGB [HEIGHT, WIDTH, 3]. `turned_deg`: how far the person has turned the head to their left; light and wall stay.
+    Without `wall` the background is plain grey."""
+    caster, normals, albedo = person(seed)
+    turn = np.radians(turned_deg)
+    rotation = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    seen = View(view.name, view.path, view.camera, view.rotation @ rotation, view.translation, True)  # the camera as the head sees it
+    face, bary, _ = raster.render_view(caster, seen, 2)
+    uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
+    colour = raster.sample(albedo, np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(albedo)).reshape(*face.shape, 3)
+    normal = raster.interpolate(normals, caster.mesh.faces, face, bary) @ rotation.T
+    shade = 0.55 + 0.45 * np.clip(normal @ (np.array([0.3, -0.8, 0.5]) / 0.99), 0, 1)
+    head = images.resize((colour * ((face >= 0) * shade * 1.6)[..., None]).astype(np.float32), view.width, view.height)
+    cover = images.resize((face >= 0).astype(np.float32), view.width, view.height)[..., None]
+    return images.linear_to_srgb(head * (cover > 0) + (1 - cover) * (_wall(view) if wall else 0.3))
+
+
+@cache
+def _paper() -> np.ndarray:
+    rng = np.random.default_rng(0)
+    coarse, fine = rng.random((60, 60, 3), np.float32), rng.random((240, 240, 3), np.float32)
+    return np.clip(0.5 * images.resize(coarse, 1200, 1200) + 0.5 * images.resize(fine, 1200, 1200), 0.02, 1) ** 2
+
+
+def _wall(view: View) -> np.ndarray:
+    """The wall behind the person, in the plane y = WALL_AT, linear [H, W, 3]."""
+    x, y = np.meshgrid(np.arange(view.width) + 0.5, np.arange(view.height) + 0.5)
+    rays = view.rays(np.stack([x, y], -1).reshape(-1, 2))
+    with np.errstate(divide="ignore"):
+        reach = (WALL_AT - view.centre[1]) / rays[:, 1]
+    hit = view.centre + rays * np.where(reach > 0, reach, 0)[:, None]
+    at = ((hit[:, [0, 2]] / WALL_M + 0.5) % 1 * 1200).astype(np.float32)
+    return cv2.remap(_paper(), at[:, :1].reshape(y.shape), at[:, 1:].reshape(y.shape), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bad captures end in the right diagnosis: a head that turns, a side that is missing, mirrored pictures, three photographs, a talking subject."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core import cameras, faces, frames, images
+from core.cameras import coverage
+from core.cameras.mirrored import find_mirrored
+from core.cameras.motion import expression_changes
+from core.capture import Capture
+from core.messages import Problem, Reporter
+from core.settings import from_json
+
+from . import painted_head
+from .painted_head import camera
+
+
+def place(azimuth_deg, elevation_deg=0.0) -> np.ndarray:
+    a, e = np.radians(azimuth_deg), np.radians(elevation_deg)
+    return 0.5 * np.stack([np.sin(a) * np.cos(e), -np.cos(a) * np.cos(e), np.sin(e) * np.ones_like(a)], -1)
+
+
+def solve(folder, capture: Capture, **settings) -> Reporter:
+    capture.root.mkdir(parents=True, exist_ok=True)
+    capture.set_source(folder)
+    chosen = from_json({"cameras": settings})
+    frames.run(capture, chosen, Reporter("frames"))
+    report = Reporter("cameras")
+    cameras.run(capture, chosen, report)
+    return report
+
+
+def problems(report: Reporter) -> str:
+    return " ".join(finding["problem"] for finding in report.findings)
+
+
+def test_missing_sides_are_named():
+    whole = np.linspace(-75, 75, 16)
+    assert coverage.missing(place(whole, 10 * np.sin(whole))) == []
+    left = " ".join(problem for problem, _ in coverage.missing(place(np.linspace(-75, 15, 10), 10 * np.sin(whole[:10]))))
+    assert "Nothing was seen from the person's left side: the pictures end 15 degrees" in left and "right" not in left
+    right = " ".join(problem for problem, _ in coverage.missing(place(np.linspace(10, 80, 10), 10 * np.sin(whole[:10]))))
+    assert "Nothing was seen from the person's right side" in right and "before the nose" in right
+    gap = " ".join(problem for problem, _ in coverage.missing(place(np.array([-70, -60, -50, 40, 55, 70.0]), 10 * np.sin(whole[:6]))))
+    assert "Between 50 degrees to the person's right and 40 degrees to the person's left there is no picture: a gap of 90 degrees" in gap
+    assert "one height" in coverage.missing(place(whole))[0][0]
+
+
+def test_three_photographs_give_cameras_and_say_that_they_are_rough(tmp_path):
+    """Nothing but the face to go by: sixty degrees apart, before a wall without structure."""
+    views = [camera(azimuth, 0.02) for azimuth in (-38, 0, 38)]
+    for i, view in enumerate(views):
+        picture = painted_head.photograph(view, wall=False)
+        images.write_srgb(tmp_path / "photos" / f"{i}.png", picture)
+    report = solve(tmp_path / "photos", Capture(tmp_path / "face.wildcap"), features="face")
+    assert report.figures["frames_registered"] == 3 and report.figures["features"] == "face"
+    assert report.figures["angular_coverage_deg"] == pytest.approx(76, abs=12)
+    assert "landmarks, to a few degrees only" in problems(report) and "gap" in problems(report)
+
+
+def test_a_mirrored_photograph_is_named(tmp_path):
+    names = []
+    for i, azimuth in enumerate((-18, -6, 6, 18)):
+        picture = painted_head.photograph(camera(azimuth, 0.02))
+        names.append(f"{i}.png")
+        images.write_srgb(tmp_path / names[-1], picture[:, ::-1] if i == 2 else picture)
+    assert find_mirrored(names, [], tmp_path, Reporter("cameras")) == ["2.png"]
+    assert find_mirrored(["2.png", "3.png"], ["0.png", "1.png"], tmp_path, Reporter("cameras")) == ["2.png"]
+    assert find_mirrored(["0.png", "1.png", "3.png"], [], tmp_path, Reporter("cameras")) == []
+
+
+def test_a_head_that_turns_before_a_still_camera_is_told(tmp_path):
+    for i, turn in enumerate(np.linspace(-32, 32, 9)):
+        images.write_srgb(tmp_path / "photos" / f"{i}.png", painted_head.photograph(camera(0, 0.03), turned_deg=turn))
+    try:
+        report = solve(tmp_path / "photos", Capture(tmp_path / "face.wildcap"), features="plain")
+    except Problem as problem:
+        assert "turned in front of a camera that stood still" in problem.problem
+        assert "move the camera" in problem.remedy
+    else:
+        assert "The head turned while the camera stood still" in problems(report)
+        assert report.figures["angular_coverage_deg"] == pytest.approx(64, abs=15)
+
+
+def test_an_open_mouth_in_some_frames_is_told():
+    face = faces.detect(painted_head.photograph(camera(0)))
+    rng = np.random.default_rng(0)
+    found = {str(i): replace(face, landmarks=face.landmarks + rng.normal(0, 0.3, face.landmarks.shape).astype(np.float32)) for i in range(10)}
+    assert expression_changes(found) == []
+    wide = face.landmarks.copy()
+    wide[list(range(14, 15)), 1] += 0.3 * np.linalg.norm(wide[33] - wide[263])  # the lower lip goes down
+    found["7"] = replace(face, landmarks=wide)
+    assert expression_changes(found) == ["7"]
