@@ -215,6 +215,13 @@ class Capture:
 
     # -- lock
 
+    def check_free(self) -> None:
+        """Raises Problem naming the worker that works here, if one does; a dead process's lock does not count."""
+        owner = _read_owner(self.lock)
+        if owner and (owner["host"] != socket.gethostname() or _alive(owner["pid"])):
+            raise Problem(f"Another worker (process {owner['pid']} on {owner['host']}, since {owner['start']}) is working on this capture.",
+                          f"Wait for it or cancel it there; if it is gone, delete {self.lock}.") from None
+
     @contextlib.contextmanager
     def locked(self):
         """Keeps every other worker out. Raises Problem naming who works here; a dead process's lock is taken over."""
@@ -227,10 +234,7 @@ class Capture:
                         json.dump(mine, file)
                     break
                 except FileExistsError:
-                    owner = _read_owner(self.lock)
-                    if owner and (owner["host"] != mine["host"] or _alive(owner["pid"])):
-                        raise Problem(f"Another worker (process {owner['pid']} on {owner['host']}, since {owner['start']}) is working on this capture.",
-                                      f"Wait for it or cancel it there; if it is gone, delete {self.lock}.") from None
+                    self.check_free()
                     self.lock.unlink(missing_ok=True)
         except OSError as error:
             raise storage_problem(error, self.root) from error

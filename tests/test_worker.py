@@ -152,7 +152,13 @@ def test_what_libraries_print_goes_to_the_log_and_not_into_the_protocol(root, ca
 def test_a_second_worker_is_refused_by_name(root, capture, video):
     first = start(root, capture, {"frames": "slow"}, source=video)
     follow(first, until=lambda m: isinstance(m, Progress))
-    refused = follow(start(root, capture, {"frames": "slow"}))[-1]
+    asked = capture.job.read_bytes()
+    with pytest.raises(Problem, match=str(first._process.pid)):
+        start(root, capture, {"frames": "slow"})
+    assert capture.job.read_bytes() == asked, "the record of what the first was asked stays"
+    late = Worker(Path(sys.executable), root, capture.job, capture.logs / "late.log")  # as by two who wrote at once
+    late.start()
+    refused = follow(late)[-1]
     assert isinstance(refused, Failed) and str(first._process.pid) in refused.problem
     assert first.running, "the first worker is not disturbed"
     first.terminate()

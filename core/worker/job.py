@@ -36,11 +36,13 @@ def write_job(capture: Capture, *, source: str | Path = "", first: str | None = 
 
     `first` (a stage's name) begins with that stage and forces it and those after it; None begins with the first one and
     skips what is fresh. `last` ends the job, None: the last stage. `settings` ({stage: {name: value}}, seed, device) lie
-    over the preset `quality`. Raises Problem for an unknown name or value, or when the folder cannot be written.
+    over the preset `quality`. Raises Problem for an unknown name or value, when the folder cannot be written, and while another worker
+    is at the capture: job.json is the record of what that one was asked.
     """
     source = os.path.abspath(source) if str(source) else ""
     values = {"capture": str(capture.root.absolute()), "source": source, "from": first, "until": last, "settings": settings or {}, "quality": quality}
     _job(values)
+    capture.check_free()
     write_json(capture.job, values)
     return capture.job
 
