@@ -37,7 +37,7 @@ from .albedo_score import compare, mean_scores, read_truth
 from .detail import Look, centre_rays, look, marks, mean_of
 
 ROWS = ("average", "blend", "aligned", "perceptual", "delit")
-STEPS = 300
+STEPS = 150
 
 
 def measure(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: int = STEPS, size: int = 1024, leave_out: int = 4,
@@ -57,13 +57,13 @@ def measure(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: 
         delighter = from_json({"delight": {"delighter": "folder", "folder": str(truth.absolute() / "albedo")}})
         importlib.import_module("core.delight").run(copy, delighter, Reporter("delight"))
         observations, surface = texture.observe_all(copy, head, size, report)
-    for row in (row for row in rows if row != "delit"):
-        try:
-            results[row] = _row(row, observations, surface, looks, steps, pictures and pictures / f"{row}.jpg")
-        except Problem as problem:  # the perceptual network is not everywhere; the other rows are
-            results[row] = {"not_run": f"{problem.problem} {problem.remedy}"}
-    if leave_out:
-        results["leave_one_out"] = _leave_one_out(observations, surface, looks, leave_out)
+        for row in (row for row in rows if row != "delit"):
+            try:
+                results[row] = _row(row, observations, surface, looks, steps, pictures and pictures / f"{row}.jpg")
+            except Problem as problem:  # the perceptual network is not everywhere; the other rows are
+                results[row] = {"not_run": f"{problem.problem} {problem.remedy}"}
+        if leave_out:
+            results["leave_one_out"] = _leave_one_out(observations, surface, looks, leave_out)
     return results
 
 

@@ -22,6 +22,7 @@ from ..views import read_views
 from .align import align
 from .blend import bands_of, blend, equalise, robust_weights
 from .fill import fill
+from .foreign import clothes, leave_out_background
 from .projection import Observation, Surface, observe
 
 
@@ -76,6 +77,9 @@ def observe_all(capture: Capture, head: meshes.Mesh, size: int, report: Reporter
 
 def build(observations: list[Observation], surface: Surface, settings: Settings, report: Reporter, aligned: bool = True) -> Built:
     """One map from what the views see; changes the observations (gains, warps, weights). `aligned`: off for measurements only."""
+    built_in = template.is_built_in(surface.caster.mesh)
+    if built_in:
+        leave_out_background(observations, report)
     gains = equalise(observations)
     report.log("Exposure gains of the views: " + ", ".join(f"{gain:.2f}" for gain in np.exp(gains.mean(1))))
     shift = align(observations, surface, report) if aligned else 0.0
@@ -83,12 +87,14 @@ def build(observations: list[Observation], surface: Surface, settings: Settings,
     log_texture, losses = blend(observations, report), {}
     seen = 1 - np.prod([1 - o.quality for o in observations], axis=0)
     confidence = np.where(surface.covered, seen, 0).astype(np.float32)
+    if built_in:
+        confidence = confidence * (1 - clothes(log_texture, confidence, surface))
     if settings.texture.perceptual > 0:
         from .features import load_features  # torch is only needed here
         from .perceptual import refine
 
         features = load_features(settings.texture.perceptual_network, settings.device)
-        wanted = (confidence > 0.3) & (template.mask("face", len(confidence)) > 0.5 if template.is_built_in(surface.caster.mesh) else True)
+        wanted = (confidence > 0.3) & (template.mask("face", len(confidence)) > 0.5 if built_in else True)
         log_texture, losses = refine(log_texture, observations, surface, wanted, features, settings.texture.perceptual, report, settings.device)
         report.figure("perceptual_network", features.name)
     return Built(log_texture, confidence, gains, shift, losses)

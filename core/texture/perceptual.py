@@ -26,9 +26,9 @@ TILE = 288
 """Pixels along a side of the part of a view that one step looks at: bounds memory and seconds whatever the frames' size; a multiple of 16."""
 OVER = 2
 """Rays along a pixel's side; their mean is what keeps a map that is finer than the picture from aliasing."""
-RATE = 0.012
+RATE = 0.002
 """Adam's first step, in the logarithm of linear colour; falls to a tenth."""
-GRADIENTS = 1.0
+GRADIENTS = 10.0
 """Weight of the gradients' L1 beside the perceptual distance, both means over positions."""
 KEPT = 8.0
 """Sigma in texels of a 1024 map: coarser changes are taken back, so that tone stays the mean of all views."""

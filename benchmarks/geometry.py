@@ -1,0 +1,157 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From the video to the textured head, measured: cameras, scan, head and texture of several captures, with what each stage cost.
+
+    python -m benchmarks.geometry FOLDER [--captures NAME ...] [--data FOLDER] [--fresh] [--results docs/results.md]
+
+Captures: `sample` (part of this repository), `lps_sun` and `bust` (in --data). FOLDER gets NAME.wildcap, NAME.json, pictures/NAME.jpg (scan, wireframe and
+texture beside the frame), geometry.json and geometry.md. What is finished is not done again without --fresh: stages that are fresh, captures that came through.
+Every stage runs in a process of its own, so its peak memory (the largest process, its children included, as getrusage tells) is its own.
+--results replaces this command's section of that file, and its picture of the synthetic sample: pictures of people never go into the documentation.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from core import images, stages
+from core.capture import Capture, write_json
+from core.messages import Problem
+
+from .geometry_table import markdown, write_section
+
+ROOT = Path(__file__).resolve().parent.parent
+LAST = "texture"
+"""Stages up to this one are run."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is captured, and what is known of it: `truth` laid out as benchmarks/albedo_score.py says, `mesh` the true surface where it is not `truth`'s own."""
+
+    source: Path
+    truth: Path | None = None
+    mesh: Path | None = None
+
+
+def subjects(data: Path) -> dict[str, Subject]:
+    """The captures by name; those of `data` that are not there are left out."""
+    sample = ROOT / "core" / "synthetic" / "sample"
+    found = {"sample": Subject(sample / "capture.mp4", sample),
+             "lps_sun": Subject(data / "lps_sun" / "capture.mp4", data / "lps_sun", data / "lee_perry_smith" / "LeePerrySmith.glb"),
+             "bust": Subject(data / "bust")}
+    return {name: subject for name, subject in found.items() if subject.source.exists()}
+
+
+def measure(name: str, subject: Subject, folder: Path, fresh: bool = False) -> dict:
+    """One capture's figures: run, compared with the truth where there is one, drawn. What stops it is told in "stopped"."""
+    capture = Capture(folder / f"{name}.wildcap")
+    if fresh:
+        shutil.rmtree(capture.root, ignore_errors=True)
+    costs, stopped = run_stages(capture, subject.source)
+    figures = {"stages": costs, "stopped": stopped}
+    for part, compare in (("cameras", _cameras), ("scan", _surface), ("head", _surface), ("texture", _texture)):
+        print(f"{name}: {part}", flush=True)
+        try:
+            figures[part] = compare(capture, subject, part)
+        except Exception as error:  # one comparison that fails must not cost the others, and is told
+            figures[part] = {"not_measured": f"{type(error).__name__}: {error}"}
+    picture = folder / "pictures" / f"{name}.jpg"
+    try:
+        from .geometry_pictures import sheet
+
+        images.write_srgb(picture, sheet(capture))
+        figures["picture"] = picture.name
+    except (Problem, OSError, ValueError, IndexError) as error:
+        figures["picture"] = f"not drawn: {error}"
+    return figures
+
+
+def run_stages(capture: Capture, source: Path) -> tuple[dict, dict | None]:
+    """Per stage its seconds and peak memory in MB; and the problem and remedy that ended the run, or None. Costs of stages that were fresh are kept."""
+    path = capture.root / "costs.json"
+    costs = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    for stage in stages.NAMES[:stages.NAMES.index(LAST) + 1]:
+        print(f"{capture.root.stem}: stage {stage}", flush=True)
+        child = subprocess.run([sys.executable, "-m", "benchmarks.geometry_stage", str(source.absolute()), str(capture.root), stage], cwd=ROOT,
+                               stdout=subprocess.PIPE, text=True, encoding="utf-8")
+        lines = child.stdout.strip().splitlines()
+        if child.returncode or not lines:
+            return costs, {"stage": stage, "problem": f"The stage's process ended with code {child.returncode}.", "remedy": f"See {capture.logs}."}
+        cost = json.loads(lines[-1])
+        if "problem" in cost:
+            return costs, {"stage": stage, **cost}
+        if not cost.pop("skipped") or stage not in costs:
+            costs[stage] = cost
+            write_json(path, costs)
+    return costs, None
+
+
+def _cameras(capture: Capture, subject: Subject, part: str) -> dict:
+    import pycolmap
+
+    from core.views import read_views
+
+    from .cameras_against_truth import compare
+
+    frames = len(json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"])
+    views = read_views(capture)
+    figures = {"frames": frames, "registered_percent": 100 * len(views) / frames,
+               "reprojection_px": pycolmap.Reconstruction(str(capture.cameras)).compute_mean_reprojection_error()}
+    return {**figures, **({"against_truth": {k: float(v) for k, v in compare(capture, subject.truth).items()}} if subject.truth else {})}
+
+
+def _surface(capture: Capture, subject: Subject, part: str) -> dict:
+    from .head_against_truth import compare
+
+    figures = capture.read()["stages"].get({"scan": "scan", "head": "registration"}[part], {}).get("figures", {})
+    if subject.truth is None:
+        return {"own": figures}
+    return {"own": figures, "against_truth": compare(capture, subject.truth, subject.mesh, {"scan": "scan.ply", "head": "head.obj"}[part])}
+
+
+def _texture(capture: Capture, subject: Subject, part: str) -> dict:
+    from .texture import measure as measure_texture
+
+    figures = capture.read()["stages"].get("texture", {}).get("figures", {})
+    return {"own": figures, **({"alone": measure_texture(capture, subject.truth)} if subject.truth else {})}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--captures", nargs="+", metavar="NAME", help="of sample, lps_sun, bust; all that are there by default")
+    parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data")
+    parser.add_argument("--fresh", action="store_true", help="do everything again")
+    parser.add_argument("--results", type=Path, help="a Markdown file whose section between the geometry markers is replaced")
+    options = parser.parse_args()
+    known = subjects(options.data)
+    missing = set(options.captures or ()) - set(known)
+    if missing:
+        parser.error(f"there is no capture named {', '.join(sorted(missing))}; there are {', '.join(known)}")
+    folder = options.folder.resolve()
+    for name in options.captures or known:
+        result = folder / f"{name}.json"
+        if result.is_file() and not options.fresh and json.loads(result.read_text(encoding="utf-8"))["stopped"] is None:
+            continue
+        started = time.monotonic()
+        figures = measure(name, known[name], folder, options.fresh)
+        write_json(result, {**figures, "minutes": round((time.monotonic() - started) / 60, 1)})
+    everything = {name: json.loads((folder / f"{name}.json").read_text(encoding="utf-8")) for name in known if (folder / f"{name}.json").is_file()}
+    write_json(folder / "geometry.json", everything)
+    text = markdown(everything)
+    (folder / "geometry.md").write_text(text, encoding="utf-8")
+    if options.results:
+        write_section(options.results, text, folder / "pictures" / "sample.jpg")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the views show where the head's surface is, but is not the head: the background past a wrong outline, clothes at the neck.
+
+Neither is taken for skin: such texels lose their weight or their confidence, and are completed from the skin around them.
+Both need the built-in head's masks; the face itself is never doubted. A cap or a hood on the scalp is not told from hair.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from .. import faces, images, raster, template
+from ..messages import Problem, Reporter
+from .projection import Observation, Surface
+
+COLOUR = 0.35
+"""How far the logarithms of R/G and B/G of a cloth lie from the face's skin; light that a delighter left does not reach that far."""
+DARK, BRIGHT = -1.3, 0.8
+"""Differences of log luminance to the face's skin from which the neck is no skin whatever its colour: black and white cloth."""
+SMOOTH = 5 / 1024
+"""Sigma of the smoothing before the comparison, as a part of the map's side: a pattern is judged by its mean, a mole not at all."""
+GROW = 10 / 1024
+"""How far a cloth's edge, where it throws its shade, is taken with it."""
+
+
+def leave_out_background(observations: list[Observation], report: Reporter) -> int:
+    """Takes quality and weight from texels that a view sees outside the person (segmented in its frame). Returns how many views were so cut.
+
+    A frame that is not there, or whose segmentation misses the face, changes nothing.
+    """
+    face, cut = template.mask("face", len(observations[0].weight)), 0
+    for i, observation in enumerate(observations):
+        report.progress(i, len(observations), f"finding the person in {observation.name}")
+        if not observation.view.path.is_file():
+            continue
+        try:
+            person = faces.segment_person(images.read_srgb(observation.view.path))
+        except Problem:
+            return cut  # the network is not installed: the margin of the silhouette has to do
+        height, width = observation.picture.shape[:2]
+        shown = cv2.remap(images.resize(person, width, height), *(observation.pixels[..., k] - 0.5 for k in range(2)), cv2.INTER_LINEAR,
+                          borderMode=cv2.BORDER_REPLICATE)
+        in_face = (observation.weight > 0) & (face > 0.5)
+        if not in_face.any() or np.median(shown[in_face]) < 0.8:
+            continue
+        kept = np.maximum(np.clip((shown - 0.3) / 0.5, 0, 1), face).astype(np.float32)
+        observation.quality, observation.weight = observation.quality * kept, observation.weight * kept
+        cut += 1
+    return cut
+
+
+def clothes(log_texture: np.ndarray, confidence: np.ndarray, surface: Surface) -> np.ndarray:
+    """How surely each texel shows a cloth, float32 [S, S] in [0, 1]: parts of the neck that reach its rim and have not the colour of the face's skin."""
+    size = len(confidence)
+    neck, skin = template.mask("neck", size), (template.mask("skin", size) > 0.9) & (confidence > 0.5)
+    seen = (neck > 0.3) & (confidence > 0.02) & surface.covered
+    if not skin.any() or not seen.any():
+        return np.zeros_like(confidence)
+    weight = ((neck > 0.3) & surface.covered).astype(np.float32) * confidence
+    sigma = SMOOTH * size
+    smooth = cv2.GaussianBlur(log_texture * weight[..., None], (0, 0), sigma) / np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-6)[..., None]
+    away = smooth - np.median(log_texture[skin], axis=0)
+    colour = np.hypot(away[..., 0] - away[..., 1], away[..., 2] - away[..., 1])
+    strange = seen & ((colour > COLOUR) | (away.mean(-1) < DARK) | (away.mean(-1) > BRIGHT))
+    radius = max(1, round(GROW * size))
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)
+    _, labels = cv2.connectedComponents(cv2.morphologyEx(strange.astype(np.uint8), cv2.MORPH_CLOSE, disc))
+    at_rim = np.unique(labels[(cv2.dilate(_rim(surface, neck), disc) > 0) & strange])
+    found = np.isin(labels, at_rim[at_rim > 0])
+    return cv2.GaussianBlur(cv2.dilate(found.astype(np.float32), disc), (0, 0), radius / 3) * surface.covered
+
+
+def _rim(surface: Surface, neck: np.ndarray) -> np.ndarray:
+    """uint8 [S, S]: texels on the edge at which the mesh ends below the neck."""
+    mesh, size = surface.caster.mesh, len(neck)
+    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    uv_edges = mesh.face_uvs[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    _, first, count = np.unique(edges, axis=0, return_index=True, return_counts=True)
+    ends = mesh.uvs[uv_edges[first[count == 1]]] * [size, -size] + [-0.5, size - 0.5]  # [E, 2, 2] in texels
+    canvas = np.zeros((size, size), np.uint8)
+    cv2.polylines(canvas, list(np.round(ends).astype(np.int32)), False, 1, 2)
+    return canvas * (raster.bleed(neck, surface.covered) > 0.3)
