@@ -18,34 +18,40 @@ from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
 from core.views import View
 
-WIDTH, HEIGHT, FOCAL = 360, 480, 560.0
+WIDTH, HEIGHT, FOCAL = 300, 400, 467.0
 WALL_M, WALL_AT = 6.0, 1.2
 SEED = 5
 
 
 @cache
-def person(seed: int = SEED) -> tuple[raster.RayCaster, np.ndarray, np.ndarray]:
-    """The head's mesh, ready for rays, its vertex normals, and its diffuse albedo, linear [512, 512, 3]."""
+def person(seed: int = SEED, texels: int = 256) -> tuple[raster.RayCaster, np.ndarray, np.ndarray]:
+    """The head's mesh, ready for rays, its vertex normals, and its diffuse albedo, linear [texels, texels, 3]."""
     mesh = subject_mesh(seed)
-    return raster.RayCaster(mesh), meshes.vertex_normals(mesh), make_skin(sample_parameters(seed), 512).diffuse
+    return raster.RayCaster(mesh), meshes.vertex_normals(mesh), make_skin(sample_parameters(seed), texels).diffuse
 
 
-def camera(azimuth_deg: float, height: float = 0.0, distance: float = 0.55, target=(0, -0.01, -0.035)) -> View:
-    """A camera that looks at the head; `height` above the eyes in metres."""
+def camera(azimuth_deg: float, height: float = 0.0, distance: float = 0.55, target=(0, -0.01, -0.035), scale: float = 1.0) -> View:
+    """A camera that looks at the head; `height` above the eyes and `distance` in metres; `scale` of its picture's size."""
     a = np.radians(azimuth_deg)
     centre, target = np.array([np.sin(a) * distance, -np.cos(a) * distance, height]), np.array(target)
     z = (target - centre) / np.linalg.norm(target - centre)
     x = np.cross(z, [0, 0, 1])
     x /= np.linalg.norm(x)
     rotation = np.stack([x, np.cross(z, x), z])
-    pinhole = pycolmap.Camera(camera_id=1, model="PINHOLE", width=WIDTH, height=HEIGHT, params=[FOCAL, FOCAL, WIDTH / 2, HEIGHT / 2])
+    pinhole = pycolmap.Camera(camera_id=1, model="PINHOLE", width=round(WIDTH * scale), height=round(HEIGHT * scale),
+                              params=np.array([FOCAL * distance / 0.55, FOCAL * distance / 0.55, WIDTH / 2, HEIGHT / 2]) * scale)
     return View("", Path(), pinhole, rotation, -rotation @ centre, True)
 
 
-def photograph(view: View, turned_deg: float = 0.0, wall: bool = True, seed: int = SEED) -> np.ndarray:
-    """sRGB [HEIGHT, WIDTH, 3]. `turned_deg`: how far the person has turned the head to their left; light and wall stay.
+def studio(scale: float = 1.0) -> list[View]:
+    """Sixteen fixed cameras a metre away in two rows, over 100 degrees from side to side: the layout of multi-view studios as NeRSemble's."""
+    return [camera(azimuth, height, 1.0, scale=scale) for height in (-0.15, 0.25) for azimuth in np.linspace(-50, 50, 8)]
+
+
+def photograph(view: View, turned_deg: float = 0.0, wall: bool = True, even: bool = False, seed: int = SEED, texels: int = 256) -> np.ndarray:
+    """sRGB [H, W, 3]. `even`: light from everywhere. `turned_deg`: how far the person has turned the head to their left; light and wall stay.
     Without `wall` the background is plain grey."""
-    caster, normals, albedo = person(seed)
+    caster, normals, albedo = person(seed, texels)
     turn = np.radians(turned_deg)
     rotation = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
     seen = View(view.name, view.path, view.camera, view.rotation @ rotation, view.translation, True)  # the camera as the head sees it
@@ -53,7 +59,7 @@ def photograph(view: View, turned_deg: float = 0.0, wall: bool = True, seed: int
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
     colour = raster.sample(albedo, np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(albedo)).reshape(*face.shape, 3)
     normal = raster.interpolate(normals, caster.mesh.faces, face, bary) @ rotation.T
-    shade = 0.55 + 0.45 * np.clip(normal @ (np.array([0.3, -0.8, 0.5]) / 0.99), 0, 1)
+    shade = np.full(face.shape, 0.9) if even else 0.55 + 0.45 * np.clip(normal @ (np.array([0.3, -0.8, 0.5]) / 0.99), 0, 1)
     head = images.resize((colour * ((face >= 0) * shade * 1.6)[..., None]).astype(np.float32), view.width, view.height)
     cover = images.resize((face >= 0).astype(np.float32), view.width, view.height)[..., None]
     return images.linear_to_srgb(head * (cover > 0) + (1 - cover) * (_wall(view) if wall else 0.3))

@@ -21,12 +21,14 @@ from .calibration import import_cameras
 from .drawing import draw_cameras
 from .landmarks import find_landmarks
 from .motion import expression_changes
-from .solving import FEW, MOST_FACES, Solved, solve
+from .solving import MOST_FACES, Solved, solve
 from .world import find_head
 
 LEAST_COVERAGE_DEG = 15.0
 IMPORT_MISS = 0.05
 """Share of the face's width by which landmarks may miss in imported cameras: those of another capture, or read by other conventions, miss by far more."""
+IMPORT_UNLIKE_M = 0.004
+"""How far a head may miss the landmarks in imported cameras; a person's does by 2 mm. Cameras in the wrong order may see a hollow face."""
 BLURRED = 0.6
 """Sharpness, as a share of that of the frames that fit, below which a frame was left out for its blur."""
 
@@ -59,6 +61,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
                         ("focal_px", round(float(np.mean([c.mean_focal_length() for c in model.cameras.values()])), 1)),
                         ("features", solved.way), ("solve_s", round(time.monotonic() - started, 1))):
         report.figure(name, value)
+    report.figure("head_miss_mm", round(1000 * solved.head.unlike_m, 2))
     if chosen:
         report.figure("pupils_apart_in_imported_units", round(solved.head.pupils_apart, 5))
     if solved.way == "face":
@@ -74,9 +77,9 @@ def _imported(path: Path, frames: dict, capture: Capture, settings: Settings, re
     found = find_landmarks(records, capture.frames, report)
     head = find_head(model, found, settings.cameras.interpupillary_mm / 1000)
     width = float(np.median([face.box[2] - face.box[0] for face in found.values()]))
-    if not max(head.miss, head.error_px / width) < IMPORT_MISS:
+    if not (max(head.miss, head.error_px / width) < IMPORT_MISS and head.unlike_m < IMPORT_UNLIKE_M):
         raise Problem(f"The cameras in {path.name} do not fit these pictures: the face's landmarks miss each other by {head.error_px:.0f} px "
-                      f"({100 * head.error_px / width:.0f} % of the face's width).",
+                      f"({100 * head.error_px / width:.0f} % of the face's width), and a head by {1000 * head.unlike_m:.0f} mm.",
                       "Import the cameras that were solved from these very pictures, not cropped, under the same names; or empty the setting.")
     return Solved(model, "imported", head, found)
 
@@ -88,8 +91,6 @@ def _findings(solved: Solved, records: list[dict], centres: np.ndarray, report: 
         rough = "to a few degrees only" if solved.tracks < 30 else "refined by what little matches"
         report.finding(f"The frames do not overlap enough to be matched: the cameras come from the face's landmarks, {rough}. Expect a rough head.",
                        "Take a photograph every ten degrees around the face, from ear to ear, with a busy background.")
-    elif len(records) < FEW:
-        report.finding(f"There are only {len(records)} frames: expect a rough head.", "30 or more around the face, from ear to ear, give a full one.")
     if solved.stood_still:
         report.finding("The head turned while the camera stood still. The cameras hold for the head, but light and shadows slide over the face as it turns.",
                        "Let the person sit still and walk around them with the camera.")

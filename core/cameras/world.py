@@ -14,7 +14,7 @@ import pycolmap
 
 from .. import faces
 from ..messages import Problem
-from .landmarks import fit_rays, pupils
+from .landmarks import fit_rays, pupils, template_landmarks
 
 FRONTAL_DEG = 45.0
 """Landmarks slide along the silhouette of a turned head, so frames within this yaw are taken where there are enough."""
@@ -25,12 +25,14 @@ MOVED = 0.08
 @dataclass(frozen=True)
 class HeadFrame:
     """The similarity into the head's world; by how much the landmarks' rays miss each other [px, median over frames and landmarks], and that as a
-    share of the face's width in the quarter of the frames where it is most; the distance of the pupils in the units of the cameras' own world."""
+    share of the face's width in the quarter of the frames where it is most; the distance of the pupils in the units of the cameras' own world;
+    by how much the template's head misses the rays [m, median]."""
 
     world_from_model: pycolmap.Sim3d
     error_px: float
     miss: float
     pupils_apart: float
+    unlike_m: float
 
     @property
     def still(self) -> bool:
@@ -56,7 +58,10 @@ def find_head(model: pycolmap.Reconstruction, found: dict[str, faces.Face], inte
     size = interpupillary_m / apart
     middle = scale * rotation @ ((left + right) / 2) + translation
     similarity = pycolmap.Sim3d(size, pycolmap.Rotation3d(rotation.T), -size * rotation.T @ middle)
-    return HeadFrame(similarity, float(np.median(errors)), float(np.percentile(errors, 75) / width), apart)
+    head = scale * template_landmarks().shape(coefficients) @ rotation.T + translation
+    offset = head[None] - origins[:, None]
+    miss = np.linalg.norm(np.cross(offset, directions), axis=-1)[:, template_landmarks().trust > 0.2]
+    return HeadFrame(similarity, float(np.median(errors)), float(np.percentile(errors, 75) / width), apart, float(np.median(miss)) * size)
 
 
 def rays(image: pycolmap.Image, camera: pycolmap.Camera, face: faces.Face) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A studio: sixteen photographs under even light with the cameras of its calibration; the mask ends empty. Blender's own cameras are such a calibration."""
+
+import json
+
+import numpy as np
+import pytest
+
+from benchmarks.cameras_against_truth import similarity
+from core import cameras, delight, frames, images, meshes, shadow_mask, texture
+from core.capture import Capture
+from core.messages import Problem, Reporter
+from core.settings import from_json
+from core.views import read_views
+
+from . import painted_head
+
+
+def calibration(views: list) -> str:
+    entries = []
+    for i, view in enumerate(views):
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = view.rotation.T @ np.diag([1, -1, -1]), view.centre
+        entries.append({"name": f"cam_{i:02d}", "matrix_world": matrix.tolist()})
+    camera = views[0].camera
+    return json.dumps({"width": camera.width, "height": camera.height, "focal_px": camera.mean_focal_length(), "cameras": entries})
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory):
+    """The capture up to its cameras, the report, and the true views."""
+    root, views = tmp_path_factory.mktemp("studio"), painted_head.studio()
+    for i, view in enumerate(views):
+        images.write_srgb(root / "photos" / f"cam_{i:02d}.png", painted_head.photograph(view, wall=False, even=True))
+    (root / "rig.json").write_text(calibration(views))
+    capture = Capture(root / "face.wildcap")
+    capture.root.mkdir()
+    capture.set_source(root / "photos")
+    settings = from_json({"cameras": {"import_from": str(root / "rig.json")}, "delight": {"delighter": "none"}, "texture": {"size": 256}})
+    frames.run(capture, settings, Reporter("frames"))
+    report = Reporter("cameras")
+    cameras.run(capture, settings, report)
+    return capture, settings, report, views
+
+
+def test_the_rigs_cameras_stand_in_the_heads_world(studio):
+    capture, _, report, true = studio
+    found = read_views(capture)
+    assert report.figures["frames_registered"] == 16 and report.figures["features"] == "imported"
+    scale, rotation, shift = similarity(np.array([view.centre for view in found]), np.array([view.centre for view in true]))
+    assert np.allclose([scale * rotation @ view.centre + shift for view in found], [view.centre for view in true], atol=1e-9)
+    assert scale == pytest.approx(1, abs=0.06) and rotation[2, 2] > np.cos(np.radians(8))  # a person's pupils are not 63 mm apart
+    assert report.figures["pupils_apart_in_imported_units"] == pytest.approx(0.062, abs=0.003)
+    assert not [finding for finding in report.findings if "fit" in finding["problem"] or "expression" in finding["problem"]]
+
+
+def test_even_light_ends_with_an_empty_mask(studio):
+    """On the true head, so that registration has no part in it."""
+    capture, settings, _, true = studio
+    found = read_views(capture)
+    scale, rotation, shift = similarity(np.array([view.centre for view in true]), np.array([view.centre for view in found]))
+    head = painted_head.person()[0].mesh
+    meshes.write_obj(capture.head, head.moved(scale * head.vertices @ rotation.T + shift))
+    for stage, name in ((delight, "delight"), (texture, "texture"), (shadow_mask, "shadow_mask")):
+        stage.run(capture, settings, Reporter(name))
+    assert images.read_mask(capture.shadow_mask_auto).mean() < 0.01
+
+
+def test_another_rigs_calibration_is_refused(studio, tmp_path):
+    capture, settings, _, true = studio
+    (tmp_path / "rig.json").write_text(calibration(true[::-1]))
+    with pytest.raises(Problem, match="do not fit these pictures"):  # in the opposite order: rays meet, but in a hollow face
+        cameras.run(capture, from_json({"cameras": {"import_from": str(tmp_path / "rig.json")}}), Reporter("cameras"))
+
+
+def test_blenders_cameras_are_written_as_they_are_read(addon, tmp_path):
+    """Lens, sensor fit and shift: Blender's own projection agrees."""
+    import bpy
+    from bpy_extras.object_utils import world_to_camera_view
+    from mathutils import Vector
+
+    from core.cameras.calibration import read_cameras
+
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 600, 800, 100
+    for i, fit in enumerate(('AUTO', 'HORIZONTAL', 'VERTICAL')):
+        data = bpy.data.cameras.new(f"lens {i}")
+        data.lens, data.sensor_width, data.sensor_height, data.sensor_fit, data.shift_x, data.shift_y = 70 + i, 32, 20, fit, 0.05, -0.03
+        thing = bpy.data.objects.new(f"IMG_{i}", data)
+        thing.location, thing.rotation_euler = (0.1 * i, -0.7, 0.1), (1.5, 0.1, 0.05 * i)
+        scene.collection.objects.link(thing)
+    assert addon("capture.scene_cameras").write_cameras(scene, str(tmp_path / "cameras.json")) == 3
+    point = np.array([0.02, 0.03, -0.04])
+    for read in read_cameras(tmp_path / "cameras.json"):
+        across, up, _ = world_to_camera_view(scene, bpy.data.objects[read.name], Vector(point))
+        there = np.asarray(read.camera(1, 600, 800).img_from_cam((read.rotation @ point + read.translation)[None]))[0]
+        assert np.allclose(there, [600 * across, 800 * (1 - up)], atol=1e-3)
