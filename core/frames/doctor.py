@@ -18,7 +18,7 @@ FEW = 12
 """Below this many frames the result is accepted but the report warns."""
 BLURRED = 0.68
 """Crete's measure of a face that is blurred by about 7 px: sharp ones have 0.35 to 0.6, whatever they look like; at 9 px it is 0.7 to 0.8."""
-DARK, CLIPPED, NOISY = 0.22, 0.04, 6 / 255
+DARK, CLIPPED, NOISY = 0.22, 0.06, 6 / 255
 """sRGB of a face's bright quarter; share of a face's pixels at the end of the range; standard deviation of the noise in sRGB."""
 SMALL_PX, FAR = 160, 0.22
 """Width of a face in pixels; and as a share of the shorter side of the picture."""
@@ -106,7 +106,7 @@ def _size(found: list[dict], report: Reporter) -> None:
                        _names([r for r, w in zip(found, width, strict=True) if w < FAR * min(r["size"])]))
     elif np.median(width) < SMALL_PX:
         report.finding(f"The face is only {np.median(width):.0f} pixels wide, too few for pores.",
-                       "Record in 1080p or 4K, or raise the setting Long Side of the frames where the video is larger.")
+                       "Go closer, shoot in the highest resolution, or raise the setting Long Side of the frames where the pictures are larger.")
 
 
 def _light(found: list[dict], report: Reporter) -> None:

@@ -25,7 +25,9 @@ LEAST_SPOTS, LEAST_SHARE = 16, 0.5
 """Spots that must follow a gain, and the share of all: fewer explain no picture."""
 TOLERANCE = 0.08
 """How far a spot may be from the common gain to follow it, in natural logarithms (8 %)."""
-STEADY = 0.05
+DOUBT = 0.2
+"""Weight of a comparison that may be shading: it stands for no change, unless another one knows better."""
+STEADY = 0.06
 """Whole range of the gains, in natural logarithms, up to which the light counts as constant and no picture is touched."""
 
 
@@ -84,7 +86,7 @@ def gains_of(contents: list[Content], check=lambda: None) -> np.ndarray:
                 continue
             turning[i:i + step] |= link.shading
             if link.shading or (link.person and turning[i:i + step].any()):
-                link = Link(np.zeros(3), link.weight)
+                link = Link(np.zeros(3), DOUBT * link.weight)
             pairs.append((i, i + step))
             links.append(link)
     if not links:
@@ -108,7 +110,9 @@ def compare(a: Content, b: Content) -> Link | None:
     if common is not None:
         return Link(*common[:2])
     common = _common(ratio[person], place[person])
-    return None if common is None else Link(*common[:2], True, common[2])
+    if common is None:
+        return Link(np.zeros(3), float(person.sum()), True, True) if _slanted(ratio[person].mean(1), place[person]) else None
+    return Link(*common[:2], True, common[2])
 
 
 def _matches(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -137,6 +141,19 @@ def _common(ratio: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, float, bo
     slope = np.linalg.lstsq(offset * voice[:, None], (ratio - gain).mean(1) * voice, rcond=None)[0]
     slant, noise = 3 * np.linalg.norm(slope), 9 * (ratio - gain).mean(1).std() / len(ratio) ** 0.5
     return gain, float(voice.sum()), bool(slant > max(noise, 0.5 * np.abs(gain).max()))
+
+
+def _slanted(ratio: np.ndarray, place: np.ndarray) -> bool:
+    """Whether log ratios [n] that have no value in common lie on a slope across the picture [n, 2]: shading, not wrong matches."""
+    if len(ratio) < LEAST_SPOTS:
+        return False
+    ones = np.concatenate([(place - place.mean(0)) / np.maximum(place.std(0), 1), np.ones((len(place), 1))], 1)
+    error = ratio - np.median(ratio)
+    before, left = np.median(np.abs(error)), error
+    for _ in range(5):
+        voice = 1 / np.sqrt(np.maximum(np.abs(left), 0.02))
+        left = error - ones @ np.linalg.lstsq(ones * voice[:, None], error * voice, rcond=None)[0]
+    return bool(np.median(np.abs(left)) < 0.6 * before)
 
 
 def _weighted_median(values: np.ndarray, weights: np.ndarray) -> float:

@@ -1,0 +1,163 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The video doctor: bad captures end in the right diagnosis, blurred frames and blinks are left out, good ones hear nothing of it."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+from skimage.data import astronaut
+
+from core import faces, frames, images
+from core.capture import Capture
+from core.frames.doctor import blurred, diagnose, examine
+from core.frames.eyes import blinks
+from core.messages import Problem, Reporter
+from core.settings import from_json
+
+FACE = astronaut().astype(np.float32)[:300, 60:400] / 255
+
+
+def take(tmp_path, pictures, **settings) -> tuple[list[dict], Reporter]:
+    """The frames stage over photographs; the records and the reporter."""
+    capture, folder = Capture(tmp_path / "a face.wildcap"), tmp_path / "photographs"
+    folder.mkdir()
+    for i, picture in enumerate(pictures):
+        images.write_srgb(folder / f"{i:02d}.png", picture)
+    capture.set_source(folder)
+    report = Reporter("frames")
+    frames.run(capture, from_json({"frames": settings}), report)
+    records = json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]
+    assert {p.name for p in capture.frames.glob("*.jpg")} == {r["name"] for r in records}
+    return records, report
+
+
+def problems(report: Reporter) -> str:
+    assert all(f["problem"].endswith(".") and f["remedy"].endswith(".") for f in report.findings)
+    return " ".join(f["problem"] for f in report.findings)
+
+
+def wander(i: int, picture=FACE) -> np.ndarray:
+    return picture[i:i + 260, 2 * i:2 * i + 280]
+
+
+def shaken(picture: np.ndarray, length: int) -> np.ndarray:
+    return cv2.blur(picture, (length, 1))
+
+
+def lids_closed(picture: np.ndarray) -> np.ndarray:
+    """The skin above each eye drawn down over it."""
+    marks = faces.detect(picture).landmarks[:, :2]
+    y, x = np.mgrid[0:picture.shape[0], 0:picture.shape[1]].astype(np.float32)
+    source = y.copy()
+    for corners, upper, lower, brow in ((faces.RIGHT_EYE, 159, 145, 105), (faces.LEFT_EYE, 386, 374, 334)):
+        a, b = marks[list(corners)]
+        across = np.clip(1 - ((x - (a + b)[0] / 2) / (0.62 * np.linalg.norm(a - b))) ** 2, 0, 1)
+        top, low = marks[brow][1], marks[lower][1] + 1
+        reach = low + (marks[upper][1] - 1.5 - low) * np.sqrt(across)
+        source = np.where((y >= top) & (y <= low) & (across > 0), top + (y - top) / (low - top) * (reach - top), source)
+    return cv2.remap(picture, x, source.astype(np.float32), cv2.INTER_LINEAR)
+
+
+def test_blurred_frames_and_blinks_are_left_out_and_the_exposure_is_evened(tmp_path):
+    shut = lids_closed(FACE)
+    pictures = [wander(i, shut if i in (5, 11) else FACE) for i in range(18)]
+    for i in (3, 9, 14):
+        pictures[i] = shaken(pictures[i], 9)
+    gain = np.where(np.arange(18) < 10, 1.0, 0.75).astype(np.float32)
+    pictures = [images.linear_to_srgb(images.srgb_to_linear(p) * g) for p, g in zip(pictures, gain, strict=True)]
+    records, report = take(tmp_path, pictures, views=13)
+    assert [r["video_frame"] for r in records] == [i for i in range(18) if i not in (3, 9, 14)]
+    assert [r["video_frame"] for r in records if r["blink"]] == [5, 11]
+    assert sum(r["selected"] for r in records) == 13 and not any(r["selected"] and r["blink"] for r in records)
+    evened = np.array([r["gain"] for r in records]).mean(1) * gain[[r["video_frame"] for r in records]]
+    assert np.ptp(np.log(evened)) < 0.03
+    assert report.figures["frames_dropped_as_blurred"] == 3 and report.figures["frames_with_a_blink"] == 2
+    assert report.figures["exposure_drift_percent"] == pytest.approx(33, abs=4)
+    assert "3 of 18 photographs are blurred" in problems(report) and "exposure changed" in problems(report)
+    assert [f["frames"] for f in report.findings if "blurred" in f["problem"]] == [["00003.jpg", "00009.jpg", "00014.jpg"]]
+
+
+def test_a_capture_that_is_blurred_all_over_is_told(tmp_path):
+    records, report = take(tmp_path, [shaken(wander(3 * i), 13) for i in range(4)])
+    assert len(records) == 4 and "blurred in most of the capture" in problems(report)
+    assert "only 4 photographs" in problems(report)
+
+
+def test_two_equal_faces_are_a_problem_and_a_smaller_one_is_passed_over(tmp_path):
+    couple = [np.concatenate([wander(2 * i)[:, 40:260], wander(2 * i)[:, 40:260]], 1) for i in range(4)]
+    (tmp_path / "a").mkdir()
+    with pytest.raises(Problem, match="two faces"):
+        take(tmp_path / "a", couple)
+    small = images.resize(FACE[40:210, 80:260], 90, 85)
+    crowd = [np.concatenate([wander(2 * i), np.pad(small, ((120, 55), (0, 0), (0, 0)), "edge")], 1) for i in range(4)]
+    (tmp_path / "b").mkdir()
+    records, report = take(tmp_path / "b", crowd)
+    assert all(r["face_box"][2] < 280 and r["face_box"][2] - r["face_box"][0] > 80 for r in records), "the large face"
+    assert "second face is in 4 of 4" in problems(report)
+
+
+def record(**other) -> dict:
+    """A frame with nothing wrong."""
+    return {"name": "00000.jpg", "time_s": 0.0, "size": [720, 960], "face_box": [200, 300, 520, 720], "yaw_deg": 0.0, "blur": 0.5, "brightness": 0.6,
+            "clipped": 0.0, "noise": 0.002, "other_face": 0.0, "gain": [1.0] * 3, **other}
+
+
+def around(low=-60, high=60, step=3, **other) -> list[dict]:
+    return [record(name=f"{i:05d}.jpg", yaw_deg=float(yaw), **other) for i, yaw in enumerate(range(low, high + 1, step))]
+
+
+@pytest.mark.parametrize(("records", "words"), [
+    (around(), ""),
+    (around(low=0), "left side of the face is not seen at all"),
+    (around(high=12), "right side of the face is hardly seen: the camera came only 12 degrees"),
+    ([r for r in around() if not 0 < r["yaw_deg"] < 40], "Between 0 and 42 degrees"),
+    (around(brightness=0.12), "too dark"),
+    (around(clipped=0.2), "overexposed: 20% of it"),
+    (around(noise=0.04), "noisy"),
+    (around(face_box=[300, 400, 400, 540]), "small in the picture: 14%"),
+    (around(face_box=[60, 60, 160, 190], size=[240, 320]), "only 100 pixels wide"),
+    (around(blur=0.75), "blurred in most"),
+    (around(step=15), "only 9 frames"),
+    (around()[:40] + [record(face_box=None, yaw_deg=None)] * 40, "No face was found in 40 of 80 frames"),
+])
+def test_each_shortcoming_has_its_sentence_and_a_good_capture_none(records, words):
+    report = Reporter("frames")
+    diagnose(records, [], False, report)
+    if words == "No face was found in 40 of 80 frames":
+        records = records[:40]
+    assert words in problems(report) and (words or not report.findings)
+    if words not in ("", "No face was found in 40 of 80 frames"):
+        assert len(report.findings) == 1, "nothing else is wrong"
+
+
+def test_the_measures_say_what_was_done_to_the_picture():
+    rng = np.random.default_rng(0)
+    box = faces.detect(FACE).box
+    good = examine(FACE, box)
+    assert good["blur"] < 0.55 and 0.4 < good["brightness"] < 0.9 and good["clipped"] < 0.05 and good["noise"] < 0.012
+    assert examine(cv2.GaussianBlur(FACE, (0, 0), 3), box)["blur"] > 0.68 and examine(shaken(FACE, 15), box)["blur"] > 0.68
+    assert examine(images.linear_to_srgb(0.04 * images.srgb_to_linear(FACE)), box)["brightness"] < 0.22
+    assert examine(np.clip(2 * FACE, 0, 1), box)["clipped"] > 0.2
+    assert examine((FACE + 0.05 * rng.normal(size=FACE.shape)).astype(np.float32), box)["noise"] == pytest.approx(0.05 * 0.67, abs=0.01), "of luma"
+
+
+def test_at_most_a_third_is_dropped_and_enough_stay():
+    assert not blurred([record(blur=0.7)] * 30).any(), "equally blurred: nothing better is there"
+    assert blurred([record(blur=0.75 if i % 5 in (1, 3) else 0.45) for i in range(60)]).sum() == 20
+    assert not blurred([record(blur=0.75 if i == 3 else 0.45) for i in range(12)]).any()
+    turning = [record(blur=0.45 + 0.004 * i) for i in range(40)]  # fewer edges towards the profile
+    assert not blurred(turning).any()
+
+
+def test_blinks_are_told_by_what_the_eyes_do_else():
+    time = (np.arange(60) / 24).tolist()
+    eyes = [(0.3, 0.34)] * 60
+    blinking = [(0.1, 0.12) if 20 <= i < 25 else eye for i, eye in enumerate(eyes)]
+    assert np.flatnonzero(blinks(blinking, time)).tolist() == list(range(20, 25))
+    assert not blinks([(0.1, 0.12)] * 60, time).any(), "closed throughout"
+    assert not blinks([(0.36 - 0.004 * i, 0.12 + 0.004 * i) for i in range(60)], time).any(), "a turn of the head"
+    assert not blinks([(0.1, 0.34) if i == 30 else eye for i, eye in enumerate(eyes)], time).any(), "one eye alone is a mistake or a wink"
+    assert blinks([(0.1, 0.1) if i == 2 else None if i == 5 else (0.3, 0.3) for i in range(9)], [None] * 9).nonzero()[0].tolist() == [2]
+    assert not blinks([None] * 3, [None] * 3).any()

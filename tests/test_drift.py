@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Exposure and white balance: what a camera changed is found and evened out; what the light does to a turning head is not taken for it."""
+
+import cv2
+import numpy as np
+import pytest
+from skimage.data import astronaut
+
+from core import faces, images
+from core.frames import drift
+from core.frames.drift import content_of, gains_of
+
+HEIGHT, WIDTH = 300, 400
+
+
+def exposed(linear: np.ndarray, gain=1.0) -> np.ndarray:
+    """A linear picture as a camera of that gain stores it: sRGB of 8 bits."""
+    return (np.round(images.linear_to_srgb(linear * np.asarray(gain, np.float32)) * 255) / 255).astype(np.float32)
+
+
+def walk(count: int) -> list[np.ndarray]:
+    """Linear pictures of a camera that moves before a person and what is behind her."""
+    whole = images.srgb_to_linear(astronaut().astype(np.float32) / 255) * 0.7
+    return [whole[i:i + 360, 2 * i:2 * i + 400] for i in range(count)]
+
+
+def errors(gains: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """|log| of what is left of the true exposure, against the median frame."""
+    left = np.log(gains * true)
+    return np.abs(left - np.median(left, 0))
+
+
+def test_known_gains_are_recovered():
+    k = np.arange(26)
+    level = np.exp(0.3 * np.sin(k / 4) + 0.15 * (k > 14))
+    true = np.stack([level, level * np.exp(0.05 * np.sin(k / 9)), level * np.exp(-0.12 * k / 26)], 1)
+    gains = gains_of([content_of(exposed(picture, gain)) for picture, gain in zip(walk(26), true, strict=True)])
+    assert np.ptp(np.log(true[:, 2])) > 0.5
+    assert np.percentile(errors(gains, true), 95) < 0.02 and errors(gains, true).max() < 0.04
+    assert np.median(gains, 0) == pytest.approx(1, abs=0.02)
+
+
+def test_a_steady_exposure_is_left_alone():
+    assert (gains_of([content_of(exposed(picture)) for picture in walk(14)]) == 1).all()
+    assert (gains_of([content_of(np.full((60, 80, 3), 0.5, np.float32))] * 3) == 1).all(), "nothing to compare"
+
+
+def noise(rng, cells: int, width: int, height: int) -> np.ndarray:
+    return np.exp(0.5 * cv2.resize(rng.normal(size=(height // cells, width // cells, 1)).astype(np.float32), (width, height), interpolation=cv2.INTER_CUBIC))
+
+
+def turning_head(angle: float, skin: np.ndarray, wall: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A painted ball before a wall, lit from the left and above and turned by `angle` (radians) with its light held still: linear picture, its mask."""
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH].astype(np.float32)
+    right, up = (x - WIDTH / 2) / 130, (HEIGHT / 2 - y) / 130
+    inside = right**2 + up**2 < 1
+    near = np.sqrt(np.maximum(1 - right**2 - up**2, 0))
+    light = np.array([-0.75, 0.3, 0.6]) / np.linalg.norm([-0.75, 0.3, 0.6])
+    shade = 0.12 + 0.88 * np.maximum(right * light[0] + up * light[1] + near * light[2], 0)
+    u, v = (np.arctan2(right, near) + angle + np.pi) / (2 * np.pi) * skin.shape[1], np.arccos(np.clip(up, -1, 1)) / np.pi * skin.shape[0]
+    albedo = cv2.remap(skin, u.astype(np.float32), v.astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)[..., None]
+    return np.where(inside[..., None], albedo * shade[..., None] * np.array([0.5, 0.36, 0.28]), wall[..., None] * 0.3).astype(np.float32), inside
+
+
+@pytest.mark.parametrize("behind", ["a textured wall", "an empty wall"])
+@pytest.mark.parametrize("exposure", ["steady", "drifting"])
+def test_a_head_that_turns_into_the_shade_is_not_drift(monkeypatch, behind, exposure):
+    rng = np.random.default_rng(3)
+    skin = noise(rng, 8, 1200, 480)[..., None]
+    wall = noise(rng, 9, WIDTH, HEIGHT) if behind == "a textured wall" else np.ones((HEIGHT, WIDTH), np.float32)
+    true = np.exp(0.25 * np.sin(np.arange(24) / 8))[:, None] * np.ones(3) if exposure == "drifting" else np.ones((24, 3))
+    contents = []
+    for i in range(24):
+        picture, inside = turning_head(0.035 * i, skin, wall)
+        monkeypatch.setattr(faces, "segment_person", lambda small, inside=inside: cv2.resize(inside.astype(np.float32), small.shape[1::-1]))
+        contents.append(content_of(exposed(picture, true[i])))
+    assert np.mean([c.person.mean() for c in contents]) > (0.2 if behind == "a textured wall" else 0.8)
+    gains = gains_of(contents)
+    if exposure == "steady":
+        assert np.abs(np.log(gains)).max() <= 0.02
+    elif behind == "a textured wall":
+        assert errors(gains, true).max() < 0.03
+    else:  # turn and exposure cannot be told apart in one shaded ball: it may leave the drift in, but must not add to it
+        assert errors(gains, true).max() < errors(np.ones((24, 3)), true).max() + 0.05
+
+
+def test_the_share_that_must_agree_is_a_majority():
+    rng = np.random.default_rng(0)
+    place = rng.uniform(0, 400, (200, 2)).astype(np.float32)
+    ratio = 0.2 + 0.01 * rng.normal(size=(200, 3))
+    ratio[:60] += 0.5  # a lamp that was switched on over a part of it
+    gain, _, shading = drift._common(ratio, place)
+    assert gain == pytest.approx(0.2, abs=0.01) and not shading
+    assert drift._common(rng.normal(size=(200, 3)), place) is None
+    slope = 0.00016 * (place[:, :1] - 200) * np.ones(3) + 0.003 * rng.normal(size=(200, 3))
+    assert drift._common(0.02 + slope, place)[2], "brighter on one side, darker on the other, and little in common"
+    assert not drift._common(0.2 + slope, place)[2]
