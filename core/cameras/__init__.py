@@ -88,7 +88,7 @@ def _findings(solved: Solved, records: list[dict], centres: np.ndarray, report: 
     """What is wrong with a capture that can be used, and how to shoot it again."""
     shown = {record["name"]: record.get("source") or record["name"] for record in records}
     if solved.way == "face":
-        rough = "to a few degrees only" if solved.tracks < 30 else "refined by what little matches"
+        rough = "refined by what little matches" if solved.refined else "to ten degrees or so"
         report.finding(f"The frames do not overlap enough to be matched: the cameras come from the face's landmarks, {rough}. Expect a rough head.",
                        "Take a photograph every ten degrees around the face, from ear to ear, with a busy background.")
     if solved.stood_still:

@@ -8,6 +8,7 @@ Terzakis and Lourakis, A Consistently Fast and Globally Optimal Solution to the 
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 
 import cv2
@@ -26,6 +27,9 @@ TYPICAL = 1.1
 """A phone's, in the same unit."""
 AGREE = (0.05, 0.025, 0.0125)
 """Shares of the face's width by which matches may miss, round by round, as the cameras get better."""
+HELD = 20
+"""Tracks that a frame is seen in where they hold its camera better than the face does."""
+AGREED_SHARE = 0.25
 LEAST_ANGLE_DEG = 2.0
 LEAST_MATCHES = 12
 """Points by which a frame without a face is placed."""
@@ -34,12 +38,13 @@ LEAST_MATCHES = 12
 @dataclass(frozen=True)
 class Resection:
     """A model in the head's world (metres); landmark_px, how far the landmarks miss [median px], and that as a share of the face's width; the
-    number of tracks that refined it, and the names of frames that came in through matches alone."""
+    number of tracks that refined it, whether they are enough to trust it, and the names of frames that came in through matches alone."""
 
     model: pycolmap.Reconstruction
     landmark_px: float
     landmark_miss: float
     tracks: int
+    refined: bool
     by_matches: list[str]
 
 
@@ -67,7 +72,15 @@ def resect(groups: list[dict], found: dict[str, faces.Face], matches: Matches, r
     late = _place_by_matches(bundle, groups, group_of, names, used, matches)
     miss = np.linalg.norm(bundle.project(landmarks.camera, landmarks.point) - landmarks.pixel, axis=1)
     error = float(np.median(miss[model.trust[landmarks.point] > 0.2]))
-    return Resection(_model(bundle, groups, group_of, names, seen, late), error, error / width, len(used), sorted(late))
+    return Resection(_model(bundle, groups, group_of, names, seen, late), error, error / width, len(used), _trusted(names, matches, used), sorted(late))
+
+
+def _trusted(names: list[str], matches: Matches, used: list) -> bool:
+    """Whether every frame is held by tracks, and they are a good part of all that matches: chance agreements are few among many."""
+    held = Counter(name for track in used for name, _ in track)
+    offered = sum(len(index) for (a, b), index in matches.pairs.items() if a in names and b in names)
+    agreed = sum(len(track) - 1 for track in used)
+    return all(held[name] >= HELD for name in names) and agreed > AGREED_SHARE * offered
 
 
 def _first(groups: list[dict], group_of: dict, names: list[str], pixels: dict) -> Bundle:

@@ -41,7 +41,8 @@ FILM_AGAIN = ("Film again: the person sits still, the camera moves slowly around
 @dataclass(frozen=True)
 class Solved:
     """A model in a world of its own; how it was found: plain, skin or face; the head in it; the faces it was found by; whether the head moved
-    before its background, and whether the camera stood still then; mirrored frames that were left out; tracks that refined a model from the face."""
+    before its background, and whether the camera stood still then; mirrored frames that were left out; tracks that refined a model from the face,
+    and whether they are enough to trust it."""
 
     model: pycolmap.Reconstruction
     way: str
@@ -51,6 +52,7 @@ class Solved:
     stood_still: bool = False
     mirrored: tuple[str, ...] = ()
     tracks: int = 0
+    refined: bool = True
 
 
 def solve(frames: dict, capture: Capture, settings: Settings, report: Reporter) -> Solved:
@@ -65,7 +67,7 @@ def solve(frames: dict, capture: Capture, settings: Settings, report: Reporter) 
             if len(found) < len(records) <= 5 * MOST_FACES and not few:
                 found = find_landmarks(records, capture.frames, report)
             solved, fault = _by_face(records, capture, found, matches, settings, report)
-            if solved and few and solved.tracks < 30 and "skin" in ways[turn:]:
+            if solved and few and not solved.refined and "skin" in ways[turn:]:
                 report.log("The face gives cameras, but too little else matches to refine them; features that hold on skin are tried.")
                 continue
         else:
@@ -124,7 +126,8 @@ def _by_face(records: list[dict], capture: Capture, found: dict, matches: Matche
     if result.landmark_miss > MOST_LANDMARK_MISS:
         return None, f"The face does not look like one still face in these frames: its landmarks miss by {100 * result.landmark_miss:.0f} % of its width."
     head = find_head(result.model, found, settings.cameras.interpupillary_mm / 1000)
-    return Solved(result.model, "face", head, found, mirrored=tuple(mirrored), tracks=result.tracks), None
+    return Solved(result.model, "face", head, found, mirrored=tuple(mirrored), tracks=result.tracks,
+                  refined=result.refined), None
 
 
 def _mirrored(frames: dict, rest: list[str], model: pycolmap.Reconstruction, capture: Capture, report: Reporter) -> list[str]:

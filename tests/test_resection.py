@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cameras from the face: known ones found again from landmarks alone and with matches; a profile without a face comes in through matches."""
+
+import numpy as np
+import pytest
+
+from benchmarks.cameras_against_truth import similarity
+from core.cameras.landmarks import fit_rays, pupils, template_landmarks
+from core.cameras.matches import Matches, tracks
+from core.cameras.resection import resect
+from core.faces import Face
+from core.messages import Reporter
+
+from .painted_head import FOCAL, HEIGHT, WIDTH, camera
+
+AZIMUTHS = (-45, -20, 0, 25, 50)
+IDENTITY = np.random.default_rng(3).normal(0, 0.8, len(template_landmarks().basis))
+PERSON = template_landmarks().shape(IDENTITY)
+"""A person's landmarks: a head of the identity space, of its own face."""
+
+
+def seen(view, noise_px: float, rng) -> Face:
+    pixels, _ = view.project(PERSON + rng.normal(0, 0.0005, PERSON.shape))
+    pixels = pixels + rng.normal(0, noise_px, pixels.shape)
+    return Face((*pixels.min(0), *pixels.max(0)), np.concatenate([pixels, np.zeros((468, 1))], 1).astype(np.float32), 1.0)
+
+
+def matched(views: dict, rng, count: int = 400) -> Matches:
+    """Points on a ball about the size of a head, and behind it, seen by all; a third of the matches are wrong."""
+    points = rng.normal(size=(count, 3))
+    points = points / np.linalg.norm(points, axis=1, keepdims=True) * rng.uniform(0.08, 0.35, (count, 1))
+    keypoints = {name: view.project(points)[0] + rng.normal(0, 0.3, (count, 2)) for name, view in views.items()}
+    pairs = {}
+    for i, first in enumerate(views):
+        for second in list(views)[i + 1:]:
+            index = np.stack([np.arange(count)] * 2, 1)
+            index[::3, 1] = rng.permutation(index[::3, 1])
+            pairs[first, second] = index
+    return Matches(keypoints, pairs)
+
+
+def off(result, views: dict) -> tuple[np.ndarray, np.ndarray]:
+    """Errors of the centres [N] as shares of the distance, and of the rotations [N] in degrees, after the similarity of the centres."""
+    found = sorted(result.model.images.values(), key=lambda image: image.name)
+    true = [views[image.name] for image in found]
+    scale, rotation, shift = similarity(np.array([image.projection_center() for image in found]), np.array([view.centre for view in true]))
+    centres = [np.linalg.norm(scale * rotation @ image.projection_center() + shift - view.centre) / 0.55 for image, view in zip(found, true, strict=True)]
+    cosines = [(np.trace(view.rotation @ rotation @ image.cam_from_world().rotation.matrix().T) - 1) / 2 for image, view in zip(found, true, strict=True)]
+    return np.array(centres), np.degrees(np.arccos(np.clip(cosines, -1, 1)))
+
+
+@pytest.fixture(scope="module")
+def scene():
+    rng = np.random.default_rng(0)
+    views = {f"{i}.jpg": camera(azimuth, 0.05 * np.sin(i)) for i, azimuth in enumerate(AZIMUTHS)}
+    return rng, views, {name: seen(view, 0.5, rng) for name, view in views.items()}
+
+
+def group(names, focal_px=FOCAL) -> list[dict]:
+    return [{"names": list(names), "width": WIDTH, "height": HEIGHT, "focal_px": focal_px}]
+
+
+def test_landmarks_alone_place_the_cameras(scene):
+    _, views, found = scene
+    result = resect(group(views), found, Matches(), Reporter("cameras"))
+    centres, turns = off(result, views)
+    assert np.median(centres) < 0.02 and np.median(turns) < 1.5
+    assert result.tracks == 0 and not result.refined and result.landmark_px < 2
+
+
+def test_an_unknown_focal_length_is_found(scene):
+    _, views, found = scene
+    result = resect(group(views, None), found, Matches(), Reporter("cameras"))
+    assert result.model.cameras[1].params[0] == pytest.approx(FOCAL, rel=0.15)
+
+
+def test_matches_refine_the_cameras_and_bring_in_a_profile(scene):
+    rng, views, found = scene
+    views = views | {"9.jpg": camera(88, 0.05)}
+    result = resect(group(views), found, matched(views, rng), Reporter("cameras"))
+    centres, turns = off(result, views)
+    assert result.by_matches == ["9.jpg"] and result.refined and result.tracks > 200
+    assert centres.max() < 0.005 and turns.max() < 0.3
+
+
+def test_wrong_matches_do_not_count_as_refinement(scene):
+    rng, views, found = scene
+    keypoints = {name: rng.uniform(0, WIDTH, (300, 2)) for name in views}
+    index = np.stack([np.arange(300)] * 2, 1)
+    result = resect(group(views), found, Matches(keypoints, {(a, b): index for a in views for b in views if a < b}), Reporter("cameras"))
+    assert not result.refined
+
+
+def test_fewer_than_two_faces_give_nothing(scene):
+    _, views, found = scene
+    assert resect(group(views), {"0.jpg": found["0.jpg"]}, Matches(), Reporter("cameras")) is None
+
+
+def test_tracks_hang_together_and_ambiguous_ones_go():
+    pixels = {name: np.zeros((5, 2)) for name in "abc"}
+    pairs = {("a", "b"): np.array([[0, 0], [1, 1]]), ("b", "c"): np.array([[0, 3], [1, 2]]), ("a", "c"): np.array([[4, 2]])}
+    assert sorted(map(sorted, tracks(Matches(pixels, pairs)))) == [[("a", 0), ("b", 0), ("c", 3)]]  # a1-b1-c2-a4 meets a twice
+
+
+def test_head_of_known_size_against_rays():
+    views = [camera(azimuth) for azimuth in (-30, -10, 10, 30)]
+    origins = np.array([view.centre for view in views])
+    directions = PERSON[None] - origins[:, None]
+    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+    scale, rotation, translation, coefficients = fit_rays(origins, directions, PERSON)
+    (right, left), (true_right, true_left) = pupils(coefficients), pupils(IDENTITY)
+    assert scale * np.linalg.norm(left - right) == pytest.approx(np.linalg.norm(true_left - true_right), rel=0.01)
+    assert np.degrees(np.arccos((np.trace(rotation) - 1) / 2)) < 1.5 and np.linalg.norm(translation) < 0.003
