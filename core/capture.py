@@ -21,6 +21,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from . import stages
+from .hashes import code_hash, hash_tree, source_stamp
 from .messages import Problem
 from .settings import Settings
 
@@ -99,6 +100,7 @@ class Capture:
         self.cameras = self.root / "cameras"
         self.scan = self.root / "scan.ply"
         self.landmarks = self.root / "landmarks.json"
+        self.landmarks_artist = self.root / "landmarks_artist.json"
         self.head = self.root / "head.obj"
         self.own_head = self.root / "own_head.obj"
         self.own_head_skin = self.root / "own_head.json"
@@ -144,7 +146,7 @@ class Capture:
     def set_source(self, source: str | Path) -> None:
         """Records where the pictures come from, with a stamp that outlives them: a video may be put away once its frames are taken."""
         record = self.read()
-        changed = {**record, "source": str(source), "source_stamp": _source_stamp(str(source)) or record.get("source_stamp", [])}
+        changed = {**record, "source": str(source), "source_stamp": source_stamp(str(source)) or record.get("source_stamp", [])}
         if changed != record:
             write_json(self.json, changed)
 
@@ -152,7 +154,7 @@ class Capture:
         """Whether `source` is what this capture's frames were taken from, or there are none yet."""
         record = self.read()
         first = next(stage.name for stage in stages.STAGES if not stage.reads)
-        return first not in record["stages"] or _source_stamp(str(source)) in ([], record.get("source_stamp"))
+        return first not in record["stages"] or source_stamp(str(source)) in ([], record.get("source_stamp"))
 
     def finish(self, stage: stages.Stage, key: str, seconds: float, settings: Settings, figures: dict, version: str,
                findings: Collection[dict] = ()) -> None:
@@ -184,13 +186,13 @@ class Capture:
     def stage_key(self, stage: stages.Stage, settings: Settings) -> str:
         """Hash of all a stage's result depends on: its inputs' contents, its settings, the shared ones it names, its code."""
         record = self.read()
-        parts = [asdict(getattr(settings, stage.name)), {name: getattr(settings, name) for name in stage.shared}, _code_hash(stage.module)]
+        parts = [asdict(getattr(settings, stage.name)), {name: getattr(settings, name) for name in stage.shared}, code_hash(stage.module)]
         if not stage.reads:
-            parts.append(_source_stamp(record.get("source", "")) or record.get("source_stamp", []))
+            parts.append(source_stamp(record.get("source", "")) or record.get("source_stamp", []))
         named = {"delight": settings.delight.folder, "cameras": settings.cameras.import_from, "registration": settings.registration.template}.get(stage.name)
-        parts += [_hash_tree(Path(named).expanduser())] if named else []  # what the artist keeps elsewhere
-        parts += [[name, _hash_tree(self.root / name)] for name in (*stage.reads, *stage.wishes)]
-        parts += [_hash_tree(Path(__file__).parent / name) for name in stage.data]
+        parts += [hash_tree(Path(named).expanduser())] if named else []  # what the artist keeps elsewhere
+        parts += [[name, hash_tree(self.root / name)] for name in (*stage.reads, *stage.wishes)]
+        parts += [hash_tree(Path(__file__).parent / name) for name in stage.data]
         return hashlib.blake2b(json.dumps(parts, sort_keys=True).encode(), digest_size=16).hexdigest()
 
     def state(self, stage: stages.Stage, settings: Settings) -> str:
@@ -266,38 +268,3 @@ def _alive(pid: int) -> bool:
     except ProcessLookupError:
         return False
     return True
-
-
-_hashes: dict[tuple, str] = {}
-
-
-def _hash_file(path: Path) -> str:
-    info = path.stat()
-    key = (str(path), info.st_size, info.st_mtime_ns)
-    if key not in _hashes:
-        with open(path, "rb") as file:
-            _hashes[key] = hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
-    return _hashes[key]
-
-
-def _hash_tree(path: Path) -> str | dict:
-    """The content hash of a file, {relative name: hash} of a folder, or '' for what is not there."""
-    if path.is_dir():
-        return {p.relative_to(path).as_posix(): _hash_file(p) for p in sorted(path.rglob("*")) if p.is_file() and not p.name.startswith(".")}
-    return _hash_file(path) if path.is_file() else ""
-
-
-def _source_stamp(source: str) -> list:
-    """Name, size and time of a source's files ([] when it is gone): a long video is not read to see that it is the same, nor its folder's name."""
-    path = Path(source)
-    files = [] if not source else sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path] if path.is_file() else []
-    return [[p.name, p.stat().st_size, p.stat().st_mtime_ns] for p in files]
-
-
-def _code_hash(module: str) -> str:
-    """Hash of the stage's own room, without importing it."""
-    room = Path(__file__).parent / module.split(".", 1)[1]
-    digest = hashlib.blake2b(digest_size=8)
-    for path in sorted(room.glob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()

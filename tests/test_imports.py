@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-GROUND = {"capture", "settings", "stages", "messages", "mask_history", "report", "worker"}
+GROUND = {"capture", "hashes", "settings", "stages", "messages", "mask_history", "artist_landmarks", "report", "worker"}
 """Standard library only: what Blender may import."""
 SHARED = {"images", "meshes", "raster", "surfaces", "atlas", "views", "template", "faces", "mask_import"}
 """What the rooms of the upper floor may import beside the ground floor."""
