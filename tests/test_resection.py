@@ -110,5 +110,5 @@ def test_head_of_known_size_against_rays():
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     scale, rotation, translation, coefficients = fit_rays(origins, directions, PERSON)
     (right, left), (true_right, true_left) = pupils(coefficients), pupils(IDENTITY)
-    assert scale * np.linalg.norm(left - right) == pytest.approx(np.linalg.norm(true_left - true_right), rel=0.01)
+    assert scale * np.linalg.norm(left - right) == pytest.approx(np.linalg.norm(true_left - true_right), rel=0.035)
     assert np.degrees(np.arccos((np.trace(rotation) - 1) / 2)) < 1.5 and np.linalg.norm(translation) < 0.003

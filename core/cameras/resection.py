@@ -27,6 +27,7 @@ TYPICAL = 1.1
 """A phone's, in the same unit."""
 AGREE = (0.05, 0.025, 0.0125)
 """Shares of the face's width by which matches may miss, round by round, as the cameras get better."""
+MOST_TRACKS = 5000
 HELD = 20
 """Tracks that a frame is seen in where they hold its camera better than the face does."""
 AGREED_SHARE = 0.25
@@ -114,7 +115,8 @@ def _agreeing(bundle: Bundle, names: list[str], matches: Matches, reach_px: floa
     points, used, camera, point, pixel = [], [], [], [], []
     marks = len(template_landmarks().mean)
     pairs = {pair: index for pair, index in matches.pairs.items() if pair[0] in number and pair[1] in number}
-    for track in tracks(_epipolar(bundle, number, Matches(matches.keypoints, pairs), reach_px)):
+    candidates = tracks(_epipolar(bundle, number, Matches(matches.keypoints, pairs), reach_px))
+    for track in sorted(candidates, key=len, reverse=True)[:MOST_TRACKS]:
         at = np.array([number[name] for name, _ in track])
         where = np.array([matches.keypoints[name][k] for name, k in track])
         place = _triangulate(bundle, at, where)

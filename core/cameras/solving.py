@@ -7,7 +7,7 @@ and on the head alone where it did not keep still. The first model that passes t
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -81,7 +81,7 @@ def solve(frames: dict, capture: Capture, settings: Settings, report: Reporter) 
         if solved and not fault:
             rest = sorted({record["name"] for record in records} - {image.name for image in solved.model.images.values() if image.has_pose})
             mirrored = _mirrored(frames, rest, solved.model, capture, report) if way != "face" else ()
-            return Solved(solved.model, way, solved.head, solved.found, moved, stood, tuple(mirrored), solved.tracks)
+            return replace(solved, head_moved=moved, stood_still=stood, mirrored=tuple(mirrored) or solved.mirrored)
         faults.append(fault)
         report.log(f"By {way} features: {fault}" if way != "face" else f"By the face: {fault}")
     raise _explained(frames, faults, moved, stood, capture, report)
@@ -98,7 +98,10 @@ def _by_features(skin: bool, frames: dict, capture: Capture, found: dict, settin
     fault = shortcoming(model, len(frames["frames"]))
     if fault:
         return None, matches, fault
-    head = find_head(model, found, settings.cameras.interpupillary_mm / 1000)
+    try:
+        head = find_head(model, found, settings.cameras.interpupillary_mm / 1000)
+    except Problem as problem:
+        return None, matches, problem.problem
     solved = Solved(model, "skin" if skin else "plain", head, found)
     return solved, matches, None if head.still else "The face is not still with respect to its surroundings."
 
