@@ -1,10 +1,13 @@
-# The two commands of the README (demo, test), the GUI tests, and the extension's zip.
+# The two commands of the README (demo, test), the add-on in other Blenders and in a real window, and the extension's zip.
 PYTHON ?= python3.11
 BIN := .venv/bin
 DEMO ?= .demo
 EXTENSION_TOOL = $(wildcard .venv/lib/python3*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py)
 
-.PHONY: demo test test-gui zip clean
+# The oldest Blender that the add-on supports, and the newest whose module installs beside Python 3.11.
+BLENDERS ?= 4.2.0 5.0.1
+
+.PHONY: demo test test-blenders test-gui zip clean
 
 demo: .venv/installed
 	$(BIN)/python -m benchmarks.demo $(DEMO)
@@ -12,6 +15,16 @@ demo: .venv/installed
 test: .venv/installed
 	$(BIN)/ruff check core wildcap_addon tests benchmarks
 	$(BIN)/python -m pytest tests --ignore=tests/gui
+
+test-blenders: $(BLENDERS:%=.blenders/%/installed)
+	for version in $(BLENDERS); do \
+	    .blenders/$$version/bin/python -m pytest -W ignore::DeprecationWarning tests/test_addon.py tests/test_paint.py tests/test_relight.py tests/test_next_step.py || exit 1; \
+	done
+
+.blenders/%/installed: Makefile
+	$(PYTHON) -m venv .blenders/$*
+	.blenders/$*/bin/python -m pip install --quiet --disable-pip-version-check bpy==$* numpy==1.26.4 pytest==9.0.3
+	touch $@
 
 test-gui: .venv/installed zip
 	$(BIN)/python -m pytest tests/gui -s
@@ -29,4 +42,4 @@ zip: .venv/installed
 	touch $@
 
 clean:
-	rm -rf .demo dist
+	rm -rf .demo .blenders dist

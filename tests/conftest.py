@@ -8,6 +8,7 @@ The bpy wheel hangs at exit when a class stays registered, so the fixture disabl
 import atexit
 import os
 import shutil
+import sys
 import tempfile
 from importlib import import_module
 from pathlib import Path
@@ -16,10 +17,26 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 MODULE = "bl_ext.user_default.wildcap"
+STATUS = pytest.StashKey()
 
 # Blender reads this when it starts, and any test may be the one that imports bpy first.
 os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="wildcap-test-")
 atexit.register(shutil.rmtree, os.environ["BLENDER_USER_RESOURCES"], ignore_errors=True)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config):
+    """The bpy 4.2 module crashes at its exit where any property ever had an update callback (seen with five lines of plain bpy),
+    long after the last test: it leaves without its exit."""
+    bpy = sys.modules.get("bpy")
+    if bpy is not None and bpy.app.version < (4, 3, 0):
+        shutil.rmtree(os.environ["BLENDER_USER_RESOURCES"], ignore_errors=True)
+        sys.stdout.flush()
+        os._exit(int(config.stash.get(STATUS, 1)))
+
+
+def pytest_sessionfinish(session, exitstatus):
+    session.config.stash[STATUS] = exitstatus
 
 
 @pytest.fixture(scope="session")
