@@ -52,10 +52,13 @@ def leave_out_background(observations: list[Observation], report: Reporter) -> i
 
 
 def clothes(log_texture: np.ndarray, confidence: np.ndarray, surface: Surface) -> np.ndarray:
-    """How surely each texel shows a cloth, float32 [S, S] in [0, 1]: parts of the neck that reach its rim and have not the colour of the face's skin."""
+    """How surely each texel shows a cloth, float32 [S, S] in [0, 1]: parts of the neck that reach its rim and have not the colour of the face's skin.
+
+    The last texels at the rim always count: whatever the neck ends at throws its shade and its outline there.
+    """
     size = len(confidence)
     neck, skin = template.mask("neck", size), (template.mask("skin", size) > 0.9) & (confidence > 0.5)
-    seen = (neck > 0.3) & (confidence > 0.02) & surface.covered
+    seen = (neck > 0.3) & (confidence > 0) & surface.covered
     if not skin.any() or not seen.any():
         return np.zeros_like(confidence)
     weight = ((neck > 0.3) & surface.covered).astype(np.float32) * confidence
@@ -67,9 +70,10 @@ def clothes(log_texture: np.ndarray, confidence: np.ndarray, surface: Surface) -
     radius = max(1, round(GROW * size))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)
     _, labels = cv2.connectedComponents(cv2.morphologyEx(strange.astype(np.uint8), cv2.MORPH_CLOSE, disc))
-    at_rim = np.unique(labels[(cv2.dilate(_rim(surface, neck), disc) > 0) & strange])
-    found = np.isin(labels, at_rim[at_rim > 0])
-    return cv2.GaussianBlur(cv2.dilate(found.astype(np.float32), disc), (0, 0), radius / 3) * surface.covered
+    rim = cv2.dilate(_rim(surface, neck), disc) > 0
+    at_rim = np.unique(labels[cv2.dilate(rim.astype(np.uint8), disc).astype(bool) & strange])
+    found = cv2.dilate(np.isin(labels, at_rim[at_rim > 0]).astype(np.uint8), disc).astype(bool) | rim
+    return np.clip(1.5 * cv2.GaussianBlur(found.astype(np.float32), (0, 0), radius / 3, borderType=cv2.BORDER_REPLICATE), 0, 1) * surface.covered
 
 
 def _rim(surface: Surface, neck: np.ndarray) -> np.ndarray:
