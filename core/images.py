@@ -75,6 +75,16 @@ def read_focal_35mm(path: Path) -> float | None:
     return float(focal) if focal else None
 
 
+def read_profile(path: Path) -> str:
+    """The name of the colour profile in a picture ("Display P3"), or "" where it has none."""
+    image = oiio.ImageInput.open(str(path))
+    if image is None:
+        return ""
+    name = image.spec().getattribute("ICCProfile:profile_description")
+    image.close()
+    return name or ""
+
+
 def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8, quality: int = 92) -> None:
     """sRGB [H, W, 3 or 4] (alpha stays as it is) to PNG (8 or 16 bit) or JPEG (8 bit, of that quality), atomically."""
     _write(path, np.clip(srgb, 0, 1), f"uint{bits}", "sRGB", quality)

@@ -112,6 +112,7 @@ def around(low=-60, high=60, step=3, **other) -> list[dict]:
     (around(), ""),
     (around(low=0), "left side of the face is not seen at all"),
     (around(high=12), "right side of the face is hardly seen: the camera came only 12 degrees"),
+    (around(low=-12, high=9, step=1), "from in front only: the camera came 12 degrees around to its left and 9 to its right"),
     ([r for r in around() if not 0 < r["yaw_deg"] < 40], "Between 0 and 42 degrees"),
     (around(brightness=0.12), "too dark"),
     (around(clipped=0.2), "overexposed: 20% of it"),

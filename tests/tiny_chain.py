@@ -19,7 +19,8 @@ from core.worker.client import Worker
 from core.worker.job import write_job
 
 ROOT = Path(__file__).resolve().parent.parent
-GROUND = ("__init__.py", "__main__.py", "capture.py", "hashes.py", "settings.py", "stages.py", "messages.py", "mask_history.py", "artist_landmarks.py", "report.py")
+GROUND = ("__init__.py", "__main__.py", "capture.py", "hashes.py", "settings.py", "stages.py", "messages.py", "mask_history.py", "artist_landmarks.py",
+          "report.py")
 
 ROOM = '''
 import errno, hashlib, json, os, sys, time

@@ -87,10 +87,14 @@ def _angles(records: list[dict], photographs: bool, report: Reporter) -> None:
     turn = turns(records)
     turn = np.sort(turn[np.isfinite(turn)])
     again = "Start at one ear and walk around the face to the other, at arm's length, while the person sits still."
-    for side, reach in (("left", -turn[0]), ("right", turn[-1])):
-        if reach < REACH_DEG:
-            report.finding(f"The {side} side of the face is hardly seen: the camera came only {max(reach, 0):.0f} degrees around to it." if reach > 0
-                           else f"The {side} side of the face is not seen at all.", again)
+    left, right = -turn[0], turn[-1]
+    if max(left, right) < REACH_DEG:
+        report.finding("The face is seen from in front only: "
+                       f"the camera came {max(left, 0):.0f} degrees around to its left and {max(right, 0):.0f} to its right.", again)
+    elif min(left, right) < REACH_DEG:
+        side, reach = ("left", left) if left < right else ("right", right)
+        report.finding(f"The {side} side of the face is hardly seen: the camera came only {reach:.0f} degrees around to it." if reach > 0
+                       else f"The {side} side of the face is not seen at all.", again)
     gaps = np.diff(turn)
     if len(gaps) and turn[0] < 0 < turn[-1] and gaps.max() > GAP_DEG:
         at = int(gaps.argmax())

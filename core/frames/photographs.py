@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folders of photographs, in the order of their names, upright by their EXIF orientation."""
+"""Folders of photographs, in the order of their names, upright by their EXIF orientation, Display P3 brought to sRGB."""
 
 from __future__ import annotations
 
@@ -9,10 +9,13 @@ from pathlib import Path
 
 from .. import images
 from ..messages import Problem, Reporter
+from .colour import P3, SDR, to_srgb
 from .source import Picture, evenly, fit
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr")
 PHONE_ONLY = (".heic", ".heif", ".avif", ".dng")
+"""OpenImageIO's wheel has no HEIF decoder, and FFmpeg reads the tiles of which an iPhone's HEIC consists without saying how they lie."""
+AS_JPEG = "Export them as JPEG or PNG (on an iPhone: Settings, Camera, Formats, Most Compatible)."
 
 
 def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) -> Iterator[Picture]:
@@ -22,8 +25,11 @@ def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) 
     if not pictures:
         if any(p.suffix.lower() in PHONE_ONLY for p in files):
             raise Problem(f"The photographs in {folder.name} are HEIC or raw files, which cannot be read.",
-                          "Export them as JPEG or PNG (on an iPhone: Settings, Camera, Formats, Most Compatible).")
+                          AS_JPEG)
         raise Problem(f"There are no photographs in {folder}.", "Choose a folder with JPEG, PNG, TIFF or WebP pictures of the face, or a video.")
+    unread = [p for p in files if p.suffix.lower() in PHONE_ONLY]
+    if unread:
+        report.finding(f"{len(unread)} HEIC or raw files were left out beside {len(pictures)} photographs that can be read.", AS_JPEG)
     chosen = evenly(len(pictures), most)
     for done, index in enumerate(chosen, 1):
         path = pictures[index]
@@ -34,5 +40,7 @@ def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) 
             continue
         focal = images.read_focal_35mm(path)
         srgb = fit(srgb, long_side)
+        if "Display P3" in images.read_profile(path):  # an iPhone's JPEG
+            srgb = to_srgb(srgb, SDR, P3)
         focal_px = None if focal is None else round(focal / 36 * max(srgb.shape[:2]), 2)  # a full frame is 36 mm wide
         yield Picture(srgb, int(index), None, path.name, focal_px, done, len(chosen))
