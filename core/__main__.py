@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m core: run, stages, status, mask, doctor, train.
+"""python -m core: run, stages, status, mask, landmarks, doctor, train.
 
 The command line is one more host of the worker: it writes a job, starts the worker with this same Python and prints
 what it says. Failures are two lines, a problem and its remedy, and exit code 2; Ctrl-C ends with 130.
@@ -14,7 +14,7 @@ import signal
 import sys
 from pathlib import Path
 
-from . import __version__, report, settings, stages
+from . import __version__, artist_landmarks, report, settings, stages
 from .capture import Capture
 from .messages import Problem
 from .worker import terminal
@@ -53,6 +53,8 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--skin-tone", metavar="R,G,B", help="sRGB in 0..1, the linear mean over facial skin; or auto")
     run.add_argument("--delighter", choices=DELIGHTERS, help="how the light is taken out of the frames")
     run.add_argument("--folder", metavar="FOLDER", type=Path, help="delit pictures for the folder delighter, matched by name")
+    run.add_argument("--cameras", metavar="PATH", type=Path,
+                     help="cameras of another program: COLMAP's folder, Metashape's .xml, RealityScan's .csv, Blender's .json")
     run.add_argument("--template", metavar="MESH", type=Path, help="your own head mesh, fitted too: an OBJ, or a folder with a neutral OBJ and its shapes")
     run.add_argument("--new-atlas", action="store_true", help="give that mesh new UVs where its own are missing or overlap")
     run.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
@@ -68,6 +70,21 @@ def _parser() -> argparse.ArgumentParser:
     bring.add_argument("capture", metavar="CAPTURE", type=Path)
     bring.add_argument("picture", metavar="PNG", type=Path)
     bring.set_defaults(command=_mask_import)
+    marks = commands.add_parser("landmarks", help="put landmarks by hand; they win over what was found")
+    marks = marks.add_subparsers(required=True, metavar="set|free|import")
+    put = marks.add_parser("set", help="put one landmark at a place of the capture's world")
+    put.add_argument("capture", metavar="CAPTURE", type=Path)
+    put.add_argument("index", metavar="INDEX", help="0 to 467, as in landmarks.json")
+    put.add_argument("position", metavar=("X", "Y", "Z"), nargs=3, type=float, help="metres")
+    put.set_defaults(command=_landmarks)
+    free = marks.add_parser("free", help="let the frames say again where a landmark is")
+    free.add_argument("capture", metavar="CAPTURE", type=Path)
+    free.add_argument("index", metavar="INDEX")
+    free.set_defaults(command=_landmarks, position=None)
+    many = marks.add_parser("import", help='take the points of a JSON file: {"points": {"152": [x, y, z]}}, metres')
+    many.add_argument("capture", metavar="CAPTURE", type=Path)
+    many.add_argument("file", metavar="JSON", type=Path)
+    many.set_defaults(command=_landmarks)
     commands.add_parser("doctor", help="say what is installed, what is missing and what to do").set_defaults(command=_doctor)
     commands.add_parser("train", help="train a network (developers): train prior --help")
     return parser
@@ -82,6 +99,8 @@ def _run(options: argparse.Namespace) -> int:
     # A shell that starts a job in the background has it ignore Ctrl-C's signal; here the signal means cancel, whoever sends it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     values = {"seed": options.seed, "device": options.device, "delight": delight}
+    if options.cameras:
+        values["cameras"] = {"import_from": str(options.cameras.absolute())}
     if options.new_atlas and not options.template:
         raise Problem("--new-atlas goes with --template only.", "Name your head mesh with --template, or leave --new-atlas out.")
     if options.template:
@@ -125,6 +144,15 @@ def _mask_import(options: argparse.Namespace) -> int:
     from .mask_import import import_mask  # needs OpenImageIO
 
     print(f"{import_mask(Capture(options.capture), options.picture)} is now the shadow mask; solve comes next.")
+    return 0
+
+
+def _landmarks(options: argparse.Namespace) -> int:
+    if "file" in options and not options.file.is_file():
+        raise Problem(f"There is no file at {options.file}.", "Check its name.")
+    points = artist_landmarks.read(options.file) if "file" in options else {options.index: options.position}
+    count = len(artist_landmarks.put(Capture(options.capture), points))
+    print(f"{count} landmark{'' if count == 1 else 's'} put by hand; the stage registration comes next.")
     return 0
 
 

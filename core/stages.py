@@ -36,7 +36,7 @@ STAGES = (
     Stage("frames", "Frames", (), ("frames/",), "core.frames"),
     Stage("cameras", "Cameras", ("frames/",), ("cameras/",), "core.cameras", shared=("seed",)),
     Stage("scan", "Scan", ("frames/", "cameras/"), ("scan.ply",), "core.scan"),
-    Stage("registration", "Head", ("frames/", "cameras/", "scan.ply"), ("head.obj", "landmarks.json"), "core.registration",
+    Stage("registration", "Head", ("frames/", "cameras/", "scan.ply"), ("head.obj", "landmarks.json"), "core.registration", wishes=("landmarks_artist.json",),
           data=("assets/head.obj", "assets/head.json", "assets/identity.npz", "assets/masks")),
     Stage("delight", "Delight", ("frames/", "cameras/", "head.obj"), ("delit/",), "core.delight"),
     Stage("texture", "Texture", ("frames/", "delit/", "cameras/", "head.obj"), ("texture.exr", "texture.png", "texture_confidence.exr"), "core.texture"),

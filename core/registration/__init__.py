@@ -8,14 +8,16 @@ the scan; it stays watertight where the scan has holes.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from .. import images, meshes, raster, template
+from .. import artist_landmarks, images, meshes, raster, template
 from ..capture import Capture, write_json
-from ..messages import Problem, Reporter
+from ..messages import Reporter
 from ..settings import Settings
 from ..views import read_views
-from . import alignment, drawing, landmarks, nonrigid, own_template
+from . import alignment, drawing, eyes, intersections, landmarks, nonrigid, own_template, quality
 from .correspondence import Scan
 
 STEPS = 100.0
@@ -29,26 +31,33 @@ HELD = ("lips", "eyes", "brows")
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """frames/, cameras/, scan.ply -> head.obj, landmarks.json. Raises Problem where no face is found or the fit does not hold."""
+    given = artist_landmarks.read(capture.landmarks_artist)
     views = read_views(capture)
     surface = meshes.read_ply(capture.scan)
     scan = Scan(surface)
-    found = landmarks.onto_surface(landmarks.find(views, report, STEPS), views, surface)
-    model = load_model()
+    found = landmarks.with_artists(landmarks.onto_surface(landmarks.find(views, report, STEPS), views, surface), given)
+    model = trusting(load_model(), found.put)
     follow, shaped, hold = weights_of(model)
+    trust = found.trust
+    if eyes.are_open(found.opening):
+        lids = _per_vertex(model.mesh, template.mask("eyes", 512))
+        report.log("The eyes are open: the lids follow the face around them, not the eyeballs.")
+        (follow, trust), shaped = eyes.spared(follow, trust, lids), eyes.spared(shaped, trust, lids)[0]
+        trust = np.where(found.put, found.trust, trust)
 
     report.progress(10, STEPS, "placing the head")
-    pose, coefficients = alignment.fit_landmarks(model, found.points, found.trust)
+    pose, coefficients = alignment.fit_landmarks(model, found.points, trust)
     report.progress(15, STEPS, "finding the nearest head")
-    pose, coefficients = alignment.fit_scan(model, pose, coefficients, found.points, found.trust, scan, shaped)
+    pose, coefficients = alignment.fit_scan(model, pose, coefficients, found.points, trust, scan, shaped)
     start = pose.apply(model.shape(coefficients))
-    vertices = nonrigid.fit(model, start, scan, follow, hold, found.points, found.trust, settings.registration.iterations, report, 20, STEPS)
+    vertices = nonrigid.fit(model, start, scan, follow, hold, found.points, trust, settings.registration.iterations, report, 20, 0.9 * STEPS, found.put)
+    placed = model.mesh.moved(pose.apply(model.mesh.vertices))
+    vertices = intersections.mended(placed, vertices, lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
 
     head, aligned = model.mesh.moved(vertices), model.mesh.moved(start)
     distances = scan.distances(vertices[follow > 0.5], meshes.vertex_normals(head)[follow > 0.5])
-    _figures(report, model, head, aligned, found, coefficients, distances, int((follow > 0.5).sum()))
-    if len(distances) < 0.3 * (follow > 0.5).sum() or np.median(distances) > 0.004:
-        raise Problem("The head could not be laid over the scan of the face.",
-                      "Look at the scan's picture in the report; film again slower, with the whole face in view, if it is torn or not a face.")
+    quality.figures(report, model, aligned, head, found, coefficients, distances, follow)
+    quality.judge(report, head, scan, distances, follow)
     meshes.write_obj(capture.head, head)
     write_json(capture.landmarks, landmarks.to_json(found))
     own_template.run(capture, settings, head, hold, report)
@@ -59,6 +68,11 @@ def load_model() -> alignment.Model:
     """The built-in head with its identity space and landmarks."""
     face, bary = template.landmarks()
     return alignment.Model(template.load(), template.identity(), face, bary, template.landmark_weights())
+
+
+def trusting(model: alignment.Model, put: np.ndarray) -> alignment.Model:
+    """The model with full weight on the landmarks [468] that the artist has put, the net's worst among them."""
+    return replace(model, landmark_weight=np.where(put, 1.0, model.landmark_weight))
 
 
 def weights_of(model: alignment.Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -78,16 +92,3 @@ def _per_vertex(mesh: meshes.Mesh, mask: np.ndarray) -> np.ndarray:
     np.add.at(total, mesh.faces.ravel(), at_uvs[mesh.face_uvs.ravel()])
     np.add.at(count, mesh.faces.ravel(), 1)
     return total / np.maximum(count, 1)
-
-
-def _figures(report, model, head, aligned, found, coefficients, distances, wanted) -> None:
-    known = np.isfinite(found.points).all(1)
-    miss = np.linalg.norm(model.at_landmarks(head.vertices) - found.points, axis=1)[known]
-    report.figure("landmark_frames", len(found.images))
-    report.figure("landmark_reprojection_px", round(found.error_px, 2))
-    report.figure("landmark_residual_mm", round(1e3 * float(np.median(miss)), 2))
-    report.figure("identity_norm", round(float(np.linalg.norm(coefficients)), 2))
-    report.figure("head_to_scan_median_mm", round(1e3 * float(np.median(distances)), 3) if len(distances) else None)
-    report.figure("head_to_scan_p90_mm", round(1e3 * float(np.percentile(distances, 90)), 3) if len(distances) else None)
-    report.figure("face_with_scan_percent", round(100 * len(distances) / max(wanted, 1), 1))
-    report.figure("flipped_triangles", nonrigid.flipped_triangles(aligned, head))

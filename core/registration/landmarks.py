@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from ..meshes import Mesh
 from ..messages import Problem, Reporter
 from ..raster import RayCaster
 from ..views import View
+from . import eyes
 
 MOST_VIEWS = 32
 BEHIND_FACE_M = 0.06
@@ -22,12 +24,15 @@ BEHIND_FACE_M = 0.06
 @dataclass(frozen=True)
 class Landmarks:
     """points [468, 3] in metres (nan: not lifted), trust [468] in [0, 1], error_px the median reprojection error;
-    images maps a frame's name to what was found in it: pixels [468, 2], and used bool [468]."""
+    images maps a frame's name to what was found in it: pixels [468, 2], and used bool [468]; opening of the eyes, height over width;
+    put bool [468]: which points the artist has given."""
 
     points: np.ndarray
     trust: np.ndarray
     error_px: float
     images: dict[str, tuple[np.ndarray, np.ndarray]]
+    opening: float = float("nan")
+    put: np.ndarray = field(default_factory=lambda: np.zeros(468, bool))
 
 
 def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
@@ -35,17 +40,19 @@ def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
 
     `steps` is the stage's total for the progress bar, of which detection is the first tenth.
     """
-    chosen, found = spread(views, MOST_VIEWS), []
+    chosen, found, openings = spread(views, MOST_VIEWS), [], []
     for i, view in enumerate(chosen):
         report.progress(0.1 * steps * i / len(chosen), steps, f"looking for the face in {view.name}")
         srgb = images.read_srgb(view.path)
         face = faces.detect(srgb)
         if face is not None:
             found.append((view, face.landmarks[:, :2] * [view.width / srgb.shape[1], view.height / srgb.shape[0]]))
+            openings.append((face.yaw_deg, faces.eye_openness(srgb, face)))
     if len(found) < 3:
         raise Problem(f"A face was found in only {len(found)} of the {len(chosen)} frames that were looked at.",
                       "Film the face larger, in better light and from the front too, then start again from the video.")
-    return triangulate([view for view, _ in found], np.stack([pixels for _, pixels in found]))
+    lifted = triangulate([view for view, _ in found], np.stack([pixels for _, pixels in found]))
+    return replace(lifted, opening=eyes.opening(openings))
 
 
 def spread(views: list[View], count: int) -> list[View]:
@@ -113,6 +120,14 @@ def onto_surface(found: Landmarks, views: list[View], mesh: Mesh, farthest: floa
         mean = (hits * robust[..., None]).sum(1) / np.maximum(robust.sum(1), 1e-9)[:, None]
         points = np.where((total > 0)[:, None], mean, found.points)
     return replace(found, points=points)
+
+
+def with_artists(found: Landmarks, given: Mapping[int, tuple]) -> Landmarks:
+    """The same landmarks with the artist's in their places, fully trusted."""
+    points, trust, put = found.points.copy(), found.trust.copy(), np.zeros(len(found.points), bool)
+    for index, point in given.items():
+        points[index], trust[index], put[index] = point, 1.0, True
+    return replace(found, points=points, trust=trust, put=put)
 
 
 def to_json(found: Landmarks) -> dict:

@@ -17,6 +17,7 @@ from ..meshes import Mesh, vertex_normals
 from ..messages import Reporter
 from .alignment import Model
 from .correspondence import Scan, trimmed
+from .intersections import flipped
 
 STIFF_M, SOFT_M = 0.030, 0.0022
 """Length over which the displacement is held together, at the first and the last step, metres."""
@@ -29,17 +30,22 @@ PULL, BLIND_PULL = 1e-3, 2e-2
 LANDMARK_AREA_M2 = (3e-4, 3e-6)
 """Surface area that one landmark counts for, at the first and the last step."""
 
+PUT_AREA_M2 = 1e-3
+"""The same for one that the artist has put, from the first step to the last."""
+
 
 def fit(model: Model, start: np.ndarray, scan: Scan, follow: np.ndarray, hold: np.ndarray, points: np.ndarray, trust: np.ndarray,
-        iterations: int, report: Reporter, first: float, steps: float) -> np.ndarray:
+        iterations: int, report: Reporter, first: float, steps: float, put: np.ndarray | None = None) -> np.ndarray:
     """Vertices [V, 3] in metres. start [V, 3]: the aligned head; follow [V] in [0, 1]: how far the scan is believed;
-    hold [468]: how much longer a landmark counts than the others (lips and lids); points [468, 3], trust [468] as in Landmarks.
+    hold [468]: how much longer a landmark counts than the others (lips and lids); points [468, 3], trust [468] as in Landmarks;
+    put bool [468]: landmarks that are where they are said to be, whatever the scan says. Nothing is known of what the mesh is but these arrays.
 
     Progress goes from `first` to `steps`.
     """
     area, laplacian = _operators(model.mesh.moved(start))
     anchors = _anchors(model)
     known = np.isfinite(points).all(1) & (trust * model.landmark_weight > 0)
+    put = np.zeros(len(points), bool) if put is None else put & known
     vertices = start.copy()
     for step in range(iterations):
         report.progress(first + (steps - first) * step / iterations, steps, "fitting the head to the scan")
@@ -55,12 +61,13 @@ def fit(model: Model, start: np.ndarray, scan: Scan, follow: np.ndarray, hold: n
         miss = np.nan_to_num(points - at)
         surface = anchors @ normals
         surface /= np.linalg.norm(surface, axis=1, keepdims=True)
-        seen = (anchors @ data)[:, None]
+        seen = np.where(put, 0, anchors @ data)[:, None]
         miss -= seen * (miss * surface).sum(1, keepdims=True) * surface  # in depth the scan knows better
         robust = 1 / (1 + (np.linalg.norm(miss, axis=1) / 0.005) ** 2)
         pin = LANDMARK_AREA_M2[0] * (LANDMARK_AREA_M2[1] / LANDMARK_AREA_M2[0]) ** part * np.maximum(1, hold * part)
         pin = np.where(known, pin * robust * trust * model.landmark_weight, 0)
 
+        pin[put] = PUT_AREA_M2
         blind = 1 - follow * np.isfinite(signed)
         bending = np.maximum(length, BLIND_M * blind) ** 4
         pull = PULL + (BLIND_PULL - PULL) * (1 - follow)
@@ -74,9 +81,7 @@ def fit(model: Model, start: np.ndarray, scan: Scan, follow: np.ndarray, hold: n
 
 def flipped_triangles(before: Mesh, after: Mesh) -> int:
     """How many triangles turned over between two shapes of one topology."""
-    from ..meshes import face_normals
-
-    return int(((face_normals(before) * face_normals(after)).sum(1) < 0).sum())
+    return int(flipped(before, after.vertices).sum())
 
 
 def _operators(mesh: Mesh) -> tuple[np.ndarray, sparse.csr_matrix]:

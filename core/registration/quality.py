@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How good a fit is: its figures, whether it holds, and what part of the face the scan does not show."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .. import atlas
+from ..meshes import Mesh, vertex_normals
+from ..messages import Problem, Reporter
+from .alignment import Model
+from .correspondence import Scan
+from .intersections import flipped, intersecting
+from .landmarks import Landmarks
+
+LEAST_SHARE, FARTHEST_M = 0.3, 0.004
+"""A fit holds when this share of the followed vertices finds a partner on the scan, at this distance or nearer in the median."""
+SHOWN = 0.75
+"""Share of a side of the face that the scan should show."""
+
+
+def figures(report: Reporter, model: Model, aligned: Mesh, head: Mesh, found: Landmarks, coefficients: np.ndarray, distances: np.ndarray,
+            follow: np.ndarray) -> None:
+    """Reports a fit's figures. aligned: the head before the non-rigid fit; distances [M] of the followed vertices (follow [V] > 0.5) to the scan."""
+    known = np.isfinite(found.points).all(1)
+    miss = np.linalg.norm(model.at_landmarks(head.vertices) - found.points, axis=1)
+    face = (follow > 0.5)[head.faces].all(1)
+    stretched = atlas.stretch(replace(head, faces=head.faces[face], face_uvs=head.face_uvs[face]))
+    report.figure("landmark_frames", len(found.images))
+    report.figure("landmark_reprojection_px", round(found.error_px, 2))
+    report.figure("landmark_residual_mm", round(1e3 * float(np.median(miss[known])), 2))
+    report.figure("landmarks_put_by_hand", int(found.put.sum()))
+    if found.put.any():
+        report.figure("put_landmark_residual_mm", round(1e3 * float(miss[found.put].max()), 2))
+    report.figure("eye_opening", round(found.opening, 2) if np.isfinite(found.opening) else None)
+    report.figure("identity_norm", round(float(np.linalg.norm(coefficients)), 2))
+    report.figure("head_to_scan_median_mm", round(1e3 * float(np.median(distances)), 3) if len(distances) else None)
+    report.figure("head_to_scan_p90_mm", round(1e3 * float(np.percentile(distances, 90)), 3) if len(distances) else None)
+    report.figure("face_with_scan_percent", round(100 * len(distances) / max(int((follow > 0.5).sum()), 1), 1))
+    report.figure("flipped_triangles", int(flipped(aligned, head.vertices).sum()))
+    report.figure("intersecting_triangles", len(intersecting(head.vertices, head.faces)))
+    report.figure("uv_stretch_p95", round(float(np.percentile(stretched, 95)), 2))
+
+
+def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follow: np.ndarray) -> None:
+    """Raises Problem where the fit does not hold; tells which side of the face the scan does not show."""
+    wanted = follow > 0.5
+    if len(distances) < LEAST_SHARE * wanted.sum():
+        raise Problem(f"The head could not be laid over the scan of the face: only {100 * len(distances) / wanted.sum():.0f} % of the face is in the scan.",
+                      "Look at the scan's picture in the report; film again slower, in an arc from ear to ear, with the whole face in view.")
+    if np.median(distances) > FARTHEST_M:
+        raise Problem(f"The head could not be laid over the scan of the face: it stays {1e3 * np.median(distances):.0f} mm away from it.",
+                      "Look at the scan's picture in the report: where it is no face, film again with the head kept still and hair and hands off the face.")
+    signed, _ = scan.match(head.vertices, vertex_normals(head), 0.01)
+    for name, where in _sides(head, wanted).items():
+        shown = float(np.isfinite(signed[where]).mean())
+        if shown < SHOWN:
+            report.finding(f"The scan shows only {100 * shown:.0f} % of {name}; the rest was guessed from the shape of heads.",
+                           f"Film once more and bring {name} well into view, in sharp frames.")
+
+
+def _sides(head: Mesh, wanted: np.ndarray) -> dict[str, np.ndarray]:
+    """Parts of the face as the person has them: bool [V] each."""
+    x, _, z = head.vertices.T
+    middle, low, high = np.median(x[wanted]), *np.percentile(z[wanted], [15, 85])
+    return {"the right side of the face": wanted & (x < middle - 0.02), "the left side of the face": wanted & (x > middle + 0.02),
+            "the chin": wanted & (z < low), "the forehead": wanted & (z > high)}
