@@ -144,7 +144,7 @@ class FakeLayout:
     def __getattr__(self, name):
         def call(*args, **kwargs):
             self.drawn.append((name, args, kwargs))
-            return self
+            return (self, self) if name == "panel" else self
         return call
 
     def __setattr__(self, name, value):
@@ -194,6 +194,36 @@ def test_a_finished_stage_can_be_done_again_from_its_row(addon, capture, monkeyp
     bpy.ops.wildcap.reconstruct(first="scan")
     bpy.ops.wildcap.reconstruct()
     assert started == [("reconstruct", {"first": "scan", "last": "shadow_mask"}), ("reconstruct", {"first": None, "last": "shadow_mask"})]
+
+
+def test_moved_landmarks_are_kept_and_the_head_is_fitted_to_them_again(addon, capture, monkeypatch):
+    from core.capture import Capture
+
+    Capture(capture).set_source(capture.parent / "face.mp4")
+    bpy.ops.wildcap.bring_in_head()
+    head = bpy.context.view_layer.objects.active
+    with pytest.raises(RuntimeError, match="no landmarks"):
+        bpy.ops.wildcap.show_landmarks()
+    (capture / "landmarks.json").write_text(json.dumps({"points": {"1": [0.0, -0.1, 0.0], "152": [0.0, -0.08, -0.1], "7": [0, 0, 0]}}), encoding="utf-8")
+    bpy.ops.wildcap.show_landmarks()
+    empties = {o["wildcap_landmark"]: o for o in bpy.data.collections["WildCap Landmarks"].objects}
+    assert set(empties) == {1, 152} and "Chin" in empties[152].name
+    head.location = (3, 2, 1)
+    bpy.context.view_layer.update()
+    assert tuple(empties[152].matrix_world.translation) == pytest.approx((3, 1.92, 0.9), abs=1e-6), "they stay on the head"
+    with pytest.raises(RuntimeError, match="No landmark was moved"):
+        bpy.ops.wildcap.fit_landmarks()
+    started = []
+    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **span: started.append(span))
+    empties[152].location.z -= 0.004
+    bpy.ops.wildcap.fit_landmarks()
+    assert started == [{"first": "registration", "last": "shadow_mask"}]
+    kept = json.loads((capture / "landmarks_artist.json").read_text(encoding="utf-8"))["points"]
+    assert list(kept) == ["152"] and kept["152"] == pytest.approx([0, -0.08, -0.104], abs=1e-6)
+    assert "WildCap Landmarks" not in bpy.data.collections
+    bpy.ops.wildcap.show_landmarks()
+    assert bpy.data.collections["WildCap Landmarks"].objects["Chin Landmark"].location.z == pytest.approx(-0.104, abs=1e-6)
+    bpy.ops.wildcap.hide_landmarks()
 
 
 def test_every_panel_draws_in_every_state(addon, capture):

@@ -4,6 +4,7 @@
 
 from dataclasses import fields
 
+from ..core.stages import Stage
 from . import captures
 from .properties import STAGE_KINDS
 
@@ -31,9 +32,11 @@ class CapturePanel(FoldedPanel):
         return captures.active(context) is not None
 
 
-def draw_settings(layout, item, stage: str, without: tuple[str, ...] = ()) -> None:
-    """The fields of a stage's settings, in their order."""
-    group = getattr(item, stage)
-    for f in fields(STAGE_KINDS[stage]):
+def draw_settings(layout, item, stage: Stage, without: tuple[str, ...] = ()) -> None:
+    """The fields of a stage's settings, in their order, folded away under its name: every one has a good default."""
+    header, body = layout.panel(f"wildcap_{stage.name}", default_closed=True)
+    header.label(text=stage.label)
+    group = getattr(item, stage.name)
+    for f in fields(STAGE_KINDS[stage.name]) if body else ():
         if f.name not in without:
-            layout.prop(group, f.name)
+            body.prop(group, f.name)

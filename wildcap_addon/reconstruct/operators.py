@@ -8,6 +8,7 @@ from ...core import stages
 from ...core.messages import Problem
 from .. import captures, head, jobs
 from ..base_operator import BaseOperator
+from . import landmarks
 
 
 class WILDCAP_OT_reconstruct(BaseOperator, bpy.types.Operator):
@@ -68,4 +69,53 @@ class WILDCAP_OT_bring_in_head(BaseOperator, bpy.types.Operator):
             head.look_at(context, obj)
 
 
-CLASSES = (WILDCAP_OT_reconstruct, WILDCAP_OT_cancel, WILDCAP_OT_bring_in_head)
+class WILDCAP_OT_show_landmarks(BaseOperator, bpy.types.Operator):
+    """Show the landmarks that placed the head as small spheres on it: move those that are wrong, then click Fit Head Again"""
+
+    bl_idname = "wildcap.show_landmarks"
+    bl_label = "Show Landmarks"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        return context.mode == 'OBJECT' and captures.active(context) is not None
+
+    def work(self, context):
+        landmarks.show(context, captures.require(context))
+
+
+class WILDCAP_OT_hide_landmarks(BaseOperator, bpy.types.Operator):
+    """Take the landmarks off the head without fitting it again; the capture keeps what was kept before"""
+
+    bl_idname = "wildcap.hide_landmarks"
+    bl_label = "Hide Landmarks"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        return context.mode == 'OBJECT' and bool(landmarks.shown())
+
+    def work(self, context):
+        landmarks.hide()
+
+
+class WILDCAP_OT_fit_landmarks(BaseOperator, bpy.types.Operator):
+    """Keep the landmarks that were moved, and fit the head again: they win over what was found in the frames"""
+
+    bl_idname = "wildcap.fit_landmarks"
+    bl_label = "Fit Head Again"
+
+    @classmethod
+    def poll(cls, context):
+        return context.mode == 'OBJECT' and bool(landmarks.shown()) and jobs.can_start(cls, context)
+
+    def work(self, context):
+        item = captures.require(context)
+        if not landmarks.keep_moved(item):
+            raise Problem("No landmark was moved.", "Move a sphere to where it belongs on the face, then click Fit Head Again.")
+        jobs.start(item, "reconstruct", first="registration", last=stages.MASK_STAGE)
+        landmarks.hide()
+
+
+CLASSES = (WILDCAP_OT_reconstruct, WILDCAP_OT_cancel, WILDCAP_OT_bring_in_head, WILDCAP_OT_show_landmarks, WILDCAP_OT_hide_landmarks,
+           WILDCAP_OT_fit_landmarks)

@@ -7,6 +7,7 @@ import bpy
 from ...core import stages
 from .. import captures
 from ..base_panel import CapturePanel, draw_settings
+from . import landmarks
 
 
 class WILDCAP_PT_reconstruct(CapturePanel, bpy.types.Panel):
@@ -18,13 +19,14 @@ class WILDCAP_PT_reconstruct(CapturePanel, bpy.types.Panel):
         layout.use_property_split = True
         item = captures.active(context)
         layout.prop(item, "quality")
-        for stage in stages.STAGES[:stages.NAMES.index(stages.MASK_STAGE) + 1]:
-            column = layout.column(heading=stage.label)
-            column.label(text=stage.label)
-            draw_settings(column, item, stage.name)
         row = layout.row(align=True)
         row.operator("wildcap.reconstruct")
         row.operator("wildcap.bring_in_head")
+        row = layout.row(align=True)
+        row.operator("wildcap.hide_landmarks" if landmarks.shown() else "wildcap.show_landmarks", icon='EMPTY_AXIS')
+        row.operator("wildcap.fit_landmarks")
+        for stage in stages.STAGES[:stages.NAMES.index(stages.MASK_STAGE) + 1]:
+            draw_settings(layout, item, stage)
 
 
 CLASSES = (WILDCAP_PT_reconstruct,)

@@ -4,6 +4,7 @@
 
 import bpy
 
+from ...core import stages
 from .. import captures, jobs
 from ..base_panel import CapturePanel, WildcapPanel, draw_settings
 from . import preview
@@ -38,11 +39,9 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         row.prop(item, "skin_tone", text="")
         layout.prop(item, "device")
         layout.prop(item, "seed")
-        draw_settings(layout, item, "solve", without=("skin_tone",))
-        draw_settings(layout, item, "upscale")
-        layout.label(text="Delivery")
-        draw_settings(layout, item, "transfer")
         layout.operator("wildcap.solve")
+        for stage in stages.STAGES[stages.NAMES.index(stages.MASK_STAGE) + 1:]:
+            draw_settings(layout, item, stage, without=("skin_tone",))
 
 
 CLASSES = (WILDCAP_PT_preview, WILDCAP_PT_solve)

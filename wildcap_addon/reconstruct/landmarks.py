@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The landmarks that placed the head, as empties on it: the artist moves those that are wrong, and the head is fitted again to them.
+
+Each empty is a child of the head, so that the head may stand anywhere; its own coordinates are those of the capture's world.
+"""
+
+import json
+
+import bpy
+from mathutils import Vector
+
+from ...core import artist_landmarks
+from ...core.capture import Capture
+from ...core.messages import Problem
+from .. import captures
+
+COLLECTION = "WildCap Landmarks"
+INDEX_KEY = "wildcap_landmark"
+FOUND_KEY = "wildcap_found"
+"""Custom properties of an empty: the landmark's number, and where it was when it was shown."""
+MOVED_M = 1e-4
+
+# Numbers in MediaPipe's face mesh. Left and right are the person's.
+NAMES = {
+    33: "Right Eye Outer", 133: "Right Eye Inner", 159: "Right Upper Lid", 145: "Right Lower Lid",
+    362: "Left Eye Inner", 263: "Left Eye Outer", 386: "Left Upper Lid", 374: "Left Lower Lid",
+    70: "Right Brow Outer", 105: "Right Brow", 107: "Right Brow Inner", 336: "Left Brow Inner", 334: "Left Brow", 300: "Left Brow Outer",
+    168: "Nose Bridge", 1: "Nose Tip", 2: "Nose Base", 98: "Right Nostril", 327: "Left Nostril",
+    61: "Right Mouth Corner", 0: "Upper Lip", 17: "Lower Lip", 291: "Left Mouth Corner",
+    152: "Chin", 10: "Forehead", 234: "Right Cheek Bone", 454: "Left Cheek Bone", 172: "Right Jaw", 397: "Left Jaw",
+}
+
+
+def show(context, item) -> int:
+    """Puts the capture's landmarks on its head, in place of any that are shown. Returns how many. Raises Problem where there are none."""
+    capture = captures.folder(item)
+    head = captures.require_head(context, item)
+    points = _known(capture)
+    hide()
+    collection = bpy.data.collections.new(COLLECTION)
+    context.scene.collection.children.link(collection)
+    for index, name in NAMES.items():
+        if index not in points:
+            continue
+        empty = bpy.data.objects.new(f"{name} Landmark", None)
+        empty.empty_display_type, empty.empty_display_size = 'SPHERE', 0.002
+        empty.show_in_front = True
+        empty.parent = head
+        empty.location = points[index]
+        empty.lock_rotation = empty.lock_scale = (True, True, True)
+        empty[INDEX_KEY], empty[FOUND_KEY], empty[captures.HEAD_KEY] = index, points[index], item.path
+        collection.objects.link(empty)
+    return len(collection.objects)
+
+
+def shown() -> list[bpy.types.Object]:
+    collection = bpy.data.collections.get(COLLECTION)
+    return [o for o in collection.objects if INDEX_KEY in o] if collection else []
+
+
+def keep_moved(item) -> int:
+    """Writes the landmarks that were moved to the capture, where they win over what the frames say. Returns how many."""
+    moved = {o[INDEX_KEY]: tuple(o.location) for o in shown() if (o.location - Vector(o[FOUND_KEY])).length > MOVED_M}
+    if moved:
+        artist_landmarks.put(captures.folder(item), moved)
+    return len(moved)
+
+
+def hide() -> None:
+    """Takes the empties off the scene."""
+    for empty in shown():
+        bpy.data.objects.remove(empty)
+    collection = bpy.data.collections.get(COLLECTION)
+    if collection is not None and not collection.objects:
+        bpy.data.collections.remove(collection)
+
+
+def _known(capture: Capture) -> dict[int, list[float]]:
+    """Where the landmarks are: as found, and over that as the artist has put them."""
+    try:
+        found = json.loads(capture.landmarks.read_text(encoding="utf-8"))["points"]
+        points = {int(index): [float(v) for v in point] for index, point in found.items()}
+    except FileNotFoundError as error:
+        raise Problem("This capture has no landmarks.", "Click Reconstruct first: they are found in the frames.") from error
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise Problem(f"{capture.landmarks} cannot be read ({type(error).__name__}: {error}).", "Do the stage Head again.") from error
+    return points | {index: list(point) for index, point in artist_landmarks.read(capture.landmarks_artist).items()}
