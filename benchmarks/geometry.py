@@ -6,7 +6,8 @@
 
 Captures: `sample` (part of this repository), `lps_sun` and `bust` (in --data). FOLDER gets NAME.wildcap, NAME.json, pictures/NAME.jpg (scan, wireframe and
 texture beside the frame), geometry.json and geometry.md. What is finished is not done again without --fresh: stages that are fresh, captures that came through.
-Every stage runs in a process of its own, so its peak memory (the largest process, its children included, as getrusage tells) is its own.
+The perceptual row needs `pip install --no-deps -r requirements/perceptual.txt`; without it the table says so. Every stage
+runs in a process of its own, so its peak memory (of the largest of its processes, as getrusage tells) is its own.
 --results replaces this command's section of that file, and its picture of the synthetic sample: pictures of people never go into the documentation.
 """
 
@@ -57,7 +58,10 @@ def measure(name: str, subject: Subject, folder: Path, fresh: bool = False) -> d
         shutil.rmtree(capture.root, ignore_errors=True)
     costs, stopped = run_stages(capture, subject.source)
     figures = {"stages": costs, "stopped": stopped}
-    for part, compare in (("cameras", _cameras), ("scan", _surface), ("head", _surface), ("texture", _texture)):
+    for part, made, compare in (("cameras", capture.cameras, _cameras), ("scan", capture.scan, _surface), ("head", capture.head, _surface),
+                                ("texture", capture.head, _texture)):
+        if not made.exists():  # "stopped" says why
+            continue
         print(f"{name}: {part}", flush=True)
         try:
             figures[part] = compare(capture, subject, part)
