@@ -28,9 +28,9 @@ TYPICAL = 1.1
 AGREE = (0.05, 0.025, 0.0125)
 """Shares of the face's width by which matches may miss, round by round, as the cameras get better."""
 MOST_TRACKS = 5000
-HELD = 20
+HELD = 30
 """Tracks that a frame is seen in where they hold its camera better than the face does."""
-AGREED_SHARE = 0.25
+AGREED_SHARE = 0.5
 LEAST_ANGLE_DEG = 2.0
 LEAST_MATCHES = 12
 """Points by which a frame without a face is placed."""
@@ -79,9 +79,10 @@ def resect(groups: list[dict], found: dict[str, faces.Face], matches: Matches, r
 def _trusted(names: list[str], matches: Matches, used: list) -> bool:
     """Whether every frame is held by tracks, and they are a good part of all that matches: chance agreements are few among many."""
     held = Counter(name for track in used for name, _ in track)
-    offered = sum(len(index) for (a, b), index in matches.pairs.items() if a in names and b in names)
-    agreed = sum(len(track) - 1 for track in used)
-    return all(held[name] >= HELD for name in names) and agreed > AGREED_SHARE * offered
+    track_of = {member: number for number, track in enumerate(used) for member in track}
+    pairs = [(a, b, index) for (a, b), index in matches.pairs.items() if a in names and b in names]
+    agree = [track_of.get((a, i), -1) == track_of.get((b, j), -2) for a, b, index in pairs for i, j in index.tolist()]
+    return all(held[name] >= HELD for name in names) and np.mean(agree) > AGREED_SHARE
 
 
 def _first(groups: list[dict], group_of: dict, names: list[str], pixels: dict) -> Bundle:
