@@ -19,7 +19,8 @@ from scipy.spatial import cKDTree
 from .meshes import Mesh, vertex_normals
 from .raster import RayCaster, interpolate
 
-CANDIDATES = 8
+CANDIDATES = (8, 64)
+"""How many samples near a point are looked at: at first, and where none of these will do."""
 NEAR_SHARE = 0.25
 """The first rays start this share of `farthest` off the surface: most partners lie within, and farther ones cost a search."""
 
@@ -49,8 +50,15 @@ class Surface:
 
     def nearest(self, points: np.ndarray, normals: np.ndarray, farthest: float, cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray]:
         """As `partners`, by distance alone."""
+        face, bary = self._nearest_of(CANDIDATES[0], points, normals, farthest, cosine)
+        missed = np.flatnonzero(face < 0)  # another sheet lies before the one that faces the same way
+        face[missed], bary[missed] = self._nearest_of(CANDIDATES[1], points[missed], normals[missed], farthest, cosine)
+        return face, bary
+
+    def _nearest_of(self, count: int, points, normals, farthest: float, cosine: float) -> tuple[np.ndarray, np.ndarray]:
+        """The best of the `count` samples nearest to each point."""
         best_face, best_bary = np.full(len(points), -1), np.zeros((len(points), 3))
-        _, index = self._tree.query(points, CANDIDATES, distance_upper_bound=farthest + 0.005)
+        _, index = self._tree.query(points, count, distance_upper_bound=farthest + 0.005)
         best = np.full(len(points), farthest)
         for column in index.T:
             there = np.flatnonzero(column < len(self._parent))

@@ -60,7 +60,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     quality.judge(report, head, scan, distances, follow)
     meshes.write_obj(capture.head, head)
     write_json(capture.landmarks, landmarks.to_json(found))
-    own_template.run(capture, settings, head, hold, report)
+    own_template.run(capture, settings, head, own_template.BuiltIn(model, follow, shaped, hold), report)
     images.write_srgb(capture.picture("registration", "wireframe"), drawing.overlay(drawing.three_views(views, found), head, found))
 
 

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from ..messages import Reporter
 from .alignment import similarity
 
-MOST_CENTRES = 2200
+MOST_CENTRES = 2000
 ROUND = 0.06
 """Deviation from a sphere, as a share of its radius, below which a part is a ball."""
 
@@ -32,11 +32,7 @@ def along(start: np.ndarray, faces: np.ndarray, label: np.ndarray, skin: np.ndar
     centres = _centres(start, skin, others)
     shift = np.zeros_like(start)
     shift[skin] = fitted - start[skin]
-    field = RBFInterpolator(start[centres], shift[centres], kernel="linear", smoothing=1e-6)
-    for i in range(0, len(others), 4000):
-        report.progress(i, len(others), "carrying eyes, teeth and other parts along")
-        part = others[i:i + 4000]
-        final[part] += field(start[part])
+    final[others] += field(start[centres], shift[centres], start[others], report)
     for part in np.unique(label[others]):
         index = np.flatnonzero(label == part)
         if len(index) > 30 and _is_ball(start[index]):
@@ -44,14 +40,25 @@ def along(start: np.ndarray, faces: np.ndarray, label: np.ndarray, skin: np.ndar
     return final
 
 
+def field(places: np.ndarray, shift: np.ndarray, at: np.ndarray, report: Reporter) -> np.ndarray:
+    """A displacement known at places [N, 3] (shift [N, 3]), smoothly continued to `at` [M, 3]; of many places an even choice counts."""
+    chosen = np.linspace(0, len(places) - 1, min(len(places), MOST_CENTRES)).astype(int)
+    _, first = np.unique(np.round(places[chosen] * 1e5), axis=0, return_index=True)  # two centres at one place have no solution
+    chosen = chosen[np.sort(first)]
+    continued = RBFInterpolator(places[chosen], shift[chosen], kernel="linear", smoothing=1e-6)
+    out = np.empty_like(at)
+    for i in range(0, len(at), 4000):
+        report.progress(i, len(at), "carrying eyes, teeth and other parts along")
+        out[i:i + 4000] = continued(at[i:i + 4000])
+    return out
+
+
 def _centres(start: np.ndarray, skin: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Vertices of the skin that carry the rest: those nearest to the other parts, and an even choice of all."""
     distance, _ = cKDTree(start[others]).query(start[skin])
     near = skin[np.argsort(distance, kind="stable")[:MOST_CENTRES // 2]]
     even = skin[np.linspace(0, len(skin) - 1, MOST_CENTRES // 2).astype(int)]
-    chosen = np.union1d(near, even)
-    _, first = np.unique(np.round(start[chosen] * 1e5), axis=0, return_index=True)  # two centres at one place have no solution
-    return chosen[np.sort(first)]
+    return np.union1d(near, even)
 
 
 def _is_ball(points: np.ndarray) -> bool:

@@ -23,12 +23,15 @@ from ..settings import Settings
 from . import alignment, carried, nonrigid, own_mesh, render_landmarks
 from .correspondence import Scan
 
-ITERATIONS = 14
+ITERATIONS, COVER_ITERATIONS = 14, 8
+"""Steps of the fit to the head, and of laying the built-in head over the artist's mesh."""
 SOURCE_SPACING_M = 0.0012
 OPEN = (0.25, 0.5)
 """Share of free sky over a vertex below which it lies inside the mouth, a nostril or a socket, and above which it is certainly outside."""
 REACH_M = (0.006, 0.015)
 """Distance of an aligned vertex to the head up to which it belongs to it, and from which it is another thing: shoulders, clothes."""
+SLIGHT = 0.05
+"""Share of their say that landmarks keep once two clean surfaces lie on each other: a net's marks are a millimetre or two off."""
 RIM_M = (0.005, 0.045)
 """Distance to the edge where the built-in head ends at which it begins to draw, and from which it draws fully: a neck must not show a step."""
 PAINTED_M = 0.010
@@ -51,14 +54,24 @@ class Fitted:
     pictures: list[np.ndarray]
 
 
-def run(capture: Capture, settings: Settings, head: Mesh, hold: np.ndarray, report: Reporter) -> None:
-    """Writes own_head.obj, or removes that of another template where none is chosen. hold [468]: how much longer a landmark counts than others."""
+@dataclass(frozen=True)
+class BuiltIn:
+    """The built-in head: its model, and per vertex and landmark the weights that registration uses (registration.weights_of)."""
+
+    model: alignment.Model
+    follow: np.ndarray
+    shaped: np.ndarray
+    hold: np.ndarray
+
+
+def run(capture: Capture, settings: Settings, head: Mesh, ours: BuiltIn, report: Reporter) -> None:
+    """Writes own_head.obj, or removes that of another template where none is chosen."""
     if not settings.registration.template:
         for path in (capture.own_head, capture.own_head_skin, capture.picture("registration", "own_template")):
             path.unlink(missing_ok=True)
         return
     own = own_mesh.read(settings.registration.template, report)
-    fitted = fit(own, head, hold, report)
+    fitted = fit(own, head, ours, report)
     own, uvs = own_mesh.with_usable_uvs(own, fitted.skin, settings.registration.new_atlas, settings.transfer.size)
     own_mesh.write(capture.own_head, own, fitted.vertices)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], fitted.skin, [0]])))
@@ -72,7 +85,7 @@ def run(capture: Capture, settings: Settings, head: Mesh, hold: np.ndarray, repo
     images.write_srgb(capture.picture("registration", "own_template"), _drawn(head, own.mesh.moved(fitted.vertices), fitted.pictures[0]))
 
 
-def fit(own: own_mesh.OwnMesh, head: Mesh, hold: np.ndarray, report: Reporter) -> Fitted:
+def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> Fitted:
     """Lays the artist's mesh over the head. Raises Problem where no face is found on it or the fit does not hold."""
     whole, index = surfaces.welded(own.mesh)
     first = np.full(len(whole.vertices), -1)
@@ -111,7 +124,8 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, hold: np.ndarray, report: Reporter) -
     if eyes:
         trust[_lid_marks()] = 0
     start = placed.apply(model.shape(coefficients))
-    vertices = nonrigid.fit(model, start, dense, follow, hold, target, trust, ITERATIONS, report, 0, 1)
+    start = _matched(model, start, follow, head, ours, report)
+    vertices = nonrigid.fit(model, start, dense, follow, ours.hold, target, SLIGHT * trust, ITERATIONS, report, 0.5, 1)
 
     final = skin.moved(vertices)
     drawn = follow > 0.5
@@ -125,6 +139,28 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, hold: np.ndarray, report: Reporter) -
     normals = vertex_normals(final)
     counterpart[used] = (surface.nearest(vertices, normals, PAINTED_M)[0] >= 0) & (_free_sky(final, normals) > OPEN[0])
     return Fitted(everything[index], counterpart[whole.faces].any(1), distances, nonrigid.flipped_triangles(skin.moved(start), final), pictures)
+
+
+def _matched(model: alignment.Model, start: np.ndarray, follow: np.ndarray, head: Mesh, ours: BuiltIn, report: Reporter) -> np.ndarray:
+    """The placed skin [V, 3], each vertex taken to the place on the head that it has on the built-in head laid over it.
+
+    Between landmarks two faces say little about which point is which; the built-in head's identity space says it: it is laid over the
+    artist's mesh, as over a scan, and what lies together there belongs together.
+    """
+    skin = model.mesh.moved(start)
+    outside = skin.faces[(follow[skin.faces] > 0.1).all(1)]
+    fine, faces = trimesh.remesh.subdivide(*trimesh.remesh.subdivide(skin.vertices, outside))
+    cover, points = Scan(Mesh(fine, faces)), model.at_landmarks(start)
+    pose, coefficients = alignment.fit_landmarks(ours.model, points, model.landmark_weight)
+    trust = SLIGHT * model.landmark_weight
+    pose, coefficients = alignment.fit_scan(ours.model, pose, coefficients, points, trust, cover, np.maximum(ours.shaped, 0.7))
+    over = nonrigid.fit(ours.model, pose.apply(ours.model.shape(coefficients)), cover, np.maximum(ours.follow, 0.5 * ours.shaped), ours.hold, points,
+                        trust, COVER_ITERATIONS, report, 0, 0.5)
+    known = np.flatnonzero(follow > 0.1)
+    face, bary = surfaces.Surface(ours.model.mesh.moved(over), SOURCE_SPACING_M).nearest(start[known], vertex_normals(skin)[known], REACH_M[1])
+    known, face, bary = known[face >= 0], face[face >= 0], bary[face >= 0]
+    shift = ((head.vertices - over)[head.faces[face]] * bary[..., None]).sum(1)
+    return start + carried.field(start[known], shift, start, report)
 
 
 def _follow(model: alignment.Model, placed: alignment.Similarity, coefficients: np.ndarray, surface: surfaces.Surface, eyes: bool) -> np.ndarray:

@@ -21,7 +21,7 @@ from ..messages import Problem, Reporter
 from ..views import View
 from .landmarks import Landmarks, onto_surface, triangulate
 
-FIRST_SIZE, SIZE = 256, 512
+FIRST_SIZE, SIZE = 192, 460
 """Sides of the pictures in which the face is looked for, and in which its marks are found, pixels."""
 FOCAL = 2.2
 """Focal length in picture sides: an angle of view of 26 degrees, as a portrait's."""
@@ -35,7 +35,9 @@ EYE_LINES = ((263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 3
              (33, 7, 163, 144, 145, 153, 154, 155, 133, 173, 157, 158, 159, 160, 161, 246))
 EYE_LIDS = ((386, 374), (159, 145))
 """Middle of the upper and the lower lid of the person's left and right eye."""
-SURE = 0.8
+TEMPLES = (127, 162, 234, 356, 389, 454)
+SURE, PORTRAITS = 0.85, (2.6, 3.4)
+"""Score with which a face is taken without looking further, and the sides of pictures of it, in widths of the face."""
 FACE_M = 0.11
 """How far apart the outermost marks at the temples lie on a person, metres: the first guess of the scale."""
 
@@ -56,20 +58,23 @@ def find(mesh: Mesh, report: Reporter | None = None) -> tuple[Pose, Landmarks, l
     pose = _find_pose(mesh, report)
     posed = mesh.moved(to_ours(mesh.vertices, pose))
     colours, found, pictures = np.tile(SKIN, (len(mesh.vertices), 1)), None, []
-    for _ in range(2):
-        views, pixels, pictures = [], [], []
-        caster, normals = raster.RayCaster(posed), vertex_normals(posed)
-        for yaw, pitch in SIDES:
-            if report is not None:
-                report.progress(0, 1, "finding the face on the artist's mesh")
-            view = view_from(yaw, pitch, SIZE, FACE_M * 2.6)
-            picture = shaded(caster, normals, colours, view)
-            face = faces.detect(picture)
-            if face is not None:
-                views.append(replace(view, name=f"{yaw}_{pitch}"))
-                pixels.append(face.landmarks[:, :2])
-                pictures.append(picture)
-        if len(views) < 4:
+    caster, normals = raster.RayCaster(posed), vertex_normals(posed)
+    for sides in (SIDES[:5], SIDES):
+        for portrait in PORTRAITS:
+            views, pixels, pictures = [], [], []
+            for yaw, pitch in sides:
+                if report is not None:
+                    report.progress(0, 1, "finding the face on the artist's mesh")
+                view = view_from(yaw, pitch, SIZE, FACE_M * portrait)
+                picture = shaded(caster, normals, colours, view)
+                face = faces.detect(picture)
+                if face is not None:
+                    views.append(replace(view, name=f"{yaw}_{pitch}"))
+                    pixels.append(face.landmarks[:, :2])
+                    pictures.append(picture)
+            if len(views) > 0.6 * len(sides):
+                break
+        else:
             raise _no_face()
         found = onto_surface(triangulate(views, np.stack(pixels)), views, posed)
         colours = _painted(posed, found.points)
@@ -89,42 +94,44 @@ def from_ours(points: np.ndarray, pose: Pose) -> np.ndarray:
 def _find_pose(mesh: Mesh, report: Reporter | None) -> Pose:
     """The way to hold the mesh in which it shows the surest upright face from the front."""
     used = mesh.vertices[np.unique(mesh.faces)]
-    low, high = used.min(0), used.max(0)
-    best = (0.0, None)
-    turns = _turns()
-    for i, turn in enumerate(turns):
-        if report is not None:
-            report.progress(0, 1, "finding out which way the artist's mesh looks")
-        sides = np.abs(turn @ (high - low))
-        middle = (low + high) / 2
-        for centre, extent in _windows(turn, middle, sides):
-            seen = _look(mesh, turn, centre, extent)
-            if seen is not None and seen[0] > best[0]:
-                best = seen
-        if i % 4 == 3 and best[0] > SURE:  # the four ways to face, with one way up
-            break
+    middle, size = (used.min(0) + used.max(0)) / 2, np.ptp(used, axis=0).max()
+    unit = mesh.moved((mesh.vertices - middle) / size)
+    caster, normals, extents = raster.RayCaster(unit), vertex_normals(unit), np.ptp(used, axis=0) / size
+    best, turns = (0.0, None), _turns()
+    for first in range(0, len(turns), 4):  # the four ways to face, with one way up
+        for window in range(len(_windows(extents))):
+            for turn in turns[first:first + 4]:
+                if report is not None:
+                    report.progress(first, len(turns), "finding out which way the artist's mesh looks")
+                windows = _windows(np.abs(turn @ extents))
+                if window < len(windows):
+                    lift, side = windows[window]
+                    seen = _look(caster, normals, turn, turn.T @ [0, 0, lift], side)
+                    for portrait in PORTRAITS if seen is not None else ():  # looked at again in a picture of its own: what was no face is none any more
+                        closer = _look(caster, normals, turn, seen[1].face, portrait * seen[1].width)
+                        best = closer if closer is not None and closer[0] > best[0] else best
+            if best[0] > SURE:
+                return Pose(best[1].turn, middle + size * best[1].face, size * best[1].width)
     if best[1] is None:
         raise _no_face()
-    return best[1]
+    return Pose(best[1].turn, middle + size * best[1].face, size * best[1].width)
 
 
-def _windows(turn: np.ndarray, middle: np.ndarray, sides: np.ndarray) -> list[tuple[np.ndarray, float]]:
-    """Middles, in the mesh's coordinates, and sides of the squares in which a face may lie: all of the mesh, its upper half, or, in a figure with a body
-    or arms, what is round the top of its middle. sides [3]: its extents in our axes."""
+def _windows(sides: np.ndarray) -> list[tuple[float, float]]:
+    """Heights over the middle, and sides, of the squares in which a face may lie: all of the mesh, its upper half, or, in a figure with a body
+    or arms, what is round the top of its middle. sides [3]: the mesh's extents in our axes."""
     whole = 1.05 * max(sides[0], sides[2])
     windows = [(0.0, whole), (0.2 * sides[2], 0.75 * whole)]
-    for side in (1.2 * sides[2], 0.35 * sides[2], 0.2 * sides[2]):
-        if side < 0.7 * whole:
-            windows.append((max(0.5 * sides[2] - 0.42 * side, 0.0), side))
-    return [(middle + turn.T @ [0, 0, lift], side) for lift, side in windows]
+    smaller = [side for side in (1.2 * sides[2], 0.35 * sides[2], 0.2 * sides[2]) if side < 0.7 * whole]
+    return windows + [(max(0.5 * sides[2] - 0.42 * side, 0.0), side) for side in smaller]
 
 
-def _look(mesh: Mesh, turn: np.ndarray, centre: np.ndarray, extent: float) -> tuple[float, Pose] | None:
-    """How sure an upright face is seen in a square of side `extent` around `centre`, and where it is."""
-    posed = mesh.moved((mesh.vertices - centre) @ turn.T / extent)  # the square has side 1
-    caster, normals = raster.RayCaster(posed), vertex_normals(posed)
-    view = view_from(0, 0, FIRST_SIZE, 1.0)
-    face = faces.detect(shaded(caster, normals, np.tile(SKIN, (len(mesh.vertices), 1)), view))
+def _look(caster: raster.RayCaster, normals: np.ndarray, turn: np.ndarray, centre: np.ndarray, extent: float) -> tuple[float, Pose] | None:
+    """How sure an upright face is seen in a square of side `extent` around `centre` [3], and where it is."""
+    front = view_from(0, 0, FIRST_SIZE, extent)
+    rotation = front.rotation @ turn
+    view = replace(front, rotation=rotation, translation=front.translation - rotation @ centre)
+    face = faces.detect(shaded(caster, normals, np.tile(SKIN, (len(normals), 1)), view))
     if face is None:
         return None
     marks = face.landmarks[:, :2].astype(np.float64)
@@ -132,17 +139,19 @@ def _look(mesh: Mesh, turn: np.ndarray, centre: np.ndarray, extent: float) -> tu
     roll = np.degrees(np.arctan2(across[1], across[0]))
     if abs(roll) > 30 or abs(face.yaw_deg) > 30:
         return None
-    hit, _, distance = caster.first_hits(np.repeat(view.centre[None], len(marks), 0), view.rays(marks))
+    rays = view.rays(marks)
+    hit, _, distance = caster.first_hits(np.repeat(view.centre[None], len(marks), 0), rays)
     if (hit >= 0).mean() < 0.8:
         return None
-    points = view.centre + view.rays(marks) * np.where(hit >= 0, distance, np.nan)[:, None]
-    width = np.nanmax(points[:, 0]) - np.nanmin(points[:, 0])
+    points = view.centre + rays * np.where(hit >= 0, distance, np.nan)[:, None]
+    posed = points @ turn.T
+    width = np.nanmax(posed[:, 0]) - np.nanmin(posed[:, 0])
     # a face is about as deep as it is wide: the back of a head, where nets see faces too, has no nose in front of its sides
-    bulge = np.nanmedian(points[[10, 152, 127, 356], 1]) - points[faces.NOSE, 1]
-    if not 0.15 < bulge / width < 1.2:
+    bulge = np.nanmedian(posed[list(TEMPLES), 1]) - posed[faces.NOSE, 1]
+    if not 0.2 < bulge / width < 1.4:
         return None
-    score = face.score * np.cos(np.radians(roll)) * np.cos(np.radians(face.yaw_deg)) * min(1.0, 0.5 + (marks[:, 0].max() - marks[:, 0].min()) / FIRST_SIZE)
-    return score, Pose(turn, centre + np.nanmedian(points, 0) * extent @ turn, float(width * extent * 0.8))
+    score = face.score * np.cos(np.radians(roll)) * np.cos(np.radians(face.yaw_deg))
+    return score, Pose(turn, np.nanmedian(points, 0), float(width * 0.8))
 
 
 def _turns() -> list[np.ndarray]:
@@ -178,7 +187,7 @@ def shaded(caster: raster.RayCaster, normals: np.ndarray, colours: np.ndarray, v
     normal = raster.interpolate(normals, caster.mesh.faces, face, bary)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
     normal *= np.where((normal @ view.axis) > 0, -1, 1)[..., None]
-    key = -0.75 * view.axis + 0.55 * np.array([0, 0, 1]) + 0.35 * view.rotation[0]
+    key = -0.75 * view.axis - 0.55 * view.rotation[1] + 0.35 * view.rotation[0]
     light = 0.75 * np.clip(normal @ (key / np.linalg.norm(key)), 0, 1) + 0.2 + 0.15 * np.clip(-(normal @ view.axis), 0, 1)
     colour = raster.interpolate(colours, caster.mesh.faces, face, bary)
     return images.linear_to_srgb(np.where((face >= 0)[..., None], colour * light[..., None], 0.2))
