@@ -117,6 +117,8 @@ def around(low=-60, high=60, step=3, **other) -> list[dict]:
     (around(brightness=0.12), "too dark"),
     (around(clipped=0.2), "overexposed: 20% of it"),
     (around(noise=0.04), "noisy"),
+    ([{**r, "gain": [1 + 0.4 * i / 40] * 3} for i, r in enumerate(around())], "exposure changed by 40%"),
+    ([{**r, "gain": [1 + 0.1 * i / 20 - 0.1, 1.0, 1.1 - 0.1 * i / 20]} for i, r in enumerate(around())], "white balance changed"),
     (around(face_box=[300, 400, 400, 540]), "small in the picture: 14%"),
     (around(face_box=[60, 60, 160, 190], size=[240, 320]), "only 100 pixels wide"),
     (around(blur=0.75), "blurred in most"),

@@ -76,18 +76,14 @@ def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[dict],
 
 def _subject(srgb: np.ndarray, last: faces.Face | None) -> tuple[faces.Face | None, float]:
     """The face of the subject, the one followed so far unless another is far more prominent, and how prominent the next is beside it."""
-    height, width = srgb.shape[:2]
     face = faces.detect(srgb, last)
     if face is None:
         return None, 0.0
-    others = faces.detect_others(srgb, face)
-    weigh = lambda each: faces.prominence(each, width, height)  # noqa: E731
-    rival = max(others, key=weigh, default=None)
-    if rival is None:
+    weighed = [(faces.prominence(each, srgb.shape[1], srgb.shape[0]), each) for each in faces.detect_others(srgb, face)]
+    if not weighed:
         return face, 0.0
-    if weigh(rival) > RIVAL * weigh(face):
-        face, rival = rival, face
-    return face, weigh(rival) / weigh(face)
+    weight, (second, rival) = faces.prominence(face, srgb.shape[1], srgb.shape[0]), max(weighed, key=lambda pair: pair[0])
+    return (rival, weight / second) if second > RIVAL * weight else (face, second / weight)
 
 
 def _record(picture: Picture, name: str, face: faces.Face | None, last: faces.Face | None, rival: float) -> dict:

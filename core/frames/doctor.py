@@ -124,8 +124,8 @@ def _light(found: list[dict], report: Reporter) -> None:
     if np.median(noise) > NOISY:
         report.finding("The picture is noisy, which the maps would take for pores.", "Film in more light, and without digital zoom.")
     gain = np.array([r["gain"] for r in found])
-    ratio = float(np.median(gain, 1).max() / np.median(gain, 1).min())
-    tint = float((gain / gain.mean(1, keepdims=True)).max(0).max())
+    tone = gain / gain.mean(1, keepdims=True)
+    ratio, tint = float(np.median(gain, 1).max() / np.median(gain, 1).min()), float((tone.max(0) / tone.min(0)).max())
     if ratio > DRIFT or tint > DRIFT:
         what = f"The exposure changed by {ratio - 1:.0%}" if ratio > DRIFT else "The white balance changed"
         report.finding(f"{what} while filming; it was evened out as far as possible.",
