@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of a person's own marks a texture keeps: moles one by one, pores by their band, against true albedo frames.
+"""How much of a person's own marks a texture keeps: moles one by one (freckles and dots of stubble among them), pores by their band.
 
-Both are measured in the picture on the logarithm of linear green, so no tone or gain counts. The texture is rendered
+Both are measured against true albedo frames, in the picture, on the logarithm of linear green, so no tone or gain counts. The texture is rendered
 with several rays per pixel, as the truth was: one ray would count aliasing for or against it.
 """
 

@@ -77,7 +77,7 @@ def _textures(results: dict) -> list[str]:
             elif f:
                 rows.append([f"{name}: {label}", _number(f.get("psnr"), 2, " dB"), *(_number(f.get(k), 3) for k in (
                     "ssim", "detail", "mole_contrast", "pore_contrast", "pore_correlation")), _number(f.get("seconds"), 0, " s")])
-    return _table(["texture of the true albedo frames", "PSNR", "SSIM", "detail", "moles' contrast", "pores' contrast", "pores' correlation", "seconds"], rows)
+    return _table(["texture of the true albedo frames", "PSNR", "SSIM", "detail", "moles: contrast", "pores: contrast", "pores: correlation", "seconds"], rows)
 
 
 def _costs(results: dict) -> list[str]:
