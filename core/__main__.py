@@ -86,7 +86,7 @@ def _parser() -> argparse.ArgumentParser:
     many.add_argument("file", metavar="JSON", type=Path)
     many.set_defaults(command=_landmarks)
     commands.add_parser("doctor", help="say what is installed, what is missing and what to do").set_defaults(command=_doctor)
-    commands.add_parser("train", help="train a network (developers): train prior --help")
+    commands.add_parser("train", help="train a network, or bring other skins in for it (developers): train prior --help, train carry --help")
     return parser
 
 
