@@ -183,3 +183,4 @@ def test_cameras_of_other_pictures_are_refused(tmp_path, shot):
         read_cameras(tmp_path / "gone.xml")
     with pytest.raises(Problem, match="holds no COLMAP model"):
         read_cameras(turned_folder)
+    assert len(read_cameras(written(tmp_path, "colmap_txt") / "images.txt")) == 4  # what a file selector gives

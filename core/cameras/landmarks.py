@@ -22,7 +22,7 @@ RIGHT_LIDS = (33, 7, 163, 144, 145, 153, 154, 155, 133, 173, 157, 158, 159, 160,
 LEFT_LIDS = (263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 387, 388, 466)
 PUPILS_PER_LIDS = 63.0 / 62.156 / 1.019
 """The template's pupils are 63 mm apart, the middles of its lids' outlines a little less; and the head that fits a net's landmarks came out
-1.9 % too large over six synthetic heads of known size (0 to 4.6 %)."""
+1.9 % too large over six synthetic heads of known size (benchmarks/head_scale.py)."""
 SIGMA_M = 0.003
 """How far a landmark of the net lies from the same point of a person's head, roughly."""
 INDEPENDENT = 120
