@@ -44,6 +44,8 @@ class CamerasSettings:
 
 @dataclass(frozen=True)
 class ScanSettings:
+    method: str = setting("auto", choices=("auto", "stereo", "splats"))
+    """stereo runs anywhere; splats are Gaussian surfels and need an NVIDIA GPU with gsplat; auto takes splats where they can run"""
     pairs: int = setting(24, min=2, max=400)
     """Stereo pairs that are matched and fused"""
     voxel_mm: float = setting(1.0, min=0.3, max=5.0, unit="mm")

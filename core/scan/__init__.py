@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stage scan: frames and cameras become scan.ply, the dense surface of the head as far as it was seen.
 
-Pairs of frames are matched by semi-global stereo, coarse to fine, and their depth maps fused in a truncated signed distance field.
+Pairs of frames are matched by semi-global stereo, coarse to fine, and their depth maps fused in a truncated signed distance field;
+where there is an NVIDIA GPU and gsplat, Gaussian surfels trained on the frames refine that surface, and their depth is fused the same way.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from ..capture import Capture
 from ..messages import Problem, Reporter
 from ..settings import Settings
 from ..views import View, read_views
-from . import rounds
+from . import rounds, splats
 
 HEAD_BOX = np.array([[-0.13, -0.08, -0.21], [0.13, 0.21, 0.19]])
 """Where a head lies in its world, in metres: the origin is midway between the eyes, the face looks along -Y."""
@@ -27,18 +28,23 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     started = time.monotonic()
     views = read_views(capture)
     sharpness = _sharpness(capture, views)
+    by_splats = splats.wanted(settings.scan.method, settings.device)
     fused, maps = rounds.measure(views, sharpness, settings.scan.pairs, settings.scan.voxel_mm / 1000, HEAD_BOX, report)
+    if fused is not None and by_splats:
+        fused, maps = splats.measure(fused.mesh, views, settings.scan.voxel_mm / 1000, HEAD_BOX, settings.device, report)
     if fused is None or len(fused.mesh.faces) < 1000:
         raise Problem("No surface of the head could be measured from these frames.",
                       "Use sharper frames that lie closer together: walk slowly, in good light, and keep the face in the picture.")
     mesh = fused.mesh
     meshes.write_ply(capture.scan, mesh)
-    report.figure("pairs", len(maps))
+    report.figure("method", "splats" if by_splats else "stereo")
+    report.figure("depth_maps", len(maps))
     report.figure("points", len(mesh.vertices))
     report.figure("faces", len(mesh.faces))
     report.figure("disagreeing_percent", round(100 * fused.disagreeing, 2))
     report.figure("floating_percent", round(100 * fused.floating, 2))
-    report.figure("left_right_disagreement_px", round(float(np.nanmedian([seen.disagreement for seen in maps])), 3))
+    if not by_splats:
+        report.figure("left_right_disagreement_px", round(float(np.nanmedian([seen.disagreement for seen in maps])), 3))
     report.figure("seconds", round(time.monotonic() - started, 1))
     images.write_srgb(capture.picture("scan", "surface"), _draw(mesh, views))
 

@@ -70,8 +70,8 @@ def match_pair(first: View, second: View, pictures: tuple, masks: tuple, box: np
     # a pixel of the second picture lies where the guide expects it, less the smallest disparity that is looked for
     least = -count // 2 if guide else 0
     move = cv2.warpAffine(expected, np.float32([[1, 0, least], [0, 1, 0]]), (width, height), borderMode=cv2.BORDER_REPLICATE) + least
-    a, mask_a = _warp(first, pictures[0], masks[0], rotation, focal, origin, np.zeros_like(move))
-    b, mask_b = _warp(second, pictures[1], masks[1], rotation, focal, origin, move)
+    a, mask_a = warp(first, pictures[0], masks[0], rotation, focal, origin, np.zeros_like(move))
+    b, mask_b = warp(second, pictures[1], masks[1], rotation, focal, origin, move)
     mask_a &= seen
     if min(mask_a.sum(), mask_b.sum()) < 500:
         return None
@@ -117,7 +117,7 @@ def _rectify(baseline: np.ndarray, axis: np.ndarray) -> np.ndarray:
     return np.stack([x, np.cross(z, x), z])
 
 
-def _warp(view: View, picture: np.ndarray, mask: np.ndarray, rotation: np.ndarray, focal: float, origin: np.ndarray, move: np.ndarray) -> tuple:
+def warp(view: View, picture: np.ndarray, mask: np.ndarray, rotation: np.ndarray, focal: float, origin: np.ndarray, move: np.ndarray) -> tuple:
     """The view through the rectified camera, each pixel read `move` [H, W] further left: uint8 [H, W, 3] and bool [H, W].
     Lens distortion is taken out on the way."""
     step = 4  # the lens's map is smooth: computed on a grid, then interpolated
