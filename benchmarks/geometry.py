@@ -25,6 +25,7 @@ from pathlib import Path
 from core import images, stages
 from core.capture import Capture, write_json
 from core.messages import Problem
+from core.settings import Settings
 
 from .geometry_table import markdown, write_section
 
@@ -83,6 +84,8 @@ def run_stages(capture: Capture, source: Path) -> tuple[dict, dict | None]:
     path = capture.root / "costs.json"
     costs = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
     for stage in stages.NAMES[:stages.NAMES.index(LAST) + 1]:
+        if stage in costs and capture.state(stages.by_name(stage), Settings()) == "done":
+            continue
         print(f"{capture.root.stem}: stage {stage}", flush=True)
         child = subprocess.run([sys.executable, "-m", "benchmarks.geometry_stage", str(source.absolute()), str(capture.root), stage], cwd=ROOT,
                                stdout=subprocess.PIPE, text=True, encoding="utf-8")
@@ -92,9 +95,8 @@ def run_stages(capture: Capture, source: Path) -> tuple[dict, dict | None]:
         cost = json.loads(lines[-1])
         if "problem" in cost:
             return costs, {"stage": stage, **cost}
-        if not cost.pop("skipped") or stage not in costs:
-            costs[stage] = cost
-            write_json(path, costs)
+        costs[stage] = cost
+        write_json(path, costs)
     return costs, None
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One stage of the chain in this very process, and what it cost: `python -m benchmarks.geometry_stage SOURCE CAPTURE STAGE`.
 
-The last line of the output is JSON: {"seconds", "peak_mb", "skipped"}, or {"problem", "remedy"} where the stage could not end well.
+Runs it even where it is fresh, and no other. The last line of the output is JSON: {"seconds", "peak_mb"}, or {"problem", "remedy"} where it could not end well.
 """
 
 from __future__ import annotations
@@ -19,14 +19,11 @@ from core.worker.runner import run_job
 
 
 def main(source: str, capture: str, stage: str) -> dict:
-    """Runs a stage (skipped where it is fresh) and reads this process's costs."""
+    """Runs a stage and reads this process's costs."""
     finished = []
-    job = write_job(Capture(Path(capture)), source=source, last=stage)
+    job = write_job(Capture(Path(capture)), source=source, first=stage, last=stage)
     end = run_job(job, lambda message: finished.append(message) if isinstance(message, StageDone) else None)
-    if not isinstance(end, Done):
-        return {"problem": end.problem, "remedy": end.remedy}
-    of_stage = next(message for message in reversed(finished) if message.stage == stage)
-    return {"seconds": of_stage.seconds, "peak_mb": peak_mb(), "skipped": of_stage.skipped}
+    return {"seconds": finished[-1].seconds, "peak_mb": peak_mb()} if isinstance(end, Done) else {"problem": end.problem, "remedy": end.remedy}
 
 
 def peak_mb() -> int:
