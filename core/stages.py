@@ -35,7 +35,7 @@ MAPS = ("diffuse_albedo.png", "diffuse_albedo.exr", "specular_albedo.png", "norm
 STAGES = (
     Stage("frames", "Frames", (), ("frames/",), "core.frames"),
     Stage("cameras", "Cameras", ("frames/",), ("cameras/",), "core.cameras", shared=("seed",)),
-    Stage("scan", "Scan", ("frames/", "cameras/"), ("scan.ply",), "core.scan"),
+    Stage("scan", "Scan", ("frames/", "cameras/"), ("scan.ply",), "core.scan", shared=("device",)),
     Stage("registration", "Head", ("frames/", "cameras/", "scan.ply"), ("head.obj", "landmarks.json"), "core.registration", wishes=("landmarks_artist.json",),
           data=("assets/head.obj", "assets/head.json", "assets/identity.npz", "assets/masks")),
     Stage("delight", "Delight", ("frames/", "cameras/", "head.obj"), ("delit/",), "core.delight"),

@@ -4,6 +4,7 @@
 
 import json
 
+import cv2
 import numpy as np
 import pycolmap
 import pytest
@@ -13,7 +14,9 @@ from core import images, meshes, raster, scan
 from core.capture import Capture
 from core.meshes import Mesh
 from core.messages import CancelledError, Problem, Reporter
+from core.scan.fusion import fuse
 from core.scan.pairs import choose_pairs
+from core.scan.stereo import DepthMap
 from core.settings import from_json
 from core.views import read_views
 
@@ -109,6 +112,19 @@ def _towards_front(centre: np.ndarray) -> np.ndarray:
     spots = spots[spots @ axis > 0.75][:200]
     directions = spots * RADII + CENTRE - centre
     return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+def test_what_floats_and_what_the_maps_disagree_about_is_left_out():
+    rng, maps = np.random.default_rng(0), []
+    for _ in range(8):
+        depth = np.full((100, 100), 0.40, np.float32)
+        depth[10:14, 10:14] = 0.34  # a hair in front of everything
+        depth[50:80, 50:80] += rng.choice([-0.008, 0.009], (30, 30))  # a curl that no two frames show alike
+        maps.append(DepthMap(np.eye(3), np.zeros(3), 250.0, np.array([-50.0, -50.0]), cv2.blur(depth, (3, 3)), 0.05, 0.0))
+    fused = fuse(maps, np.array([[-0.1, -0.1, 0.3], [0.1, 0.1, 0.45]]), 0.002)
+    assert fused.floating > 0 and abs(fused.mesh.vertices[:, 2] - 0.40).max() < 0.012
+    still = fuse(maps[:1] * 8, np.array([[-0.1, -0.1, 0.3], [0.1, 0.1, 0.45]]), 0.002)
+    assert still.disagreeing == 0
 
 
 def test_pairs_keep_their_baseline_and_go_all_around():

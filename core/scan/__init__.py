@@ -22,6 +22,9 @@ from . import rounds, splats
 
 HEAD_BOX = np.array([[-0.13, -0.08, -0.21], [0.13, 0.21, 0.19]])
 """Where a head lies in its world, in metres: the origin is midway between the eyes, the face looks along -Y."""
+MOST_DISAGREEING = 0.03
+"""Share of the surface that hair and highlights may take; more is a subject that moved."""
+
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """Writes capture.scan. Raises Problem where no pair of frames gives a surface."""
@@ -46,6 +49,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     if not by_splats:
         report.figure("left_right_disagreement_px", round(float(np.nanmedian([seen.disagreement for seen in maps])), 3))
     report.figure("seconds", round(time.monotonic() - started, 1))
+    if fused.disagreeing > MOST_DISAGREEING:
+        report.finding(f"The frames disagree about {100 * fused.disagreeing:.0f} % of the surface; it was left out of the scan.",
+                       "Film again with the head kept still, the hair tied back and nothing shiny on the skin.")
     images.write_srgb(capture.picture("scan", "surface"), _draw(mesh, views))
 
 

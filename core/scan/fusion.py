@@ -69,7 +69,9 @@ def fuse(maps: list[DepthMap], box: np.ndarray, voxel: float, tick: Callable[[in
     field = np.ones(shape * SIDE, np.float32)
     known = np.zeros(shape * SIDE, bool)
     index = tuple(voxels.T)
-    field[index], known[index] = mean, enough & agreeing
+    field[index], known[index] = np.where(enough & agreeing, mean, 1), enough & agreeing
+    for axis in range(3):  # a cube counts when all its corners are known: at an unknown one there is no crossing, but a curtain
+        known &= np.roll(known, -1, axis)
     found = _surface(field, known, low, voxel)
     return None if found is None else Fused(found[0], float((at_surface & ~agreeing).sum() / max(at_surface.sum(), 1)), found[1])
 
