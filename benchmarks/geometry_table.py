@@ -9,7 +9,7 @@ from pathlib import Path
 
 BEGIN, END = "<!-- begin: python -m benchmarks.geometry -->", "<!-- end: python -m benchmarks.geometry -->"
 ROWS = {"average": "plain average (L2)", "blend": "blend", "aligned": "aligned blend", "perceptual": "with perceptual step",
-        "delit": "aligned, own delit frames"}
+        "delit": "aligned, own delit frames, after one gain"}
 PICTURE = "geometry.jpg"
 
 
@@ -75,7 +75,7 @@ def _textures(results: dict) -> list[str]:
             if f and "not_run" in f:
                 rows.append([f"{name}: {label}", f"not run: {f['not_run']}", *["-"] * 6])
             elif f:
-                rows.append([f"{name}: {label}", _number(f.get("psnr"), 2, " dB"), *(_number(f.get(k), 3) for k in (
+                rows.append([f"{name}: {label}", _number(f.get("psnr_after_gain" if row == "delit" else "psnr"), 2, " dB"), *(_number(f.get(k), 3) for k in (
                     "ssim", "detail", "mole_contrast", "pore_contrast", "pore_correlation")), _number(f.get("seconds"), 0, " s")])
     return _table(["texture of the true albedo frames", "PSNR", "SSIM", "detail", "moles: contrast", "pores: contrast", "pores: correlation", "seconds"], rows)
 
