@@ -28,6 +28,8 @@ class FramesSettings:
     """Longer side of the extracted frames"""
     views: int = setting(16, min=3, max=64)
     """Sharp, evenly spread frames chosen for the texture (V in the paper)"""
+    mirrored: bool = setting(False)
+    """The pictures are mirrored, as a front camera may save them: flip them back. A head alone cannot show which way round it was"""
 
 
 @dataclass(frozen=True)

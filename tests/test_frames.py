@@ -181,6 +181,15 @@ def test_display_p3_photographs_are_brought_to_srgb(capture, tmp_path):
     assert np.abs(wide - skin).mean() > 0.005 and np.abs(wide - to_srgb(skin.astype(np.float32), 1, 12)).mean() < 0.01
 
 
+def test_mirrored_pictures_are_flipped_back(capture, tmp_path):
+    source = write_video(tmp_path / "clip.mp4", [moving_face(i) for i in range(4)])
+    take(capture, source)
+    plain = images.read_srgb(capture.frames / "00002.jpg")
+    record, _ = take(capture, source, mirrored=True)
+    assert np.abs(images.read_srgb(capture.frames / "00002.jpg")[:, ::-1] - plain).mean() < 0.01
+    assert all(f["face_box"] for f in record["frames"])
+
+
 def test_sharp_frames_spread_over_the_turn_are_chosen():
     rng = np.random.default_rng(0)
     sharp, turn = rng.random(200), np.linspace(-60, 60, 200)

@@ -49,7 +49,7 @@ def _apply_quality(self, context):
     preset = core_settings.preset(self.quality)
     for stage, kind in STAGE_KINDS.items():
         for f in fields(kind):
-            if f.name not in ("skin_tone", "folder", "delighter", "template", "new_atlas", "import_from"):  # about the face, not about quality
+            if f.name not in ("skin_tone", "folder", "delighter", "template", "new_atlas", "import_from", "mirrored"):  # about the face, not about quality
                 setattr(getattr(self, stage), f.name, getattr(getattr(preset, stage), f.name))
 
 

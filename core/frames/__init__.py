@@ -10,6 +10,7 @@ that is given the folder, sees one exposure. The mask of the person is not store
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     photographs = path.is_dir()
     read = read_photographs if photographs else read_video
     pictures = read(path, settings.frames.max_frames, settings.frames.long_side, report)
+    if settings.frames.mirrored:
+        pictures = (replace(picture, srgb=np.ascontiguousarray(picture.srgb[:, ::-1])) for picture in pictures)
     with replacing_folder(capture.frames) as folder:
         records, thumbnails, contents = _write_frames(pictures, folder, report)
         _check(records, thumbnails, photographs)
