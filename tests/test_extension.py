@@ -20,7 +20,7 @@ TAGS = SCRIPTS / "modules" / "_bpy_internal" / "extensions" / "tags.py"
 
 # Every file of the zip matches one of these.
 WANTED = (
-    r"__init__\.py", r"blender_manifest\.toml", r"LICENSE", r"README\.md", r"requirements/(worker|nets|perceptual)\.txt",
+    r"__init__\.py", r"blender_manifest\.toml", r"LICENSE", r"README\.md", r"requirements/(worker|nets|perceptual|cuda)\.txt",
     r"wildcap_addon/([a-z_]+/)?[a-z_]+\.py",
     r"core/README\.md", r"core/[a-z_]+\.py",
     r"core/(worker|frames|cameras|scan|registration|delight|texture|shadow_mask|solve|transfer|upscale)/[a-z0-9_]+\.py",
