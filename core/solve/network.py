@@ -3,8 +3,7 @@
 """The prior's network: a U-Net of modulated residual blocks, and EDM's preconditioning around it (Karras et al. 2022).
 
 Parameter names and arithmetic are those of the `image_v1` models the method's authors trained, so their state dict loads as it is.
-Two choices are ours: `norm: pixel` normalises each texel over its channels, so that a patch and a whole map are treated alike, and
-`patch_size: 2` works on 2x2 blocks of texels.
+One choice is ours: `norm: pixel` normalises each texel over its channels, so that a patch and a whole map are treated alike.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ import math
 import torch
 from torch import nn
 from torch.nn import functional
+from torch.utils.checkpoint import checkpoint
 
 
 def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: torch.Tensor, mapping_condition: torch.Tensor | None = None,
@@ -29,33 +29,41 @@ def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: torc
         mean, spread = torch.zeros_like(x), torch.full((1, 1, 1, 1), network.sigma_data, device=x.device)
         condition = condition / (s * s + spread**2).sqrt()
     total = (s * s + spread**2).sqrt()
-    inner = network(torch.cat([(x - mean) / total, condition], 1), sigma, mapping_condition)
+    dtype = network.proj_in.weight.dtype
+    inner = network(torch.cat([((x - mean) / total).to(dtype), condition.to(dtype)], 1), sigma, mapping_condition)
     return mean + inner.float() * (s * spread / total) + (x - mean) * (spread / total) ** 2
 
 
 class UNet(nn.Module):
-    """F(x, sigma): depths and channels per level, finest first. Input [N, data + condition, H, W], output [N, data, H, W]."""
+    """F(x, sigma): depths and channels per level, finest first. Input [N, data + condition, H, W], output [N, data, H, W].
+
+    With `patch_size` p it works on p x p blocks of texels. The first `skip_stages` levels exist but are left out, and the next one takes the map as it
+    is (progressive growing). With `has_variance` the last channel estimates the loss, which sampling does not need.
+    """
 
     def __init__(self, data_channels: int, condition_channels: int, mapping_out: int, depths: list[int], channels: list[int],
-                 attention: list[bool] | None = None, patch_size: int = 1, mapping_cond_dim: int = 0, sigma_data: float = 0.5, norm: str = "group"):
+                 attention: list[bool] | None = None, patch_size: int = 1, mapping_cond_dim: int = 0, sigma_data: float = 0.5, norm: str = "group",
+                 skip_stages: int = 0, has_variance: bool = False):
         super().__init__()
         attention = attention or [False] * len(depths)
-        self.patch_size, self.sigma_data = patch_size, sigma_data
-        self.multiple = patch_size * 2 ** (len(depths) - 1)
+        self.patch_size, self.sigma_data, self.skip_stages, self.has_variance = patch_size, sigma_data, skip_stages, has_variance
+        self.low_memory = False  # a third more work for the gradient, for a fraction of the memory
+        self.multiple = patch_size * 2 ** (len(depths) - 1 - skip_stages)
         self.timestep_embed = _Fourier(mapping_out)
         self.mapping_cond = nn.Linear(mapping_cond_dim, mapping_out, bias=False) if mapping_cond_dim else None
         self.mapping = nn.Sequential(nn.Linear(mapping_out, mapping_out), nn.GELU(), nn.Linear(mapping_out, mapping_out), nn.GELU())
-        self.proj_in = nn.Conv2d((data_channels + condition_channels) * patch_size**2, channels[0], 1)
-        self.proj_out = nn.Conv2d(channels[0], data_channels * patch_size**2, 1)
+        outer = channels[max(0, skip_stages - 1)]
+        self.proj_in = nn.Conv2d((data_channels + condition_channels) * patch_size**2, outer, 1)
+        self.proj_out = nn.Conv2d(outer, data_channels * patch_size**2 + has_variance, 1)
         nn.init.zeros_(self.proj_out.weight)
         nn.init.zeros_(self.proj_out.bias)
         down, up = [], []
         for level, (depth, width) in enumerate(zip(depths, channels, strict=True)):
             above = channels[max(0, level - 1)]
-            deepest = level == len(depths) - 1
-            down.append(_block(mapping_out, [above] + [width] * (depth - 1), width, width, attention[level], norm, first=_Down() if level else nn.Identity()))
+            deepest, halved = level == len(depths) - 1, level > skip_stages
+            down.append(_block(mapping_out, [above] + [width] * (depth - 1), width, width, attention[level], norm, first=_Down() if halved else nn.Identity()))
             up.append(_block(mapping_out, [width if deepest else 2 * width] + [width] * (depth - 1), width, above, attention[level], norm,
-                             last=_Up() if level else nn.Identity()))
+                             last=_Up() if halved else nn.Identity()))
         self.u_net = nn.ModuleDict({"d_blocks": nn.ModuleList(down), "u_blocks": nn.ModuleList(up[::-1])})
 
     def lower(self, dtype: torch.dtype) -> UNet:
@@ -77,13 +85,13 @@ class UNet(nn.Module):
             x = functional.pixel_unshuffle(x, self.patch_size)
         x = self.proj_in(x.contiguous(memory_format=torch.channels_last))
         skips = []
-        for blocks in self.u_net["d_blocks"]:
-            x = _run(blocks, x, mapped)
+        for blocks in self.u_net["d_blocks"][self.skip_stages:]:
+            x = _run(blocks, x, mapped, self.low_memory)
             skips.append(x)
-        for level, blocks in enumerate(self.u_net["u_blocks"]):
+        for level, blocks in enumerate(self.u_net["u_blocks"][:len(skips)]):
             skip = skips.pop()
-            x = _run(blocks, x if level == 0 else torch.cat([x, skip], 1), mapped)
-        x = self.proj_out(x)
+            x = _run(blocks, x if level == 0 else torch.cat([x, skip], 1), mapped, self.low_memory)
+        x = self.proj_out(x)[:, :-1] if self.has_variance else self.proj_out(x)
         return functional.pixel_shuffle(x, self.patch_size) if self.patch_size > 1 else x
 
 
@@ -95,13 +103,15 @@ def _block(mapping: int, inputs: list[int], width: int, out: int, attention: boo
         c_out = out if last is not None and i == len(inputs) - 1 else width
         layers.append(_Residual(mapping, c_in, width, c_out, norm))
         if attention:
-            layers.append(_Attention(mapping, c_out, out, norm))
+            layers.append(_Attention(mapping, c_out, norm))
     return nn.ModuleList(layers if last is None else [*layers, last])
 
 
-def _run(blocks: nn.ModuleList, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
+def _run(blocks: nn.ModuleList, x: torch.Tensor, mapped: torch.Tensor, low_memory: bool) -> torch.Tensor:
+    """The layers one after the other. In low memory only their inputs are kept for the gradient, and what is inside them is computed a second time."""
     for layer in blocks:
-        x = layer(x, mapped) if isinstance(layer, _Residual | _Attention) else layer(x)
+        given = (x, mapped) if isinstance(layer, _Residual | _Attention) else (x,)
+        x = checkpoint(layer, *given, use_reentrant=False) if low_memory and x.requires_grad else layer(*given)
     return x
 
 
@@ -144,10 +154,10 @@ class _Norm(nn.Module):
 class _Attention(nn.Module):
     """Self attention over all texels; heads of 64 channels."""
 
-    def __init__(self, mapping: int, channels: int, block_out: int, norm: str):
+    def __init__(self, mapping: int, channels: int, norm: str):
         super().__init__()
         self.heads = max(1, channels // 64)
-        self.norm_in = _Norm(mapping, channels, max(1, block_out // 32), norm)
+        self.norm_in = _Norm(mapping, channels, max(1, channels // 32), norm)
         self.qkv_proj = nn.Conv2d(channels, 3 * channels, 1)
         self.out_proj = nn.Conv2d(channels, channels, 1)
 
@@ -188,6 +198,7 @@ class _Up(nn.Module):
 
 
 def from_state(state: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
-    """A released state dict's weights under our names: no wrapper prefix, no constant resampling kernels."""
-    state = {name.removeprefix("inner_model."): value for name, value in state.items()}
+    """A released state dict's weights under our names: no wrappers' prefixes, however many, and no constant resampling kernels."""
+    while state and all(name.startswith("inner_model.") for name in state):
+        state = {name.removeprefix("inner_model."): value for name, value in state.items()}
     return {name: value for name, value in state.items() if not name.endswith(".kernel")}

@@ -15,6 +15,7 @@ import torch
 from safetensors import safe_open
 
 from ..messages import Problem
+from . import released
 from .network import UNet, denoise, from_state
 
 WEIGHTS = Path(__file__).parent.parent / "weights" / "prior.safetensors"
@@ -25,8 +26,11 @@ class Prior:
 
     Ours models what differs from the mean face of the subject's skin tone (`tone`, linear RGB [3]): a dark patch alone cannot say whether its skin
     or its light is dark. mean_face [7, S, S] covers the UV square: albedo over skin tone, normal, 2 * specular - 1; spread [7]: deviation of skins
-    from it, of the albedo in units of the tone. The released priors have neither and take no tone.
+    from it, of the albedo in units of the tone. The released priors have neither and take no tone; their coordinates are not those of texel centres
+    (`centred`), they bring the noise levels they were trained on (`sigmas`, least and largest), and know maps of one size only (`one_scale`).
     """
+
+    centred, sigmas, one_scale = True, None, False
 
     def __init__(self, network: UNet, octaves: int = 0, mean_face: torch.Tensor | None = None, spread: torch.Tensor | None = None, tones: list | None = None):
         self.network = network.eval().requires_grad_(False)
@@ -39,15 +43,41 @@ class Prior:
         """The expected clean map given x at noise level sigma. coords [N, 2, H, W] from `coordinates`, one texel apart in the map's own scale."""
         device = self.network.proj_in.weight.device  # the map may live elsewhere: the network is all that is slow
         if self._known.get("coords") is not coords:
-            known = condition(coords, self.octaves, self.mean_face, self.spread, self.tone[None]) if self.mean_face is not None else {
-                "condition": positional_encoding(coords, self.octaves)}
+            known = self._condition(coords)
             self._known = {"coords": coords, **{name: value.to(device) for name, value in known.items()}}
         sigmas = torch.full((len(x),), float(sigma), device=device)
         return denoise(self.network, x.to(device), sigmas, **{k: v for k, v in self._known.items() if k != "coords"}).to(x.device)
 
+    def _condition(self, coords: torch.Tensor) -> dict[str, torch.Tensor]:
+        return condition(coords, self.octaves, self.mean_face, self.spread, self.tone[None])
+
     def use_tone(self, tone: torch.Tensor) -> None:
         """Conditions the prior on a skin tone, linear RGB [3]."""
         self.tone, self._known = tone, {}
+
+
+class ReleasedPrior(Prior):
+    """One of the authors' own, in the UV layout it was trained in (layout.py). `kind` is what it is conditioned on: coord, posenc or noise; the fixed
+    random map `noise` [1, 3, S, S] of the last is not in their checkpoint."""
+
+    centred, one_scale = False, True
+
+    def __init__(self, network: UNet, kind: str, octaves: int, sigmas: tuple[float, float] | None, noise: torch.Tensor | None):
+        super().__init__(network, octaves)
+        self.kind, self.sigmas, self.noise = kind, sigmas, noise
+
+    def check(self) -> None:
+        """Raises Problem where it loads but cannot sample."""
+        if self.kind == "noise" and self.noise is None:
+            raise Problem("This prior is conditioned on a fixed random map, which is not in its folder.",
+                          f"Save the map it was trained with beside ckpt.pth as {released.NOISE_FILE}, float32 of shape 3, S, S.")
+
+    def _condition(self, coords: torch.Tensor) -> dict[str, torch.Tensor]:
+        self.check()
+        if self.kind != "noise":
+            return {"condition": positional_encoding(coords, self.octaves)}
+        columns, rows = ((coords + 1) / 2 * self.noise.shape[-1]).round().long().clamp(0, self.noise.shape[-1] - 1).unbind(1)
+        return {"condition": self.noise[0][:, rows, columns].transpose(0, 1)}
 
 
 def condition(coords: torch.Tensor, octaves: int, mean_face: torch.Tensor, spread: torch.Tensor, tone: torch.Tensor) -> dict[str, torch.Tensor]:
@@ -72,11 +102,13 @@ def load(path: Path = WEIGHTS, device: str = "cpu", dtype: torch.dtype | None = 
     Map-sized work runs in `dtype`, by default bfloat16 where the processor has it. Raises Problem for files that are missing or of another kind.
     """
     path = Path(path)
-    try:
-        prior = _load_released(path) if path.is_dir() else _load_ours(path)
-    except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
-        raise Problem(f"The prior {path} cannot be loaded ({type(error).__name__}: {error}).",
-                      "Reinstall the extension, or choose a folder that holds config.json and ckpt.pth.") from error
+    if path.suffix != WEIGHTS.suffix:
+        prior = _load_released(path)
+    else:
+        try:
+            prior = _load_ours(path)
+        except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
+            raise Problem(f"The prior {path} cannot be loaded ({type(error).__name__}: {error}).", "Reinstall the extension.") from error
     prior.network.to(device).lower(dtype or fast_dtype(device))
     return prior
 
@@ -94,7 +126,8 @@ def build(config: dict) -> UNet:
     channels = {"coord": 2, "posenc": 2 + 4 * int(cond.get("pos_enc_freq", 0)), "noise": 3}[cond.get("type", "coord")]
     augmented = 9 if model.get("augment_wrapper", True) else 0
     return UNet(model["input_channels"], channels, model["mapping_out"], model["depths"], model["channels"], model.get("self_attn_depths"),
-                model.get("patch_size", 1), augmented + model.get("mapping_cond_dim", 0), model.get("sigma_data", 1.0), model.get("norm", "group"))
+                model.get("patch_size", 1), augmented + model.get("mapping_cond_dim", 0), model.get("sigma_data", 1.0), model.get("norm", "group"),
+                model.get("skip_stages", 0), model.get("has_variance", False))
 
 
 def coordinates(size: int, rows: slice, columns: slice, centred: bool = True) -> torch.Tensor:
@@ -122,15 +155,14 @@ def _load_ours(path: Path) -> Prior:
     return Prior(network, card["cond"]["pos_enc_freq"], mean_face, spread, card["tones"])
 
 
-def _load_released(folder: Path) -> Prior:
-    config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
-    kind = config["model"].get("type", "image_v1")
-    if kind != "image_v1":
-        raise ValueError(f"models of type {kind} are not supported")
-    cond = config.get("cond", {})
-    if cond.get("type", "coord") == "noise":
-        raise ValueError("a prior conditioned on a fixed random map needs that map")
-    state = torch.load(folder / "ckpt.pth", map_location="cpu", weights_only=True)
-    network = build(config)
-    network.load_state_dict(from_state(state.get("model_ema", state)))
-    return Prior(network, int(cond.get("pos_enc_freq", 0)) if cond.get("type") == "posenc" else 0)
+def _load_released(folder: Path) -> ReleasedPrior:
+    config = released.read_config(folder)
+    network, state = build(config), from_state(released.read_weights(folder))
+    try:
+        network.load_state_dict(state)
+    except RuntimeError as error:
+        first = str(error).strip().splitlines()[1:2] or [str(error)]
+        raise Problem(f"{folder / 'ckpt.pth'} does not fit the config.json beside it ({first[0].strip()}).", released.CHOOSE) from error
+    model, cond = config["model"], config["cond"]
+    sigmas = (float(model["sigma_min"]), float(model["sigma_max"])) if {"sigma_min", "sigma_max"} <= set(model) else None
+    return ReleasedPrior(network, cond["type"], cond.get("pos_enc_freq", 0) if cond["type"] == "posenc" else 0, sigmas, released.read_noise(folder))
