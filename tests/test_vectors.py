@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parity with the authors' released modules, by input and output arrays alone. The folder is WILDCAP_VECTORS, or shared/vectors beside the checkout."""
+"""Parity with the authors' released modules, by input and output arrays alone. The folder is WILDCAP_VECTORS, or shared/vectors beside the checkout;
+every set found there is run."""
 
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +12,8 @@ import numpy as np
 import pytest
 import torch
 
-from core.solve import prior
+from core.solve import maps, prior
+from core.solve.initial import mean_tone
 from core.solve.light_fit import light_loss
 from core.solve.lighting import Lights, Shader, interpolation, sh_basis
 from core.solve.network import denoise
@@ -20,6 +23,8 @@ from core.solve.sampler import ancestral, karras, sample
 
 VECTORS = Path(os.environ.get("WILDCAP_VECTORS", Path(__file__).parents[2] / "shared" / "vectors"))
 pytestmark = pytest.mark.skipif(not VECTORS.is_dir(), reason=f"the parity vectors are not at {VECTORS}")
+PRIORS = sorted(p.name for p in VECTORS.glob("prior_v1_*"))
+LOOPS = sorted(p.stem for p in VECTORS.glob("miniloop/*.npz"))
 
 
 def arrays(name: str) -> dict[str, torch.Tensor]:
@@ -70,15 +75,17 @@ def test_vectors_schedule():
 
 def test_vectors_coordinates():
     v = arrays("coord.npz")
-    whole = prior.coordinates(32, slice(0, 32), slice(0, 32), centred=False)
-    close(whole[0], v["coord32"])
-    close(prior.positional_encoding(whole, 4)[0], v["posenc32_f4"])
-    close(prior.coordinates(1024, slice(0, None, 97), slice(0, None, 89), centred=False)[0], v["coord1024_rows_97_cols_89"])
+    for key, wanted in v.items():
+        kind, size, a, b = re.fullmatch(r"(coord|posenc)(\d+)(?:_f(\d+)|_rows_(\d+)_cols_\d+)?", key).groups()
+        steps = [slice(0, None, int(n)) for n in re.findall(r"_(?:rows|cols)_(\d+)", key)] or [slice(None), slice(None)]
+        coords = prior.coordinates(int(size), *steps, centred=False)
+        close((prior.positional_encoding(coords, int(a)) if kind == "posenc" else coords)[0], wanted)
 
 
 def test_vectors_losses():
     v = arrays("losses.npz")
     close(blurred(v["blur_in"][0]), v["blur_out"][0])
+    close(mean_tone(v["diff"][0], v["shadow_mask"]), v["skin_tone"][0])
     # our light loss, made of the same terms: with the ring as given and weight zero only the regularisers remain
     shade, main, ring = v["shade"][0], v["shade_main"][0], v["tv_ring_mask"][0, 0] > 0.5
 
@@ -94,23 +101,29 @@ def test_vectors_losses():
     assert light_loss(None, zero, o, Recipe(tv=1.0, neg=0.0, smooth=0.0)).item() == pytest.approx(v["tv_ring_of_shade"].item(), rel=1e-5)
 
 
-@pytest.mark.parametrize("folder", sorted(p.name for p in VECTORS.glob("prior_v1_*")) or ["prior_v1_coord"])
+@pytest.mark.parametrize("folder", PRIORS or ["prior_v1_coord"])
 def test_vectors_released_prior(folder):
     """The authors' layout of config.json and ckpt.pth loads, and gives their values and gradients."""
     v = arrays(f"{folder}/io.npz")
     network = prior.load(VECTORS / folder, dtype=torch.float32).network
-    close(network(torch.cat([v["x"], v["cond"]], 1), v["sigma"]), v["inner_on_raw_input"])
+    mapping = v.get("mapping_cond")
+    if mapping is not None and mapping.shape[1] < network.mapping_cond.in_features:  # the augmentation's nine numbers are zero, and come first
+        mapping = torch.nn.functional.pad(mapping, (network.mapping_cond.in_features - mapping.shape[1], 0))
+    if "inner_on_raw_input" in v:
+        close(network(torch.cat([v["x"], v["cond"]], 1), v["sigma"], mapping), v["inner_on_raw_input"])
     x = v["x"].clone().requires_grad_(True)
-    denoised = denoise(network, x, v["sigma"], v["cond"])
+    denoised = denoise(network, x, v["sigma"], v["cond"], mapping)
     close(denoised.detach(), v["denoised"])
     close(torch.autograd.grad((denoised * v["w"]).sum(), x)[0], v["grad_x"], 2e-4)
 
 
-@pytest.mark.parametrize("run", ["pho0_prior_only", "pho1"])
+@pytest.mark.parametrize("run", LOOPS or ["pho1"])
 def test_vectors_miniloop(run):
     """The whole released loop, step by step: proximal candidates, decade clip, lights in stages, and the traces of x, denoised and both lights."""
     v = arrays(f"miniloop/{run}.npz")
     rows, columns = slice(2, 34), slice(4, 36)
+    if "prior_v1_coord" not in PRIORS:
+        pytest.skip(f"the loop's prior, {VECTORS / 'prior_v1_coord'}, is missing")
     network = prior.load(VECTORS / "prior_v1_coord", dtype=torch.float32)
 
     def crop(name):
@@ -122,7 +135,7 @@ def test_vectors_miniloop(run):
                     v["in_tv_ring"][0, 0] > 0.5)
     reference = torch.cat([2 * crop("in_init_diff") - 1, crop("in_init_normal"), 2 * crop("in_init_spec") - 1])[None]
     recipe = replace(RECIPES["released"], steps=12, start=0.6, candidates=3, phases=(("main", 0.0, 5 / 12), ("grid", 5 / 12, 10 / 12)),
-                     zeta=1.0 if run == "pho1" else 0.0)
+                     zeta=0.0 if run.startswith("pho0") else 1.0)
 
     def noise(step):
         drawn = [*([v["init_noise"]] if step == 0 else []), *(v["cand_noise"][step, :, None] if step < 11 else [])]
@@ -141,3 +154,7 @@ def test_vectors_miniloop(run):
     with torch.no_grad():
         close(albedo(last.denoised), v["out_diff"][0], 2e-4)
         close(blurred(albedo(last.denoised) * shader.total(last.lights)), v["out_shading"][0], 4e-4)
+        diffuse, skin = torch.zeros(3, 40, 40), v["in_skin_mask"][0, 0]
+        diffuse[:, rows, columns] = albedo(last.denoised).clamp_min(0)
+        tone = mean_tone(v["in_init_diff"][0] ** (1 / 2.2), skin) ** 2.2
+        close((diffuse * maps._gain(diffuse, skin, tone, "srgb")[:, None, None]) ** (1 / 2.2), v["out_diff_srgb_rescaled"][0], 1e-3)
