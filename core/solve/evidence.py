@@ -28,7 +28,7 @@ MASK_FADE = 2.0  # deviation in texels over which a hard mask's border fades
 class Evidence:
     """texture [3, S, S] linear; weight [S, S]: how far it counts, 0 where nobody looked; alpha [S, S]: the soft shadow mask M; normal [3, S, S], unit, world
     space, N_c; covered bool [S, S]: texels of the head; skin [S, S]: facial skin without lips, brows and eyes; trust [S, S]: 1, less where a texel's
-    colour says little of the light."""
+    colour says little of the light; protected [S, S]: what the artist keeps out of M; edge [S, S]: how far M's border lies on a shadow's edge that is seen."""
 
     texture: torch.Tensor
     weight: torch.Tensor
@@ -37,6 +37,8 @@ class Evidence:
     covered: torch.Tensor
     skin: torch.Tensor
     trust: torch.Tensor
+    protected: torch.Tensor
+    edge: torch.Tensor
 
     @property
     def size(self) -> int:
@@ -67,13 +69,14 @@ def read_evidence(capture: Capture, size: int) -> Evidence:
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
     mask = images.read_mask(capture.shadow_mask if capture.shadow_mask.is_file() else capture.shadow_mask_auto)
     protected = images.read_mask(capture.protect_mask) if capture.protect_mask.is_file() else np.zeros_like(mask)
-    alpha = softened(_sized(mask, size)) * (1 - _sized(protected, size))
+    protected = _sized(protected, size)
+    alpha = softened(_sized(mask, size)) * (1 - protected)
     skin = template.mask("skin", size) * template.mask("face", size)
     skin = skin * (1 - template.mask("eyes", size))
     weight = np.where(covered, np.clip(seen / TRUSTED, 0, 1), 0)
     tensors = [np.ascontiguousarray(a, np.float32) for a in (texture.transpose(2, 0, 1), weight, np.where(covered, alpha, 0), normal.transpose(2, 0, 1))]
     unlike_skin = np.maximum.reduce([template.mask(name, size) for name in ("brows", "lips", "eyes", "nostrils", "scalp")])
-    parts = [torch.from_numpy(np.ascontiguousarray(a, np.float32)) for a in (skin, 1 - (1 - FEATURE_TRUST) * unlike_skin)]
+    parts = [torch.from_numpy(np.ascontiguousarray(a, np.float32)) for a in (skin, 1 - (1 - FEATURE_TRUST) * unlike_skin, protected, np.zeros_like(alpha))]
     return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts)
 
 
@@ -94,12 +97,13 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
         size = evidence.size // factor
         if factor > 1 and (size < REFERENCE // 4 or size % multiple or evidence.size % factor):
             continue
-        weight, alpha, trust = (torch.from_numpy(_sized(a.numpy(), size)) for a in (evidence.weight, evidence.alpha, evidence.trust))
+        weight, alpha, trust, edge = (torch.from_numpy(_sized(a.numpy(), size)) for a in (evidence.weight, evidence.alpha, evidence.trust, evidence.edge))
         texture = _shrunk(evidence.texture * evidence.weight, size) / weight.clamp_min(1e-4) * exposure
         normal = torch.nn.functional.normalize(_shrunk(evidence.normal, size), dim=0)
         inside = (alpha > (0.5 if recipe.hard_mask else 0)).numpy().astype(np.uint8)
         support = cv2.dilate(inside, np.ones((5, 5)))  # M and two texels around it
         ring = (support > 0) & ((inside == 0) if recipe.hard_mask else (alpha.numpy() < 0.5))
+        ring &= edge.numpy() < 0.5  # a border that lies on a shadow's edge shall not be seamless
         modulation = torch.from_numpy(support.astype(np.float32)) if recipe.hard_mask else alpha
         coords = coordinates(size, slice(0, size), slice(0, size), centred)
         shader = Shader(normal, modulation, cells, recipe.bilinear)

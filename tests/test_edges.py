@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The shadow's edge under a rough mask: found where it is, as wide as it is, and left alone where there is none; and what the real solve leaves of it."""
+
+import cv2
+import numpy as np
+import pytest
+import torch
+
+from core import images, meshes, template
+from core.capture import Capture
+from core.solve import initial, maps
+from core.solve.edges import BAND, INWARD, penumbra, place
+from core.solve.evidence import read_evidence, softened
+from core.solve.prior import load
+from core.solve.recipes import OURS
+from core.solve.sampler import sample, seeded
+
+SIZE = 512
+TAKEN = np.array([0.62, 0.55, 0.48])  # the share of the light that the shadow takes
+MELANIN = np.array([0.5, 0.8, 1.0])  # what a mole takes of the skin's reflectance, natural log units
+
+
+def shadowed(width, size=SIZE, centre=(0.655, 0.56), radius=90.0, grown=8, moved=(3, -3)):
+    """(distance to the edge in texels of a 1024 map, positive outside; share of the shadow; a hard mask grown and moved by so many texels)."""
+    texel = 1024 / size
+    y, x = (np.mgrid[:size, :size] + 0.5) * texel
+    distance = np.hypot(x - 1024 * centre[0], y - 1024 * centre[1]) - radius
+    shadow = penumbra(distance, np.float32(max(width, texel)))
+    painted = np.hypot(x - 1024 * centre[0] - moved[1], y - 1024 * centre[1] - moved[0]) < radius + grown
+    return distance, shadow, painted.astype(np.float32)
+
+
+def pores(size, strength=0.05):
+    noise = cv2.GaussianBlur(np.random.default_rng(0).normal(size=(size, size)), (0, 0), 1.0)
+    return np.exp(strength * noise / noise.std())[..., None]
+
+
+@pytest.mark.parametrize("width", [0, 2, 6, 12])
+def test_alpha_lies_on_the_penumbra(width):
+    distance, shadow, painted = shadowed(width)
+    light = pores(SIZE) * (1 - shadow[..., None] * TAKEN)
+    edge = place(light, softened(painted), np.ones((SIZE, SIZE), np.float32))
+    near = np.abs(distance) < 25
+    before, after = (np.abs(alpha - shadow)[near].mean() for alpha in (softened(painted), edge.alpha))
+    assert after < 0.01 and after < 0.1 * before
+    assert np.abs(edge.alpha - shadow)[np.abs(distance) > width / 2 + 4].max() < 0.05  # no halo to either side
+    assert np.abs(edge.colour - TAKEN / TAKEN.mean()).max() < 0.05
+    assert edge.found[np.abs(distance) < BAND - 2].min() > 0.9 and edge.found[np.abs(distance) > BAND + 4].max() == 0
+
+
+def test_a_mask_without_a_shadow_stays_as_it_was_painted():
+    painted = softened(shadowed(0)[2])
+    edge = place(pores(SIZE) * np.ones(3), painted, np.ones((SIZE, SIZE), np.float32))
+    assert np.array_equal(edge.alpha, painted) and edge.found.max() == 0
+
+
+@pytest.mark.parametrize("painted", [np.zeros((64, 64), np.float32), np.ones((64, 64), np.float32), np.eye(64, dtype=np.float32) * (np.arange(64) == 30)])
+def test_any_mask_gives_a_finite_alpha(painted):
+    light = np.random.default_rng(0).uniform(0.2, 1, (64, 64, 3))
+    for weight in (0, 1):
+        alpha = place(light, painted, np.full((64, 64), weight, np.float32)).alpha
+        assert np.isfinite(alpha).all() and alpha.min() >= 0 and alpha.max() <= 1
+
+
+def test_a_step_of_another_colour_is_not_the_shadows():
+    """The mask covers a shadow and, elsewhere, something brown such as a patch of hair: alpha goes to the shadow's edge and leaves the other alone."""
+    _, shadow, painted = shadowed(2, centre=(0.7, 0.5))
+    _, patch, around = shadowed(2, centre=(0.25, 0.5), radius=60.0)
+    light = (1 - shadow[..., None] * TAKEN) * np.exp(-patch[..., None] * MELANIN)
+    mask = softened(np.maximum(painted, around))
+    edge = place(light * pores(SIZE), mask, np.ones((SIZE, SIZE), np.float32))
+    left = np.arange(SIZE) < SIZE // 2
+    assert np.abs(edge.alpha - shadow)[:, ~left].mean() < 0.1 * np.abs(mask - shadow)[:, ~left].mean()
+    assert np.abs(edge.alpha - mask)[:, left].max() < 0.15
+
+
+def test_deep_strokes_are_never_taken_back():
+    """A lit island in the middle of a large stroke: the artist said shadow."""
+    size = SIZE
+    y, x = (np.mgrid[:size, :size] + 0.5) * 2
+    shadow = ((np.hypot(x - 500, y - 500) < 200) & (np.hypot(x - 500, y - 500) > 60)).astype(np.float32)
+    painted = softened((np.hypot(x - 500, y - 500) < 206).astype(np.float32))
+    edge = place(1 - shadow[..., None] * TAKEN, painted, np.ones((size, size), np.float32))
+    assert edge.alpha[np.hypot(x - 500, y - 500) < 206 - INWARD - BAND].min() == 1
