@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 import pytest
 
-from core import atlas, images, meshes, raster, stages, surfaces, transfer
+from core import atlas, baking, images, meshes, raster, stages, surfaces, transfer
 from core.capture import Capture
 from core.meshes import Mesh, vertex_normals
 from core.messages import CancelledError, Problem, Reporter
 from core.settings import from_json
-from core.transfer import baking, scan
+from core.transfer import scan
 
 from .painted_egg import capture_of, egg, skin
 

@@ -19,11 +19,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from .. import images, registration, template
+from .. import baking, images, registration, template
 from ..capture import replacing_folder
 from ..messages import Problem, Reporter
 from ..registration import own_mesh, own_template, render_landmarks
-from ..transfer import baking
 
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".exr")
 FAR_M = 0.010
@@ -48,7 +47,8 @@ def carry(folder: Path, out: Path, mesh: Path | None, size: int, report: Reporte
             shots.append(_marked(srgb))
         images.write_data(made / "known.png", at.known.astype(np.float32))
         images.write_srgb(made / "sheet.jpg", _grid(shots))
-        told = {"from": folder.name, "mesh": heads[0].name, "size_px": size, "skins": [path.stem for path in pictures],
+        notices = [path.read_text(encoding="utf-8") for path in sorted(folder.glob("LICENSE*"))]  # whatever is made of the skins must carry them
+        told = {"from": folder.name, "notices": notices, "mesh": heads[0].name, "size_px": size, "skins": [path.stem for path in pictures],
                 "known_percent": round(100 * float(at.known.mean()), 1), "mesh_to_head_median_mm": round(1e3 * float(np.median(fitted.distances)), 3),
                 "mesh_to_head_p95_mm": round(1e3 * float(np.percentile(fitted.distances, 95)), 3), "flipped_triangles": fitted.flipped}
         (made / "carried.json").write_text(json.dumps(told, indent=1), encoding="utf-8")

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import atlas, images, meshes, stages
+from .. import atlas, baking, images, meshes, stages
 from ..capture import Capture, replacing_folder
 from ..meshes import Mesh
 from ..messages import Reporter
 from ..settings import Settings
 from ..views import read_views
-from . import baking, drawing, scan
+from . import drawing, scan
 
 OWN_FAR_M = 0.012
 """Farthest that the artist's fitted mesh and the head may lie apart."""

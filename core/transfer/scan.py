@@ -14,9 +14,9 @@ import numpy as np
 import trimesh
 
 from .. import atlas, images, raster, surfaces
+from ..baking import STRIP, Places
 from ..meshes import Mesh, vertex_normals
 from ..views import View
-from .baking import STRIP, Places
 
 LEAST_PART = 0.02
 """Share of all triangles under which a loose part is dropped as a floater."""
