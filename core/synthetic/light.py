@@ -166,7 +166,8 @@ def _in_the_way(x: np.ndarray, y: np.ndarray, blur: float, kind: str, rng: np.ra
 
 
 @lru_cache(maxsize=2)
-def _template_transfer() -> np.ndarray:
+def sky_transfer() -> np.ndarray:
+    """`transfer` of the built-in head's vertices [V, 9]; computed once per process."""
     mesh = template.load()
     return transfer(mesh.vertices, vertex_normals(mesh), raster.RayCaster(mesh))
 
@@ -175,5 +176,5 @@ def _transfer_of(mesh: Mesh, caster: raster.RayCaster) -> np.ndarray:
     """Per vertex [V, 9]; the template's is computed once per process."""
     same = template.load()
     if mesh.vertices.shape == same.vertices.shape and np.array_equal(mesh.vertices, same.vertices):
-        return _template_transfer()
+        return sky_transfer()
     return transfer(mesh.vertices, vertex_normals(mesh), caster)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,10 +40,13 @@ class SkinParameters:
     scalp_hair: float = 0.8  # cover of cropped hair
     hair_colour: tuple[float, float, float] = (0.03, 0.02, 0.014)  # albedo of scalp and beard, linear sRGB
     brow_colour: tuple[float, float, float] = (0.03, 0.02, 0.014)
+    scars: float = 0.0  # expected number
+    make_up: float = 0.0  # 0 none, 1 lips, lids, lashes and cheeks painted in full
     tone_seed: int = 0
     mole_seed: int = 0
     pore_seed: int = 0
     hair_seed: int = 0
+    adorn_seed: int = 0  # of scars and make-up
 
 
 def sample_parameters(seed: int) -> SkinParameters:
@@ -70,6 +73,15 @@ def sample_parameters(seed: int) -> SkinParameters:
         brow_density=float(rng.uniform(0.5, 1.4) * (1.15 if male else 0.85)), scalp_hair=float(rng.uniform(0.25, 1.0)),
         hair_colour=_greyed(hair, grey), brow_colour=_greyed(hair * 0.8, 0.4 * grey**2),
         tone_seed=seed, mole_seed=seed, pore_seed=seed, hair_seed=seed)
+
+
+def adorned(parameters: SkinParameters, seed: int) -> SkinParameters:
+    """The same subject with what only some people have: half of them scars, most women and few men make-up. What trains a network takes these."""
+    rng = np.random.default_rng([seed, 9])
+    painted = rng.random() < (0.05 if parameters.beard > 0 else 0.6)
+    make_up = float(rng.uniform(0.15, 1.0)) if painted else 0.0
+    return replace(parameters, scars=float(rng.gamma(1.0, 1.5)) if rng.random() < 0.5 else 0.0, make_up=make_up,
+                   mottling=parameters.mottling * (1 - 0.5 * make_up), adorn_seed=seed)
 
 
 def _melanin_of_angle(angle: float, blood: float, oxygen: float, scattering: float, slope: float) -> float:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import hairs, pigment
+from . import adornment, hairs, pigment
 from .canvas import Canvas, canvas
 from .noise import noise, octaves
 from .parameters import SkinParameters, sample_parameters
@@ -53,9 +53,12 @@ def paint_skin(parameters: SkinParameters, on: Canvas, ground: Canvas) -> Skin:
     stain, dome = _marks(parameters, on, ground)
     melanin = melanin * np.exp(stain)
     height = height + dome
-
     p = parameters
+    scar = adornment.scars(on, ground, p.scars, np.random.default_rng([p.adorn_seed, 10]))
+    melanin, blood, height = melanin * np.exp(scar.stain), blood * np.exp(scar.flush), height + scar.ridge
+
     diffuse = pigment.reflectance(melanin, blood, p.oxygen, p.scattering, p.slope, p.chroma) * (1 - 0.07 * np.clip(hollow, 0, 1))[:, None]
+    diffuse = adornment.made_up(diffuse, area, adornment.lid_distance(on), p.make_up, np.random.default_rng([p.adorn_seed, 11]))
     hair, diffuse = _hair(parameters, on, ground, area, diffuse)
     specular = _specular(parameters, on, area, hollow, dry) * (1 - 0.55 * hair)
     height = height + 0.05 * hair

@@ -1,127 +1,120 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Patches of synthetic reflectance maps for the prior: skins made once into a cache, then random windows at three scales.
-
-A map is [7, S, S] float16: 2 * diffuse_linear - 1, tangent-space normal xyz, 2 * specular - 1.
-"""
+"""Random windows of the skins at three scales, mirrored and moved in tone, and the statistics that the prior's network is built around."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
-import cv2
 import numpy as np
 import torch
 
 from .. import template
-from ..capture import replacing
-from ..messages import Reporter
 from ..solve.prior import coordinates, mean_at
-from ..synthetic.skin import make_skin
+from ..synthetic import pigment
+from .skins import SCALES, SIZE, Skins, shrink
 
-SIZE = 1024
-SCALES = (1, 2, 4)
-"""Sides of a texel in texels of the 1024 map; the solver goes from coarse to fine over them."""
-
-
-@dataclass(frozen=True)
-class Skins:
-    """maps[scale]: float16 tensors [7, SIZE / scale, SIZE / scale], one per skin; tones: linear RGB float32 [N, 3]."""
-
-    maps: dict[int, list[torch.Tensor]]
-    tones: torch.Tensor
-    face: torch.Tensor  # int64 [M, 2]: rows and columns of face texels of the SIZE map
+LN_MELANIN = np.log(0.008), np.log(0.45)
+"""Range of the melanin fraction that a skin's tone is moved to: very light to very dark."""
+REACH, DARK_REACH = 1.2, 0.4
+"""Largest change of the logarithm of melanin; the lower one makes dark skin lighter, whose pigments are known less well."""
 
 
 @dataclass(frozen=True)
 class Batch:
-    """clean [N, 7, P, P], coords [N, 2, P, P], tone [N, 3], scale [N]; float32."""
+    """clean [N, 7, P, P], known [N, 7, P, P]: 1 where `clean` is true; coords [N, 2, P, P], tone [N, 3], scale [N]; float32."""
 
     clean: torch.Tensor
+    known: torch.Tensor
     coords: torch.Tensor
     tone: torch.Tensor
     scale: torch.Tensor
 
 
-def make_skins(seeds: list[int], cache: Path, report: Reporter) -> Skins:
-    """The skins of these seeds with their coarser versions; those the cache lacks are made first (some seconds each)."""
-    maps: dict[int, list[torch.Tensor]] = {scale: [] for scale in SCALES}
-    tones = []
-    skin = template.mask("skin", SIZE)
-    for i, seed in enumerate(seeds):
-        path = Path(cache) / f"skin_{seed}_{SIZE}.npy"
-        if not path.is_file():
-            with replacing(path) as temporary, open(temporary, "wb") as file:
-                np.save(file, make_map(seed, SIZE))
-        full = np.load(path)
-        for scale in SCALES:
-            maps[scale].append(torch.from_numpy(shrink(full, scale)))
-        tones.append(((full[:3].astype(np.float32) + 1) / 2 * skin).sum((1, 2)) / skin.sum())
-        report.progress(i + 1, len(seeds), f"skin {i + 1} of {len(seeds)}")
-    face = torch.from_numpy(np.argwhere(template.mask("face", SIZE) > 0.5))
-    return Skins(maps, torch.from_numpy(np.stack(tones)).float(), face)
+class Windows:
+    """Draws batches from skins; `real` is the share of the windows that carried skins get."""
 
+    def __init__(self, skins: Skins, real: float = 0.4):
+        self.skins = skins
+        whole = np.array([area is None for area in skins.known[1]])
+        share = np.where(whole, (1 - real) / max(whole.sum(), 1), real / max((~whole).sum(), 1))
+        self.chance = share / share.sum()
+        self.face = np.argwhere(template.mask("face", SIZE) > 0.5)
+        bare = template.mask("skin", SIZE // SCALES[-1]) * template.mask("face", SIZE // SCALES[-1]) * (1 - template.mask("eyes", SIZE // SCALES[-1]))
+        some = np.flatnonzero(bare > 0.9)[::29]  # enough texels of facial skin for its mean
+        self.sparse = [m[:, some // bare.shape[1], some % bare.shape[1]].float().numpy()[:, None] for m in skins.maps[SCALES[-1]]]
 
-def make_map(seed: int, size: int) -> np.ndarray:
-    """The reflectance map of one synthetic skin, float16 [7, size, size]."""
-    made = make_skin(seed, size)
-    channels = [2 * made.diffuse - 1, made.normal, 2 * made.specular[..., None] - 1]
-    return np.concatenate(channels, -1).transpose(2, 0, 1).astype(np.float16)
+    def draw(self, count: int, patch: int, rng: np.random.Generator, augment: bool = True) -> Batch:
+        """`count` random windows: a third of each scale, three quarters of them on the face; mirrored and re-toned when `augment`."""
+        drawn = [self._one(patch, rng, augment) for _ in range(count)]
+        return Batch(*(torch.stack(parts) for parts in zip(*drawn, strict=True)))
 
-
-def shrink(full: np.ndarray, scale: int) -> np.ndarray:
-    """A map [7, S, S] averaged over scale x scale texels, its normals of length one again."""
-    if scale == 1:
-        return full
-    side = full.shape[-1] // scale
-    small = np.stack([cv2.resize(channel.astype(np.float32), (side, side), interpolation=cv2.INTER_AREA) for channel in full])
-    small[3:6] /= np.maximum(np.linalg.norm(small[3:6], axis=0), 1e-6)
-    return small.astype(full.dtype)
-
-
-def draw(skins: Skins, count: int, patch: int, rng: np.random.Generator, augment: bool = True) -> Batch:
-    """`count` random windows: a third of each scale, three quarters of them on the face; mirrored and re-toned when `augment`."""
-    clean, places, tones, scales = [], [], [], []
-    for _ in range(count):
+    def _one(self, patch: int, rng: np.random.Generator, augment: bool) -> tuple[torch.Tensor, ...]:
         scale = SCALES[rng.integers(len(SCALES))]
-        index = rng.integers(len(skins.tones))
+        index = int(rng.choice(len(self.chance), p=self.chance))
         side = SIZE // scale
-        if rng.random() < 0.75:
-            centre = skins.face[rng.integers(len(skins.face))].numpy() // scale
+        area = self.skins.known[scale][index]
+        if area is not None or rng.random() < 0.75:
+            centre = self.face[rng.integers(len(self.face))] // scale
             row, column = np.clip(centre - rng.integers(0, patch, 2), 0, side - patch)
         else:
             row, column = rng.integers(0, side - patch + 1, 2)
-        window = skins.maps[scale][index][:, row:row + patch, column:column + patch].float()
-        coords = coordinates(side, slice(row, row + patch), slice(column, column + patch))
-        tone = skins.tones[index]
+        window = slice(row, row + patch), slice(column, column + patch)
+        maps = self.skins.maps[scale][index][(slice(None), *window)].float()
+        clean, tone = maps[:7], self.skins.tones[index]
+        known = torch.ones_like(clean)
+        if area is not None:
+            known = torch.cat([area[window].float().expand(3, -1, -1), torch.zeros(4, patch, patch)])
+        coords = coordinates(side, *window)[0]
         if augment:
+            clean, tone = self._toned(maps.numpy(), index, rng)
             if rng.random() < 0.5:  # the UV layout is symmetric about u = 0.5
-                window, coords = window.flip(2), torch.stack([-coords[:, 0], coords[:, 1]], 1).flip(3)
-                window[3] *= -1
-            gain = torch.from_numpy(np.exp(rng.normal(0, 0.1) + rng.normal(0, 0.04, 3))).float()
-            window[:3] = (window[:3] + 1) * gain[:, None, None] - 1
-            tone = tone * gain * torch.from_numpy(np.exp(rng.normal(0, 0.06) + rng.normal(0, 0.02, 3))).float()  # a tone is never known exactly
-        clean.append(window)
-        places.append(coords[0])
-        tones.append(tone)
-        scales.append(scale)
-    return Batch(torch.stack(clean), torch.stack(places), torch.stack(tones), torch.tensor(scales))
+                clean, known, coords = clean.flip(2), known.flip(2), torch.stack([-coords[0], coords[1]]).flip(2)
+                clean[3] *= -1
+        return clean, known, coords, tone, torch.tensor(scale)
+
+    def _toned(self, maps: np.ndarray, index: int, rng: np.random.Generator) -> tuple[torch.Tensor, torch.Tensor]:
+        """A window [9, P, P] of skin `index` with more or less melanin and blood, and its tone, which is never known exactly."""
+        sparse = self.sparse[index]
+        own = float(np.median(sparse[7]))
+        lightest = -DARK_REACH if own > np.log(0.3) else -REACH
+        more = rng.uniform(max(LN_MELANIN[0] - own, lightest), np.clip(LN_MELANIN[1] - own, 0, REACH)), rng.normal(0, 0.15)
+        gain = np.exp(rng.normal(0, 0.08) + rng.normal(0, 0.03, 3))[:, None, None]
+        albedo, everywhere = (np.clip((m[:3] + 1) / 2 * gain * _change(m[7], m[8], *more), 0, 1) for m in (maps, sparse))
+        clean = torch.from_numpy(np.concatenate([2 * albedo - 1, maps[3:7]]).astype(np.float32))
+        tone = everywhere.mean((1, 2)) * np.exp(rng.normal(0, 0.06) + rng.normal(0, 0.02, 3))
+        return clean, torch.from_numpy(tone.astype(np.float32))
+
+
+def _change(melanin: np.ndarray, blood: np.ndarray, more_melanin: float, more_blood: float) -> np.ndarray:
+    """What happens to an albedo of these pigments (logarithms [H, W]) when each changes by a factor: [3, H, W]."""
+    before = pigment.reflectance(np.exp(melanin), np.exp(blood))
+    after = pigment.reflectance(np.exp(melanin + more_melanin), np.exp(blood + more_blood))
+    return np.moveaxis(after / before, -1, 0)
 
 
 def mean_map(skins: Skins, size: int = 256) -> torch.Tensor:
-    """The mean face [7, size, size], symmetric: geometric mean of albedo over tone, mean normal (of length one), mean 2 * specular - 1."""
-    small = [torch.from_numpy(shrink(m.numpy(), SIZE // SCALES[1] // size)).float() for m in skins.maps[SCALES[1]]]
-    relative = torch.stack([((m[:3] + 1) / 2).clamp_min(1e-3).log() - tone.log()[:, None, None] for m, tone in zip(small, skins.tones, strict=True)])
-    mean = torch.cat([relative.mean(0).exp(), torch.stack([m[3:] for m in small]).mean(0)])
+    """The mean face [7, size, size], symmetric: geometric mean of albedo over tone, mean normal (of length one), mean 2 * specular - 1.
+    Each skin counts where it is known, which the whole ones are everywhere."""
+    factor = SIZE // SCALES[1] // size
+    total, weight = torch.zeros(7, size, size), torch.zeros(7, size, size)
+    for maps, area, tone in zip(skins.maps[SCALES[1]], skins.known[SCALES[1]], skins.tones, strict=True):
+        small = torch.from_numpy(shrink(maps.numpy(), factor))[:7].float()
+        small[:3] = ((small[:3] + 1) / 2).clamp_min(1e-3).log() - tone.log()[:, None, None]
+        known = torch.ones(7, size, size)
+        if area is not None:
+            known[:3], known[3:] = area[::factor, ::factor].float(), 0
+        total, weight = total + known * small, weight + known
+    mean = total / weight.clamp_min(1e-6)
+    mean[:3] = mean[:3].exp()
     mean = (mean + torch.stack([*mean[:3], -mean[3], *mean[4:]]).flip(2)) / 2
     mean[3:6] /= mean[3:6].norm(dim=0).clamp_min(1e-6)
     return mean
 
 
-def spread_about(skins: Skins, mean: torch.Tensor, patch: int) -> torch.Tensor:
-    """Deviation [7] of random patches from the mean face of their tone; of the albedo in units of the tone."""
-    batch = draw(skins, 256, patch, np.random.default_rng(3), augment=False)
+def spread_about(windows: Windows, mean: torch.Tensor, patch: int) -> torch.Tensor:
+    """Deviation [7] of random windows from the mean face of their tone; of the albedo in units of the tone."""
+    batch = windows.draw(256, patch, np.random.default_rng(3))
     difference = batch.clean - mean_at(mean, batch.coords, batch.tone)
     difference[:, :3] /= batch.tone[:, :, None, None]
-    return (difference**2).mean((0, 2, 3)).sqrt()
+    return ((difference**2 * batch.known).sum((0, 2, 3)) / batch.known.sum((0, 2, 3))).sqrt()

@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Trains the diffusion prior of facial reflectance on patches of synthetic skins (paper, section 3.4: "Diffusion Prior Training").
+"""Trains the diffusion prior of facial reflectance on patches of skins (paper, section 3.4: "Diffusion Prior Training").
 
-    python -m core.training.prior --config cpu --minutes 55 [--resume] [--work DIR]   train, then write the weights and their card
-    python -m core.training.prior --export [--work DIR] [--out FILE]                  write the running training's averaged weights now
+    python -m core train prior --config cpu|gpu [--minutes 60] [--skins FOLDER --held-out NAME ...] [--work DIR]   train, then write weights and card
+    python -m core train prior --export [--work DIR] [--out FILE]                                      write the running training's averaged weights now
 
-Needs neither Blender nor the internet. Training can be killed at any time and resumed.
+Needs neither Blender nor the internet. A second run goes on where the first was killed. FOLDER is what `train carry` made of another head's skins; of each
+--held-out name the whole cluster is kept from training (the same photographs painted over). Such skins teach the diffuse channels only.
 """
 
 from __future__ import annotations
@@ -19,60 +20,68 @@ from pathlib import Path
 import numpy as np
 import torch
 from safetensors.torch import save_file
+from torch.utils.data import DataLoader, Dataset
 
 from ..capture import replacing
-from ..messages import Reporter
+from ..messages import Problem, Reporter
 from ..solve.network import UNet, denoise
 from ..solve.prior import WEIGHTS, build, condition, fast_dtype
-from .patches import SCALES, Batch, draw, make_skins, mean_map, spread_about
+from ..synthetic.identities import reserved_seeds
+from .patches import Batch, Windows, mean_map, spread_about
+from .skins import SCALES, Skins, carried_names, carried_skins, clusters, synthetic_skins
 
 OCTAVES = 6
+_MODEL = {"type": "image_v1", "input_channels": 7, "patch_size": 2, "mapping_out": 128, "self_attn_depths": [False, False, False], "augment_wrapper": False,
+          "mapping_cond_dim": 4, "norm": "pixel", "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80}
+_COND = {"type": "posenc", "pos_enc_freq": OCTAVES}
 CONFIGS = {
-    "cpu": {
-        "model": {"type": "image_v1", "input_channels": 7, "patch_size": 2, "mapping_out": 128, "depths": [1, 2, 2], "channels": [48, 96, 160],
-                  "self_attn_depths": [False, False, False], "augment_wrapper": False, "mapping_cond_dim": 4, "norm": "pixel",
-                  "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80},
-        "cond": {"type": "posenc", "pos_enc_freq": OCTAVES},
-        "training": {"patch": 64, "batch": 16, "rate": 5e-4, "skins": 36, "held_out": 4, "seed": 0},
-    },
+    "cpu": {"model": {**_MODEL, "depths": [1, 2, 2], "channels": [48, 96, 160]}, "cond": _COND,
+            "training": {"patch": 64, "batch": 16, "wide_every": 4, "rate": 6e-4, "minutes": 60, "skins": 96, "held_out": 6, "seed": 0, "workers": 0}},
+    "gpu": {"model": {**_MODEL, "depths": [2, 2, 2], "channels": [64, 128, 256]}, "cond": _COND,
+            "training": {"patch": 64, "batch": 64, "wide_every": 4, "rate": 4e-4, "minutes": 20, "skins": 160, "held_out": 6, "seed": 0, "workers": 12}},
 }
+"""`wide_every`: every so many steps the windows are twice as wide and a quarter as many."""
 SIGMA = {1: (-2.4, 1.2), 2: (-1.8, 1.3), 4: (-1.0, 1.5)}
 """Mean and deviation of ln sigma per scale: the solver sees the coarse maps at high noise and the fine ones at low."""
 FIRST_SEED = 1000
-"""Training takes the seeds from here on, held-out skins those from HELD_OUT_SEED on; the sample subject's are far below both."""
+"""Training takes the seeds from here on, held-out skins those from HELD_OUT_SEED on; the sample subject's and the benchmarks' are reserved."""
 HELD_OUT_SEED = 9000
 
 
-def train_prior(config: str, out: Path, minutes: float, report: Reporter, work: Path | None = None, resume: bool = True) -> dict:
-    """Trains for `minutes` in all (those of earlier runs included), writes `out` (safetensors, fp16) and its card, returns the card."""
+def train_prior(config: str, out: Path, report: Reporter, minutes: float | None = None, skins: Path | None = None, held_out: list[str] = (),
+                work: Path | None = None) -> dict:
+    """Trains for `minutes` in all (those of earlier runs included), writes `out` (safetensors, fp16) and its card, returns the card.
+
+    Raises Problem where `skins` is no carried folder, or the work folder holds a training on other data.
+    """
     work = Path(work or Path(tempfile.gettempdir()) / "wildcap_prior")
     work.mkdir(parents=True, exist_ok=True)
-    options = CONFIGS[config]
-    t = options["training"]
-    seeds = list(range(FIRST_SEED, FIRST_SEED + t["skins"]))
-    held_out_seeds = list(range(HELD_OUT_SEED, HELD_OUT_SEED + t["held_out"]))
-    held_out = draw(make_skins(held_out_seeds, work, report), 96, t["patch"], np.random.default_rng(1), augment=False)
-    skins = make_skins(seeds, work, report)
-    mean = mean_map(skins)
-    statistics = {"mean_face": mean, "spread": spread_about(skins, mean, t["patch"])}
-    torch.manual_seed(t["seed"])
-    network = build(options)
+    t = CONFIGS[config]["training"]
+    minutes = minutes or t["minutes"]
+    device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
+    data = _data(t, skins, held_out)
+    windows, seen, unseen = _windows(data, skins, work, report)
+    held_out_windows = {kind: Windows(s, real=0.5).draw(96, t["patch"], np.random.default_rng(1)) for kind, s in unseen.items() if s.names}
+    state = _begin(config, data, seen, windows)
+    if (work / "state.pt").is_file():
+        state = torch.load(work / "state.pt", weights_only=True)
+        if state["data"] != data or state["config"] != config:
+            raise Problem(f"The training in {work} is on other data or of another configuration.", "Name another --work folder, or delete this one.")
+    network = build(CONFIGS[config])
+    network.load_state_dict(state["network"])
+    network.to(device, memory_format=torch.channels_last)
+    statistics = {name: value.to(device) for name, value in state["statistics"].items()}
     optimiser = torch.optim.AdamW(network.parameters(), lr=t["rate"], betas=(0.9, 0.99), weight_decay=1e-3)
-    average = {name: value.clone() for name, value in network.state_dict().items()}
-    progress = {"config": config, "step": 0, "seconds": 0.0, "seeds": seeds, "held_out_seeds": held_out_seeds, "tones": skins.tones.tolist(), "history": []}
-    if resume and (work / "state.pt").is_file():
-        saved = torch.load(work / "state.pt", weights_only=True)
-        network.load_state_dict(saved["network"])
-        optimiser.load_state_dict(saved["optimiser"])
-        average, progress = saved["average"], saved["progress"]
-    network.to(memory_format=torch.channels_last)
-    began, before, saved_at = time.monotonic(), progress["seconds"], 0.0
-    while progress["seconds"] < 60 * minutes:
-        step, share = progress["step"], progress["seconds"] / (60 * minutes)
+    if state["optimiser"]:
+        optimiser.load_state_dict(state["optimiser"])
+    average = {name: value.to(device) for name, value in state["average"].items()}
+    began, before, saved_at = time.monotonic(), state["seconds"], state["seconds"]
+    batches = DataLoader(_Steps(windows, t), batch_size=None, sampler=range(state["step"], 10**9), num_workers=t["workers"])
+    for step, batch in zip(range(state["step"], 10**9), batches, strict=False):
+        share = state["seconds"] / (60 * minutes)
         for group in optimiser.param_groups:
             group["lr"] = t["rate"] * min(1.0, (step + 1) / 200) * max(0.02, min(1.0, 2 * (1 - share)))  # constant, then linear to zero over the second half
-        rng = np.random.default_rng((t["seed"], step))  # a resumed run draws what an unbroken one would have
-        loss = _loss(network, statistics, draw(skins, t["batch"], t["patch"], rng), rng).mean()
+        loss = _loss(network, statistics, batch, np.random.default_rng((t["seed"], step, 1)), device).mean()
         optimiser.zero_grad(set_to_none=True)
         loss.backward()
         torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
@@ -80,81 +89,143 @@ def train_prior(config: str, out: Path, minutes: float, report: Reporter, work: 
         decay = min(0.9995, (step + 1) / (step + 10))
         for name, value in network.state_dict().items():
             average[name].lerp_(value, 1 - decay)
-        progress["step"] += 1
-        progress["seconds"] = before + time.monotonic() - began
-        report.progress(min(progress["seconds"], 60 * minutes), 60 * minutes, f"step {step + 1}, loss {loss.item():.4f}")
-        if progress["seconds"] - saved_at > 120 or progress["seconds"] >= 60 * minutes:
-            progress["history"].append([progress["step"], progress["seconds"], *_held_out_loss(average, statistics, options, held_out)])
-            report.log(f"step {step + 1}, {progress['seconds'] / 60:.1f} min, held-out loss per scale {progress['history'][-1][2:]}")
+        state["step"], state["seconds"] = step + 1, before + time.monotonic() - began
+        ended = state["seconds"] >= 60 * minutes
+        report.progress(min(state["seconds"], 60 * minutes), 60 * minutes, f"step {step + 1}")
+        if state["seconds"] - saved_at > 120 or ended:
+            losses = {kind: _held_out_loss(average, statistics, config, b, device) for kind, b in held_out_windows.items()}
+            state["history"].append([state["step"], round(state["seconds"]), losses])
+            report.log(f"step {step + 1}, {state['seconds'] / 60:.1f} min, held-out loss per scale {losses}")
+            state |= {"network": network.state_dict(), "optimiser": optimiser.state_dict(), "average": average}
             with replacing(work / "state.pt") as temporary:
-                torch.save({"network": network.state_dict(), "optimiser": optimiser.state_dict(), "average": average, "progress": progress,
-                            "statistics": statistics}, temporary)
-            saved_at = progress["seconds"]
+                torch.save(state, temporary)
+            saved_at = state["seconds"]
+        if ended:
+            break
     return export(work, out)
 
 
 def export(work: Path, out: Path = WEIGHTS) -> dict:
     """The averaged weights and the mean face of a training folder as fp16 safetensors, with the card that says where they come from."""
-    state = torch.load(Path(work) / "state.pt", weights_only=True)
-    progress = state["progress"]
+    state = torch.load(Path(work) / "state.pt", weights_only=True, map_location="cpu")
+    data = state["data"]
     tensors = {**state["average"], **state["statistics"]}
     with replacing(out) as temporary:
         save_file({name: value.half().contiguous() for name, value in tensors.items()}, temporary)
-    options = CONFIGS[progress["config"]]
-    history = progress["history"]
+    told = "Procedural skins of core/synthetic on the built-in head, which derives from the MakeHuman base mesh (CC0)"
+    if data["skins"]:
+        told += f"; {len(data['skins'])} skins of {data['from']}, carried into the built-in UVs, diffuse only"
     card = {
-        **options, "scales": list(SCALES),
-        "data": "Procedural skins of core/synthetic on the built-in head, which derives from the MakeHuman base mesh (CC0); no photograph, no scan",
-        "licence": "GPL-3.0-or-later",
-        "command": f"python -m core train prior --config {progress['config']} --minutes {round(progress['seconds'] / 60)}",
-        "steps": progress["step"], "minutes": round(progress["seconds"] / 60, 1), "parameters": sum(v.numel() for n, v in state["average"].items()),
-        "seeds": progress["seeds"], "held_out_seeds": progress["held_out_seeds"],
-        "held_out": {"loss": dict(zip((f"scale_{scale}" for scale in SCALES), history[-1][2:], strict=True)),
-                     "what": "mean squared error of the network's output on fixed patches and noise of the held-out skins; 1 is that of the mean face"},
-        "tones": [[round(v, 4) for v in tone] for tone in progress["tones"]],
+        **CONFIGS[state["config"]], "scales": list(SCALES), "data": told, "licence": "GPL-3.0-or-later", "notices": data["notices"],
+        "command": _command(state), "steps": state["step"], "minutes": round(state["seconds"] / 60, 1),
+        "parameters": sum(v.numel() for v in state["average"].values()),
+        "seeds": data["seeds"], "held_out_seeds": data["held_out_seeds"], "skins": data["skins"], "held_out_skins": data["held_out_skins"],
+        "held_out": {"loss": {kind: dict(zip((f"scale_{scale}" for scale in SCALES), losses, strict=True)) for kind, losses in state["history"][-1][2].items()},
+                     "what": "mean squared error of the network's output on fixed patches and noise of held-out skins; 1 is that of the mean face"},
+        "tones": [[round(v, 4) for v in tone] for tone in state["tones"]],
     }
     with replacing(Path(out).with_suffix(".json")) as temporary:
         temporary.write_text(json.dumps(card, indent=1), encoding="utf-8")
     return card
 
 
-def _loss(network: UNet, statistics: dict[str, torch.Tensor], batch: Batch, rng: np.random.Generator) -> torch.Tensor:
-    """EDM's weighted denoising error per sample [N] (Karras et al. 2022, table 1): the squared error of F itself."""
-    known = condition(batch.coords, OCTAVES, **statistics, tone=batch.tone)
+def _data(t: dict, skins: Path | None, held_out: list[str]) -> dict:
+    """What is trained on and what is kept from it, by name."""
+    seeds = [seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * t["skins"]) if seed not in reserved_seeds()][:t["skins"]]
+    data = {"seeds": seeds, "held_out_seeds": list(range(HELD_OUT_SEED, HELD_OUT_SEED + t["held_out"])), "from": "", "skins": [], "held_out_skins": [],
+            "notices": []}
+    if skins is None:
+        return data
+    names = carried_names(skins)
+    unknown = sorted(set(held_out) - set(names))
+    if unknown:
+        raise Problem(f"{skins} holds no skin named {', '.join(unknown)}.", f"Choose from {', '.join(names)}.")
+    kept = {name for group in clusters(skins, names) if set(group) & set(held_out) for name in group}
+    carried = json.loads((Path(skins) / "carried.json").read_text(encoding="utf-8"))
+    return data | {"from": carried["from"], "notices": carried["notices"], "skins": [n for n in names if n not in kept], "held_out_skins": sorted(kept)}
+
+
+def _windows(data: dict, folder: Path | None, work: Path, report: Reporter) -> tuple[Windows, Skins, dict[str, Skins]]:
+    """What windows are drawn from, the same as skins, and the held-out skins by kind."""
+    seen, unseen = synthetic_skins(data["seeds"], work, report), {"synthetic": synthetic_skins(data["held_out_seeds"], work, report)}
+    if data["skins"]:
+        mean = mean_map(seen)
+        seen = seen + carried_skins(folder, data["skins"], mean, work, report)
+        unseen["carried"] = carried_skins(folder, data["held_out_skins"], mean, work, report)
+    return Windows(seen), seen, unseen
+
+
+def _begin(config: str, data: dict, skins: Skins, windows: Windows) -> dict:
+    """The state of a training before its first step."""
+    t = CONFIGS[config]["training"]
+    torch.manual_seed(t["seed"])
+    mean = mean_map(skins)
+    network = build(CONFIGS[config]).state_dict()
+    return {"config": config, "data": data, "step": 0, "seconds": 0.0, "history": [], "network": network, "optimiser": {},
+            "average": {name: value.clone() for name, value in network.items()}, "tones": skins.tones.tolist(),
+            "statistics": {"mean_face": mean, "spread": spread_about(windows, mean, t["patch"])}}
+
+
+class _Steps(Dataset):
+    """The batch of each step: it depends on the step alone, so a resumed training draws what an unbroken one would have."""
+
+    def __init__(self, windows: Windows, options: dict):
+        self.windows, self.options = windows, options
+
+    def __getitem__(self, step: int) -> Batch:
+        t = self.options
+        wide = 2 if step % t["wide_every"] == 0 else 1
+        return self.windows.draw(t["batch"] // wide**2, t["patch"] * wide, np.random.default_rng((t["seed"], step, 0)))
+
+
+def _loss(network: UNet, statistics: dict[str, torch.Tensor], batch: Batch, rng: np.random.Generator, device: str) -> torch.Tensor:
+    """EDM's weighted denoising error per sample [N] (Karras et al. 2022, table 1): the squared error of F itself, where the truth is known.
+    What is not known goes in as pure noise of the deviation that data would have."""
     mean, deviation = (torch.tensor([SIGMA[int(scale)][i] for scale in batch.scale]) for i in (0, 1))
-    sigma = (torch.from_numpy(rng.standard_normal(len(mean))).float() * deviation + mean).exp().clamp(0.005, 80.0)
-    noise = torch.from_numpy(rng.standard_normal(batch.clean.shape, dtype=np.float32))
-    with torch.autocast("cpu", torch.bfloat16, enabled=fast_dtype("cpu") == torch.bfloat16):
-        denoised = denoise(network, batch.clean + sigma[:, None, None, None] * noise, sigma, **known)
-    s = sigma[:, None, None, None]
-    weight = (s**2 + known["spread"] ** 2) / (s * known["spread"]) ** 2
-    return (weight * (denoised - batch.clean) ** 2).mean((1, 2, 3))
+    sigma = (torch.from_numpy(rng.standard_normal(len(mean))).float() * deviation + mean).exp().clamp(0.005, 80.0).to(device)
+    noise = torch.from_numpy(rng.standard_normal(batch.clean.shape, dtype=np.float32)).to(device)
+    clean, known = batch.clean.to(device), batch.known.to(device)
+    told = condition(batch.coords.to(device), OCTAVES, **statistics, tone=batch.tone.to(device))
+    s, spread = sigma[:, None, None, None], told["spread"]
+    noisy = torch.where(known > 0, clean + s * noise, told["mean"] + (s**2 + spread**2).sqrt() * noise)
+    low = device == "cuda" or fast_dtype("cpu") == torch.bfloat16
+    with torch.autocast(device, torch.bfloat16, enabled=low):
+        denoised = denoise(network, noisy, sigma, **told)
+    weight = known * (s**2 + spread**2) / (s * spread) ** 2
+    return (weight * (denoised - clean) ** 2).sum((1, 2, 3)) / known.sum((1, 2, 3)).clamp_min(1)
 
 
 @torch.no_grad()
-def _held_out_loss(average: dict, statistics: dict, options: dict, batch: Batch) -> list[float]:
+def _held_out_loss(average: dict, statistics: dict, config: str, batch: Batch, device: str) -> list[float]:
     """The averaged network's loss per scale, always on the same patches and noise."""
-    network = build(options)
+    network = build(CONFIGS[config])
     network.load_state_dict(average)
-    losses = _loss(network.to(memory_format=torch.channels_last), statistics, batch, np.random.default_rng(2))
+    losses = _loss(network.to(device, memory_format=torch.channels_last), statistics, batch, np.random.default_rng(2), device).cpu()
     return [round(losses[batch.scale == scale].mean().item(), 4) for scale in SCALES]
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def _command(state: dict) -> str:
+    skins = f" --skins {state['data']['from']}_carried --held-out {' '.join(state['data']['held_out_skins'])}" if state["data"]["skins"] else ""
+    return f"python -m core train prior --config {state['config']} --minutes {round(state['seconds'] / 60)}{skins}"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser("python -m core train prior", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--config", default="cpu", choices=tuple(CONFIGS))
-    parser.add_argument("--minutes", type=float, default=55)
-    parser.add_argument("--resume", action="store_true", help="go on from the last checkpoint in the work folder")
+    parser.add_argument("--minutes", type=float, help="in all, those of earlier runs included; the configuration's by default")
+    parser.add_argument("--skins", type=Path, metavar="FOLDER", help="skins that `train carry` brought into our UVs")
+    parser.add_argument("--held-out", nargs="+", default=[], metavar="NAME", help="skins of FOLDER that are kept from training, each with its cluster")
     parser.add_argument("--export", action="store_true", help="write the weights of the work folder's last checkpoint and stop")
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_prior")
     parser.add_argument("--out", type=Path, default=WEIGHTS)
-    arguments = parser.parse_args()
-    if arguments.export:
-        export(arguments.work, arguments.out)
-        return
+    options = parser.parse_args(arguments)
+    if options.export:
+        export(options.work, options.out)
+        return 0
     report = Reporter("train", emit=lambda message: print(message.text, flush=True) if type(message).__name__ == "Log" else None)
-    train_prior(arguments.config, arguments.out, arguments.minutes, report, arguments.work, arguments.resume)
+    train_prior(options.config, options.out, report, options.minutes, options.skins, options.held_out, options.work)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())
