@@ -12,7 +12,7 @@ from .recipes import Recipe
 
 BETAS = 0.9, 0.999
 BAND_OF = torch.tensor([BANDS[0]] + [BANDS[1]] * 3 + [BANDS[2]] * 5)
-MOVING = {"both": (0, 1, 2), "main": (0,), "grid": (1, 2)}
+MOVING = {"both": (0, 1, 2), "main": (0,), "grid": (1, 2), "cells": (1,)}
 """Which of Lights.parameters() a phase moves."""
 
 
@@ -48,7 +48,8 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
     if recipe.faint:
         loss = loss + recipe.faint * brightness * (local**2).sum()
     if recipe.smooth:
-        loss = loss + recipe.smooth * brightness / o.texel * variation(local, o.shader.box_alpha)
+        free = o.shader.unmodulated(lights) if recipe.sharp_edges else local  # a shadow's own edge is in M and costs nothing
+        loss = loss + recipe.smooth * brightness / o.texel * variation(free, o.shader.box_alpha)
     return loss
 
 

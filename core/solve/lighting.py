@@ -56,7 +56,7 @@ class Shader:
 
     def __init__(self, normal: torch.Tensor, alpha: torch.Tensor, cells: tuple[int, int], bilinear: bool = False):
         self.basis = sh_basis(normal)  # [9, H, W]
-        self.alpha = alpha
+        self.normal, self.alpha, self.cells, self.bilinear = normal, alpha, cells, bilinear
         height, width = alpha.shape
         rows, columns = (torch.nonzero(alpha.sum(1 - axis) > 0)[:, 0] for axis in (0, 1))
         self.empty = len(rows) == 0
@@ -68,13 +68,22 @@ class Shader:
         self.box_basis = self.basis[(slice(None), *self.box)]
         self.box_alpha = alpha[self.box]
 
+    def part(self, rows: slice, columns: slice, cells: tuple[slice, slice]) -> Shader:
+        """The shader of a part of the map, whose own grid are these cells of V."""
+        count = tuple(part.stop - part.start for part in cells)
+        return Shader(self.normal[:, rows, columns], self.alpha[rows, columns], count, self.bilinear)
+
     def main(self, lights: Lights) -> torch.Tensor:
         """Shading by the global light [3, H, W]."""
         return torch.einsum("ck,khw->chw", lights.glob, self.basis)
 
     def local(self, lights: Lights) -> torch.Tensor:
         """s^V, shading by the grid alone, modulated by M, on `box` [3, h', w'] (paper, equations 2 to 4)."""
-        scalar = (self.coefficients(lights) * self.box_basis).sum(1) * self.box_alpha  # [G, h', w']
+        return self.unmodulated(lights) * self.box_alpha
+
+    def unmodulated(self, lights: Lights) -> torch.Tensor:
+        """Shading by the grid alone as if M were everywhere, on `box` [3, h', w']."""
+        scalar = (self.coefficients(lights) * self.box_basis).sum(1)  # [G, h', w']
         return scalar * lights.chroma[:, None, None] if len(scalar) == 1 else scalar
 
     def coefficients(self, lights: Lights) -> torch.Tensor:

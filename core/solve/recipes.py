@@ -37,6 +37,7 @@ class Recipe:
     one_chroma: bool = True  # all local light has one learned colour; False: 27 free numbers per cell
     bilinear: bool = False  # how a texel reads V; else cubic
     fitted: bool = True  # gamma^g starts from a least-squares fit to x_0^ref; else from the even light that gives the texture's mean
+    sharp_edges: bool = True  # M's border is laid on the shadow's edge where the texture shows one, and there light may step
     trusting: bool = False  # light may explain brows, lips and hair as freely as skin
     phases: tuple[tuple[str, float, float], ...] = (("both", 0.0, 0.5),)  # (which lights, from, to): shares of the steps; frozen outside of them
     updates: int = 300  # of each phase, spread over its steps; one a step is the least
@@ -50,13 +51,14 @@ class Recipe:
     faint: float = 0.0  # pull of s^V towards zero, likewise
 
     # the end
+    released_boxes: bool = False  # with the authors' prior the tone is that of their box, and texture and M count within the bounds of their masks alone
     rescale: str = "linear"  # the mean of the facial skin is brought to the skin tone, in linear light; "srgb": in sRGB values; "none"
 
 
 OURS = Recipe()
 
 # What neither the paper nor the released code has is off in both.
-_PLAIN = replace(OURS, coarse=(), hard_mask=True, one_chroma=False, trusting=True, smooth=0.0)
+_PLAIN = replace(OURS, coarse=(), hard_mask=True, one_chroma=False, sharp_edges=False, trusting=True, smooth=0.0)
 
 RECIPES = {
     "wildcap": OURS,
@@ -72,5 +74,5 @@ RECIPES = {
     "paper": replace(_PLAIN, steps=600, preserving=True, clip="none", phases=(("both", 0.0, 1.0),), updates=600, tv_of_gamma=True,
                      bilinear=True, rescale="none"),
     "released": replace(_PLAIN, steps=599, start=0.599, uniform_start=True, clip="decade", candidates=20, blur=True, fitted=False,
-                        phases=(("main", 0.0, 101 / 599), ("grid", 101 / 599, 301 / 599)), updates=1, rescale="srgb"),
+                        phases=(("main", 0.0, 101 / 599), ("grid", 101 / 599, 301 / 599)), updates=1, rescale="srgb", released_boxes=True),
 }
