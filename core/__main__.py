@@ -57,8 +57,10 @@ def _parser() -> argparse.ArgumentParser:
                      help="cameras of another program: COLMAP's folder, Metashape's .xml, RealityScan's .csv, Blender's .json")
     run.add_argument("--template", metavar="MESH", type=Path, help="your own head mesh, fitted too: an OBJ, or a folder with a neutral OBJ and its shapes")
     run.add_argument("--new-atlas", action="store_true", help="give that mesh new UVs where its own are missing or overlap")
+    run.add_argument("--prior", metavar="FOLDER", type=Path, help="the authors' config.json and ckpt.pth; needs ICT-FaceKit as --template")
     run.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
     run.add_argument("--seed", type=int, default=0)
+    run.add_argument("--edited-part", action="store_true", help="solve only what a mask edit touched since the last solve, where that can be done")
     run.set_defaults(command=_run)
 
     commands.add_parser("stages", help="list the stages of the chain").set_defaults(command=_stages)
@@ -98,15 +100,14 @@ def _run(options: argparse.Namespace) -> int:
         delight["folder"] = str(options.folder.absolute())
     # A shell that starts a job in the background has it ignore Ctrl-C's signal; here the signal means cancel, whoever sends it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    values = {"seed": options.seed, "device": options.device, "delight": delight}
+    values = {"seed": options.seed, "device": options.device, "delight": delight, "edited_part": options.edited_part}
     if options.cameras:
         values["cameras"] = {"import_from": str(options.cameras.absolute())}
     if options.new_atlas and not options.template:
         raise Problem("--new-atlas goes with --template only.", "Name your head mesh with --template, or leave --new-atlas out.")
     if options.template:
         values["registration"] = {"template": str(options.template.absolute()), "new_atlas": options.new_atlas}
-    if options.skin_tone:
-        values["solve"] = {"skin_tone": options.skin_tone}
+    values["solve"] = {**({"skin_tone": options.skin_tone} if options.skin_tone else {}), **({"prior": str(options.prior.absolute())} if options.prior else {})}
     capture = Capture(options.capture)
     strangers = [path.name for path in capture.root.iterdir() if path not in vars(capture).values()] if capture.root.is_dir() else []
     if strangers and not capture.json.is_file():

@@ -113,6 +113,7 @@ class Capture:
         self.protect_mask = self.root / "protect_mask.png"
         self.mask_history = self.root / "mask_history"
         self.maps = self.root / "maps"
+        self.solved = self.maps / "solved.safetensors"  # what a later solve of an edited part goes on from
         self.maps_4k = self.root / "maps_4k"
         self.delivery = self.root / "delivery"
         self.preview = self.root / "preview"
@@ -189,8 +190,11 @@ class Capture:
         parts = [asdict(getattr(settings, stage.name)), {name: getattr(settings, name) for name in stage.shared}, code_hash(stage.module)]
         if not stage.reads:
             parts.append(source_stamp(record.get("source", "")) or record.get("source_stamp", []))
-        named = {"delight": settings.delight.folder, "cameras": settings.cameras.import_from, "registration": settings.registration.template}.get(stage.name)
+        named = {"delight": settings.delight.folder, "cameras": settings.cameras.import_from, "registration": settings.registration.template,
+                 "solve": settings.solve.prior}.get(stage.name)
         parts += [hash_tree(Path(named).expanduser())] if named else []  # what the artist keeps elsewhere
+        if stage.name == "solve" and settings.solve.prior:  # it works in the UVs of the artist's own mesh
+            parts += [[path.name, hash_tree(path)] for path in (self.own_head, self.own_head_skin)]
         parts += [[name, hash_tree(self.root / name)] for name in (*stage.reads, *stage.wishes)]
         parts += [hash_tree(Path(__file__).parent / name) for name in stage.data]
         return hashlib.blake2b(json.dumps(parts, sort_keys=True).encode(), digest_size=16).hexdigest()

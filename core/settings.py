@@ -104,6 +104,8 @@ class SolveSettings:
     """Cells per side of the texel grid of lights over the whole map's face crop (96 cells of 8 texels at 1024)"""
     skin_tone: str = setting("auto")
     """Skin tone as sRGB R,G,B in 0..1 (linear mean over facial skin), or auto"""
+    prior: str = setting("")
+    """The authors' prior: the folder with its config.json and ckpt.pth. It needs ICT-FaceKit fitted as template, in whose UVs it works; empty: ours"""
     checkpoint_every: int = setting(10, min=1, max=600)
     """Steps between two checkpoints"""
 
@@ -132,6 +134,7 @@ class Settings:
 
     seed: int = 0
     device: str = "cpu"
+    edited_part: bool = False  # solve only what a mask edit touched, where that can be done; how a result was reached is no condition of it
     frames: FramesSettings = field(default_factory=FramesSettings)
     cameras: CamerasSettings = field(default_factory=CamerasSettings)
     scan: ScanSettings = field(default_factory=ScanSettings)

@@ -25,10 +25,23 @@ MASK_FADE = 2.0  # deviation in texels over which a hard mask's border fades
 
 
 @dataclass(frozen=True)
+class Extent:
+    """Which part of the UV square the maps cover, in texels of REFERENCE: `side` rows from `top` on and as many columns from `left` on. The prior is told
+    the coordinates of texel centres, or of their upper left corners (not `centred`), and knows maps that are coarser by `factors`."""
+
+    top: int = 0
+    left: int = 0
+    side: int = REFERENCE
+    centred: bool = True
+    factors: tuple[int, ...] = (1, 2, 4)
+
+
+@dataclass(frozen=True)
 class Evidence:
     """texture [3, S, S] linear; weight [S, S]: how far it counts, 0 where nobody looked; alpha [S, S]: the soft shadow mask M; normal [3, S, S], unit, world
     space, N_c; covered bool [S, S]: texels of the head; skin [S, S]: facial skin without lips, brows and eyes; trust [S, S]: 1, less where a texel's
-    colour says little of the light; protected [S, S]: what the artist keeps out of M; edge [S, S]: how far M's border lies on a shadow's edge that is seen."""
+    colour says little of the light; protected [S, S]: what the artist keeps out of M; edge [S, S]: how far M's border lies on a shadow's edge that is
+    seen; taken [3]: the colour of what shadows take of the light, over its mean, zeros where that is not known."""
 
     texture: torch.Tensor
     weight: torch.Tensor
@@ -39,10 +52,17 @@ class Evidence:
     trust: torch.Tensor
     protected: torch.Tensor
     edge: torch.Tensor
+    taken: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    extent: Extent = Extent()
 
     @property
     def size(self) -> int:
         return self.alpha.shape[0]
+
+    @property
+    def texel(self) -> float:
+        """Side of a texel in texels of REFERENCE."""
+        return self.extent.side / self.size
 
 
 def read_evidence(capture: Capture, size: int) -> Evidence:
@@ -76,7 +96,8 @@ def read_evidence(capture: Capture, size: int) -> Evidence:
     weight = np.where(covered, np.clip(seen / TRUSTED, 0, 1), 0)
     tensors = [np.ascontiguousarray(a, np.float32) for a in (texture.transpose(2, 0, 1), weight, np.where(covered, alpha, 0), normal.transpose(2, 0, 1))]
     unlike_skin = np.maximum.reduce([template.mask(name, size) for name in ("brows", "lips", "eyes", "nostrils", "scalp")])
-    parts = [torch.from_numpy(np.ascontiguousarray(a, np.float32)) for a in (skin, 1 - (1 - FEATURE_TRUST) * unlike_skin, protected, np.zeros_like(alpha))]
+    parts = [torch.from_numpy(np.ascontiguousarray(a, np.float32))
+             for a in (skin, 1 - (1 - FEATURE_TRUST) * unlike_skin, protected, np.zeros_like(alpha))]
     return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts)
 
 
@@ -86,14 +107,15 @@ def softened(mask: np.ndarray) -> np.ndarray:
     return np.clip((faded - 0.02) / 0.96, 0, 1)
 
 
-def observations(evidence: Evidence, exposure: float, cell: float, multiple: int, recipe: Recipe, centred: bool = True) -> dict[int, Observation]:
-    """The evidence as the sampler takes it, per coarsening factor. The texture is multiplied by `exposure`; `cell` is a grid cell in texels at REFERENCE.
+def observations(evidence: Evidence, exposure: float, cell: float, multiple: int, recipe: Recipe) -> dict[int, Observation]:
+    """The evidence as the sampler takes it, per coarsening factor. The texture is multiplied by `exposure`; `cell` is a grid cell where the map has REFERENCE
+    texels.
 
     Maps coarser than a quarter of REFERENCE are left out: the prior has not seen them.
     """
-    cells = grid_cells(cell)
+    cells, extent = grid_cells(cell), evidence.extent
     found = {}
-    for factor in (1, 2, 4):
+    for factor in extent.factors:
         size = evidence.size // factor
         if factor > 1 and (size < REFERENCE // 4 or size % multiple or evidence.size % factor):
             continue
@@ -105,9 +127,11 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
         ring = (support > 0) & ((inside == 0) if recipe.hard_mask else (alpha.numpy() < 0.5))
         ring &= edge.numpy() < 0.5  # a border that lies on a shadow's edge shall not be seamless
         modulation = torch.from_numpy(support.astype(np.float32)) if recipe.hard_mask else alpha
-        coords = coordinates(size, slice(0, size), slice(0, size), centred)
+        whole = size * REFERENCE // extent.side
+        top, left = (start * whole // REFERENCE for start in (extent.top, extent.left))
+        coords = coordinates(whole, slice(top, top + size), slice(left, left + size), extent.centred)
         shader = Shader(normal, modulation, cells, recipe.bilinear)
-        found[factor] = Observation(texture, weight, trust, coords, shader, torch.from_numpy(ring), REFERENCE / size)
+        found[factor] = Observation(texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size)
     return found
 
 

@@ -38,8 +38,10 @@ class Recipe:
     bilinear: bool = False  # how a texel reads V; else cubic
     fitted: bool = True  # gamma^g starts from a least-squares fit to x_0^ref; else from the even light that gives the texture's mean
     sharp_edges: bool = True  # M's border is laid on the shadow's edge where the texture shows one, and there light may step
+    protect_marks: bool = True  # moles and round scars inside M tell nothing of the light
     trusting: bool = False  # light may explain brows, lips and hair as freely as skin
     phases: tuple[tuple[str, float, float], ...] = (("both", 0.0, 0.5),)  # (which lights, from, to): shares of the steps; frozen outside of them
+    refit: float = 0.0  # share of the steps at which gamma^g is fitted outside of M in closed form
     updates: int = 300  # of each phase, spread over its steps; one a step is the least
     rate: float = 0.01  # of Adam ...
     decay: float = 0.995  # ... and its factor per update of a phase
@@ -58,7 +60,7 @@ class Recipe:
 OURS = Recipe()
 
 # What neither the paper nor the released code has is off in both.
-_PLAIN = replace(OURS, coarse=(), hard_mask=True, one_chroma=False, sharp_edges=False, trusting=True, smooth=0.0)
+_PLAIN = replace(OURS, coarse=(), hard_mask=True, one_chroma=False, sharp_edges=False, protect_marks=False, trusting=True, smooth=0.0)
 
 RECIPES = {
     "wildcap": OURS,
