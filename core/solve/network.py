@@ -17,14 +17,15 @@ from torch.utils.checkpoint import checkpoint
 
 
 def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: torch.Tensor, mapping_condition: torch.Tensor | None = None,
-            mean: torch.Tensor | None = None, spread: torch.Tensor | None = None) -> torch.Tensor:
+            mean: torch.Tensor | None = None, spread: torch.Tensor | None = None, levels: torch.Tensor | None = None) -> torch.Tensor:
     """D(x; sigma): the preconditioned denoiser. x float32 [N, C, H, W], sigma [N], condition [N, K, H, W] -> [N, C, H, W].
+    `levels` [N, C, 1, 1] are the noise levels of the channels where they differ; the network is told `sigma`.
 
     The released priors take data of mean 0 and deviation sigma_data, and scale the condition, which is not noised, by c_in like the data.
     With `mean` [N, C, H, W] and `spread` [N, C, 1, 1] the network sees what differs from the mean in units of its spread, and the condition as it is:
     where it has nothing to say, D is then the best estimate of a Gaussian of that mean and spread. Only the network itself runs in low precision.
     """
-    s = sigma.reshape(-1, 1, 1, 1)
+    s = sigma.reshape(-1, 1, 1, 1) if levels is None else levels
     if mean is None:
         mean, spread = torch.zeros_like(x), torch.full((1, 1, 1, 1), network.sigma_data, device=x.device)
         condition = condition / (s * s + spread**2).sqrt()

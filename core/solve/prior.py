@@ -18,6 +18,8 @@ from ..messages import Problem
 from . import released
 from .network import UNet, denoise, from_state
 
+BLIND = 80.0  # noise level of a channel of which nothing is seen
+CLEAR = 0.01  # ... and of one that is known
 WEIGHTS = Path(__file__).parent.parent / "weights" / "prior.safetensors"
 
 
@@ -48,8 +50,22 @@ class Prior:
         sigmas = torch.full((len(x),), float(sigma), device=device)
         return denoise(self.network, x.to(device), sigmas, **{k: v for k, v in self._known.items() if k != "coords"}).to(x.device)
 
+    def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor) -> torch.Tensor:
+        """Maps [1, 7, H, W] with the normals and specular that are expected of their diffuse albedo; noise [1, 7, H, W] is standard normal.
+
+        A sample's are one possibility; these are the mean of all, in one evaluation of the network.
+        """
+        device = self.network.proj_in.weight.device
+        known = condition(coords, self.octaves, self.mean_face, self.spread, self.tone[None], blind=torch.ones(1))
+        levels = torch.tensor([CLEAR] * 3 + [BLIND] * 4)[None, :, None, None]
+        x = torch.where(levels < BLIND, maps, known["mean"]) + levels * noise
+        told = {name: value.to(device) for name, value in known.items()}
+        out = denoise(self.network, x.to(device), torch.full((1,), CLEAR, device=device), levels=levels.to(device), **told).to(maps.device)
+        return torch.cat([maps[:, :3], out[:, 3:]], 1)
+
     def _condition(self, coords: torch.Tensor) -> dict[str, torch.Tensor]:
-        return condition(coords, self.octaves, self.mean_face, self.spread, self.tone[None])
+        blind = torch.zeros(1) if self.network.mapping_cond.in_features == 5 else None
+        return condition(coords, self.octaves, self.mean_face, self.spread, self.tone[None], blind)
 
     def use_tone(self, tone: torch.Tensor) -> None:
         """Conditions the prior on a skin tone, linear RGB [3]."""
@@ -72,6 +88,10 @@ class ReleasedPrior(Prior):
             raise Problem("This prior is conditioned on a fixed random map, which is not in its folder.",
                           f"Save the map it was trained with beside ckpt.pth as {released.NOISE_FILE}, float32 of shape 3, S, S.")
 
+    def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor) -> torch.Tensor:
+        """The maps as they are: a released prior was not taught to answer in one evaluation."""
+        return maps
+
     def _condition(self, coords: torch.Tensor) -> dict[str, torch.Tensor]:
         self.check()
         if self.kind != "noise":
@@ -80,11 +100,15 @@ class ReleasedPrior(Prior):
         return {"condition": self.noise[0][:, rows, columns].transpose(0, 1)}
 
 
-def condition(coords: torch.Tensor, octaves: int, mean_face: torch.Tensor, spread: torch.Tensor, tone: torch.Tensor) -> dict[str, torch.Tensor]:
-    """What our network is told of maps at coords [N, 2, H, W] of skins of tone [N, 3]: `denoise`'s arguments by name."""
+def condition(coords: torch.Tensor, octaves: int, mean_face: torch.Tensor, spread: torch.Tensor, tone: torch.Tensor,
+              blind: torch.Tensor | None) -> dict[str, torch.Tensor]:
+    """What our network is told of maps at coords [N, 2, H, W] of skins of tone [N, 3]: `denoise`'s arguments by name. blind [N] is 1 where the normals
+    and specular it gets are pure noise (`denoise`'s `levels` are BLIND there) and follow from the diffuse alone."""
     texel = 512 * (coords[:, 0, 0, 1] - coords[:, 0, 0, 0]).abs()  # side of a texel in texels of a 1024 map
     scale = torch.cat([spread[:3] * tone, spread[3:].expand(len(tone), -1)], 1)
     mapping = torch.cat([texel.log2()[:, None], tone.clamp_min(1e-3).log() / 2 + 0.6], 1)  # logarithms of about -1 to 1
+    if blind is not None:
+        mapping = torch.cat([mapping, blind.to(mapping)[:, None]], 1)
     return {"condition": positional_encoding(coords, octaves), "mapping_condition": mapping,
             "mean": mean_at(mean_face, coords, tone), "spread": scale[:, :, None, None]}
 

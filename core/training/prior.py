@@ -25,14 +25,14 @@ from torch.utils.data import DataLoader, Dataset
 from ..capture import replacing
 from ..messages import Problem, Reporter
 from ..solve.network import UNet, denoise
-from ..solve.prior import WEIGHTS, build, condition, fast_dtype
+from ..solve.prior import BLIND, WEIGHTS, build, condition, fast_dtype
 from ..synthetic.identities import reserved_seeds
 from .patches import Batch, Windows, mean_map, spread_about
 from .skins import SCALES, Skins, carried_names, carried_skins, clusters, synthetic_skins
 
 OCTAVES = 6
 _MODEL = {"type": "image_v1", "input_channels": 7, "patch_size": 2, "mapping_out": 128, "self_attn_depths": [False, False, False], "augment_wrapper": False,
-          "mapping_cond_dim": 4, "norm": "pixel", "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80}
+          "mapping_cond_dim": 5, "norm": "pixel", "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80}
 _COND = {"type": "posenc", "pos_enc_freq": OCTAVES}
 CONFIGS = {
     "cpu": {"model": {**_MODEL, "depths": [1, 2, 2], "channels": [48, 96, 160]}, "cond": _COND,
@@ -46,6 +46,10 @@ SIGMA = {1: (-2.4, 1.2), 2: (-1.8, 1.3), 4: (-1.0, 1.5)}
 FIRST_SEED = 1000
 """Training takes the seeds from here on, held-out skins those from HELD_OUT_SEED on; the sample subject's and the benchmarks' are reserved."""
 HELD_OUT_SEED = 9000
+BLINDFOLDED = 0.25
+"""Share of the whole skins' windows whose normals and specular go in as pure noise, as all of those do that have none: they must follow from the diffuse,
+of which more is then to be seen (ln sigma lower by CLEARER)."""
+CLEARER = 1.5
 
 
 def train_prior(config: str, out: Path, report: Reporter, minutes: float | None = None, skins: Path | None = None, held_out: list[str] = (),
@@ -180,17 +184,21 @@ class _Steps(Dataset):
 
 def _loss(network: UNet, statistics: dict[str, torch.Tensor], batch: Batch, rng: np.random.Generator, device: str) -> torch.Tensor:
     """EDM's weighted denoising error per sample [N] (Karras et al. 2022, table 1): the squared error of F itself, where the truth is known.
-    What is not known goes in as pure noise of the deviation that data would have."""
+    What is not known goes in as pure noise."""
     mean, deviation = (torch.tensor([SIGMA[int(scale)][i] for scale in batch.scale]) for i in (0, 1))
-    sigma = (torch.from_numpy(rng.standard_normal(len(mean))).float() * deviation + mean).exp().clamp(0.005, 80.0).to(device)
-    noise = torch.from_numpy(rng.standard_normal(batch.clean.shape, dtype=np.float32)).to(device)
     clean, known = batch.clean.to(device), batch.known.to(device)
-    told = condition(batch.coords.to(device), OCTAVES, **statistics, tone=batch.tone.to(device))
-    s, spread = sigma[:, None, None, None], told["spread"]
+    blind = torch.from_numpy(rng.random(len(mean)) < BLINDFOLDED).float().to(device)
+    mean = mean.to(device) - CLEARER * blind
+    blind = torch.maximum(blind, 1 - known[:, 3:].amax((1, 2, 3)))
+    sigma = (torch.from_numpy(rng.standard_normal(len(mean))).float() * deviation).to(device).add(mean).exp().clamp(0.005, BLIND)
+    noise = torch.from_numpy(rng.standard_normal(batch.clean.shape, dtype=np.float32)).to(device)
+    told = condition(batch.coords.to(device), OCTAVES, **statistics, tone=batch.tone.to(device), blind=blind)
+    s, spread = sigma[:, None, None, None].expand(-1, 7, -1, -1).clone(), told["spread"]
+    s[:, 3:][blind > 0] = BLIND
     noisy = torch.where(known > 0, clean + s * noise, told["mean"] + (s**2 + spread**2).sqrt() * noise)
     low = device == "cuda" or fast_dtype("cpu") == torch.bfloat16
     with torch.autocast(device, torch.bfloat16, enabled=low):
-        denoised = denoise(network, noisy, sigma, **told)
+        denoised = denoise(network, noisy, sigma, levels=s, **told)
     weight = known * (s**2 + spread**2) / (s * spread) ** 2
     return (weight * (denoised - clean) ** 2).sum((1, 2, 3)) / known.sum((1, 2, 3)).clamp_min(1)
 
