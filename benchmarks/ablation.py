@@ -1,13 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each part of the solver is worth, on UV-space problems with known truth: held-out synthetic skins under sky, sun and cast shadows.
+"""What each part of the solver is worth, on UV-space problems with known truth (benchmarks/uv_problems.py): subjects that no training saw.
 
-    python -m benchmarks.ablation OUT.json [--rows NAME ...] [--subjects SEED ...] [--shadows leaves self ...] [--seeds 0 1] [--size 256]
+    python -m benchmarks.ablation OUT.json [--rows NAME ...] [--skins FOLDER] [--kind raw|delit] [--size 256] [--steps 20] [--jobs 2]
     python -m benchmarks.ablation OUT.json --table
+    python -m benchmarks.ablation OUT.json --pictures FOLDER
 
-OUT.json keeps every finished solve, so the command goes on where it was stopped. --table prints, per row, PSNR (sRGB, after one gain per channel), SSIM and
-FLIP inside the shadow, in a band of 12 texels (of a 1024 map) about its border and outside: means, and beside the PSNR the spread over the solver's seeds. The
-feature distance of an LPIPS kind is not computed. The rows paper and released take their own 600 steps.
+Six subjects x three shadows x two seeds for the rows that carry the method (KEY); the other rows run on one shadow per subject, the 600 steps of the paper
+and of the released code on one problem each; every row is compared with the full method on its own problems only. OUT.json keeps every finished solve, so the
+command goes on where it was stopped. --skins names a folder of skins carried into our UVs (`python -m core train carry`); those in the prior's
+card under held_out_skins are added to the subjects. The pictures are of synthetic subjects only.
 """
 
 from __future__ import annotations
@@ -17,118 +19,168 @@ import json
 import os
 import tempfile
 import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
+from functools import lru_cache
+from multiprocessing import get_context
 from pathlib import Path
 
-import cv2
 import numpy as np
 import torch
-from flip_evaluator import evaluate as flip_evaluate
-from skimage.metrics import structural_similarity
+from skimage.color import deltaE_ciede2000, rgb2lab
 
 from core import images, meshes, template
 from core.capture import Capture
-from core.solve import initial, maps
+from core.solve import DELIT, initial, maps
 from core.solve.evidence import read_evidence
 from core.solve.light_fit import update_lights
-from core.solve.prior import load
+from core.solve.prior import WEIGHTS, load
 from core.solve.problem import State, photometric
-from core.solve.recipes import OURS, RECIPES
+from core.solve.recipes import OURS, RECIPES, Recipe
 from core.solve.sampler import sample, seeded
 
-from .solve_uv import problem, psnr
+from .ablation_measures import measure, table
+from .uv_problems import LEE_PERRY_SMITH, SHADOWS, UvProblem, problem
 
-REGIONS = ("shadow", "band", "outside")
-FACE_CROP = 768
-CELLS = 96
+SUBJECTS = ("9000", "9002", "9004", "9007", "9008", LEE_PERRY_SMITH.name if LEE_PERRY_SMITH.is_dir() else "9001")
+FACE_CROP, CELLS = 768, 96
+FULL = "full method"
+KEY = (FULL, "without texel grid", "without prior", "grid on the whole face", "the texture itself")
+PICTURED = "without texel grid", "without prior", FULL
 
-# name: (recipe, cells of V across the face, what becomes of M, with the prior)
-ROWS = {
-    "full method": (OURS, CELLS, "painted", True),
-    "without texel grid": (OURS, CELLS, "empty", True),
-    "grid on the whole face": (OURS, CELLS, "full", True),
-    "without prior": (OURS, CELLS, "painted", False),
-    "1 cell": (OURS, 1, "painted", True),
-    "24 cells": (OURS, 24, "painted", True),
-    "384 cells": (OURS, 384, "painted", True),
-    "start at T": (replace(OURS, start=1.0), CELLS, "painted", True),
-    "start from a uniform tone": (replace(OURS, uniform_start=True), CELLS, "painted", True),
-    "27 numbers per cell": (replace(OURS, one_chroma=False), CELLS, "painted", True),
-    "hard mask": (replace(OURS, hard_mask=True), CELLS, "painted", True),
-    "light explains features too": (replace(OURS, trusting=True), CELLS, "painted", True),
-    "local light not smooth": (replace(OURS, smooth=0.0), CELLS, "painted", True),
-    "held back, as after a delighter": (replace(OURS, even=0.4, faint=2.0), CELLS, "painted", True),
-    "no coarse to fine": (replace(OURS, coarse=()), CELLS, "painted", True),
-    "proximal guidance": (replace(OURS, guidance="proximal"), CELLS, "painted", True),
-    "proximal, 30 steps": (replace(OURS, guidance="proximal", steps=30), CELLS, "painted", True),
-    "recipe paper": (RECIPES["paper"], CELLS, "painted", True),
-    "recipe released": (RECIPES["released"], CELLS, "painted", True),
+# name: (what is changed in our recipe, cells of V across the face, what becomes of M, with the prior)
+ROWS: dict[str, tuple[dict, int, str, bool]] = {
+    FULL: ({}, CELLS, "painted", True),
+    "the texture itself": ({}, CELLS, "painted", False),
+    "without texel grid": ({}, CELLS, "empty", True),
+    "without prior": ({}, CELLS, "painted", False),
+    "grid on the whole face": ({}, CELLS, "full", True),
+    "1 cell": ({}, 1, "painted", True),
+    "24 cells": ({}, 24, "painted", True),
+    "384 cells": ({}, 384, "painted", True),
+    "start at T": ({"start": 1.0}, CELLS, "painted", True),
+    "start from a uniform tone": ({"uniform_start": True}, CELLS, "painted", True),
+    "27 numbers per cell": ({"one_chroma": False}, CELLS, "painted", True),
+    "mask as painted, no edge fitted": ({"sharp_edges": False}, CELLS, "painted", True),
+    "moles not protected": ({"protect_marks": False}, CELLS, "painted", True),
+    "light explains features too": ({"trusting": True}, CELLS, "painted", True),
+    "local light not smooth": ({"smooth": 0.0}, CELLS, "painted", True),
+    "lights held back": (DELIT, CELLS, "painted", True),
+    "global light by Adam with the grid": ({"phases": (("both", 0.0, 0.5),), "refit": 0.0}, CELLS, "painted", True),
+    "no coarse to fine": ({"coarse": ()}, CELLS, "painted", True),
+    "proximal guidance": ({"guidance": "proximal"}, CELLS, "painted", True),
+    "75 steps": ({"steps": 75}, CELLS, "painted", True),
+    "recipe paper": ({}, CELLS, "painted", True),
+    "recipe released": ({}, CELLS, "painted", True),
 }
-SLOW = ("recipe paper", "recipe released")
+NAMED = {"recipe paper": "paper", "recipe released": "released"}
+TONES = ((0.95, 0.80, 0.72), (0.85, 0.67, 0.56), (0.76, 0.57, 0.45), (0.62, 0.43, 0.32), (0.47, 0.31, 0.23), (0.30, 0.20, 0.16))
+"""sRGB, light to dark: asked for of one subject after the other, whatever its own is."""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--rows", nargs="+", choices=tuple(ROWS), default=[name for name in ROWS if name not in SLOW])
-    parser.add_argument("--subjects", type=int, nargs="+", default=[9000, 9001, 9002, 9003, 9004, 9005])
-    parser.add_argument("--shadows", nargs="+", default=["leaves", "self", "blinds"])
-    parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1])
+    parser.add_argument("--rows", nargs="+", choices=tuple(ROWS), default=list(ROWS))
+    parser.add_argument("--subjects", nargs="+", default=list(SUBJECTS))
+    parser.add_argument("--skins", type=Path)
+    parser.add_argument("--kind", choices=("raw", "delit"), default="raw")
     parser.add_argument("--size", type=int, default=256)
+    parser.add_argument("--steps", type=int, default=20, help="of every row that does not say otherwise")
+    parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--table", action="store_true")
+    parser.add_argument("--pictures", type=Path)
     options = parser.parse_args()
     done = json.loads(options.out.read_text(encoding="utf-8")) if options.out.is_file() else {}
+    if options.pictures:
+        draw(options)
+        return
     if not options.table:
         solve_all(options, done)
-    print(table(done))
+    print(table({k: r for k, r in done.items() if "tone" not in r}, list(ROWS), FULL))
+    differences = [r["tone"] for r in done.values() if "tone" in r]
+    if differences:
+        print(f"\nSkin tone, CIEDE2000 of the solved mean to the request, six tones: largest {max(a for a, _ in differences):.2f} as delivered, "
+              f"{max(b for _, b in differences):.2f} by the sampling alone.")
 
 
 def solve_all(options: argparse.Namespace, done: dict) -> None:
-    """Fills `done` with the solves that are missing and stores it after each."""
-    prior = load()
-    for subject in options.subjects:
-        for shadows in options.shadows:
-            wanted = [(row, seed) for seed in options.seeds for row in options.rows if _key(row, subject, shadows, options.size, seed) not in done]
-            if not wanted:
-                continue
-            given = problem(subject, options.size, shadows)
-            for row, seed in wanted:
-                began = time.monotonic()
-                albedo = solve_row(prior, given, row, seed)
-                key = _key(row, subject, shadows, options.size, seed)
-                done[key] = {"row": row, "seed": seed, "problem": [subject, shadows, options.size], "seconds": round(time.monotonic() - began, 1),
-                             **{name: measure(albedo, given[0], where) for name, where in regions(given).items()}}
-                temporary = options.out.with_name(f".{options.out.name}")
-                temporary.write_text(json.dumps(done, indent=0), encoding="utf-8")
-                os.replace(temporary, options.out)
-                print(f"{key:60} {done[key]['shadow']['psnr']:6.2f} {done[key]['band']['psnr']:6.2f} {done[key]['outside']['psnr']:6.2f}", flush=True)
+    """Fills `done` with the solves that are missing and stores it after each problem."""
+    subjects = [*options.subjects, *(_held_out(options.skins) if options.skins else [])]
+    tasks = []
+    for i, subject in enumerate(subjects):
+        for j, shadows in enumerate(SHADOWS):
+            wanted = [(row, seed) for row in options.rows for seed in (0, 1) if _belongs(row, i, j, seed)]
+            if j == i % 3 and i < len(TONES) and options.kind == "raw":
+                wanted.append((f"tone {i}", 0))
+            wanted = [(row, seed) for row, seed in wanted if _key(row, subject, shadows, options, seed) not in done]
+            if wanted:
+                tasks.append((subject, shadows, wanted))
+    with ProcessPoolExecutor(options.jobs, get_context("spawn")) as pool:
+        for future in as_completed([pool.submit(_solve_problem, *task, options) for task in tasks]):
+            done.update(future.result())
+            temporary = options.out.with_name(f".{options.out.name}")
+            temporary.write_text(json.dumps(done, indent=0), encoding="utf-8")
+            os.replace(temporary, options.out)
+            print(f"{len(done)} solves", flush=True)
 
 
-def solve_row(prior, given: tuple, row: str, seed: int) -> np.ndarray:
+def _belongs(row: str, subject: int, shadows: int, seed: int) -> bool:
+    """Whether a row is solved on a problem: key rows on all, others on one shadow per subject, the 600 steps on one problem each."""
+    if row in NAMED:
+        return subject == shadows == 0 and seed == 0
+    return row in KEY or shadows == subject % 3
+
+
+def _held_out(folder: Path) -> list[str]:
+    names = json.loads(WEIGHTS.with_suffix(".json").read_text(encoding="utf-8")).get("held_out_skins", [])
+    return [str(folder / f"{name}.png") for name in names]
+
+
+def _solve_problem(subject: str, shadows: str, wanted: list[tuple[str, int]], options: argparse.Namespace) -> dict:
+    torch.set_num_threads(1)
+    given, found = problem(subject, shadows, options.size, options.kind), {}
+    for row, seed in wanted:
+        began = time.monotonic()
+        about = {"row": row, "seed": seed, "problem": [Path(subject).stem, shadows, options.size, options.kind]}
+        if row.startswith("tone "):
+            about["tone"] = tone_error(given, TONES[int(row[5:])], options.steps)
+        else:
+            albedo = solve_row(given, row, seed, options.steps)
+            about |= {"seconds": round(time.monotonic() - began, 1), **measure(albedo, given.albedo, given.face, given.regions())}
+        found[_key(row, subject, shadows, options, seed)] = about
+    return found
+
+
+def solve_row(given: UvProblem, row: str, seed: int, steps: int) -> np.ndarray:
     """The linear albedo [S, S, 3] that one row's method finds; it is told the true skin tone."""
-    recipe, cells, mask, with_prior = ROWS[row]
-    truth, texture, _, painted = given
-    size = len(truth)
-    skin = template.mask("skin", size) * (1 - template.mask("eyes", size))
-    tone = images.linear_to_srgb((truth * skin[..., None]).sum((0, 1)) / skin.sum())
+    if row == "the texture itself":
+        return given.texture
+    changes, cells, mask, with_prior = ROWS[row]
+    recipe = RECIPES[NAMED[row]] if row in NAMED else replace(OURS, **{"steps": steps, **changes})
+    skin = _skin(len(given.albedo))
+    tone = images.linear_to_srgb((given.albedo * skin[..., None]).sum((0, 1)) / skin.sum())
+    return solved(given, recipe, tone, seed, cells, mask, with_prior)
+
+
+def solved(given: UvProblem, recipe: Recipe, tone: np.ndarray, seed: int = 0, cells: int = CELLS, mask: str = "painted", with_prior: bool = True) -> np.ndarray:
+    """The linear albedo [S, S, 3] under a recipe and a requested tone (sRGB)."""
+    size, prior = len(given.albedo), _prior()
     with tempfile.TemporaryDirectory() as folder:
         capture = Capture(folder)
-        images.write_linear(capture.texture, texture)
+        images.write_linear(capture.texture, given.texture)
         images.write_data(capture.texture_confidence, np.ones((size, size), np.float32))
-        images.write_data(capture.shadow_mask_auto, {"painted": painted, "empty": np.zeros_like(painted), "full": np.ones_like(painted)}[mask])
+        images.write_data(capture.shadow_mask_auto, {"painted": given.mask, "empty": 0 * given.mask, "full": 0 * given.mask + 1}[mask])
         meshes.write_obj(capture.head, template.load())
         evidence = read_evidence(capture, size)
     start = initial.start(prior, evidence, ",".join(f"{v:.5f}" for v in tone), FACE_CROP / cells, recipe)
-    if with_prior:
-        state = sample(prior, start.observations, start.state, recipe, seeded(seed))
-    else:
-        state = texels_alone(start, recipe)
+    state = sample(prior, start.observations, start.state, recipe, seeded(seed)) if with_prior else texels_alone(start, recipe)
     return maps.finished(state, evidence, start, recipe).diffuse
 
 
-def texels_alone(start: initial.Start, recipe, updates: int = 600) -> State:
+def texels_alone(start: initial.Start, recipe: Recipe, updates: int = 600) -> State:
     """No prior: the albedo's texels and the lights follow the photometric loss alone, under Adam (the paper's ablation)."""
-    o, state = start.observations[1], start.state
+    o, state, recipe = start.observations[1], start.state, replace(recipe, phases=(("both", 0.0, 1.0),), refit=0.0, updates=updates)
     x = state.denoised.clone().requires_grad_(True)
     adam = torch.optim.Adam([x], lr=0.01)
     scheduler = torch.optim.lr_scheduler.ExponentialLR(adam, 0.995)
@@ -144,63 +196,38 @@ def texels_alone(start: initial.Start, recipe, updates: int = 600) -> State:
     return state
 
 
-def regions(given: tuple) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Name -> (texels bool [S, S], all the face's texels)."""
-    truth, _, shadow, _ = given
-    size = len(truth)
-    face = template.mask("face", size) > 0.5
-    edge = cv2.morphologyEx((shadow > 0.5).astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
-    band = cv2.dilate(edge, np.ones((25 * size // 1024 | 1,) * 2, np.uint8)) > 0
-    return {"shadow": (face & (shadow > 0.5) & ~band, face), "band": (face & band, face), "outside": (face & (shadow < 0.05) & ~band, face)}
+def tone_error(given: UvProblem, tone: tuple[float, float, float], steps: int) -> tuple[float, float]:
+    """CIEDE2000 between a requested skin tone and the mean of the solved facial skin: as it is delivered, and before the mean is brought to the request."""
+    skin, found = _skin(len(given.albedo)), []
+    for rescale in (OURS.rescale, "none"):
+        albedo = solved(given, replace(OURS, steps=steps, rescale=rescale), np.array(tone))
+        mean = images.linear_to_srgb((albedo * skin[..., None]).sum((0, 1)) / skin.sum())
+        found.append(round(float(deltaE_ciede2000(rgb2lab(mean), rgb2lab(np.array(tone)))), 3))
+    return found[0], found[1]
 
 
-def measure(albedo: np.ndarray, truth: np.ndarray, where: tuple[np.ndarray, np.ndarray]) -> dict:
-    """PSNR, SSIM and FLIP over a region, in sRGB, after the gain per channel that is best for the whole face."""
-    region, face = where
-    gain = (albedo[face] * truth[face]).sum(0) / (albedo[face] ** 2).sum(0)
-    ours, theirs = images.linear_to_srgb(albedo * gain).astype(np.float32), images.linear_to_srgb(truth).astype(np.float32)
-    _, ssim = structural_similarity(theirs, ours, channel_axis=2, data_range=1.0, full=True)
-    flip, _, _ = flip_evaluate(theirs, ours, "LDR", applyMagma=False, computeMeanError=False)
-    return {"psnr": round(psnr(albedo, truth, region, face), 3), "ssim": round(float(ssim[region].mean()), 4),
-            "flip": round(float(np.squeeze(flip)[region].mean()), 4)}
+def draw(options: argparse.Namespace) -> None:
+    """FOLDER/ablation.jpg: of two synthetic subjects the texture, the rows PICTURED and the truth."""
+    lines = []
+    for subject, shadows in (("9007", "leaves, hard"), ("9008", "edge, half soft")):
+        given = problem(subject, shadows, options.size, options.kind)
+        solves = [solve_row(given, row, 0, options.steps) for row in PICTURED]
+        pictures = [given.texture * (given.albedo.mean() / given.texture.mean()), *solves]
+        lines.append(np.hstack([*pictures, given.albedo]))
+    images.write_srgb(options.pictures / "ablation.jpg", images.linear_to_srgb(np.clip(np.vstack(lines), 0, 1)))
 
 
-def table(done: dict) -> str:
-    """Markdown, a line per row that was solved, over the problems that all of these rows share."""
-    by_row = {row: [r for r in done.values() if r["row"] == row] for row in ROWS}
-    by_row = {row: results for row, results in by_row.items() if results}
-    if not by_row:
-        return "Nothing was solved yet."
-    shared = set.intersection(*({_problem(r) for r in results} for results in by_row.values()))
-    lines = [f"{len({p[:3] for p in shared})} problems, {len({p[3] for p in shared})} seeds each", "",
-             "| row | shadow: PSNR | SSIM | FLIP | band: PSNR | SSIM | FLIP | outside: PSNR | SSIM | FLIP | seconds |", "|" + " --- |" * 11]
-    for row, results in by_row.items():
-        results = [r for r in results if _problem(r) in shared]
-        cells = [cell for region in REGIONS for cell in (
-            f"{_mean(results, region, 'psnr'):.2f} ± {_seed_spread(results, region):.2f}",
-            f"{_mean(results, region, 'ssim'):.3f}", f"{_mean(results, region, 'flip'):.3f}")]
-        lines.append("| " + " | ".join([row, *cells, f"{np.mean([r['seconds'] for r in results]):.0f}"]) + " |")
-    return "\n".join(lines)
+@lru_cache(maxsize=1)
+def _prior():
+    return load()
 
 
-def _seed_spread(results: list[dict], region: str) -> float:
-    """Half the difference between the best and the worst seed, as a mean over problems."""
-    by_problem: dict = {}
-    for r in results:
-        by_problem.setdefault(tuple(r["problem"]), []).append(r[region]["psnr"])
-    return float(np.mean([(max(values) - min(values)) / 2 for values in by_problem.values()]))
+def _skin(size: int) -> np.ndarray:
+    return template.mask("skin", size) * (1 - template.mask("eyes", size))
 
 
-def _mean(results: list[dict], region: str, figure: str) -> float:
-    return float(np.mean([r[region][figure] for r in results]))
-
-
-def _problem(result: dict) -> tuple:
-    return (*result["problem"], result["seed"])
-
-
-def _key(row: str, subject: int, shadows: str, size: int, seed: int) -> str:
-    return f"{row} | {subject} {shadows} {size} | seed {seed}"
+def _key(row: str, subject: str, shadows: str, options: argparse.Namespace, seed: int) -> str:
+    return f"{row} | {Path(subject).stem} {shadows} {options.size} {options.kind} {options.steps} | seed {seed}"
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import torch
 
-from .lighting import BANDS, Lights
+from .lighting import BANDS, Lights, fit_around_constant
 from .problem import Observation, State, albedo, photometric
 from .recipes import Recipe
 
@@ -21,12 +21,22 @@ def update_lights(state: State, denoised: torch.Tensor, o: Observation, recipe: 
 
     How many there were before follows from the step's number, so a stored state continues exactly.
     """
+    if step < recipe.refit * steps:
+        _refit(state, denoised, o, recipe)
     for phase, begin, end in recipe.phases:
         first, last = round(begin * steps), max(round(end * steps), round(begin * steps) + 1)
         if first <= step < last:
             per_step = max(1, round(recipe.updates / (last - first)))
             for k in range(per_step):
                 _adam(state, denoised, o, recipe, MOVING[phase], (step - first) * per_step + k)
+
+
+def _refit(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> None:
+    """gamma^g in closed form from what is seen outside of M under \\hat x_t. While there is much noise that map is what the prior expects, and no light but
+    the true one makes it fit; later it would agree with whatever light there is."""
+    weight = o.weight * (1 - o.shader.alpha) * (1.0 if recipe.trusting else o.trust)
+    if weight.sum() >= 1:
+        state.lights.glob = fit_around_constant(o.texture, albedo(denoised), o.shader.basis, weight, max(recipe.even, 0.01))
 
 
 def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> torch.Tensor:

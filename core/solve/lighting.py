@@ -132,6 +132,13 @@ def fit_global(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor,
     return torch.stack(out).float()
 
 
+def fit_around_constant(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor, weight: torch.Tensor, ridge: float) -> torch.Tensor:
+    """`fit_global`, but what no normal sees, and what `ridge` holds back, is drawn to the even light that gives the texture's mean colour."""
+    total = weight.sum().clamp_min(1e-6)
+    even = constant_light((texture * weight).sum((1, 2)) / (albedo * weight).sum((1, 2)).clamp_min(1e-4 * total))
+    return even + fit_global(texture - albedo * torch.einsum("ck,khw->chw", even, basis), albedo, basis, weight, ridge)
+
+
 def constant_light(shade: torch.Tensor) -> torch.Tensor:
     """gamma^g [3, 9] whose shading is `shade` [3] for every normal."""
     glob = torch.zeros(3, 9)
