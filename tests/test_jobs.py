@@ -2,13 +2,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Jobs and the solver's Python, seen from Blender. Timers do not fire in the wheel, so the tests poll."""
 
+import json
 import os
+import struct
 import sys
 import time
 import venv
+from importlib import import_module
 from pathlib import Path
 
 import pytest
+
+from core.capture import Capture
 
 from . import standin
 
@@ -121,3 +126,33 @@ def test_the_preview_is_read_again_when_it_is_newer(addon, tmp_path):
     preview.forget()
     assert len({icon for icon, _ in seen}) == 1
     assert [colour for _, colour in seen] == [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
+
+
+def test_the_edited_part_can_be_solved_when_only_the_mask_changed(addon, capture):
+    captures, properties, status = addon("captures"), addon("properties"), addon("status")
+    mask_edit = import_module(addon("status").__package__.replace("wildcap_addon", "core.mask_edit"))
+    item, folder = captures.active(bpy.context), Capture(capture)
+    status.refresh(bpy.context)
+    assert "No solve" in status.of(item).whole_solve and not bpy.ops.wildcap.solve_edited.poll()
+    conditions = mask_edit.conditions(captures.folder(item), properties.settings(item))
+    header = json.dumps({"__metadata__": {mask_edit.FIELD: json.dumps(conditions)}}).encode()
+    folder.solved.write_bytes(struct.pack("<Q", len(header)) + header)
+    status.refresh(bpy.context)
+    assert status.of(item).whole_solve == "" and bpy.ops.wildcap.solve_edited.poll()
+    preferences = addon("preferences").get()
+    preferences.python = sys.executable
+    bpy.ops.wildcap.solve_edited()
+    asked = json.loads(folder.job.read_text(encoding="utf-8"))
+    assert asked["settings"]["edited_part"] is True and asked["from"] == "solve"
+    bpy.ops.wildcap.cancel()
+    while addon("jobs").poll():
+        time.sleep(0.05)
+    bpy.ops.wildcap.solve()
+    assert "edited_part" not in json.loads(folder.job.read_text(encoding="utf-8"))["settings"], "the next solve is whole again"
+    bpy.ops.wildcap.cancel()
+    while addon("jobs").poll():
+        time.sleep(0.05)
+    preferences.python = ""
+    item.seed += 1
+    status.refresh(bpy.context)
+    assert "settings changed" in status.of(item).whole_solve and not bpy.ops.wildcap.solve_edited.poll()

@@ -55,15 +55,15 @@ def can_start(operator, context) -> bool:
     return False
 
 
-def start(item, goal: str, *, first: str | None = None, last: str | None = None) -> Job:
-    """Starts the stages from `first` (or from what is not fresh) to `last`. Raises Problem when it cannot."""
+def start(item, goal: str, *, first: str | None = None, last: str | None = None, **shared) -> Job:
+    """Starts the stages from `first` (or from what is not fresh) to `last`, with `shared` settings for this once. Raises Problem when it cannot."""
     capture, root = captures.folder(item), captures.root(item)
     if root in _jobs:
         raise Problem("This capture is being worked on already.", "Wait for it, or click Cancel.")
     python = preferences.python()
     if python is None:
         raise Problem("The solver is not set up on this machine.", "Click Install Solver in the Setup panel, or Use an Existing Python.")
-    path = write_job(capture, first=first, last=last, settings=properties.values(item))
+    path = write_job(capture, first=first, last=last, settings={**properties.values(item), **shared})
     return begin(root, goal, Worker(python, ROOT, path, capture.logs / "worker.log"))
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import bpy
 
-from ..core import report, stages
+from ..core import mask_edit, report, stages
 from ..core.capture import Capture
 from ..core.messages import Problem
 from . import captures, properties
@@ -31,6 +31,7 @@ class Status:
     has_maps: bool = False
     maps_time: float = 0.0
     render: str = ""
+    whole_solve: str = ""  # why an edited part of the mask cannot be solved alone; '' where it can
     findings: tuple[dict, ...] = ()  # what is wrong with the capture, as core.report.findings tells it
     problem: Problem | None = None
 
@@ -68,7 +69,7 @@ def look(capture: Capture, settings) -> Status:
     maps_time = max(map(_time, delivered(capture)))
     render = max(capture.renders.glob("[!.]*.png"), key=_time, default=Path())
     return Status(
-        source=record.get("source", ""), stages=states,
+        source=record.get("source", ""), stages=states, whole_solve=_whole_solve(capture, states["solve"], settings),
         seconds={name: done["seconds"] for name, done in record["stages"].items()},
         has_head=capture.head.is_file(), head_time=_time(capture.head), has_mask=capture.shadow_mask.is_file(),
         findings=tuple(report.findings(record)),
@@ -90,6 +91,10 @@ def _state(capture: Capture, stage: stages.Stage, record: dict, settings) -> str
     return capture.state(stage, settings)
 
 
+def _whole_solve(capture: Capture, state: str, settings) -> str:
+    return "The mask is as it was at the last solve." if state == "done" else mask_edit.obstacle(capture, settings)
+
+
 def _time(path: Path) -> float:
     return path.stat().st_mtime if path.is_file() else 0.0
 
@@ -97,7 +102,7 @@ def _time(path: Path) -> float:
 def _look(root: str, item) -> bool:
     capture = captures.folder(item)
     values = properties.values(item)
-    watched = (capture.json, capture.head, capture.shadow_mask, capture.protect_mask, capture.texture, *delivered(capture), capture.renders)
+    watched = (capture.json, capture.head, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved, *delivered(capture), capture.renders)
     stamp = (repr(values), *(p.stat().st_mtime_ns if p.exists() else 0 for p in watched))
     if root in _known and _known[root][0] == stamp:
         return False

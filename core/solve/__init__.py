@@ -10,20 +10,27 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict, replace
+from pathlib import Path
 
 import numpy as np
 import torch
 
-from .. import images
+from .. import images, mask_edit
 from ..capture import Capture
+from ..hashes import hash_tree
 from ..messages import Reporter
 from ..settings import Settings
-from . import checkpoint, initial, maps
+from . import checkpoint, drawing, initial, layout, maps
+from .checkpoint import Solution
+from .confidence import spread
+from .edited import solve_edited
 from .evidence import REFERENCE, Evidence, read_evidence
 from .prior import WEIGHTS, Prior, load
 from .problem import State
 from .recipes import RECIPES, Recipe
 from .sampler import sample, seeded
+from .window import coarse
+from .witnesses import confirmed
 
 FACE_CROP = 768
 """Texels at 1024 over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels."""
@@ -37,15 +44,29 @@ mean one; on raw light every pull costs. Chosen on one head scan, so to be confi
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """texture, confidence, head and masks -> maps/ (see maps.py for their colour spaces), preview/, and two pictures for the report.
 
-    The artist's mask wins over the proposal. Continues from its own checkpoint. Raises Problem for unusable inputs and for divergence.
+    The artist's mask wins over the proposal. Continues from its own checkpoint. With settings.edited_part only what a mask edit touched is solved again,
+    where that can be done (edited.py). Raises Problem for unusable inputs and for divergence.
     """
     options = settings.solve
-    recipe = _recipe(settings)
+    prior = load(Path(options.prior).expanduser() if options.prior else WEIGHTS, settings.device)
+    recipe = _recipe(settings, prior)
     report.progress(0, recipe.steps, "reading the texture, the head and the masks")
-    prior = load(WEIGHTS, settings.device)
-    size = max(options.size // 32, 4) * 32  # the network halves the map several times
-    evidence = read_evidence(capture, size)
-    start = initial.start(prior, evidence, options.skin_tone, FACE_CROP / options.grid_cells, recipe)
+    size = layout.whole_size(options.size, prior.multiple) if options.prior else max(options.size // 32, 4) * 32  # the network halves the map several times
+    known = evidence = read_evidence(capture, size)
+    elsewhere = layout.fitted(capture, known, prior, report) if options.prior else None
+    if elsewhere is not None:  # the authors' prior speaks of maps in other UVs
+        evidence = elsewhere.evidence(known, recipe.released_boxes)
+    _check_often(prior, report)
+    cell = FACE_CROP / options.grid_cells * REFERENCE / evidence.extent.side
+    part = solve_edited(capture, settings, recipe, prior, evidence, cell, report) if settings.edited_part and elsewhere is None else None
+    if part is not None:
+        _leave_figures(capture, evidence, *part, report)
+        return
+    conditions = mask_edit.conditions(capture, settings)
+    witness = (lambda marks: confirmed(capture, marks, evidence.size)) if elsewhere is None else list
+    start = initial.start(prior, evidence, options.skin_tone, cell, recipe, witness)
+    report.figure("marks_kept_from_light", len(start.marks))
+    images.write_srgb(capture.picture("solve", "edges_and_marks"), drawing.edges_and_marks(evidence, start.alpha, start.marks))
     state, seen = start.state, start.observations
     stored, key = capture.checkpoints / "solve.safetensors", _key(evidence, settings, start.tone)
     stopped = checkpoint.read(stored, key)
@@ -59,18 +80,31 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             checkpoint.write(stored, state, key)
             maps.write_preview(capture, state, seen, report)
 
-    _check_often(prior, report)
     state = sample(prior, seen, state, recipe, seeded(settings.seed), on_step)
-    result = maps.finished(state, evidence, start, recipe)
-    maps.write(capture, result)
+    result, found = _finished(prior, state, evidence, start, recipe, settings.seed, report)
+    delivered = result if elsewhere is None else elsewhere.returned(result, known, state.lights, start.exposure, start.tone)
+    maps.write(capture, delivered, found, conditions)
     maps.write_preview(capture, state, seen, report)
     _leave_figures(capture, evidence, result, start.tone, report)
     stored.unlink(missing_ok=True)
 
 
-def _recipe(settings: Settings) -> Recipe:
-    """The chosen recipe. Ours takes the number of steps and the guidance from the settings; the others come with their own."""
+def _finished(prior: Prior, state: State, evidence: Evidence, start: initial.Start, recipe: Recipe, seed: int, report: Reporter) -> tuple[maps.Maps, Solution]:
+    """The maps with their confidence, and what a later solve of a part needs."""
+    factor = max(start.observations)
+    varied = spread(prior, start.observations[factor], coarse(start.reference, factor), state.lights, recipe, seed, report.check)
+    result = maps.finished(state, evidence, start, recipe, varied)
+    return result, Solution(state.denoised, state.lights, evidence.alpha, start.alpha, varied, start.tone, result.gain, start.exposure)
+
+
+def _recipe(settings: Settings, prior: Prior) -> Recipe:
+    """The chosen recipe on the noise levels that the prior knows. Ours takes the number of steps and the guidance from the settings; the others come with
+    their own."""
     recipe = RECIPES[settings.solve.recipe]
+    if prior.one_scale:
+        recipe = replace(recipe, coarse=())
+    if prior.sigmas is not None:
+        recipe = replace(recipe, sigma_min=prior.sigmas[0], sigma_max=prior.sigmas[1])
     if settings.solve.recipe != "wildcap":
         return recipe
     return replace(recipe, steps=settings.solve.steps, guidance=settings.solve.guidance, **({} if settings.delight.delighter == "none" else DELIT))
@@ -95,6 +129,7 @@ def _key(evidence: Evidence, settings: Settings, tone: torch.Tensor) -> str:
         digest.update(tensor.numpy().tobytes())
     digest.update(json.dumps([asdict(settings.solve), settings.seed, settings.device]).encode())
     digest.update(WEIGHTS.read_bytes())
+    digest.update(json.dumps(hash_tree(Path(settings.solve.prior).expanduser()) if settings.solve.prior else "").encode())
     return digest.hexdigest()
 
 

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sampler's state on disk: written whole or not at all, and taken up only by a run on the same inputs."""
+"""What the solver keeps on disk: its state on the way, taken up only by a run on the same inputs, and what it found in the end, for a later solve of a part."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import torch
@@ -12,8 +13,47 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 
 from ..capture import replacing
+from ..mask_edit import FIELD
 from .lighting import Lights
 from .problem import State
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a solve ended with, all of the whole map: denoised x_0 [1, 7, S, S] before the maps' own gain, lights, the mask as `painted` [S, S] and as it was
+    used (`alpha`), the spread [H, W] of a coarser map that the confidence took; tone [3] linear, gain [3] of the albedo, exposure of the texture."""
+
+    denoised: torch.Tensor
+    lights: Lights
+    painted: torch.Tensor
+    alpha: torch.Tensor
+    spread: torch.Tensor
+    tone: torch.Tensor
+    gain: torch.Tensor
+    exposure: float
+
+
+def write_solution(path: Path, found: Solution, conditions: dict[str, str]) -> None:
+    """`conditions` are mask_edit's: under others this state is of no use."""
+    lights = {"glob": found.lights.glob, "grid": found.lights.grid, "chroma": found.lights.chroma}
+    tensors = {name: getattr(found, name) for name in ("denoised", "painted", "alpha", "spread", "tone", "gain")} | lights
+    tensors = {name: tensor.detach().cpu().clone().contiguous() for name, tensor in tensors.items()}
+    with replacing(path) as temporary:
+        save_file(tensors, temporary, metadata={FIELD: json.dumps(conditions), "exposure": repr(found.exposure)})
+
+
+def read_solution(path: Path, conditions: dict[str, str]) -> Solution | None:
+    """None where there is none, it is damaged, or it was found under other conditions."""
+    try:
+        with safe_open(path, "pt") as file:
+            metadata = file.metadata() or {}
+            if json.loads(metadata.get(FIELD, "null")) != conditions:
+                return None
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
+        lights = Lights(*(tensors.pop(name) for name in ("glob", "grid", "chroma")))
+        return Solution(lights=lights, exposure=float(metadata["exposure"]), **tensors)
+    except (OSError, SafetensorError, KeyError, TypeError, ValueError):
+        return None
 
 
 def write(path: Path, state: State, key: str) -> None:

@@ -4,15 +4,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 
 from .. import images
 from ..messages import Problem
+from .checkpoint import Solution
+from .edges import with_edges
 from .evidence import Evidence, grid_cells, observations
 from .lighting import Lights, constant_light, fit_global, sh_basis
+from .marks import Mark, with_marks
 from .prior import Prior, coordinates, mean_at
 from .problem import Observation, State
 from .problem import albedo as albedo_of
@@ -25,17 +29,22 @@ HUMAN_GREEN = 0.02, 0.45
 @dataclass(frozen=True)
 class Start:
     """tone: linear RGB [3]; reference x_0^ref [1, 7, S, S]; exposure: what the texture is multiplied by in `observations` (by coarsening factor),
-    so that its shading is about one; state: before the first step."""
+    so that its shading is about one; alpha [S, S]: M as it is used; state: before the first step; marks: what of the skin's own
+    is kept from the light."""
 
     tone: torch.Tensor
     reference: torch.Tensor
     exposure: float
+    alpha: torch.Tensor
     observations: dict[int, Observation]
     state: State
+    marks: tuple[Mark, ...] = ()
 
 
-def start(prior: Prior, evidence: Evidence, tone: str, cell: float, recipe: Recipe) -> Start:
-    """All that a run begins with. `tone` as in `skin_tone`, which the prior is told; `cell` is a cell of V in texels of a 1024 map.
+def start(prior: Prior, evidence: Evidence, tone: str, cell: float, recipe: Recipe,
+          witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
+    """All that a run begins with. `tone` as in `skin_tone`, which the prior is told; `cell` is a cell of V in texels of a 1024 map;
+    `witness` leaves those marks that the views confirm.
 
     Raises Problem where no facial skin was seen.
     """
@@ -51,7 +60,30 @@ def start(prior: Prior, evidence: Evidence, tone: str, cell: float, recipe: Reci
     trusted = evidence.weight * (1 if recipe.trusting else evidence.trust)
     weight = trusted * (1 - evidence.alpha)
     lights = first_lights(evidence.texture * exposure, albedo_of(x_ref), evidence.normal, weight if weight.sum() >= 1 else trusted, grid_cells(cell), recipe)
-    return Start(tone, x_ref, exposure, observations(evidence, exposure, cell, prior.multiple, recipe), State(0, None, x_ref, lights))
+    return _laid_out(prior, evidence, Start(tone, x_ref, exposure, evidence.alpha, {}, State(0, None, x_ref, lights)), cell, recipe, witness=witness)
+
+
+def again(prior: Prior, evidence: Evidence, earlier: Solution, cell: float, recipe: Recipe, near: torch.Tensor,
+          witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
+    """What a part of an earlier solve goes on from: that solve's tone, exposure and light, and where `near` [S, S] is 0 its mask too."""
+    prior.use_tone(earlier.tone)
+    x_ref = reference(prior, earlier.tone, evidence.skin, recipe.uniform_start)
+    begun = Start(earlier.tone, x_ref, earlier.exposure, evidence.alpha, {}, State(0, None, earlier.denoised, earlier.lights))
+    return _laid_out(prior, evidence, begun, cell, recipe, lambda alpha: torch.lerp(earlier.alpha, alpha, near), witness)
+
+
+def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float, recipe: Recipe,
+              mask: Callable[[torch.Tensor], torch.Tensor] = lambda alpha: alpha, witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
+    """`begun` with M as it is used, the marks that light must not explain, and the observations under both."""
+    if recipe.sharp_edges:
+        lit = torch.einsum("ck,khw->chw", begun.state.lights.glob, sh_basis(evidence.normal)) * albedo_of(begun.reference).clamp_min(1e-3)
+        trusted = evidence.weight * (1 if recipe.trusting else evidence.trust)
+        evidence = with_edges(evidence, evidence.texture * begun.exposure / lit.clamp_min(1e-3), trusted)
+    evidence = replace(evidence, alpha=mask(evidence.alpha))
+    marks: list[Mark] = []
+    if recipe.protect_marks:
+        evidence, marks = with_marks(evidence, witness)
+    return replace(begun, alpha=evidence.alpha, marks=tuple(marks), observations=observations(evidence, begun.exposure, cell, prior.multiple, recipe))
 
 
 def skin_tone(setting: str, texture: torch.Tensor, weight: torch.Tensor, tones: list[list[float]]) -> torch.Tensor:

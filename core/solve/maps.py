@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,8 @@ import torch
 from .. import images
 from ..capture import Capture, replacing_folder
 from ..messages import Reporter
+from .checkpoint import Solution, write_solution
+from .confidence import confidence
 from .evidence import Evidence
 from .initial import Start, mean_tone
 from .problem import Observation, State, albedo
@@ -23,31 +26,35 @@ DARKEST = 0.004  # linear albedo below which no skin or hair lies
 @dataclass(frozen=True)
 class Maps:
     """[S, S(, 3)] float32. diffuse and shading linear, diffuse * shading = I_UV; normal packed into [0, 1], tangent space, OpenGL Y+;
-    specular and confidence in [0, 1]."""
+    specular and confidence in [0, 1]; gain [3]: what the albedo was multiplied by to be of the skin tone."""
 
     diffuse: np.ndarray
     specular: np.ndarray
     normal: np.ndarray
     shading: np.ndarray
     confidence: np.ndarray
+    gain: torch.Tensor
 
 
-def finished(state: State, evidence: Evidence, start: Start, recipe: Recipe) -> Maps:
-    """Reads the maps out of \\hat x_0. The albedo is rescaled once so that the mean of the confident facial skin is the skin tone;
-    the shading takes the inverse, so that their product stays. What nobody saw is the mean face of that tone: a drawn
-    sample would be as likely, but would look like something that was measured."""
+def finished(state: State, evidence: Evidence, start: Start, recipe: Recipe, spread: torch.Tensor | None = None, gain: torch.Tensor | None = None) -> Maps:
+    """Reads the maps out of \\hat x_0. The albedo is rescaled once so that the mean of the confident facial skin is the skin tone (or by a `gain`
+    [3] that was found before); the shading takes the inverse, so that their product stays. What nobody saw is the mean face of that tone: a drawn
+    sample would be as likely, but would look like something that was measured. `spread` [H, W], of any size, is
+    confidence.py's; none by default."""
     shader = start.observations[1].shader
     x = torch.lerp(start.reference, state.denoised, evidence.weight.sqrt())[0]
     with torch.no_grad():
         shading = shader.total(state.lights).clamp_min(1e-3) / start.exposure
         main = shader.main(state.lights).clamp_min(1e-3) / start.exposure
     diffuse = albedo(x[None]).clamp_min(DARKEST)
-    gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone, recipe.rescale)[:, None, None]
+    if gain is None:
+        gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone, recipe.rescale)
     normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
-    explained = (1 - (shading / main).mean(0)).clamp(0, 1)  # the share of the darkness that was called shadow
-    confidence = (evidence.weight * (1 - explained * evidence.alpha)).clamp(0, 1)
     specular = ((x[6] + 1) / 2).clamp(0, 1).numpy()
-    return Maps(_picture((diffuse * gain).clamp(DARKEST, 1)), specular, _picture(normal), _picture(shading / gain), confidence.numpy())
+    explained = (1 - (shading / main).mean(0)).clamp(0, 1)  # the share of the darkness that was called shadow
+    each = gain[:, None, None]
+    trusted = confidence(evidence.weight, explained, diffuse * each, albedo(start.reference), spread)
+    return Maps(_picture((diffuse * each).clamp(DARKEST, 1)), specular, _picture(normal), _picture(shading / each), trusted.numpy(), gain)
 
 
 def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, rescale: str) -> torch.Tensor:
@@ -58,15 +65,24 @@ def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, resca
     return (tone ** (1 / gamma) / mean_tone(diffuse ** (1 / gamma), weight)).pow(gamma).clamp(0.2, 5.0)
 
 
-def write(capture: Capture, maps: Maps) -> None:
-    """The folder maps/, whole or not at all."""
+def write(capture: Capture, maps: Maps, found: Solution, conditions: dict[str, str], only: tuple[slice, slice] | None = None) -> None:
+    """The folder maps/, whole or not at all, with what a later solve of a part goes on from. `only` those rows and columns are new where given:
+    the others keep the values that their files have."""
+    def put(write: Callable, name: str, values: np.ndarray, **options) -> None:
+        if only is not None:
+            before = images.read_data(capture.maps / name)
+            before[only] = values.reshape(*values.shape[:2], -1)[only]
+            values = before
+        write(folder / name, values, **options)
+
     with replacing_folder(capture.maps) as folder:
-        images.write_srgb(folder / "diffuse_albedo.png", images.linear_to_srgb(maps.diffuse), bits=16)
-        images.write_linear(folder / "diffuse_albedo.exr", maps.diffuse)
-        images.write_data(folder / "specular_albedo.png", maps.specular, bits=16)
-        images.write_data(folder / "normal.png", maps.normal, bits=16)
-        images.write_linear(folder / "shading.exr", maps.shading)
-        images.write_data(folder / "confidence.png", maps.confidence)
+        put(images.write_srgb, "diffuse_albedo.png", images.linear_to_srgb(maps.diffuse), bits=16)
+        put(images.write_linear, "diffuse_albedo.exr", maps.diffuse)
+        put(images.write_data, "specular_albedo.png", maps.specular, bits=16)
+        put(images.write_data, "normal.png", maps.normal, bits=16)
+        put(images.write_linear, "shading.exr", maps.shading)
+        put(images.write_data, "confidence.png", maps.confidence)
+        write_solution(folder / capture.solved.name, found, conditions)
 
 
 def write_preview(capture: Capture, state: State, seen: dict[int, Observation], report: Reporter) -> None:

@@ -29,10 +29,12 @@ def seeded(seed: int) -> Callable[[int], Callable]:
 
 
 def sample(prior: Callable, observations: dict[int, Observation], state: State, recipe: Recipe, noise: Callable[[int], Callable],
-           on_step: Callable[[State, int], None] = lambda state, steps: None) -> State:
+           on_step: Callable[[State, int], None] = lambda state, steps: None,
+           known: Callable[[torch.Tensor, float, Callable], torch.Tensor] = lambda x, sigma, draw: x) -> State:
     """Runs the sampler from `state` to its end and returns the final state; `denoised` is the solved map, `lights` theta.
 
-    prior(x, sigma, coords) is the denoiser; `observations` maps a coarsening factor to what is known at that size; `noise` is `seeded`'s.
+    prior(x, sigma, coords) is the denoiser; `observations` maps a coarsening factor to what is known at that size; `noise` is `seeded`'s;
+    `known` puts what is known of the map for sure into x_t (window.py).
     Raises Problem when the numbers leave all bounds.
     """
     sigmas = schedule(recipe)
@@ -45,7 +47,7 @@ def sample(prior: Callable, observations: dict[int, Observation], state: State, 
             clean = _resized(state.denoised, *o.weight.shape)
             state.x = clean + s * draw(*clean.shape)
 
-        x = state.x.requires_grad_(recipe.guidance == "dps")
+        x = known(state.x, s, draw).requires_grad_(recipe.guidance == "dps")
         denoised = prior(x, s, o.coords)  # equation 6
         with torch.no_grad():
             shading = o.shader.total(state.lights)

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operator: solve the maps from the texture and the mask, and enlarge them."""
+"""Operators: solve the maps from the texture and the mask, whole or where the mask was edited, and enlarge them."""
 
 import bpy
 
 from ...core.messages import Problem
-from .. import captures, jobs
+from .. import captures, jobs, status
 from ..base_operator import BaseOperator
 from . import preview
 
@@ -29,4 +29,25 @@ class WILDCAP_OT_solve(BaseOperator, bpy.types.Operator):
         preview.forget()
 
 
-CLASSES = (WILDCAP_OT_solve,)
+class WILDCAP_OT_solve_edited(BaseOperator, bpy.types.Operator):
+    """Solve only the part of the maps that the last mask edit touched; everything else of them stays as it is"""
+
+    bl_idname = "wildcap.solve_edited"
+    bl_label = "Solve the Edited Part"
+
+    @classmethod
+    def poll(cls, context):
+        if not jobs.can_start(cls, context):
+            return False
+        known = status.of(captures.active(context))
+        if known is None or known.whole_solve:
+            cls.poll_message_set("Looking at the capture ..." if known is None else f"{known.whole_solve} Click Solve for the whole map")
+            return False
+        return True
+
+    def work(self, context):
+        jobs.start(captures.require(context), "solve", first="solve", edited_part=True)
+        preview.forget()
+
+
+CLASSES = (WILDCAP_OT_solve, WILDCAP_OT_solve_edited)

@@ -39,7 +39,9 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         row.prop(item, "skin_tone", text="")
         layout.prop(item, "device")
         layout.prop(item, "seed")
-        layout.operator("wildcap.solve")
+        row = layout.row(align=True)
+        row.operator("wildcap.solve")
+        row.operator("wildcap.solve_edited")
         for stage in stages.STAGES[stages.NAMES.index(stages.MASK_STAGE) + 1:]:
             draw_settings(layout, item, stage, without=("skin_tone",))
 

@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether only the part of the maps that a mask edit touched can be solved again: when all but the masks is as it was at the last solve.
+
+Ground floor: standard library only. What the last solve found stands in maps/solved.safetensors, with the conditions it was found under.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import struct
+from dataclasses import asdict
+from pathlib import Path
+
+from . import stages
+from .capture import Capture
+from .hashes import code_hash, hash_tree
+from .settings import Settings
+
+FIELD = "conditions"  # of the file's metadata
+
+
+def obstacle(capture: Capture, settings: Settings) -> str:
+    """Why the edited part cannot be solved alone, as a sentence; '' where it can."""
+    if settings.solve.prior:
+        return "The authors' prior works in the UVs of another mesh."
+    before = _stored(capture.solved)
+    if before is None:
+        return "No solve has left its state here yet."
+    now = conditions(capture, settings)
+    changed = [name for name in now if now[name] != before.get(name)]
+    return f"{changed[0][0].upper()}{changed[0][1:]} changed since the last solve." if changed else ""
+
+
+def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
+    """All that a solve depends on beside its masks: name -> hash."""
+    stage = stages.by_name("solve")
+    chosen = [asdict(settings.solve), settings.seed, settings.device, settings.delight.delighter]
+    files = {name: hash_tree(capture.root / name) for name in (*stage.reads, *stage.wishes) if "mask" not in name}
+    shipped = {name: hash_tree(Path(__file__).parent / name) for name in stage.data}
+    found = {**files, "the solver's settings": chosen, "the prior": shipped, "the solver's code": code_hash(stage.module)}
+    return {name: hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=8).hexdigest() for name, value in found.items()}
+
+
+def _stored(path: Path) -> dict | None:
+    """The conditions in a safetensors file's header: 8 bytes of length, then JSON; None where there are none."""
+    try:
+        with open(path, "rb") as file:
+            length, = struct.unpack("<Q", file.read(8))
+            header = json.loads(file.read(min(length, 1 << 20)))
+        return dict(json.loads(header["__metadata__"][FIELD]))
+    except (OSError, ValueError, KeyError, TypeError, struct.error):
+        return None

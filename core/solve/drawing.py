@@ -1,0 +1,31 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The solver's own picture for the report: where the mask was painted, where its border was laid, and which marks were kept from the light."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import torch
+
+from .. import images
+from .evidence import REFERENCE, Evidence
+from .marks import Mark
+
+PAINTED, LAID, MARK = (1.0, 1.0, 1.0), (1.0, 0.45, 0.0), (0.1, 0.9, 0.2)
+
+
+def edges_and_marks(evidence: Evidence, alpha: torch.Tensor, marks: tuple[Mark, ...]) -> np.ndarray:
+    """sRGB [H, 2 H, 3]: the texture with the painted contour in white, M's border as it is used in orange, the marks ringed in green; M itself beside it."""
+    side = min(evidence.size, REFERENCE // 2)
+    texture = images.resize(np.ascontiguousarray(evidence.texture.permute(1, 2, 0).numpy()), side, side)
+    seen = texture[images.resize(evidence.weight.numpy(), side, side) > 0.5]
+    shown = images.linear_to_srgb(texture * (0.8 / max(float(np.percentile(seen, 99)) if seen.size else 1.0, 1e-6)))
+    small = images.resize(alpha.numpy(), side, side)
+    for mask, colour in ((images.resize(evidence.alpha.numpy(), side, side), PAINTED), (small, LAID)):
+        contours, _ = cv2.findContours((mask > 0.5).astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+        cv2.drawContours(shown, contours, -1, colour, 1)
+    scale = side / evidence.size
+    for mark in marks:
+        cv2.circle(shown, (round(mark.column * scale), round(mark.row * scale)), max(4, round(2.2 * mark.radius * scale)), MARK, 1)
+    return np.hstack([shown, np.repeat(np.clip(small, 0, 1)[..., None], 3, 2)])

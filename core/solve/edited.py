@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""After a mask edit: the touched part of the maps solved again and put into the maps of the last solve; everything else of them stays, bit by bit."""
+
+from __future__ import annotations
+
+import time
+
+import torch
+
+from .. import mask_edit
+from ..capture import Capture
+from ..messages import Reporter
+from ..settings import Settings
+from . import checkpoint, initial, maps
+from .checkpoint import Solution
+from .confidence import spread
+from .evidence import REFERENCE, Evidence, grid_cells
+from .lighting import Lights
+from .prior import Prior
+from .problem import State
+from .recipes import Recipe
+from .window import Window, coarse, cropped, solve_inside, window
+from .witnesses import confirmed
+
+
+def solve_edited(capture: Capture, settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidence, cell: float,
+                 report: Reporter) -> tuple[maps.Maps, torch.Tensor] | None:
+    """The maps with the edited part new, as they are now in maps/, and the skin tone [3]; None, and the reason in the log, where the whole map is to be solved.
+
+    Without an edit the maps stay as they are.
+    """
+    conditions, obstacle = mask_edit.conditions(capture, settings), mask_edit.obstacle(capture, settings)
+    earlier = None if obstacle else checkpoint.read_solution(capture.solved, conditions)
+    try:
+        if earlier is None:
+            raise ValueError(obstacle or "What the last solve left behind is damaged.")
+        part = window(earlier.painted, evidence.alpha, grid_cells(cell), prior.multiple, REFERENCE)
+    except ValueError as reason:
+        report.log(f"The whole map is solved. {reason}")
+        return None
+    began = time.monotonic()
+    near = torch.zeros_like(evidence.alpha)
+    if part is not None:
+        near[part.inside] = 1
+    start = initial.again(prior, evidence, earlier, cell, recipe, near, lambda marks: confirmed(capture, marks, evidence.size))
+    found = earlier if part is None else _sampled(settings, recipe, prior, evidence, earlier, start, part, report)
+    state = State(0, None, found.denoised, found.lights)
+    result = maps.finished(state, evidence, start, recipe, found.spread, found.gain)
+    if part is None:
+        report.log("The mask is the last solve's: nothing was solved again.")
+    else:
+        maps.write(capture, result, found, conditions, part.inside)
+        maps.write_preview(capture, state, start.observations, report)
+        height, width = (s.stop - s.start for s in part.inside)
+        report.log(f"{width} x {height} texels were solved again in {time.monotonic() - began:.1f} s.")
+    return result, earlier.tone
+
+
+def _sampled(settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidence, earlier: Solution, start: initial.Start, part: Window,
+             report: Reporter) -> Solution:
+    def on_step(state: State, steps: int) -> None:
+        report.progress(state.step, steps, f"sampling the edited part, step {state.step} of {steps}")
+
+    denoised, lights = solve_inside(prior, start.observations, earlier.denoised, earlier.lights, part, recipe, settings.seed, on_step)
+    factor = max(start.observations)
+    here = Lights(lights.glob, lights.grid[(..., *part.cells)], lights.chroma)
+    reference = coarse(start.reference[(..., *part.seen)], factor)
+    patch = spread(prior, cropped(start.observations[factor], part, factor), reference, here, recipe, settings.seed, report.check)
+    rows, columns = (slice(a.start // factor, a.stop // factor) for a in part.inside)
+    whole = earlier.spread.clone()
+    whole[rows, columns] = patch[tuple(slice((a.start - b.start) // factor, (a.stop - b.start) // factor) for a, b in zip(part.inside, part.seen, strict=True))]
+    return Solution(denoised, lights, evidence.alpha, start.alpha, whole, earlier.tone, earlier.gain, earlier.exposure)

@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A part of the map sampled again after a mask edit, inside what an earlier solve found (inpainting by known region; Lugmayr et al. 2022, Meng et al. 2022).
+
+Around the window x_t is the earlier result with the noise of level t, at every level, so what is drawn inside goes on from it. The light outside stays: the
+global one is frozen, and of V move only the cells that no texel outside reads.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+
+import torch
+from torch.nn import functional
+
+from .lighting import Lights
+from .problem import Observation, State
+from .recipes import Recipe
+from .sampler import sample, seeded
+
+MARGIN = 64
+"""Texels of a 1024 map around the touched box that are sampled again."""
+CONTEXT = 64
+"""Texels of a 1024 map around the window that the network sees beside it: the side of the patches it was trained on."""
+STEPS = 40
+"""Most steps of such a sampling: what surrounds the window settles its large shapes."""
+LARGEST = 0.5
+"""Share of the map from which on a part is not worth its while."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """Rows and columns of the whole map: `inside` is sampled again, `seen` is what the network sees; `cells` of V belong to `seen`, and of these cells
+    `moving` [h, w] may change."""
+
+    inside: tuple[slice, slice]
+    seen: tuple[slice, slice]
+    cells: tuple[slice, slice]
+    moving: torch.Tensor
+
+
+def window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int], multiple: int, reference: int) -> Window | None:
+    """What an edit from the mask `before` to `now` [S, S] touches; None where they are the same.
+
+    `cells` (rows, columns) of V cover the map, the network takes sides that are multiples of `multiple`, `reference` is the size that MARGIN counts texels of.
+    Raises ValueError, with a sentence, where the whole map is to be solved.
+    """
+    size = now.shape[0]
+    touched = (now - before).abs() > 1e-3
+    if not touched.any():
+        return None
+    if any(size % count for count in cells):
+        raise ValueError(f"The light's grid of {cells[0]} cells does not divide the map of {size} texels.")
+    inside, seen, cells_seen, moving = [], [], [], []
+    for axis, count in enumerate(cells):
+        hit = torch.nonzero(touched.any(1 - axis))[:, 0]
+        whole = math.lcm(multiple * 4, size // count)  # 4: the coarsest map's factor
+        within = _grown(int(hit[0]), int(hit[-1]) + 1, MARGIN * size // reference, 4, size)
+        around = _grown(within.start, within.stop, CONTEXT * size // reference, whole, size)
+        wide = size // count
+        part = slice(around.start // wide, -(-around.stop // wide))
+        cell = torch.arange(part.start, part.stop)
+        low, high = (cell - 1.5) * wide, (cell + 2.5) * wide  # texels that read a cell, by the cubic kernel
+        moving.append(((low >= within.start) | (within.start == 0)) & ((high <= within.stop) | (within.stop == size)))
+        inside.append(within)
+        seen.append(around)
+        cells_seen.append(part)
+    share = math.prod(part.stop - part.start for part in inside) / size**2
+    if share > LARGEST:
+        raise ValueError(f"The edit touches {share:.0%} of the map.")
+    return Window(tuple(inside), tuple(seen), tuple(cells_seen), moving[0][:, None] & moving[1][None])
+
+
+def solve_inside(prior: Callable, observations: dict[int, Observation], denoised: torch.Tensor, lights: Lights, part: Window, recipe: Recipe, seed: int,
+                 on_step: Callable[[State, int], None] = lambda state, steps: None) -> tuple[torch.Tensor, Lights]:
+    """The map [1, 7, S, S] and the lights of an earlier solve with the window sampled anew under `observations` of the whole map, by coarsening factor."""
+    here = {factor: cropped(o, part, factor) for factor, o in observations.items()}
+    known = denoised[(..., *part.seen)]
+    grid = lights.grid[(..., *part.cells)].clone()
+    state = State(0, None, known.clone(), Lights(lights.glob.clone(), grid.clone(), lights.chroma.clone()))
+    inside = torch.zeros(known.shape[-2:])
+    inside[tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(part.inside, part.seen, strict=True))] = 1
+
+    def with_known(x: torch.Tensor, s: float, draw: Callable) -> torch.Tensor:
+        factor = known.shape[-1] // x.shape[-1]
+        clean, within = coarse(known, factor), coarse(inside[None, None], factor)
+        return torch.where(within > 0.5, x, clean + s * draw(*x.shape))
+
+    def keep_frozen(state: State, steps: int) -> None:
+        state.lights.grid = torch.where(part.moving, state.lights.grid, grid)
+        on_step(state, steps)
+
+    last = max(end for _, _, end in recipe.phases)
+    local = replace(recipe, steps=min(recipe.steps, STEPS), phases=(("cells", 0.0, last),), refit=0.0)
+    state = sample(prior, here, state, local, seeded(seed), keep_frozen, with_known)
+    solved, moved = denoised.clone(), lights.grid.clone()
+    moved[(..., *part.cells)] = state.lights.grid
+    solved[(..., *part.seen)] = torch.where(inside > 0, state.denoised, known)
+    return solved, Lights(lights.glob, moved, lights.chroma)
+
+
+def cropped(o: Observation, part: Window, factor: int) -> Observation:
+    """What is known of the window and its surroundings, of a map coarser by `factor`; coordinates keep their place."""
+    rows, columns = (slice(s.start // factor, s.stop // factor) for s in part.seen)
+    tensors = {f.name: getattr(o, f.name)[..., rows, columns] for f in fields(o) if isinstance(getattr(o, f.name), torch.Tensor)}
+    return replace(o, **tensors, shader=o.shader.part(rows, columns, part.cells))
+
+
+def coarse(maps: torch.Tensor, factor: int) -> torch.Tensor:
+    """[1, C, H, W] at 1 / factor of its size, areas averaged."""
+    return functional.avg_pool2d(maps, factor)
+
+
+def _grown(first: int, end: int, by: int, multiple: int, size: int) -> slice:
+    """first..end grown to both sides and out to multiples, within the map."""
+    return slice(max((first - by) // multiple * multiple, 0), min(-(-(end + by) // multiple) * multiple, size))

@@ -1,0 +1,39 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A capture small enough to solve in a second or two: the mean face of a known tone in a little light from the left, with a soft shadow on one cheek."""
+
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from core import images, meshes, template
+from core.capture import Capture
+from core.settings import Settings, from_json
+from core.solve import initial
+from core.solve.prior import load
+
+SIZE = 128
+TONE = np.array([0.42, 0.26, 0.18], np.float32)  # linear
+
+
+def make(root: Path) -> Capture:
+    made = Capture(root)
+    skin = torch.from_numpy(template.mask("skin", SIZE).copy())
+    face = initial.reference(load(), torch.from_numpy(TONE), skin)
+    y, x = np.mgrid[:SIZE, :SIZE] / SIZE
+    shadow = 1 / (1 + np.exp((np.hypot(x - 0.66, y - 0.55) - 0.09) / 0.006))
+    light = (0.7 + 0.3 * x) * (1 - 0.5 * shadow)
+    albedo = (face[0, :3].permute(1, 2, 0).numpy() + 1) / 2
+    images.write_linear(made.texture, albedo * light[..., None].astype(np.float32))
+    images.write_data(made.texture_confidence, np.ones((SIZE, SIZE), np.float32))
+    images.write_data(made.shadow_mask_auto, (shadow > 0.05).astype(np.float32))
+    meshes.write_obj(made.head, template.load())
+    return made
+
+
+def settings(seed: int = 0, edited_part: bool = False, **options) -> Settings:
+    """A short solve that is told the true tone."""
+    tone = ",".join(f"{v:.5f}" for v in images.linear_to_srgb(TONE))
+    return from_json({"seed": seed, "edited_part": edited_part,
+                      "solve": {"size": SIZE, "steps": 8, "guidance": "proximal", "skin_tone": tone, "checkpoint_every": 2, **options}})
