@@ -1,20 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shadow's edge under a rough mask: found where it is, as wide as it is, and left alone where there is none; and what the real solve leaves of it."""
+"""The shadow's edge under a rough mask: found where it is, as wide as it is, and left alone where there is none."""
 
 import cv2
 import numpy as np
 import pytest
-import torch
 
-from core import images, meshes, template
-from core.capture import Capture
-from core.solve import initial, maps
 from core.solve.edges import BAND, INWARD, penumbra, place
-from core.solve.evidence import read_evidence, softened
-from core.solve.prior import load
-from core.solve.recipes import OURS
-from core.solve.sampler import sample, seeded
+from core.solve.evidence import softened
 
 SIZE = 512
 TAKEN = np.array([0.62, 0.55, 0.48])  # the share of the light that the shadow takes
@@ -40,7 +33,7 @@ def pores(size, strength=0.05):
 def test_alpha_lies_on_the_penumbra(width):
     distance, shadow, painted = shadowed(width)
     light = pores(SIZE) * (1 - shadow[..., None] * TAKEN)
-    edge = place(light, softened(painted), np.ones((SIZE, SIZE), np.float32))
+    edge = place(light, softened(painted), np.ones((SIZE, SIZE), np.float32), 2.0)
     near = np.abs(distance) < 25
     before, after = (np.abs(alpha - shadow)[near].mean() for alpha in (softened(painted), edge.alpha))
     assert after < 0.01 and after < 0.1 * before
@@ -51,7 +44,7 @@ def test_alpha_lies_on_the_penumbra(width):
 
 def test_a_mask_without_a_shadow_stays_as_it_was_painted():
     painted = softened(shadowed(0)[2])
-    edge = place(pores(SIZE) * np.ones(3), painted, np.ones((SIZE, SIZE), np.float32))
+    edge = place(pores(SIZE) * np.ones(3), painted, np.ones((SIZE, SIZE), np.float32), 2.0)
     assert np.array_equal(edge.alpha, painted) and edge.found.max() == 0
 
 
@@ -59,7 +52,7 @@ def test_a_mask_without_a_shadow_stays_as_it_was_painted():
 def test_any_mask_gives_a_finite_alpha(painted):
     light = np.random.default_rng(0).uniform(0.2, 1, (64, 64, 3))
     for weight in (0, 1):
-        alpha = place(light, painted, np.full((64, 64), weight, np.float32)).alpha
+        alpha = place(light, painted, np.full((64, 64), weight, np.float32), 16.0).alpha
         assert np.isfinite(alpha).all() and alpha.min() >= 0 and alpha.max() <= 1
 
 
@@ -69,7 +62,7 @@ def test_a_step_of_another_colour_is_not_the_shadows():
     _, patch, around = shadowed(2, centre=(0.25, 0.5), radius=60.0)
     light = (1 - shadow[..., None] * TAKEN) * np.exp(-patch[..., None] * MELANIN)
     mask = softened(np.maximum(painted, around))
-    edge = place(light * pores(SIZE), mask, np.ones((SIZE, SIZE), np.float32))
+    edge = place(light * pores(SIZE), mask, np.ones((SIZE, SIZE), np.float32), 2.0)
     left = np.arange(SIZE) < SIZE // 2
     assert np.abs(edge.alpha - shadow)[:, ~left].mean() < 0.1 * np.abs(mask - shadow)[:, ~left].mean()
     assert np.abs(edge.alpha - mask)[:, left].max() < 0.15
@@ -81,5 +74,5 @@ def test_deep_strokes_are_never_taken_back():
     y, x = (np.mgrid[:size, :size] + 0.5) * 2
     shadow = ((np.hypot(x - 500, y - 500) < 200) & (np.hypot(x - 500, y - 500) > 60)).astype(np.float32)
     painted = softened((np.hypot(x - 500, y - 500) < 206).astype(np.float32))
-    edge = place(1 - shadow[..., None] * TAKEN, painted, np.ones((size, size), np.float32))
+    edge = place(1 - shadow[..., None] * TAKEN, painted, np.ones((size, size), np.float32), 2.0)
     assert edge.alpha[np.hypot(x - 500, y - 500) < 206 - INWARD - BAND].min() == 1

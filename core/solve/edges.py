@@ -41,23 +41,22 @@ class Edge:
 
 def with_edges(evidence: Evidence, light: torch.Tensor, weight: torch.Tensor) -> Evidence:
     """The evidence with `place`'s alpha for its own; light [3, S, S] and weight [S, S] as there. What is protected stays out of M."""
-    edge = place(light.permute(1, 2, 0).numpy(), evidence.alpha.numpy(), (weight * evidence.covered).numpy())
+    edge = place(light.permute(1, 2, 0).numpy(), evidence.alpha.numpy(), (weight * evidence.covered).numpy(), evidence.texel)
     alpha = torch.from_numpy(edge.alpha) * (1 - evidence.protected) * evidence.covered
-    return replace(evidence, alpha=alpha, edge=torch.from_numpy(edge.found))
+    return replace(evidence, alpha=alpha, edge=torch.from_numpy(edge.found), taken=tuple(edge.colour.tolist()))
 
 
-def place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray) -> Edge:
+def place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: float) -> Edge:
     """The edge of the shadow under a rough mask.
 
     light [S, S, 3]: texture over (reference albedo x global shading), linear, about 1 where lit; painted [S, S]: the mask in [0, 1], as soft as it
-    shall stay where no edge is found; weight [S, S] in [0, 1]: how far a texel tells of light (0: unseen, or a brow).
-    Deeper than INWARD inside the mask alpha is never lowered.
+    shall stay where no edge is found; weight [S, S] in [0, 1]: how far a texel tells of light (0: unseen, or a brow); `texel` is the side of one in
+    texels of a 1024 map. Deeper than INWARD inside the mask alpha is never lowered.
     """
     nothing = Edge(painted, np.zeros_like(painted), np.zeros(3))
     inside = painted > 0.5
     if not inside.any() or inside.all():
         return nothing
-    texel = 1024 / len(painted)
     box = _box(inside, (OUTWARD + 3 * WINDOW) / texel)
     found = _place(np.clip(light[box], 0, 4).astype(np.float32), painted[box], weight[box].astype(np.float32), texel)
     if found is None:
