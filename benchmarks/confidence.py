@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether the confidence map knows where the solved albedo is wrong, on UV-space problems of held-out synthetic subjects.
 
-    python -m benchmarks.confidence [--subjects 9000 ... 9005] [--size 256] [--steps 75] [--picture PATH]
+    python -m benchmarks.confidence [--subjects 9000 ... 9005] [--size 256] [--steps 20] [--picture PATH]
 
 Prints, per subject, Spearman's correlation of 1 - confidence with the true error over the texels of the face (absolute difference in sRGB, mean of the
 channels, after the gain per channel that is best for the whole face), and the error of the more confident half over that of the rest. All of the texture
@@ -32,7 +32,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--subjects", type=int, nargs="+", default=[9000, 9001, 9002, 9003, 9004, 9005])
     parser.add_argument("--size", type=int, default=256)
-    parser.add_argument("--steps", type=int, default=75)
+    parser.add_argument("--steps", type=int, default=OURS.steps)
     parser.add_argument("--picture", type=Path)
     options = parser.parse_args()
     rows, shown = [], []

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The solver alone, on UV-space problems with known truth: a held-out synthetic skin under a sky and a sun, with cast shadows.
 
-    python -m benchmarks.solve_uv [--seeds 9000 9001 9002] [--size 512] [--steps 75] [--guidance dps] [--recipe wildcap] [--pictures DIR]
+    python -m benchmarks.solve_uv [--seeds 9000 9001 9002] [--size 512] [--steps 20] [--guidance dps] [--recipe wildcap] [--pictures DIR]
 
 Prints PSNR (sRGB, after one gain per channel) inside the shadow, in a band of 12 texels about its border, and outside; the input beside the result.
 """
@@ -22,7 +22,7 @@ from core import images, meshes, solve, template
 from core.capture import Capture
 from core.messages import Reporter
 from core.settings import from_json
-from core.solve.recipes import RECIPES
+from core.solve.recipes import OURS, RECIPES
 from core.synthetic.light import uv_problem
 
 
@@ -31,7 +31,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[9000, 9001, 9002])
     parser.add_argument("--shadows", nargs="+", default=["leaves", "self", "blinds"], help="what throws them, in turn")
     parser.add_argument("--size", type=int, default=512)
-    parser.add_argument("--steps", type=int, default=75)
+    parser.add_argument("--steps", type=int, default=OURS.steps)
     parser.add_argument("--guidance", default="dps")
     parser.add_argument("--recipe", default="wildcap", choices=tuple(RECIPES))
     parser.add_argument("--auto-tone", action="store_true", help="do not tell the solver the true skin tone")

@@ -96,7 +96,7 @@ class SolveSettings:
     """Side of the map that is solved"""
     recipe: str = setting("wildcap", choices=("wildcap", "paper", "released"))
     """wildcap is the default; paper and released follow the paper and its authors' code to the letter, with their own 600 steps, and are many times slower"""
-    steps: int = setting(75, min=4, max=600)
+    steps: int = setting(20, min=4, max=600)
     """Sampling steps"""
     guidance: str = setting("dps", choices=("dps", "proximal"))
     """dps follows the paper through the network's gradient; proximal is a closed form, twice as fast"""
@@ -106,7 +106,7 @@ class SolveSettings:
     """Skin tone as sRGB R,G,B in 0..1 (linear mean over facial skin), or auto"""
     prior: str = setting("")
     """The authors' prior: the folder with its config.json and ckpt.pth. It needs ICT-FaceKit fitted as template, in whose UVs it works; empty: ours"""
-    checkpoint_every: int = setting(10, min=1, max=600)
+    checkpoint_every: int = setting(5, min=1, max=600)
     """Steps between two checkpoints"""
 
 
@@ -151,7 +151,7 @@ QUALITIES = ("draft", "standard", "full")
 _PRESETS = {
     "draft": {"solve": {"size": 512, "steps": 30, "guidance": "proximal"}, "scan": {"pairs": 16}},
     "standard": {},
-    "full": {"solve": {"steps": 150}, "scan": {"pairs": 48}},
+    "full": {"scan": {"pairs": 48}},
 }
 
 

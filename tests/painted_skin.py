@@ -34,6 +34,12 @@ def make(root: Path) -> Capture:
 
 def settings(seed: int = 0, edited_part: bool = False, **options) -> Settings:
     """A short solve that is told the true tone."""
-    tone = ",".join(f"{v:.5f}" for v in images.linear_to_srgb(TONE))
-    return from_json({"seed": seed, "edited_part": edited_part,
-                      "solve": {"size": SIZE, "steps": 8, "guidance": "proximal", "skin_tone": tone, "checkpoint_every": 2, **options}})
+    return from_json({"seed": seed, "edited_part": edited_part, "solve": {**SHORT, **options}})
+
+
+def as_setting(tone: np.ndarray) -> str:
+    """A linear colour as settings.solve.skin_tone."""
+    return ",".join(f"{v:.5f}" for v in images.linear_to_srgb(tone))
+
+
+SHORT = {"size": SIZE, "steps": 8, "guidance": "proximal", "skin_tone": as_setting(TONE), "checkpoint_every": 2}

@@ -17,6 +17,7 @@ from .checkpoint import Solution, write_solution
 from .confidence import confidence
 from .evidence import Evidence
 from .initial import Start, mean_tone
+from .marks import cover
 from .problem import Observation, State, albedo
 from .recipes import Recipe
 
@@ -46,7 +47,11 @@ def finished(state: State, evidence: Evidence, start: Start, recipe: Recipe, spr
     with torch.no_grad():
         shading = shader.total(state.lights).clamp_min(1e-3) / start.exposure
         main = shader.main(state.lights).clamp_min(1e-3) / start.exposure
-    diffuse = albedo(x[None]).clamp_min(DARKEST)
+    diffuse = albedo(x[None])
+    if start.marks:  # what is known to be no light is the skin's, be it ever so unlikely to the prior
+        kept = torch.from_numpy(cover(start.marks, evidence.size, evidence.texel)) * evidence.weight
+        diffuse = torch.lerp(diffuse, evidence.texture / shading, kept)
+    diffuse = diffuse.clamp_min(DARKEST)
     if gain is None:
         gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone, recipe.rescale)
     normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5

@@ -8,7 +8,7 @@ shadow: melanin and blood take blue and green, a shadow takes what the sun gave.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -82,7 +82,7 @@ def unlike_shadow(mark: Mark, taken: np.ndarray) -> bool:
     return float(np.abs((change - change.mean()) - (shadow - shadow.mean())).max()) > UNLIKE * mark.contrast
 
 
-def cover(marks: list[Mark], size: int, texel: float) -> np.ndarray:
+def cover(marks: Sequence[Mark], size: int, texel: float) -> np.ndarray:
     """[size, size] in [0, 1]: 1 on the marks and a little around them, fading over a texel or two."""
     out = np.zeros((size, size), np.float32)
     row, column = np.mgrid[:size, :size]

@@ -15,7 +15,7 @@ class Recipe:
     """Every choice the solver makes. The defaults are ours; equation numbers are the paper's."""
 
     # the walk
-    steps: int = 75
+    steps: int = 20
     start: float = 0.6  # T_init / T: the share of the noise schedule that is walked
     sigma_min: float = 0.01
     sigma_max: float = 80.0
