@@ -22,6 +22,7 @@ from core import images, meshes, solve, template
 from core.capture import Capture
 from core.messages import Reporter
 from core.settings import from_json
+from core.solve.recipes import OURS
 
 from .solve_uv import problem
 
