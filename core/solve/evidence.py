@@ -15,7 +15,7 @@ from ..capture import Capture
 from ..messages import Problem
 from .lighting import Shader
 from .prior import coordinates
-from .problem import Observation
+from .problem import Observation, blurred
 from .recipes import Recipe
 
 REFERENCE = 1024  # lengths in texels are given for maps of this size
@@ -121,6 +121,7 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
             continue
         weight, alpha, trust, edge = (torch.from_numpy(_sized(a.numpy(), size)) for a in (evidence.weight, evidence.alpha, evidence.trust, evidence.edge))
         texture = _shrunk(evidence.texture * evidence.weight, size) / weight.clamp_min(1e-4) * exposure
+        texture = blurred(texture) if recipe.blur else texture
         normal = torch.nn.functional.normalize(_shrunk(evidence.normal, size), dim=0)
         inside = (alpha > (0.5 if recipe.hard_mask else 0)).numpy().astype(np.uint8)
         support = cv2.dilate(inside, np.ones((5, 5)))  # M and two texels around it

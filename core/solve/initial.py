@@ -58,7 +58,7 @@ def start(prior: Prior, evidence: Evidence, tone: str, cell: float, recipe: Reci
     x_ref = reference(prior, tone, evidence.skin, recipe.uniform_start)
     exposure = float(mean_tone(albedo_of(x_ref), lit).mean() / mean_tone(evidence.texture, lit).mean().clamp_min(1e-6))
     trusted = evidence.weight * (1 if recipe.trusting else evidence.trust)
-    weight = trusted * (1 - evidence.alpha)
+    weight = trusted * (1 - evidence.alpha) if recipe.fitted else lit  # one even light is best told by skin
     lights = first_lights(evidence.texture * exposure, albedo_of(x_ref), evidence.normal, weight if weight.sum() >= 1 else trusted, grid_cells(cell), recipe)
     return _laid_out(prior, evidence, Start(tone, x_ref, exposure, evidence.alpha, {}, State(0, None, x_ref, lights)), cell, recipe, witness=witness)
 

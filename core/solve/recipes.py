@@ -28,7 +28,7 @@ class Recipe:
     preserving: bool = False  # equation 8 in the paper's variance-preserving coordinates: there the same zeta is (1 + sigma^2) times larger
     clip: str = "texel"  # each texel's guidance is limited alone; "decade": all of it is divided by ten until the largest fits; "none"
     limit: float = 0.1  # largest guidance of one texel
-    blur: bool = False  # the rendering is compared through a 3 x 3 Gaussian
+    blur: bool = False  # rendering and texture are compared through a 3 x 3 Gaussian
     candidates: int = 1  # of so many draws of a step's noise the one nearest to the texture is taken
     residual: float = 0.02  # proximal: the photometric error that is taken for noise
 
