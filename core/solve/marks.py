@@ -24,7 +24,7 @@ LEAST = 0.3  # contrast, natural log units: a fainter one is a freckle, or nothi
 STANDING_OUT = 4.5, 32.0  # of the usual response of such a blob within that distance: in stubble and on rough skin more is asked for
 COMPACT = 0.45  # least ratio of the two curvatures: an edge has 0, a disc 1
 SURROUNDED = 0.45  # of the contrast that every direction must show
-NEIGHBOURS, REACH = 2, 26.0  # so many others of like contrast within that distance make it one of a crowd of freckles
+NEIGHBOURS, REACH, LIKE = 2, 64.0, 0.4  # more others of that share of its contrast, within that distance, make it one of a crowd of freckles
 UNLIKE = 0.16  # distance of a mark's colour from the shadow's, in shares of its contrast
 SECTORS = 8
 MARGIN = 12.0  # distance to brows, lips, lids, nostrils and scalp
@@ -42,6 +42,17 @@ class Mark:
     @property
     def contrast(self) -> float:
         return -sum(self.change) / 3
+
+
+@dataclass(frozen=True)
+class _Blob:
+    """A maximum of the scale space, in texels of the map; strength: the contrast it would have as a disc."""
+
+    row: int
+    column: int
+    radius: float
+    strength: float
+    stands_out: bool
 
 
 def with_marks(evidence: Evidence, witness: Callable[[list[Mark]], list[Mark]] = list) -> tuple[Evidence, list[Mark]]:
@@ -64,13 +75,13 @@ def find(texture: np.ndarray, where: np.ndarray, texel: float) -> list[Mark]:
     log = np.log(np.maximum(texture, 1e-3)).astype(np.float32)
     log = raster.bleed(log, where)  # so that the border of what is not skin is no blob
     candidates = _blobs(log.mean(-1), where, texel)
-    measured = [mark for blob in candidates if (mark := _measured(log, *blob, texel)) is not None]
+    measured = [mark for blob in candidates if blob.stands_out and (mark := _measured(log, blob.row, blob.column, blob.radius)) is not None]
     measured.sort(key=lambda mark: -mark.contrast)
     kept: list[Mark] = []
     for mark in measured:
         if all(_apart(mark, other) > mark.radius + other.radius for other in kept):
             kept.append(mark)
-    return [mark for mark in kept if _alone(mark, kept, REACH / texel)]
+    return [mark for mark in kept if _alone(mark, candidates, REACH / texel)]
 
 
 def unlike_shadow(mark: Mark, taken: np.ndarray) -> bool:
@@ -93,8 +104,8 @@ def cover(marks: Sequence[Mark], size: int, texel: float) -> np.ndarray:
     return out
 
 
-def _blobs(value: np.ndarray, where: np.ndarray, texel: float) -> list[tuple[int, int, float]]:
-    """(row, column, radius) of dark blobs: maxima of the normalised Laplacian over place and scale with two like curvatures. value [S, S]."""
+def _blobs(value: np.ndarray, where: np.ndarray, texel: float) -> list[_Blob]:
+    """Dark blobs: maxima of the normalised Laplacian over place and scale with two like curvatures. value [S, S]."""
     radii = [r / texel for r in RADII if r / texel >= 0.9]
     responses, compact, usual = [], [], []
     known = where.astype(np.float32)
@@ -113,9 +124,9 @@ def _blobs(value: np.ndarray, where: np.ndarray, texel: float) -> list[tuple[int
     around = highest.copy()
     around[1:] = np.maximum(around[1:], highest[:-1])
     around[:-1] = np.maximum(around[:-1], highest[1:])
-    strong = (stack > 0.7 * LEAST) & (stack > STANDING_OUT[0] * np.stack(usual))
-    level, row, column = np.nonzero((stack >= around) & strong & (np.stack(compact) > COMPACT) & where[None])
-    return [(r, c, radii[k]) for k, r, c in zip(level.tolist(), row.tolist(), column.tolist(), strict=True)]
+    stands_out = (stack > 0.7 * LEAST) & (stack > STANDING_OUT[0] * np.stack(usual))
+    found = np.nonzero((stack >= around) & (stack > LIKE * LEAST) & (np.stack(compact) > COMPACT) & where[None])
+    return [_Blob(r, c, radii[k], float(stack[k, r, c]), bool(stands_out[k, r, c])) for k, r, c in zip(*(i.tolist() for i in found), strict=True)]
 
 
 def _usual(values: np.ndarray, reach: float) -> np.ndarray:
@@ -127,7 +138,7 @@ _CURVATURES = tuple(np.array(k, np.float32) for k in (
     [[0, 0, 0], [1, -2, 1], [0, 0, 0]], [[0, 1, 0], [0, -2, 0], [0, 1, 0]], [[0.25, 0, -0.25], [0, 0, 0], [-0.25, 0, 0.25]]))
 
 
-def _measured(log: np.ndarray, row: int, column: int, radius: float, texel: float) -> Mark | None:
+def _measured(log: np.ndarray, row: int, column: int, radius: float) -> Mark | None:
     """The mark at a blob of the map's logarithm [S, S, 3], or None where some direction around it is as dark."""
     reach = int(np.ceil(2.7 * radius + 1))
     if min(row, column) < reach or max(row, column) >= len(log) - reach:
@@ -145,10 +156,10 @@ def _measured(log: np.ndarray, row: int, column: int, radius: float, texel: floa
     return Mark(float(row), float(column), float(radius), tuple(float(v) for v in change))
 
 
-def _apart(a: Mark, b: Mark) -> float:
+def _apart(a: Mark, b: Mark | _Blob) -> float:
     return float(np.hypot(a.row - b.row, a.column - b.column))
 
 
-def _alone(mark: Mark, marks: list[Mark], reach: float) -> bool:
+def _alone(mark: Mark, blobs: list[_Blob], reach: float) -> bool:
     """Not one of a crowd."""
-    return sum(other is not mark and _apart(mark, other) < reach and other.contrast > 0.5 * mark.contrast for other in marks) <= NEIGHBOURS
+    return sum(2 * mark.radius < _apart(mark, other) < reach and other.strength > LIKE * mark.contrast for other in blobs) <= NEIGHBOURS

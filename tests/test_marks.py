@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Moles inside a shadow: found, told from freckles, pores and shadow, confirmed by views, and still there after the real solve, as the shadow's edge is not."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pycolmap
+import pytest
+import torch
+
+from core import images, meshes, raster, template
+from core.capture import Capture
+from core.solve import initial, maps, witnesses
+from core.solve.edges import penumbra
+from core.solve.evidence import read_evidence
+from core.solve.marks import Mark, find, unlike_shadow
+from core.solve.prior import load
+from core.solve.recipes import OURS
+from core.solve.sampler import sample, seeded
+from core.views import View
+
+SIZE = 512
+TEXEL = 1024 / SIZE
+MELANIN = np.array([0.5, 0.8, 1.0])  # what a mole takes of the skin's reflectance, natural log units
+TAKEN = np.array([0.62, 0.55, 0.48])  # the share of the light that the shadow takes
+TONE = np.array([0.42, 0.26, 0.18], np.float32)
+SKIN = np.ones((SIZE, SIZE), bool)
+
+
+def distance_to(row, column):
+    """[SIZE, SIZE], texels of a 1024 map."""
+    y, x = np.mgrid[:SIZE, :SIZE]
+    return np.hypot(y - row, x - column) * TEXEL
+
+
+def spot(row, column, diameter):
+    return np.clip((diameter / 2 - distance_to(row, column)) / TEXEL + 0.5, 0, 1)[..., None]
+
+
+def skin(strength=0.05):
+    noise = cv2.GaussianBlur(np.random.default_rng(0).normal(size=(SIZE, SIZE)), (0, 0), 1.0)
+    return TONE * np.exp(strength * noise / noise.std())[..., None]
+
+
+@pytest.mark.parametrize("diameter", [6, 8, 12, 16])
+def test_a_mole_is_found_where_and_as_large_as_it_is(diameter):
+    marks = find(skin() * np.exp(-spot(200, 300, diameter) * MELANIN), SKIN, TEXEL)
+    assert len(marks) == 1
+    assert np.hypot(marks[0].row - 200, marks[0].column - 300) < 1.5 and 0.6 < marks[0].radius * TEXEL / (diameter / 2) < 1.6
+    assert 0.6 * MELANIN.mean() < marks[0].contrast < 1.2 * MELANIN.mean()
+    assert unlike_shadow(marks[0], TAKEN / TAKEN.mean())
+
+
+def test_freckles_pores_and_shadow_edges_are_no_moles():
+    random = np.random.default_rng(1)
+    freckles = np.zeros((SIZE, SIZE), np.float32)  # one in 47 square millimetres, 0.8 mm wide, faint to well seen
+    freckles[tuple(random.integers(0, SIZE, (2, 1500)))] = random.uniform(0.1, 0.35, 1500)
+    freckles = cv2.GaussianBlur(freckles, (0, 0), 1.5 / TEXEL) * (2 * np.pi) * (1.5 / TEXEL) ** 2
+    assert len(find(skin() * np.exp(-freckles[..., None] * MELANIN), SKIN, TEXEL)) <= 5  # where several fall on one place
+    assert find(skin(0.12), SKIN, TEXEL) == []
+    wavy = 260 + 20 * np.sin(np.arange(SIZE) / 12)
+    shadow = (np.arange(SIZE)[:, None] > wavy).astype(float)[..., None]
+    assert find(skin() * (1 - shadow * TAKEN), SKIN, TEXEL) == []
+
+
+def test_a_speck_of_shadow_is_told_by_its_colour():
+    marks = find(skin() * (1 - spot(200, 300, 10) * TAKEN), SKIN, TEXEL)
+    assert len(marks) == 1 and not unlike_shadow(marks[0], TAKEN / TAKEN.mean())
+
+
+def test_views_confirm_what_they_all_show(tmp_path, monkeypatch):
+    """Three cameras before the face: two dots in all pictures but that the second is in one of them only."""
+    capture = Capture(tmp_path)
+    head = template.load()
+    meshes.write_obj(capture.head, head)
+    capture.cameras.mkdir()
+    capture.frames.mkdir()
+    capture.frames_json.write_text("{}", encoding="utf-8")
+    face, bary = raster.rasterize_uv(head, 256)
+    points = raster.interpolate(head.vertices, head.faces, face, bary)
+    marks = [Mark(80.0, 110.0, 2.0, (-0.5, -0.8, -1.0)), Mark(80.0, 146.0, 2.0, (-0.5, -0.8, -1.0))]
+    there = np.array([points[int(m.row), int(m.column)] for m in marks])
+    camera = pycolmap.Camera(model="PINHOLE", width=400, height=400, params=[800.0, 800.0, 200.0, 200.0])
+    rotation = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    views = []
+    for i, x in enumerate((-0.1, 0.0, 0.1)):
+        view = View(f"{i}.jpg", capture.frames / f"{i}.jpg", camera, rotation, -rotation @ np.array([x, there[0, 1] - 0.5, there[0, 2]]), True)
+        picture = np.full((400, 400, 3), 0.5, np.float32)
+        pixels, _ = view.project(there)
+        for pixel in pixels[: 2 if i == 0 else 1]:
+            cv2.circle(picture, tuple(int(v) for v in pixel), 5, (0.2, 0.2, 0.2), -1)
+        images.write_srgb((capture.delit / view.name).with_suffix(".png"), picture)
+        views.append(view)
+    monkeypatch.setattr(witnesses, "read_views", lambda capture: views)
+    assert witnesses.confirmed(capture, marks, 256) == marks[:1]
+    monkeypatch.setattr(witnesses, "read_views", lambda capture: views[:1])
+    assert witnesses.confirmed(capture, marks, 256) == marks  # one view is too few to deny what the texture shows
+
+
+def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
+    """A mole of 8 texels, as large as a cell of the light's grid, in a shadow with a hard edge under a mask that is 8 texels too large and beside it."""
+    prior, capture = load(), Capture(tmp_path)
+    covered = torch.from_numpy(template.mask("skin", SIZE).copy())
+    albedo = (initial.reference(prior, torch.from_numpy(TONE), covered)[0, :3].permute(1, 2, 0).numpy() + 1) / 2
+    row, column = round(0.56 * SIZE), round(0.655 * SIZE)
+    albedo = albedo * skin(0.04) / TONE * np.exp(-spot(row, column, 8) * MELANIN)
+    distance = distance_to(row, column) - 90
+    light = 1 - penumbra(distance, np.float32(TEXEL))[..., None] * TAKEN
+    images.write_linear(capture.texture, (albedo * light).astype(np.float32))
+    images.write_data(capture.texture_confidence, np.ones((SIZE, SIZE), np.float32))
+    images.write_data(capture.shadow_mask, (distance_to(row - 1.5, column + 1.5) < 98).astype(np.float32))
+    meshes.write_obj(capture.head, template.load())
+    evidence, recipe = read_evidence(capture, SIZE), replace(OURS, guidance="proximal", steps=16)
+    start = initial.start(prior, evidence, ",".join(f"{v:.5f}" for v in images.linear_to_srgb(TONE)), 8.0, recipe)
+    assert [(round(m.row / 4), round(m.column / 4)) for m in start.marks] == [(round(row / 4), round(column / 4))]
+    solved = maps.finished(sample(prior, start.observations, start.state, recipe, seeded(0)), evidence, start, recipe).diffuse
+
+    def contrast(image):
+        log, away = np.log(np.maximum(image, 1e-3)).mean(-1), distance_to(row, column)
+        return log[(away > 9) & (away < 14)].mean() - log[away < 2.8].mean()
+
+    assert 0.8 < contrast(solved) / contrast(albedo) < 1.2
+    error = np.log(np.maximum(solved, 1e-3) / albedo).mean(-1)
+    rings = [error[(distance >= d) & (distance < d + 3)].mean() for d in range(-18, 18, 3)]  # six inside the shadow, six outside
+    inside, outside = np.mean(rings[:4]), np.mean(rings[-4:])
+    assert abs(outside - inside) < 0.15 * -np.log(1 - TAKEN).mean()
+    assert max(rings) - max(inside, outside) < 0.06 and min(rings) - min(inside, outside) > -0.06  # no light or dark outline
