@@ -5,6 +5,7 @@
 import json
 import math
 import time
+from pathlib import Path
 
 import pytest
 
@@ -59,8 +60,10 @@ def test_a_quality_sets_the_settings_and_keeps_the_skin_tone(addon):
     properties = addon("properties")
     item = bpy.context.scene.wildcap.captures.add()
     item.use_skin_tone, item.skin_tone = True, (0.5, 0.25, 0.125)
+    item.solve.prior = "/authors"
     item.quality = "draft"
     values = properties.values(item)
+    assert values["solve"]["prior"] == str(Path("/authors"))
     draft = properties.core_settings.preset("draft")
     assert values["solve"]["size"] == draft.solve.size
     assert values["solve"]["steps"] == draft.solve.steps
