@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the solver keeps on disk: its state on the way, taken up only by a run on the same inputs, and what it found in the end, for a later solve of a part."""
+"""What the solver keeps on disk: its state on the way, taken up only by a run on the same inputs, and what it found in the end, for a later solve of a part.
+
+Numbers are stored as tensors: safetensors writes several metadata fields in random order, and the same solve is to give the same bytes.
+"""
 
 from __future__ import annotations
 
@@ -37,9 +40,10 @@ def write_solution(path: Path, found: Solution, conditions: dict[str, str]) -> N
     """`conditions` are mask_edit's: under others this state is of no use."""
     lights = {"glob": found.lights.glob, "grid": found.lights.grid, "chroma": found.lights.chroma}
     tensors = {name: getattr(found, name) for name in ("denoised", "painted", "alpha", "spread", "tone", "gain")} | lights
+    tensors["exposure"] = torch.tensor(found.exposure, dtype=torch.float64)
     tensors = {name: tensor.detach().cpu().clone().contiguous() for name, tensor in tensors.items()}
     with replacing(path) as temporary:
-        save_file(tensors, temporary, metadata={FIELD: json.dumps(conditions), "exposure": repr(found.exposure)})
+        save_file(tensors, temporary, metadata={FIELD: json.dumps(conditions)})
 
 
 def read_solution(path: Path, conditions: dict[str, str]) -> Solution | None:
@@ -51,7 +55,7 @@ def read_solution(path: Path, conditions: dict[str, str]) -> Solution | None:
                 return None
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
         lights = Lights(*(tensors.pop(name) for name in ("glob", "grid", "chroma")))
-        return Solution(lights=lights, exposure=float(metadata["exposure"]), **tensors)
+        return Solution(lights=lights, exposure=tensors.pop("exposure").item(), **tensors)
     except (OSError, SafetensorError, KeyError, TypeError, ValueError):
         return None
 
@@ -61,10 +65,11 @@ def write(path: Path, state: State, key: str) -> None:
     tensors = {"denoised": state.denoised, "glob": state.lights.glob, "grid": state.lights.grid, "chroma": state.lights.chroma}
     if state.x is not None:
         tensors["x"] = state.x
+    tensors["step"] = torch.tensor(state.step)
     tensors |= {f"moment{k}": moment for k, moment in enumerate(state.moments)}
     tensors = {name: tensor.detach().cpu().clone().contiguous() for name, tensor in tensors.items()}
     with replacing(path) as temporary:
-        save_file(tensors, temporary, metadata={"key": key, "numbers": json.dumps({"step": state.step})})
+        save_file(tensors, temporary, metadata={"key": key})
 
 
 def read(path: Path, key: str) -> State | None:
@@ -75,9 +80,8 @@ def read(path: Path, key: str) -> State | None:
             if metadata.get("key") != key:
                 return None
             tensors: dict[str, torch.Tensor] = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
-        numbers = json.loads(metadata["numbers"])
         moments = [tensors[f"moment{k}"] for k in range(sum(name.startswith("moment") for name in tensors))]
         lights = Lights(tensors["glob"], tensors["grid"], tensors["chroma"])
-        return State(numbers["step"], tensors.get("x"), tensors["denoised"], lights, moments)
+        return State(int(tensors["step"]), tensors.get("x"), tensors["denoised"], lights, moments)
     except (OSError, SafetensorError, KeyError, ValueError):
         return None
