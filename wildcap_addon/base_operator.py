@@ -13,6 +13,22 @@ class BaseOperator:
 
     bl_options = {'REGISTER'}
 
+    @classmethod
+    def allowed(cls, condition, why_not: str) -> bool:
+        """For `poll`: whether the condition holds; where it does not, the tooltip of the greyed-out button says why."""
+        if not condition:
+            cls.poll_message_set(why_not)
+        return bool(condition)
+
+    @classmethod
+    def in_object_mode(cls, context) -> bool:
+        """For `poll`: data-blocks are made in Object Mode only, never in the middle of a stroke."""
+        return cls.allowed(context.mode == 'OBJECT', "Only in Object Mode: leave painting or editing first")
+
+    @classmethod
+    def with_capture(cls, context) -> bool:
+        return cls.allowed(captures.active(context) is not None, "There is no face to work on yet: choose a video, or open the sample head")
+
     def execute(self, context):
         root = captures.root(captures.active(context))
         try:

@@ -28,6 +28,10 @@ class WILDCAP_OT_paint_mask(BaseOperator, bpy.types.Operator):
         items=[('SHADOW', "Shadow", "Where a shadow is baked into the texture"),
                ('PROTECT', "Protect", "Moles, scars and make-up that the solver must not take for shadow; it wins over the shadow mask")])
 
+    @classmethod
+    def poll(cls, context):
+        return cls.with_capture(context)
+
     def work(self, context):
         session.begin(context, captures.require(context), self.on == 'SHEET', self.mask)
 
@@ -41,7 +45,7 @@ class WILDCAP_OT_finish_mask(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return session.active()
+        return cls.allowed(session.active(), "No mask is being painted: click Paint Mask first")
 
     def work(self, context):
         session.end(context)
@@ -65,9 +69,7 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not session.active():
-            cls.poll_message_set("Click Paint Mask first: the mask is changed while it is painted")
-        return session.active()
+        return cls.allowed(session.active(), "Click Paint Mask first: the mask is changed while it is painted")
 
     def work(self, context):
         if self.kind == 'PROPOSAL' and session.which() == 'PROTECT':

@@ -43,7 +43,8 @@ class WILDCAP_OT_cancel(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return jobs.of(captures.root(captures.active(context))) is not None or jobs.of("") is not None
+        running = jobs.of(captures.root(captures.active(context))) is not None or jobs.of("") is not None
+        return cls.allowed(running, "Nothing is running for this capture")
 
     def work(self, context):
         root = captures.root(captures.active(context))
@@ -59,7 +60,7 @@ class WILDCAP_OT_bring_in_head(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return context.mode == 'OBJECT'
+        return cls.in_object_mode(context) and cls.with_capture(context)
 
     def work(self, context):
         item = captures.require(context)
@@ -78,7 +79,7 @@ class WILDCAP_OT_show_landmarks(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return context.mode == 'OBJECT' and captures.active(context) is not None
+        return cls.in_object_mode(context) and cls.with_capture(context)
 
     def work(self, context):
         landmarks.show(context, captures.require(context))
@@ -93,7 +94,7 @@ class WILDCAP_OT_hide_landmarks(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return context.mode == 'OBJECT' and bool(landmarks.shown())
+        return cls.in_object_mode(context) and cls.allowed(landmarks.shown(), "No landmarks are shown: click Show Landmarks first")
 
     def work(self, context):
         landmarks.hide()
@@ -107,7 +108,8 @@ class WILDCAP_OT_fit_landmarks(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return context.mode == 'OBJECT' and bool(landmarks.shown()) and jobs.can_start(cls, context)
+        shown = cls.in_object_mode(context) and cls.allowed(landmarks.shown(), "No landmarks are shown: click Show Landmarks first")
+        return shown and jobs.can_start(cls, context)
 
     def work(self, context):
         item = captures.require(context)

@@ -18,7 +18,7 @@ class WILDCAP_OT_assemble_material(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return context.mode == 'OBJECT' and captures.active(context) is not None
+        return cls.in_object_mode(context) and cls.with_capture(context)
 
     def work(self, context):
         material.assemble(context, captures.require(context))
@@ -32,7 +32,7 @@ class WILDCAP_OT_render(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return context.mode == 'OBJECT' and captures.active(context) is not None
+        return cls.in_object_mode(context) and cls.with_capture(context)
 
     def work(self, context):
         item = captures.require(context)

@@ -26,7 +26,7 @@ class WILDCAP_OT_install_solver(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return jobs.of("") is None
+        return cls.allowed(jobs.of("") is None, "The solver is being installed already: wait for it, or click Cancel")
 
     def invoke(self, context, event):
         return context.window_manager.invoke_confirm(self, event, title="Install the Solver?", confirm_text="Install",
@@ -70,7 +70,8 @@ class WILDCAP_OT_remove_solver(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return jobs.of("") is None and preferences.environment_folder().is_dir()
+        return (cls.allowed(jobs.of("") is None, "The solver is being installed: wait for it, or click Cancel")
+                and cls.allowed(preferences.environment_folder().is_dir(), "Nothing was installed here that could be removed"))
 
     def invoke(self, context, event):
         return context.window_manager.invoke_confirm(self, event, title="Remove the Solver?", message=f"Deletes {preferences.environment_folder()}")
