@@ -33,10 +33,8 @@ def require(context) -> bpy.types.PropertyGroup:
 
 
 def folder(item) -> Capture:
-    """The item's capture; one that moved together with its .blend is found beside it."""
-    path = Path(bpy.path.abspath(item.path))
-    beside = Path(bpy.data.filepath).parent / path.name if bpy.data.filepath else path
-    return Capture(beside if not path.is_dir() and beside.is_dir() else path)
+    """The item's capture; `links` sees to it that the path leads there. Asks no disk: panels call this when they draw."""
+    return Capture(Path(bpy.path.abspath(item.path)))
 
 
 def root(item) -> str:

@@ -52,6 +52,8 @@ def next_step(facts: Facts) -> Step:
     status = facts.status
     if status is None:
         return Step("Looking at the capture ...", "", "", 'TIME')
+    if status.missing:
+        return Step("The folder of this capture is not where it was.", "Locate Capture", "wildcap.locate_capture", 'VIEWZOOM')
     if status.problem is not None:
         return Step("This capture cannot be used.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
     return _step_of(facts, status)

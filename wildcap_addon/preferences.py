@@ -54,9 +54,9 @@ def environment_folder() -> Path:
     return Path(bpy.path.abspath(chosen) if chosen else bpy.utils.extension_path_user(base_package, path="solver"))
 
 
-def captures_folder() -> Path:
-    """Beside the .blend; while it is unsaved, the preferences' folder or WildCap in the user's documents."""
-    if bpy.data.filepath:
+def captures_folder(saved: bool = True) -> Path:
+    """Beside the .blend; while it is unsaved (or with saved=False), the preferences' folder or WildCap in the user's documents."""
+    if bpy.data.filepath and saved:
         return Path(bpy.data.filepath).parent
     chosen = get().captures
     return Path(bpy.path.abspath(chosen)) if chosen else Path.home() / "Documents" / "WildCap"

@@ -59,6 +59,9 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
     """One capture folder in the scene's list."""
 
     path: bpy.props.StringProperty(name="Capture Folder", subtype='DIR_PATH', description="The folder that holds everything about this face")
+    from_blend: bpy.props.StringProperty(
+        name="From the .blend", options={'HIDDEN'}, description="The folder as it was reached from the .blend when that was last saved",
+    )
     head: bpy.props.PointerProperty(name="Head", type=bpy.types.Object, description="The head object of this capture")
     quality: bpy.props.EnumProperty(
         name="Quality", items=[(q, q.title(), "") for q in core_settings.QUALITIES], default="standard", update=_apply_quality,

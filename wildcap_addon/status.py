@@ -34,6 +34,7 @@ class Status:
     whole_solve: str = ""  # why an edited part of the mask cannot be solved alone; '' where it can
     findings: tuple[dict, ...] = ()  # what is wrong with the capture, as core.report.findings tells it
     problem: Problem | None = None
+    missing: bool = False  # the folder is not there
 
 
 _known: dict[str, tuple[tuple, Status]] = {}  # capture folder -> (stamp, status)
@@ -58,6 +59,9 @@ def refresh(context) -> None:
 
 def look(capture: Capture, settings) -> Status:
     """Reads the folder; hashes only files that changed since they were last hashed."""
+    if not capture.root.is_dir():
+        return Status(missing=True, problem=Problem(f"The capture folder {capture.root} is not there any more.",
+                                                    "Connect its disk, or click Locate Capture and show where it is now."))
     try:
         record = capture.read()
         states = {stage.name: _state(capture, stage, record, settings) for stage in stages.STAGES}

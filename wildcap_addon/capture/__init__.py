@@ -4,6 +4,6 @@
 
 import bpy
 
-from . import operators, panel, sample_head
+from . import operators, panel, sample_head, source
 
-register, unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *sample_head.CLASSES, *panel.CLASSES))
+register, unregister = bpy.utils.register_classes_factory((*source.CLASSES, *operators.CLASSES, *sample_head.CLASSES, *panel.CLASSES))

@@ -1,40 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that say which face: choose a video, open a capture folder, take one off the list."""
+"""Operators on the list of captures: open a folder, find one that was moved, take one off the list, show its report."""
 
-import re
 from pathlib import Path
 
 import bpy
 
 from ...core.capture import Capture
 from ...core.messages import Problem
-from .. import captures, preferences
+from .. import captures, links
 from ..base_operator import BaseOperator
-
-VIDEO_SUFFIXES = ("mp4", "mov", "m4v", "mkv", "avi", "webm")
-
-
-class WILDCAP_OT_choose_video(BaseOperator, bpy.types.Operator):
-    """Choose the video of a face, or a folder of photographs; a capture folder is made for it"""
-
-    bl_idname = "wildcap.choose_video"
-    bl_label = "Choose Video"
-
-    filepath: bpy.props.StringProperty(subtype='FILE_PATH')
-    filter_glob: bpy.props.StringProperty(default=";".join(f"*.{s};*.{s.upper()}" for s in VIDEO_SUFFIXES), options={'HIDDEN'})
-
-    def invoke(self, context, event):
-        context.window_manager.fileselect_add(self)
-        return {'RUNNING_MODAL'}
-
-    def work(self, context):
-        source = Path(bpy.path.abspath(self.filepath))
-        if not source.exists() or not self.filepath:
-            raise Problem(f"There is no file or folder {source}.", "Choose a video, or a folder of photographs.")
-        capture = Capture(new_folder(preferences.captures_folder(), source))
-        capture.set_source(source)
-        captures.add(context, capture.root)
 
 
 class WILDCAP_OT_open_capture(BaseOperator, bpy.types.Operator):
@@ -58,11 +33,49 @@ class WILDCAP_OT_open_capture(BaseOperator, bpy.types.Operator):
         captures.add(context, root)
 
 
+class WILDCAP_OT_locate_capture(BaseOperator, bpy.types.Operator):
+    """Find the folder of a capture that was moved: beside the .blend, among your captures, or where you say; others that moved along are found, too"""
+
+    bl_idname = "wildcap.locate_capture"
+    bl_label = "Locate Capture"
+
+    directory: bpy.props.StringProperty(subtype='DIR_PATH', options={'SKIP_SAVE'})
+
+    @classmethod
+    def poll(cls, context):
+        return cls.with_capture(context)
+
+    def invoke(self, context, event):
+        if links.find(captures.require(context)) is not None:
+            return self.execute(context)
+        context.window_manager.fileselect_add(self)
+        return {'RUNNING_MODAL'}
+
+    def work(self, context):
+        item = captures.require(context)
+        name = Path(item.path).name
+        chosen = Path(bpy.path.abspath(self.directory)).absolute() if self.directory else links.find(item)
+        if chosen is None:
+            raise Problem(f"{name} is neither beside this .blend nor among your captures.", "Click Locate Capture and choose the folder it is in now.")
+        place = next((path for path in (chosen, chosen / name) if links.is_capture(path)), None)
+        if place is None:
+            raise Problem(f"{chosen} is not a capture, and holds no {name}.", "Choose the folder that ends in .wildcap, or the one it lies in.")
+        Capture(place).read()  # refuses a damaged or newer one
+        links.move(item, place)
+        for other in links.missing():
+            if links.is_capture(place.parent / Path(other.path).name):
+                links.move(other, place.parent / Path(other.path).name)
+
+
 class WILDCAP_OT_close_capture(BaseOperator, bpy.types.Operator):
     """Take the capture off this list; its folder stays"""
 
     bl_idname = "wildcap.close_capture"
     bl_label = "Close Capture"
+
+    @classmethod
+    def poll(cls, context):
+        return cls.with_capture(context)
 
     def work(self, context):
         props = context.scene.wildcap
@@ -80,7 +93,7 @@ class WILDCAP_OT_open_report(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return captures.active(context) is not None
+        return cls.with_capture(context)
 
     def work(self, context):
         report = captures.folder(captures.require(context)).report
@@ -89,14 +102,4 @@ class WILDCAP_OT_open_report(BaseOperator, bpy.types.Operator):
         bpy.ops.wm.url_open(url=report.absolute().as_uri())
 
 
-def new_folder(parent: Path, source: Path) -> Path:
-    """parent/NAME.wildcap for a source; the same source finds its folder again, another one of the same name gets a number."""
-    name = re.sub(r'[<>:"/\\|?*\x00-\x1f]', "_", source.stem if source.is_file() else source.name).strip(" .") or "face"
-    for number in range(1, 1000):
-        folder = parent / (f"{name}.wildcap" if number == 1 else f"{name}_{number}.wildcap")
-        if not folder.exists() or (Capture(folder).json.is_file() and Capture(folder).read().get("source") == str(source)):
-            return folder
-    raise Problem(f"{parent} holds a thousand captures named {name}.", "Choose another captures folder in the preferences.")
-
-
-CLASSES = (WILDCAP_OT_choose_video, WILDCAP_OT_open_capture, WILDCAP_OT_close_capture, WILDCAP_OT_open_report)
+CLASSES = (WILDCAP_OT_open_capture, WILDCAP_OT_locate_capture, WILDCAP_OT_close_capture, WILDCAP_OT_open_report)

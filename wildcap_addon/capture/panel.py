@@ -25,10 +25,13 @@ class WILDCAP_PT_capture(FoldedPanel, bpy.types.Panel):
         column = row.column(align=True)
         column.operator("wildcap.choose_video", text="", icon='ADD')
         column.operator("wildcap.open_capture", text="", icon='FILE_FOLDER')
+        column.operator("wildcap.locate_capture", text="", icon='VIEWZOOM')
         column.operator("wildcap.close_capture", text="", icon='REMOVE')
         item = captures.active(context)
         if item is not None:
-            layout.prop(item, "path", text="")
+            row = layout.row()
+            row.enabled = False  # to be read: Locate moves the link, and what hangs on it
+            row.prop(item, "path", text="")
             layout.operator("wildcap.open_report", icon='URL')
 
 

@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Captures in a .blend: chosen, dropped, several at once; the link that Save As keeps, and a capture that was moved."""
+
+import ast
+import json
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from . import standin
+
+bpy = pytest.importorskip("bpy")
+
+
+def items():
+    return bpy.context.scene.wildcap.captures
+
+
+def chosen_source(item) -> str:
+    return json.loads((Path(item.path) / "capture.json").read_text(encoding="utf-8"))["source"]
+
+
+@pytest.fixture
+def project(addon, tmp_path) -> Path:
+    """A saved .blend in "Projekt é", with two solved captures beside it, both heads in the scene."""
+    folder = tmp_path / "Projekt é"
+    for name in ("anna", "berta"):
+        bpy.ops.wildcap.open_capture(directory=str(standin.make(folder / f"{name}.wildcap")))
+        bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "face.blend"))
+    return folder
+
+
+def test_what_is_dropped_becomes_captures(addon, tmp_path):
+    addon("preferences").get().captures = str(tmp_path / "captures")
+    for name in ("one.mp4", "TWO.MOV", "notes.txt"):
+        (tmp_path / name).write_bytes(b"0")
+    shots = tmp_path / "shots"
+    shots.mkdir()
+    for name in ("a.jpg", "b.JPG"):
+        (shots / name).write_bytes(b"0")
+    bpy.ops.wildcap.choose_video('INVOKE_DEFAULT', directory=str(tmp_path), files=[{"name": "one.mp4"}, {"name": "TWO.MOV"}])
+    assert [chosen_source(item) for item in items()] == [str(tmp_path / "one.mp4"), str(tmp_path / "TWO.MOV")]
+    bpy.ops.wildcap.choose_video('INVOKE_DEFAULT', directory=str(shots), files=[{"name": "a.jpg"}, {"name": "b.JPG"}])
+    assert len(items()) == 3 and chosen_source(items()[2]) == str(shots) and bpy.context.scene.wildcap.active_index == 2
+    with pytest.raises(RuntimeError, match="neither a video nor a photograph"):
+        bpy.ops.wildcap.choose_video(filepath=str(tmp_path / "notes.txt"))
+    with pytest.raises(RuntimeError, match="no photographs"):
+        bpy.ops.wildcap.choose_video(filepath=str(tmp_path))
+
+
+def test_drops_are_taken_where_the_tab_is_shown_and_blenders_reference_images_are_left_alone(addon):
+    source = addon("capture.source")
+    stage = ast.parse((Path(__file__).parents[1] / "core" / "frames" / "photographs.py").read_text(encoding="utf-8"))  # not imported: it needs OpenCV
+    known = {node.targets[0].id: ast.literal_eval(node.value) for node in stage.body if isinstance(node, ast.Assign) and node.targets[0].id.isupper()}
+    assert set(source.PHOTOGRAPHS) == {*known["SUFFIXES"], *known["PHONE_ONLY"]}
+
+    def taken(handler, tab, over):
+        view, sidebar = SimpleNamespace(type='WINDOW'), SimpleNamespace(type='UI', active_panel_category=tab)
+        space = SimpleNamespace(show_region_ui=bool(tab))
+        area = SimpleNamespace(type='VIEW_3D', spaces=SimpleNamespace(active=space), regions=[view, sidebar])
+        return handler.poll_drop(SimpleNamespace(area=area, region=sidebar if over == 'UI' else view))
+
+    video, photograph = source.WILDCAP_FH_source, source.WILDCAP_FH_photographs
+    assert taken(video, "WildCap", 'WINDOW') and taken(video, "WildCap", 'UI') and not taken(video, "Item", 'WINDOW') and not taken(video, "", 'WINDOW')
+    assert taken(photograph, "WildCap", 'UI') and not taken(photograph, "WildCap", 'WINDOW')
+    assert not video.poll_drop(SimpleNamespace(area=SimpleNamespace(type='IMAGE_EDITOR'), region=None))
+
+
+def test_the_active_head_says_which_of_several_captures_is_meant(addon, project):
+    captures = addon("captures")
+    assert captures.active(bpy.context).name == "berta"
+    bpy.context.view_layer.objects.active = bpy.data.objects["anna"]
+    assert captures.active(bpy.context).name == "anna"
+    bpy.context.view_layer.objects.active = None
+    bpy.context.scene.wildcap.active_index = 1
+    assert captures.active(bpy.context).name == "berta"
+
+
+def test_save_as_elsewhere_keeps_the_link(addon, project, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "elsewhere" / "other.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "elsewhere" / "other.blend"))
+    assert [Path(item.path) for item in items()] == [project / "anna.wildcap", project / "berta.wildcap"]
+    shutil.move(tmp_path / "elsewhere" / "other.blend", tmp_path / "alone.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "alone.blend"))
+    assert [Path(item.path) for item in items()] == [project / "anna.wildcap", project / "berta.wildcap"], "moved alone, it knows where they were"
+
+
+@pytest.mark.parametrize("kept", [False, True], ids=["moved", "copied"])
+def test_a_project_that_was_moved_or_copied_works_on_its_own_captures(addon, project, tmp_path, kept):
+    bpy.ops.wildcap.assemble_material()
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.read_homefile(use_empty=True)
+    there = tmp_path / "there"
+    (shutil.copytree if kept else shutil.move)(project, there)
+    bpy.ops.wm.open_mainfile(filepath=str(there / "face.blend"))
+    assert [Path(item.path) for item in items()] == [there / "anna.wildcap", there / "berta.wildcap"]
+    assert {o.name: Path(o["wildcap_capture"]).parent for o in bpy.context.scene.objects} == {"anna": there, "berta": there}
+    pictures = [Path(bpy.path.abspath(image.filepath)) for image in bpy.data.images if image.source == 'FILE' and image.filepath]
+    assert pictures and all(path.is_relative_to(there) and path.is_file() for path in pictures)
+
+
+def test_a_moved_capture_is_missed_and_one_click_finds_it_and_what_moved_along(addon, project, tmp_path):
+    status, next_step, panel, captures = addon("status"), addon("next_step"), addon("panel"), addon("captures")
+    archive = tmp_path / "archive"
+    archive.mkdir()
+    for name in ("anna", "berta"):
+        shutil.move(project / f"{name}.wildcap", archive)
+    item = captures.active(bpy.context)
+    status.of(item)
+    status.refresh(bpy.context)
+    assert "not there any more" in status.of(item).problem.problem
+    assert next_step.next_step(panel.gather(bpy.context, item)).operator == "wildcap.locate_capture"
+    with pytest.raises(RuntimeError, match="neither beside"):
+        bpy.ops.wildcap.locate_capture()
+    with pytest.raises(RuntimeError, match="is not a capture"):
+        bpy.ops.wildcap.locate_capture(directory=str(tmp_path))
+    bpy.ops.wildcap.locate_capture(directory=str(archive))
+    assert [Path(found.path) for found in items()] == [archive / "anna.wildcap", archive / "berta.wildcap"]
+    assert captures.active(bpy.context).name == "berta" and not status.of(captures.active(bpy.context)).missing
+    shutil.move(archive / "berta.wildcap", project)
+    shutil.move(archive / "anna.wildcap", project / "anna.wildcap")
+    bpy.ops.wildcap.locate_capture('INVOKE_DEFAULT')  # beside the .blend: no browser
+    assert {Path(found.path).parent for found in items()} == {project}
+
+
+def test_captures_of_an_unsaved_file_go_where_the_preferences_say_and_stay_linked(addon, tmp_path):
+    addon("preferences").get().captures = str(tmp_path / "all faces")
+    (tmp_path / "face.mp4").write_bytes(b"0")
+    bpy.ops.wildcap.choose_video(filepath=str(tmp_path / "face.mp4"))
+    (tmp_path / "work").mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "work" / "scene.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "work" / "scene.blend"))
+    assert [item.path for item in items()] == [str(tmp_path / "all faces" / "face.wildcap")]
+    (tmp_path / "second.mp4").write_bytes(b"0")
+    bpy.ops.wildcap.choose_video(filepath=str(tmp_path / "second.mp4"))
+    assert items()[1].path == str(tmp_path / "work" / "second.wildcap")

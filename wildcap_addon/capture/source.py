@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The video or the photographs of a face: chosen in the file browser, or dropped on a 3D view that shows the WildCap tab."""
+
+import re
+from pathlib import Path
+
+import bpy
+
+from ...core.capture import Capture
+from ...core.messages import Problem
+from .. import captures, preferences
+from ..base_operator import BaseOperator
+from ..base_panel import WildcapPanel
+
+VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm")
+PHOTOGRAPHS = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr", ".heic", ".heif", ".avif", ".dng")
+"""What the stage frames reads, and what it explains how to convert."""
+
+
+class WILDCAP_OT_choose_video(BaseOperator, bpy.types.Operator):
+    """Choose the video of a face, or any one of its photographs: all in that folder are used. A capture folder is made for it"""
+
+    bl_idname = "wildcap.choose_video"
+    bl_label = "Choose Video"
+
+    filepath: bpy.props.StringProperty(subtype='FILE_PATH', options={'SKIP_SAVE'})
+    directory: bpy.props.StringProperty(subtype='DIR_PATH', options={'SKIP_SAVE', 'HIDDEN'})
+    files: bpy.props.CollectionProperty(type=bpy.types.OperatorFileListElement, options={'SKIP_SAVE', 'HIDDEN'})
+    filter_glob: bpy.props.StringProperty(default=";".join(f"*{s};*{s.upper()}" for s in VIDEOS + PHOTOGRAPHS), options={'HIDDEN'})
+
+    def invoke(self, context, event):
+        if self.filepath or self.files:  # dropped
+            return self.execute(context)
+        context.window_manager.fileselect_add(self)
+        return {'RUNNING_MODAL'}
+
+    def work(self, context):
+        folder = Path(bpy.path.abspath(self.directory))
+        chosen = [folder / file.name for file in self.files if file.name] if self.directory else []
+        for source in sources(chosen or [Path(bpy.path.abspath(self.filepath or self.directory))]):
+            capture = Capture(new_folder(preferences.captures_folder(), source))
+            capture.set_source(source)
+            captures.add(context, capture.root)
+
+
+class WILDCAP_FH_source(bpy.types.FileHandler):
+    """Takes what is dropped on a 3D view while its sidebar shows the WildCap tab; photographs only on the tab itself, as elsewhere they
+    are Blender's reference images."""
+
+    bl_idname = "WILDCAP_FH_source"
+    bl_label = "Face for WildCap"
+    bl_import_operator = "wildcap.choose_video"
+    bl_file_extensions = ";".join(VIDEOS)
+
+    @classmethod
+    def poll_drop(cls, context):
+        return _tab_shown(context)
+
+
+class WILDCAP_FH_photographs(bpy.types.FileHandler):
+    """As WILDCAP_FH_source, for photographs."""
+
+    bl_idname = "WILDCAP_FH_photographs"
+    bl_label = "Photographs for WildCap"
+    bl_import_operator = "wildcap.choose_video"
+    bl_file_extensions = ";".join(PHOTOGRAPHS)
+
+    @classmethod
+    def poll_drop(cls, context):
+        return _tab_shown(context) and context.region is not None and context.region.type == 'UI'
+
+
+def sources(chosen: list[Path]) -> list[Path]:
+    """What was meant by some files: each video by itself, and for photographs the folder that they lie in. Raises Problem where there is nothing to see."""
+    found = []
+    for path in chosen:
+        if not path.exists() or path == Path():
+            raise Problem(f"There is no file or folder {path}.", "Choose a video, or a folder of photographs.")
+        if path.is_file() and path.suffix.lower() in PHOTOGRAPHS:
+            path = path.parent
+        elif path.is_file() and path.suffix.lower() not in VIDEOS:
+            raise Problem(f"{path.name} is neither a video nor a photograph.", f"Choose one of {', '.join(s[1:] for s in VIDEOS)}, or a folder of photographs.")
+        if path.is_dir() and not any(file.suffix.lower() in PHOTOGRAPHS for file in path.iterdir()):
+            raise Problem(f"There are no photographs in {path}.", "Choose a video, or a folder of photographs.")
+        found.append(path.absolute())
+    return list(dict.fromkeys(found))
+
+
+def new_folder(parent: Path, source: Path) -> Path:
+    """parent/NAME.wildcap for a source; the same source finds its folder again, another one of the same name gets a number."""
+    name = re.sub(r'[<>:"/\\|?*\x00-\x1f]', "_", source.stem if source.is_file() else source.name).strip(" .") or "face"
+    for number in range(1, 1000):
+        folder = parent / (f"{name}.wildcap" if number == 1 else f"{name}_{number}.wildcap")
+        if not folder.exists() or (Capture(folder).json.is_file() and Capture(folder).read().get("source") == str(source)):
+            return folder
+    raise Problem(f"{parent} holds a thousand captures named {name}.", "Choose another captures folder in the preferences.")
+
+
+def _tab_shown(context) -> bool:
+    """Whether the 3D view under the cursor has its sidebar open on our tab."""
+    area = context.area
+    if area is None or area.type != 'VIEW_3D' or not area.spaces.active.show_region_ui:
+        return False
+    return any(region.type == 'UI' and region.active_panel_category == WildcapPanel.bl_category for region in area.regions)
+
+
+CLASSES = (WILDCAP_OT_choose_video, WILDCAP_FH_source, WILDCAP_FH_photographs)
