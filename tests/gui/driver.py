@@ -25,6 +25,7 @@ def play(flow, limit_s: float = 600) -> None:
     """Runs the generator to its end and leaves Blender: exit code 0 and FLOW PASSED, or 1, a traceback and a screenshot."""
     survive_lost_contexts()
     bpy.context.preferences.view.show_splash = False
+    bpy.context.preferences.view.filebrowser_display_type = 'SCREEN'  # there is no window manager to place a second window
     bpy.context.preferences.use_preferences_save = False
 
     def step():
@@ -133,7 +134,9 @@ def middle():
 
 
 def park():
-    """Takes the cursor off every button: a hovered one keeps its old state."""
+    """Takes the cursor off every button: a hovered one keeps its old state. A file browser in place of the 3D view needs none of that."""
+    if not any(area.type == 'VIEW_3D' for area in window().screen.areas):
+        return
     x, y = middle()
     yield from move((x - 200, y))
     yield from move((x - 202, y))
@@ -178,6 +181,35 @@ def find(command: str, options: str = ""):
                     return x, y
         yield 0.5
     raise AssertionError(f"there is no button for {command} {options} in the sidebar")
+
+
+def lead(command: str):
+    """Clicks the sidebar's first button, which must be the one that runs this operator: what a newcomer does who reads nothing."""
+    sidebar = region('UI')
+    for y in range(sidebar.y + sidebar.height - 4, sidebar.y + 4, -11):
+        position = sidebar.x + sidebar.width * 0.5, y
+        yield from move(position)
+        text = under_cursor()
+        if "bpy.ops." in text:
+            assert command in text, f"the first button is {text}, not {command}"
+            yield from click(position)
+            yield from park()
+            return
+    raise AssertionError(f"no button leads, where {command} should")
+
+
+def browse(path: Path):
+    """Chooses a file in the file browser that a button has opened in place of the window's areas."""
+    yield from until(lambda: any(area.type == 'FILE_BROWSER' for area in window().screen.areas), "the file browser", 10)
+    area = next(area for area in window().screen.areas if area.type == 'FILE_BROWSER')
+    yield 1.0
+    area.spaces.active.params.directory = os.fsencode(str(path.parent) + "/")
+    area.spaces.active.params.filename = path.name
+    yield 0.5
+    with bpy.context.temp_override(window=window(), area=area, region=next(r for r in area.regions if r.type == 'WINDOW')):
+        bpy.ops.file.execute()
+    yield from until(lambda: any(area.type == 'VIEW_3D' for area in window().screen.areas), "the 3D view", 10)
+    yield 1.0
 
 
 def under_cursor() -> str:
