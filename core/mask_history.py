@@ -16,18 +16,19 @@ from .capture import Capture, replacing
 KEPT = 10
 
 
-def keep(capture: Capture, mask: Path) -> Path | None:
-    """Copies `mask` (shadow_mask.png or protect_mask.png) to mask_history/NAME_DATE_TIME.png and drops all but the last ten of that name.
+def keep(capture: Capture, mask: Path, content: bytes | None = None) -> Path | None:
+    """Copies `mask` (shadow_mask.png or protect_mask.png), or another `content` of that file, to mask_history/NAME_DATE_TIME.png and drops all but the
+    last ten of that name.
 
     Returns the copy, or None when there is no mask yet. Raises Problem when the folder cannot be written.
     """
-    if not mask.is_file():
+    if content is None and not mask.is_file():
         return None
     seconds, milliseconds = divmod(time.time_ns() // 1_000_000, 1000)  # read once: two readings may fall on both sides of a second
     stamp = f"{time.strftime('%Y%m%d_%H%M%S', time.localtime(seconds))}_{milliseconds:03d}"
     copy = capture.mask_history / f"{mask.stem}_{stamp}{mask.suffix}"
     with replacing(copy) as temporary:
-        shutil.copyfile(mask, temporary)
+        shutil.copyfile(mask, temporary) if content is None else temporary.write_bytes(content)
     for old in sorted(capture.mask_history.glob(f"{mask.stem}_*{mask.suffix}"))[:-KEPT]:
         old.unlink(missing_ok=True)
     return copy

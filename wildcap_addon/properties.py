@@ -95,6 +95,13 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
                ('window', "Window", "One large window from the side")],
         description="The light for Render",
     )
+    shadow_tint: bpy.props.FloatVectorProperty(
+        name="Shadow Tint", subtype='COLOR', size=3, min=0, max=1, default=(1.0, 0.0, 0.0), description="Colour in which the shadow mask is shown",
+    )
+    protect_tint: bpy.props.FloatVectorProperty(
+        name="Protect Tint", subtype='COLOR', size=3, min=0, max=1, default=(0.0, 0.6, 0.1), description="Colour in which the protect mask is shown",
+    )
+    tint_strength: bpy.props.FloatProperty(name="Tint Strength", min=0.05, max=1, default=0.45, description="How strongly a mask covers the texture")
     resolution: bpy.props.IntProperty(name="Resolution", subtype='PIXEL', min=16, max=8192, default=1024, description="Side of the rendered picture")
     samples: bpy.props.IntProperty(name="Samples", min=1, max=65536, default=128, description="Cycles samples per pixel")
 

@@ -4,16 +4,16 @@
 
 import bpy
 
-from . import operators, panel, session
+from . import files, operators, panel
 
 _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *panel.CLASSES))
 
 
 def register():
     _register()
-    session.register()
+    files.register()
 
 
 def unregister():
-    session.unregister()
+    files.unregister()
     _unregister()

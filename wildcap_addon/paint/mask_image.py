@@ -32,6 +32,8 @@ def load(capture: Capture, which: str = 'SHADOW') -> bpy.types.Image:
     name = f"{capture.root.stem} {which.capitalize()} Mask"
     image = bpy.data.images.get(name)
     if image is not None:
+        settle(image, capture, which)
+        path = kept if kept.is_file() else path
         bpy.data.images.remove(image)
     image = bpy.data.images.load(str(path))
     image.name = name
@@ -44,6 +46,38 @@ def load(capture: Capture, which: str = 'SHADOW') -> bpy.types.Image:
     if which == 'PROTECT' and not kept.is_file():
         set_values(image, np.zeros_like(values(image)))
     return image
+
+
+def settle(image: bpy.types.Image, capture: Capture, which: str) -> None:
+    """A mask that a .blend has packed against the capture's own: the newer one becomes the capture's, the other goes to the history."""
+    path = file_of(capture, which)
+    if image.packed_file is None or not bpy.data.filepath or not image.size[0]:
+        return
+    packed = grey_png(values(image))
+    if path.is_file() and path.read_bytes() == packed:
+        return
+    if not path.is_file() or Path(bpy.data.filepath).stat().st_mtime > path.stat().st_mtime:
+        mask_history.keep(capture, path)
+        write(path, packed)
+    else:
+        mask_history.keep(capture, path, packed)
+
+
+def refresh(image: bpy.types.Image, capture: Capture, which: str) -> None:
+    """The image of a .blend that was opened again, as the newer of that file and the capture has it. Raises Problem when there is no mask."""
+    path = file_of(capture, which)
+    settle(image, capture, which)
+    if image.packed_file is not None:
+        image.unpack(method='REMOVE')
+    image.filepath_raw = str(path)
+    if path.is_file():
+        image.reload()
+    elif capture.shadow_mask_auto.is_file():
+        image.source = 'FILE'
+        set_values(image, proposal(image, capture) if which == 'SHADOW' else np.zeros_like(values(image)))
+    image.colorspace_settings.name = 'Non-Color'
+    if not image.size[0]:
+        raise Problem("The mask that was being painted is gone.", "Click Paint Mask: it is looked for again.")
 
 
 def values(image: bpy.types.Image) -> np.ndarray:

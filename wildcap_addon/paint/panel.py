@@ -32,6 +32,10 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
         if brush is not None:
             layout.prop(brush, "size", slider=True)
             layout.prop(brush, "strength", slider=True)
+        row = layout.row(align=True)
+        row.prop(context.scene.tool_settings.image_paint, "stencil_color", text="")
+        if context.space_data is not None:
+            row.prop(context.space_data.overlay, "texture_paint_mode_opacity", text="Tint", slider=True)
         layout.prop(context.scene.tool_settings.image_paint, "use_symmetry_x", text="Mirror Left and Right")
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
         for kind in EDITS:

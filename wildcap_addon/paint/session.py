@@ -4,23 +4,25 @@
 
 Its state is names and values, never references: an undo replaces every data-block. However the artist leaves
 (the button, Tab, opening or saving a file), the mask reaches the capture's folder, and within seconds of a stroke's end anyway: Blender may be killed.
+A .blend that is saved in the middle of it is opened in the middle of it.
 """
 
+import json
 import time
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 
 import bpy
 
 from ...core.capture import Capture
 from ...core.messages import Problem
 from .. import captures, head, problems
-from . import brush, mask_image, sheet, view
+from . import before, brush, mask_image, sheet, view
 
-TINTS = {"SHADOW": (1.0, 0.0, 0.0), "PROTECT": (0.0, 0.6, 0.1)}
+TINTS = {"SHADOW": "shadow_tint", "PROTECT": "protect_tint"}
+"""The scene's properties that keep the colour in which a mask is shown."""
 WATCH_S = 0.5
 KEEP_UP_S = 3.0
 """Between two looks at whether the mask changed; a look costs the reading of its pixels."""
-_SETTINGS = ("mode", "canvas", "use_stencil_layer", "stencil_image", "stencil_color", "invert_stencil")
 
 
 @dataclass
@@ -34,11 +36,10 @@ class Session:
     which: str = 'SHADOW'  # or 'PROTECT'
     on_sheet: bool = False
     hidden: list[str] = field(default_factory=list)
-    paint: dict = field(default_factory=dict)
+    before: dict = field(default_factory=dict)
     brush: dict = field(default_factory=dict)
-    views: list[dict] = field(default_factory=list)
     looked: float = 0.0  # when the mask was last looked at (time.monotonic)
-    kept: bool = False  # whether the mask of before the session is in the history already
+    written: tuple = ()  # size and time of the mask's file as this session wrote it; another one goes to the history first
 
 
 _session: Session | None = None
@@ -91,28 +92,23 @@ def begin(context, item, use_sheet: bool, which: str = 'SHADOW') -> None:
     if texture is None:
         raise Problem("This capture has no texture to paint over.", "Click Reconstruct first.")
     image = mask_image.load(capture, which)
-    _session = Session(str(capture.root), context.scene.name, obj.name, image.name, which)
-    paint = context.scene.tool_settings.image_paint
-    for name in _SETTINGS:
-        value = getattr(paint, name)
-        _session.paint[name] = value.name if isinstance(value, bpy.types.Image) else tuple(value) if name == "stencil_color" else value
-    if context.screen is not None:
-        _session.views = view.set_up(context.screen)
+    _session = Session(str(capture.root), context.scene.name, obj.name, image.name, which, before=before.remember(context))
+    props, paint = context.scene.wildcap, context.scene.tool_settings.image_paint
+    view.set_up(_session.before["views"], props.tint_strength)
     paint.mode = 'IMAGE'
     paint.canvas = texture
     paint.use_stencil_layer = True
     paint.stencil_image = image
-    paint.stencil_color = TINTS[which]
+    paint.stencil_color = getattr(props, TINTS[which])
     paint.invert_stencil = False
     try:
         _enter(context, use_sheet)
         _session.brush = brush.activate(context)
     except Exception:
-        view.restore(_session.views)
+        before.put_back(context, _session.before)
         _session = None
         raise
-    if not bpy.app.timers.is_registered(_watch):
-        bpy.app.timers.register(_watch, first_interval=WATCH_S, persistent=True)
+    _start_watching()
 
 
 def end(context) -> None:
@@ -125,11 +121,9 @@ def end(context) -> None:
     if context.mode != 'PAINT_TEXTURE':  # only in this mode does Blender let go of a brush
         _enter(context, session.on_sheet)
     brush.restore(context, session.brush)
+    _keep_tint(context)
     _leave(context)
-    paint = context.scene.tool_settings.image_paint
-    for name, value in session.paint.items():
-        setattr(paint, name, bpy.data.images.get(value or "") if name in ("canvas", "stencil_image") else value)
-    view.restore(session.views)
+    before.put_back(context, session.before)
     image = bpy.data.images.get(session.mask)
     if image is not None and mask_image.file_of(Capture(session.root), session.which).is_file():
         image.reload()  # from the file, so that Blender does not ask to save it
@@ -138,11 +132,27 @@ def end(context) -> None:
     _session = None
 
 
+def _keep_tint(context) -> None:
+    """The tint as the artist left it, for the next session."""
+    props = context.scene.wildcap
+    setattr(props, TINTS[_session.which], context.scene.tool_settings.image_paint.stencil_color)
+    props.tint_strength = view.opacity(_session.before["views"]) or props.tint_strength
+
+
 def save() -> None:
-    """Writes the mask to the capture, atomically, if it changed; only the mask of before the session goes to the history. Raises Problem when it cannot."""
+    """Writes the mask to the capture, atomically, if it changed. A mask there that is not this session's (the one of before it, or one that another
+    Blender or the command line has put there since) goes to the history. Raises Problem when it cannot."""
     image = bpy.data.images.get(_session.mask) if _session else None
-    if image is not None and mask_image.save(image, Capture(_session.root), _session.which, keep=not _session.kept):
-        _session.kept = True
+    if image is None:
+        return
+    capture = Capture(_session.root)
+    path = mask_image.file_of(capture, _session.which)
+    if mask_image.save(image, capture, _session.which, keep=_stamp(path) != tuple(_session.written)):
+        _session.written = _stamp(path)
+
+
+def _stamp(path) -> tuple:
+    return (path.stat().st_size, path.stat().st_mtime_ns) if path.is_file() else ()
 
 
 def keep_up(stroking: bool) -> None:
@@ -150,7 +160,7 @@ def keep_up(stroking: bool) -> None:
     image = bpy.data.images.get(_session.mask)
     if not stroking and image is not None and image.is_dirty and time.monotonic() - _session.looked >= KEEP_UP_S:
         _session.looked = time.monotonic()
-        _save_or_show()
+        save_or_show()
 
 
 def forget() -> None:
@@ -178,7 +188,7 @@ def _enter(context, use_sheet: bool) -> None:
         _session.hidden = [o.name for o in context.view_layer.objects if o != target and not o.hide_get()]
         for name in _session.hidden:
             bpy.data.objects[name].hide_set(True)
-        view.face_sheet(_session.views, target.location, sheet.SIDE_M)
+        view.face_sheet(_session.before["views"], target.location, sheet.SIDE_M)
     context.view_layer.objects.active = target
     target.select_set(True)
     bpy.ops.object.mode_set(mode='TEXTURE_PAINT')
@@ -190,7 +200,7 @@ def _leave(context) -> None:
         bpy.ops.object.mode_set(mode='OBJECT')
     if _session.on_sheet:
         sheet.remove()
-        view.face_head(_session.views)
+        view.face_head(_session.before["views"])
         for name in _session.hidden:
             if name in context.view_layer.objects:
                 context.view_layer.objects[name].hide_set(False)
@@ -199,6 +209,11 @@ def _leave(context) -> None:
     if obj is not None and obj.name in context.view_layer.objects:
         context.view_layer.objects.active = obj
         obj.select_set(True)
+
+
+def _start_watching() -> None:
+    if not bpy.app.timers.is_registered(_watch):
+        bpy.app.timers.register(_watch, first_interval=WATCH_S, persistent=True)
 
 
 def _watch() -> float | None:
@@ -221,37 +236,39 @@ def _watch() -> float | None:
     return WATCH_S
 
 
-@bpy.app.handlers.persistent
-def save_with_file(*_):
-    """Painted pixels are in no .blend: whoever saves the file wants the mask saved too."""
-    _save_or_show()
+def note() -> str:
+    """The session as JSON, for the file in which it is saved; '' for none."""
+    return json.dumps(asdict(_session)) if _session else ""
 
 
-@bpy.app.handlers.persistent
-def save_before_load(*_):
-    _save_or_show()
-    forget()
+def go_on(text: str) -> None:
+    """Takes up the session of a note, with the mask that is the newer one of file and capture."""
+    global _session
+    try:
+        _session = Session(**json.loads(text))
+        mask_image.refresh(mask(), Capture(_session.root), _session.which)
+    except (ValueError, TypeError):  # a note of another version
+        forget()
+        return
+    except Problem as problem:
+        problems.show(_session.root, problem)
+        forget()
+        return
+    _session.looked, _session.written = 0.0, ()
+    _start_watching()
 
 
-def _save_or_show() -> None:
+def save_or_show() -> None:
+    """As `save`, where nobody can catch a Problem: it is shown in the tab."""
     try:
         save()
     except Problem as problem:
         problems.show(_session.root, problem)
 
 
-_HANDLERS = (("save_pre", save_with_file), ("load_pre", save_before_load))
-
-
-def register():
-    for name, handler in _HANDLERS:
-        getattr(bpy.app.handlers, name).append(handler)
-
-
-def unregister():
-    _save_or_show()
+def stop() -> None:
+    """Saves the mask and stops watching, for an add-on that leaves."""
+    save_or_show()
     forget()
-    for name, handler in _HANDLERS:
-        getattr(bpy.app.handlers, name).remove(handler)
     if bpy.app.timers.is_registered(_watch):
         bpy.app.timers.unregister(_watch)

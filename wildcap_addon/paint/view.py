@@ -5,41 +5,49 @@
 import bpy
 
 SHADING = {"type": 'SOLID', "light": 'FLAT', "color_type": 'TEXTURE'}
-TINT_OPACITY = 0.45
 
 
-def set_up(screen: bpy.types.Screen) -> list[dict]:
-    """Shows texture and tint in every 3D view of the screen; returns what `restore` needs (names and values only)."""
-    before = []
-    for index, area in enumerate(screen.areas):
-        if area.type != 'VIEW_3D':
-            continue
-        space = area.spaces.active
-        before.append({
-            "screen": screen.name, "area": index, "local": False,
-            "shading": {name: getattr(space.shading, name) for name in SHADING},
-            "overlays": space.overlay.show_overlays, "opacity": space.overlay.texture_paint_mode_opacity,
-            "perspective": space.region_3d.view_perspective, "rotation": tuple(space.region_3d.view_rotation),
-            "location": tuple(space.region_3d.view_location), "distance": space.region_3d.view_distance,
-        })
-        for name, value in SHADING.items():
-            setattr(space.shading, name, value)
-        space.overlay.show_overlays = True
-        space.overlay.texture_paint_mode_opacity = TINT_OPACITY
-    return before
+def remember(screen: bpy.types.Screen) -> list[dict]:
+    """How every 3D view of the screen looks (names and values only)."""
+    return [{
+        "screen": screen.name, "area": index,
+        "shading": {name: getattr(area.spaces.active.shading, name) for name in SHADING},
+        "overlays": area.spaces.active.overlay.show_overlays, "opacity": area.spaces.active.overlay.texture_paint_mode_opacity,
+        "perspective": area.spaces.active.region_3d.view_perspective, "rotation": tuple(area.spaces.active.region_3d.view_rotation),
+        "location": tuple(area.spaces.active.region_3d.view_location), "distance": area.spaces.active.region_3d.view_distance,
+    } for index, area in enumerate(screen.areas) if area.type == 'VIEW_3D']
+
+
+def set_up(before: list[dict], opacity: float) -> None:
+    """Shows the texture flat, in Solid shading, and the tint over it with that opacity."""
+    for kept in before:
+        space = _space(kept)
+        if space is not None:
+            space.shading.type = SHADING["type"]  # first: what the others may be depends on it
+            for name, value in SHADING.items():
+                setattr(space.shading, name, value)
+            space.overlay.show_overlays = True
+            space.overlay.texture_paint_mode_opacity = opacity
+
+
+def opacity(before: list[dict]) -> float | None:
+    """The tint's opacity as it is now, in the first of these views."""
+    space = next(filter(None, map(_space, before)), None)
+    return space.overlay.texture_paint_mode_opacity if space is not None else None
 
 
 def restore(before: list[dict]) -> None:
-    """Shading, overlays and viewpoints as they were, of the views that are still there."""
+    """Shading and overlays as they were, of the views that are still there. The viewpoint stays where the artist turned it to."""
     for kept in before:
         space = _space(kept)
         if space is None:
             continue
-        for name, value in kept["shading"].items():
-            setattr(space.shading, name, value)
+        shading = kept["shading"]
+        space.shading.type = 'SOLID'  # light and colour of Solid shading can only be set in it
+        space.shading.light, space.shading.color_type = shading["light"], shading["color_type"]
+        space.shading.type = shading["type"]
         space.overlay.show_overlays = kept["overlays"]
         space.overlay.texture_paint_mode_opacity = kept["opacity"]
-        _look(space, kept)
 
 
 def face_sheet(before: list[dict], centre, size: float) -> None:
