@@ -2,16 +2,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The worker's environment: made from nothing, continued after a failure, checked and removed; without the network."""
 
+import http.server
 import os
 import sys
+import threading
 import time
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from core.messages import Cancelled, Done, Failed, Problem, Progress
-from core.worker import environment
+from core.worker import environment, index
+from core.worker.background import Task
 from core.worker.environment import Installation, find_python, judge, python_of, remove, required, survey, verify
 
 REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
@@ -74,6 +78,103 @@ def test_a_cancelled_installation_says_so(local, tmp_path):
     installation.start()
     installation.cancel()
     assert isinstance(follow(installation)[-1], Cancelled)
+
+
+def test_what_an_installation_brings_is_known_before_it_begins(local, tmp_path):
+    task = Task("index", lambda task: index.plan(environment.base_python(), environment.pip_steps(local, environment.compute_of("auto")), task.run, task.say))
+    task.start()
+    messages = follow(task)
+    assert isinstance(messages[-1], Done), messages[-1]
+    wheels = sorted((tmp_path / "wheels").iterdir())
+    plan = task.result
+    assert plan.packages == {"tinytorch": "1.0", "tinynets": "1.0"} and plan.hosts == ("this disk",)
+    assert plan.download == sum(wheel.stat().st_size for wheel in wheels)
+    assert plan.disk == sum(entry.file_size for wheel in wheels for entry in zipfile.ZipFile(wheel).infolist()) > 0
+    assert index.check_space(plan, tmp_path / "not" / "there") > plan.needed
+    huge = replace(plan, disk=1 << 60)
+    with pytest.raises(Problem, match="are needed while"):
+        index.check_space(huge, tmp_path)
+    (local / "worker.txt").write_text("tinytorch==2.0\n")
+    task = Task("index", lambda task: index.plan(environment.base_python(), environment.pip_steps(local, environment.compute_of("auto")), task.run))
+    task.start()
+    assert "did not answer as expected" in follow(task)[-1].problem
+
+
+def test_sizes_come_from_a_wheels_own_directory_wherever_it_lies(tmp_path):
+    content = os.urandom(70_000) + bytes(500_000)
+    with zipfile.ZipFile(tmp_path / "a-1-py3-none-any.whl", "w", zipfile.ZIP_DEFLATED) as wheel:
+        wheel.writestr("a/data.bin", content)
+        wheel.writestr("a/é.txt", "ü" * 10)
+    size = (tmp_path / "a-1-py3-none-any.whl").stat().st_size
+
+    class WithRanges(http.server.SimpleHTTPRequestHandler):
+        whole = False
+
+        def do_GET(self):
+            data = (tmp_path / self.path[1:]).read_bytes()
+            first, last = self.headers["Range"].removeprefix("bytes=").split("-")
+            start, end = (len(data) - int(last), len(data)) if not first else (int(first), int(last) + 1)
+            self.send_response(200 if self.whole else 206)
+            if not self.whole:
+                self.send_header("Content-Range", f"bytes {start}-{end - 1}/{len(data)}")
+            self.send_header("Content-Length", str(len(data) if self.whole else end - start))
+            self.end_headers()
+            self.wfile.write(data if self.whole else data[start:end])
+
+        def log_message(self, *_):
+            pass
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), WithRanges)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    address = f"http://127.0.0.1:{server.server_port}/a-1-py3-none-any.whl"
+    assert index.wheel_size(address) == index.wheel_size((tmp_path / "a-1-py3-none-any.whl").as_uri()) == (size, len(content) + 20)
+    WithRanges.whole = True
+    assert index.wheel_size(address) == (size, round(index.UNPACKED * size))
+    server.shutdown()
+    server.server_close()
+    with pytest.raises(Problem, match="did not answer"):
+        index.wheel_size(address)
+
+
+@pytest.mark.parametrize("system, compute, torch", [
+    ("linux", "cpu", ["torch==2.13.0+cpu", "--find-links", "https://download.pytorch.org/whl/cpu/torch/"]), ("linux", "cuda", []),
+    ("win32", "cpu", []), ("win32", "cuda", ["torch==2.13.0+cu130", "--find-links", "https://download.pytorch.org/whl/cu130/torch/"]), ("darwin", "apple", [])])
+def test_each_system_gets_the_torch_that_was_chosen(monkeypatch, system, compute, torch):
+    monkeypatch.setattr(sys, "platform", system)
+    assert environment.compute_of(compute) == compute
+    assert environment.pip_steps(REQUIREMENTS, compute)[0] == ["-r", str(REQUIREMENTS / "worker.txt"), *torch]
+    monkeypatch.setattr(environment.shutil, "which", lambda name: "/usr/bin/nvidia-smi")
+    assert environment.compute_of("auto") == ("apple" if system == "darwin" else "cuda")
+    monkeypatch.setattr(environment.shutil, "which", lambda name: None)
+    assert environment.compute_of("auto") == ("apple" if system == "darwin" else "cpu")
+    with pytest.raises(Problem, match="no solver for"):
+        environment.compute_of("cuda" if system == "darwin" else "apple")
+
+
+def test_an_environment_for_another_device_is_made_anew(local, tmp_path):
+    folder = tmp_path / "env"
+    for compute, fresh in (("cpu", True), ("cpu", False), ("cuda", True)):
+        kept = folder / "kept"
+        installation = Installation(folder, local, tmp_path / "install.log", compute=compute)
+        installation.start()
+        assert isinstance(follow(installation)[-1], Done)
+        assert kept.exists() != fresh
+        kept.write_text("of this environment")
+    remove(folder)
+
+
+def test_a_task_ends_with_its_problem_or_at_once_when_cancelled():
+    def refuse(task):
+        raise Problem("It cannot be.", "Let it be.")
+
+    for work, problem in ((refuse, "It cannot be."), (lambda task: 1 / 0, "Something failed unexpectedly: ZeroDivisionError: division by zero")):
+        task = Task("try", work)
+        task.start()
+        assert [message.problem for message in follow(task)] == [problem]
+    task = Task("sleep", lambda task: task.run([sys.executable, "-c", "import time; time.sleep(60)"]))
+    task.start()
+    task.cancel()
+    assert follow(task, 2) == [Cancelled("sleep")]
 
 
 def test_other_peoples_folders_are_left_alone(local, tmp_path):

@@ -25,6 +25,12 @@ PYTHONS = ((3, 11), (3, 12))
 DISK_GB = 1.7
 """Size of the finished environment, measured on Linux with torch for the CPU; the CUDA build of torch, which is what PyPI has for Linux,
 brings NVIDIA's libraries and takes several times as much."""
+TORCH = "https://download.pytorch.org/whl/"
+"""Where PyTorch keeps the builds that are not on PyPI, whose build for Linux brings CUDA and whose build for Windows is for the CPU."""
+BUILDS = {("linux", "cpu"): "cpu", ("linux", "cuda"): "", ("win32", "cpu"): "", ("win32", "cuda"): "cu130", ("darwin", "cpu"): "", ("darwin", "apple"): ""}
+"""Which of them a system and its choice need; '' for PyPI's. On a Mac there is one build, for both."""
+COMPUTE_FILE = "wildcap_compute.txt"
+"""Says in an environment for what it was made: another choice makes it anew."""
 MODULES = {"opencv-contrib-python-headless": "cv2", "openimageio": "OpenImageIO", "scikit-image": "skimage"}
 """Modules of the packages that are called otherwise."""
 
@@ -41,6 +47,14 @@ def find_python() -> Path | None:
         if answer(candidate, f"import sys, venv, ensurepip; print(sys.version_info[:2] in {PYTHONS})") == "True":
             return Path(candidate)
     return None
+
+
+def base_python() -> Path:
+    """As `find_python`. Raises Problem when there is none."""
+    found = find_python()
+    if found is None:
+        raise Problem("No Python 3.11 or 3.12 was found on this machine.", "Install one from python.org, then try again.")
+    return found
 
 
 def python_of(folder: Path) -> Path:
@@ -103,14 +117,35 @@ def remove(folder: Path) -> None:
         raise storage_problem(error, folder) from error
 
 
+def compute_of(choice: str) -> str:
+    """What 'auto' means on this machine: 'apple' on a Mac, 'cuda' with NVIDIA's driver, else 'cpu'. Raises Problem for what cannot be here."""
+    system = "linux" if sys.platform.startswith("linux") else sys.platform
+    if choice == "auto":
+        choice = "apple" if system == "darwin" else "cuda" if shutil.which("nvidia-smi") else "cpu"
+    if (system, choice) not in BUILDS:
+        raise Problem(f"There is no solver for {choice} on this system.", "Choose Automatic.")
+    return choice
+
+
+def pip_steps(requirements: Path, compute: str) -> list[list[str]]:
+    """The arguments of each `pip install` in turn. `compute`: 'cpu', 'cuda' or 'apple'."""
+    build = BUILDS["linux" if sys.platform.startswith("linux") else sys.platform, compute]
+    version = required(requirements).get("torch")
+    # A page of links for this one package, so that no other one can come from there.
+    torch = [f"torch=={version}+{build}", "--find-links", f"{TORCH}{build}/torch/"] if build and version else []
+    return [["-r", str(requirements / "worker.txt"), *torch], ["--no-deps", "-r", str(requirements / "nets.txt")]]
+
+
 class Installation:
     """Makes an environment in the background; `poll` it like a Worker. A second one in the same folder continues a broken one."""
 
-    def __init__(self, folder: Path, requirements: Path, log: Path, base: Path | None = None):
-        """`folder` is new, empty, or one that an earlier installation began; `base` is the Python to make it from (None: found)."""
+    def __init__(self, folder: Path, requirements: Path, log: Path, base: Path | None = None, compute: str = "auto"):
+        """`folder` is new, empty, or one that an earlier installation began; `base` is the Python to make it from (None: found);
+        `compute` is 'auto', 'cpu', 'cuda' or 'apple'."""
         self.folder = Path(folder)
         self.requirements = Path(requirements)
         self.log = Path(log)
+        self.compute = compute
         self._base = base
         self._messages: queue.SimpleQueue[Message] = queue.SimpleQueue()
         self._process: subprocess.Popen | None = None
@@ -118,10 +153,8 @@ class Installation:
         self.running = False
 
     def start(self) -> None:
-        """Raises Problem when there is no Python to begin with, or the folder is somebody else's."""
-        self._base = self._base or find_python()
-        if self._base is None:
-            raise Problem("No Python 3.11 or 3.12 was found on this machine.", "Install one from python.org, then try again.")
+        """Raises Problem when the folder is somebody else's."""
+        self.compute = compute_of(self.compute)
         if self.folder.is_dir() and any(self.folder.iterdir()) and not (self.folder / "pyvenv.cfg").is_file():
             raise Problem(f"{self.folder} holds other files.", "Choose an empty folder.")
         self.running = True
@@ -147,19 +180,24 @@ class Installation:
             self.log.parent.mkdir(parents=True, exist_ok=True)
             with open(self.log, "w", encoding="utf-8") as log:
                 final = self._install(log)
+        except Problem as problem:
+            final = Failed("environment", problem.problem, problem.remedy)
         except OSError as error:
             problem = storage_problem(error, self.folder)
             final = Failed("environment", problem.problem, problem.remedy)
         self._messages.put(final or Done(round(time.monotonic() - started, 1)))
 
     def _install(self, log) -> Message | None:
-        python = python_of(self.folder)
+        python, mark = python_of(self.folder), self.folder / COMPUTE_FILE
         pip = [python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--progress-bar", "off"]
-        steps = [[*pip, "-r", self.requirements / "worker.txt"], [*pip, "--no-deps", "-r", self.requirements / "nets.txt"]]
-        if answer(python, "import pip; print('pip')") != "pip":  # not begun, or broken on the way
-            steps.insert(0, [self._base, "-m", "venv", "--clear", self.folder])
+        steps = [[*pip, *words] for words in pip_steps(self.requirements, self.compute)]
+        other = mark.is_file() and mark.read_text(encoding="utf-8") != self.compute
+        if other or answer(python, "import pip; print('pip')") != "pip":  # not begun, or broken on the way
+            steps.insert(0, [self._base or base_python(), "-m", "venv", "--clear", self.folder])
         self._seen = 0
-        for step in steps:
+        for i, step in enumerate(steps):
+            if i == len(steps) - 2:
+                mark.write_text(self.compute, encoding="utf-8")
             code, last_error = self._run([str(word) for word in step], log)
             if self._cancelled.is_set():
                 return Cancelled("environment")

@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an installation will download and how much disk it takes, as the package index reports it for this machine, before anything is installed.
+
+Ground floor: standard library only. pip chooses the files (its dry run reads their descriptions alone); a wheel's own directory, at its end,
+says how large it is unpacked.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import struct
+import tempfile
+import urllib.parse
+import urllib.request
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..messages import Problem
+
+UNPACKED = 3.5
+"""Bytes on disk for each that is downloaded, where a wheel's directory cannot be read: 0.46 GB became 1.6 GB on Linux with torch for the CPU."""
+END = struct.Struct("<4s4H2LH")
+"""End of a zip file's central directory without a comment (PKWARE APPNOTE 4.3.16): its size and offset are the sixth and seventh."""
+RETRIES = ("--retries", "1")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The packages by name and version, the hosts they come from ('this disk' for files), bytes to download and bytes once unpacked."""
+
+    packages: dict[str, str]
+    hosts: tuple[str, ...]
+    download: int
+    disk: int
+
+    @property
+    def needed(self) -> int:
+        """Free bytes to have: while it installs, downloads and packages are both there."""
+        return self.download + self.disk
+
+
+def plan(base: Path, steps: list[list[str]], run: Callable[[list[str]], tuple[int, str]], say: Callable[[float, float, str], None] = lambda *_: None) -> Plan:
+    """What `pip install` with each of the argument lists `steps` would bring. `base` is the Python to ask with, `run` runs a command and gives its
+    exit code and last error, `say` takes how far it is. Raises Problem when the index cannot be reached or lacks a package."""
+    with tempfile.TemporaryDirectory(prefix="wildcap_index_", ignore_cleanup_errors=True) as folder:
+        say(0, 4, "preparing to ask the package index")
+        run([base, "-m", "venv", folder])
+        python = next((p for p in (Path(folder) / "bin" / "python", Path(folder) / "Scripts" / "python.exe") if p.is_file()), base)
+        pip = [python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", *RETRIES]
+        say(1, 4, "preparing to ask the package index")
+        run([*pip, "--quiet", "--upgrade", "pip"])  # one that reads descriptions without downloading packages; an old one works, slowly
+        found = {}
+        for i, step in enumerate(steps):
+            say(2 + i / len(steps), 4, "asking the package index")
+            file = Path(folder) / f"{i}.json"
+            code, error = run([*pip, "--dry-run", "--quiet", "--ignore-installed", "--report", file, *step])
+            if code or not file.is_file():
+                raise Problem(f"The package index did not answer as expected ({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",
+                              "Check the network connection, and try again.")
+            for entry in json.loads(file.read_text(encoding="utf-8"))["install"]:
+                found[entry["metadata"]["name"]] = entry["metadata"]["version"], entry["download_info"]["url"]
+        say(3, 4, "asking how large the packages are")
+        with ThreadPoolExecutor(8) as pool:
+            sizes = list(pool.map(wheel_size, [url for _, url in found.values()]))
+    hosts = sorted({urllib.parse.urlsplit(url).hostname or "this disk" for _, url in found.values()})
+    return Plan({name: version for name, (version, _) in found.items()}, tuple(hosts), sum(size for size, _ in sizes), sum(disk for _, disk in sizes))
+
+
+def check_space(plan: Plan, folder: Path) -> int:
+    """Bytes free on the disk of a folder that need not be there yet. Raises Problem when the plan does not fit."""
+    free = free_space(folder)
+    if free < plan.needed:
+        raise Problem(f"The disk that holds {folder} has {gigabytes(free)} free; {gigabytes(plan.needed)} are needed while the solver is installed.",
+                      "Free some space, or choose a solver folder on another disk.")
+    return free
+
+
+def free_space(folder: Path) -> int:
+    """Bytes free on the disk of a folder that need not be there yet."""
+    return shutil.disk_usage(next(path for path in (folder, *folder.absolute().parents) if path.is_dir())).free
+
+
+def folder_size(folder: Path) -> int:
+    """Bytes of all files in a folder; links are not followed."""
+    return sum(path.lstat().st_size for path in Path(folder).rglob("*") if not path.is_dir())
+
+
+def gigabytes(size: int) -> str:
+    return f"{size / 1e9:.1f} GB" if size >= 1e8 else f"{size / 1e6:.0f} MB"
+
+
+def wheel_size(url: str) -> tuple[int, int]:
+    """(bytes to download, bytes unpacked) of a wheel at an address. Raises Problem when it is not there."""
+    try:
+        tail, total = _part(url, -END.size)
+        signature, *_, size, offset, _ = END.unpack(tail)
+        if signature == b"PK\5\6":
+            return total, _unpacked(_part(url, offset, size)[0])
+    except (OSError, ValueError, struct.error) as error:
+        raise Problem(f"{urllib.parse.urlsplit(url).hostname or url} did not answer ({error}).", "Check the network connection, and try again.") from error
+    return total, round(UNPACKED * total)
+
+
+def _part(url: str, offset: int, size: int | None = None) -> tuple[bytes, int]:
+    """`size` bytes of a file from `offset` (the last ones where it is negative), and the whole file's size."""
+    parts = urllib.parse.urlsplit(url)
+    if parts.scheme == "file":
+        path = Path(urllib.request.url2pathname(parts.path))
+        total = path.stat().st_size
+        with open(path, "rb") as file:
+            file.seek(offset % total)
+            return file.read() if size is None else file.read(size), total
+    wanted = f"bytes={offset}" if offset < 0 else f"bytes={offset}-{'' if size is None else offset + size - 1}"
+    with urllib.request.urlopen(urllib.request.Request(url, headers={"Range": wanted}), timeout=30) as answer:
+        found = re.fullmatch(r"bytes \d+-\d+/(\d+)", answer.headers.get("Content-Range", ""))
+        if found is None:  # it sends the whole file: its size is all we want of it
+            return b"\0" * END.size, int(answer.headers.get("Content-Length", 0))
+        return answer.read(), int(found[1])
+
+
+def _unpacked(directory: bytes) -> int:
+    """Sum of the uncompressed sizes in a zip file's central directory (PKWARE APPNOTE 4.3.12)."""
+    total, at = 0, 0
+    while directory[at:at + 4] == b"PK\1\2":
+        total += struct.unpack_from("<L", directory, at + 24)[0]
+        at += 46 + sum(struct.unpack_from("<3H", directory, at + 28))
+    return total
