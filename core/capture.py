@@ -111,6 +111,7 @@ class Capture:
         self.shadow_mask_auto = self.root / "shadow_mask_auto.png"
         self.shadow_mask = self.root / "shadow_mask.png"
         self.protect_mask = self.root / "protect_mask.png"
+        self.shadow_mask_edges = self.root / "shadow_mask_edges.png"  # the mask snapped to the shadow's edges, until the artist takes it
         self.mask_history = self.root / "mask_history"
         self.maps = self.root / "maps"
         self.solved = self.maps / "solved.safetensors"  # what a later solve of an edited part goes on from

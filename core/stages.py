@@ -50,6 +50,14 @@ STAGES = (
           wishes=(*(f"maps_4k/{name}" for name in MAPS), "own_head.obj", "own_head.json", "scan.ply", "frames/", "cameras/")),
 )
 
+TOOLS = (
+    Stage("mask_edges", "Snap to Edges", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"), ("shadow_mask_edges.png",),
+          "core.solve.snapping"),
+    Stage("skin_tone", "Skin Tone", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"), (), "core.solve.tone"),
+)
+"""What a worker does for one button: no stage of the chain depends on it, and nothing of it is recorded."""
+LABELS = {stage.name: stage.label for stage in (*STAGES, *TOOLS)}
+
 NAMES = tuple(stage.name for stage in STAGES)
 MASK_STAGE = "shadow_mask"  # in Blender the chain stops after it, for the artist
 

@@ -28,19 +28,21 @@ class Job:
     chain: tuple[stages.Stage, ...]
     force: bool
     settings: Settings
+    tool: stages.Stage | None = None  # what runs in the chain's place
 
 
 def write_job(capture: Capture, *, source: str | Path = "", first: str | None = None, last: str | None = None, settings: dict | None = None,
-              quality: str = "standard") -> Path:
+              quality: str = "standard", tool: str = "") -> Path:
     """Writes the capture's job.json and returns its path.
 
     `first` (a stage's name) begins with that stage and forces it and those after it; None begins with the first one and
     skips what is fresh. `last` ends the job, None: the last stage. `settings` ({stage: {name: value}}, seed, device) lie
-    over the preset `quality`. Raises Problem for an unknown name or value, when the folder cannot be written, and while another worker
-    is at the capture: job.json is the record of what that one was asked.
+    over the preset `quality`. `tool` names one of stages.TOOLS that runs in place of the chain. Raises Problem for an unknown name or value, when the
+    folder cannot be written, and while another worker is at the capture: job.json is the record of what that one was asked.
     """
     source = os.path.abspath(source) if str(source) else ""
-    values = {"capture": str(capture.root.absolute()), "source": source, "from": first, "until": last, "settings": settings or {}, "quality": quality}
+    values = {"capture": str(capture.root.absolute()), "source": source, "from": first, "until": last, "settings": settings or {}, "quality": quality,
+              **({"tool": tool} if tool else {})}
     _job(values)
     capture.check_free()
     write_json(capture.job, values)
@@ -61,4 +63,7 @@ def _job(values: dict) -> Job:
     if first > last:
         raise Problem(f"The stage {stages.NAMES[first]} comes after {stages.NAMES[last]}.", "Name the first stage to run before the last one.")
     settings = from_json(values.get("settings") or {}, preset(values.get("quality") or "standard"))
-    return Job(Capture(values["capture"]), values.get("source") or "", stages.STAGES[first:last + 1], bool(values.get("from")), settings)
+    tool = next((each for each in stages.TOOLS if each.name == values.get("tool")), None)
+    if values.get("tool") and tool is None:
+        raise Problem(f"There is no tool named {values['tool']!r}.", f"The tools are {', '.join(each.name for each in stages.TOOLS)}.")
+    return Job(Capture(values["capture"]), values.get("source") or "", stages.STAGES[first:last + 1], bool(values.get("from")), settings, tool)

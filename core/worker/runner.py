@@ -36,8 +36,13 @@ def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None, 
         job = read_job(path)
         with job.capture.locked():
             job.capture.tidy()
-            _take_source(job, emit)
+            if job.tool is None:
+                _take_source(job, emit)
             _check_device(job.settings.device)
+            if job.tool is not None:
+                stage = job.tool.name
+                run_tool(job.tool, job, emit, cancelled)
+                return Done(round(time.monotonic() - started, 2))
             if job.force:
                 job.capture.forget([stage.name for stage in job.chain])
             for step in job.chain:
@@ -90,6 +95,24 @@ def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled
                     report.write(capture, settings)
             raise
     emit(StageDone(stage.name, round(seconds, 2), False, reporter.figures))
+
+
+def run_tool(tool: Stage, job: Job, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
+    """Runs one of stages.TOOLS and sends its figures. Raises whatever it raises."""
+    capture, started = job.capture, time.monotonic()
+    missing = [name for name in tool.reads if not capture.has(name)]
+    if missing:
+        raise Problem(f"{tool.label} needs {missing[0]}, which this capture does not have.", "Click Reconstruct first.")
+    emit(Progress(tool.name, 0, 1, "Starting"))
+    with _log_of(capture, tool) as log:
+        reporter = Reporter(tool.name, _logging(emit, log), cancelled)
+        try:
+            importlib.import_module("." + tool.module.split(".", 1)[1], __package__.rpartition(".")[0]).run(capture, job.settings, reporter)
+        except BaseException:
+            with contextlib.suppress(OSError):  # the disk may be full; that is said elsewhere
+                traceback.print_exc(file=log)
+            raise
+    emit(StageDone(tool.name, round(time.monotonic() - started, 2), False, reporter.figures))
 
 
 def explained(error: Exception, stage: str, log: Path) -> Problem:

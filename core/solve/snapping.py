@@ -1,0 +1,37 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The tool behind Snap to Edges: the shadow mask laid on the penumbra that the texture shows, as a solve lays it before its first step."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from .. import images
+from ..capture import Capture
+from ..messages import Reporter
+from ..settings import Settings
+from . import initial
+from .evidence import read_evidence
+from .prior import WEIGHTS, load
+from .recipes import RECIPES
+
+CELL = 8.0
+"""Texels of a 1024 map per light of the grid: none is fitted here, but a start lays them out."""
+
+
+def run(capture: Capture, settings: Settings, report: Reporter) -> None:
+    """The artist's mask, or the proposal -> shadow_mask_edges.png, 8 bit grey, of the texture's size."""
+    report.progress(0, 2, "reading the texture, the head and the masks")
+    prior = load(Path(settings.solve.prior).expanduser() if settings.solve.prior else WEIGHTS, settings.device)
+    height, width = images.read_linear(capture.texture).shape[:2]
+    evidence = read_evidence(capture, max(min(height, 1024) // 32, 4) * 32)
+    report.progress(1, 2, "looking for the shadow's edges")
+    recipe = replace(RECIPES["wildcap"], sharp_edges=True, protect_marks=False)
+    found = initial.start(prior, evidence, settings.solve.skin_tone, CELL, recipe)
+    snapped = np.clip(images.resize(found.alpha.numpy(), width, height), 0, 1)
+    images.write_data(capture.shadow_mask_edges, snapped)
+    painted = images.resize(evidence.alpha.numpy(), width, height)
+    report.figure("moved_percent_of_mask", round(100 * float(np.abs(snapped - painted).sum() / max(float(painted.sum()), 1e-6)), 1))

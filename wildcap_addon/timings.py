@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How long a solve takes on this machine: learned from the last one that ran here, kept in the extension's user folder.
+
+A sampling step costs in proportion to the map's texels, and twice as much with the gradient through the network.
+"""
+
+import contextlib
+import json
+from pathlib import Path
+
+import bpy
+
+from .. import __package__ as base_package
+from ..core.capture import write_json
+from ..core.messages import Problem
+from ..core.settings import QUALITIES, Settings, preset
+
+_rates: dict[str, float] = {}  # device -> seconds per million texels and step
+
+
+def minutes(quality: str, device: str) -> float | None:
+    """Expected minutes of a solve at a quality, None before the first one on that device."""
+    return _rates[device] * work(preset(quality)) / 60 if device in _rates else None
+
+
+def words(device: str) -> str:
+    """All qualities in one line; '' before the first solve."""
+    return ", ".join(f"{quality.title()} {_spoken(minutes(quality, device))}" for quality in QUALITIES) if device in _rates else ""
+
+
+def record(settings: Settings, seconds: float) -> None:
+    """Takes note of a solve that ran from its first step to its last, by the default recipe; others are no measure of it."""
+    if settings.edited_part or settings.solve.recipe != "wildcap" or settings.solve.prior:
+        return
+    _rates[settings.device] = seconds / work(settings)
+    with contextlib.suppress(Problem):  # a folder that cannot be written: it is learned again the next time
+        write_json(_file(), _rates)
+
+
+def work(settings: Settings) -> float:
+    """Millions of texels times steps; a step through the network's gradient counts for two."""
+    solve = settings.solve
+    return solve.size**2 / 1e6 * solve.steps * (2 if solve.guidance == "dps" else 1)
+
+
+def _spoken(value: float) -> str:
+    return "under 1 min" if value < 1 else f"about {value:.0f} min"
+
+
+def _file() -> Path:
+    return Path(bpy.utils.extension_path_user(base_package, create=True)) / "timings.json"
+
+
+def register():
+    _rates.clear()
+    with contextlib.suppress(OSError, ValueError, TypeError, AttributeError):  # none yet, or not ours
+        _rates.update({str(device): float(rate) for device, rate in json.loads(_file().read_text(encoding="utf-8")).items()})
+
+
+def unregister():
+    _rates.clear()
