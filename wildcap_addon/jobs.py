@@ -13,6 +13,7 @@ import bpy
 
 from ..core import messages, stages
 from ..core.messages import Problem
+from ..core.worker.background import Task
 from ..core.worker.client import Worker
 from ..core.worker.environment import Installation
 from ..core.worker.job import write_job
@@ -26,9 +27,10 @@ ROOT = Path(__file__).resolve().parent.parent  # the folder that holds core/, wh
 class Job:
     """A worker at a capture, and the last thing it said. `previews` counts the preview pictures so far."""
 
-    goal: str  # 'reconstruct', 'solve' or 'install'
-    worker: Worker | Installation
+    goal: str  # 'reconstruct', 'solve', 'install', or 'ask' for what is found out or tidied up in seconds
+    worker: Worker | Installation | Task
     then: Callable[[], None] | None = None  # called when it ended well
+    well: bool = False
     progress: messages.Progress | None = None
     stage: str = ""
     previews: int = 0
@@ -67,7 +69,7 @@ def start(item, goal: str, *, first: str | None = None, last: str | None = None,
     return begin(root, goal, Worker(python, ROOT, path, capture.logs / "worker.log"))
 
 
-def begin(root: str, goal: str, worker: Worker | Installation, then: Callable[[], None] | None = None) -> Job:
+def begin(root: str, goal: str, worker: Worker | Installation | Task, then: Callable[[], None] | None = None) -> Job:
     """Starts a worker and listens to it. Raises Problem when it cannot."""
     worker.start()
     problems.clear(root)
@@ -90,7 +92,17 @@ def poll() -> bool:
             _hear(root, job, message)
         if not job.worker.running:
             del _jobs[root]
+            _finish(root, job)
     return bool(_jobs)
+
+
+def _finish(root: str, job: Job) -> None:
+    """What follows a job that ended well, now that another one can begin."""
+    if job.well and job.then is not None:
+        try:
+            job.then()
+        except Problem as problem:
+            problems.show(root, problem)
 
 
 def _hear(root: str, job: Job, message: messages.Message) -> None:
@@ -104,8 +116,7 @@ def _hear(root: str, job: Job, message: messages.Message) -> None:
         case messages.StageDone():
             job.progress = None
         case messages.Done():
-            if job.then is not None:
-                job.then()
+            job.well = True
         case messages.Failed():
             problems.show(root, Problem(message.problem, message.remedy))
         case messages.Cancelled():
@@ -141,7 +152,7 @@ def eta(job: Job) -> str:
 
 
 def stage_label(job: Job) -> str:
-    return stages.by_name(job.stage).label if job.stage in stages.NAMES else "Installing" if job.goal == "install" else "Starting"
+    return stages.by_name(job.stage).label if job.stage in stages.NAMES else {"install": "Installing", "ask": "Looking"}.get(job.goal, "Starting")
 
 
 def register():

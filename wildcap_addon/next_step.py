@@ -19,7 +19,7 @@ class Facts:
 
     has_capture: bool = False
     has_python: bool = False
-    running: str = ""  # what the capture's job is doing: '', 'reconstruct', 'solve' or 'install'
+    running: str = ""  # what the capture's job is doing: '', 'reconstruct', 'solve', 'install' or 'ask'
     painting: bool = False
     head_time: float = -1.0  # modification time of the head.obj that is in the scene; -1: none
     maps_time: float = -1.0  # of the maps that the material shows; -1: none assembled
@@ -38,7 +38,7 @@ class Step:
 
 BEFORE_MASK = stages.NAMES[:stages.NAMES.index(stages.MASK_STAGE) + 1]
 SET_UP = Step("The solver is not set up on this machine.", "Install Solver", "wildcap.install_solver", 'IMPORT')
-WORDS = {"reconstruct": "Reconstructing ...", "solve": "Solving ...", "install": "Installing the solver ..."}
+WORDS = {"reconstruct": "Reconstructing ...", "solve": "Solving ...", "install": "Installing the solver ...", "ask": "One moment ..."}
 
 
 def next_step(facts: Facts) -> Step:

@@ -89,7 +89,7 @@ class WILDCAP_PT_doctor(WildcapPanel, bpy.types.Panel):
 def gather(context, item) -> next_step.Facts:
     """What the next step depends on, from what is known already."""
     if item is None:
-        return next_step.Facts(has_python=preferences.python() is not None, running="install" if jobs.of("") else "")
+        return next_step.Facts(has_python=preferences.python() is not None, running=jobs.of("").goal if jobs.of("") else "")
     head = captures.head(context, item)
     job = jobs.of(captures.root(item)) or jobs.of("")
     return next_step.Facts(

@@ -2,11 +2,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The extension's preferences: the Python that runs the solver, and where captures go."""
 
+import sys
 from pathlib import Path
 
 import bpy
 
 from .. import __package__ as base_package
+
+COMPUTES = [('auto', "Automatic", "For the GPU where there is an NVIDIA one or an Apple one, else for the CPU"),
+            *([('apple', "Apple", "For Apple GPUs, by Metal; the CPU can be chosen as well")] if sys.platform == "darwin" else
+              [('cuda', "CUDA", "For NVIDIA GPUs; several times larger")]),
+            ('cpu', "CPU", "For the processor alone: the smallest")]
+DEVICES = {"cpu": "CPU", "cuda": "CUDA", "mps": "Metal", "": ""}
+_aside: set[str] = set()  # Pythons that were found not to answer, in this session
 
 
 class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
@@ -20,6 +28,8 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
         name="Solver Folder", subtype='DIR_PATH',
         description="Where Install Solver puts its packages; empty: in the extension's own user folder",
     )
+    compute: bpy.props.EnumProperty(name="Compute On", items=COMPUTES, default='auto', description="What Install Solver downloads PyTorch for")
+    device: bpy.props.StringProperty(name="Device", description="What the solver's Python was found to compute on")
     captures: bpy.props.StringProperty(
         name="Captures Folder", subtype='DIR_PATH',
         description="Where new captures go while the .blend is not saved; empty: WildCap in the documents folder",
@@ -28,9 +38,24 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
+        draw_solver(layout, self)
         layout.prop(self, "python")
-        layout.prop(self, "environment")
         layout.prop(self, "captures")
+
+
+def draw_solver(layout, preferences) -> None:
+    """Whether there is a solver, and the buttons that make, choose and remove one: here, and in the tab until there is one."""
+    ready = python() is not None
+    device = f" ({DEVICES.get(preferences.device, preferences.device)})" if preferences.device else ""
+    layout.label(text=f"The solver is ready{device}" if ready else "There is no solver yet", icon='CHECKMARK' if ready else 'INFO')
+    column = layout.column()
+    column.use_property_split = True
+    column.prop(preferences, "compute")
+    column.prop(preferences, "environment", text="Folder")
+    column = layout.column(align=True)
+    column.operator("wildcap.install_solver", icon='IMPORT')
+    column.operator("wildcap.use_python", icon='FILE_FOLDER')
+    column.operator("wildcap.remove_solver", icon='TRASH')
 
 
 def get() -> WILDCAP_AP_preferences:
@@ -38,13 +63,19 @@ def get() -> WILDCAP_AP_preferences:
 
 
 def python() -> Path | None:
-    """The solver's Python, if it is set and there."""
+    """The solver's Python, if it is set and there, and was not found to be broken."""
     path = bpy.path.abspath(get().python)
-    return Path(path) if path and Path(path).is_file() else None
+    return Path(path) if path and path not in _aside and Path(path).is_file() else None
 
 
-def set_python(path: Path | None) -> None:
-    get().python = str(path or "")
+def set_aside(path: Path) -> None:
+    """Takes a Python that does not answer for none, until it is chosen or installed again."""
+    _aside.add(str(path))
+
+
+def set_python(path: Path | None, device: str = "") -> None:
+    _aside.discard(str(path))
+    get().python, get().device = str(path or ""), device
     bpy.context.preferences.is_dirty = True  # Blender saves preferences on exit
 
 

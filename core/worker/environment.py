@@ -19,6 +19,7 @@ from pathlib import Path
 
 from ..capture import storage_problem
 from ..messages import FINAL, Cancelled, Done, Failed, Message, Problem, Progress
+from .background import Task
 
 PYTHONS = ((3, 11), (3, 12))
 """Versions of Python for which every pinned requirement has a wheel."""
@@ -107,10 +108,9 @@ def judge(found: dict, requirements: Path) -> list[str]:
 def remove(folder: Path) -> None:
     """Deletes an environment. Raises Problem for a folder that is none, or that cannot be deleted."""
     folder = Path(folder)
+    check_removable(folder)
     if not folder.exists():
         return
-    if not (folder / "pyvenv.cfg").is_file():
-        raise Problem(f"{folder} is not a Python environment, so it is not deleted.", "Choose the folder that the solver was installed to.")
     try:
         shutil.rmtree(folder)
     except OSError as error:
@@ -134,6 +134,21 @@ def pip_steps(requirements: Path, compute: str) -> list[list[str]]:
     # A page of links for this one package, so that no other one can come from there.
     torch = [f"torch=={version}+{build}", "--find-links", f"{TORCH}{build}/torch/"] if build and version else []
     return [["-r", str(requirements / "worker.txt"), *torch], ["--no-deps", "-r", str(requirements / "nets.txt")]]
+
+
+def check_removable(folder: Path) -> None:
+    """Raises Problem for a folder that is no environment."""
+    if Path(folder).exists() and not (Path(folder) / "pyvenv.cfg").is_file():
+        raise Problem(f"{folder} is not a Python environment, so it is not deleted.", "Choose the folder that the solver was installed to.")
+
+
+def removal(folder: Path) -> Task:
+    """`remove` in the background: an environment has tens of thousands of files."""
+    def work(task: Task) -> None:
+        task.say(0, 1, "deleting the solver")
+        remove(folder)
+
+    return Task("environment", work)
 
 
 class Installation:
@@ -203,7 +218,8 @@ class Installation:
                 return Cancelled("environment")
             if code != 0:
                 return self._failure(last_error)
-        problems = verify(python, self.requirements)
+        self._messages.put(Progress("environment", 99, 100, "trying every package"))
+        problems = verify(python, self.requirements, importing=True)
         return Failed("environment", problems[0], f"Install again; the log is {self.log}.") if problems else None
 
     def _run(self, command: list[str], log) -> tuple[int, str]:

@@ -4,6 +4,16 @@
 
 import bpy
 
-from . import operators, panel
+from . import install, operators, panel
 
-register, unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *panel.CLASSES))
+_register, _unregister = bpy.utils.register_classes_factory((*install.CLASSES, *operators.CLASSES, *panel.CLASSES))
+
+
+def register():
+    _register()
+    operators.register()
+
+
+def unregister():
+    operators.unregister()
+    _unregister()

@@ -1,44 +1,21 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators of the first steps: install the solver into an environment of its own, use an existing Python, remove it."""
+"""Operator: use a Python that has the solver's packages already; and what looks at the chosen one again when Blender starts."""
 
 import os
-import sys
 from pathlib import Path
 
 import bpy
 
 from ...core.messages import Problem
 from ...core.worker import environment
-from .. import jobs, preferences
+from ...core.worker.background import Task
+from .. import jobs, preferences, problems, status
 from ..base_operator import BaseOperator
+from .install import REQUIREMENTS
 
-REQUIREMENTS = jobs.ROOT / "requirements"
-SIZE = "up to 3 GB to download and 7 GB on disk" if sys.platform == "linux" else "about 1 GB to download and 2 GB on disk"
-"""PyPI's torch for Linux brings CUDA; without it the environment measures 1.6 GB"""
-
-
-class WILDCAP_OT_install_solver(BaseOperator, bpy.types.Operator):
-    """Download the solver's packages from PyPI into a folder of their own; Blender's Python stays as it is"""
-
-    bl_idname = "wildcap.install_solver"
-    bl_label = "Install Solver"
-
-    @classmethod
-    def poll(cls, context):
-        return cls.allowed(jobs.of("") is None, "The solver is being installed already: wait for it, or click Cancel")
-
-    def invoke(self, context, event):
-        return context.window_manager.invoke_confirm(self, event, title="Install the Solver?", confirm_text="Install",
-                                                     message=f"PyTorch and other packages from PyPI, {SIZE}, into {preferences.environment_folder()}")
-
-    def work(self, context):
-        if not bpy.app.online_access:
-            where = "" if bpy.app.online_access_override else " (Preferences, System, Network)"
-            raise Problem("Blender is set to work offline.", f"Allow online access{where}, or use a Python that has the packages already.")
-        folder = preferences.environment_folder()
-        installation = environment.Installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"))
-        jobs.begin("", "install", installation, lambda: preferences.set_python(environment.python_of(folder)))
+LOOK_S = 2.0
+_checks: list[Task] = []  # the look at the Python that is under way, if any
 
 
 class WILDCAP_OT_use_python(BaseOperator, bpy.types.Operator):
@@ -49,38 +26,36 @@ class WILDCAP_OT_use_python(BaseOperator, bpy.types.Operator):
 
     filepath: bpy.props.StringProperty(subtype='FILE_PATH')
 
+    @classmethod
+    def poll(cls, context):
+        return cls.allowed(jobs.of("") is None, "The solver is being set up: wait for it, or click Cancel")
+
     def invoke(self, context, event):
         context.window_manager.fileselect_add(self)
         return {'RUNNING_MODAL'}
 
     def work(self, context):
         python = interpreter(Path(bpy.path.abspath(self.filepath)))
-        problems = environment.verify(python, REQUIREMENTS)
-        if problems:
-            raise Problem(f"{python} cannot run the solver. {' '.join(problems[:3])}",
-                          f"Install what {REQUIREMENTS / 'worker.txt'} lists, then nets.txt beside it with --no-deps; or click Install Solver.")
-        preferences.set_python(python)
+        if self.options.is_invoke:  # every package is loaded once, which takes its time
+            task = Task("setup", lambda task: judge(task, python))
+            jobs.begin("", "ask", task, lambda: preferences.set_python(python, task.result))
+        else:
+            refuse(python, environment.verify(python, REQUIREMENTS))
+            preferences.set_python(python)
 
 
-class WILDCAP_OT_remove_solver(BaseOperator, bpy.types.Operator):
-    """Delete the folder that Install Solver made; captures stay"""
+def judge(task: Task, python: Path) -> str:
+    """The device that a Python computes on. Raises Problem where it cannot run the solver."""
+    task.say(0, 1, "trying that Python")
+    found = environment.survey(python, REQUIREMENTS, importing=True)
+    refuse(python, environment.judge(found, REQUIREMENTS))
+    return found["device"]
 
-    bl_idname = "wildcap.remove_solver"
-    bl_label = "Remove Solver"
 
-    @classmethod
-    def poll(cls, context):
-        return (cls.allowed(jobs.of("") is None, "The solver is being installed: wait for it, or click Cancel")
-                and cls.allowed(preferences.environment_folder().is_dir(), "Nothing was installed here that could be removed"))
-
-    def invoke(self, context, event):
-        return context.window_manager.invoke_confirm(self, event, title="Remove the Solver?", message=f"Deletes {preferences.environment_folder()}")
-
-    def work(self, context):
-        folder = preferences.environment_folder()
-        environment.remove(folder)
-        if not preferences.python():
-            preferences.set_python(None)
+def refuse(python: Path, faults: list[str]) -> None:
+    if faults:
+        raise Problem(f"{python} cannot run the solver. {' '.join(faults[:3])}",
+                      f"Install what {REQUIREMENTS / 'worker.txt'} lists, then nets.txt beside it with --no-deps; or click Install Solver.")
 
 
 def interpreter(path: Path) -> Path:
@@ -91,4 +66,30 @@ def interpreter(path: Path) -> Path:
     raise Problem(f"There is no Python at {path}.", "Choose the python file itself, or the folder of a virtual environment.")
 
 
-CLASSES = (WILDCAP_OT_install_solver, WILDCAP_OT_use_python, WILDCAP_OT_remove_solver)
+def check_again() -> float | None:
+    """A timer: whether the solver's Python still answers, asked once in a thread after Blender has started. One that does not is set aside."""
+    if not _checks:
+        python = preferences.python()
+        if python is None:
+            return None
+        _checks.append(Task("setup", lambda task: refuse(python, environment.verify(python, REQUIREMENTS))))
+        _checks[0].start()
+    for message in _checks[0].poll():
+        if hasattr(message, "problem"):
+            preferences.set_aside(preferences.python())
+            problems.show("", Problem(message.problem, message.remedy))
+            status.redraw()
+    return 0.5 if _checks[0].running else None
+
+
+def register():
+    bpy.app.timers.register(check_again, first_interval=LOOK_S, persistent=True)
+
+
+def unregister():
+    if bpy.app.timers.is_registered(check_again):
+        bpy.app.timers.unregister(check_again)
+    _checks.clear()
+
+
+CLASSES = (WILDCAP_OT_use_python,)

@@ -1,30 +1,25 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel: the solver's Python, and where captures go."""
+"""Panel: the first steps, until a solver answers; from then on the same is in the extension's preferences."""
 
 import bpy
 
 from .. import preferences
-from ..base_panel import FoldedPanel
-from .operators import SIZE
+from ..base_panel import WildcapPanel
 
 
-class WILDCAP_PT_setup(FoldedPanel, bpy.types.Panel):
+class WILDCAP_PT_setup(WildcapPanel, bpy.types.Panel):
     bl_label = "Setup"
     bl_order = 90
+    bl_parent_id = "WILDCAP_PT_main"
+
+    @classmethod
+    def poll(cls, context):
+        return preferences.python() is None
 
     def draw(self, context):
-        layout = self.layout
-        ready = preferences.python() is not None
-        layout.label(text="The solver is ready" if ready else "There is no solver", icon='CHECKMARK' if ready else 'X')
-        column = layout.column(align=True)
-        column.operator("wildcap.install_solver", icon='IMPORT')
-        column.label(text=SIZE.capitalize())
-        column.operator("wildcap.use_python", icon='FILE_FOLDER')
-        column.operator("wildcap.remove_solver", icon='TRASH')
-        column = layout.column()
-        column.prop(preferences.get(), "environment", text="Solver")
-        column.prop(preferences.get(), "captures", text="Captures")
+        preferences.draw_solver(self.layout, preferences.get())
+        self.layout.label(text="Masks, materials and renders work without it")
 
 
 CLASSES = (WILDCAP_PT_setup,)

@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The first steps in Blender: what is said before anything is installed or removed, and a Python that does not answer. No network."""
+
+import sys
+import time
+import venv
+from pathlib import Path
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+
+@pytest.fixture
+def setup(addon, tmp_path):
+    """The add-on's set-up with an empty solver folder in "Löser", Blender online, and nothing known."""
+    preferences, asking = addon("preferences"), addon("setup.asking")
+    system = bpy.context.preferences.system
+    preferences.get().environment, system.use_online_access = str(tmp_path / "Löser"), True
+    asking._answers.clear()
+    yield addon
+    preferences.set_python(None)
+    preferences.get().environment, system.use_online_access = "", False
+    asking._answers.clear()
+
+
+def follow(addon, limit_s: float = 60):
+    end = time.monotonic() + limit_s
+    while addon("jobs").poll():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def plan_of(addon, disk: int = 1_600_000_000):
+    index = addon("setup.install").index
+    return index.Plan({"torch": "2.13.0", "numpy": "1.26.4", "av": "15.1.0"}, ("files.pythonhosted.org",), 430_000_000, disk)
+
+
+def test_installing_asks_the_index_first_and_says_what_it_means(setup, monkeypatch, tmp_path):
+    install, asking, jobs = setup("setup.install"), setup("setup.asking"), setup("jobs")
+    if not bpy.app.online_access:
+        pytest.skip("this Blender cannot go online")
+    asked = []
+    monkeypatch.setattr(install, "look_up", lambda task, compute: asked.append(compute) or plan_of(setup))
+    setup("preferences").get().compute = 'cpu'
+    assert install.WILDCAP_OT_install_solver.tell() is None
+    assert jobs.of("").goal == "ask" and not bpy.ops.wildcap.install_solver.poll()
+    follow(setup)
+    assert asked == ["cpu"] and asking.answer(("plan", "cpu")) == plan_of(setup), "from now on the dialog opens at once"
+    assert "the CPU" in install.WILDCAP_OT_install_solver.tell()[0] and jobs.of("") is None
+    lines = install.told(plan_of(setup), "cpu", tmp_path / "Löser", 23_400_000_000)
+    for words in ("PyTorch 2.13.0 for the CPU and 2 more packages", "0.4 GB to download from files.pythonhosted.org", "1.6 GB on disk",
+                  "Löser", "23.4 GB are free"):
+        assert any(words in line for line in lines), words
+
+
+def test_a_disk_that_is_too_small_is_known_before_the_download(setup):
+    if not bpy.app.online_access:
+        pytest.skip("this Blender cannot go online")
+    setup("preferences").get().compute = 'cpu'
+    setup("setup.asking")._answers["plan", "cpu"] = plan_of(setup, disk=1 << 60)
+    for click in (bpy.ops.wildcap.install_solver, setup("setup.install").WILDCAP_OT_install_solver.tell):
+        with pytest.raises(Exception, match="are needed while the solver is installed"):
+            click()
+    assert setup("jobs").of("") is None and "another disk" in setup("problems").of("").remedy
+
+
+def test_offline_nothing_is_asked(setup):
+    bpy.context.preferences.system.use_online_access = False
+    for click in (bpy.ops.wildcap.install_solver, setup("setup.install").WILDCAP_OT_install_solver.tell):
+        with pytest.raises(Exception, match="work offline"):
+            click()
+    assert setup("jobs").of("") is None
+
+
+def test_removing_adds_up_what_is_freed_and_takes_the_solver_off(setup, tmp_path):
+    preferences, asking = setup("preferences"), setup("setup.asking")
+    folder = tmp_path / "Löser"
+    assert not bpy.ops.wildcap.remove_solver.poll()
+    venv.create(folder, with_pip=False, symlinks=True)
+    (folder / "big.bin").write_bytes(bytes(3_000_000))
+    preferences.set_python(folder / "bin" / "python")
+    tell = setup("setup.install").WILDCAP_OT_remove_solver.tell
+    assert tell() is None
+    follow(setup)
+    assert "frees 3 MB" in tell()[0]
+    assert asking.answer(("size", str(folder))) == pytest.approx(3_000_000, rel=0.05)
+    bpy.ops.wildcap.remove_solver()
+    follow(setup)
+    assert not folder.exists() and preferences.python() is None and preferences.get().python == ""
+    folder.mkdir()
+    (folder / "photo.jpg").write_bytes(b"1")
+    with pytest.raises(RuntimeError, match="not a Python environment"):
+        bpy.ops.wildcap.remove_solver()
+    assert (folder / "photo.jpg").is_file()
+
+
+def test_the_set_up_is_shown_until_a_solver_answers_and_again_when_it_does_not(setup, tmp_path):
+    preferences, operators, panel = setup("preferences"), setup("setup.operators"), setup("setup.panel").WILDCAP_PT_setup
+    assert panel.poll(bpy.context)
+    bare = tmp_path / "bare"
+    venv.create(bare, with_pip=False, symlinks=True)
+    preferences.set_python(bare / "bin" / "python")
+    assert not panel.poll(bpy.context)
+    operators._checks.clear()
+    end = time.monotonic() + 60
+    while operators.check_again() is not None:
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    assert panel.poll(bpy.context) and preferences.python() is None
+    assert "torch" in setup("problems").of("").problem and setup("problems").of("").remedy
+    preferences.set_python(Path(sys.executable), "cpu")
+    assert preferences.python() is not None and preferences.get().device == "cpu" and not panel.poll(bpy.context)
+    operators._checks.clear()
+
+
+def test_the_chosen_python_is_tried_in_the_background(setup, tmp_path):
+    operators, preferences = setup("setup.operators"), setup("preferences")
+    task = operators.Task("setup", lambda task: operators.judge(task, tmp_path / "none"))
+    setup("jobs").begin("", "ask", task, lambda: preferences.set_python(tmp_path / "none", task.result))
+    follow(setup)
+    assert "not a working Python" in setup("problems").of("").problem and preferences.python() is None

@@ -1,0 +1,40 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a dialog has to say and takes seconds to find out (how much to download, how much is freed): found in the background, then the dialog opens."""
+
+from collections.abc import Callable
+
+import bpy
+
+from ...core.worker.background import Task
+from .. import jobs
+
+_answers: dict[tuple, object] = {}
+
+
+def answer(key: tuple):
+    """What was found for a question; None: not asked yet."""
+    return _answers.get(key)
+
+
+def forget(key: tuple) -> None:
+    _answers.pop(key, None)
+
+
+def ask(key: tuple, work: Callable[[Task], object], operator: str) -> None:
+    """Runs `work(task)` as a job that the tab shows, and then the operator as if it were clicked again."""
+    task = Task("setup", work)
+
+    def then() -> None:
+        _answers[key] = task.result
+        _click(operator)
+
+    jobs.begin("", "ask", task, then)
+
+
+def _click(operator: str) -> None:
+    """Opens the operator's dialog; not under an artist who is in the middle of something: then the next click shows it at once."""
+    windows = [] if bpy.app.background else bpy.context.window_manager.windows
+    if windows and not any(window.modal_operators for window in windows):
+        with bpy.context.temp_override(window=windows[0]):
+            getattr(bpy.ops.wildcap, operator)('INVOKE_DEFAULT')
