@@ -23,7 +23,7 @@ from pathlib import Path
 from . import stages
 from .hashes import code_hash, hash_tree, source_stamp
 from .messages import Problem
-from .settings import Settings
+from .settings import Settings, deciding
 
 FORMAT = 1
 """Version of the capture folder's layout; a capture of a newer format is refused."""
@@ -188,7 +188,7 @@ class Capture:
     def stage_key(self, stage: stages.Stage, settings: Settings) -> str:
         """Hash of all a stage's result depends on: its inputs' contents, its settings, the shared ones it names, its code."""
         record = self.read()
-        parts = [asdict(getattr(settings, stage.name)), {name: getattr(settings, name) for name in stage.shared}, code_hash(stage.module)]
+        parts = [deciding(getattr(settings, stage.name)), {name: getattr(settings, name) for name in stage.shared}, code_hash(stage.module)]
         if not stage.reads:
             parts.append(source_stamp(record.get("source", "")) or record.get("source_stamp", []))
         named = {"delight": settings.delight.folder, "cameras": settings.cameras.import_from, "registration": settings.registration.template,

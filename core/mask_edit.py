@@ -10,13 +10,12 @@ from __future__ import annotations
 import hashlib
 import json
 import struct
-from dataclasses import asdict
 from pathlib import Path
 
 from . import stages
 from .capture import Capture
 from .hashes import code_hash, hash_tree
-from .settings import Settings
+from .settings import Settings, deciding
 
 FIELD = "conditions"  # of the file's metadata
 
@@ -36,7 +35,7 @@ def obstacle(capture: Capture, settings: Settings) -> str:
 def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
     """All that a solve depends on beside its masks: name -> hash."""
     stage = stages.by_name("solve")
-    chosen = [asdict(settings.solve), settings.seed, settings.device, settings.delight.delighter]
+    chosen = [deciding(settings.solve), settings.seed, settings.device, settings.delight.delighter]
     files = {name: hash_tree(capture.root / name) for name in (*stage.reads, *stage.wishes) if "mask" not in name}
     shipped = {name: hash_tree(Path(__file__).parent / name) for name in stage.data}
     found = {**files, "the solver's settings": chosen, "the prior": shipped, "the solver's code": code_hash(stage.module)}

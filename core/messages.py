@@ -11,6 +11,8 @@ import json
 from collections.abc import Callable, Collection
 from dataclasses import asdict, dataclass
 
+NO_MEMORY = ("out of memory", "not enough memory", "can't allocate memory", "cannot allocate memory", "insufficient memory", "bad_alloc", "unable to allocate")
+
 
 class Problem(Exception):
     """A failure the user can act on: what is wrong, and what to do about it. Never shown as a traceback."""
@@ -19,6 +21,11 @@ class Problem(Exception):
         super().__init__(f"{problem} {remedy}")
         self.problem = problem
         self.remedy = remedy
+
+
+def out_of_memory(error: BaseException) -> bool:
+    """Whether Python, torch, OpenCV or NumPy say with it that memory did not suffice."""
+    return isinstance(error, MemoryError) or any(words in str(error).lower() for words in NO_MEMORY)
 
 
 class CancelledError(Exception):

@@ -3,7 +3,7 @@
 """One frozen dataclass per stage. Default, range, unit and tooltip of every setting are written here and nowhere else.
 
 Ground floor: standard library only. The docstring under a field is its tooltip in Blender and its line in the
-command line's help; `metadata` holds `min`, `max`, `choices` and `unit`.
+command line's help; `metadata` holds `min`, `max`, `choices` and `unit`, and `deciding` False where no result depends on it.
 """
 
 from __future__ import annotations
@@ -106,8 +106,10 @@ class SolveSettings:
     """Skin tone as sRGB R,G,B in 0..1 (linear mean over facial skin), or auto"""
     prior: str = setting("")
     """The authors' prior: the folder with its config.json and ckpt.pth. It needs ICT-FaceKit fitted as template, in whose UVs it works; empty: ours"""
-    checkpoint_every: int = setting(5, min=1, max=600)
+    checkpoint_every: int = setting(5, min=1, max=600, deciding=False)
     """Steps between two checkpoints"""
+    low_memory: bool = setting(False, deciding=False)
+    """Use far less memory for the same maps, at a third more time. Without it this begins where the memory does not suffice"""
 
 
 @dataclass(frozen=True)
@@ -164,6 +166,12 @@ def preset(quality: str) -> Settings:
 
 def to_json(settings: Settings) -> dict:
     return asdict(settings)
+
+
+def deciding(stage_settings) -> dict:
+    """The settings of one stage that its result depends on."""
+    without = [f.name for f in fields(stage_settings) if not f.metadata.get("deciding", True)]
+    return {name: value for name, value in asdict(stage_settings).items() if name not in without}
 
 
 def from_json(values: dict, base: Settings | None = None) -> Settings:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,16 +19,17 @@ from .. import images, mask_edit
 from ..capture import Capture
 from ..hashes import hash_tree
 from ..messages import Reporter
-from ..settings import Settings
+from ..settings import Settings, deciding
 from . import checkpoint, drawing, initial, layout, maps
 from .checkpoint import Solution
 from .confidence import spread
 from .edited import solve_edited
 from .evidence import REFERENCE, Evidence, read_evidence
+from .memory import sample_within_memory
 from .prior import WEIGHTS, Prior, load
 from .problem import State
 from .recipes import RECIPES, Recipe
-from .sampler import sample, seeded
+from .sampler import seeded
 from .window import coarse
 from .witnesses import confirmed
 
@@ -49,6 +50,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """
     options = settings.solve
     prior = load(Path(options.prior).expanduser() if options.prior else WEIGHTS, settings.device)
+    prior.network.low_memory = options.low_memory
     recipe = _recipe(settings, prior)
     report.progress(0, recipe.steps, "reading the texture, the head and the masks")
     size = layout.whole_size(options.size, prior.multiple) if options.prior else max(options.size // 32, 4) * 32  # the network halves the map several times
@@ -80,7 +82,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             checkpoint.write(stored, state, key)
             maps.write_preview(capture, state, seen, report)
 
-    state = sample(prior, seen, state, recipe, seeded(settings.seed), on_step)
+    state = sample_within_memory(prior, seen, state, recipe, seeded(settings.seed), on_step, report.log)
     result, found = _finished(prior, state, evidence, start, recipe, settings.seed, report)
     delivered = result if elsewhere is None else elsewhere.returned(result, known, state.lights, start.exposure, start.tone)
     maps.write(capture, delivered, found, conditions)
@@ -127,7 +129,7 @@ def _key(evidence: Evidence, settings: Settings, tone: torch.Tensor) -> str:
     digest = hashlib.blake2b(digest_size=16)
     for tensor in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, tone):
         digest.update(tensor.numpy().tobytes())
-    digest.update(json.dumps([asdict(settings.solve), settings.seed, settings.device]).encode())
+    digest.update(json.dumps([deciding(settings.solve), settings.seed, settings.device]).encode())
     digest.update(WEIGHTS.read_bytes())
     digest.update(json.dumps(hash_tree(Path(settings.solve.prior).expanduser()) if settings.solve.prior else "").encode())
     return digest.hexdigest()

@@ -62,7 +62,8 @@ def _sampled(settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidenc
     def on_step(state: State, steps: int) -> None:
         report.progress(state.step, steps, f"sampling the edited part, step {state.step} of {steps}")
 
-    denoised, lights = solve_inside(prior, start.observations, earlier.denoised, earlier.lights, part, recipe, settings.seed, on_step)
+    denoised, lights = solve_inside(prior, start.observations, earlier.denoised, earlier.lights, part, recipe, settings.seed, on_step,
+                                    report.log)
     factor = max(start.observations)
     here = Lights(lights.glob, lights.grid[(..., *part.cells)], lights.chroma)
     reference = coarse(start.reference[(..., *part.seen)], factor)

@@ -16,9 +16,11 @@ import torch
 from torch.nn import functional
 
 from .lighting import Lights
+from .memory import sample_within_memory
+from .prior import Prior
 from .problem import Observation, State
 from .recipes import Recipe
-from .sampler import sample, seeded
+from .sampler import seeded
 
 MARGIN = 64
 """Texels of a 1024 map around the touched box that are sampled again."""
@@ -73,8 +75,9 @@ def window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int], mult
     return Window(tuple(inside), tuple(seen), tuple(cells_seen), moving[0][:, None] & moving[1][None])
 
 
-def solve_inside(prior: Callable, observations: dict[int, Observation], denoised: torch.Tensor, lights: Lights, part: Window, recipe: Recipe, seed: int,
-                 on_step: Callable[[State, int], None] = lambda state, steps: None) -> tuple[torch.Tensor, Lights]:
+def solve_inside(prior: Prior, observations: dict[int, Observation], denoised: torch.Tensor, lights: Lights, part: Window, recipe: Recipe, seed: int,
+                 on_step: Callable[[State, int], None] = lambda state, steps: None,
+                 log: Callable[[str], None] = lambda text: None) -> tuple[torch.Tensor, Lights]:
     """The map [1, 7, S, S] and the lights of an earlier solve with the window sampled anew under `observations` of the whole map, by coarsening factor."""
     here = {factor: cropped(o, part, factor) for factor, o in observations.items()}
     known = denoised[(..., *part.seen)]
@@ -94,7 +97,7 @@ def solve_inside(prior: Callable, observations: dict[int, Observation], denoised
 
     last = max(end for _, _, end in recipe.phases)
     local = replace(recipe, steps=min(recipe.steps, STEPS), phases=(("cells", 0.0, last),), refit=0.0)
-    state = sample(prior, here, state, local, seeded(seed), keep_frozen, with_known)
+    state = sample_within_memory(prior, here, state, local, seeded(seed), keep_frozen, log, known=with_known)
     solved, moved = denoised.clone(), lights.grid.clone()
     moved[(..., *part.cells)] = state.lights.grid
     solved[(..., *part.seen)] = torch.where(inside > 0, state.denoised, known)

@@ -18,11 +18,9 @@ from pathlib import Path
 
 from .. import __version__, report
 from ..capture import Capture, storage_problem
-from ..messages import Cancelled, CancelledError, Done, Failed, Log, Message, Problem, Progress, Reporter, StageDone
+from ..messages import Cancelled, CancelledError, Done, Failed, Log, Message, Problem, Progress, Reporter, StageDone, out_of_memory
 from ..stages import Stage
 from .job import Job, read_job
-
-OUT_OF_MEMORY = ("out of memory", "can't allocate memory", "cannot allocate memory", "insufficient memory", "bad_alloc", "unable to allocate")
 
 
 def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None, cancelled: Callable[[], bool] = lambda: False) -> Message:
@@ -120,8 +118,7 @@ def explained(error: Exception, stage: str, log: Path) -> Problem:
     if isinstance(error, Problem):
         return error
     during = f"the stage {stage}" if stage else "the job"
-    text = f"{error}".lower()
-    if isinstance(error, MemoryError) or any(words in text for words in OUT_OF_MEMORY):
+    if out_of_memory(error):
         return Problem(f"There was not enough memory for {during}.",
                        "Close other programs or choose a lower quality, then run again: finished stages are kept.")
     if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith(__package__.split(".")[0]):

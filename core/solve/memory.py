@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sampling where memory is short: the step that did not fit, and all after it, again in the network's low-memory mode.
+
+That mode keeps only the inputs of the network's layers for the gradient and computes what is inside them a second time: the result is the same.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable
+from dataclasses import replace
+
+import torch
+
+from ..messages import Problem, out_of_memory
+from .lighting import Lights
+from .prior import Prior
+from .problem import Observation, State
+from .recipes import Recipe
+from .sampler import sample
+
+SAYS = "There was not enough memory for step {} of {}: it is done again in the low-memory mode, which is slower and gives the same maps."
+
+
+def sample_within_memory(prior: Prior, observations: dict[int, Observation], state: State, recipe: Recipe, noise: Callable[[int], Callable],
+                         on_step: Callable[[State, int], None] = lambda state, steps: None, log: Callable[[str], None] = lambda text: None,
+                         **options) -> State:
+    """`sample`, to the same bytes whether it had to fall back or not; `log` is told if it had to.
+
+    Raises Problem where the low-memory mode does not fit either.
+    """
+    begun = _copied(state)
+
+    def keep(state: State, steps: int) -> None:
+        nonlocal begun
+        on_step(state, steps)
+        begun = _copied(state)
+
+    try:
+        return sample(prior, observations, state, recipe, noise, keep, **options)
+    except (MemoryError, RuntimeError) as error:
+        if not out_of_memory(error):
+            raise
+        if prior.network.low_memory:
+            raise Problem(f"There was not enough memory for step {begun.step + 1} of {recipe.steps}, even in the low-memory mode.",
+                          "Close other programs, choose a smaller map size for the solve, or the quality draft.") from error
+    log(SAYS.format(begun.step + 1, recipe.steps))  # past the except block, which holds on to all that the step had computed
+    prior.network.low_memory = True
+    gc.collect()
+    if torch.cuda.is_available():
+        torch.cuda.empty_cache()
+    return sample_within_memory(prior, observations, begun, recipe, noise, on_step, log, **options)
+
+
+def _copied(state: State) -> State:
+    """A state that the rest of a step cannot touch: the lights and their moments are moved in place, the maps are replaced."""
+    lights = Lights(*(parameter.detach().clone() for parameter in state.lights.parameters()))
+    return replace(state, lights=lights, moments=[moment.clone() for moment in state.moments])

@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where memory does not suffice the solve goes on in the low-memory mode, says so, and gives the same bytes."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+import torch
+
+from core import solve
+from core.capture import Capture
+from core.messages import Problem, Reporter
+from core.settings import Settings, from_json
+from core.solve.memory import sample_within_memory
+from core.solve.network import UNet
+from core.solve.recipes import Recipe
+from core.solve.sampler import sample, seeded
+from core.stages import MAPS, by_name
+
+from .painted_skin import make, settings
+from .test_sampler import SmoothPrior, observation, shadow_problem, start
+
+REFUSALS = [MemoryError(), torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB"),
+            RuntimeError("[enforce fail at alloc_cpu.cpp:117] DefaultCPUAllocator: can't allocate memory: you tried to allocate 99 bytes"),
+            RuntimeError("DefaultCPUAllocator: not enough memory: you tried to allocate 99 bytes.")]
+
+
+class Refusing:
+    """A denoiser that fails at call `at`, or from there on; in the backward pass where asked."""
+
+    def __init__(self, priors, at, error, backward=False, always=False):
+        self.priors, self.at, self.error, self.backward, self.always = priors, at, error, backward, always
+        self.calls, self.network = 0, SimpleNamespace(low_memory=False)
+
+    def __call__(self, x, sigma, coords):
+        self.calls += 1
+        out = self.priors[x.shape[-1]](x, sigma, coords)
+        if self.calls == self.at or self.always and self.calls > self.at:
+            if not self.backward:
+                raise self.error
+            out.register_hook(self.refuse)
+        return out
+
+    def refuse(self, gradient):
+        raise self.error
+
+
+def problem():
+    """Observations of a shadow at two sizes, and their denoisers: the map becomes finer within the run."""
+    prior, _, texture, mask, _ = shadow_problem(32)
+    half = observation(torch.nn.functional.avg_pool2d(texture, 2), torch.nn.functional.avg_pool2d(mask[None], 2)[0])
+    return {32: prior, 16: SmoothPrior(16)}, {1: observation(texture, mask), 2: half}, Recipe(steps=6, coarse=((2, 0.5),))
+
+
+@pytest.fixture(scope="module")
+def unbroken():
+    priors, seen, recipe = problem()
+    sizes = []
+    out = sample(lambda x, s, c: priors[x.shape[-1]](x, s, c), seen, start(-0.2), recipe, seeded(1), lambda state, steps: sizes.append(state.x.shape[-1]))
+    assert sizes[0] == 16 and sizes[-1] == 32
+    return out
+
+
+@pytest.mark.parametrize("backward", [False, True])
+@pytest.mark.parametrize("at", [1, 2, 3, 4, 5, 6])
+def test_a_step_that_did_not_fit_is_done_again_to_the_same_bytes(unbroken, at, backward):
+    priors, seen, recipe = problem()
+    prior, said, steps = Refusing(priors, at, REFUSALS[at % len(REFUSALS)], backward), [], []
+    out = sample_within_memory(prior, seen, start(-0.2), recipe, seeded(1), lambda state, of: steps.append(state.step), said.append)
+    assert torch.equal(out.denoised, unbroken.denoised) and torch.equal(out.x, unbroken.x)
+    assert all(torch.equal(a, b) for a, b in zip(out.lights.parameters(), unbroken.lights.parameters(), strict=True))
+    assert prior.network.low_memory and len(said) == 1 and f"step {at} of 6" in said[0]
+    assert prior.calls == 7 and steps == [1, 2, 3, 4, 5, 6]
+
+
+def test_lights_that_did_not_fit_start_over_too(unbroken, monkeypatch):
+    from core.solve import light_fit
+
+    calls, loss = [], light_fit.light_loss
+
+    def refusing(*given):
+        calls.append(1)
+        if len(calls) == 30:
+            raise MemoryError
+        return loss(*given)
+
+    monkeypatch.setattr(light_fit, "light_loss", refusing)
+    priors, seen, recipe = problem()
+    out = sample_within_memory(Refusing(priors, 0, None), seen, start(-0.2), recipe, seeded(1))
+    assert torch.equal(out.denoised, unbroken.denoised) and torch.equal(out.lights.grid, unbroken.lights.grid)
+
+
+@pytest.mark.parametrize("error", REFUSALS)
+def test_what_does_not_fit_in_either_mode_is_a_problem_with_a_remedy(error):
+    priors, seen, recipe = problem()
+    with pytest.raises(Problem, match="step 3 of 6") as raised:
+        sample_within_memory(Refusing(priors, 3, error, always=True), seen, start(-0.2), recipe, seeded(1))
+    assert "smaller map size" in raised.value.remedy
+
+
+def test_other_errors_are_not_taken_for_a_lack_of_memory():
+    priors, seen, recipe = problem()
+    prior = Refusing(priors, 2, RuntimeError("mat1 and mat2 shapes cannot be multiplied"))
+    with pytest.raises(RuntimeError, match="shapes"):
+        sample_within_memory(prior, seen, start(-0.2), recipe, seeded(1))
+    assert prior.calls == 2 and not prior.network.low_memory
+
+
+def test_the_stage_falls_back_and_its_maps_are_the_same(tmp_path, monkeypatch):
+    """The shipped network: plain, failing once, and with the setting."""
+    options = {"guidance": "dps", "steps": 4}
+    plain, failing, chosen = (make(tmp_path / name) for name in ("plain.wildcap", "failing.wildcap", "chosen.wildcap"))
+    solve.run(plain, settings(**options), Reporter("solve"))
+    forward, calls, modes = UNet.forward, [], []
+
+    def watched(network, *given):
+        calls.append(1)
+        modes.append(network.low_memory)
+        if fails and len(calls) == 3:
+            raise MemoryError
+        return forward(network, *given)
+
+    monkeypatch.setattr(UNet, "forward", watched)
+    for capture, fails, low in ((failing, True, False), (chosen, False, True)):
+        said = []
+        calls.clear()
+        modes.clear()
+        solve.run(capture, settings(**options, low_memory=low), Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))))
+        assert any("step 3 of 4" in line and "low-memory" in line for line in said) == fails
+        assert modes[0] == low and modes[-1]
+        assert {name: (capture.maps / name).read_bytes() == (plain.maps / name).read_bytes() for name in MAPS} == dict.fromkeys(MAPS, True)
+
+
+def test_how_much_memory_is_used_decides_nothing(tmp_path):
+    capture, stage = Capture(tmp_path), by_name("solve")
+    plain, low, other = (from_json({"solve": values}) for values in ({}, {"low_memory": True}, {"steps": 9}))
+    assert capture.stage_key(stage, plain) == capture.stage_key(stage, low) == capture.stage_key(stage, replace(Settings()))
+    assert capture.stage_key(stage, plain) != capture.stage_key(stage, other)
