@@ -20,7 +20,7 @@ TONE = np.array([0.42, 0.26, 0.18], np.float32)  # linear
 def make(root: Path) -> Capture:
     made = Capture(root)
     skin = torch.from_numpy(template.mask("skin", SIZE).copy())
-    face = initial.reference(load(), torch.from_numpy(TONE), skin)
+    face = initial.face_of_tone(load().mean_face, torch.from_numpy(TONE), skin)
     y, x = np.mgrid[:SIZE, :SIZE] / SIZE
     shadow = 1 / (1 + np.exp((np.hypot(x - 0.66, y - 0.55) - 0.09) / 0.006))
     light = (0.7 + 0.3 * x) * (1 - 0.5 * shadow)

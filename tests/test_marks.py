@@ -103,7 +103,7 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     """A mole of 8 texels, as large as a cell of the light's grid, in a shadow with a hard edge under a mask that is 8 texels too large and beside it."""
     prior, capture = load(), Capture(tmp_path)
     covered = torch.from_numpy(template.mask("skin", SIZE).copy())
-    albedo = (initial.reference(prior, torch.from_numpy(TONE), covered)[0, :3].permute(1, 2, 0).numpy() + 1) / 2
+    albedo = (initial.face_of_tone(prior.mean_face, torch.from_numpy(TONE), covered)[0, :3].permute(1, 2, 0).numpy() + 1) / 2
     row, column = round(0.56 * SIZE), round(0.655 * SIZE)
     albedo = albedo * skin(0.04) / TONE * np.exp(-spot(row, column, 8) * MELANIN)
     distance = distance_to(row, column) - 90

@@ -63,7 +63,7 @@ def put_own_head(capture: Capture, own: meshes.Mesh, skin: np.ndarray | None = N
 def capture(tmp_path):
     """The mean face of TONE in a little light from the left, a soft shadow on one cheek, and another head fitted beside the built-in one."""
     made = Capture(tmp_path / "face.wildcap")
-    reference = initial.reference(load(), torch.from_numpy(TONE), torch.from_numpy(template.mask("skin", SIZE).copy()))
+    reference = initial.face_of_tone(load().mean_face, torch.from_numpy(TONE), torch.from_numpy(template.mask("skin", SIZE).copy()))
     y, x = np.mgrid[:SIZE, :SIZE] / SIZE
     shadow = 1 / (1 + np.exp((np.hypot(x - 0.6, y - 0.5) - 0.06) / 0.006))
     light = (0.7 + 0.3 * x) * (1 - 0.5 * shadow)

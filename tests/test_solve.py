@@ -3,6 +3,7 @@
 """The solve stage on a small capture with the shipped prior: its maps, the tone control, cancel and resume, what bad inputs give."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ import torch
 from core import images, solve, template
 from core.messages import CancelledError, Problem, Reporter
 from core.solve import initial
-from core.solve.evidence import softened
-from core.solve.prior import WEIGHTS
+from core.solve.evidence import read_evidence, softened
+from core.solve.prior import WEIGHTS, load
+from core.solve.problem import albedo
 from core.stages import MAPS
 from core.synthetic.identities import reserved_seeds
 
@@ -120,3 +122,18 @@ def test_the_card_names_its_seeds_and_they_are_not_the_sample_subjects():
     reserved = reserved_seeds()
     assert reserved and not reserved & set(card["seeds"] + card["held_out_seeds"])
     assert WEIGHTS.stat().st_size < 15e6
+
+
+def test_the_nearest_skin_is_the_one_that_was_filmed(capture):
+    """Under another light, another tone and a shadow that M covers."""
+    prior, tone = load(), torch.from_numpy(TONE)
+    evidence = read_evidence(capture, SIZE)
+    light = images.read_linear(capture.texture) / np.maximum(filmed(prior.mean_face, evidence), 1e-3)
+    for skin in prior.references[[3, 7]]:
+        evidence = replace(evidence, texture=torch.from_numpy((filmed(skin, evidence) * light).transpose(2, 0, 1)))
+        found = initial.reference(prior, tone, evidence, "nearest")
+        assert torch.equal(found, initial.face_of_tone(skin, tone, evidence.skin))
+
+
+def filmed(face, evidence) -> np.ndarray:
+    return albedo(initial.face_of_tone(face, torch.from_numpy(TONE), evidence.skin)).permute(1, 2, 0).numpy()

@@ -20,7 +20,7 @@ from .marks import Mark, with_marks
 from .prior import Prior, coordinates, mean_at
 from .problem import Observation, State
 from .problem import albedo as albedo_of
-from .recipes import Recipe
+from .recipes import OURS, Recipe
 
 HUMAN_GREEN = 0.02, 0.45
 """Range of linear green a skin's mean albedo can have; red and blue follow from the colour."""
@@ -55,7 +55,7 @@ def start(prior: Prior, evidence: Evidence, tone: str, cell: float, recipe: Reci
         raise Problem("No facial skin was seen in the texture.", "Look at the texture in the report; film the face from the front and from both sides.")
     tone = skin_tone(tone, evidence.texture, lit, prior.tones)
     prior.use_tone(tone)
-    x_ref = reference(prior, tone, evidence.skin, recipe.uniform_start)
+    x_ref = reference(prior, tone, evidence, recipe.reference)
     exposure = float(mean_tone(albedo_of(x_ref), lit).mean() / mean_tone(evidence.texture, lit).mean().clamp_min(1e-6))
     trusted = evidence.weight * (1 if recipe.trusting else evidence.trust)
     weight = trusted * (1 - evidence.alpha) if recipe.fitted else lit  # one even light is best told by skin
@@ -67,7 +67,7 @@ def again(prior: Prior, evidence: Evidence, earlier: Solution, cell: float, reci
           witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
     """What a part of an earlier solve goes on from: that solve's tone, exposure and light, and where `near` [S, S] is 0 its mask too."""
     prior.use_tone(earlier.tone)
-    x_ref = reference(prior, earlier.tone, evidence.skin, recipe.uniform_start)
+    x_ref = reference(prior, earlier.tone, evidence, recipe.reference)
     begun = Start(earlier.tone, x_ref, earlier.exposure, evidence.alpha, {}, State(0, None, earlier.denoised, earlier.lights))
     return _laid_out(prior, evidence, begun, cell, recipe, lambda alpha: torch.lerp(earlier.alpha, alpha, near), witness)
 
@@ -127,17 +127,35 @@ def mean_tone(albedo: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
     return (albedo * weight).sum((1, 2)) / weight.sum().clamp_min(1e-6)
 
 
-def reference(prior: Prior, tone: torch.Tensor, skin: torch.Tensor, uniform: bool = False) -> torch.Tensor:
-    """x_0^ref [1, 7, S, S]: the prior's mean face, its skin colour-matched to the tone; the tone everywhere if `uniform` or the prior has none. skin [S, S]."""
+def reference(prior: Prior, tone: torch.Tensor, evidence: Evidence, kind: str) -> torch.Tensor:
+    """x_0^ref [1, 7, S, S] of the tone: the prior's mean face; the one of its reference skins that explains the texture best ("nearest"); or the tone
+    everywhere ("uniform", and where the prior has neither)."""
+    if prior.mean_face is None or kind == "uniform":
+        return uniform_skin(tone, evidence.size)
+    if kind == "mean" or prior.references is None:
+        return face_of_tone(prior.mean_face, tone, evidence.skin)
+    basis, weight = sh_basis(evidence.normal), evidence.weight * (1 - evidence.alpha)
+
+    def unexplained(face: torch.Tensor) -> float:
+        light = first_lights(evidence.texture, albedo_of(face), evidence.normal, weight, (1, 1), OURS).glob
+        return float((((evidence.texture - albedo_of(face) * torch.einsum("ck,khw->chw", light, basis)) * weight) ** 2).sum())
+
+    return min((face_of_tone(skin, tone, evidence.skin) for skin in prior.references), key=unexplained)
+
+
+def face_of_tone(face: torch.Tensor, tone: torch.Tensor, skin: torch.Tensor) -> torch.Tensor:
+    """A face [7, R, R] in the form of the prior's mean face as x [1, 7, S, S], the mean of its skin [S, S] brought to the tone."""
     size = skin.shape[0]
-    if uniform or prior.mean_face is None:
-        out = torch.zeros(1, 7, size, size)
-        out[:, :3], out[:, 5], out[:, 6] = 2 * tone[:, None, None] - 1, 1.0, -0.3
-        return out
-    coords = coordinates(size, slice(0, size), slice(0, size))
-    out = mean_at(prior.mean_face, coords, tone[None])
-    albedo = (out[0, :3] + 1) / 2
+    out = mean_at(face, coordinates(size, slice(0, size), slice(0, size)), tone[None])
+    albedo = albedo_of(out)
     out[0, :3] = 2 * albedo * (tone / mean_tone(albedo, skin))[:, None, None] - 1
+    return out
+
+
+def uniform_skin(tone: torch.Tensor, size: int) -> torch.Tensor:
+    """[1, 7, S, S]: the tone, a flat normal and an ordinary specular albedo everywhere."""
+    out = torch.zeros(1, 7, size, size)
+    out[:, :3], out[:, 5], out[:, 6] = 2 * tone[:, None, None] - 1, 1.0, -0.3
     return out
 
 

@@ -28,15 +28,17 @@ class Prior:
 
     Ours models what differs from the mean face of the subject's skin tone (`tone`, linear RGB [3]): a dark patch alone cannot say whether its skin
     or its light is dark. mean_face [7, S, S] covers the UV square: albedo over skin tone, normal, 2 * specular - 1; spread [7]: deviation of skins
-    from it, of the albedo in units of the tone. The released priors have neither and take no tone; their coordinates are not those of texel centres
-    (`centred`), they bring the noise levels they were trained on (`sigmas`, least and largest), and know maps of one size only (`one_scale`).
+    from it, of the albedo in units of the tone; references [N, 7, R, R] are single skins in the mean face's form. The released priors have none of these
+    and take no tone; their coordinates are not those of texel centres (`centred`), they bring the noise levels they were trained on (`sigmas`, least and
+    largest), and know maps of one size only (`one_scale`).
     """
 
     centred, sigmas, one_scale = True, None, False
 
-    def __init__(self, network: UNet, octaves: int = 0, mean_face: torch.Tensor | None = None, spread: torch.Tensor | None = None, tones: list | None = None):
+    def __init__(self, network: UNet, octaves: int = 0, mean_face: torch.Tensor | None = None, spread: torch.Tensor | None = None, tones: list | None = None,
+                 references: torch.Tensor | None = None):
         self.network = network.eval().requires_grad_(False)
-        self.octaves, self.mean_face, self.spread, self.tones = octaves, mean_face, spread, tones or []
+        self.octaves, self.mean_face, self.spread, self.tones, self.references = octaves, mean_face, spread, tones or [], references
         self.tone = torch.tensor(tones).float().median(0).values if tones else None
         self.multiple = network.multiple
         self._known: dict[str, torch.Tensor] = {}
@@ -173,10 +175,10 @@ def _load_ours(path: Path) -> Prior:
     card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     with safe_open(path, "pt") as file:
         tensors = {name: file.get_tensor(name).float() for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
-    mean_face, spread = tensors.pop("mean_face"), tensors.pop("spread")
+    mean_face, spread, references = tensors.pop("mean_face"), tensors.pop("spread"), tensors.pop("references", None)
     network = build(card)
     network.load_state_dict(tensors)
-    return Prior(network, card["cond"]["pos_enc_freq"], mean_face, spread, card["tones"])
+    return Prior(network, card["cond"]["pos_enc_freq"], mean_face, spread, card["tones"], references)
 
 
 def _load_released(folder: Path) -> ReleasedPrior:

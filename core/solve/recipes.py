@@ -20,7 +20,7 @@ class Recipe:
     sigma_min: float = 0.01
     sigma_max: float = 80.0
     coarse: tuple[tuple[int, float], ...] = ((4, 1.0), (2, 0.3))  # (factor, sigma): above this noise the map is sampled at 1 / factor of its size
-    uniform_start: bool = False  # x_0^ref is the skin tone everywhere, instead of the prior's mean face of that tone
+    reference: str = "mean"  # x_0^ref, of the skin tone: the prior's mean face; "nearest" of its reference skins; or "uniform", the tone everywhere
 
     # guidance by the texture
     guidance: str = "dps"  # or "proximal": closed form on the denoised map, without the network's gradient
@@ -66,15 +66,15 @@ RECIPES = {
     "wildcap": OURS,
     #                                the paper                                     the released code
     # walk                           T_init = 600 of T = 1000                      the last 599 of 1000 Karras levels
-    # x_0^ref                        nearest scan, colour-matched: our mean face   the tone everywhere
+    # x_0^ref                        nearest scan, colour-matched                  the tone everywhere
     # equation 8                     zeta = 1, variance preserving, no limit       zeta = 1, variance exploding, decade clip, best of 20 draws
     # rendering compared             as it is                                      through a 3 x 3 Gaussian
     # lights                         both at every step, gamma^g fitted first      gamma^g for 101 steps, then V for 200, then none
     # L_TV                           squared, of gamma                             L1, of the shading on the ring
     # V read                         bilinear                                      cubic
     # skin tone                      by x_0^ref alone                              rescaled in sRGB at the end
-    "paper": replace(_PLAIN, steps=600, preserving=True, clip="none", phases=(("both", 0.0, 1.0),), updates=600, tv_of_gamma=True,
+    "paper": replace(_PLAIN, steps=600, reference="nearest", preserving=True, clip="none", phases=(("both", 0.0, 1.0),), updates=600, tv_of_gamma=True,
                      bilinear=True, rescale="none"),
-    "released": replace(_PLAIN, steps=599, start=0.599, uniform_start=True, clip="decade", candidates=20, blur=True, fitted=False,
+    "released": replace(_PLAIN, steps=599, start=0.599, reference="uniform", clip="decade", candidates=20, blur=True, fitted=False,
                         phases=(("main", 0.0, 101 / 599), ("grid", 101 / 599, 301 / 599)), updates=1, rescale="srgb", released_boxes=True),
 }

@@ -112,6 +112,18 @@ def mean_map(skins: Skins, size: int = 256) -> torch.Tensor:
     return mean
 
 
+def reference_skins(skins: Skins, count: int = 16, size: int = 128) -> torch.Tensor:
+    """The first `count` whole skins in the mean face's form [count, 7, size, size]: albedo over tone, normal, 2 * specular - 1."""
+    factor, found = SIZE // SCALES[1] // size, []
+    for maps, area, tone in zip(skins.maps[SCALES[1]], skins.known[SCALES[1]], skins.tones, strict=True):
+        if area is None and len(found) < count:
+            small = torch.from_numpy(shrink(maps.numpy(), factor))[:7].float()
+            small[:3] = (small[:3] + 1) / 2 / tone[:, None, None]
+            small[3:6] /= small[3:6].norm(dim=0).clamp_min(1e-6)
+            found.append(small)
+    return torch.stack(found)
+
+
 def spread_about(windows: Windows, mean: torch.Tensor, patch: int) -> torch.Tensor:
     """Deviation [7] of random windows from the mean face of their tone; of the albedo in units of the tone."""
     batch = windows.draw(256, patch, np.random.default_rng(3))

@@ -27,7 +27,7 @@ from ..messages import Problem, Reporter
 from ..solve.network import UNet, denoise
 from ..solve.prior import BLIND, WEIGHTS, build, condition, fast_dtype
 from ..synthetic.identities import reserved_seeds
-from .patches import Batch, Windows, mean_map, spread_about
+from .patches import Batch, Windows, mean_map, reference_skins, spread_about
 from .skins import SCALES, Skins, carried_names, carried_skins, clusters, synthetic_skins
 
 OCTAVES = 6
@@ -110,10 +110,10 @@ def train_prior(config: str, out: Path, report: Reporter, minutes: float | None 
 
 
 def export(work: Path, out: Path = WEIGHTS) -> dict:
-    """The averaged weights and the mean face of a training folder as fp16 safetensors, with the card that says where they come from."""
+    """The averaged weights, the mean face and the reference skins of a training folder as fp16 safetensors, with the card that says where they come from."""
     state = torch.load(Path(work) / "state.pt", weights_only=True, map_location="cpu")
     data = state["data"]
-    tensors = {**state["average"], **state["statistics"]}
+    tensors = {**state["average"], **state["statistics"], "references": state["references"]}
     with replacing(out) as temporary:
         save_file({name: value.half().contiguous() for name, value in tensors.items()}, temporary)
     told = "Procedural skins of core/synthetic on the built-in head, which derives from the MakeHuman base mesh (CC0)"
@@ -167,7 +167,8 @@ def _begin(config: str, data: dict, skins: Skins, windows: Windows) -> dict:
     network = build(CONFIGS[config]).state_dict()
     return {"config": config, "data": data, "step": 0, "seconds": 0.0, "history": [], "network": network, "optimiser": {},
             "average": {name: value.clone() for name, value in network.items()}, "tones": skins.tones.tolist(),
-            "statistics": {"mean_face": mean, "spread": spread_about(windows, mean, t["patch"])}}
+            "statistics": {"mean_face": mean, "spread": spread_about(windows, mean, t["patch"])},
+            "references": reference_skins(skins)}
 
 
 class _Steps(Dataset):
