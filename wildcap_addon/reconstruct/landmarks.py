@@ -61,7 +61,7 @@ def shown() -> list[bpy.types.Object]:
 
 def keep_moved(item) -> int:
     """Writes the landmarks that were moved to the capture, where they win over what the frames say. Returns how many."""
-    moved = {o[INDEX_KEY]: tuple(o.location) for o in shown() if (o.location - Vector(o[FOUND_KEY])).length > MOVED_M}
+    moved = {o[INDEX_KEY]: tuple(o.location) for o in shown() if o.get(captures.HEAD_KEY) == item.path and (o.location - Vector(o[FOUND_KEY])).length > MOVED_M}
     if moved:
         artist_landmarks.put(captures.folder(item), moved)
     return len(moved)

@@ -8,7 +8,7 @@ from ...core import stages
 from ...core.messages import Problem
 from .. import captures, head, jobs
 from ..base_operator import BaseOperator
-from . import landmarks
+from . import evidence, landmarks
 
 
 class WILDCAP_OT_reconstruct(BaseOperator, bpy.types.Operator):
@@ -70,6 +70,38 @@ class WILDCAP_OT_bring_in_head(BaseOperator, bpy.types.Operator):
             head.look_at(context, obj)
 
 
+class WILDCAP_OT_bring_in_cameras(BaseOperator, bpy.types.Operator):
+    """Bring in the cameras that took the frames, each with its frame behind the head; or update them in place"""
+
+    bl_idname = "wildcap.bring_in_cameras"
+    bl_label = "Bring In Cameras"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    every: bpy.props.BoolProperty(name="Every Frame", default=False, description="All registered frames; off: those that the texture is made from")
+
+    @classmethod
+    def poll(cls, context):
+        return cls.in_object_mode(context) and cls.with_capture(context)
+
+    def work(self, context):
+        evidence.bring_in_cameras(context, captures.require(context), self.every)
+
+
+class WILDCAP_OT_bring_in_scan(BaseOperator, bpy.types.Operator):
+    """Bring in the scan that the head was fitted to, or update it in place"""
+
+    bl_idname = "wildcap.bring_in_scan"
+    bl_label = "Bring In Scan"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        return cls.in_object_mode(context) and cls.with_capture(context)
+
+    def work(self, context):
+        evidence.bring_in_scan(context, captures.require(context))
+
+
 class WILDCAP_OT_show_landmarks(BaseOperator, bpy.types.Operator):
     """Show the landmarks that placed the head as small spheres on it: move those that are wrong, then click Fit Head Again"""
 
@@ -119,5 +151,5 @@ class WILDCAP_OT_fit_landmarks(BaseOperator, bpy.types.Operator):
         landmarks.hide()
 
 
-CLASSES = (WILDCAP_OT_reconstruct, WILDCAP_OT_cancel, WILDCAP_OT_bring_in_head, WILDCAP_OT_show_landmarks, WILDCAP_OT_hide_landmarks,
-           WILDCAP_OT_fit_landmarks)
+CLASSES = (WILDCAP_OT_reconstruct, WILDCAP_OT_cancel, WILDCAP_OT_bring_in_head, WILDCAP_OT_bring_in_cameras, WILDCAP_OT_bring_in_scan,
+           WILDCAP_OT_show_landmarks, WILDCAP_OT_hide_landmarks, WILDCAP_OT_fit_landmarks)

@@ -21,7 +21,9 @@ class WILDCAP_PT_reconstruct(CapturePanel, bpy.types.Panel):
         layout.prop(item, "quality")
         row = layout.row(align=True)
         row.operator("wildcap.reconstruct")
-        row.operator("wildcap.bring_in_head")
+        row = layout.row(align=True)
+        for name, icon in (("head", 'MESH_MONKEY'), ("cameras", 'CAMERA_DATA'), ("scan", 'OUTLINER_DATA_POINTCLOUD')):
+            row.operator(f"wildcap.bring_in_{name}", text=name.title(), icon=icon)
         row = layout.row(align=True)
         row.operator("wildcap.hide_landmarks" if landmarks.shown() else "wildcap.show_landmarks", icon='EMPTY_AXIS')
         row.operator("wildcap.fit_landmarks")

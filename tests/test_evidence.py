@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the head was made from, in Blender's scene: cameras that see what the frames saw, and the scan."""
+
+import json
+import struct
+
+import pytest
+
+from . import standin
+
+bpy = pytest.importorskip("bpy")
+from bpy_extras.object_utils import world_to_camera_view  # noqa: E402
+from mathutils import Matrix, Quaternion, Vector  # noqa: E402
+
+WIDTH, HEIGHT, FOCAL, CENTRE = 720, 960, 900.0, (350.0, 490.0)
+POSES = {"00000.jpg": (Quaternion((0.7, 0.7, 0.1, 0.05)).normalized(), Vector((0.02, -0.03, 0.6))),
+         "00001.jpg": (Quaternion((0.65, 0.6, -0.2, 0.1)).normalized(), Vector((-0.05, 0.01, 0.5))),
+         "00002.jpg": (Quaternion((0.7, 0.7, 0.0, 0.0)).normalized(), Vector((0.0, 0.0, 0.7)))}
+
+
+@pytest.fixture
+def reconstructed(capture):
+    """A capture with three frames, two of them chosen, their cameras as COLMAP writes them (SIMPLE_RADIAL), and a scan of two triangles."""
+    for name in ("frames", "cameras"):
+        (capture / name).mkdir()
+    for name in POSES:
+        (capture / "frames" / name).write_bytes(standin.plain((90, 80, 70)))
+    frames = [{"name": name, "selected": name != "00001.jpg", "sharpness": 0.2} for name in POSES]
+    (capture / "frames" / "frames.json").write_text(json.dumps({"kind": "video", "frames": frames}), encoding="utf-8")
+    (capture / "cameras" / "cameras.bin").write_bytes(struct.pack("<QiiQQ4d", 1, 7, 2, WIDTH, HEIGHT, FOCAL, *CENTRE, -0.004))
+    images = struct.pack("<Q", len(POSES))
+    for number, (name, (turn, move)) in enumerate(POSES.items(), 1):
+        images += struct.pack("<I7dI", number, *turn, *move, 7) + name.encode() + b"\0" + struct.pack("<Q2dQ2dQ", 2, 1, 2, 3, 4, 5, 6)
+    (capture / "cameras" / "images.bin").write_bytes(images)
+    header = ("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+              "element face 2\nproperty list uchar int vertex_indices\nend_header\n")
+    (capture / "scan.ply").write_text(header + "0 -0.1 0\n0.1 0 0\n0 0 0.1\n-0.1 0 0\n3 0 1 2\n3 0 2 3\n", encoding="ascii")
+    return capture
+
+
+def cameras():
+    return {o.name: o for o in bpy.context.scene.objects if o.type == 'CAMERA'}
+
+
+def seen(thing, point) -> tuple[float, float]:
+    """Pixel of the frame at which Blender's camera shows a world point, rows from the top."""
+    x, y, _ = world_to_camera_view(bpy.context.scene, thing, Vector(point))
+    render = bpy.context.scene.render
+    rows = WIDTH * render.resolution_y / render.resolution_x  # the sensor is as wide as the frame, whatever is rendered
+    return x * WIDTH, HEIGHT / 2 - (y - 0.5) * rows
+
+
+@pytest.mark.parametrize("resolution", [(720, 960), (1920, 1080), (500, 1000)])
+def test_cameras_see_points_where_the_frames_saw_them(addon, reconstructed, resolution):
+    bpy.context.scene.render.resolution_x, bpy.context.scene.render.resolution_y = resolution
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.bring_in_cameras(every=True)
+    assert len(cameras()) == 3
+    bpy.context.view_layer.update()
+    for (turn, move), thing in zip(POSES.values(), cameras().values(), strict=True):
+        for point in ((0, -0.1, 0), (0.05, -0.06, 0.08), (-0.07, 0.02, -0.1)):
+            local = turn.to_matrix() @ Vector(point) + move
+            expected = FOCAL * local.x / local.z + CENTRE[0], FOCAL * local.y / local.z + CENTRE[1]
+            assert seen(thing, point) == pytest.approx(expected, abs=0.02)
+        behind = thing.data.background_images[0]
+        assert thing.data.show_background_images and behind.image.filepath.endswith(thing.name.split()[-1])
+        assert behind.frame_method == ('FIT' if resolution[0] / resolution[1] < WIDTH / HEIGHT else 'CROP')
+
+
+def test_cameras_and_scan_come_in_again_in_place_and_go_with_the_head(addon, reconstructed):
+    bpy.ops.wildcap.bring_in_head()
+    head = bpy.context.view_layer.objects.active
+    for _ in range(2):
+        bpy.ops.wildcap.bring_in_cameras()
+        bpy.ops.wildcap.bring_in_scan()
+    assert sorted(name.split()[-1] for name in cameras()) == ["00000.jpg", "00002.jpg"], "those the texture is made from"
+    assert len(bpy.data.cameras) == 2 and [c.name for c in bpy.data.collections] == ["head Cameras"]
+    scans = [o for o in bpy.context.scene.objects if o.name.endswith("Scan")]
+    assert len(scans) == 1 and len(scans[0].data.vertices) == 4 and scans[0].data.vertices[0].co.y == pytest.approx(-0.1)
+    assert bpy.context.view_layer.objects.active == head and head.select_get() and not scans[0].select_get()
+    before = {o.name: o.matrix_world.copy() for o in (*cameras().values(), scans[0])}
+    head.matrix_world = Matrix.Translation((1, 2, 3))
+    bpy.context.view_layer.update()
+    for name, matrix in before.items():
+        moved = bpy.data.objects[name].matrix_world.translation - matrix.translation
+        assert tuple(moved) == pytest.approx((1, 2, 3), abs=1e-5), name
+    assert addon("captures").active(bpy.context).path == str(reconstructed)
+
+
+def test_what_is_missing_or_damaged_is_told_and_nothing_comes_in_while_painting(addon, reconstructed):
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.paint_mask()
+    assert not bpy.ops.wildcap.bring_in_cameras.poll() and not bpy.ops.wildcap.bring_in_scan.poll()
+    bpy.ops.wildcap.finish_mask()
+    (reconstructed / "cameras" / "images.bin").write_bytes(b"\3\0\0\0\0\0\0\0short")
+    with pytest.raises(RuntimeError, match="cannot be read"):
+        bpy.ops.wildcap.bring_in_cameras()
+    (reconstructed / "cameras" / "images.bin").unlink()
+    with pytest.raises(RuntimeError, match="no cameras yet"):
+        bpy.ops.wildcap.bring_in_cameras()
+    (reconstructed / "scan.ply").unlink()
+    with pytest.raises(RuntimeError, match="no scan yet"):
+        bpy.ops.wildcap.bring_in_scan()
+    assert not cameras()

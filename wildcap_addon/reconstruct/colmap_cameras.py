@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A capture's cameras as the scene needs them, read from COLMAP's binary files with the standard library alone: the worker's reader needs a package.
+
+File format: https://colmap.github.io/format.html (cameras.bin, images.bin).
+"""
+
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+from mathutils import Matrix, Quaternion
+
+from ...core.messages import Problem
+
+PARAMETERS = {0: 3, 1: 4, 2: 4, 3: 5, 4: 8, 5: 8, 6: 12, 7: 5, 8: 4, 9: 5, 10: 12}
+"""Number of parameters of each camera model, by COLMAP's number for it"""
+TWO_FOCALS = (1, 4, 5, 6, 7, 10)
+"""Models whose parameters begin with a focal length for each axis"""
+
+
+@dataclass(frozen=True)
+class FrameCamera:
+    """Name of a registered frame, its size in pixels, focal length and principal point in pixels (of the horizontal axis; without lens distortion,
+    which Blender's camera does not have), and the camera in the capture's world as Blender has cameras: looking along its -Z, +Y up."""
+
+    name: str
+    width: int
+    height: int
+    focal: float
+    centre: tuple[float, float]
+    matrix: Matrix
+
+
+def read(folder: Path) -> list[FrameCamera]:
+    """The registered frames by name. Raises Problem where there are none, or the files are damaged."""
+    try:
+        return sorted(_read(folder), key=lambda camera: camera.name)
+    except FileNotFoundError as error:
+        raise Problem("This capture has no cameras yet.", "Click Reconstruct: they are found from the frames.") from error
+    except (OSError, struct.error, KeyError, UnicodeDecodeError, ValueError) as error:
+        raise Problem(f"The cameras in {folder} cannot be read ({type(error).__name__}: {error}).", "Do the stage Cameras again.") from error
+
+
+def _read(folder: Path) -> list[FrameCamera]:
+    lenses = _lenses((folder / "cameras.bin").read_bytes())
+    data = (folder / "images.bin").read_bytes()
+    (count,), at, found = struct.unpack_from("<Q", data), 8, []
+    for _ in range(count):
+        *pose, lens = struct.unpack_from("<7dI", data, at + 4)
+        end = data.index(b"\0", at + 64)
+        name = data[at + 64:end].decode("utf-8")
+        (points,) = struct.unpack_from("<Q", data, end + 1)
+        at = end + 9 + 24 * points
+        to_camera = Matrix.Translation(pose[4:]) @ Quaternion(pose[:4]).to_matrix().to_4x4()
+        found.append(FrameCamera(name, *lenses[lens], to_camera.inverted() @ Matrix.Diagonal((1, -1, -1, 1))))
+    return found
+
+
+def _lenses(data: bytes) -> dict[int, tuple]:
+    """Camera's number -> (width, height, focal length, principal point)."""
+    (count,), at, found = struct.unpack_from("<Q", data), 8, {}
+    for _ in range(count):
+        number, model, width, height = struct.unpack_from("<iiQQ", data, at)
+        values = struct.unpack_from(f"<{PARAMETERS[model]}d", data, at + 24)
+        at += 24 + 8 * PARAMETERS[model]
+        found[number] = width, height, values[0], values[2:4] if model in TWO_FOCALS else values[1:3]
+    return found

@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the head was made from, brought into the scene: the cameras with their frames behind them, and the scan.
+
+Both are children of the head if it is there, so that it may stand anywhere; their own coordinates are those of the capture's world (metres).
+"""
+
+import json
+
+import bpy
+
+from ...core.capture import Capture
+from ...core.messages import Problem
+from .. import captures
+from . import colmap_cameras
+
+KIND_KEY = "wildcap_kind"
+"""Custom property of what was brought in: 'camera' or 'scan'."""
+CAMERA_SIZE_M = 0.03
+SENSOR_MM = 36.0
+
+
+def bring_in_cameras(context, item, every: bool = False) -> int:
+    """A camera for each frame that the texture uses, or for every registered one, in place of those that are there. Returns how many.
+    Raises Problem where the capture has none."""
+    capture = captures.folder(item)
+    found = colmap_cameras.read(capture.cameras)
+    if not every:
+        chosen = _chosen(capture)
+        found = [camera for camera in found if camera.name in chosen] or found
+    _remove(item, 'camera')
+    collection = bpy.data.collections.new(f"{item.name} Cameras")
+    context.scene.collection.children.link(collection)
+    for camera in found:
+        collection.objects.link(_camera(context, item, capture, camera))
+    if context.scene.camera is None:
+        context.scene.camera = collection.objects[0]
+    return len(found)
+
+
+def bring_in_scan(context, item) -> bpy.types.Object:
+    """The scan as a mesh with its colours, in place of one that is there. Raises Problem where the capture has none."""
+    capture = captures.folder(item)
+    if not capture.scan.is_file():
+        raise Problem("This capture has no scan yet.", "Click Reconstruct: it is made from the frames.")
+    active, selected, before = context.view_layer.objects.active, list(context.selected_objects), set(context.scene.objects)
+    bpy.ops.wm.ply_import(filepath=str(capture.scan), forward_axis='Y', up_axis='Z')
+    new = [thing for thing in context.scene.objects if thing not in before]
+    if len(new) != 1 or new[0].type != 'MESH':
+        for thing in new:
+            bpy.data.objects.remove(thing)
+        raise Problem(f"{capture.scan} cannot be read.", "Do the stage Scan again.")
+    _remove(item, 'scan')
+    scan = new[0]
+    scan.name = scan.data.name = f"{item.name} Scan"
+    _belongs(scan, context, item, 'scan')
+    for thing in context.view_layer.objects:
+        thing.select_set(thing in selected)
+    context.view_layer.objects.active = active or scan
+    return scan
+
+
+def _camera(context, item, capture: Capture, camera: colmap_cameras.FrameCamera) -> bpy.types.Object:
+    lens = bpy.data.cameras.new(f"{item.name} {camera.name}")
+    lens.sensor_fit, lens.sensor_width = 'HORIZONTAL', SENSOR_MM
+    lens.lens = camera.focal / camera.width * SENSOR_MM
+    lens.shift_x = (camera.width / 2 - camera.centre[0]) / camera.width
+    lens.shift_y = (camera.centre[1] - camera.height / 2) / camera.width
+    lens.display_size = CAMERA_SIZE_M
+    lens.clip_start = 0.01
+    if (capture.frames / camera.name).is_file():
+        lens.show_background_images = True
+        behind = lens.background_images.new()
+        behind.image = bpy.data.images.load(str(capture.frames / camera.name), check_existing=True)
+        behind.alpha = 1.0
+        render = context.scene.render  # the frame's width is the sensor's: of a wider picture the height is cut, of a narrower one there is more
+        behind.frame_method = 'CROP' if camera.width * render.resolution_y <= camera.height * render.resolution_x else 'FIT'
+    thing = bpy.data.objects.new(lens.name, lens)
+    thing.lock_location = thing.lock_rotation = thing.lock_scale = (True, True, True)
+    _belongs(thing, context, item, 'camera')
+    thing.matrix_basis = camera.matrix
+    return thing
+
+
+def _belongs(thing: bpy.types.Object, context, item, kind: str) -> None:
+    thing.parent = captures.head(context, item)
+    thing[KIND_KEY], thing[captures.HEAD_KEY] = kind, item.path
+
+
+def _remove(item, kind: str) -> None:
+    """Takes away what was brought in before, with its data and an empty collection."""
+    for thing in [t for t in bpy.data.objects if t.get(KIND_KEY) == kind and t.get(captures.HEAD_KEY) == item.path]:
+        data, homes = thing.data, list(thing.users_collection)
+        bpy.data.objects.remove(thing)
+        (bpy.data.cameras if kind == 'camera' else bpy.data.meshes).remove(data)
+        for home in homes:
+            if kind == 'camera' and not home.all_objects and home in bpy.data.collections.values():
+                bpy.data.collections.remove(home)
+
+
+def _chosen(capture: Capture) -> set[str]:
+    """The frames that the texture uses."""
+    try:
+        return {frame["name"] for frame in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"] if frame["selected"]}
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()
