@@ -8,6 +8,9 @@ from ..core.capture import Capture
 from ..core.messages import Problem
 from . import captures
 
+PREVIEW = "WildCap Preview"
+"""Name of the image node by which a running solve is shown on the head."""
+
 
 def bring_in(context, item) -> bpy.types.Object:
     """The capture's head in the scene, active and selected. An existing head keeps its place and materials and gets the new mesh."""

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The running jobs, one per capture, and the solver's installation: started by an operator, polled by a timer, stopped when Blender closes.
 
-Run-time state only, nothing of it reaches the .blend. A job belongs to its capture: opening another .blend changes nothing.
+One worker runs at a time, for each takes all cores; jobs of other captures wait in line. Run-time state only, nothing of it reaches the .blend. A job
+belongs to its capture: opening another .blend, a new scene or an undo past its start changes nothing; disabling the add-on or closing Blender ends it,
+and what was finished is kept.
 """
 
 from collections.abc import Callable
@@ -13,11 +15,12 @@ import bpy
 
 from ..core import messages, stages
 from ..core.messages import Problem
+from ..core.settings import Settings
 from ..core.worker.background import Task
 from ..core.worker.client import Worker
 from ..core.worker.environment import Installation
-from ..core.worker.job import write_job
-from . import captures, preferences, problems, properties, status
+from ..core.worker.job import read_job, write_job
+from . import captures, preferences, problems, properties, status, timings
 
 INTERVAL_S = 0.2
 ROOT = Path(__file__).resolve().parent.parent  # the folder that holds core/, where the worker starts; nothing is written there
@@ -31,6 +34,10 @@ class Job:
     worker: Worker | Installation | Task
     then: Callable[[], None] | None = None  # called when it ended well
     well: bool = False
+    on_preview: Callable[[str], None] | None = None  # called with the capture's folder when a preview is new, and when the job has ended
+    settings: Settings | None = None
+    waiting: bool = False  # in line behind another capture's job
+    figures: dict = field(default_factory=dict)  # of the stage that ended last
     progress: messages.Progress | None = None
     stage: str = ""
     previews: int = 0
@@ -57,43 +64,74 @@ def can_start(operator, context) -> bool:
     return False
 
 
-def start(item, goal: str, *, first: str | None = None, last: str | None = None, **shared) -> Job:
-    """Starts the stages from `first` (or from what is not fresh) to `last`, with `shared` settings for this once. Raises Problem when it cannot."""
+def start(item, goal: str, *, first: str | None = None, last: str | None = None, tool: str = "", then: Callable[[], None] | None = None,
+          on_preview: Callable[[str], None] | None = None, **shared) -> Job:
+    """Starts the stages from `first` (or from what is not fresh) to `last`, or one of core.stages.TOOLS, with `shared` settings for this once.
+    Raises Problem when it cannot."""
     capture, root = captures.folder(item), captures.root(item)
     if root in _jobs:
         raise Problem("This capture is being worked on already.", "Wait for it, or click Cancel.")
     python = preferences.python()
     if python is None:
         raise Problem("The solver is not set up on this machine.", "Click Install Solver in the Setup panel, or Use an Existing Python.")
-    path = write_job(capture, first=first, last=last, settings={**properties.values(item), **shared})
-    return begin(root, goal, Worker(python, ROOT, path, capture.logs / "worker.log"))
+    path = write_job(capture, first=first, last=last, tool=tool, settings={**properties.values(item), **shared})
+    job = begin(root, goal, Worker(python, ROOT, path, capture.logs / "worker.log"), then)
+    job.on_preview, job.settings = on_preview, read_job(path).settings
+    return job
 
 
 def begin(root: str, goal: str, worker: Worker | Installation | Task, then: Callable[[], None] | None = None) -> Job:
-    """Starts a worker and listens to it. Raises Problem when it cannot."""
-    worker.start()
+    """Starts a worker, or puts it in line behind the one that runs, and listens to it. Raises Problem when it cannot."""
+    waiting = root != "" and _busy()
+    if not waiting:
+        worker.start()
     problems.clear(root)
-    _jobs[root] = Job(goal, worker, then)
+    _jobs[root] = Job(goal, worker, then, waiting=waiting)
     if not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=INTERVAL_S, persistent=True)
     return _jobs[root]
 
 
 def cancel(root: str) -> None:
-    """Asks the capture's job ('': the installation) to stop; it does so within two seconds."""
-    if root in _jobs:
+    """Asks the capture's job ('': the installation) to stop; it does so within two seconds. One that waits leaves the line."""
+    if root in _jobs and _jobs[root].waiting:
+        del _jobs[root]
+    elif root in _jobs:
         _jobs[root].worker.cancel()
 
 
 def poll() -> bool:
     """Takes in what the workers said. True while one is running. Makes no data-blocks; tests call it in place of the timer."""
     for root, job in list(_jobs.items()):
+        if job.waiting:
+            continue
         for message in job.worker.poll():
             _hear(root, job, message)
         if not job.worker.running:
             del _jobs[root]
+            if job.on_preview is not None:
+                job.on_preview(root)
             _finish(root, job)
+    if not _busy():
+        _start_next()
     return bool(_jobs)
+
+
+def _busy() -> bool:
+    return any(root and not job.waiting for root, job in _jobs.items())
+
+
+def _start_next() -> None:
+    """The first job in line; one that cannot start says so in its capture's tab and makes room for the next."""
+    for root, job in [(root, job) for root, job in _jobs.items() if job.waiting]:
+        try:
+            job.worker.start()
+        except Problem as problem:
+            problems.show(root, problem)
+            del _jobs[root]
+            continue
+        job.waiting = False
+        return
 
 
 def _finish(root: str, job: Job) -> None:
@@ -111,10 +149,14 @@ def _hear(root: str, job: Job, message: messages.Message) -> None:
             job.progress, job.stage = message, message.stage
         case messages.Preview():
             job.previews += 1
+            if job.on_preview is not None:
+                job.on_preview(root)
         case messages.Log():
             job.log = [*job.log[-99:], message.text]
         case messages.StageDone():
-            job.progress = None
+            job.progress, job.figures = None, message.figures
+            if message.stage == "solve" and not message.skipped and job.settings is not None and not any("Going on after" in line for line in job.log):
+                timings.record(job.settings, message.seconds)
         case messages.Done():
             job.well = True
         case messages.Failed():
@@ -124,9 +166,10 @@ def _hear(root: str, job: Job, message: messages.Message) -> None:
 
 
 def _tick() -> float | None:
+    before = set(_jobs)
     running = poll()
     status.redraw()
-    if not running:
+    if before - set(_jobs):
         _bring_in_results()
     return INTERVAL_S if running else None
 
@@ -152,7 +195,9 @@ def eta(job: Job) -> str:
 
 
 def stage_label(job: Job) -> str:
-    return stages.by_name(job.stage).label if job.stage in stages.NAMES else {"install": "Installing", "ask": "Looking"}.get(job.goal, "Starting")
+    if job.waiting:
+        return "Waiting"
+    return stages.LABELS[job.stage] if job.stage in stages.LABELS else {"install": "Installing", "ask": "Looking"}.get(job.goal, "Starting")
 
 
 def register():
@@ -163,6 +208,6 @@ def unregister():
     """Also when Blender closes: no worker outlives it (and if Blender dies, the end of its stdin stops the worker)."""
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
-    for job in _jobs.values():
+    for job in [job for job in _jobs.values() if not job.waiting]:
         (job.worker.cancel if job.goal == "install" else job.worker.terminate)()
     _jobs.clear()

@@ -38,7 +38,9 @@ class Step:
 
 BEFORE_MASK = stages.NAMES[:stages.NAMES.index(stages.MASK_STAGE) + 1]
 SET_UP = Step("The solver is not set up on this machine.", "Install Solver", "wildcap.install_solver", 'IMPORT')
-WORDS = {"reconstruct": "Reconstructing ...", "solve": "Solving ...", "install": "Installing the solver ...", "ask": "One moment ..."}
+WORDS = {"reconstruct": "Reconstructing ...", "solve": "Solving ...",
+         "tool": "Looking at the texture ...", "wait": "Waiting for the job of another face ...",
+         "install": "Installing the solver ...", "ask": "One moment ..."}
 
 
 def next_step(facts: Facts) -> Step:
@@ -71,6 +73,9 @@ def _step_of(facts: Facts, status: Status) -> Step:
     if facts.head_time < status.head_time:
         return Step("The head is ready.", "Bring In Head", "wildcap.bring_in_head", 'IMPORT')
     solved = status.has_maps and status.stages["solve"] in ("done", "absent")
+    if not solved and status.interrupted:
+        step = Step("A solve was interrupted: it goes on from its last checkpoint.", "Continue Solving", "wildcap.solve", 'LIGHT')
+        return step if facts.has_python else SET_UP
     if not solved and not status.has_mask:
         return Step("Check the shadow mask, then Solve.", "Check Shadow Mask", "wildcap.paint_mask", 'BRUSH_DATA')
     if not solved:

@@ -27,6 +27,8 @@ class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
         job = jobs.of(root) or jobs.of("")
         if job is not None:
             draw_job(layout, job)
+            if session.active():  # the large button leaves the painting
+                layout.operator("wildcap.cancel", icon='CANCEL')
         if step.operator:
             row = layout.row()
             row.scale_y = 2.0
@@ -93,7 +95,7 @@ def gather(context, item) -> next_step.Facts:
     head = captures.head(context, item)
     job = jobs.of(captures.root(item)) or jobs.of("")
     return next_step.Facts(
-        has_capture=True, has_python=preferences.python() is not None, running=job.goal if job else "", painting=session.active(),
+        has_capture=True, has_python=preferences.python() is not None, running=("wait" if job.waiting else job.goal) if job else "", painting=session.active(),
         head_time=head.get("wildcap_head_time", 0.0) if head else -1.0, maps_time=head.get("wildcap_maps_time", -1.0) if head else -1.0,
         status=status.of(item),
     )

@@ -32,6 +32,7 @@ class Status:
     maps_time: float = 0.0
     render: str = ""
     whole_solve: str = ""  # why an edited part of the mask cannot be solved alone; '' where it can
+    interrupted: bool = False  # a solve was stopped on its way and left a checkpoint
     findings: tuple[dict, ...] = ()  # what is wrong with the capture, as core.report.findings tells it
     problem: Problem | None = None
     missing: bool = False  # the folder is not there
@@ -76,7 +77,7 @@ def look(capture: Capture, settings) -> Status:
         source=record.get("source", ""), stages=states, whole_solve=_whole_solve(capture, states["solve"], settings),
         seconds={name: done["seconds"] for name, done in record["stages"].items()},
         has_head=capture.head.is_file(), head_time=_time(capture.head), has_mask=capture.shadow_mask.is_file(),
-        findings=tuple(report.findings(record)),
+        findings=tuple(report.findings(record)), interrupted=(capture.checkpoints / "solve.safetensors").is_file(),
         has_maps=all(path.is_file() for path in delivered(capture)), maps_time=maps_time, render=render.name if _time(render) >= maps_time else "",
     )
 
@@ -106,7 +107,8 @@ def _time(path: Path) -> float:
 def _look(root: str, item) -> bool:
     capture = captures.folder(item)
     values = properties.values(item)
-    watched = (capture.json, capture.head, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved, *delivered(capture), capture.renders)
+    watched = (capture.json, capture.head, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved, capture.checkpoints,
+               *delivered(capture), capture.renders)
     stamp = (repr(values), *(p.stat().st_mtime_ns if p.exists() else 0 for p in watched))
     if root in _known and _known[root][0] == stamp:
         return False

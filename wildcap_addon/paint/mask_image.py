@@ -74,7 +74,7 @@ def refresh(image: bpy.types.Image, capture: Capture, which: str) -> None:
         image.reload()
     elif capture.shadow_mask_auto.is_file():
         image.source = 'FILE'
-        set_values(image, proposal(image, capture) if which == 'SHADOW' else np.zeros_like(values(image)))
+        set_values(image, proposal(image, capture.shadow_mask_auto) if which == 'SHADOW' else np.zeros_like(values(image)))
     image.colorspace_settings.name = 'Non-Color'
     if not image.size[0]:
         raise Problem("The mask that was being painted is gone.", "Click Paint Mask: it is looked for again.")
@@ -97,11 +97,11 @@ def set_values(image: bpy.types.Image, mask: np.ndarray) -> None:
     image.update()
 
 
-def proposal(image: bpy.types.Image, capture: Capture) -> np.ndarray:
-    """The mask that the capture proposes [H, W], of the image's size. Raises Problem where there is none, or one of another size."""
-    if not capture.shadow_mask_auto.is_file():
+def proposal(image: bpy.types.Image, path: Path) -> np.ndarray:
+    """The mask of a file [H, W], at the image's size. Raises Problem where there is none."""
+    if not path.is_file():
         raise Problem("This capture has no proposal for its shadow mask.", "Click Reconstruct, or paint the mask by hand.")
-    other = bpy.data.images.load(str(capture.shadow_mask_auto))
+    other = bpy.data.images.load(str(path))
     try:
         other.colorspace_settings.name = 'Non-Color'
         if tuple(other.size) != tuple(image.size):

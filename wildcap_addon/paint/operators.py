@@ -4,9 +4,10 @@
 
 import bpy
 
+from ...core import stages
 from ...core.capture import Capture
 from ...core.messages import Problem
-from .. import captures
+from .. import captures, jobs
 from ..base_operator import BaseOperator
 from . import edits, mask_image, session
 
@@ -61,7 +62,8 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
     kind: bpy.props.EnumProperty(name="Change", options={'SKIP_SAVE'}, items=[
         ('GROW', "Grow", "Wider by a few texels"), ('SHRINK', "Shrink", "Narrower by a few texels"), ('SOFTEN', "Soften", "Fade the borders"),
         ('MIRROR', "Mirror", "What is masked on one side is masked on the other, too"), ('INVERT', "Invert", "Shadow where there was none"),
-        ('CLEAR', "Clear", "No shadow anywhere"), ('PROPOSAL', "Back to Proposal", "Start again from the mask that was found by itself")])
+        ('CLEAR', "Clear", "No shadow anywhere"), ('PROPOSAL', "Back to Proposal", "Start again from the mask that was found by itself"),
+        ('SNAPPED', "Take Snapped Mask", "The mask that was painted, laid on the shadow's edges")])
 
     @classmethod
     def description(cls, context, properties):
@@ -72,15 +74,58 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
         return cls.allowed(session.active(), "Click Paint Mask first: the mask is changed while it is painted")
 
     def work(self, context):
+        capture = Capture(session.root())
+        if self.kind == 'SNAPPED' and session.offered() != 'SNAPPED':
+            raise Problem("There is no snapped mask.", "Click Snap to Edges first, and wait until it is done.")
         if self.kind == 'PROPOSAL' and session.which() == 'PROTECT':
             raise Problem("What is to be protected is never proposed.", "Paint it by hand, or click Clear.")
         image = session.mask()
         mask = mask_image.values(image)
-        changed = mask_image.proposal(image, Capture(session.root())) if self.kind == 'PROPOSAL' else EDITS[self.kind](mask)
+        files = {"PROPOSAL": capture.shadow_mask_auto, "SNAPPED": capture.shadow_mask_edges}
+        changed = mask_image.proposal(image, files[self.kind]) if self.kind in files else EDITS[self.kind](mask)
         if not image.is_dirty:  # the session's first change: the step that Ctrl-Z comes back to
             session.push_undo(context)
         mask_image.set_values(image, changed)
         session.push_undo(context)
+        if self.kind == session.offered():
+            session.offer("")
 
 
-CLASSES = (WILDCAP_OT_paint_mask, WILDCAP_OT_finish_mask, WILDCAP_OT_edit_mask)
+class ToolOperator(BaseOperator):
+    """Mixin: an operator that has a worker look at the texture while the painting goes on. Its result waits for a click: no stroke is ever overwritten."""
+
+    @classmethod
+    def poll(cls, context):
+        return (cls.allowed(session.which() == 'SHADOW', "Click Paint Mask first, and choose Shadow: it is the shadow mask that is found by itself")
+                and jobs.can_start(cls, context))
+
+
+class WILDCAP_OT_detect_mask(ToolOperator, bpy.types.Operator):
+    """Look for the shadows in the texture again, with the sensitivity set under Reconstruction; the result waits for a click, what you painted stays"""
+
+    bl_idname = "wildcap.detect_mask"
+    bl_label = "Detect"
+
+    def work(self, context):
+        item = captures.require(context)
+        stage = stages.by_name(stages.MASK_STAGE)
+        lacking = [name for name in stage.reads if not captures.folder(item).has(name)]
+        if lacking:
+            raise Problem(f"Shadows are looked for in {lacking[0]}, which this capture does not have.",
+                          "Paint by hand: the sample head comes without it. Your own video brings it, once it is reconstructed.")
+        jobs.start(item, "tool", first=stage.name, last=stage.name, then=lambda: session.offer('PROPOSAL'))
+
+
+class WILDCAP_OT_snap_mask(ToolOperator, bpy.types.Operator):
+    """Lay the border of what you painted on the shadow's own edge, hard or soft as it is in the texture; the result waits for a click"""
+
+    bl_idname = "wildcap.snap_mask"
+    bl_label = "Snap to Edges"
+
+    def work(self, context):
+        item = captures.require(context)
+        session.save()
+        jobs.start(item, "tool", tool="mask_edges", then=lambda: session.offer('SNAPPED'))
+
+
+CLASSES = (WILDCAP_OT_paint_mask, WILDCAP_OT_finish_mask, WILDCAP_OT_edit_mask, WILDCAP_OT_detect_mask, WILDCAP_OT_snap_mask)

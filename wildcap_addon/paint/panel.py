@@ -41,7 +41,14 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
         for kind in EDITS:
             grid.operator("wildcap.edit_mask", text=kind.capitalize()).kind = kind
         if session.which() == 'SHADOW':
-            layout.operator("wildcap.edit_mask", text="Back to Proposal", icon='LOOP_BACK').kind = 'PROPOSAL'
+            row = layout.row(align=True)
+            row.operator("wildcap.detect_mask", icon='VIEWZOOM')
+            row.operator("wildcap.snap_mask", icon='SNAP_ON')
+            found = session.offered()
+            if found == 'SNAPPED':
+                layout.operator("wildcap.edit_mask", text="Take Snapped Mask", icon='CHECKMARK', depress=True).kind = found
+            text = "Take Detected Mask" if found == 'PROPOSAL' else "Back to Proposal"
+            layout.operator("wildcap.edit_mask", text=text, icon='LOOP_BACK', depress=found == 'PROPOSAL').kind = 'PROPOSAL'
 
 
 class WILDCAP_PT_mask(CapturePanel, bpy.types.Panel):

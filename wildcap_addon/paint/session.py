@@ -39,6 +39,7 @@ class Session:
     before: dict = field(default_factory=dict)
     brush: dict = field(default_factory=dict)
     looked: float = 0.0  # when the mask was last looked at (time.monotonic)
+    offered: str = ""  # the kind of edit that a worker has prepared
     written: tuple = ()  # size and time of the mask's file as this session wrote it; another one goes to the history first
 
 
@@ -69,6 +70,17 @@ def mask() -> bpy.types.Image:
     if image is None:
         raise Problem("The mask is not in this file any more.", "Leave the painting, and click Paint Mask again.")
     return image
+
+
+def offered() -> str:
+    """What a worker has prepared for a click: PROPOSAL, SNAPPED, or '' for nothing."""
+    return _session.offered if _session else ""
+
+
+def offer(kind: str) -> None:
+    """Notes what waits for a click; nobody may be painting any more."""
+    if _session is not None:
+        _session.offered = kind
 
 
 def push_undo(context) -> None:

@@ -50,6 +50,12 @@ def _material(obj) -> bpy.types.Material:
 
 def _build(material, paths: dict, obj) -> None:
     tree = material.node_tree
+    preview = tree.nodes.get(head.PREVIEW)  # the maps are here: what showed them on the way goes
+    if preview is not None:
+        image = preview.image
+        tree.nodes.remove(preview)
+        if image is not None and image.users == 0:
+            bpy.data.images.remove(image)
     if KEY not in material:
         tree.nodes.clear()  # ours and new: a preview of the texture, or Blender's default
     skin = _node(tree, "WildCap Skin", 'ShaderNodeGroup', (80, 0))

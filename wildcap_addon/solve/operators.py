@@ -7,7 +7,7 @@ import bpy
 from ...core.messages import Problem
 from .. import captures, jobs, status
 from ..base_operator import BaseOperator
-from . import preview
+from . import live, preview
 
 
 class WILDCAP_OT_solve(BaseOperator, bpy.types.Operator):
@@ -25,8 +25,9 @@ class WILDCAP_OT_solve(BaseOperator, bpy.types.Operator):
         capture = captures.folder(item)
         if not (capture.texture.is_file() and (capture.shadow_mask.is_file() or capture.shadow_mask_auto.is_file())):
             raise Problem("There is no texture to solve yet.", "Click Reconstruct first.")
-        jobs.start(item, "solve", first="solve")
+        jobs.start(item, "solve", first="solve", on_preview=live.update)
         preview.forget()
+        live.prepare(context, item)
 
 
 class WILDCAP_OT_solve_edited(BaseOperator, bpy.types.Operator):
@@ -46,8 +47,56 @@ class WILDCAP_OT_solve_edited(BaseOperator, bpy.types.Operator):
         return True
 
     def work(self, context):
-        jobs.start(captures.require(context), "solve", first="solve", edited_part=True)
+        item = captures.require(context)
+        jobs.start(item, "solve", first="solve", edited_part=True, on_preview=live.update)
         preview.forget()
+        live.prepare(context, item)
 
 
-CLASSES = (WILDCAP_OT_solve, WILDCAP_OT_solve_edited)
+class WILDCAP_OT_solve_all(BaseOperator, bpy.types.Operator):
+    """Solve every capture of the list that has a texture and is not solved yet, one after the other"""
+
+    bl_idname = "wildcap.solve_all"
+    bl_label = "Solve All"
+
+    @classmethod
+    def poll(cls, context):
+        return cls.allowed(len(context.scene.wildcap.captures) > 1, "There is only one capture: click Solve")
+
+    def work(self, context):
+        started = [item for item in context.scene.wildcap.captures if self._ready(item)]
+        if not started:
+            raise Problem("There is nothing to solve.", "Each capture is solved, is being worked on, or needs Reconstruct first.")
+        for item in started:
+            jobs.start(item, "solve", first="solve", on_preview=live.update)
+
+    def _ready(self, item) -> bool:
+        capture = captures.folder(item)
+        solved = capture.read()["stages"].get("solve") is not None
+        return not solved and jobs.of(captures.root(item)) is None and capture.texture.is_file() and capture.shadow_mask_auto.is_file()
+
+
+class WILDCAP_OT_estimate_skin_tone(BaseOperator, bpy.types.Operator):
+    """Look at the texture's skin outside of the shadow mask, and set the skin tone from it; light and lightness cannot be told apart, so correct it by eye"""
+
+    bl_idname = "wildcap.estimate_skin_tone"
+    bl_label = "Estimate"
+
+    @classmethod
+    def poll(cls, context):
+        return jobs.can_start(cls, context)
+
+    def work(self, context):
+        root = captures.root(captures.require(context))
+        job = jobs.start(captures.require(context), "tool", tool="skin_tone", then=lambda: set_tone(root, job.figures["skin_tone_srgb"]))
+
+
+def set_tone(root: str, tone: list[float]) -> None:
+    """The estimated tone into the settings of the capture, in whichever scene lists it."""
+    for scene in bpy.data.scenes:
+        for item in scene.wildcap.captures:
+            if captures.root(item) == root:
+                item.skin_tone, item.use_skin_tone = tone, True
+
+
+CLASSES = (WILDCAP_OT_solve, WILDCAP_OT_solve_edited, WILDCAP_OT_solve_all, WILDCAP_OT_estimate_skin_tone)

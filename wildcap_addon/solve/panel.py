@@ -5,7 +5,7 @@
 import bpy
 
 from ...core import stages
-from .. import captures, jobs
+from .. import captures, jobs, timings
 from ..base_panel import CapturePanel, WildcapPanel, draw_settings
 from . import preview
 
@@ -33,7 +33,12 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         layout.use_property_split = True
         item = captures.active(context)
         layout.prop(item, "quality")
-        layout.prop(item, "use_skin_tone")
+        times = timings.words(item.device)
+        if times:
+            layout.label(text=times, icon='TIME')
+        row = layout.row(align=True)
+        row.prop(item, "use_skin_tone")
+        row.operator("wildcap.estimate_skin_tone")
         row = layout.row()
         row.enabled = item.use_skin_tone
         row.prop(item, "skin_tone", text="")
@@ -42,6 +47,8 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("wildcap.solve")
         row.operator("wildcap.solve_edited")
+        if len(context.scene.wildcap.captures) > 1:
+            layout.operator("wildcap.solve_all")
         for stage in stages.STAGES[stages.NAMES.index(stages.MASK_STAGE) + 1:]:
             draw_settings(layout, item, stage, without=("skin_tone",))
 

@@ -7,7 +7,7 @@ import bpy.utils.previews
 
 from ...core.capture import Capture
 
-NAMES = ("albedo", "shading")
+NAMES = ("albedo", "shading", "loss")
 
 _icons: bpy.utils.previews.ImagePreviewCollection | None = None
 _loaded: dict[str, int] = {}  # picture -> modification time of what is shown

@@ -1,0 +1,58 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The running solve's albedo on the head itself: an image node in its material, made by the click on Solve, that the timer reads anew.
+
+Solid shading shows a material's active image node, so nothing is linked and the artist's own nodes stay. While somebody paints or edits, nothing is touched.
+"""
+
+from pathlib import Path
+
+import bpy
+
+from ...core.capture import Capture
+from .. import captures, head, jobs
+
+
+def prepare(context, item) -> None:
+    """Puts the node into the head's material, for `update` to show once there is a picture. Without a head or a material there is nothing to show it on."""
+    obj = captures.head(context, item)
+    material = obj.active_material if obj is not None else None
+    if material is None or material.node_tree is None:
+        return
+    nodes = material.node_tree.nodes
+    node = nodes.get(head.PREVIEW)
+    if node is None:
+        node = nodes.new('ShaderNodeTexImage')
+        node.name = node.label = head.PREVIEW
+        node.location = (-320, -320)
+        node.image = bpy.data.images.new(f"{obj.name} {head.PREVIEW}", 8, 8)
+    path = captures.folder(item).preview / "albedo.png"
+    path.unlink(missing_ok=True)  # of another solve
+    node.image.source = 'FILE'
+    node.image.filepath = str(path)
+    if nodes.active is not None and nodes.active != node:
+        node["before"] = nodes.active.name
+
+
+def update(root: str) -> None:
+    """Shows the newest picture of the capture's solve on its heads, and what they showed before once it has ended. Makes no data-blocks."""
+    if bpy.context.mode != 'OBJECT':
+        return
+    for nodes, node in _nodes(root):
+        if jobs.of(root) is None:
+            nodes.active = nodes.get(node.get("before", "")) or nodes.active
+        elif Path(bpy.path.abspath(node.image.filepath)).is_file():
+            node.image.reload()
+            nodes.active = node
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == 'VIEW_3D':
+                area.tag_redraw()
+
+
+def _nodes(root: str):
+    preview = str(Capture(root).preview)
+    for material in bpy.data.materials:
+        node = material.node_tree.nodes.get(head.PREVIEW) if material.node_tree is not None else None
+        if node is not None and node.image is not None and str(Path(bpy.path.abspath(node.image.filepath)).parent) == preview:
+            yield material.node_tree.nodes, node
