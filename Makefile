@@ -18,7 +18,7 @@ test: .venv/installed
 
 test-blenders: $(BLENDERS:%=.blenders/%/installed)
 	for version in $(BLENDERS); do \
-	    .blenders/$$version/bin/python -m pytest -W ignore::DeprecationWarning tests/test_addon.py tests/test_captures.py tests/test_setup.py tests/test_evidence.py tests/test_paint.py tests/test_relight.py tests/test_next_step.py || exit 1; \
+	    .blenders/$$version/bin/python -m pytest -W ignore::DeprecationWarning tests/test_addon.py tests/test_captures.py tests/test_setup.py tests/test_evidence.py tests/test_choices.py tests/test_paint.py tests/test_relight.py tests/test_next_step.py || exit 1; \
 	done
 
 .blenders/%/installed: Makefile

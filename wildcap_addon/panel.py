@@ -62,8 +62,13 @@ class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
             row = column.row()
             row.label(text=stage.label, icon=STATE_ICONS[state])
             row.label(text=_words(state, found.seconds.get(stage.name) if found else None))
-            if stage.name in next_step.BEFORE_MASK and state in ("done", "stale") and job is None:
-                row.operator("wildcap.reconstruct", text="", icon='FILE_REFRESH', emboss=False).first = stage.name
+            if state == "running" and job.progress and job.progress.of > 0:
+                row.label(text=f"{min(1.0, job.progress.done / job.progress.of):.0%}")
+            if state in ("done", "stale") and job is None:
+                if stage.name == "solve":
+                    row.operator("wildcap.solve", text="", icon='FILE_REFRESH', emboss=False)
+                else:
+                    row.operator("wildcap.reconstruct", text="", icon='FILE_REFRESH', emboss=False).first = stage.name
 
 
 class WILDCAP_PT_doctor(WildcapPanel, bpy.types.Panel):
@@ -114,8 +119,9 @@ def draw_job(layout, job: jobs.Job) -> None:
 
 
 def _words(state: str, seconds: float | None) -> str:
-    if state == "done" and seconds is not None:
-        return f"done, {seconds:.0f} s"
+    if state in ("done", "stale") and seconds is not None:
+        time = f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
+        return f"done, {time}" if state == "done" else f"out of date, {time}"
     return {"absent": "done", "stale": "out of date"}.get(state, state)
 
 

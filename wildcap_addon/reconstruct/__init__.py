@@ -4,6 +4,20 @@
 
 import bpy
 
-from . import operators, panel
+from . import choices, delighters, operators, panel
 
-register, unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *panel.CLASSES))
+_register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *choices.CLASSES, *panel.CLASSES))
+
+
+def register():
+    _register()
+    bpy.types.WindowManager.wildcap_wipe = bpy.props.FloatProperty(
+        name="Wipe", subtype='FACTOR', min=0, max=1, default=0.5, options={'SKIP_SAVE'},
+        description="Left of the edge the frame as it was shot, right of it without its light", update=lambda manager, _: delighters.move(manager.wildcap_wipe),
+    )
+
+
+def unregister():
+    del bpy.types.WindowManager.wildcap_wipe
+    delighters.forget()
+    _unregister()

@@ -22,7 +22,10 @@ class WILDCAP_OT_reconstruct(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def description(cls, context, properties):
-        return f"Do the stage {stages.by_name(properties.first).label} again, and what follows from it up to the mask" if properties.first else cls.__doc__
+        if properties.first not in stages.NAMES:
+            return cls.__doc__
+        after_mask = stages.NAMES.index(properties.first) > stages.NAMES.index(stages.MASK_STAGE)
+        return f"Run from the stage {stages.by_name(properties.first).label}, also where it is done, {'to the end' if after_mask else 'up to the mask'}"
 
     @classmethod
     def poll(cls, context):
@@ -30,9 +33,10 @@ class WILDCAP_OT_reconstruct(BaseOperator, bpy.types.Operator):
 
     def work(self, context):
         item = captures.require(context)
-        if not captures.folder(item).read().get("source"):
+        after_mask = self.first and stages.NAMES.index(stages.by_name(self.first).name) > stages.NAMES.index(stages.MASK_STAGE)
+        if not after_mask and not captures.folder(item).read().get("source"):
             raise Problem("This capture has no video: there is nothing to reconstruct it from.", "Choose the video of your own face.")
-        jobs.start(item, "reconstruct", first=self.first or None, last=stages.MASK_STAGE)
+        jobs.start(item, "solve" if after_mask else "reconstruct", first=self.first or None, last=None if after_mask else stages.MASK_STAGE)
 
 
 class WILDCAP_OT_cancel(BaseOperator, bpy.types.Operator):

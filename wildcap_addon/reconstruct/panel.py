@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel: the settings of the stages up to the mask proposal."""
+"""Panels: what the artist may choose up to the mask proposal, and the settings of those stages."""
 
 import bpy
 
 from ...core import stages
-from .. import captures
+from .. import captures, problems
 from ..base_panel import CapturePanel, draw_settings
-from . import landmarks
+from . import delighters, landmarks
 
 
 class WILDCAP_PT_reconstruct(CapturePanel, bpy.types.Panel):
@@ -28,7 +28,47 @@ class WILDCAP_PT_reconstruct(CapturePanel, bpy.types.Panel):
         row.operator("wildcap.hide_landmarks" if landmarks.shown() else "wildcap.show_landmarks", icon='EMPTY_AXIS')
         row.operator("wildcap.fit_landmarks")
         for stage in stages.STAGES[:stages.NAMES.index(stages.MASK_STAGE) + 1]:
-            draw_settings(layout, item, stage)
+            draw_settings(layout, item, stage, without=("delighter", "folder", "template"))
 
 
-CLASSES = (WILDCAP_PT_reconstruct,)
+class WILDCAP_PT_head_mesh(CapturePanel, bpy.types.Panel):
+    bl_label = "Head Mesh"
+    bl_parent_id = "WILDCAP_PT_reconstruct"
+
+    def draw(self, context):
+        layout = self.layout
+        item = captures.active(context)
+        own = item.registration.template
+        width = context.region.width if context.region else 300
+        problems.draw_text(layout, f"The built-in head, and {bpy.path.basename(own.rstrip('/'))} beside it." if own else "The built-in head.", width)
+        column = layout.column(align=True)
+        column.operator("wildcap.use_active_mesh", icon='OUTLINER_OB_MESH')
+        column.operator("wildcap.choose_template", text="Choose OBJ or ICT-FaceKit Folder", icon='FILE_FOLDER')
+        column.operator("wildcap.use_built_in_head", icon='X')
+        if own:
+            layout.prop(item.registration, "new_atlas")
+
+
+class WILDCAP_PT_delighter(CapturePanel, bpy.types.Panel):
+    bl_label = "Delighter"
+    bl_parent_id = "WILDCAP_PT_reconstruct"
+
+    def draw(self, context):
+        layout = self.layout
+        item = captures.active(context)
+        width = context.region.width if context.region else 300
+        layout.row().prop(item.delight, "delighter", expand=True)
+        card = layout.box().column()
+        for line in delighters.CARDS[item.delight.delighter]:
+            problems.draw_text(card, line, width)
+        if item.delight.delighter == "folder":
+            layout.prop(item.delight, "folder", text="")
+        capture = captures.folder(item)
+        layout.operator("wildcap.compare_delit", icon='IMAGE_DATA')
+        name = delighters.shown(capture)
+        if name:
+            layout.template_icon(icon_value=delighters.icon(), scale=11)
+            layout.prop(context.window_manager, "wildcap_wipe", text=f"Frame {name}", slider=True)
+
+
+CLASSES = (WILDCAP_PT_reconstruct, WILDCAP_PT_head_mesh, WILDCAP_PT_delighter)

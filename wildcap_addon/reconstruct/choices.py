@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators on what a head is made with: the head mesh that is fitted beside the built-in one, and a look at what a delighter did."""
+
+from pathlib import Path
+
+import bpy
+
+from ...core.capture import storage_problem
+from ...core.messages import Problem
+from .. import captures
+from ..base_operator import BaseOperator
+from . import delighters
+
+
+class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
+    """Fit the active mesh, too: the maps are baked into its UVs in the end. It is kept in the capture as it is now, without its modifiers"""
+
+    bl_idname = "wildcap.use_active_mesh"
+    bl_label = "Use Active Mesh"
+
+    @classmethod
+    def poll(cls, context):
+        thing = context.view_layer.objects.active
+        return (cls.in_object_mode(context) and cls.with_capture(context)
+                and cls.allowed(thing is not None and thing.type == 'MESH', "Make a head mesh of your own the active object first")
+                and cls.allowed(captures.HEAD_KEY not in thing, "This is the capture's own head or scan: make a head mesh of your own the active object"))
+
+    def work(self, context):
+        item, thing = captures.require(context), context.view_layer.objects.active
+        name = bpy.path.clean_name(thing.name)
+        path = captures.folder(item).root / "template" / f"{name}.obj"
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise storage_problem(error, path) from error
+        selected = list(context.selected_objects)
+        for other in context.view_layer.objects:
+            other.select_set(other == thing)
+        try:
+            bpy.ops.wm.obj_export(filepath=str(path), export_selected_objects=True, apply_modifiers=False, export_materials=False, export_normals=False,
+                                  forward_axis='Y', up_axis='Z')
+        finally:
+            for other in context.view_layer.objects:
+                other.select_set(other in selected)
+        item.registration.template = str(path)
+
+
+class WILDCAP_OT_choose_template(BaseOperator, bpy.types.Operator):
+    """Fit a head mesh of your own, too: an OBJ, or a folder with a neutral OBJ and its shapes, as ICT-FaceKit. Maps are baked into its UVs"""
+
+    bl_idname = "wildcap.choose_template"
+    bl_label = "Choose Head Mesh"
+
+    filepath: bpy.props.StringProperty(subtype='FILE_PATH', options={'SKIP_SAVE'})
+    filter_glob: bpy.props.StringProperty(default="*.obj;*.OBJ", options={'HIDDEN'})
+
+    @classmethod
+    def poll(cls, context):
+        return cls.with_capture(context)
+
+    def invoke(self, context, event):
+        context.window_manager.fileselect_add(self)
+        return {'RUNNING_MODAL'}
+
+    def work(self, context):
+        path = Path(bpy.path.abspath(self.filepath)).absolute()
+        if not self.filepath or not (path.is_file() and path.suffix.lower() == ".obj" or path.is_dir()):
+            raise Problem(f"{path} is neither an OBJ nor a folder.", "Choose an OBJ of a head, or a folder with a neutral OBJ and its shapes.")
+        if path.is_dir() and not any("neutral" in file.name.lower() for file in (*path.glob("*.obj"), *path.glob("*/*.obj"))):
+            raise Problem(f"{path} holds no OBJ with 'neutral' in its name.", "Choose the OBJ itself, or the folder of shapes (FaceXModel in ICT-FaceKit).")
+        captures.require(context).registration.template = str(path)
+
+
+class WILDCAP_OT_use_built_in_head(BaseOperator, bpy.types.Operator):
+    """Fit the built-in head alone"""
+
+    bl_idname = "wildcap.use_built_in_head"
+    bl_label = "Built-In Head Alone"
+
+    @classmethod
+    def poll(cls, context):
+        return cls.with_capture(context) and cls.allowed(captures.active(context).registration.template, "The built-in head is fitted alone already")
+
+    def work(self, context):
+        captures.require(context).registration.template = ""
+
+
+class WILDCAP_OT_compare_delit(BaseOperator, bpy.types.Operator):
+    """Show a frame before and after its light was taken out; click again for the next one"""
+
+    bl_idname = "wildcap.compare_delit"
+    bl_label = "Before and After"
+
+    which: bpy.props.IntProperty(name="Frame", default=-1, options={'SKIP_SAVE'}, description="Which of the delit frames; -1: the next one")
+
+    @classmethod
+    def poll(cls, context):
+        return cls.with_capture(context)
+
+    def work(self, context):
+        item = captures.require(context)
+        capture = captures.folder(item)
+        names = delighters.frames(capture)
+        before = delighters.shown(capture)
+        following = names.index(before) + 1 if before in names else len(names) // 2
+        delighters.show(capture, self.which if self.which >= 0 else following, context.window_manager.wildcap_wipe)
+
+
+CLASSES = (WILDCAP_OT_use_active_mesh, WILDCAP_OT_choose_template, WILDCAP_OT_use_built_in_head, WILDCAP_OT_compare_delit)
