@@ -139,3 +139,25 @@ def test_captures_of_an_unsaved_file_go_where_the_preferences_say_and_stay_linke
     (tmp_path / "second.mp4").write_bytes(b"0")
     bpy.ops.wildcap.choose_video(filepath=str(tmp_path / "second.mp4"))
     assert items()[1].path == str(tmp_path / "work" / "second.wildcap")
+
+
+def test_the_strip_shows_frames_of_the_texture_with_their_sharpness(addon, tmp_path):
+    strip, panel = addon("capture.strip"), addon("capture.panel").WILDCAP_PT_frames
+    root = standin.make(tmp_path / "face.wildcap")
+    bpy.ops.wildcap.open_capture(directory=str(root))
+    item = items()[0]
+    assert strip.of(item) is None and strip.look(str(root)) and strip.of(item) is None and panel.poll(bpy.context)
+    (root / "frames").mkdir()
+    frames = [{"name": f"{i:05}.png", "selected": i % 4 == 1, "sharpness": 0.05 if i in (5, 6) else 0.2 + i / 1000} for i in range(100)]
+    for frame in frames[:50]:
+        (root / "frames" / frame["name"]).write_bytes(standin.plain((90, 80, 70)))
+    (root / "frames" / "frames.json").write_text(json.dumps({"kind": "video", "frames": frames}), encoding="utf-8")
+    images = len(bpy.data.images)
+    assert strip.look(str(root)) and not strip.look(str(root)), "read once"
+    found = strip.of(item)
+    assert (found.count, found.used, found.blurred, len(found.frames)) == (100, 25, 2, strip.MOST)
+    assert [frame.name for frame in found.frames][:4] == ["00001", "00009", "00017", "00025"]
+    assert found.frames[0].sharpness == pytest.approx(0.201 / 0.299) and not found.frames[0].blurred
+    shown = {str(root / "frames" / f"{frame.name}.png") for frame in found.frames}  # icons have no numbers without a window
+    assert set(strip._icons) == {path for path in shown if Path(path).is_file()} and 3 < len(strip._icons) < len(shown)
+    assert len(bpy.data.images) == images

@@ -4,6 +4,16 @@
 
 import bpy
 
-from . import operators, panel, sample_head, source
+from . import operators, panel, sample_head, source, strip
 
-register, unregister = bpy.utils.register_classes_factory((*source.CLASSES, *operators.CLASSES, *sample_head.CLASSES, *panel.CLASSES))
+_register, _unregister = bpy.utils.register_classes_factory((*source.CLASSES, *operators.CLASSES, *sample_head.CLASSES, *panel.CLASSES))
+
+
+def register():
+    _register()
+    strip.register()
+
+
+def unregister():
+    strip.unregister()
+    _unregister()

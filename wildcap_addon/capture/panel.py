@@ -5,7 +5,8 @@
 import bpy
 
 from .. import captures
-from ..base_panel import FoldedPanel
+from ..base_panel import CapturePanel, FoldedPanel
+from . import strip
 
 
 class WILDCAP_UL_captures(bpy.types.UIList):
@@ -35,4 +36,27 @@ class WILDCAP_PT_capture(FoldedPanel, bpy.types.Panel):
             layout.operator("wildcap.open_report", icon='URL')
 
 
-CLASSES = (WILDCAP_UL_captures, WILDCAP_PT_capture)
+class WILDCAP_PT_frames(CapturePanel, bpy.types.Panel):
+    """The strip of frames."""
+
+    bl_label = "Frames"
+    bl_order = 11
+
+    def draw(self, context):
+        layout = self.layout
+        found = strip.of(captures.active(context))
+        if found is None:
+            layout.label(text="No frames yet: they are taken from the video by Reconstruct", icon='INFO')
+            return
+        blurred = f", {found.blurred} blurred" if found.blurred else ""
+        layout.label(text=f"{found.count} frames, {found.used} in the texture{blurred}")
+        grid = layout.grid_flow(row_major=True, columns=4, even_columns=True, align=True)
+        for frame in found.frames:
+            column = grid.column(align=True)
+            column.template_icon(icon_value=frame.icon, scale=3.5)
+            column.alert = frame.blurred
+            column.label(text=f"{frame.sharpness:.0%}")
+        layout.label(text="Sharpness, in parts of the sharpest frame's")
+
+
+CLASSES = (WILDCAP_UL_captures, WILDCAP_PT_capture, WILDCAP_PT_frames)
