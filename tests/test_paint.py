@@ -90,6 +90,7 @@ def test_strokes_reach_the_capture_while_the_artist_paints_on(addon, capture, mo
         assert file() == before
         monkeypatch.setattr(session, "KEEP_UP_S", 0.0)
         session.keep_up(stroking=False)
+        session.wait()
         assert file() == mask_image.grey_png(mask_image.values(image)) != before
         before = file()
     assert [p.read_bytes() for p in (capture / "mask_history").iterdir()] == [standin.plain((77,))], "one session is one step of the history"

@@ -5,6 +5,8 @@
 A panel asks `of(item)`, which only reads the last answer and notes that somebody wants to know; a timer looks.
 """
 
+import queue
+import threading
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -40,6 +42,8 @@ class Status:
 
 _known: dict[str, tuple[tuple, Status]] = {}  # capture folder -> (stamp, status)
 _wanted: set[str] = set()
+_looking: set[str] = set()  # captures that a thread is looking at
+_found: queue.SimpleQueue = queue.SimpleQueue()  # what such a thread has seen: (capture folder, stamp, status)
 
 
 def of(item) -> Status | None:
@@ -104,25 +108,46 @@ def _time(path: Path) -> float:
     return path.stat().st_mtime if path.is_file() else 0.0
 
 
-def _look(root: str, item) -> bool:
+def _look(root: str, item) -> None:
+    capture, stamp = _stamp(item)
+    if root not in _known or _known[root][0] != stamp:
+        _known[root] = (stamp, look(capture, properties.settings(item)))
+
+
+def _stamp(item) -> tuple[Capture, tuple]:
+    """The capture, and what its status depends on: a few file times and the settings."""
     capture = captures.folder(item)
     values = properties.values(item)
     watched = (capture.json, capture.head, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved, capture.checkpoints,
                *delivered(capture), capture.renders)
     stamp = (repr(values), *(p.stat().st_mtime_ns if p.exists() else 0 for p in watched))
-    if root in _known and _known[root][0] == stamp:
-        return False
-    _known[root] = (stamp, look(capture, properties.settings(item)))
-    return True
+    return capture, stamp
 
 
 def _tick() -> float:
+    """Has what changed looked at aside: hashing a new capture takes seconds, and longer while a solver takes all cores."""
+    while not _found.empty():
+        root, stamp, status = _found.get()
+        _looking.discard(root)
+        _known[root] = (stamp, status)
+        redraw()
     for scene in bpy.data.scenes:
         for item in scene.wildcap.captures:
             root = captures.root(item)
-            if root in _wanted and _look(root, item):
-                redraw()
+            if root not in _wanted or root in _looking:
+                continue
+            capture, stamp = _stamp(item)
+            if root not in _known or _known[root][0] != stamp:
+                _looking.add(root)
+                threading.Thread(target=_look_aside, args=(root, stamp, capture, properties.settings(item)), name="wildcap-status", daemon=True).start()
     return INTERVAL_S
+
+
+def _look_aside(root: str, stamp: tuple, capture: Capture, settings) -> None:
+    try:
+        _found.put((root, stamp, look(capture, settings)))
+    except Exception as error:  # of a folder that changes under the look: the next stamp is another one
+        _found.put((root, stamp, Status(problem=Problem(f"The capture folder {capture.root} cannot be read ({error}).", "It is looked at again in a second."))))
 
 
 def redraw() -> None:
@@ -142,5 +167,5 @@ def register():
 def unregister():
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
-    _known.clear()
-    _wanted.clear()
+    for kept in (_known, _wanted, _looking):
+        kept.clear()

@@ -112,11 +112,16 @@ def proposal(image: bpy.types.Image, path: Path) -> np.ndarray:
 
 
 def save(image: bpy.types.Image, capture: Capture, which: str = 'SHADOW', keep: bool = True) -> bool:
-    """Writes the image to the mask's file (8 bit grey), atomically, and with `keep` the mask that was there to mask_history.
+    """As `store`, of an image."""
+    return store(values(image), capture, which, keep)
+
+
+def store(mask: np.ndarray, capture: Capture, which: str, keep: bool) -> bool:
+    """Writes a mask [H, W] to its file (8 bit grey), atomically, and with `keep` the mask that was there to mask_history. Knows no bpy: a thread may do it.
 
     False, and nothing is written, where the file holds that mask already, or there is nothing to protect and never was.
     """
-    path, mask = file_of(capture, which), values(image)
+    path = file_of(capture, which)
     content = grey_png(mask)
     if path.read_bytes() == content if path.is_file() else which == 'PROTECT' and not mask.any():
         return False

@@ -16,7 +16,7 @@ import bpy
 from ...core.capture import Capture
 from ...core.messages import Problem
 from .. import captures, head, problems
-from . import before, brush, mask_image, sheet, view
+from . import before, brush, keeping, mask_image, sheet, view
 
 TINTS = {"SHADOW": "shadow_tint", "PROTECT": "protect_tint"}
 """The scene's properties that keep the colour in which a mask is shown."""
@@ -44,6 +44,7 @@ class Session:
 
 
 _session: Session | None = None
+_saving: keeping.Saving | None = None
 
 
 def active() -> bool:
@@ -152,27 +153,36 @@ def _keep_tint(context) -> None:
 
 
 def save() -> None:
-    """Writes the mask to the capture, atomically, if it changed. A mask there that is not this session's (the one of before it, or one that another
-    Blender or the command line has put there since) goes to the history. Raises Problem when it cannot."""
+    """Writes the mask to the capture, atomically, if it changed. Raises Problem when it cannot."""
+    wait()
     image = bpy.data.images.get(_session.mask) if _session else None
-    if image is None:
-        return
-    capture = Capture(_session.root)
-    path = mask_image.file_of(capture, _session.which)
-    if mask_image.save(image, capture, _session.which, keep=_stamp(path) != tuple(_session.written)):
-        _session.written = _stamp(path)
-
-
-def _stamp(path) -> tuple:
-    return (path.stat().st_size, path.stat().st_mtime_ns) if path.is_file() else ()
+    if image is not None:
+        _session.written = keeping.store(mask_image.values(image), Capture(_session.root), _session.which, _session.written)
 
 
 def keep_up(stroking: bool) -> None:
-    """Saves a mask that was painted on, every few seconds, but not in the middle of a stroke."""
+    """Saves a mask that was painted on, every few seconds, but not in the middle of a stroke; the main thread reads the pixels and no more."""
+    global _saving
+    if _saving is not None and _saving.is_alive():
+        return
+    try:
+        wait()
+    except Problem as problem:
+        problems.show(_session.root, problem)
     image = bpy.data.images.get(_session.mask)
     if not stroking and image is not None and image.is_dirty and time.monotonic() - _session.looked >= KEEP_UP_S:
         _session.looked = time.monotonic()
-        save_or_show()
+        _saving = keeping.Saving(mask_image.values(image), Capture(_session.root), _session.which, _session.written)
+
+
+def wait() -> None:
+    """Waits for a mask that is being saved aside. Raises Problem when it could not be."""
+    global _saving
+    saving, _saving = _saving, None
+    if saving is not None:
+        stamp = saving.result()
+        if _session is not None:
+            _session.written = stamp
 
 
 def forget() -> None:

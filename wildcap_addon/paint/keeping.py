@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How a painted mask gets to the capture: at once, or aside in a thread, so that compressing and writing never hold up a stroke.
+
+A mask in the capture that this session did not write (the one of before it, or one that another Blender or the command line has put there since)
+goes to the history first.
+"""
+
+import threading
+from pathlib import Path
+
+import numpy as np
+
+from ...core.capture import Capture
+from ...core.messages import Problem
+from . import mask_image
+
+
+def store(mask: np.ndarray, capture: Capture, which: str, written: tuple) -> tuple:
+    """Writes a mask [H, W], rows from the top, if it differs from the capture's. `written` is the stamp of what this session wrote last; returns the
+    new one. Raises Problem when it cannot be written."""
+    path = mask_image.file_of(capture, which)
+    return _stamp(path) if mask_image.store(mask, capture, which, keep=_stamp(path) != tuple(written)) else written
+
+
+class Saving(threading.Thread):
+    """One `store` aside. It touches nothing of Blender's; `result` is for the main thread, once it has ended."""
+
+    def __init__(self, mask: np.ndarray, capture: Capture, which: str, written: tuple):
+        super().__init__(name="wildcap-mask", daemon=False)  # Blender waits for it when it closes
+        self._arguments = mask.copy(), capture, which, written
+        self._stamp: tuple = written
+        self._problem: Exception | None = None
+        self.start()
+
+    def run(self) -> None:
+        try:
+            self._stamp = store(*self._arguments)
+        except (Problem, OSError) as error:
+            self._problem = error
+
+    def result(self) -> tuple:
+        """Waits, and gives the stamp. Raises what `store` raised."""
+        self.join()
+        if self._problem is not None:
+            raise self._problem
+        return self._stamp
+
+
+def _stamp(path: Path) -> tuple:
+    return (path.stat().st_size, path.stat().st_mtime_ns) if path.is_file() else ()
