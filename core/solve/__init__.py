@@ -27,7 +27,7 @@ from .edited import solve_edited
 from .evidence import REFERENCE, Evidence, read_evidence
 from .memory import sample_within_memory
 from .prior import WEIGHTS, Prior, load
-from .problem import State
+from .problem import State, unexplained
 from .recipes import RECIPES, Recipe
 from .sampler import seeded
 from .window import coarse
@@ -76,11 +76,16 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         report.log(f"Going on after step {stopped.step} of {recipe.steps}.")
         state = stopped
 
+    losses: list[tuple[int, float]] = []
+
     def on_step(state: State, steps: int) -> None:
         report.progress(state.step, steps, f"sampling, step {state.step} of {steps}")
+        losses.append((state.step, unexplained(state, seen)))
         if state.step % options.checkpoint_every == 0:
             checkpoint.write(stored, state, key)
             maps.write_preview(capture, state, seen, report)
+            images.write_srgb(capture.preview / "loss.png", drawing.loss_curve(losses, steps))
+            report.preview("preview/loss.png")
 
     state = sample_within_memory(prior, seen, state, recipe, seeded(settings.seed), on_step, report.log)
     result, found = _finished(prior, state, evidence, start, recipe, settings.seed, report)

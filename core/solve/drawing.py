@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solver's own picture for the report: where the mask was painted, where its border was laid, and which marks were kept from the light."""
+"""The solver's own pictures: how its loss falls; for the report, where the mask was painted, where its border was laid, and which marks are kept from light."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from .. import images
 from .evidence import REFERENCE, Evidence
 from .marks import Mark
 
+CURVE = 192, 256  # rows and columns of the loss curve
 PAINTED, LAID, MARK = (1.0, 1.0, 1.0), (1.0, 0.45, 0.0), (0.1, 0.9, 0.2)
 
 
@@ -29,3 +30,18 @@ def edges_and_marks(evidence: Evidence, alpha: torch.Tensor, marks: tuple[Mark, 
     for mark in marks:
         cv2.circle(shown, (round(mark.column * scale), round(mark.row * scale)), max(4, round(2.2 * mark.radius * scale)), MARK, 1)
     return np.hstack([shown, np.repeat(np.clip(small, 0, 1)[..., None], 3, 2)])
+
+
+def loss_curve(losses: list[tuple[int, float]], steps: int) -> np.ndarray:
+    """sRGB [h, w, 3] of (step, loss) over all steps of the run, on a logarithmic scale from the largest to the smallest so far; a line at every tenfold."""
+    height, width = CURVE
+    picture = np.full((height, width, 3), 0.12, np.float32)
+    values = np.log10(np.maximum([loss for _, loss in losses], 1e-6))
+    low, high = float(values.min()) - 0.05, float(values.max()) + 0.05
+    for decade in range(int(np.ceil(low)), int(np.floor(high)) + 1):
+        row = round((high - decade) / (high - low) * (height - 1))
+        picture[row] = 0.3
+    points = [(round((step - 1) / max(steps - 1, 1) * (width - 1)), round((high - value) / (high - low) * (height - 1)))
+              for (step, _), value in zip(losses, values, strict=True)]
+    cv2.polylines(picture, [np.array(points, np.int32)], False, LAID, 2, cv2.LINE_AA)
+    return picture

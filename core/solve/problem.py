@@ -52,6 +52,14 @@ def photometric(denoised: torch.Tensor, shading: torch.Tensor, o: Observation, w
     return ((weight * ((blurred(rendered) if blur else rendered) - o.texture)) ** 2).sum()
 
 
+def unexplained(state: State, observations: dict[int, Observation]) -> float:
+    """Root mean square of texture minus albedo times shading, linear, where the texture counts: what a person watches fall while the solver runs."""
+    o = next(o for o in observations.values() if o.weight.shape == state.denoised.shape[-2:])
+    with torch.no_grad():
+        error = (albedo(state.denoised) * o.shader.total(state.lights) - o.texture) ** 2 * o.weight
+    return float((error.sum() / (3 * o.weight.sum()).clamp_min(1e-6)).sqrt())
+
+
 def blurred(image: torch.Tensor, sigma: float = 0.8) -> torch.Tensor:
     """[3, H, W] under a 3 x 3 Gaussian, reflected at the border: the released code compares textures through it."""
     line = torch.exp(-torch.tensor([-1.0, 0.0, 1.0]) ** 2 / (2 * sigma**2))
