@@ -2,40 +2,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the head was made from, in Blender's scene: cameras that see what the frames saw, and the scan."""
 
-import json
-import struct
-
 import pytest
 
 from . import standin
+from .standin import CENTRE, FOCAL, HEIGHT, WIDTH
 
 bpy = pytest.importorskip("bpy")
 from bpy_extras.object_utils import world_to_camera_view  # noqa: E402
 from mathutils import Matrix, Quaternion, Vector  # noqa: E402
 
-WIDTH, HEIGHT, FOCAL, CENTRE = 720, 960, 900.0, (350.0, 490.0)
-POSES = {"00000.jpg": (Quaternion((0.7, 0.7, 0.1, 0.05)).normalized(), Vector((0.02, -0.03, 0.6))),
-         "00001.jpg": (Quaternion((0.65, 0.6, -0.2, 0.1)).normalized(), Vector((-0.05, 0.01, 0.5))),
-         "00002.jpg": (Quaternion((0.7, 0.7, 0.0, 0.0)).normalized(), Vector((0.0, 0.0, 0.7)))}
+POSES = {name: (Quaternion(turn).normalized(), Vector(move)) for name, (turn, move) in standin.POSES.items()}
 
 
 @pytest.fixture
 def reconstructed(capture):
-    """A capture with three frames, two of them chosen, their cameras as COLMAP writes them (SIMPLE_RADIAL), and a scan of two triangles."""
-    for name in ("frames", "cameras"):
-        (capture / name).mkdir()
-    for name in POSES:
-        (capture / "frames" / name).write_bytes(standin.plain((90, 80, 70)))
-    frames = [{"name": name, "selected": name != "00001.jpg", "sharpness": 0.2} for name in POSES]
-    (capture / "frames" / "frames.json").write_text(json.dumps({"kind": "video", "frames": frames}), encoding="utf-8")
-    (capture / "cameras" / "cameras.bin").write_bytes(struct.pack("<QiiQQ4d", 1, 7, 2, WIDTH, HEIGHT, FOCAL, *CENTRE, -0.004))
-    images = struct.pack("<Q", len(POSES))
-    for number, (name, (turn, move)) in enumerate(POSES.items(), 1):
-        images += struct.pack("<I7dI", number, *turn, *move, 7) + name.encode() + b"\0" + struct.pack("<Q2dQ2dQ", 2, 1, 2, 3, 4, 5, 6)
-    (capture / "cameras" / "images.bin").write_bytes(images)
-    header = ("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
-              "element face 2\nproperty list uchar int vertex_indices\nend_header\n")
-    (capture / "scan.ply").write_text(header + "0 -0.1 0\n0.1 0 0\n0 0 0.1\n-0.1 0 0\n3 0 1 2\n3 0 2 3\n", encoding="ascii")
+    """A capture with its frames, cameras and scan."""
+    standin.add_evidence(capture)
     return capture
 
 

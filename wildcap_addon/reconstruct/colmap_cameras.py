@@ -52,7 +52,7 @@ def _read(folder: Path) -> list[FrameCamera]:
         name = data[at + 64:end].decode("utf-8")
         (points,) = struct.unpack_from("<Q", data, end + 1)
         at = end + 9 + 24 * points
-        to_camera = Matrix.Translation(pose[4:]) @ Quaternion(pose[:4]).to_matrix().to_4x4()
+        to_camera = Matrix.Translation(pose[4:]) @ Quaternion(pose[:4]).normalized().to_matrix().to_4x4()
         found.append(FrameCamera(name, *lenses[lens], to_camera.inverted() @ Matrix.Diagonal((1, -1, -1, 1))))
     return found
 
