@@ -122,6 +122,8 @@ def test_a_moved_capture_is_missed_and_one_click_finds_it_and_what_moved_along(a
     bpy.ops.wildcap.locate_capture(directory=str(archive))
     assert [Path(found.path) for found in items()] == [archive / "anna.wildcap", archive / "berta.wildcap"]
     assert captures.active(bpy.context).name == "berta" and not status.of(captures.active(bpy.context)).missing
+    with pytest.raises(RuntimeError, match="is where it was"):
+        bpy.ops.wildcap.locate_capture()
     shutil.move(archive / "berta.wildcap", project)
     shutil.move(archive / "anna.wildcap", project / "anna.wildcap")
     bpy.ops.wildcap.locate_capture('INVOKE_DEFAULT')  # beside the .blend: no browser

@@ -17,6 +17,7 @@ class WILDCAP_OT_open_capture(BaseOperator, bpy.types.Operator):
 
     bl_idname = "wildcap.open_capture"
     bl_label = "Open Capture"
+    bl_options = {'REGISTER', 'UNDO'}
 
     directory: bpy.props.StringProperty(subtype='DIR_PATH')
 
@@ -38,6 +39,7 @@ class WILDCAP_OT_locate_capture(BaseOperator, bpy.types.Operator):
 
     bl_idname = "wildcap.locate_capture"
     bl_label = "Locate Capture"
+    bl_options = {'REGISTER', 'UNDO'}
 
     directory: bpy.props.StringProperty(subtype='DIR_PATH', options={'SKIP_SAVE'})
 
@@ -46,7 +48,8 @@ class WILDCAP_OT_locate_capture(BaseOperator, bpy.types.Operator):
         return cls.with_capture(context)
 
     def invoke(self, context, event):
-        if links.find(captures.require(context)) is not None:
+        item = captures.require(context)
+        if not captures.folder(item).root.is_dir() and links.find(item) is not None:
             return self.execute(context)
         context.window_manager.fileselect_add(self)
         return {'RUNNING_MODAL'}
@@ -54,6 +57,8 @@ class WILDCAP_OT_locate_capture(BaseOperator, bpy.types.Operator):
     def work(self, context):
         item = captures.require(context)
         name = Path(item.path).name
+        if not self.directory and captures.folder(item).root.is_dir():
+            raise Problem(f"{name} is where it was.", "To work on another copy of it, click Locate Capture and choose its folder.")
         chosen = Path(bpy.path.abspath(self.directory)).absolute() if self.directory else links.find(item)
         if chosen is None:
             raise Problem(f"{name} is neither beside this .blend nor among your captures.", "Click Locate Capture and choose the folder it is in now.")
@@ -72,6 +77,7 @@ class WILDCAP_OT_close_capture(BaseOperator, bpy.types.Operator):
 
     bl_idname = "wildcap.close_capture"
     bl_label = "Close Capture"
+    bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
     def poll(cls, context):

@@ -23,6 +23,7 @@ class WILDCAP_OT_choose_video(BaseOperator, bpy.types.Operator):
 
     bl_idname = "wildcap.choose_video"
     bl_label = "Choose Video"
+    bl_options = {'REGISTER', 'UNDO'}
 
     filepath: bpy.props.StringProperty(subtype='FILE_PATH', options={'SKIP_SAVE'})
     directory: bpy.props.StringProperty(subtype='DIR_PATH', options={'SKIP_SAVE', 'HIDDEN'})

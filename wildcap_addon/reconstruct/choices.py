@@ -18,6 +18,7 @@ class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
 
     bl_idname = "wildcap.use_active_mesh"
     bl_label = "Use Active Mesh"
+    bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
     def poll(cls, context):
@@ -51,6 +52,7 @@ class WILDCAP_OT_choose_template(BaseOperator, bpy.types.Operator):
 
     bl_idname = "wildcap.choose_template"
     bl_label = "Choose Head Mesh"
+    bl_options = {'REGISTER', 'UNDO'}
 
     filepath: bpy.props.StringProperty(subtype='FILE_PATH', options={'SKIP_SAVE'})
     filter_glob: bpy.props.StringProperty(default="*.obj;*.OBJ", options={'HIDDEN'})
@@ -77,6 +79,7 @@ class WILDCAP_OT_use_built_in_head(BaseOperator, bpy.types.Operator):
 
     bl_idname = "wildcap.use_built_in_head"
     bl_label = "Built-In Head Alone"
+    bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
     def poll(cls, context):
