@@ -175,9 +175,9 @@ def _tick() -> float | None:
 
 
 def _bring_in_results() -> None:
-    """A new head comes in at once if the artist is in Object Mode; otherwise it waits for the next click."""
+    """A new head comes in at once if the artist is in Object Mode and not in the middle of a move; otherwise it waits for the next click."""
     window = next(iter(bpy.context.window_manager.windows), None)
-    if window is None:
+    if window is None or window.modal_operators:
         return
     with bpy.context.temp_override(window=window):
         status.refresh(bpy.context)
