@@ -8,13 +8,14 @@
 `samples` draws 32 patches of a quarter of the face and shows beside each the training patch nearest to it (at its place or mirrored, colours over
 skin tone), with their distance over the distance between two neighbouring training skins: a prior that copies gives 0. DIR is the training's work folder.
 `response` gives held-out subjects' true albedo to the prior, which tells the rest: the angle of the normals to the true ones and the RMSE of specular,
-sampled and as the mean of what is possible, against the mean face's maps and another subject's.
+sampled, as the mean of what is possible, and as a draft solves and restores them, against the mean face's maps and another subject's.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ import torch
 
 from core import images, template
 from core.messages import Reporter
+from core.solve.draft import restored
 from core.solve.lighting import Lights, Shader, constant_light
 from core.solve.network import denoise
 from core.solve.prior import WEIGHTS, Prior, condition, coordinates, load, mean_at
@@ -34,7 +36,7 @@ from core.training.skins import SCALES, carried_names, carried_skins, synthetic_
 
 PATCH = 64
 COARSE = SCALES[-1]
-NAMES = "sampled", "expected", "mean face", "another subject"
+NAMES = "sampled", "expected", "draft", "draft, not restored", "mean face", "another subject"
 FIRST_SIGMA = 7.3  # where the solver's walk begins
 
 
@@ -125,12 +127,14 @@ def measure_response(options: argparse.Namespace) -> None:
         coords = coordinates(options.size, slice(0, options.size), slice(0, options.size))
         noise = torch.randn(1, *truth.shape, generator=torch.Generator().manual_seed(0))
         expected = prior.respond(truth[None], coords, noise)[0]
-        rows.append([errors(maps, truth, face) for maps in (solved, expected, mean, other)])
+        draft = given_diffuse(prior, truth, options.steps, "proximal")
+        again = restored(prior, draft[None], coords, replace(OURS, guidance="proximal"), 0)[0]
+        rows.append([errors(maps, truth, face) for maps in (solved, expected, again, draft, mean, other)])
         print(f"{seed}: " + "; ".join(f"{name} {angle:.2f} deg, {gloss:.4f}" for name, (angle, gloss) in zip(NAMES, rows[-1], strict=True)), flush=True)
     means = np.mean(rows, 0)
-    for k, name in enumerate(NAMES[:2]):
+    for k, name in enumerate(NAMES[:-2]):
         print(f"{name}: " + ", ".join(f"normals {means[k][0] / means[j][0]:.2f} and specular {means[k][1] / means[j][1]:.2f} of {NAMES[j]}'s error"
-                                      for j in (2, 3)))
+                                      for j in (-2, -1)))
 
 
 def reflectance(seed: int, size: int) -> torch.Tensor:
@@ -139,7 +143,7 @@ def reflectance(seed: int, size: int) -> torch.Tensor:
     return torch.from_numpy(np.concatenate([2 * made.diffuse - 1, made.normal, 2 * made.specular[..., None] - 1], -1).transpose(2, 0, 1).copy())
 
 
-def given_diffuse(prior: Prior, truth: torch.Tensor, steps: int) -> torch.Tensor:
+def given_diffuse(prior: Prior, truth: torch.Tensor, steps: int, guidance: str = "dps") -> torch.Tensor:
     """The map [7, S, S] that the solver samples under even light where the texture is the true albedo."""
     size = truth.shape[-1]
     albedo, everywhere = (truth[:3] + 1) / 2, torch.ones(size, size)
@@ -154,7 +158,7 @@ def given_diffuse(prior: Prior, truth: torch.Tensor, steps: int) -> torch.Tensor
         coords = coordinates(side, slice(0, side), slice(0, side))
         one = torch.ones(side, side)
         found[factor] = Observation(texture, one, one, coords, Shader(normal, 0 * one, (1, 1)), (0 * one).bool(), 1024 / side)
-    recipe = OURS.__class__(steps=steps, phases=())
+    recipe = replace(OURS, steps=steps, phases=(), guidance=guidance)
     coords = coordinates(size, slice(0, size), slice(0, size))
     lights = Lights(constant_light(torch.ones(3)), torch.zeros(1, 9, 1, 1), torch.ones(3))
     start = mean_at(prior.mean_face, coords, prior.tone[None])

@@ -99,7 +99,7 @@ class SolveSettings:
     steps: int = setting(20, min=4, max=600)
     """Sampling steps"""
     guidance: str = setting("dps", choices=("dps", "proximal"))
-    """dps follows the paper through the network's gradient; proximal is a closed form, twice as fast"""
+    """dps follows the paper through the network's gradient; proximal is a closed form, twice as fast, with smoother normals and specular"""
     grid_cells: int = setting(96, min=1, max=512)
     """Cells per side of the texel grid of lights over the whole map's face crop (96 cells of 8 texels at 1024)"""
     skin_tone: str = setting("auto")

@@ -111,7 +111,7 @@ def test_the_stage_falls_back_and_its_maps_are_the_same(tmp_path, monkeypatch):
     """The shipped network: plain, failing once, and with the setting."""
     options = {"guidance": "dps", "steps": 4}
     plain, failing, chosen = (make(tmp_path / name) for name in ("plain.wildcap", "failing.wildcap", "chosen.wildcap"))
-    solve.run(plain, settings(**options), Reporter("solve"))
+    solved(plain, **options)
     forward, calls, modes = UNet.forward, [], []
 
     def watched(network, *given):
@@ -123,13 +123,19 @@ def test_the_stage_falls_back_and_its_maps_are_the_same(tmp_path, monkeypatch):
 
     monkeypatch.setattr(UNet, "forward", watched)
     for capture, fails, low in ((failing, True, False), (chosen, False, True)):
-        said = []
         calls.clear()
         modes.clear()
-        solve.run(capture, settings(**options, low_memory=low), Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))))
+        said = solved(capture, **options, low_memory=low)
         assert any("step 3 of 4" in line and "low-memory" in line for line in said) == fails
         assert modes[0] == low and modes[-1]
         assert {name: (capture.maps / name).read_bytes() == (plain.maps / name).read_bytes() for name in MAPS} == dict.fromkeys(MAPS, True)
+
+
+def solved(capture, **options):
+    """Runs the stage; what it said."""
+    said = []
+    solve.run(capture, settings(**options), Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))))
+    return said
 
 
 def test_how_much_memory_is_used_decides_nothing(tmp_path):

@@ -23,6 +23,7 @@ from ..settings import Settings, deciding
 from . import checkpoint, drawing, initial, layout, maps
 from .checkpoint import Solution
 from .confidence import spread
+from .draft import restored
 from .edited import solve_edited
 from .evidence import REFERENCE, Evidence, read_evidence
 from .memory import sample_within_memory
@@ -88,6 +89,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             report.preview("preview/loss.png")
 
     state = sample_within_memory(prior, seen, state, recipe, seeded(settings.seed), on_step, report.log)
+    state.denoised = restored(prior, state.denoised, seen[1].coords, recipe, settings.seed)
     result, found = _finished(prior, state, evidence, start, recipe, settings.seed, report)
     delivered = result if elsewhere is None else elsewhere.returned(result, known, state.lights, start.exposure, start.tone)
     maps.write(capture, delivered, found, conditions)

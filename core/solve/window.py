@@ -15,6 +15,7 @@ from dataclasses import dataclass, fields, replace
 import torch
 from torch.nn import functional
 
+from .draft import restored
 from .lighting import Lights
 from .memory import sample_within_memory
 from .prior import Prior
@@ -98,9 +99,10 @@ def solve_inside(prior: Prior, observations: dict[int, Observation], denoised: t
     last = max(end for _, _, end in recipe.phases)
     local = replace(recipe, steps=min(recipe.steps, STEPS), phases=(("cells", 0.0, last),), refit=0.0)
     state = sample_within_memory(prior, here, state, local, seeded(seed), keep_frozen, log, known=with_known)
+    found = restored(prior, state.denoised, observations[1].coords, recipe, seed, part.seen)
     solved, moved = denoised.clone(), lights.grid.clone()
     moved[(..., *part.cells)] = state.lights.grid
-    solved[(..., *part.seen)] = torch.where(inside > 0, state.denoised, known)
+    solved[(..., *part.seen)] = torch.where(inside > 0, found, known)
     return solved, Lights(lights.glob, moved, lights.chroma)
 
 
