@@ -56,7 +56,7 @@ def _network():
 def table(done: dict[str, dict], rows: list[str], first: str) -> str:
     """Markdown: a line per row over the problems that it was solved on, each with its PSNR's distance to row `first` on just these problems and seeds.
 
-    The spread is half the difference between two seeds of the solver; a distance smaller than it (the larger of the row's and the first row's) is a tie.
+    The spread is half the difference between two seeds of the solver; a distance smaller than the first row's is a tie.
     """
     by_row = {row: {_problem(r): r for r in done.values() if r["row"] == row} for row in rows}
     by_row = {row: results for row, results in by_row.items() if results}
@@ -72,7 +72,7 @@ def table(done: dict[str, dict], rows: list[str], first: str) -> str:
         cells = []
         for region in REGIONS:
             own = [r[region]["psnr"] for r in mine]
-            cells += [f"{np.mean(own):.2f}", "" if row == first else _compared(mine, best, region),
+            cells += [f"{np.mean(own):.2f}", "" if row == first else _compared(mine, best, region, seed_spread(list(by_row[first].values()), region)),
                       *(f"{np.mean([r[region][figure] for r in mine]):.3f}" if figure in mine[0][region] else "-" for figure in FIGURES[1:])]
         lines.append(f"| {row} | {len({p[:-1] for p in shared})} x {len({p[-1] for p in shared})} | " + " | ".join(cells)
                      + f" | {np.mean([r['seconds'] for r in mine]):.0f} |")
@@ -80,10 +80,10 @@ def table(done: dict[str, dict], rows: list[str], first: str) -> str:
     return "\n".join([*lines, "", f"Spread of {first} over the solver's seeds: {spread}."])
 
 
-def _compared(mine: list[dict], best: list[dict], region: str) -> str:
-    """How far a row is from the first on the same problems, in dB, and whether that is a tie."""
+def _compared(mine: list[dict], best: list[dict], region: str, spread: float) -> str:
+    """How far a row is from the first on the same problems, in dB, and whether that is within the spread."""
     distance = float(np.mean([a[region]["psnr"] - b[region]["psnr"] for a, b in zip(mine, best, strict=True)]))
-    return f"{distance:+.2f}" + (" (tie)" if abs(distance) < max(seed_spread(mine, region), seed_spread(best, region)) else "")
+    return f"{distance:+.2f}" + (" (tie)" if abs(distance) < spread else "")
 
 
 def seed_spread(results: list[dict], region: str) -> float:

@@ -66,4 +66,4 @@ def test_the_table_compares_on_shared_problems_and_names_ties():
 def test_rows_of_the_key_run_on_every_problem():
     assert set(ablation.KEY) <= set(ablation.ROWS)
     count = {row: sum(ablation._belongs(row, i, j, seed) for i in range(6) for j in range(3) for seed in (0, 1)) for row in ablation.ROWS}
-    assert count[ablation.FULL] == 36 and count["1 cell"] == 12 and count["recipe paper"] == 1
+    assert count[ablation.FULL] == 36 and count["1 cell"] == 6 and count["without prior"] == 18 and count["recipe paper"] == 1

@@ -119,7 +119,8 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
         size = evidence.size // factor
         if factor > 1 and (size < REFERENCE // 4 or size % multiple or evidence.size % factor):
             continue
-        weight, alpha, trust, edge = (torch.from_numpy(_sized(a.numpy(), size)) for a in (evidence.weight, evidence.alpha, evidence.trust, evidence.edge))
+        weight, alpha, trust, edge, protected = (torch.from_numpy(_sized(a.numpy(), size))
+                                                 for a in (evidence.weight, evidence.alpha, evidence.trust, evidence.edge, evidence.protected))
         texture = _shrunk(evidence.texture * evidence.weight, size) / weight.clamp_min(1e-4) * exposure
         texture = blurred(texture) if recipe.blur else texture
         normal = torch.nn.functional.normalize(_shrunk(evidence.normal, size), dim=0)
@@ -127,7 +128,7 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
         support = cv2.dilate(inside, np.ones((5, 5)))  # M and two texels around it
         ring = (support > 0) & ((inside == 0) if recipe.hard_mask else (alpha.numpy() < 0.5))
         ring &= edge.numpy() < 0.5  # a border that lies on a shadow's edge shall not be seamless
-        modulation = torch.from_numpy(support.astype(np.float32)) if recipe.hard_mask else alpha
+        modulation = torch.from_numpy(support.astype(np.float32)) if recipe.hard_mask else alpha + recipe.open * (1 - alpha) * (1 - protected)
         whole = size * REFERENCE // extent.side
         top, left = (start * whole // REFERENCE for start in (extent.top, extent.left))
         coords = coordinates(whole, slice(top, top + size), slice(left, left + size), extent.centred)

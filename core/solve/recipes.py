@@ -34,6 +34,7 @@ class Recipe:
 
     # the lights
     hard_mask: bool = False  # M is 0 or 1 and lights also the ring around it; else a soft alpha that fades over a few texels
+    open: float = 0.0  # how far the texel grid reaches outside of M; above 0 it takes away shadows that nobody masked, and more
     one_chroma: bool = True  # all local light has one learned colour; False: 27 free numbers per cell
     bilinear: bool = False  # how a texel reads V; else cubic
     fitted: bool = True  # gamma^g starts from a least-squares fit to x_0^ref; else from the even light that gives the texture's mean
