@@ -15,6 +15,9 @@ from torch import nn
 from torch.nn import functional
 from torch.utils.checkpoint import checkpoint
 
+LAYOUT = torch.channels_last
+"""Of all maps inside the network: channels first takes longer, in convolutions and in this normalisation (benchmarks/solver_speed.py)."""
+
 
 def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: torch.Tensor, mapping_condition: torch.Tensor | None = None,
             mean: torch.Tensor | None = None, spread: torch.Tensor | None = None, levels: torch.Tensor | None = None) -> torch.Tensor:
@@ -70,7 +73,7 @@ class UNet(nn.Module):
     def lower(self, dtype: torch.dtype) -> UNet:
         """Everything that works on maps in `dtype`, channels last; the noise level's few numbers stay as they are."""
         for part in (self.proj_in, self.proj_out, self.u_net):
-            part.to(dtype=dtype, memory_format=torch.channels_last)
+            part.to(dtype=dtype, memory_format=LAYOUT)
         return self
 
     def forward(self, x: torch.Tensor, sigma: torch.Tensor, mapping_condition: torch.Tensor | None = None) -> torch.Tensor:
@@ -84,7 +87,7 @@ class UNet(nn.Module):
         mapped, x = self.mapping(mapped).to(dtype), x.to(dtype)
         if self.patch_size > 1:
             x = functional.pixel_unshuffle(x, self.patch_size)
-        x = self.proj_in(x.contiguous(memory_format=torch.channels_last))
+        x = self.proj_in(x.contiguous(memory_format=LAYOUT))
         skips = []
         for blocks in self.u_net["d_blocks"][self.skip_stages:]:
             x = _run(blocks, x, mapped, self.low_memory)
@@ -185,7 +188,7 @@ class _Down(nn.Module):
     """Half the size by the separable kernel [1, 3, 3, 1] / 8, reflected at the border: the triangle filter."""
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
-        x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=torch.channels_last)
+        x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=LAYOUT)
         kernel = torch.tensor([1.0, 3.0, 3.0, 1.0], device=x.device, dtype=x.dtype) / 8
         return functional.conv2d(x, torch.outer(kernel, kernel).expand(x.shape[1], 1, 4, 4), stride=2, groups=x.shape[1])
 
@@ -194,7 +197,7 @@ class _Up(nn.Module):
     """Twice the size by the same kernel transposed, which is bilinear interpolation; reflected at the border."""
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
-        x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=torch.channels_last)
+        x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=LAYOUT)
         return functional.interpolate(x, scale_factor=2.0, mode="bilinear", align_corners=False)[..., 2:-2, 2:-2]
 
 

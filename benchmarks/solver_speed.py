@@ -1,0 +1,235 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How fast the solver is and how much memory it takes, each row in a fresh process: seconds per sampling step, peak memory, the ratio to the plain recipe.
+
+    python -m benchmarks.solver_speed [--rows plain ours ...] [--size 1024] [--steps 6] [--network ours|60M] [--device cpu|cuda] [--compile]
+                                      [--capture FOLDER] [--json FILE]
+
+The first rows sample `--steps` steps of the walk, with their share of the light's updates: "plain" in float32, channels first, the whole map from the first
+step on; "ours" in the precision that is chosen here, channels last, coarse to fine; then in float32, in the low-memory mode, and by the draft's closed form.
+"draft at 512" and "standard at 1024" are the whole stage, loading included, on a synthetic subject, or on a copy of `--capture`, then with its mask proposal
+before it. `60M` is a network of random weights and of the size that the authors' has; it knows no coarse maps. Memory is the process's own peak, Python and
+its libraries included; on CUDA also what torch held there. On a machine that does other things as well only the processor's own seconds, summed over its
+threads, tell something, and the ratio of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+AUTHORS = {"model": {"type": "image_v1", "input_channels": 7, "patch_size": 1, "mapping_out": 256, "depths": [2, 2, 4, 4], "channels": [128, 256, 256, 512],
+                     "augment_wrapper": True, "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80}, "cond": {"type": "coord"}}
+"""The bounds that the paper's time and memory set leave about this (54 to 73 million parameters)."""
+TONE = "0.69,0.54,0.45"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A way to sample, or (`stage`) the settings of a whole stage, and the seconds it shall take on two cores."""
+
+    float32: bool = False
+    channels_first: bool = False
+    coarse: bool = True
+    low_memory: bool = False
+    guidance: str = "dps"
+    stage: dict | None = None
+    target: float | None = None
+
+
+DRAFT, STANDARD = {"size": 512, "steps": 30, "guidance": "proximal"}, {"size": 1024}
+ROWS = {
+    "plain": Row(float32=True, channels_first=True, coarse=False),
+    "ours": Row(),
+    "float32": Row(float32=True),
+    "low memory": Row(low_memory=True),
+    "draft": Row(guidance="proximal"),
+    "draft at 512": Row(stage=DRAFT, target=90),
+    "standard at 1024": Row(stage=STANDARD, target=480),
+    "standard at 1024, low memory": Row(stage={**STANDARD, "low_memory": True}, low_memory=True),
+    "draft at 512, float32": Row(float32=True, stage=DRAFT, target=180),
+    "standard at 1024, float32": Row(float32=True, stage=STANDARD, target=960),
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rows", nargs="+", choices=tuple(ROWS), default=list(ROWS)[:-2])
+    parser.add_argument("--size", type=int, default=1024, help="of the rows of single steps")
+    parser.add_argument("--steps", type=int, default=6)
+    parser.add_argument("--network", choices=("ours", "60M"), default="ours")
+    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--compile", action="store_true")
+    parser.add_argument("--capture", type=Path, help="a capture whose chain came as far as the texture")
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--child", nargs=2, metavar=("ROW", "FOLDER"), help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.child:
+        print(json.dumps(measured(ROWS[options.child[0]], Path(options.child[1]), options)))
+        return
+    rows = {}
+    with tempfile.TemporaryDirectory() as folder:
+        prepare(Path(folder), options.capture)
+        for name in options.rows:
+            given = [*sys.argv[1:], "--child", name, folder]
+            child = subprocess.run([sys.executable, "-m", "benchmarks.solver_speed", *given], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
+            rows[name] = json.loads(child.stdout.splitlines()[-1])
+            print(line(name, rows[name], rows.get("plain")), flush=True)
+    if options.json:
+        options.json.write_text(json.dumps({"network": options.network, "device": options.device, "size": options.size, "rows": rows}, indent=1),
+                                encoding="utf-8")
+
+
+def line(name: str, row: dict, plain: dict | None) -> str:
+    """What a row says, for the screen."""
+    parts = [f"{row['seconds']:7.2f} s, of the processor's {row['processor_seconds']:.2f} s"]
+    if "seconds_per_step" in row:
+        parts.append(f"{row['seconds_per_step']:.3f} s a step, of the processor's {row['processor_seconds_per_step']:.3f} s")
+        if plain is not None:
+            parts.append(" and ".join(f"{row[name] / plain[name]:.2f}" for name in ("seconds_per_step", "processor_seconds_per_step")) + " of plain's")
+    if ROWS[name].target:
+        parts.append(f"{ROWS[name].target} s allowed on two cores alone")
+    parts.append(f"{row['peak_gib']:5.2f} GiB, {row['added_gib']:.2f} of it since the libraries were loaded")
+    if "device_peak_gib" in row:
+        parts.append(f"{row['device_peak_gib']:.2f} GiB on the device")
+    return f"{name:>30}: {', '.join(parts)}  ({row['dtype']}, {row['threads']} threads)"
+
+
+def prepare(folder: Path, source: Path | None) -> None:
+    """A capture that is ready to be solved, in a process of its own as well: a copy of `source`, or a synthetic subject's texture."""
+    code = f"from benchmarks.solver_speed import make; make({str(folder)!r}, {str(source) if source else None!r})"
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+def make(folder: str, source: str | None) -> None:
+    import shutil
+
+    import numpy as np
+
+    from benchmarks.solve_uv import problem
+    from core import images, meshes, template
+    from core.capture import Capture
+
+    capture = Capture(Path(folder) / "a.wildcap")
+    if source:
+        shutil.copytree(source, capture.root, ignore=shutil.ignore_patterns("maps*", "checkpoints", "delivery", "logs", "lock"))
+        return
+    _, texture, _, mask = problem(9000, 512, "leaves")
+    images.write_linear(capture.texture, texture)
+    images.write_data(capture.texture_confidence, np.ones(texture.shape[:2], np.float32))
+    images.write_data(capture.shadow_mask_auto, mask)
+    meshes.write_obj(capture.head, template.load())
+
+
+def measured(row: Row, folder: Path, options: argparse.Namespace) -> dict:
+    """A row's figures, in this process."""
+    import torch
+
+    from core import solve  # noqa: F401 - all that the stage imports counts as loaded
+    from core.capture import Capture
+
+    before = peak_gib()
+    capture = Capture(folder / "a.wildcap")
+    found = whole_stage(row, capture, options) if row.stage else single_steps(row, capture, options)
+    found |= {"peak_gib": round(peak_gib(), 3), "added_gib": round(peak_gib() - before, 3), "threads": torch.get_num_threads()}
+    if options.device.startswith("cuda"):
+        found["device_peak_gib"] = round(torch.cuda.max_memory_allocated() / 2**30, 3)
+    return found
+
+
+def single_steps(row: Row, capture, options: argparse.Namespace) -> dict:
+    """`options.steps` steps that lie along the walk as all of them do, each with as many light updates as one of theirs."""
+    from dataclasses import replace
+
+    import torch
+
+    from core.messages import Reporter
+    from core.solve import FACE_CROP, initial
+    from core.solve.evidence import read_evidence
+    from core.solve.memory import sample_within_memory
+    from core.solve.recipes import OURS
+    from core.solve.sampler import seeded
+
+    prior = prior_of(row, options)
+    coarse = OURS.coarse if row.coarse and not prior.one_scale else ()
+    recipe = replace(OURS, coarse=coarse, guidance=row.guidance, sharp_edges=False, protect_marks=False)
+    begun = initial.start(prior, read_evidence(capture, options.size), TONE, FACE_CROP / 96, recipe)
+    short = replace(recipe, steps=options.steps, updates=max(1, recipe.updates * options.steps // recipe.steps))
+    if options.compile:
+        prior.network = torch.compile(prior.network)
+    if options.compile or options.device != "cpu":
+        sample_within_memory(prior, begun.observations, begun.state, short, seeded(0))  # warms up
+        begun.state.step, begun.state.x, begun.state.denoised = 0, None, begun.reference
+    report = Reporter("solve", emit=lambda message: print(message.text, file=sys.stderr))
+    began, worked = time.perf_counter(), time.process_time()
+    sample_within_memory(prior, begun.observations, begun.state, short, seeded(0), log=report.log)
+    seconds, worked = time.perf_counter() - began, time.process_time() - worked
+    dtype = str(prior.network.proj_in.weight.dtype).removeprefix("torch.")
+    return {"seconds": round(seconds, 3), "processor_seconds": round(worked, 2), "seconds_per_step": round(seconds / short.steps, 4),
+            "processor_seconds_per_step": round(worked / short.steps, 4), "steps": short.steps, "dtype": dtype}
+
+
+def whole_stage(row: Row, capture, options: argparse.Namespace) -> dict:
+    """The stage solve, the mask's proposal before it where the capture has frames; imports and loading count."""
+    import torch
+
+    from core import shadow_mask, solve
+    from core.messages import Reporter
+    from core.settings import from_json
+    from core.solve import prior
+
+    dtype = torch.float32 if row.float32 else prior.fast_dtype(options.device)
+    prior.fast_dtype = lambda device: dtype
+    settings = from_json({"device": options.device, "solve": row.stage})
+    report = Reporter("solve", emit=lambda message: print(getattr(message, "text", ""), file=sys.stderr))
+    began, worked = time.perf_counter(), time.process_time()
+    if capture.delit.is_dir():
+        shadow_mask.run(capture, settings, report)
+    solve.run(capture, settings, report)
+    return {"seconds": round(time.perf_counter() - began, 2), "processor_seconds": round(time.process_time() - worked, 2),
+            "dtype": str(dtype).removeprefix("torch.")}
+
+
+def prior_of(row: Row, options: argparse.Namespace):
+    """The shipped prior, or one of the authors' size, as the row has it."""
+    import torch
+
+    from core.solve import network as networks
+    from core.solve.prior import ReleasedPrior, build, fast_dtype, load
+
+    dtype = torch.float32 if row.float32 else fast_dtype(options.device)
+    if row.channels_first:
+        networks.LAYOUT = torch.contiguous_format
+    if options.network == "ours":
+        prior = load(device=options.device, dtype=dtype)
+    else:
+        torch.manual_seed(0)
+        network = build(AUTHORS)
+        for parameter in network.parameters():  # those that begin at zero as well: their products are to be worked out
+            torch.nn.init.normal_(parameter, std=0.02)
+        prior = ReleasedPrior(network, "coord", 0, (0.01, 80.0), None)
+        network.to(options.device).lower(dtype)
+    prior.network.low_memory = row.low_memory
+    return prior
+
+
+def peak_gib() -> float:
+    """The largest resident size of this process so far."""
+    try:
+        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+        return int(next(each for each in lines if each.startswith("VmHWM")).split()[1]) / 2**20
+    except OSError:
+        import resource
+
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**30 if sys.platform == "darwin" else 2**20)
+
+
+if __name__ == "__main__":
+    main()
