@@ -2,10 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The first steps in Blender: what is said before anything is installed or removed, and a Python that does not answer. No network."""
 
-import sys
 import time
 import venv
-from pathlib import Path
 
 import pytest
 
@@ -28,6 +26,13 @@ def setup(addon, tmp_path):
 def follow(addon, limit_s: float = 60):
     end = time.monotonic() + limit_s
     while addon("jobs").poll():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def wait(checking, limit_s: float = 60):
+    end = time.monotonic() + limit_s
+    while checking.look() is not None:
         assert time.monotonic() < end
         time.sleep(0.02)
 
@@ -96,28 +101,29 @@ def test_removing_adds_up_what_is_freed_and_takes_the_solver_off(setup, tmp_path
     assert (folder / "photo.jpg").is_file()
 
 
-def test_the_set_up_is_shown_until_a_solver_answers_and_again_when_it_does_not(setup, tmp_path):
-    preferences, operators, panel = setup("preferences"), setup("setup.operators"), setup("setup.panel").WILDCAP_PT_setup
+def test_the_set_up_is_shown_until_a_solver_answers_and_again_when_it_does_not(setup, tmp_path, monkeypatch):
+    preferences, checking, panel = setup("preferences"), setup("setup.checking"), setup("setup.panel").WILDCAP_PT_setup
     assert panel.poll(bpy.context)
     bare = tmp_path / "bare"
     venv.create(bare, with_pip=False, symlinks=True)
     preferences.set_python(bare / "bin" / "python")
     assert not panel.poll(bpy.context)
-    operators._checks.clear()
-    end = time.monotonic() + 60
-    while operators.check_again() is not None:
-        assert time.monotonic() < end
-        time.sleep(0.02)
+    checking._checks.clear()
+    wait(checking)
     assert panel.poll(bpy.context) and preferences.python() is None
     assert "torch" in setup("problems").of("").problem and setup("problems").of("").remedy
-    preferences.set_python(Path(sys.executable), "cpu")
-    assert preferences.python() is not None and preferences.get().device == "cpu" and not panel.poll(bpy.context)
-    operators._checks.clear()
+    monkeypatch.setattr(checking.environment, "judge", lambda found, requirements: [])
+    monkeypatch.setattr(checking.environment, "survey", lambda python, requirements, importing: {"device": "cuda" if importing else "cpu"})
+    checking.accept(bare / "bin" / "python")
+    assert not panel.poll(bpy.context) and preferences.get().device == ""
+    wait(checking)
+    assert preferences.get().device == "cuda" and preferences.python() == bare / "bin" / "python"
+    checking._checks.clear()
 
 
 def test_the_chosen_python_is_tried_in_the_background(setup, tmp_path):
     operators, preferences = setup("setup.operators"), setup("preferences")
-    task = operators.Task("setup", lambda task: operators.judge(task, tmp_path / "none"))
-    setup("jobs").begin("", "ask", task, lambda: preferences.set_python(tmp_path / "none", task.result))
+    task = operators.Task("setup", lambda task: operators.try_out(task, tmp_path / "none"))
+    setup("jobs").begin("", "ask", task, lambda: setup("setup.checking").accept(tmp_path / "none"))
     follow(setup)
     assert "not a working Python" in setup("problems").of("").problem and preferences.python() is None

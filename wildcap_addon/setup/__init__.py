@@ -4,16 +4,16 @@
 
 import bpy
 
-from . import install, operators, panel
+from . import checking, install, operators, panel
 
 _register, _unregister = bpy.utils.register_classes_factory((*install.CLASSES, *operators.CLASSES, *panel.CLASSES))
 
 
 def register():
     _register()
-    operators.register()
+    checking.register()
 
 
 def unregister():
-    operators.unregister()
+    checking.unregister()
     _unregister()

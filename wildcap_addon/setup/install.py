@@ -11,8 +11,8 @@ from ...core.worker import environment, index
 from .. import jobs, preferences, problems
 from ..base_operator import BaseOperator
 from . import asking
+from .checking import REQUIREMENTS, accept
 
-REQUIREMENTS = jobs.ROOT / "requirements"
 COMPUTES = {"cpu": "the CPU", "cuda": "NVIDIA GPUs (CUDA)", "apple": "Apple GPUs (Metal)"}
 WIDTH = 460
 
@@ -65,7 +65,7 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
             index.check_space(plan, folder)
         installation = environment.Installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), compute=compute)
         asking.forget(("size", str(folder)))
-        jobs.begin("", "install", installation, lambda: preferences.set_python(environment.python_of(folder)))
+        jobs.begin("", "install", installation, lambda: accept(environment.python_of(folder)))
 
 
 class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):

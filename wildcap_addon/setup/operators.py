@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operator: use a Python that has the solver's packages already; and what looks at the chosen one again when Blender starts."""
+"""Operator: use a Python that has the solver's packages already."""
 
 import os
 from pathlib import Path
@@ -10,12 +10,9 @@ import bpy
 from ...core.messages import Problem
 from ...core.worker import environment
 from ...core.worker.background import Task
-from .. import jobs, preferences, problems, status
+from .. import jobs, preferences
 from ..base_operator import BaseOperator
-from .install import REQUIREMENTS
-
-LOOK_S = 2.0
-_checks: list[Task] = []  # the look at the Python that is under way, if any
+from . import checking
 
 
 class WILDCAP_OT_use_python(BaseOperator, bpy.types.Operator):
@@ -36,26 +33,17 @@ class WILDCAP_OT_use_python(BaseOperator, bpy.types.Operator):
 
     def work(self, context):
         python = interpreter(Path(bpy.path.abspath(self.filepath)))
-        if self.options.is_invoke:  # every package is loaded once, which takes its time
-            task = Task("setup", lambda task: judge(task, python))
-            jobs.begin("", "ask", task, lambda: preferences.set_python(python, task.result))
-        else:
-            refuse(python, environment.verify(python, REQUIREMENTS))
+        if self.options.is_invoke:
+            jobs.begin("", "ask", Task("setup", lambda task: try_out(task, python)), lambda: checking.accept(python))
+        else:  # a script waits for the answer
+            checking.judge(python, importing=False)
             preferences.set_python(python)
 
 
-def judge(task: Task, python: Path) -> str:
-    """The device that a Python computes on. Raises Problem where it cannot run the solver."""
-    task.say(0, 1, "trying that Python")
-    found = environment.survey(python, REQUIREMENTS, importing=True)
-    refuse(python, environment.judge(found, REQUIREMENTS))
-    return found["device"]
-
-
-def refuse(python: Path, faults: list[str]) -> None:
-    if faults:
-        raise Problem(f"{python} cannot run the solver. {' '.join(faults[:3])}",
-                      f"Install what {REQUIREMENTS / 'worker.txt'} lists, then nets.txt beside it with --no-deps; or click Install Solver.")
+def try_out(task: Task, python: Path) -> None:
+    """Raises Problem where a Python lacks something."""
+    task.say(0, 1, "asking that Python what it has")
+    checking.judge(python, importing=False)
 
 
 def interpreter(path: Path) -> Path:
@@ -64,32 +52,6 @@ def interpreter(path: Path) -> Path:
         if candidate.is_file() and os.access(candidate, os.X_OK):
             return candidate
     raise Problem(f"There is no Python at {path}.", "Choose the python file itself, or the folder of a virtual environment.")
-
-
-def check_again() -> float | None:
-    """A timer: whether the solver's Python still answers, asked once in a thread after Blender has started. One that does not is set aside."""
-    if not _checks:
-        python = preferences.python()
-        if python is None:
-            return None
-        _checks.append(Task("setup", lambda task: refuse(python, environment.verify(python, REQUIREMENTS))))
-        _checks[0].start()
-    for message in _checks[0].poll():
-        if hasattr(message, "problem"):
-            preferences.set_aside(preferences.python())
-            problems.show("", Problem(message.problem, message.remedy))
-            status.redraw()
-    return 0.5 if _checks[0].running else None
-
-
-def register():
-    bpy.app.timers.register(check_again, first_interval=LOOK_S, persistent=True)
-
-
-def unregister():
-    if bpy.app.timers.is_registered(check_again):
-        bpy.app.timers.unregister(check_again)
-    _checks.clear()
 
 
 CLASSES = (WILDCAP_OT_use_python,)

@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether the solver's Python answers: asked in a thread when Blender has started, and, with every package loaded once, after it was chosen.
+
+One that does not answer is set aside, and the tab shows the first steps again.
+"""
+
+from pathlib import Path
+
+import bpy
+
+from ...core.messages import Problem
+from ...core.worker import environment
+from ...core.worker.background import Task
+from .. import jobs, preferences, problems, status
+
+REQUIREMENTS = jobs.ROOT / "requirements"
+FIRST_S, INTERVAL_S = 2.0, 0.5
+_checks: list[Task] = []  # the one under way or done, if any
+
+
+def judge(python: Path, importing: bool) -> str:
+    """The device that a Python computes on, '' if its packages are not loaded. Raises Problem where it cannot run the solver."""
+    found = environment.survey(python, REQUIREMENTS, importing)
+    refuse(python, environment.judge(found, REQUIREMENTS))
+    return found["device"] if importing else ""
+
+
+def refuse(python: Path, faults: list[str]) -> None:
+    if faults:
+        raise Problem(f"{python} cannot run the solver. {' '.join(faults[:3])}",
+                      f"Install what {REQUIREMENTS / 'worker.txt'} lists, then nets.txt beside it with --no-deps; or click Install Solver.")
+
+
+def accept(python: Path) -> None:
+    """Makes it the solver's Python, and has a closer look in the background."""
+    preferences.set_python(python)
+    _checks.clear()
+    if not bpy.app.timers.is_registered(look):
+        bpy.app.timers.register(look, first_interval=INTERVAL_S, persistent=True)
+
+
+def look() -> float | None:
+    """The timer: starts the look, and takes in how it ended."""
+    python = preferences.python()
+    if python is None:
+        return None
+    if not _checks:
+        _checks.append(Task("setup", lambda task: judge(python, importing=not preferences.get().device)))
+        _checks[0].start()
+    for message in _checks[0].poll():
+        if hasattr(message, "problem"):
+            preferences.set_aside(python)
+            problems.show("", Problem(message.problem, message.remedy))
+        elif _checks[0].result:
+            preferences.set_python(python, _checks[0].result)
+        status.redraw()
+    return INTERVAL_S if _checks[0].running else None
+
+
+def register():
+    bpy.app.timers.register(look, first_interval=FIRST_S, persistent=True)
+
+
+def unregister():
+    if bpy.app.timers.is_registered(look):
+        bpy.app.timers.unregister(look)
+    for task in _checks:
+        task.terminate()
+    _checks.clear()
