@@ -45,6 +45,7 @@ class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
     bl_label = "Stages"
     bl_order = 5
     bl_parent_id = "WILDCAP_PT_main"
+    bl_options = {'DEFAULT_CLOSED'}
 
     @classmethod
     def poll(cls, context):
@@ -77,12 +78,16 @@ class WILDCAP_PT_doctor(WildcapPanel, bpy.types.Panel):
     bl_label = "Video Doctor"
     bl_order = 4
     bl_parent_id = "WILDCAP_PT_main"
+    bl_options = {'DEFAULT_CLOSED'}
 
     @classmethod
     def poll(cls, context):
         item = captures.active(context)
         found = status.of(item) if item is not None else None
         return found is not None and bool(found.findings)
+
+    def draw_header(self, context):
+        self.layout.label(text="", icon='ERROR')
 
     def draw(self, context):
         layout = self.layout
