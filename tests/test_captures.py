@@ -52,22 +52,20 @@ def test_what_is_dropped_becomes_captures(addon, tmp_path):
         bpy.ops.wildcap.choose_video(filepath=str(tmp_path))
 
 
-def test_drops_are_taken_where_the_tab_is_shown_and_blenders_reference_images_are_left_alone(addon):
+def test_drops_are_taken_where_the_tab_is_shown(addon):
     source = addon("capture.source")
     stage = ast.parse((Path(__file__).parents[1] / "core" / "frames" / "photographs.py").read_text(encoding="utf-8"))  # not imported: it needs OpenCV
     known = {node.targets[0].id: ast.literal_eval(node.value) for node in stage.body if isinstance(node, ast.Assign) and node.targets[0].id.isupper()}
     assert set(source.PHOTOGRAPHS) == {*known["SUFFIXES"], *known["PHONE_ONLY"]}
 
-    def taken(handler, tab, over):
-        view, sidebar = SimpleNamespace(type='WINDOW'), SimpleNamespace(type='UI', active_panel_category=tab)
-        space = SimpleNamespace(show_region_ui=bool(tab))
-        area = SimpleNamespace(type='VIEW_3D', spaces=SimpleNamespace(active=space), regions=[view, sidebar])
-        return handler.poll_drop(SimpleNamespace(area=area, region=sidebar if over == 'UI' else view))
+    def taken(tab: str) -> bool:
+        space, sidebar = SimpleNamespace(show_region_ui=bool(tab)), SimpleNamespace(type='UI', active_panel_category=tab)
+        return handler.poll_drop(SimpleNamespace(area=SimpleNamespace(type='VIEW_3D', spaces=SimpleNamespace(active=space), regions=[sidebar])))
 
-    video, photograph = source.WILDCAP_FH_source, source.WILDCAP_FH_photographs
-    assert taken(video, "WildCap", 'WINDOW') and taken(video, "WildCap", 'UI') and not taken(video, "Item", 'WINDOW') and not taken(video, "", 'WINDOW')
-    assert taken(photograph, "WildCap", 'UI') and not taken(photograph, "WildCap", 'WINDOW')
-    assert not video.poll_drop(SimpleNamespace(area=SimpleNamespace(type='IMAGE_EDITOR'), region=None))
+    handler = source.WILDCAP_FH_source
+    assert taken("WildCap") and not taken("Item") and not taken("")
+    assert not handler.poll_drop(SimpleNamespace(area=SimpleNamespace(type='IMAGE_EDITOR')))
+    assert set(handler.bl_file_extensions.split(";")) == {*source.VIDEOS, *source.PHOTOGRAPHS}
 
 
 def test_the_active_head_says_which_of_several_captures_is_meant(addon, project):

@@ -46,30 +46,19 @@ class WILDCAP_OT_choose_video(BaseOperator, bpy.types.Operator):
 
 
 class WILDCAP_FH_source(bpy.types.FileHandler):
-    """Takes what is dropped on a 3D view while its sidebar shows the WildCap tab; photographs only on the tab itself, as elsewhere they
-    are Blender's reference images."""
+    """Takes what is dropped on a 3D view while its sidebar shows the WildCap tab. Blender then asks whether a reference image was meant."""
 
     bl_idname = "WILDCAP_FH_source"
     bl_label = "Face for WildCap"
     bl_import_operator = "wildcap.choose_video"
-    bl_file_extensions = ";".join(VIDEOS)
+    bl_file_extensions = ";".join(VIDEOS + PHOTOGRAPHS)
 
     @classmethod
     def poll_drop(cls, context):
-        return _tab_shown(context)
-
-
-class WILDCAP_FH_photographs(bpy.types.FileHandler):
-    """As WILDCAP_FH_source, for photographs."""
-
-    bl_idname = "WILDCAP_FH_photographs"
-    bl_label = "Photographs for WildCap"
-    bl_import_operator = "wildcap.choose_video"
-    bl_file_extensions = ";".join(PHOTOGRAPHS)
-
-    @classmethod
-    def poll_drop(cls, context):
-        return _tab_shown(context) and context.region is not None and context.region.type == 'UI'
+        area = context.area
+        if area is None or area.type != 'VIEW_3D' or not area.spaces.active.show_region_ui:
+            return False
+        return any(region.type == 'UI' and region.active_panel_category == WildcapPanel.bl_category for region in area.regions)
 
 
 def sources(chosen: list[Path]) -> list[Path]:
@@ -98,12 +87,4 @@ def new_folder(parent: Path, source: Path) -> Path:
     raise Problem(f"{parent} holds a thousand captures named {name}.", "Choose another captures folder in the preferences.")
 
 
-def _tab_shown(context) -> bool:
-    """Whether the 3D view under the cursor has its sidebar open on our tab."""
-    area = context.area
-    if area is None or area.type != 'VIEW_3D' or not area.spaces.active.show_region_ui:
-        return False
-    return any(region.type == 'UI' and region.active_panel_category == WildcapPanel.bl_category for region in area.regions)
-
-
-CLASSES = (WILDCAP_OT_choose_video, WILDCAP_FH_source, WILDCAP_FH_photographs)
+CLASSES = (WILDCAP_OT_choose_video, WILDCAP_FH_source)

@@ -4,14 +4,13 @@
 
 import bpy
 
-from .. import preferences
-from ..base_panel import WildcapPanel
+from .. import preferences, problems
+from ..base_panel import FoldedPanel
 
 
-class WILDCAP_PT_setup(WildcapPanel, bpy.types.Panel):
+class WILDCAP_PT_setup(FoldedPanel, bpy.types.Panel):
     bl_label = "Setup"
     bl_order = 90
-    bl_parent_id = "WILDCAP_PT_main"
 
     @classmethod
     def poll(cls, context):
@@ -19,7 +18,7 @@ class WILDCAP_PT_setup(WildcapPanel, bpy.types.Panel):
 
     def draw(self, context):
         preferences.draw_solver(self.layout, preferences.get())
-        self.layout.label(text="Masks, materials and renders work without it")
+        problems.draw_text(self.layout, "Masks, materials and renders work without it.", context.region.width if context.region else 300)
 
 
 CLASSES = (WILDCAP_PT_setup,)
