@@ -202,6 +202,7 @@ def prior_of(row: Row, options: argparse.Namespace):
     import torch
 
     from core.solve import network as networks
+    from core.solve.memory import spare_memory
     from core.solve.prior import ReleasedPrior, build, fast_dtype, load
 
     dtype = torch.float32 if row.float32 else fast_dtype(options.device)
@@ -216,7 +217,8 @@ def prior_of(row: Row, options: argparse.Namespace):
             torch.nn.init.normal_(parameter, std=0.02)
         prior = ReleasedPrior(network, "coord", 0, (0.01, 80.0), None)
         network.to(options.device).lower(dtype)
-    prior.network.low_memory = row.low_memory
+    if row.low_memory:
+        spare_memory(prior)
     return prior
 
 

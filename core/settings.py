@@ -109,7 +109,7 @@ class SolveSettings:
     checkpoint_every: int = setting(5, min=1, max=600, deciding=False)
     """Steps between two checkpoints"""
     low_memory: bool = setting(False, deciding=False)
-    """Use far less memory for the same maps, at a third more time. Without it this begins where the memory does not suffice"""
+    """Use a third less memory for the same maps, at two thirds more time. Without it this begins where the memory does not suffice"""
 
 
 @dataclass(frozen=True)

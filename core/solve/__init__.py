@@ -26,7 +26,7 @@ from .confidence import spread
 from .draft import restored
 from .edited import solve_edited
 from .evidence import REFERENCE, Evidence, read_evidence
-from .memory import sample_within_memory
+from .memory import sample_within_memory, spare_memory
 from .prior import WEIGHTS, Prior, load
 from .problem import State, unexplained
 from .recipes import RECIPES, Recipe
@@ -51,7 +51,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """
     options = settings.solve
     prior = load(Path(options.prior).expanduser() if options.prior else WEIGHTS, settings.device)
-    prior.network.low_memory = options.low_memory
+    if options.low_memory:
+        spare_memory(prior)
     recipe = _recipe(settings, prior)
     report.progress(0, recipe.steps, "reading the texture, the head and the masks")
     size = layout.whole_size(options.size, prior.multiple) if options.prior else max(options.size // 32, 4) * 32  # the network halves the map several times

@@ -7,6 +7,8 @@ That mode keeps only the inputs of the network's layers for the gradient and com
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import gc
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,6 +22,7 @@ from .problem import Observation, State
 from .recipes import Recipe
 from .sampler import sample
 
+MMAP_THRESHOLD, LARGE = -3, 8 << 20  # glibc's name for it, and the bytes from which on memory is asked of the system and given back to it
 SAYS = "There was not enough memory for step {} of {}: it is done again in the low-memory mode, which is slower and gives the same maps."
 
 
@@ -46,11 +49,18 @@ def sample_within_memory(prior: Prior, observations: dict[int, Observation], sta
             raise Problem(f"There was not enough memory for step {begun.step + 1} of {recipe.steps}, even in the low-memory mode.",
                           "Close other programs, choose a smaller map size for the solve, or the quality draft.") from error
     log(SAYS.format(begun.step + 1, recipe.steps))  # past the except block, which holds on to all that the step had computed
+    spare_memory(prior)
+    return sample_within_memory(prior, observations, begun, recipe, noise, on_step, log, **options)
+
+
+def spare_memory(prior: Prior) -> None:
+    """Turns the low-memory mode on, and gives what is free back to the system, now and from here on."""
     prior.network.low_memory = True
     gc.collect()
     if torch.cuda.is_available():
         torch.cuda.empty_cache()
-    return sample_within_memory(prior, observations, begun, recipe, noise, on_step, log, **options)
+    with contextlib.suppress(OSError, AttributeError, TypeError):  # glibc keeps freed maps for later, in pieces that others do not fit into; others do not
+        ctypes.CDLL(None).mallopt(MMAP_THRESHOLD, LARGE)
 
 
 def _copied(state: State) -> State:

@@ -51,7 +51,7 @@ class UNet(nn.Module):
         super().__init__()
         attention = attention or [False] * len(depths)
         self.patch_size, self.sigma_data, self.skip_stages, self.has_variance = patch_size, sigma_data, skip_stages, has_variance
-        self.low_memory = False  # a third more work for the gradient, for a fraction of the memory
+        self.low_memory = False  # keeps a fifth of what the gradient needs, and computes the rest again
         self.multiple = patch_size * 2 ** (len(depths) - 1 - skip_stages)
         self.timestep_embed = _Fourier(mapping_out)
         self.mapping_cond = nn.Linear(mapping_cond_dim, mapping_out, bias=False) if mapping_cond_dim else None

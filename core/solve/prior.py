@@ -48,6 +48,8 @@ class Prior:
         device = self.network.proj_in.weight.device  # the map may live elsewhere: the network is all that is slow
         if self._known.get("coords") is not coords:
             known = self._condition(coords)
+            if "mean" in known:  # it goes in as it is: kept as the network takes it, at half the memory
+                known["condition"] = known["condition"].to(self.network.proj_in.weight.dtype)
             self._known = {"coords": coords, **{name: value.to(device) for name, value in known.items()}}
         sigmas = torch.full((len(x),), float(sigma), device=device)
         return denoise(self.network, x.to(device), sigmas, **{k: v for k, v in self._known.items() if k != "coords"}).to(x.device)
