@@ -207,7 +207,7 @@ def _enter(context, use_sheet: bool) -> None:
     _session.on_sheet = use_sheet
     if use_sheet:
         target = sheet.make(context, context.scene.tool_settings.image_paint.canvas)
-        _session.hidden = [o.name for o in context.view_layer.objects if o != target and not o.hide_get()]
+        _session.hidden = [o.name for o in list(context.view_layer.objects) if o != target and not o.hide_get()]
         for name in _session.hidden:
             bpy.data.objects[name].hide_set(True)
         view.face_sheet(_session.before["views"], target.location, sheet.SIDE_M)

@@ -24,6 +24,7 @@ def make(context, image: bpy.types.Image) -> bpy.types.Object:
     mesh.materials.append(material)
     sheet = bpy.data.objects.new(NAME, mesh)
     context.scene.collection.objects.link(sheet)
+    context.view_layer.update()  # or whoever looks through its objects next finds one that is gone, and Blender ends
     return sheet
 
 
@@ -33,3 +34,4 @@ def remove() -> None:
         block = collection.get(NAME)
         if block is not None:
             collection.remove(block)
+    bpy.context.view_layer.update()
