@@ -11,7 +11,7 @@ import bpy
 
 from ...core.capture import Capture
 from ...core.messages import Problem
-from .. import captures
+from .. import captures, local_view
 from . import colmap_cameras
 
 KIND_KEY = "wildcap_kind"
@@ -35,6 +35,7 @@ def bring_in_cameras(context, item, every: bool = False) -> int:
         collection.objects.link(_camera(context, item, capture, camera))
     if context.scene.camera is None:
         context.scene.camera = collection.objects[0]
+    local_view.join(context, collection.objects)
     return len(found)
 
 
@@ -57,6 +58,7 @@ def bring_in_scan(context, item) -> bpy.types.Object:
     for thing in context.view_layer.objects:
         thing.select_set(thing in selected)
     context.view_layer.objects.active = active or scan
+    local_view.join(context, [scan])
     return scan
 
 

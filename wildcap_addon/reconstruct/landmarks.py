@@ -13,7 +13,7 @@ from mathutils import Vector
 from ...core import artist_landmarks
 from ...core.capture import Capture
 from ...core.messages import Problem
-from .. import captures
+from .. import captures, local_view
 
 COLLECTION = "WildCap Landmarks"
 INDEX_KEY = "wildcap_landmark"
@@ -51,6 +51,7 @@ def show(context, item) -> int:
         empty.lock_rotation = empty.lock_scale = (True, True, True)
         empty[INDEX_KEY], empty[FOUND_KEY], empty[captures.HEAD_KEY] = index, points[index], item.path
         collection.objects.link(empty)
+    local_view.join(context, collection.objects)
     return len(collection.objects)
 
 

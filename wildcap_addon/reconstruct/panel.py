@@ -28,7 +28,8 @@ class WILDCAP_PT_reconstruct(CapturePanel, bpy.types.Panel):
         row.operator("wildcap.hide_landmarks" if landmarks.shown() else "wildcap.show_landmarks", icon='EMPTY_AXIS')
         row.operator("wildcap.fit_landmarks")
         for stage in stages.STAGES[:stages.NAMES.index(stages.MASK_STAGE) + 1]:
-            draw_settings(layout, item, stage, without=("delighter", "folder", "template"))
+            if stage.name != "delight":  # all of its settings stand below
+                draw_settings(layout, item, stage, without=("template", "new_atlas"))
 
 
 class WILDCAP_PT_head_mesh(CapturePanel, bpy.types.Panel):
