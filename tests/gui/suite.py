@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs the flows, each in a Blender with an empty profile on a virtual screen; ends with the line N passed, N failed.
 
-    python3 suite.py ZIP [FLOW ...]        inside the chroot; a flow is flows/NAME.py
+    python3 suite.py ZIP [FLOW ...]        inside the chroot; a flow is flows/NAME.py, or by_name/NAME.py, which runs only when it is named
 """
 
 import os
@@ -20,7 +20,7 @@ LIMIT_S = 1800
 
 def main() -> int:
     archive, *names = sys.argv[1:]
-    flows = [HERE / "flows" / f"{name}.py" for name in names] or sorted((HERE / "flows").glob("*.py"))
+    flows = [next(HERE.glob(f"*/{name}.py")) for name in names] or sorted((HERE / "flows").glob("*.py"))
     display = start_screen()
     results = {flow.stem: run(flow, Path(archive), display) for flow in flows}
     for name, (passed, seconds) in results.items():
