@@ -103,8 +103,7 @@ def state() -> dict:
     return {"mode": bpy.context.mode, "active": bpy.context.view_layer.objects.active.name, "selected": sorted(o.name for o in bpy.context.selected_objects),
             "shading": [getattr(space.shading, name) for name in ("type", "light", "color_type")], "overlays": space.overlay.show_overlays,
             "opacity": space.overlay.texture_paint_mode_opacity, "canvas": paint.canvas.name, "stencil": [paint.use_stencil_layer, paint.stencil_image,
-            tuple(paint.stencil_color)], "brushes": sorted(b.name for b in bpy.data.brushes), "brush": paint.brush.name if paint.brush else None,
-            "tool": bpy.context.workspace.tools.from_space_view3d_mode('PAINT_TEXTURE').idname}
+            tuple(paint.stencil_color)], "brushes": sorted(b.name for b in bpy.data.brushes), "brush": paint.brush.name if paint.brush else None}
 
 
 def mask() -> np.ndarray:
