@@ -54,7 +54,7 @@ def _network():
 
 
 def table(done: dict[str, dict], rows: list[str], first: str) -> str:
-    """Markdown: a line per row over the problems that it was solved on, each with its PSNR's distance to row `first` on just these problems and seeds.
+    """Markdown: per region a line per row over the problems that it was solved on, with its PSNR's distance to row `first` on just these problems and seeds.
 
     The spread is half the difference between two seeds of the solver; a distance smaller than the first row's is a tie.
     """
@@ -62,22 +62,21 @@ def table(done: dict[str, dict], rows: list[str], first: str) -> str:
     by_row = {row: results for row, results in by_row.items() if results}
     if first not in by_row:
         return "The first row was not solved yet."
-    lines = ["| row | problems x seeds | " + " | ".join(f"{region}: PSNR | to {first} | SSIM | FLIP | features" for region in REGIONS) + " | seconds |",
-             "|" + " --- |" * (3 + 5 * len(REGIONS))]
-    for row, results in by_row.items():
-        shared = [p for p in results if p in by_row[first]]
-        mine, best = [results[p] for p in shared], [by_row[first][p] for p in shared]
-        if not mine:
-            continue
-        cells = []
-        for region in REGIONS:
-            own = [r[region]["psnr"] for r in mine]
-            cells += [f"{np.mean(own):.2f}", "" if row == first else _compared(mine, best, region, seed_spread(list(by_row[first].values()), region)),
-                      *(f"{np.mean([r[region][figure] for r in mine]):.3f}" if figure in mine[0][region] else "-" for figure in FIGURES[1:])]
-        lines.append(f"| {row} | {len({p[:-1] for p in shared})} x {len({p[-1] for p in shared})} | " + " | ".join(cells)
-                     + f" | {np.mean([r['seconds'] for r in mine]):.0f} |")
+    lines = []
+    for region in REGIONS:
+        lines += ["", f"| {region} | problems x seeds | PSNR | to {first} | SSIM | FLIP | features | seconds |", "|" + " --- |" * 8]
+        spread = seed_spread(list(by_row[first].values()), region)
+        for row, results in by_row.items():
+            shared = [p for p in results if p in by_row[first]]
+            mine, best = [results[p] for p in shared], [by_row[first][p] for p in shared]
+            if not mine:
+                continue
+            cells = [f"{np.mean([r[region]['psnr'] for r in mine]):.2f}", "" if row == first else _compared(mine, best, region, spread),
+                     *(f"{np.mean([r[region][figure] for r in mine]):.3f}" if figure in mine[0][region] else "-" for figure in FIGURES[1:])]
+            lines.append(f"| {row} | {len({p[:-1] for p in shared})} x {len({p[-1] for p in shared})} | " + " | ".join(cells)
+                         + f" | {np.mean([r['seconds'] for r in mine]):.0f} |")
     spread = ", ".join(f"{region} {seed_spread(list(by_row[first].values()), region):.2f} dB" for region in REGIONS)
-    return "\n".join([*lines, "", f"Spread of {first} over the solver's seeds: {spread}."])
+    return "\n".join([*lines[1:], "", f"Spread of {first} over the solver's seeds: {spread}."])
 
 
 def _compared(mine: list[dict], best: list[dict], region: str, spread: float) -> str:
