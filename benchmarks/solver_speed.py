@@ -188,7 +188,7 @@ def whole_stage(row: Row, capture, options: argparse.Namespace) -> dict:
     dtype = torch.float32 if row.float32 else prior.fast_dtype(options.device)
     prior.fast_dtype = lambda device: dtype
     settings = from_json({"device": options.device, "solve": row.stage})
-    report = Reporter("solve", emit=lambda message: print(getattr(message, "text", ""), file=sys.stderr))
+    report = Reporter("solve", emit=lambda message: None)
     began, worked = time.perf_counter(), time.process_time()
     if capture.delit.is_dir():
         shadow_mask.run(capture, settings, report)
