@@ -7,6 +7,9 @@ EXTENSION_TOOL = $(wildcard .venv/lib/python3*/site-packages/bpy/*/scripts/addon
 # The oldest Blender that the add-on supports, and the newest whose module installs beside Python 3.11.
 BLENDERS ?= 4.2.0 5.0.1
 
+# What of the tests needs Blender.
+IN_BLENDER = addon captures setup evidence choices paint paint_session operators job_life relight next_step
+
 .PHONY: demo test test-blenders test-gui zip clean
 
 demo: .venv/installed
@@ -18,7 +21,7 @@ test: .venv/installed
 
 test-blenders: $(BLENDERS:%=.blenders/%/installed)
 	for version in $(BLENDERS); do \
-	    .blenders/$$version/bin/python -m pytest -W ignore::DeprecationWarning tests/test_addon.py tests/test_captures.py tests/test_setup.py tests/test_evidence.py tests/test_choices.py tests/test_paint.py tests/test_relight.py tests/test_next_step.py || exit 1; \
+	    .blenders/$$version/bin/python -m pytest -W ignore::DeprecationWarning $(IN_BLENDER:%=tests/test_%.py) || exit 1; \
 	done
 
 .blenders/%/installed: Makefile
