@@ -83,7 +83,7 @@ def flow():
     for _ in range(600):
         node = material.node_tree.nodes.get("WildCap Preview")
         if jobs.of(root) is not None and node is not None and material.node_tree.nodes.active == node:
-            seen.add(tuple(np.round(node.image.pixels[0:400000:997], 3)))
+            seen.add(tuple(np.round(node.image.pixels[0:400000][::997], 3)))
             if len(seen) in (1, 2) and not (d.OUT / f"live_{len(seen)}.png").is_file():
                 yield 0.5
                 d.screenshot(f"live_{len(seen)}")
