@@ -68,7 +68,7 @@ def train_prior(config: str, out: Path, report: Reporter, minutes: float | None 
     held_out_windows = {kind: Windows(s, real=0.5).draw(96, t["patch"], np.random.default_rng(1)) for kind, s in unseen.items() if s.names}
     state = _begin(config, data, seen, windows)
     if (work / "state.pt").is_file():
-        state = torch.load(work / "state.pt", weights_only=True)
+        state |= torch.load(work / "state.pt", weights_only=True)  # a training begun by an older version lacks the newer entries
         if state["data"] != data or state["config"] != config:
             raise Problem(f"The training in {work} is on other data or of another configuration.", "Name another --work folder, or delete this one.")
     network = build(CONFIGS[config])
