@@ -14,9 +14,10 @@ from pathlib import Path
 import pytest
 
 from core.messages import Cancelled, Done, Failed, Problem, Progress
-from core.worker import environment, index
+from core.worker import environment, index, installation
 from core.worker.background import Task
-from core.worker.environment import Installation, find_python, judge, python_of, remove, required, survey, verify
+from core.worker.environment import judge, python_of, remove, required, survey, verify
+from core.worker.installation import find_python
 
 REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
 
@@ -42,10 +43,10 @@ def local(tmp_path, monkeypatch) -> Path:
     return folder
 
 
-def follow(installation: Installation, timeout_s: float = 120) -> list:
+def follow(task: Task, timeout_s: float = 120) -> list:
     messages, deadline = [], time.monotonic() + timeout_s
-    while installation.running:
-        messages += installation.poll()
+    while task.running:
+        messages += task.poll()
         assert time.monotonic() < deadline
         time.sleep(0.02)
     return messages
@@ -54,15 +55,15 @@ def follow(installation: Installation, timeout_s: float = 120) -> list:
 def test_an_installation_from_nothing_through_a_failure_to_removal(local, tmp_path):
     folder, log = tmp_path / "Umgebung é", tmp_path / "logs" / "install.log"
     (local / "worker.txt").write_text("tinytorch==2.0\n")
-    installation = Installation(folder, local, log)
-    installation.start()
-    final = follow(installation)[-1]
+    task = installation.installation(folder, local, log)
+    task.start()
+    final = follow(task)[-1]
     assert isinstance(final, Failed) and final.problem.startswith("A package could not be downloaded") and str(log) in final.remedy
     (local / "worker.txt").write_text("tinytorch==1.0\n")
     made = (folder / "pyvenv.cfg").stat().st_mtime_ns
-    installation = Installation(folder, local, log)
-    installation.start()
-    messages = follow(installation)
+    task = installation.installation(folder, local, log)
+    task.start()
+    messages = follow(task)
     assert isinstance(messages[-1], Done) and any(isinstance(m, Progress) and "tinytorch" in m.text for m in messages)
     assert (folder / "pyvenv.cfg").stat().st_mtime_ns == made, "the second installation continues the first"
     assert verify(python_of(folder), local) == []
@@ -74,14 +75,15 @@ def test_an_installation_from_nothing_through_a_failure_to_removal(local, tmp_pa
 
 
 def test_a_cancelled_installation_says_so(local, tmp_path):
-    installation = Installation(tmp_path / "env", local, tmp_path / "install.log")
-    installation.start()
-    installation.cancel()
-    assert isinstance(follow(installation)[-1], Cancelled)
+    task = installation.installation(tmp_path / "env", local, tmp_path / "install.log")
+    task.start()
+    task.cancel()
+    assert isinstance(follow(task)[-1], Cancelled)
 
 
 def test_what_an_installation_brings_is_known_before_it_begins(local, tmp_path):
-    task = Task("index", lambda task: index.plan(environment.base_python(), environment.pip_steps(local, environment.compute_of("auto")), task.run, task.say))
+    steps = installation.pip_steps(local, installation.compute_of("auto"))
+    task = Task("index", lambda task: index.plan(installation.base_python(), steps, task.run, task.say))
     task.start()
     messages = follow(task)
     assert isinstance(messages[-1], Done), messages[-1]
@@ -95,7 +97,7 @@ def test_what_an_installation_brings_is_known_before_it_begins(local, tmp_path):
     with pytest.raises(Problem, match="are needed while"):
         index.check_space(huge, tmp_path)
     (local / "worker.txt").write_text("tinytorch==2.0\n")
-    task = Task("index", lambda task: index.plan(environment.base_python(), environment.pip_steps(local, environment.compute_of("auto")), task.run))
+    task = Task("index", lambda task: index.plan(installation.base_python(), steps, task.run))
     task.start()
     assert "did not answer as expected" in follow(task)[-1].problem
 
@@ -141,23 +143,24 @@ def test_sizes_come_from_a_wheels_own_directory_wherever_it_lies(tmp_path):
     ("win32", "cpu", []), ("win32", "cuda", ["torch==2.13.0+cu130", "--find-links", "https://download.pytorch.org/whl/cu130/torch/"]), ("darwin", "apple", [])])
 def test_each_system_gets_the_torch_that_was_chosen(monkeypatch, system, compute, torch):
     monkeypatch.setattr(sys, "platform", system)
-    assert environment.compute_of(compute) == compute
-    assert environment.pip_steps(REQUIREMENTS, compute)[0] == ["-r", str(REQUIREMENTS / "worker.txt"), *torch]
-    monkeypatch.setattr(environment.shutil, "which", lambda name: "/usr/bin/nvidia-smi")
-    assert environment.compute_of("auto") == ("apple" if system == "darwin" else "cuda")
-    monkeypatch.setattr(environment.shutil, "which", lambda name: None)
-    assert environment.compute_of("auto") == ("apple" if system == "darwin" else "cpu")
+    assert installation.compute_of(compute) == compute
+    assert installation.pip_steps(REQUIREMENTS, compute)[0] == ["-r", str(REQUIREMENTS / "worker.txt"), *torch]
+    assert installation.pip_steps(REQUIREMENTS, compute, "pip")[0] == ["-r", str(REQUIREMENTS / "worker.txt")], "the studio's own index has its own build"
+    monkeypatch.setattr(installation.shutil, "which", lambda name: "/usr/bin/nvidia-smi")
+    assert installation.compute_of("auto") == ("apple" if system == "darwin" else "cuda")
+    monkeypatch.setattr(installation.shutil, "which", lambda name: None)
+    assert installation.compute_of("auto") == ("apple" if system == "darwin" else "cpu")
     with pytest.raises(Problem, match="no solver for"):
-        environment.compute_of("cuda" if system == "darwin" else "apple")
+        installation.compute_of("cuda" if system == "darwin" else "apple")
 
 
-def test_an_environment_for_another_device_is_made_anew(local, tmp_path):
+def test_an_environment_for_another_device_or_from_elsewhere_is_made_anew(local, tmp_path):
     folder = tmp_path / "env"
-    for compute, fresh in (("cpu", True), ("cpu", False), ("cuda", True)):
+    for compute, source, fresh in (("cpu", "pytorch", True), ("cpu", "pytorch", False), ("cuda", "pip", True)):
         kept = folder / "kept"
-        installation = Installation(folder, local, tmp_path / "install.log", compute=compute)
-        installation.start()
-        assert isinstance(follow(installation)[-1], Done)
+        task = installation.installation(folder, local, tmp_path / "install.log", compute=compute, source=source)
+        task.start()
+        assert isinstance(follow(task)[-1], Done)
         assert kept.exists() != fresh
         kept.write_text("of this environment")
     remove(folder)
@@ -182,7 +185,7 @@ def test_other_peoples_folders_are_left_alone(local, tmp_path):
     mine.mkdir()
     (mine / "a.jpg").write_bytes(b"1")
     with pytest.raises(Problem, match="other files"):
-        Installation(mine, local, tmp_path / "log").start()
+        installation.installation(mine, local, tmp_path / "log")
     with pytest.raises(Problem, match="not a Python environment"):
         remove(mine)
     assert (mine / "a.jpg").is_file()

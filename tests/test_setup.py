@@ -47,12 +47,12 @@ def test_installing_asks_the_index_first_and_says_what_it_means(setup, monkeypat
     if not bpy.app.online_access:
         pytest.skip("this Blender cannot go online")
     asked = []
-    monkeypatch.setattr(install, "look_up", lambda task, compute: asked.append(compute) or plan_of(setup))
+    monkeypatch.setattr(install, "look_up", lambda task, compute, source: asked.append((compute, source)) or plan_of(setup))
     setup("preferences").get().compute = 'cpu'
     assert install.WILDCAP_OT_install_solver.tell() is None
     assert jobs.of("").goal == "ask" and not bpy.ops.wildcap.install_solver.poll()
     follow(setup)
-    assert asked == ["cpu"] and asking.answer(("plan", "cpu")) == plan_of(setup), "from now on the dialog opens at once"
+    assert asked == [("cpu", "pytorch")] and asking.answer(("plan", "cpu", "pytorch")) == plan_of(setup), "from now on the dialog opens at once"
     assert "the CPU" in install.WILDCAP_OT_install_solver.tell()[0] and jobs.of("") is None
     lines = install.told(plan_of(setup), "cpu", tmp_path / "Löser", 23_400_000_000)
     for words in ("PyTorch 2.13.0 for the CPU and 2 more packages", "0.4 GB to download from files.pythonhosted.org", "1.6 GB on disk",
@@ -64,7 +64,7 @@ def test_a_disk_that_is_too_small_is_known_before_the_download(setup):
     if not bpy.app.online_access:
         pytest.skip("this Blender cannot go online")
     setup("preferences").get().compute = 'cpu'
-    setup("setup.asking")._answers["plan", "cpu"] = plan_of(setup, disk=1 << 60)
+    setup("setup.asking")._answers["plan", "cpu", "pytorch"] = plan_of(setup, disk=1 << 60)
     for click in (bpy.ops.wildcap.install_solver, setup("setup.install").WILDCAP_OT_install_solver.tell):
         with pytest.raises(Exception, match="are needed while the solver is installed"):
             click()

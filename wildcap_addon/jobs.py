@@ -18,7 +18,6 @@ from ..core.messages import Problem
 from ..core.settings import Settings
 from ..core.worker.background import Task
 from ..core.worker.client import Worker
-from ..core.worker.environment import Installation
 from ..core.worker.job import read_job, write_job
 from . import captures, preferences, problems, properties, status, timings
 
@@ -31,7 +30,7 @@ class Job:
     """A worker at a capture, and the last thing it said. `previews` counts the preview pictures so far."""
 
     goal: str  # 'reconstruct', 'solve', 'install', or 'ask' for what is found out or tidied up in seconds
-    worker: Worker | Installation | Task
+    worker: Worker | Task
     then: Callable[[], None] | None = None  # called when it ended well
     well: bool = False
     on_preview: Callable[[str], None] | None = None  # called with the capture's folder when a preview is new, and when the job has ended
@@ -80,7 +79,7 @@ def start(item, goal: str, *, first: str | None = None, last: str | None = None,
     return job
 
 
-def begin(root: str, goal: str, worker: Worker | Installation | Task, then: Callable[[], None] | None = None) -> Job:
+def begin(root: str, goal: str, worker: Worker | Task, then: Callable[[], None] | None = None) -> Job:
     """Starts a worker, or puts it in line behind the one that runs, and listens to it. Raises Problem when it cannot."""
     waiting = root != "" and _busy()
     if not waiting:
@@ -209,5 +208,5 @@ def unregister():
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     for job in [job for job in _jobs.values() if not job.waiting]:
-        (job.worker.cancel if job.goal == "install" else job.worker.terminate)()
+        job.worker.terminate()
     _jobs.clear()

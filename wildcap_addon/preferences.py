@@ -13,6 +13,9 @@ COMPUTES = [('auto', "Automatic", "For the GPU where there is an NVIDIA one or a
             *([('apple', "Apple", "For Apple GPUs, by Metal; the CPU can be chosen as well")] if sys.platform == "darwin" else
               [('cuda', "CUDA", "For NVIDIA GPUs; several times larger")]),
             ('cpu', "CPU", "For the processor alone: the smallest")]
+SOURCES = [('pytorch', "PyTorch and PyPI", "PyTorch from its own package index where PyPI lacks the build for your device, all others from PyPI"),
+           ('pip', "As pip Is Set Up", "All packages from where this machine's pip is set up to look (pip.conf, PIP_INDEX_URL), as with a studio's own index; "
+            "that also decides what its PyTorch computes on")]
 DEVICES = {"cpu": "CPU", "cuda": "CUDA", "mps": "Metal", "": ""}
 _aside: set[str] = set()  # Pythons that were found not to answer, in this session
 
@@ -29,6 +32,7 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
         description="Where Install Solver puts its packages; empty: in the extension's own user folder",
     )
     compute: bpy.props.EnumProperty(name="Compute On", items=COMPUTES, default='auto', description="What Install Solver downloads PyTorch for")
+    packages: bpy.props.EnumProperty(name="Packages From", items=SOURCES, default='pytorch', description="Where Install Solver downloads from")
     device: bpy.props.StringProperty(name="Device", description="What the solver's Python was found to compute on")
     captures: bpy.props.StringProperty(
         name="Captures Folder", subtype='DIR_PATH',
@@ -51,6 +55,7 @@ def draw_solver(layout, preferences) -> None:
     column = layout.column()
     column.use_property_split = True
     column.prop(preferences, "compute")
+    column.prop(preferences, "packages")
     column.prop(preferences, "environment", text="Folder")
     column = layout.column(align=True)
     column.operator("wildcap.install_solver", icon='IMPORT')

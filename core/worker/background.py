@@ -7,14 +7,19 @@ Ground floor: standard library only.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import queue
+import signal
 import subprocess
 import threading
 import time
 from collections.abc import Callable
 
-from ..messages import FINAL, Cancelled, Done, Failed, Message, Problem, Progress
+from ..messages import FINAL, Cancelled, CancelledError, Done, Failed, Message, Problem, Progress
+
+GRACE_S = 1.0
+"""How long a cancelled task's thread may take to end before it is waited for no longer."""
 
 
 class Task:
@@ -26,18 +31,20 @@ class Task:
         self.running = False
         self._work = work
         self._messages: queue.SimpleQueue[Message] = queue.SimpleQueue()
-        self._cancelled = threading.Event()
+        self._cancelled_at: float | None = None
         self._process: subprocess.Popen | None = None
+        self._thread: threading.Thread | None = None
 
     def start(self) -> None:
         self.running = True
-        threading.Thread(target=self._main, name=f"wildcap-{self.name}", daemon=True).start()
+        self._thread = threading.Thread(target=self._main, name=f"wildcap-{self.name}", daemon=True)
+        self._thread.start()
 
     def poll(self) -> list[Message]:
-        """The messages since the last call; the last of all is Done, Cancelled or Failed. After a cancel the thread is waited for no longer."""
-        if self.running and self._cancelled.is_set():
-            self.running = False
-            return [Cancelled(self.name)]
+        """The messages since the last call; the last of all is Done, Cancelled or Failed. After a cancel the thread is waited for a second at most."""
+        if self.running and self._cancelled_at is not None:
+            self.running = self._thread.is_alive() and time.monotonic() - self._cancelled_at < GRACE_S
+            return [] if self.running else [Cancelled(self.name)]
         found = []
         while self.running and not self._messages.empty():
             found.append(self._messages.get())
@@ -45,31 +52,50 @@ class Task:
         return found
 
     def cancel(self) -> None:
-        self._cancelled.set()
-        if self._process is not None and self._process.poll() is None:
-            self._process.kill()
+        self._cancelled_at = self._cancelled_at or time.monotonic()
+        self._kill()
 
     terminate = cancel
 
     def say(self, done: float, of: float, text: str) -> None:
         self._messages.put(Progress(self.name, done, of, text))
 
-    def run(self, command: list) -> tuple[int, str]:
-        """Runs a command; its exit code and the last line it wrote with an error in it. Raises OSError when it cannot be started."""
-        flags = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {}
+    def run(self, command: list, hear: Callable[[str], None] = lambda line: None) -> tuple[int, str]:
+        """Runs a command, each line it writes through `hear`; its exit code and the last line with an error in it. Raises OSError when it cannot be
+        started, and CancelledError where the task is cancelled before or meanwhile."""
+        apart = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {"start_new_session": True}
         environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
         self._process = subprocess.Popen([str(word) for word in command], env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                         stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace", **flags)
-        if self._cancelled.is_set():
-            self._process.kill()
-        lines = self._process.communicate()[0].splitlines()
-        return self._process.returncode, next((line.strip() for line in reversed(lines) if "error" in line.lower()), "")
+                                         stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace", **apart)
+        if self._cancelled_at is not None:
+            self._kill()
+        last_error = ""
+        with self._process.stdout as lines:
+            for line in lines:
+                hear(line)
+                last_error = line.strip() if "error" in line.lower() else last_error
+        code = self._process.wait()
+        if self._cancelled_at is not None:
+            raise CancelledError(self.name)
+        return code, last_error
+
+    def _kill(self) -> None:
+        """Ends the running command and, where the system can, what that has started (venv runs pip's own installer)."""
+        if self._process is None or self._process.poll() is not None:
+            return
+        with contextlib.suppress(OSError):  # it has just ended by itself
+            if os.name == "nt":
+                self._process.kill()
+            else:
+                os.killpg(self._process.pid, signal.SIGKILL)
 
     def _main(self) -> None:
         started = time.monotonic()
         try:
             self.result = self._work(self)
             final = Done(round(time.monotonic() - started, 1))
+        except CancelledError:
+            final = Cancelled(self.name)
         except Problem as problem:
             final = Failed(self.name, problem.problem, problem.remedy)
         except Exception as error:  # a thread has nobody above it: an artist reads problems, not tracebacks

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 from ...core.messages import Problem
-from ...core.worker import environment, index
+from ...core.worker import environment, index, installation
 from .. import jobs, preferences, problems
 from ..base_operator import BaseOperator
 from . import asking
@@ -50,22 +50,23 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
     @staticmethod
     def tell() -> tuple[str, ...] | None:
         require_online()
-        compute, folder = environment.compute_of(preferences.get().compute), preferences.environment_folder()
-        plan = asking.answer(("plan", compute))
+        compute, source, folder = *chosen(), preferences.environment_folder()
+        plan = asking.answer(("plan", compute, source))
         if plan is None:
-            asking.ask(("plan", compute), lambda task: look_up(task, compute), "install_solver")
+            asking.ask(("plan", compute, source), lambda task: look_up(task, compute, source), "install_solver")
             return None
         return told(plan, compute, folder, index.check_space(plan, folder))
 
     def work(self, context):
         require_online()
-        folder, compute = preferences.environment_folder(), environment.compute_of(preferences.get().compute)
-        plan = asking.answer(("plan", compute))
+        compute, source, folder = *chosen(), preferences.environment_folder()
+        plan = asking.answer(("plan", compute, source))
         if plan is not None:
             index.check_space(plan, folder)
-        installation = environment.Installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), compute=compute)
+        task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), compute=compute, source=source,
+                                         packages=len(plan.packages) if plan is not None else 0)
         asking.forget(("size", str(folder)))
-        jobs.begin("", "install", installation, lambda: accept(environment.python_of(folder)))
+        jobs.begin("", "install", task, lambda: accept(environment.python_of(folder)))
 
 
 class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
@@ -105,6 +106,11 @@ def told(plan: index.Plan, compute: str, folder: Path, free: int) -> tuple[str, 
             "You can go on working meanwhile, cancel, and continue later.")
 
 
+def chosen() -> tuple[str, str]:
+    """(compute, source) of the preferences, with what Automatic means here. Raises Problem for what cannot be here."""
+    return installation.compute_of(preferences.get().compute), preferences.get().packages
+
+
 def require_online() -> None:
     """Raises Problem while Blender is told to stay off the network."""
     if not bpy.app.online_access:
@@ -112,10 +118,10 @@ def require_online() -> None:
         raise Problem("Blender is set to work offline.", f"Allow online access{where}, or use a Python that has the packages already.")
 
 
-def look_up(task, compute: str) -> index.Plan:
+def look_up(task, compute: str, source: str) -> index.Plan:
     """The plan of an installation, asked of the package index."""
     task.say(0, 4, "looking for a Python to begin with")
-    return index.plan(environment.base_python(), environment.pip_steps(REQUIREMENTS, compute), task.run, task.say)
+    return index.plan(installation.base_python(), installation.pip_steps(REQUIREMENTS, compute, source), task.run, task.say)
 
 
 def measure(task, folder) -> int:
