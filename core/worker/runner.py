@@ -65,51 +65,32 @@ def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled
         finished = capture.read()["stages"][stage.name]
         emit(StageDone(stage.name, finished["seconds"], True, finished["figures"]))
         return
-    missing = [name for name in stage.reads if not capture.has(name)]
-    if missing:
-        raise Problem(f"The stage {stage.name} needs {missing[0]}, which this capture does not have.", "Run the stages before it first.")
-    emit(Progress(stage.name, 0, 1, "Starting"))
-    with _log_of(capture, stage) as log:
-        reporter = Reporter(stage.name, _logging(emit, log), cancelled)
+    with _at_work(stage, capture, emit, cancelled) as reporter:
         try:
             # Outputs may be half new from here on: until the end, nobody may take them for the recorded result.
             capture.forget([stage.name])
             key = capture.stage_key(stage, settings)
             started = time.monotonic()
-            room = importlib.import_module("." + stage.module.split(".", 1)[1], __package__.rpartition(".")[0])
-            room.run(capture, settings, reporter)
+            _room(stage).run(capture, settings, reporter)
             seconds = time.monotonic() - started
             lost = [name for name in stage.writes if not capture.has(name)]
             if lost:
                 raise RuntimeError(f"the stage {stage.name} ended without writing {lost[0]}")
             capture.finish(stage, key, seconds, settings, reporter.figures, __version__, reporter.findings)
             report.write(capture, settings)
-        except BaseException as error:
-            with contextlib.suppress(OSError):  # the disk may be full; that is said elsewhere
-                traceback.print_exc(file=log)
-            if isinstance(error, Problem):
-                with contextlib.suppress(OSError, Problem):
-                    capture.stop(stage.name, error, reporter.findings)
-                    report.write(capture, settings)
+        except Problem as problem:
+            with contextlib.suppress(OSError, Problem):
+                capture.stop(stage.name, problem, reporter.findings)
+                report.write(capture, settings)
             raise
     emit(StageDone(stage.name, round(seconds, 2), False, reporter.figures))
 
 
 def run_tool(tool: Stage, job: Job, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
     """Runs one of stages.TOOLS and sends its figures. Raises whatever it raises."""
-    capture, started = job.capture, time.monotonic()
-    missing = [name for name in tool.reads if not capture.has(name)]
-    if missing:
-        raise Problem(f"{tool.label} needs {missing[0]}, which this capture does not have.", "Click Reconstruct first.")
-    emit(Progress(tool.name, 0, 1, "Starting"))
-    with _log_of(capture, tool) as log:
-        reporter = Reporter(tool.name, _logging(emit, log), cancelled)
-        try:
-            importlib.import_module("." + tool.module.split(".", 1)[1], __package__.rpartition(".")[0]).run(capture, job.settings, reporter)
-        except BaseException:
-            with contextlib.suppress(OSError):  # the disk may be full; that is said elsewhere
-                traceback.print_exc(file=log)
-            raise
+    started = time.monotonic()
+    with _at_work(tool, job.capture, emit, cancelled) as reporter:
+        _room(tool).run(job.capture, job.settings, reporter)
     emit(StageDone(tool.name, round(time.monotonic() - started, 2), False, reporter.figures))
 
 
@@ -160,6 +141,28 @@ def _check_device(device: str) -> None:
         found = torch.cuda.is_available() if device == "cuda" else torch.backends.mps.is_available()
     if not found:
         raise Problem(f"This machine has no device {device} that torch can use.", "Choose cpu, or see what `python -m core doctor` says.")
+
+
+@contextlib.contextmanager
+def _at_work(step: Stage, capture: Capture, emit: Callable[[Message], None], cancelled: Callable[[], bool]):
+    """The reporter of a stage or tool; what is printed meanwhile, and the traceback of what stops it, go to its log. Raises Problem where an input is
+    missing."""
+    missing = [name for name in step.reads if not capture.has(name)]
+    if missing:
+        raise Problem(f"{step.label} needs {missing[0]}, which this capture does not have.", "Run the stages before it first: click Reconstruct.")
+    emit(Progress(step.name, 0, 1, "Starting"))
+    with _log_of(capture, step) as log:
+        try:
+            yield Reporter(step.name, _logging(emit, log), cancelled)
+        except BaseException:
+            with contextlib.suppress(OSError):  # the disk may be full; that is said elsewhere
+                traceback.print_exc(file=log)
+            raise
+
+
+def _room(step: Stage):
+    """The module that does a stage's or tool's work; importing it may take seconds."""
+    return importlib.import_module("." + step.module.split(".", 1)[1], __package__.rpartition(".")[0])
 
 
 @contextlib.contextmanager

@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The solver installed for real, by the add-on's own operators, to its end: minutes and gigabytes, so only with WILDCAP_REAL_INSTALLATION=pip
+(from where this machine's pip is set up to look) or =pytorch (from PyTorch's own index). Run it with -s: it prints its figures."""
+
+import os
+import subprocess
+import time
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+SOURCE = os.environ.get("WILDCAP_REAL_INSTALLATION", "")
+
+pytestmark = pytest.mark.skipif(SOURCE not in ("pip", "pytorch"), reason="installs gigabytes: WILDCAP_REAL_INSTALLATION=pip or =pytorch runs it")
+
+
+@pytest.fixture
+def solver(addon, tmp_path):
+    """The folder the solver goes to, with spaces and accents."""
+    preferences = addon("preferences").get()
+    preferences.environment, preferences.packages, preferences.compute = str(tmp_path / "Löser für Zoë" / "le solveur"), SOURCE, 'cpu'
+    preferences.captures = str(tmp_path / "Köpfe")
+    bpy.context.preferences.system.use_online_access = True
+    yield addon("preferences").environment_folder()
+    addon("preferences").set_python(None)
+    preferences.environment, preferences.packages, preferences.captures = "", 'pytorch', ""
+    bpy.context.preferences.system.use_online_access = False
+
+
+def follow(jobs, until=lambda job: False, limit_s: float = 1800) -> float:
+    """Polls to the jobs' end or until the set-up's job is as wanted; the seconds it took."""
+    started = time.monotonic()
+    while jobs.poll() and not (jobs.of("") and until(jobs.of(""))):
+        assert time.monotonic() - started < limit_s
+        time.sleep(0.05)
+    return time.monotonic() - started
+
+
+def test_from_the_question_through_a_cancel_to_a_solve_and_removed_again(addon, solver):
+    jobs, install, problems, checking = addon("jobs"), addon("setup.install"), addon("problems"), addon("setup.checking")
+    if not bpy.app.online_access:
+        pytest.skip("this Blender cannot go online")
+    assert install.WILDCAP_OT_install_solver.tell() is None
+    asking_s = follow(jobs)
+    assert problems.of("") is None, problems.of("")
+    told = install.WILDCAP_OT_install_solver.tell()
+    plan = addon("setup.asking").answer(("plan", 'cpu', SOURCE))
+
+    bpy.ops.wildcap.install_solver()
+    follow(jobs, lambda job: job.progress is not None and job.progress.done >= 8)
+    bpy.ops.wildcap.cancel()
+    cancel_s = follow(jobs)
+    assert problems.of("").problem == "Cancelled." and cancel_s < 2 and addon("preferences").python() is None
+    begun = (solver / "pyvenv.cfg").stat().st_mtime_ns
+
+    bpy.ops.wildcap.install_solver()
+    install_s = follow(jobs)
+    log = solver.with_name(f"{solver.name}.log").read_text(encoding="utf-8")
+    assert problems.of("") is None, (problems.of(""), log[-2000:])
+    assert (solver / "pyvenv.cfg").stat().st_mtime_ns == begun, "the second installation continues the first"
+    python = addon("preferences").python()
+    assert python is not None and solver in python.parents
+    while checking.look() is not None:
+        time.sleep(0.05)
+    assert addon("preferences").python() == python and addon("preferences").get().device == "cpu", problems.of("")
+    doctor = subprocess.run([python, "-m", "core", "doctor"], cwd=jobs.ROOT, capture_output=True, text=True)
+    assert doctor.returncode == 0 and "Nothing is missing." in doctor.stdout, doctor.stdout
+
+    bpy.ops.wildcap.open_sample_head()
+    item = bpy.context.scene.wildcap.captures[-1]
+    item.quality = 'draft'
+    item.solve.size, item.solve.steps, item.upscale.size, item.transfer.size, item.transfer.scan = 128, 6, 1024, 256, False
+    bpy.ops.wildcap.solve()
+    solve_s = follow(jobs)
+    capture = addon("captures").folder(item)
+    assert problems.of(str(capture.root)) is None and capture.read()["stages"]["solve"]["settings"]["steps"] == 6
+
+    assert install.WILDCAP_OT_remove_solver.tell() is None
+    follow(jobs)
+    size, freed = addon("setup.asking").answer(("size", str(solver))), install.WILDCAP_OT_remove_solver.tell()
+    bpy.ops.wildcap.remove_solver()
+    remove_s = follow(jobs)
+    assert not solver.exists() and addon("preferences").python() is None and problems.of("") is None
+    print(*told, *freed, sep="\n")
+    print(f"told {plan.disk / 1e9:.2f} GB on disk, found {size / 1e9:.2f} GB; {len(plan.packages)} packages; asked in {asking_s:.0f} s, cancelled in "
+          f"{cancel_s:.1f} s, installed and verified in {install_s:.0f} s, a draft solved in {solve_s:.0f} s, removed in {remove_s:.0f} s")
+    assert size == pytest.approx(plan.disk, rel=0.2)
