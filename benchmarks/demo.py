@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The whole chain on the sample video, from nothing to a relit head, and its score against the known truth.
 
-    python -m benchmarks.demo FOLDER [--quality draft|standard|full]
+    python -m benchmarks.demo FOLDER [--quality draft|standard|film]
 
 Exit code 1 when the result does not beat both the raw video and the flat true tone. What is finished is not done twice.
 """

@@ -149,11 +149,11 @@ class Settings:
     transfer: TransferSettings = field(default_factory=TransferSettings)
 
 
-QUALITIES = ("draft", "standard", "full")
+QUALITIES = ("draft", "standard", "film")
 _PRESETS = {
     "draft": {"solve": {"size": 512, "steps": 30, "guidance": "proximal"}, "scan": {"pairs": 16}},
     "standard": {},
-    "full": {"scan": {"pairs": 48}},
+    "film": {"scan": {"pairs": 48}},
 }
 
 

@@ -75,12 +75,12 @@ def test_run_until_then_on_then_status(tiny, capture, film):
 
 
 def test_options_reach_the_stages(tiny, capture, film, tmp_path):
-    core("run", film, capture.root, "--skin-tone", "0.6,0.5,0.4", "--delighter", "folder", "--folder", tmp_path, "--seed", "7", "--quality", "full",
+    core("run", film, capture.root, "--skin-tone", "0.6,0.5,0.4", "--delighter", "folder", "--folder", tmp_path, "--seed", "7", "--quality", "film",
          "--prior", tmp_path, cwd=tiny)
     record = capture.read()["stages"]
     assert record["solve"]["settings"]["prior"] == str(tmp_path)
     assert record["solve"]["settings"]["skin_tone"] == "0.6,0.5,0.4" and record["solve"]["seed"] == 7
-    assert record["solve"]["settings"]["steps"] == preset("full").solve.steps
+    assert record["solve"]["settings"]["steps"] == preset("film").solve.steps
     assert record["delight"]["settings"] == {"delighter": "folder", "folder": str(tmp_path)}
 
 

@@ -208,6 +208,9 @@ def test_the_worker_steps_back_behind_blender(root, capture, video):
     worker = start(root, capture, {"frames": "slow"}, source=video)
     follow(worker, until=lambda m: isinstance(m, Progress))
     assert os.getpriority(os.PRIO_PROCESS, worker._process.pid) > os.getpriority(os.PRIO_PROCESS, 0)
+    group = Path(f"/proc/{worker._process.pid}/autogroup")
+    if group.exists():  # Linux shares the processor between sessions before it looks at nice values
+        assert int(group.read_text().split()[-1]) > 0
     environment = Path(f"/proc/{worker._process.pid}/environ")
     if environment.exists():
         assert b"OMP_NUM_THREADS=" in environment.read_bytes()

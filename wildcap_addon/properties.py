@@ -12,6 +12,7 @@ import bpy
 
 from ..core import settings as core_settings
 from ..core import stages
+from . import preferences
 
 STAGE_KINDS = {stage.name: type(getattr(core_settings.Settings(), stage.name)) for stage in stages.STAGES}
 
@@ -65,11 +66,12 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
     head: bpy.props.PointerProperty(name="Head", type=bpy.types.Object, description="The head object of this capture")
     quality: bpy.props.EnumProperty(
         name="Quality", items=[(q, q.title(), "") for q in core_settings.QUALITIES], default="standard", update=_apply_quality,
-        description="A set of settings: draft to look, standard to work, full to deliver",
+        description="A set of settings: draft to look, standard to work, film to deliver",
     )
     device: bpy.props.EnumProperty(
-        name="Device", items=[("cpu", "CPU", ""), ("cuda", "CUDA", ""), ("mps", "Metal", "")], default="cpu",
-        description="Where the solver computes",
+        name="Device", default="auto", description="Where the solver computes",
+        items=[("auto", "Automatic", "What the solver's Python was found to compute on when it was set up"), ("cpu", "CPU", ""), ("cuda", "CUDA", ""),
+               ("mps", "Metal", "")],
     )
     seed: bpy.props.IntProperty(name="Seed", min=0, default=0, description="The same seed gives the same maps")
     use_skin_tone: bpy.props.BoolProperty(
@@ -113,7 +115,12 @@ def values(item: WILDCAP_PG_capture) -> dict:
     for stage, name in (("cameras", "import_from"), ("delight", "folder"), ("registration", "template"), ("solve", "prior")):
         if found[stage][name]:
             found[stage][name] = str(Path(bpy.path.abspath(found[stage][name])))
-    return {**found, "seed": item.seed, "device": item.device}
+    return {**found, "seed": item.seed, "device": device(item)}
+
+
+def device(item: WILDCAP_PG_capture) -> str:
+    """'cpu', 'cuda' or 'mps': the capture's own choice, else what the solver's Python computes on."""
+    return item.device if item.device != "auto" else preferences.get().device or "cpu"
 
 
 def settings(item: WILDCAP_PG_capture) -> core_settings.Settings:

@@ -8,6 +8,7 @@ file. stdin brings the line `cancel`; its end means that whoever started the wor
 
 from __future__ import annotations
 
+import contextlib
 import faulthandler
 import os
 import signal
@@ -18,18 +19,32 @@ from pathlib import Path
 from ..messages import Message, to_line
 from .runner import run_job
 
+PRIORITY = 15
+"""Nice value: beside a Blender that wants all of the processor, the worker gets a thirtieth of it."""
+
 
 def main() -> None:
     emit = _take_stdout()
     cancelled = threading.Event()
     threading.Thread(target=_listen, args=(cancelled,), name="control", daemon=True).start()
     if os.name == "posix":
-        os.nice(5)
+        _step_back()
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the starter's to translate
     faulthandler.enable(2)
     emit(run_job(Path(sys.argv[1]), emit, cancelled.is_set))
     # Not sys.exit: tearing down torch and its threads takes seconds and can only go wrong.
     os._exit(0)
+
+
+def _step_back() -> None:
+    """Lowers the priority, so that whatever the artist does in Blender comes first; an idle Blender costs the worker nothing.
+
+    Linux desktops share the processor between sessions first (sched(7), "The autogroup feature"). A worker is a session of its own, so its
+    nice value alone says nothing to Blender: that of its group does.
+    """
+    os.nice(PRIORITY)
+    with contextlib.suppress(OSError), open("/proc/self/autogroup", "w", encoding="ascii") as group:  # only there on such a Linux
+        group.write(str(PRIORITY))
 
 
 def _take_stdout():

@@ -5,7 +5,7 @@
 import bpy
 
 from ...core import stages
-from .. import captures, jobs, timings
+from .. import captures, jobs, properties, timings
 from ..base_panel import CapturePanel, WildcapPanel, draw_settings
 from . import preview
 
@@ -33,7 +33,7 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         layout.use_property_split = True
         item = captures.active(context)
         layout.prop(item, "quality")
-        times = timings.words(item.device)
+        times = timings.words(properties.device(item))
         if times:
             layout.label(text=times, icon='TIME')
         row = layout.row(align=True)
