@@ -107,6 +107,7 @@ class Capture:
         self.delit = self.root / "delit"
         self.texture = self.root / "texture.exr"
         self.texture_png = self.root / "texture.png"
+        self.texture_filmed = self.root / "texture_filmed.png"
         self.texture_confidence = self.root / "texture_confidence.exr"
         self.shadow_mask_auto = self.root / "shadow_mask_auto.png"
         self.shadow_mask = self.root / "shadow_mask.png"
@@ -117,6 +118,7 @@ class Capture:
         self.solved = self.maps / "solved.safetensors"  # what a later solve of an edited part goes on from
         self.maps_4k = self.root / "maps_4k"
         self.delivery = self.root / "delivery"
+        self.comparison = self.root / "comparison"
         self.preview = self.root / "preview"
         self.checkpoints = self.root / "checkpoints"
         self.logs = self.root / "logs"

@@ -43,7 +43,7 @@ STAGES = (
     Stage("shadow_mask", "Shadow Mask", ("delit/", "cameras/", "head.obj", "texture.exr", "texture_confidence.exr"), ("shadow_mask_auto.png",),
           "core.shadow_mask"),
     Stage("solve", "Solve", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
-          tuple(f"maps/{name}" for name in MAPS), "core.solve", wishes=("shadow_mask.png", "protect_mask.png", "frames/", "cameras/", "delit/"),
+          tuple(f"maps/{name}" for name in MAPS), "core.solve", wishes=("shadow_mask.png", "protect_mask.png", "texture_filmed.png", "frames/", "cameras/", "delit/"),
           shared=("seed",), data=("weights/prior.safetensors",)),
     Stage("upscale", "4K Maps", tuple(f"maps/{name}" for name in MAPS), tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale"),
     Stage("transfer", "Delivery", ("head.obj", *(f"maps/{name}" for name in MAPS)), ("delivery/",), "core.transfer",

@@ -40,10 +40,11 @@ def skin(size: int, seed: int = 0) -> np.ndarray:
     return np.clip(tone * np.exp(0.15 * noise(6) + 0.08 * noise(size // 4)), 0.02, 0.9).astype(np.float32)
 
 
-def capture_of(root, texture: np.ndarray, azimuths_deg, distort=lambda i, picture: picture) -> Capture:
+def capture_of(root, texture: np.ndarray, azimuths_deg, distort=lambda i, picture: picture, light=None) -> Capture:
     """A capture up to the delit frames: one camera per azimuth (0 in front, positive on the person's left), at eye height.
 
-    `distort(i, picture)` changes the linear picture of camera i before it is stored.
+    `distort(i, picture)` changes the linear picture of camera i before it is stored. With `light` (texture-like, linear), which falls on the paint,
+    the frames that were filmed are there too.
     """
     capture, mesh = Capture(root), egg()
     names = [f"{i:05d}.jpg" for i in range(len(azimuths_deg))]
@@ -54,6 +55,8 @@ def capture_of(root, texture: np.ndarray, azimuths_deg, distort=lambda i, pictur
     meshes.write_obj(capture.head, mesh)
     caster = raster.RayCaster(mesh)
     for i, view in enumerate(read_views(capture)):
+        if light is not None:
+            images.write_srgb(view.path, images.linear_to_srgb(photograph(caster, view, texture * light)), quality=98)
         images.write_srgb((capture.delit / view.name).with_suffix(".png"), images.linear_to_srgb(distort(i, photograph(caster, view, texture))), 16)
     return capture
 

@@ -51,6 +51,19 @@ def test_solve_writes_all_maps_of_the_asked_tone(capture):
     json.dumps(report.figures)
 
 
+def test_what_the_solve_is_compared_with_has_the_albedos_exposure(capture):
+    """The delit and the filmed texture in comparison/, whatever exposure they came in: the facial skin is as bright on average, its light still there."""
+    texture = images.read_linear(capture.texture)
+    images.write_srgb(capture.texture_filmed, images.linear_to_srgb(0.5 * texture))
+    solve.run(capture, settings(steps=4), Reporter("solve"))
+    skin = template.mask("skin", SIZE) * (1 - template.mask("eyes", SIZE))
+    luminance = {name: images.read_linear(path) @ np.float32([0.2126, 0.7152, 0.0722]) for name, path in (
+        ("albedo", capture.maps / "diffuse_albedo.exr"), ("delit", capture.comparison / "delit.png"), ("filmed", capture.comparison / "filmed.png"))}
+    means = {name: float(np.average(values, weights=skin)) for name, values in luminance.items()}
+    assert abs(means["delit"] / means["albedo"] - 1) < 0.03 and abs(means["filmed"] / means["albedo"] - 1) < 0.03, means
+    assert np.corrcoef(luminance["filmed"].ravel(), texture.mean(-1).ravel())[0, 1] > 0.99
+
+
 @pytest.mark.parametrize(("factor", "asked"), [(1.4, 1.0), (0.7, 0.7), (1.4, 1.4)])
 def test_the_tone_is_the_users_whatever_the_exposure_and_the_skin(capture, factor, asked):
     """The same light on a skin of another albedo and that tone asked for; or only another exposure."""

@@ -48,6 +48,17 @@ def test_the_paint_comes_back_where_it_was_seen(tmp_path, painted):
     assert np.isfinite(found).all() and found.min() > 0, "holes are filled"
 
 
+def test_the_filmed_texture_is_the_delit_one_with_its_light(tmp_path, painted):
+    across = np.linspace(0.4, 1.6, SIZE, dtype=np.float32)
+    light = np.stack([np.broadcast_to(across, (SIZE, SIZE)), np.full((SIZE, SIZE), 0.7), np.broadcast_to(across[:, None], (SIZE, SIZE))], -1)
+    capture = capture_of(tmp_path / "lit", painted, (-40, 0, 40), light=light.astype(np.float32))
+    found, confidence, _ = textured(capture)
+    sure = confidence > 0.6
+    seen = images.read_linear(capture.texture_filmed) / found
+    assert np.median(np.abs(np.log(seen / light))[sure]) < 0.03
+    assert np.corrcoef(seen[sure][:, 0], light[sure][:, 0])[0, 1] > 0.97
+
+
 def test_what_no_view_saw_has_no_confidence(tmp_path, painted):
     capture = capture_of(tmp_path / "left", painted, (40, 60, 80))
     found, confidence, _ = textured(capture)

@@ -20,7 +20,7 @@ from ..capture import Capture
 from ..hashes import hash_tree
 from ..messages import Reporter
 from ..settings import Settings, deciding
-from . import checkpoint, drawing, initial, layout, maps
+from . import checkpoint, comparison, drawing, initial, layout, maps
 from .checkpoint import Solution
 from .confidence import spread
 from .draft import restored
@@ -44,7 +44,7 @@ mean one; on raw light every pull costs. Chosen on one head scan, so to be confi
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """texture, confidence, head and masks -> maps/ (see maps.py for their colour spaces), preview/, and two pictures for the report.
+    """texture, confidence, head and masks -> maps/ (see maps.py for their colour spaces), comparison/, preview/, and two pictures for the report.
 
     The artist's mask wins over the proposal. Continues from its own checkpoint. With settings.edited_part only what a mask edit touched is solved again,
     where that can be done (edited.py). Raises Problem for unusable inputs and for divergence.
@@ -94,6 +94,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     result, found = _finished(prior, state, evidence, start, recipe, settings.seed, report)
     delivered = result if elsewhere is None else elsewhere.returned(result, known, state.lights, start.exposure, start.tone)
     maps.write(capture, delivered, found, conditions)
+    comparison.write(capture, known, delivered.diffuse)
     maps.write_preview(capture, state, seen, report)
     _leave_figures(capture, evidence, result, start.tone, report)
     stored.unlink(missing_ok=True)

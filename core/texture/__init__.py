@@ -22,12 +22,15 @@ from ..views import read_views
 from .align import align
 from .blend import bands_of, blend, equalise, robust_weights
 from .fill import fill
+from .filmed import filmed
 from .foreign import clothes, leave_out_background
 from .projection import Observation, Surface, observe
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """delit/, cameras/, head.obj -> texture.exr (linear), texture.png (sRGB), texture_confidence.exr [S, S] in [0, 1].
+    """delit/, cameras/, head.obj -> texture.exr (linear), texture.png (sRGB), texture_confidence.exr [S, S] in [0, 1],
+    and texture_filmed.png (sRGB), the same with the light
+    in it, where the frames are still there.
 
     Raises Problem where no view was delit or none of them sees the head.
     """
@@ -44,6 +47,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     images.write_srgb(capture.texture_png, images.linear_to_srgb(texture))
     images.write_data(capture.texture_confidence, built.confidence)
     _leave_figures(capture, report, observations, built, texture, surface.covered)
+    lit = filmed(observations, report)
+    if lit is not None:
+        images.write_srgb(capture.texture_filmed, images.linear_to_srgb(fill(lit, built.confidence, surface.covered)))
 
 
 @dataclass
@@ -65,12 +71,12 @@ def observe_all(capture: Capture, head: meshes.Mesh, size: int, report: Reporter
     if not views:
         raise Problem("There is no delit frame of a registered view.",
                       "Run the stage delight, or put pictures named like the frames into the delighter's folder.")
-    report.progress(0, len(views) + 4, "unfolding the head")
+    report.progress(0, len(views) + 6, "unfolding the head")
     surface = Surface.of(head, size)
     best = max(sharpness[view.name] for view, _ in views) or 1.0
     observations = []
     for i, (view, path) in enumerate(views):
-        report.progress(i, len(views) + 4, f"projecting {view.name}")
+        report.progress(i, len(views) + 6, f"projecting {view.name}")
         observations.append(observe(view, images.read_linear(path), surface, sharpness[view.name] / best))
     return observations, surface
 

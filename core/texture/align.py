@@ -30,12 +30,12 @@ def align(observations: list[Observation], surface: Surface, report: Reporter) -
     size = len(surface.covered)
     start = [raster.bleed(o.pixels, surface.covered) for o in observations]
     warps = [np.zeros((size, size, 2), np.float32) for _ in observations]
-    total = len(observations) + 4
+    total = len(observations) + 6
     for step in range(ROUNDS):
         details = [_detail(o) for o in observations]
         consensus = weighted_mean(details, [o.weight ** 3 for o in observations])
         for i, observation in enumerate(observations):
-            report.progress(total - 4 + (step * len(observations) + i) / len(observations), total, f"aligning {observation.name}")
+            report.progress(total - 6 + (step * len(observations) + i) / len(observations), total, f"aligning {observation.name}")
             warps[i] += _flow(consensus, details[i], observation.weight)
         drift = weighted_mean(warps, [o.weight for o in observations])
         for warp, pixels, observation in zip(warps, start, observations, strict=True):

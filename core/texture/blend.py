@@ -62,14 +62,14 @@ def robust_weights(observations: list[Observation], tolerance: float = 0.10) -> 
         o.weight = o.weight * cv2.resize(factor, o.weight.shape[::-1], interpolation=cv2.INTER_LINEAR)
 
 
-def blend(observations: list[Observation], report: Reporter) -> np.ndarray:
-    """One log texture [S, S, 3]; zero weight everywhere leaves zeros."""
-    total = len(observations) + 4
+def blend(observations: list[Observation], report: Reporter, what: str = "delit", done: int = 2) -> np.ndarray:
+    """One log texture [S, S, 3]; zero weight everywhere leaves zeros. What is blended, and how much
+    was `done` before, are for the progress."""
     sums, norms = [0.0] * len(BANDS), [0.0] * len(BANDS)
     largest = np.maximum(np.max([o.weight for o in observations], axis=0), 1e-12)
     scale = len(largest) / 1024
     for i, o in enumerate(observations):
-        report.progress(total - 2 + 2 * i / len(observations), total, f"blending {o.name}")
+        report.progress(len(observations) + done + 2 * i / len(observations), len(observations) + 6, f"blending {o.name}, {what}")
         seen = o.weight > 0
         for band, (values, (reach, exponent)) in enumerate(zip(bands_of(o.log_colour, seen), BANDS, strict=True)):
             weight = (o.weight / largest) ** exponent

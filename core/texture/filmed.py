@@ -1,0 +1,24 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The texture as it was filmed, to compare with: the frames themselves in the place of the delit ones, from the same views with the same weights and warps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import images
+from ..messages import Reporter
+from .blend import blend
+from .projection import Observation, log_colours
+
+
+def filmed(observations: list[Observation], report: Reporter) -> np.ndarray | None:
+    """Linear [S, S, 3] with the light in it, in the frames' exposure; 1 where no view sees anything. Changes the observations' colours.
+    None where a frame is gone: it is only looked at."""
+    if not all(o.view.path.is_file() for o in observations):
+        return None
+    for o in observations:
+        frame = images.read_linear(o.view.path)
+        scale = np.float32([frame.shape[1] / o.picture.shape[1], frame.shape[0] / o.picture.shape[0]])  # a delighter may give another size
+        o.log_colour = log_colours(frame, o.pixels * scale)
+    return np.exp(blend(observations, report, "as filmed", 4))
