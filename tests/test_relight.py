@@ -85,3 +85,55 @@ def test_a_render_is_written_and_the_scene_is_untouched(addon, capture):
 def test_headless_renders_through_the_same_functions(addon, capture):
     paths = addon("relight.headless").render_relit(capture, ("sun",), resolution=32, samples=1)
     assert paths == [capture / "renders" / "sun.png"] and paths[0].stat().st_size > 500
+
+
+def test_the_surroundings_of_a_picture_light_the_head_and_turn_with_their_rotation(addon, capture, tmp_path):
+    """A panorama that is bright towards +X alone: the head's left, at the right of the picture; a quarter turn clockwise it is before the face, half a
+    turn its other side is lit, a quarter turn counter-clockwise it is behind."""
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.assemble_material()
+    panorama = bpy.data.images.new("side", 64, 32, float_buffer=True)
+    pixels = np.zeros((32, 64, 4), np.float32)
+    pixels[8:24, 24:40, :3] = 3.0  # the middle of a panorama is +X
+    panorama.pixels.foreach_set(pixels.ravel())
+    panorama.file_format, panorama.filepath_raw = 'OPEN_EXR', str(tmp_path / "side.exr")
+    panorama.save()
+    props = bpy.context.scene.wildcap
+    props.light, props.hdri_file, props.resolution, props.samples = 'hdri', str(tmp_path / "side.exr"), 48, 4
+    sides, whole = [], []
+    for rotation in (0.0, np.pi, -np.pi / 2, np.pi / 2):
+        props.hdri_rotation = rotation
+        bpy.ops.wildcap.render()
+        image = bpy.data.images.load(str(capture / "renders" / "side.png"))
+        pixels = np.array(image.pixels[:]).reshape(48, 48, 4)[16:32, :, :3].mean((0, 2))
+        sides.append(pixels[26:34].mean() / pixels[14:22].mean())
+        whole.append(pixels[14:34].mean())
+    assert sides[0] > 1.5 and sides[1] < 1 / 1.5, sides
+    assert whole[2] > max(whole[0], whole[1]) > 2 * whole[3], whole
+    props.hdri_file = str(tmp_path / "gone.exr")
+    with pytest.raises(RuntimeError, match="There is no picture at"):
+        bpy.ops.wildcap.render()
+    props.hdri_file = ""
+    assert addon("hdri").chosen(props).path.is_file(), "one of Blender's own worlds"
+    assert len(bpy.data.scenes["WildCap Relight"].world.node_tree.nodes) == 5
+
+
+def test_filmed_delit_and_solved_are_shown_in_the_same_material(addon, capture):
+    bpy.ops.wildcap.bring_in_head()
+    with pytest.raises(RuntimeError, match="Assemble Material"):
+        bpy.ops.wildcap.compare(show='FILMED')
+    bpy.ops.wildcap.assemble_material()
+    compare, lines = addon("relight.compare"), addon("relight.material").as_text
+    tree = bpy.context.view_layer.objects.active.data.materials[0].node_tree
+    solved = lines(tree)
+    with pytest.raises(RuntimeError, match="no filmed.png"):
+        bpy.ops.wildcap.compare(show='FILMED')
+    (capture / "comparison").mkdir()
+    for name in ("filmed.png", "delit.png"):
+        (capture / "comparison" / name).write_bytes((capture / "texture.png").read_bytes())
+    for kind, name in (('FILMED', "filmed.png"), ('DELIT', "delit.png")):
+        bpy.ops.wildcap.compare(show=kind)
+        assert compare.shown(bpy.context) == kind
+        assert lines(tree) == sorted(line.replace("diffuse_albedo.png", name) for line in solved)
+    bpy.ops.wildcap.compare(show='SOLVED')
+    assert compare.shown(bpy.context) == 'SOLVED' and lines(tree) == solved

@@ -12,6 +12,7 @@ import bpy
 
 from ..core import settings as core_settings
 from ..core import stages
+from . import hdri as worlds
 from . import preferences
 
 STAGE_KINDS = {stage.name: type(getattr(core_settings.Settings(), stage.name)) for stage in stages.STAGES}
@@ -94,9 +95,13 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
     light: bpy.props.EnumProperty(
         name="Light", default='studio',
         items=[('studio', "Studio", "Key, fill and rim from three soft boxes"), ('sun', "Sun", "A low sun under a clear sky"),
-               ('window', "Window", "One large window from the side")],
+               ('window', "Window", "One large window from the side"), ('hdri', "HDRI", "The surroundings of a panoramic picture")],
         description="The light for Render",
     )
+    hdri: bpy.props.EnumProperty(name="Surroundings", items=worlds.items, description="Blender's own worlds, and those installed in its preferences (Lights)")
+    hdri_file: bpy.props.StringProperty(name="Own File", subtype='FILE_PATH', description="A panoramic HDR picture of your own; it comes before the one above")
+    hdri_rotation: bpy.props.FloatProperty(name="Rotation", subtype='ANGLE', description="Turns the surroundings about the head, counter-clockwise from above")
+    hdri_strength: bpy.props.FloatProperty(name="Strength", min=0, soft_max=4, default=1, description="How bright the surroundings are")
     shadow_tint: bpy.props.FloatVectorProperty(
         name="Shadow Tint", subtype='COLOR', size=3, min=0, max=1, default=(1.0, 0.0, 0.0), description="Colour in which the shadow mask is shown",
     )

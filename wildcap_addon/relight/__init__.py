@@ -4,9 +4,9 @@
 
 import bpy
 
-from . import operators, panel, picture
+from . import compare, operators, panel, picture
 
-_register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *panel.CLASSES))
+_register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *compare.CLASSES, *panel.CLASSES))
 
 
 def register():

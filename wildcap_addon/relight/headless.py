@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 
 from .. import captures, head
+from ..hdri import Hdri
 from . import lights, material, picture
 
 
@@ -21,11 +22,11 @@ def render_relit(capture_folder: Path, presets: Iterable[str] = tuple(lights.PRE
     item = captures.add(context, Path(capture_folder).absolute())
     obj = head.bring_in(context, item)
     material.assemble(context, item)
-    return [render_preset(obj, captures.folder(item).renders, preset, resolution, samples) for preset in presets]
+    return [render_light(obj, captures.folder(item).renders, preset, resolution, samples) for preset in presets]
 
 
-def render_preset(obj, folder: Path, preset: str, resolution: int, samples: int, wait: bool = True) -> Path:
-    """One light: folder/PRESET.png."""
-    path = folder / f"{preset}.png"
-    picture.render(picture.set_up(obj, preset, resolution, samples), path, wait)
+def render_light(obj, folder: Path, light: str | Hdri, resolution: int, samples: int, wait: bool = True) -> Path:
+    """One light: folder/PRESET.png, or that of the surroundings' picture."""
+    path = folder / f"{light if isinstance(light, str) else light.path.stem}.png"
+    picture.render(picture.set_up(obj, light, resolution, samples), path, wait)
     return path

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Three lights for a first look at a head. Built in a scene of their own, around a head of any place, turn and size.
+"""Lights for a first look at a head: three of lamps, or the surroundings of a picture. Built in a scene of their own, around a head of any place,
+turn and size.
 
 Directions are the head's: +X its left, -Y where it looks, +Z up. Distances are in head radii, powers are for a head of the reference radius.
 """
@@ -10,6 +11,8 @@ from math import radians
 
 import bpy
 from mathutils import Matrix, Vector
+
+from ..hdri import Hdri, light_with
 
 REFERENCE_RADIUS_M = 0.15
 
@@ -44,13 +47,17 @@ PRESETS = {
 }
 
 
-def build(scene: bpy.types.Scene, preset: str, frame: Matrix, radius: float) -> None:
-    """Replaces the lamps and the world of `scene`. `frame` [4, 4] is the head's place without scale, `radius` its size in scene units."""
+def build(scene: bpy.types.Scene, light: str | Hdri, frame: Matrix, radius: float) -> None:
+    """Replaces the lamps and the world of `scene` by those of a preset or of a picture. `frame` [4, 4] is the head's place without scale, `radius` its
+    size in scene units."""
     for obj in [o for o in scene.objects if o.type == 'LIGHT']:
         bpy.data.lights.remove(obj.data)  # takes its object along
-    for lamp in PRESETS[preset].lamps:
+    preset = PRESETS[light] if isinstance(light, str) else Preset((), (0.0, 0.0, 0.0))
+    for lamp in preset.lamps:
         scene.collection.objects.link(_lamp(lamp, frame, radius))
-    scene.world = _world(PRESETS[preset].world)
+    scene.world = _world(preset.world)
+    if isinstance(light, Hdri):
+        light_with(scene.world, light, frame.to_euler().z)
 
 
 def _lamp(lamp: Lamp, frame: Matrix, radius: float) -> bpy.types.Object:
@@ -71,6 +78,8 @@ def _lamp(lamp: Lamp, frame: Matrix, radius: float) -> bpy.types.Object:
 def _world(colour: tuple[float, float, float]) -> bpy.types.World:
     world = bpy.data.worlds.get("WildCap Relight") or bpy.data.worlds.new("WildCap Relight")
     world.use_nodes = True
+    for node in [n for n in world.node_tree.nodes if n.type not in ('BACKGROUND', 'OUTPUT_WORLD')]:
+        world.node_tree.nodes.remove(node)
     background = next(n for n in world.node_tree.nodes if n.type == 'BACKGROUND')
     background.inputs["Color"].default_value = (*colour, 1.0)
     background.inputs["Strength"].default_value = 1.0

@@ -4,7 +4,7 @@
 
 import bpy
 
-from .. import captures
+from .. import captures, hdri
 from ..base_operator import BaseOperator
 from . import headless, material
 
@@ -37,8 +37,9 @@ class WILDCAP_OT_render(BaseOperator, bpy.types.Operator):
     def work(self, context):
         item = captures.require(context)
         props = context.scene.wildcap
-        headless.render_preset(captures.require_head(context, item), captures.folder(item).renders, props.light, props.resolution, props.samples,
-                               wait=bpy.app.background)
+        light = hdri.chosen(props) if props.light == 'hdri' else props.light
+        headless.render_light(captures.require_head(context, item), captures.folder(item).renders, light, props.resolution, props.samples,
+                              wait=bpy.app.background)
 
 
 CLASSES = (WILDCAP_OT_assemble_material, WILDCAP_OT_render)

@@ -13,6 +13,7 @@ import bpy
 from mathutils import Matrix, Vector
 
 from ...core.capture import storage_problem
+from ..hdri import Hdri
 from . import lights
 
 SCENE = "WildCap Relight"
@@ -20,14 +21,14 @@ CAMERA_DIRECTION = (-0.28, -1.0, 0.05)
 FOCAL_LENGTH_MM = 85.0
 
 
-def set_up(obj: bpy.types.Object, preset: str, resolution: int, samples: int) -> bpy.types.Scene:
+def set_up(obj: bpy.types.Object, light: str | Hdri, resolution: int, samples: int) -> bpy.types.Scene:
     """The relight scene with this head alone in it, framed and lit."""
     scene = bpy.data.scenes.get(SCENE) or bpy.data.scenes.new(SCENE)
     for other in [o for o in scene.collection.objects if o.type not in ('CAMERA', 'LIGHT')]:
         scene.collection.objects.unlink(other)
     scene.collection.objects.link(obj)
     frame, radius = frame_of(obj)
-    lights.build(scene, preset, frame, radius)
+    lights.build(scene, light, frame, radius)
     _camera(scene, frame, radius)
     render = scene.render
     render.engine = 'CYCLES'

@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light from a picture of the surroundings (HDRI): one of Blender's own worlds, one installed in the preferences' lights, or a file."""
+
+from dataclasses import dataclass
+from math import tau
+from pathlib import Path
+
+import bpy
+
+from ..core.messages import Problem
+
+_items: list[tuple[str, str, str]] = []  # Blender keeps no reference to the strings of a dynamic enum
+
+
+@dataclass(frozen=True)
+class Hdri:
+    """An equirectangular picture, turned about the head's axis by `rotation` radians (counter-clockwise from above), times `strength`."""
+
+    path: Path
+    rotation: float = 0.0
+    strength: float = 1.0
+
+
+def items(self, context):
+    """The worlds that Blender knows, its own eight (CC0) and the artist's, for an EnumProperty."""
+    found = [(light.name, Path(light.name).stem.replace("_", " ").title(), "") for light in _worlds()]
+    _items[:] = found or [('NONE', "None", "This Blender came without any")]
+    return _items
+
+
+def chosen(props) -> Hdri:
+    """What the scene's settings ask for. Raises Problem where there is no such picture."""
+    path = Path(bpy.path.abspath(props.hdri_file)) if props.hdri_file else next((Path(light.path) for light in _worlds() if light.name == props.hdri), None)
+    if path is None:
+        raise Problem("This Blender came without pictures of surroundings.", "Choose an HDRI file of your own.")
+    if not path.is_file():
+        raise Problem(f"There is no picture at {path}.", "Choose another HDRI file, or none for one of Blender's.")
+    return Hdri(path, props.hdri_rotation, props.hdri_strength)
+
+
+def light_with(world: bpy.types.World, hdri: Hdri, turned: float) -> None:
+    """Makes the picture the world's background. `turned` is the angle of the head itself about +Z, radians: the light goes along with it."""
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    background = next(n for n in nodes if n.type == 'BACKGROUND')
+    coordinates, mapping, picture = (nodes.new(kind) for kind in ('ShaderNodeTexCoord', 'ShaderNodeMapping', 'ShaderNodeTexEnvironment'))
+    for node, x in ((coordinates, -900), (mapping, -700), (picture, -450)):
+        node.location = (x, 0)
+    # Turning what is looked up one way turns the surroundings the other way.
+    mapping.inputs["Rotation"].default_value = (0, 0, -((hdri.rotation + turned) % tau))
+    picture.image = bpy.data.images.load(str(hdri.path), check_existing=True)
+    background.inputs["Strength"].default_value = hdri.strength
+    links.new(coordinates.outputs["Generated"], mapping.inputs["Vector"])
+    links.new(mapping.outputs["Vector"], picture.inputs["Vector"])
+    links.new(picture.outputs["Color"], background.inputs["Color"])
+
+
+def _worlds():
+    return [light for light in bpy.context.preferences.studio_lights if light.type == 'WORLD']

@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operator: the skin as it was filmed, as it was delit, or solved, in the same material under the same light and at the same exposure."""
+
+import bpy
+
+from ...core.messages import Problem
+from .. import captures, head, status
+from ..base_operator import BaseOperator
+from . import material
+
+ALBEDO = material.IMAGES[0][0]
+SHOWN = {
+    'FILMED': ("As Filmed", "filmed.png", "The texture with all of its light, as it was filmed"),
+    'DELIT': ("Delit", "delit.png", "The texture that the delighter left, with the shadows that stayed in it"),
+    'SOLVED': ("Albedo", "diffuse_albedo.png", "What the solver found"),
+}
+
+
+class WILDCAP_OT_compare(BaseOperator, bpy.types.Operator):
+    """Show the head with its texture as filmed, as delit, or with the solved albedo; all at one exposure, renders included"""
+
+    bl_idname = "wildcap.compare"
+    bl_label = "Compare"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    show: bpy.props.EnumProperty(name="Show", items=[(kind, label, tip) for kind, (label, _, tip) in SHOWN.items()], default='SOLVED')
+
+    @classmethod
+    def poll(cls, context):
+        if not (cls.in_object_mode(context) and cls.with_capture(context)):
+            return False
+        return cls.allowed(skin(context) is not None, "There is no skin material yet: click Assemble Material")
+
+    def work(self, context):
+        item = captures.require(context)
+        name = SHOWN[self.show][1]
+        path = status.delivered(captures.folder(item))[0] if self.show == 'SOLVED' else captures.folder(item).comparison / name
+        if not path.is_file():
+            raise Problem(f"This capture has no {name} to show.", "Click Solve: it leaves what is compared, as long as the frames are there.")
+        skin(context).node_tree.nodes[ALBEDO].image = head.load_image(path, 'sRGB')
+
+
+def skin(context) -> bpy.types.Material | None:
+    """The assembled material of the active capture's head."""
+    item = captures.active(context)
+    obj = captures.head(context, item) if item is not None else None
+    found = obj.active_material if obj is not None else None
+    return found if found is not None and material.KEY in found and ALBEDO in found.node_tree.nodes else None
+
+
+def shown(context) -> str:
+    """Which of SHOWN the head shows."""
+    found = skin(context)
+    image = found.node_tree.nodes[ALBEDO].image if found is not None else None
+    name = bpy.path.basename(image.filepath) if image is not None else ""
+    return next((kind for kind, (_, file_name, _) in SHOWN.items() if file_name == name), 'SOLVED')
+
+
+CLASSES = (WILDCAP_OT_compare,)
