@@ -4,9 +4,9 @@
 
 import bpy
 
-from . import operators, panel, preview
+from . import eyedropper, operators, panel, preview
 
-register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *panel.CLASSES))
+register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *eyedropper.CLASSES, *panel.CLASSES))
 
 
 def unregister():

@@ -36,12 +36,12 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         times = timings.words(properties.device(item))
         if times:
             layout.label(text=times, icon='TIME')
+        layout.prop(item, "use_skin_tone")
         row = layout.row(align=True)
-        row.prop(item, "use_skin_tone")
+        row.active = item.use_skin_tone
+        row.prop(item, "skin_tone")
+        row.operator("wildcap.pick_skin_tone", text="", icon='EYEDROPPER')
         row.operator("wildcap.estimate_skin_tone")
-        row = layout.row()
-        row.enabled = item.use_skin_tone
-        row.prop(item, "skin_tone", text="")
         layout.prop(item, "device")
         layout.prop(item, "seed")
         row = layout.row(align=True)
