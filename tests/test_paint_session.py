@@ -73,6 +73,22 @@ def test_leaving_gives_back_what_the_artist_had(addon, capture, mode, shading):
     assert {name: (before[name], after[name]) for name in before if before[name] != after[name]} == {}
 
 
+def test_mirrored_strokes_go_with_the_artist_to_the_sheet_and_back_and_stay_with_the_painting(addon, capture):
+    bpy.ops.wildcap.bring_in_head()
+    head = bpy.context.object
+    bpy.ops.wildcap.paint_mask()
+    assert bpy.context.object == head and not head.data.use_mirror_x
+    head.data.use_mirror_x = True  # the panel's tick: a stroke follows the symmetry of its mesh
+    bpy.ops.wildcap.paint_mask(on='SHEET')
+    assert bpy.context.object != head and bpy.context.object.data.use_mirror_x
+    bpy.context.object.data.use_mirror_x = False
+    bpy.ops.wildcap.paint_mask(on='HEAD')
+    assert bpy.context.object == head and not head.data.use_mirror_x
+    head.data.use_mirror_x = True
+    bpy.ops.wildcap.finish_mask()
+    assert not head.data.use_mirror_x
+
+
 def test_the_tint_is_the_artists_own_and_stays_so(addon, capture):
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.paint_mask()

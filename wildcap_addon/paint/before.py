@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an artist had before painting a mask: canvas, stencil, shading, overlays, active object, selection and mode; and how it comes back.
+"""What an artist had before painting a mask: canvas, stencil, symmetry, shading, overlays, active object, selection and
+mode; and how it comes back.
 
 Names and plain values only: an undo replaces every data-block, and a .blend that is saved while a mask is painted keeps them as JSON.
 """
@@ -16,8 +17,8 @@ MODES = {'PAINT_WEIGHT': 'WEIGHT_PAINT', 'PAINT_VERTEX': 'VERTEX_PAINT', 'PAINT_
 """Of a context's mode, the name by which mode_set enters it, where it is another one."""
 
 
-def remember(context) -> dict:
-    """To be called before anything is changed."""
+def remember(context, head: bpy.types.Object) -> dict:
+    """To be called before anything is changed; `head` is what will be painted on."""
     paint = context.scene.tool_settings.image_paint
     active = context.view_layer.objects.active
     return {
@@ -25,6 +26,7 @@ def remember(context) -> dict:
         "views": view.remember(context.screen) if context.screen is not None else [],
         "mode": context.mode, "active": active.name if active else "",
         "selected": [o.name for o in context.view_layer.objects if o.select_get()],
+        "head": head.name, "mirrored": head.data.use_mirror_x,
     }
 
 
@@ -34,6 +36,9 @@ def put_back(context, before: dict) -> None:
     for name, value in before["paint"].items():
         setattr(paint, name, bpy.data.images.get(value or "") if name in ("canvas", "stencil_image") else value)
     view.restore(before["views"])
+    head = bpy.data.objects.get(before.get("head", ""))
+    if head is not None:
+        head.data.use_mirror_x = before["mirrored"]
     objects = context.view_layer.objects
     for thing in list(objects):
         thing.select_set(thing.name in before["selected"])

@@ -36,7 +36,8 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
         row.prop(context.scene.tool_settings.image_paint, "stencil_color", text="")
         if context.space_data is not None:
             row.prop(context.space_data.overlay, "texture_paint_mode_opacity", text="Tint", slider=True)
-        layout.prop(context.scene.tool_settings.image_paint, "use_symmetry_x", text="Mirror Left and Right")
+        if context.object is not None and context.object.type == 'MESH':  # whose own symmetry is what a stroke follows
+            layout.prop(context.object.data, "use_mirror_x", text="Mirror Left and Right")
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
         for kind in EDITS:
             grid.operator("wildcap.edit_mask", text=kind.capitalize()).kind = kind

@@ -105,7 +105,7 @@ def begin(context, item, use_sheet: bool, which: str = 'SHADOW') -> None:
     if texture is None:
         raise Problem("This capture has no texture to paint over.", "Click Reconstruct first.")
     image = mask_image.load(capture, which)
-    _session = Session(str(capture.root), context.scene.name, obj.name, image.name, which, before=before.remember(context))
+    _session = Session(str(capture.root), context.scene.name, obj.name, image.name, which, before=before.remember(context, obj))
     props, paint = context.scene.wildcap, context.scene.tool_settings.image_paint
     view.set_up(_session.before["views"], props.tint_strength)
     paint.mode = 'IMAGE'
@@ -206,7 +206,7 @@ def _enter(context, use_sheet: bool) -> None:
         raise Problem("The head is not in this scene any more.", "Undo, or bring the head in again.")
     _session.on_sheet = use_sheet
     if use_sheet:
-        target = sheet.make(context, context.scene.tool_settings.image_paint.canvas)
+        target = sheet.make(context, context.scene.tool_settings.image_paint.canvas, target)
         _session.hidden = [o.name for o in list(context.view_layer.objects) if o != target and not o.hide_get()]
         for name in _session.hidden:
             bpy.data.objects[name].hide_set(True)
@@ -221,7 +221,7 @@ def _leave(context) -> None:
     if context.mode != 'OBJECT':
         bpy.ops.object.mode_set(mode='OBJECT')
     if _session.on_sheet:
-        sheet.remove()
+        sheet.remove(bpy.data.objects.get(_session.head))
         view.face_head(_session.before["views"])
         for name in _session.hidden:
             if name in context.view_layer.objects:

@@ -8,12 +8,13 @@ SIDE_M = 0.4
 NAME = "WildCap Mask Sheet"
 
 
-def make(context, image: bpy.types.Image) -> bpy.types.Object:
-    """The sheet in the scene: SIDE_M wide, UV (0, 0) at its lower left, the texture in a material."""
+def make(context, image: bpy.types.Image, head: bpy.types.Object) -> bpy.types.Object:
+    """The sheet in the scene: SIDE_M wide, UV (0, 0) at its lower left, the texture in a material; painted with the head's symmetry."""
     remove()
     mesh = bpy.data.meshes.new(NAME)
     half = SIDE_M / 2
     mesh.from_pydata([(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], [], [(0, 1, 2, 3)])
+    mesh.use_mirror_x = head.data.use_mirror_x
     layer = mesh.uv_layers.new(name="UVMap")
     layer.uv.foreach_set("vector", (0, 0, 1, 0, 1, 1, 0, 1))
     material = bpy.data.materials.new(NAME)
@@ -28,8 +29,10 @@ def make(context, image: bpy.types.Image) -> bpy.types.Object:
     return sheet
 
 
-def remove() -> None:
-    """Takes the sheet and all it is made of away."""
+def remove(head: bpy.types.Object | None = None) -> None:
+    """Takes the sheet and all it is made of away; the symmetry that was set on it goes over to the head."""
+    if head is not None and NAME in bpy.data.meshes:
+        head.data.use_mirror_x = bpy.data.meshes[NAME].use_mirror_x
     for collection in (bpy.data.objects, bpy.data.meshes, bpy.data.materials):
         block = collection.get(NAME)
         if block is not None:
