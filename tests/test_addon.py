@@ -135,7 +135,12 @@ def test_the_sample_head_opens_relightable_within_ten_seconds(addon, tmp_path, m
     assert time.monotonic() - started < 10
     head = bpy.context.view_layer.objects.active
     assert "WildCap Skin" in head.data.materials[0].node_tree.nodes
-    assert head["wildcap_capture"] == str(tmp_path / "captures" / "sample_head.wildcap")
+    capture = tmp_path / "captures" / "sample_head.wildcap"
+    assert head["wildcap_capture"] == str(capture)
+    (capture / "maps" / "normal.png").unlink()
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.wildcap.open_sample_head()  # the artist's copy, on its way to other maps, is opened as it is
+    assert bpy.context.view_layer.objects.active["wildcap_capture"] == str(capture)
 
 
 class FakeLayout:
@@ -191,7 +196,8 @@ def test_a_finished_stage_can_be_done_again_from_its_row(addon, capture, monkeyp
     (capture / "capture.json").write_text(json.dumps(record), encoding="utf-8")
     addon("status").refresh(bpy.context)
     rows = drawn(addon("panel").WILDCAP_PT_stages)
-    assert [args[0] for name, args, _ in rows if name == "operator"] == ["wildcap.reconstruct"]
+    buttons = [(args[0], options["icon"]) for name, args, options in rows if name == "operator"]
+    assert buttons == [("wildcap.reconstruct", 'PLAY'), ("wildcap.reconstruct", 'FILE_REFRESH')], "the first that is to do, and the one that is done"
     started = []
     monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **span: started.append((goal, span)))
     bpy.ops.wildcap.reconstruct(first="scan")

@@ -118,13 +118,50 @@ def test_a_job_goes_on_when_another_file_is_opened_and_when_everything_is_undone
     bpy.ops.wm.read_homefile(use_empty=True)
     jobs.poll()
     assert jobs.of(root) is not None and alive(pid) and len(bpy.context.scene.wildcap.captures) == 0
+    assert [folder for folder, _ in jobs.elsewhere("")] == [root], "the tab tells of it there, too"
     bpy.ops.wildcap.open_capture(directory=root)
+    assert jobs.elsewhere(root) == []
     assert jobs.of(addon("captures").root(addon("captures").active(bpy.context))).goal == "solve", "the tab of the capture shows it again"
     bpy.ops.scene.new(type='NEW')
     assert jobs.of(root) is not None
-    jobs.cancel(root)
+    bpy.ops.wildcap.cancel(capture=root)
     finish(jobs)
     ends(pid)
+
+
+def test_a_cancelled_second_solve_is_to_be_done_though_the_maps_of_before_are_there(addon, jobs, tmp_path):
+    capture = a_capture(tmp_path, "a")
+    bpy.ops.wildcap.solve()
+    finish(jobs)
+    assert state_of_solve(addon) in ("done", "stale")
+    (capture.root / "mood.json").write_text(json.dumps({"solve": "slow"}))
+    bpy.ops.wildcap.solve()
+    finish(jobs, lambda: running(capture) and jobs.of(str(capture.root)).progress is not None)
+    jobs.cancel(str(capture.root))
+    finish(jobs)
+    assert capture.has("maps/normal.png") and state_of_solve(addon) == "to do"
+
+
+def test_a_solve_in_the_middle_of_painting_takes_the_mask_as_it_is_painted(addon, jobs, tmp_path):
+    capture = a_capture(tmp_path, "a")
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.paint_mask()
+    image = addon("paint.session").mask()
+    painted = addon("paint.mask_image").values(image).copy()
+    painted[10:20, 30:40] = 1
+    addon("paint.mask_image").set_values(image, painted)
+    bpy.ops.wildcap.solve()
+    assert capture.shadow_mask.read_bytes() == addon("paint.mask_image").grey_png(painted)
+    jobs.cancel(str(capture.root))
+    finish(jobs)
+    bpy.ops.wildcap.finish_mask()
+
+
+def state_of_solve(addon) -> str:
+    item = addon("captures").active(bpy.context)
+    addon("status").of(item)
+    addon("status").refresh(bpy.context)
+    return addon("status").of(item).stages["solve"]
 
 
 def test_disabling_the_add_on_ends_the_worker_and_keeps_what_is_finished(addon, jobs, wildcap, tmp_path):

@@ -43,12 +43,19 @@ class Job:
     log: list[str] = field(default_factory=list)
 
 
+before_start: list[Callable[[], None]] = []
+"""What rooms do before a worker reads a capture: the mask that is being painted is saved. May raise Problem, and then nothing starts."""
 _jobs: dict[str, Job] = {}  # capture folder -> its job; '' -> the installation
 
 
 def of(root: str) -> Job | None:
     """The capture's running job."""
     return _jobs.get(root)
+
+
+def elsewhere(root: str) -> list[tuple[str, Job]]:
+    """The jobs of other captures than this one, which may be in another scene or .blend: (capture folder, job)."""
+    return [(other, job) for other, job in _jobs.items() if other not in (root, "")]
 
 
 def can_start(operator, context) -> bool:
@@ -73,6 +80,8 @@ def start(item, goal: str, *, first: str | None = None, last: str | None = None,
     python = preferences.python()
     if python is None:
         raise Problem("The solver is not set up on this machine.", "Click Install Solver in the Setup panel, or Use an Existing Python.")
+    for prepare in before_start:
+        prepare()
     path = write_job(capture, first=first, last=last, tool=tool, settings={**properties.values(item), **shared})
     job = begin(root, goal, Worker(python, ROOT, path, capture.logs / "worker.log"), then)
     job.on_preview, job.settings = on_preview, read_job(path).settings

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The tab: a line of state, one large button for the next step, what a running job does, and a row per stage."""
 
+from pathlib import Path
+
 import bpy
 
 from ..core import stages
@@ -26,9 +28,7 @@ class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
         problems.draw_text(layout, step.state, width)
         job = jobs.of(root) or jobs.of("")
         if job is not None:
-            draw_job(layout, job)
-            if session.active():  # the large button leaves the painting
-                layout.operator("wildcap.cancel", icon='CANCEL')
+            draw_job(layout, job, "wildcap.cancel" if session.active() else "")  # the large button leaves the painting
         if step.operator:
             row = layout.row()
             row.scale_y = 2.0
@@ -39,6 +39,11 @@ class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
             layout.operator("wildcap.open_sample_head", icon='USER')
         found = status.of(item) if item is not None else None
         problems.draw(layout, problems.of(root) or problems.of("") or (found.problem if found else None), width)
+        for folder, other in jobs.elsewhere(root):
+            box = layout.box()
+            box.label(text=Path(folder).stem, icon='USER')
+            draw_job(box, other)
+            box.operator("wildcap.cancel", icon='CANCEL').capture = folder
 
 
 class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
@@ -56,6 +61,7 @@ class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
         found = status.of(item)
         job = jobs.of(captures.root(item))
         column = self.layout.column(align=True)
+        ready = found is not None and bool(found.source or found.has_head)  # for the first stage that is to do
         for stage in stages.STAGES:
             state = "running" if job and job.stage == stage.name else found.stages.get(stage.name, "to do") if found else "to do"
             if state == "to do" and found and not found.source and found.has_head and stage.name in next_step.BEFORE_MASK:
@@ -65,11 +71,13 @@ class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
             row.label(text=_words(state, found.seconds.get(stage.name) if found else None))
             if state == "running" and job.progress and job.progress.of > 0:
                 row.label(text=f"{min(1.0, job.progress.done / job.progress.of):.0%}")
-            if state in ("done", "stale") and job is None:
+            if job is None and (state in ("done", "stale") or state == "to do" and ready):
+                icon = 'PLAY' if state == "to do" else 'FILE_REFRESH'
                 if stage.name == "solve":
-                    row.operator("wildcap.solve", text="", icon='FILE_REFRESH', emboss=False)
+                    row.operator("wildcap.solve", text="", icon=icon, emboss=False)
                 else:
-                    row.operator("wildcap.reconstruct", text="", icon='FILE_REFRESH', emboss=False).first = stage.name
+                    row.operator("wildcap.reconstruct", text="", icon=icon, emboss=False).first = stage.name
+            ready = ready and state not in ("to do", "running")
 
 
 class WILDCAP_PT_doctor(WildcapPanel, bpy.types.Panel):
@@ -111,11 +119,14 @@ def gather(context, item) -> next_step.Facts:
     )
 
 
-def draw_job(layout, job: jobs.Job) -> None:
-    """Stage, how far it is, and how long it will take."""
+def draw_job(layout, job: jobs.Job, cancel: str = "") -> None:
+    """Stage, how far it is, and how long it will take; beside it a small button for the operator `cancel`."""
     progress = job.progress
     factor = min(1.0, progress.done / progress.of) if progress and progress.of > 0 else 0.0
-    layout.progress(text=f"{jobs.stage_label(job)}  {factor:.0%}", factor=factor)
+    row = layout.row(align=True)
+    row.progress(text=f"{jobs.stage_label(job)}  {factor:.0%}", factor=factor)
+    if cancel:
+        row.operator(cancel, text="", icon='CANCEL')
     column = layout.column(align=True)
     column.scale_y = 0.8
     for line in (progress.text if progress else "", jobs.eta(job)):

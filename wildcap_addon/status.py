@@ -22,7 +22,7 @@ INTERVAL_S = 1.0
 
 @dataclass(frozen=True)
 class Status:
-    """What a capture's folder says. `stages`: name -> 'to do', 'done', 'stale' or 'absent' (outputs came without a record)."""
+    """What a capture's folder says. `stages`: name -> 'to do', 'done', 'stale' or 'absent' (outputs came from elsewhere, without a record)."""
 
     source: str = ""
     stages: dict = field(default_factory=dict)
@@ -96,7 +96,8 @@ def delivered(capture: Capture) -> list[Path]:
 
 def _state(capture: Capture, stage: stages.Stage, record: dict, settings) -> str:
     if stage.name not in record["stages"]:
-        return "absent" if all(capture.has(name) for name in stage.writes) else "to do"
+        begun = (capture.logs / f"{stage.name}.log").is_file()  # and did not end: what is there is of another run, or half new
+        return "absent" if all(capture.has(name) for name in stage.writes) and not begun else "to do"
     return capture.state(stage, settings)
 
 

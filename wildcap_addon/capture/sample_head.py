@@ -9,7 +9,7 @@ import bpy
 
 from ...core.capture import Capture, replacing_folder, storage_problem
 from ...core.messages import Problem
-from .. import captures, preferences
+from .. import captures, preferences, status
 from ..base_operator import BaseOperator
 
 SHIPPED = Path(__file__).resolve().parents[2] / "core" / "assets" / "sample_head"
@@ -23,11 +23,13 @@ class WILDCAP_OT_open_sample_head(BaseOperator, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     def work(self, context):
-        captures.add(context, copy_to(preferences.captures_folder()).root)
+        capture = copy_to(preferences.captures_folder())
+        captures.add(context, capture.root)
         if context.mode != 'OBJECT':
             bpy.ops.object.mode_set(mode='OBJECT')
         bpy.ops.wildcap.bring_in_head()
-        bpy.ops.wildcap.assemble_material()
+        if all(path.is_file() for path in status.delivered(capture)):  # an artist's copy of it may be on its way to other maps
+            bpy.ops.wildcap.assemble_material()
 
 
 def copy_to(folder: Path) -> Capture:

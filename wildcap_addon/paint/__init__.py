@@ -4,7 +4,8 @@
 
 import bpy
 
-from . import files, operators, panel
+from .. import jobs
+from . import files, operators, panel, session
 
 _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *panel.CLASSES))
 
@@ -12,8 +13,10 @@ _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES,
 def register():
     _register()
     files.register()
+    jobs.before_start.append(session.save)
 
 
 def unregister():
+    jobs.before_start.remove(session.save)
     files.unregister()
     _unregister()

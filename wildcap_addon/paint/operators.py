@@ -124,7 +124,6 @@ class WILDCAP_OT_snap_mask(ToolOperator, bpy.types.Operator):
 
     def work(self, context):
         item = captures.require(context)
-        session.save()
         jobs.start(item, "tool", tool="mask_edges", then=lambda: session.offer('SNAPPED'))
 
 

@@ -45,13 +45,16 @@ class WILDCAP_OT_cancel(BaseOperator, bpy.types.Operator):
     bl_idname = "wildcap.cancel"
     bl_label = "Cancel"
 
+    capture: bpy.props.StringProperty(name="Capture", description="Folder of the capture whose job is meant; empty: the active one", options={'SKIP_SAVE'})
+
     @classmethod
     def poll(cls, context):
-        running = jobs.of(captures.root(captures.active(context))) is not None or jobs.of("") is not None
-        return cls.allowed(running, "Nothing is running for this capture")
+        root = captures.root(captures.active(context))
+        running = jobs.of(root) is not None or jobs.of("") is not None or jobs.elsewhere(root)
+        return cls.allowed(running, "Nothing is running")
 
     def work(self, context):
-        root = captures.root(captures.active(context))
+        root = self.capture or captures.root(captures.active(context))
         jobs.cancel(root if jobs.of(root) else "")
 
 
