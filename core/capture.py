@@ -274,4 +274,6 @@ def _alive(pid: int) -> bool:
             os.kill(pid, 0)
     except ProcessLookupError:
         return False
+    with contextlib.suppress(OSError, IndexError):  # Linux: a process that has ended, but that nobody has asked after, as in a container without an init
+        return Path(f"/proc/{pid}/stat").read_bytes().rpartition(b") ")[2][:1] != b"Z"
     return True

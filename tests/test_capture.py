@@ -123,6 +123,13 @@ def test_a_living_lock_is_refused_by_name_and_a_dead_one_taken_over(capture):
         capture.lock.write_text(text)
         with capture.locked():
             pass
+    if sys.platform == "linux":
+        unasked = subprocess.Popen([sys.executable, "-c", ""])
+        os.waitid(os.P_PID, unasked.pid, os.WEXITED | os.WNOWAIT)  # it has ended, and stays in the list of processes
+        capture.lock.write_text(json.dumps({**owner, "pid": unasked.pid}))
+        with capture.locked():
+            pass
+        unasked.wait()
     capture.lock.write_text(json.dumps({**owner, "pid": dead.pid, "host": "another machine"}))
     with pytest.raises(Problem, match="another machine"), capture.locked():
         pass
