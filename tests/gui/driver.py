@@ -173,7 +173,8 @@ def find(command: str, options: str = ""):
     """Where that button is: the cursor goes down the sidebar and Blender says what would be copied at each place."""
     for _ in range(3):
         sidebar = region('UI')
-        for x in (sidebar.x + sidebar.width * 0.25, sidebar.x + sidebar.width * 0.75):  # two buttons may share a row
+        for share in (0.25, 0.45, 0.75, 0.83):  # three buttons may share a row, and the last may be a mere icon
+            x = sidebar.x + sidebar.width * share
             for y in range(sidebar.y + sidebar.height - 4, sidebar.y + 4, -11):
                 yield from move((x, y))
                 text = under_cursor()
@@ -199,12 +200,13 @@ def lead(command: str):
 
 
 def browse(path: Path):
-    """Chooses a file in the file browser that a button has opened in place of the window's areas."""
+    """Chooses a file or a folder in the file browser that a button has opened in place of the window's areas."""
     yield from until(lambda: any(area.type == 'FILE_BROWSER' for area in window().screen.areas), "the file browser", 10)
     area = next(area for area in window().screen.areas if area.type == 'FILE_BROWSER')
     yield 1.0
-    area.spaces.active.params.directory = os.fsencode(str(path.parent) + "/")
-    area.spaces.active.params.filename = path.name
+    folder = path if path.is_dir() else path.parent
+    area.spaces.active.params.directory = os.fsencode(f"{folder}/")
+    area.spaces.active.params.filename = "" if folder == path else path.name
     yield 0.5
     with bpy.context.temp_override(window=window(), area=area, region=next(r for r in area.regions if r.type == 'WINDOW')):
         bpy.ops.file.execute()

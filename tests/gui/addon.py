@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What flows ask of the add-on as it is installed: its modules, the sample head, the worker's Python, and settings by which a solve takes seconds."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import bpy
+import driver as d
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+INSTALLED = "bl_ext.user_default.wildcap"
+
+
+def module(name: str):
+    """A module of the installed add-on, e.g. jobs or paint.session."""
+    return sys.modules[f"{INSTALLED}.wildcap_addon.{name}"]
+
+
+def unfold(*names: str) -> None:
+    """Registers panels again as open ones, before any is drawn."""
+    kinds = [getattr(bpy.types, name) for name in names]
+    for kind in reversed(kinds):
+        bpy.utils.unregister_class(kind)
+    for kind in kinds:
+        kind.bl_options = set()
+        bpy.utils.register_class(kind)
+
+
+def open_sample_head():
+    """The tab, and the sample head by its button; returns the capture's folder."""
+    yield from d.open_tab("WildCap")
+    yield from d.park()
+    yield from d.press("wildcap.open_sample_head")
+    yield from d.until(lambda: "sample_head" in bpy.data.objects, "the sample head", 20)
+    yield 1.0
+    return Path(head()["wildcap_capture"])
+
+
+def head():
+    return bpy.data.objects.get("sample_head")
+
+
+def use_solver() -> None:
+    """The checkout's Python as the worker's; a file browser otherwise, which the flow one_button goes through."""
+    bpy.ops.wildcap.use_python(filepath=str(CHECKOUT / ".venv"))
+
+
+def settings():
+    return bpy.context.scene.wildcap.captures[0]
+
+
+def draft(steps: int, checkpoint_every: int) -> None:
+    """Minutes matter in a test, detail does not."""
+    item = settings()
+    item.quality = "draft"
+    item.solve.size, item.solve.steps, item.solve.checkpoint_every = 128, steps, checkpoint_every
+    item.upscale.size = 1024
+    item.transfer.scan = False
+
+
+def unsolved(root: Path) -> None:
+    """The sample head as a capture that is finished up to its mask."""
+    for folder in ("maps", "maps_4k", "renders"):
+        shutil.rmtree(root / folder, ignore_errors=True)
+
+
+def job(root: Path):
+    return module("jobs").of(str(root))
+
+
+def worker_process(root: Path):
+    """The process that works for the capture, to be watched or killed."""
+    return job(root).worker._process
+
+
+def problem(root: Path | str = "") -> str:
+    """What the tab says went wrong, '' for nothing."""
+    found = module("problems").of(str(root))
+    return f"{found.problem} {found.remedy}" if found else ""
+
+
+def next_step():
+    """What the tab's first lines say and offer."""
+    return module("next_step").next_step(module("panel").gather(bpy.context, module("captures").active(bpy.context)))
