@@ -32,7 +32,8 @@ def main() -> None:
     if job["leaves"]:
         _add(read_obj(Path(job["leaves"])), "leaves", _plain("leaves", (0.05, 0.13, 0.03))).visible_camera = False  # they are nearer than the camera
     _light(scene, job)
-    _room(job["seed"])
+    if job["room"]:
+        _room(job["seed"])
     _torso(job["seed"])
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     scene.collection.objects.link(camera)

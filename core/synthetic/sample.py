@@ -55,10 +55,10 @@ def main() -> None:
 
 
 def render_frames(work: Path, seed: int, skin: Skin, cameras: np.ndarray, frames: list[int], samples: int, scale: float = 1.0,
-                  leaves: bool = True) -> None:
+                  leaves: bool = True, room: bool = True) -> None:
     """work/NNNNN.png of these frames (numbers into cameras [N, 4, 4]) by Cycles in a process of its own; files that exist are kept.
 
-    `scale`: of the pictures' size; `leaves`: whether they stand between the sun and the head.
+    `scale`: of the pictures' size; `leaves`: whether they stand between the sun and the head; `room`: whether there is anything behind it.
     """
     work.mkdir(parents=True, exist_ok=True)
     sun = scene.sun_of(seed)
@@ -69,7 +69,7 @@ def render_frames(work: Path, seed: int, skin: Skin, cameras: np.ndarray, frames
     images.write_data(work / "specular.png", skin.specular, bits=16)
     images.write_data(work / "normal.png", skin.normal / 2 + 0.5, bits=16)
     write_json(work / "job.json", {
-        "seed": seed, "head": str(work / "head.obj"), "leaves": str(work / "leaves.obj") if leaves else None,
+        "seed": seed, "room": room, "head": str(work / "head.obj"), "leaves": str(work / "leaves.obj") if leaves else None,
         "out": str(work), "frames": frames, "samples": samples,
         "maps": {name: str(work / f"{name}.png") for name in ("diffuse", "specular", "normal")}, "cameras": cameras.tolist(),
         "sun": {"direction": sun.direction.tolist(), "strength": sun.strength, "angle": sun.angle, "colour": sun.colour}, "sky": scene.SKY,
