@@ -11,6 +11,8 @@ import driver as d
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 INSTALLED = "bl_ext.user_default.wildcap"
+START_LIMIT_S = 300
+"""For a solver to reach its first step, on a loaded machine with two cores that draws the window, too."""
 
 
 def module(name: str):
@@ -73,6 +75,15 @@ def job(root: Path):
 def worker_process(root: Path):
     """The process that works for the capture, to be watched or killed."""
     return job(root).worker._process
+
+
+def continued(root: Path):
+    """The large button is Continue Solving; a click on it, and the solver says from which step it goes on."""
+    yield from d.until(lambda: next_step().label == "Continue Solving", f"the offer to continue instead of {next_step()}", 10)
+    yield from d.lead("wildcap.solve")
+    yield from d.until(lambda: job(root) is None or any("Going on after" in line for line in job(root).log), "going on from the checkpoint", START_LIMIT_S)
+    assert job(root) is not None, problem(root)
+    d.say(next(line for line in job(root).log if "Going on after" in line))
 
 
 def problem(root: Path | str = "") -> str:

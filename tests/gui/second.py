@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A second Blender beside the one that runs a flow, in the same profile and on the same screen, at the same captures.
+
+The flow calls `start` with the name of a part below, and the two speak by files in a folder: `tell` writes one, the flow waits for it.
+Run by Blender, this file plays that part.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import addon  # noqa: E402
+import driver as d  # noqa: E402
+import painting  # noqa: E402
+
+
+def start(part: str, folder: Path) -> subprocess.Popen:
+    """The second Blender, in a smaller window that leaves the first one's tab to be seen. What it prints goes into the flow's log."""
+    folder.mkdir(parents=True, exist_ok=True)
+    return subprocess.Popen(["blender", "--enable-event-simulate", "--no-window-focus", "-p", "0", "0", "900", "700",
+                             "-P", str(Path(__file__).resolve()), "--", part, str(folder)])
+
+
+def heard(process: subprocess.Popen, folder: Path, name: str, limit_s: float):
+    """Waits for a word of the second Blender; it must not have failed meanwhile. Returns what it told."""
+    path = folder / f"{name}.json"
+    yield from d.until(lambda: path.is_file() or process.poll() is not None, f"the second Blender's word {name}", limit_s)
+    assert path.is_file(), f"the second Blender ended with {process.poll()}"
+    return json.loads(path.read_text())
+
+
+def solve_and_paint():
+    """A stroke while its solver runs; it then waits to be killed."""
+    root = yield from solving()
+    yield from stroke(0, "stroke")
+    tell("stroked", worker=addon.worker_process(root).pid)
+    yield 600.0
+
+
+def solve_and_quit():
+    """A stroke while its solver runs, and File > Quit at once."""
+    root = yield from solving()
+    yield from stroke(40, "stroke")
+    tell("stroked", worker=addon.worker_process(root).pid)
+    bpy.ops.wm.quit_blender()
+    yield 600.0
+
+
+def solve():
+    """The solver runs; it then waits to be killed."""
+    root = yield from solving()
+    yield from d.until(lambda: (root / "checkpoints" / "solve.safetensors").is_file(), "the first checkpoint", addon.START_LIMIT_S)
+    tell("checkpoint", worker=addon.worker_process(root).pid)
+    yield 600.0
+
+
+def refused_and_paint():
+    """A solve of what the first Blender solves, and strokes on the mask that is painted there, each told of when it is in the capture."""
+    root = yield from addon.open_sample_head()
+    addon.use_solver()
+    yield 1.5
+    try:
+        bpy.ops.wildcap.solve()
+    except RuntimeError as error:
+        tell("refused", text=str(error), job=addon.job(root) is not None)
+    bpy.ops.wildcap.paint_mask()
+    yield from painting.in_hand()
+    tell("painting")
+    yield from d.until(lambda: (FOLDER / "paint.json").is_file(), "its turn", 120)
+    mask = yield from stroke(0, "stroke")
+    yield from painting.kept(root / "shadow_mask.png", mask, 8)
+    tell("kept")
+    yield 600.0
+
+
+def solving():
+    """The sample head, and its solve under way."""
+    root = yield from addon.open_sample_head()
+    addon.use_solver()
+    addon.draft(steps=600, checkpoint_every=1)
+    yield 1.5
+    bpy.ops.wildcap.solve()
+    yield from d.until(lambda: addon.job(root) is None or addon.job(root).progress is not None, "its worker", 60)
+    assert addon.job(root) is not None, addon.problem(root)
+    return root
+
+
+def stroke(offset: float, name: str):
+    """Paints, and leaves the mask as it is then where the flow finds it, rows from the top."""
+    if bpy.context.mode != 'PAINT_TEXTURE':
+        bpy.ops.wildcap.paint_mask()
+        yield from painting.in_hand()
+    x, y = d.middle()
+    yield from painting.visible_dab(x - 30 + offset, y - 40)
+    mask = painting.mask()
+    np.save(FOLDER / f"{name}.npy", mask)
+    return mask
+
+
+def tell(name: str, **what) -> None:
+    path = FOLDER / f"{name}.json"
+    path.with_suffix(".part").write_text(json.dumps(what))
+    os.replace(path.with_suffix(".part"), path)
+
+
+if __name__ == "__main__":
+    PART, FOLDER = sys.argv[-2], Path(sys.argv[-1])
+    d.play(globals()[PART](), limit_s=600)
