@@ -130,7 +130,7 @@ class Reporter:
         self._emit = emit
         self._cancelled = cancelled
         self._clock = clock or time.monotonic
-        self._started = self._clock()
+        self._first: tuple[float, float] | None = None  # the first units that were reported as done, and when
 
     def check(self) -> None:
         """Raises CancelledError if the user asked to stop."""
@@ -138,10 +138,14 @@ class Reporter:
             raise CancelledError(self.stage)
 
     def progress(self, done: float, of: float, text: str = "") -> None:
-        """`done` of `of` equal units are finished; the ETA is the elapsed time scaled to what is left."""
+        """`done` of `of` equal units are finished. The ETA is what is left at the pace since the first finished unit was reported: what comes before
+        it (reading, or going on from a checkpoint) says nothing about the pace."""
         self.check()
-        elapsed = self._clock() - self._started
-        eta = elapsed * (of - done) / done if done > 0 else None
+        now = self._clock()
+        if self._first is None and done > 0:
+            self._first = done, now
+        paced = self._first is not None and done > self._first[0]
+        eta = (now - self._first[1]) * (of - done) / (done - self._first[0]) if paced else None
         self._emit(Progress(self.stage, float(done), float(of), text, eta))
 
     def log(self, text: str) -> None:

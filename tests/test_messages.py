@@ -23,14 +23,16 @@ def test_what_is_no_message_is_refused(line):
         from_line(line)
 
 
-def test_the_time_left_is_the_elapsed_time_scaled():
+def test_the_time_left_is_what_the_pace_since_the_first_finished_unit_says():
     now = [100.0]
     sent = []
     report = Reporter("scan", sent.append, clock=lambda: now[0])
     report.progress(0, 10)
-    now[0] = 104.0
+    now[0] = 160.0  # it went on from a checkpoint: four units are no work of this run
     report.progress(4, 10, "fusing")
-    assert sent == [Progress("scan", 0.0, 10.0, "", None), Progress("scan", 4.0, 10.0, "fusing", 6.0)]
+    now[0] = 164.0
+    report.progress(6, 10, "fusing")
+    assert sent == [Progress("scan", 0.0, 10.0, "", None), Progress("scan", 4.0, 10.0, "fusing", None), Progress("scan", 6.0, 10.0, "fusing", 8.0)]
 
 
 def test_every_report_hears_of_a_cancel():

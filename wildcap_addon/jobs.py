@@ -174,12 +174,18 @@ def _hear(root: str, job: Job, message: messages.Message) -> None:
 
 
 def _tick() -> float | None:
-    before = set(_jobs)
+    before, shown = set(_jobs), _shown()
     running = poll()
-    status.redraw()
+    if shown != _shown():  # a redraw of the tab takes time from the worker, and from whoever paints
+        status.redraw()
     if before - set(_jobs):
         _bring_in_results()
     return INTERVAL_S if running else None
+
+
+def _shown() -> list[tuple]:
+    """All that the tab shows of the jobs."""
+    return [(root, job.waiting, job.progress, job.previews) for root, job in _jobs.items()]
 
 
 def _bring_in_results() -> None:
