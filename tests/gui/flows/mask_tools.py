@@ -9,18 +9,16 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import addon  # noqa: E402
 import driver as d  # noqa: E402
+from painting import dab, in_hand, mask  # noqa: E402
 
 
 def flow():
-    yield from d.open_tab("WildCap")
-    yield from d.park()
-    yield from d.press("wildcap.open_sample_head")
-    yield from d.until(lambda: "sample_head" in bpy.data.objects, "the sample head", 10)
-    yield 1.5
+    yield from addon.open_sample_head()
     yield from d.press("wildcap.paint_mask")
-    yield from d.until(lambda: bpy.context.mode == 'PAINT_TEXTURE', "texture painting", 5)
-    yield 0.5
+    yield from in_hand()
+    yield from mirrored()
     x, y = d.middle()
     states = [mask()]
     for step in (button('MIRROR'), stroke(x + 30, y), button('GROW'), button('SHRINK'), stroke(x - 30, y - 60), button('INVERT'), button('CLEAR')):
@@ -51,21 +49,32 @@ def walk(states, name, **keys):
     d.say(f"{name}: presses per step {presses}")
 
 
+def mirrored():
+    """With the panel's tick for it a stroke is on both sides, on the head and on the sheet; without it on one."""
+    x, y = d.middle()
+    for on in ('HEAD', 'SHEET'):
+        bpy.ops.wildcap.paint_mask(on=on)
+        yield 0.5
+        for both in (True, False):
+            bpy.context.object.data.use_mirror_x = both
+            bpy.ops.wildcap.edit_mask(kind='CLEAR')
+            yield 0.3
+            yield from dab(x + 50, y - 30)
+            halves = [int((half > 0.5).sum()) for half in np.split(mask(), 2, axis=1)]
+            d.say(f"a stroke to the right, {on}, {'mirrored' if both else 'plain'}: texels of the left and right half {halves}")
+            assert halves[1] > 100 and (halves[0] > 100) == both
+    bpy.ops.wildcap.paint_mask(on='HEAD')
+    bpy.ops.wildcap.edit_mask(kind='PROPOSAL')
+    yield 0.5
+
+
 def stroke(x, y):
-    yield from d.stroke([(x - 12 + 3 * i, y) for i in range(9)], ctrl=bool(mask().mean() > 0.5))
+    yield from dab(x, y, ctrl=bool(mask().mean() > 0.5))
 
 
 def button(kind):
     yield from d.press("wildcap.edit_mask", kind)
     yield 0.3
-
-
-def mask() -> np.ndarray:
-    """The mask being painted [H, W]. Data-blocks are looked up anew: an undo replaces them."""
-    image = bpy.context.scene.tool_settings.image_paint.stencil_image
-    pixels = np.empty(len(image.pixels), np.float32)
-    image.pixels.foreach_get(pixels)
-    return pixels.reshape(image.size[1], image.size[0], -1)[..., 0].copy()
 
 
 d.play(flow(), limit_s=500)
