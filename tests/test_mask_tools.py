@@ -82,8 +82,8 @@ def test_a_tool_without_what_it_reads_says_what_is_missing(tmp_path):
 def test_what_a_worker_prepared_waits_for_a_click(addon, capture, monkeypatch):
     bpy = pytest.importorskip("bpy")
     session, mask_image = addon("paint.session"), addon("paint.mask_image")
-    started = []
-    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **options: started.append(options))
+    started, prepared = [], addon("jobs").before_start
+    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **options: started.append(options) or [prepare() for prepare in prepared])
     bpy.ops.wildcap.bring_in_head()
     with pytest.raises(RuntimeError, match="Click Paint Mask first"):
         bpy.ops.wildcap.snap_mask()

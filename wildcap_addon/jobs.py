@@ -60,14 +60,8 @@ def elsewhere(root: str) -> list[tuple[str, Job]]:
 
 def can_start(operator, context) -> bool:
     """Whether there is a capture that no job works on; says in the tooltip of a greyed-out button why not."""
-    item = captures.active(context)
-    if item is None:
-        operator.poll_message_set("There is no face to work on yet: choose a video, or open the sample head")
-    elif of(captures.root(item)) is not None:
-        operator.poll_message_set("This capture is being worked on: wait for it, or click Cancel")
-    else:
-        return True
-    return False
+    return operator.with_capture(context) and operator.allowed(of(captures.root(captures.active(context))) is None,
+                                                               "This capture is being worked on: wait for it, or click Cancel")
 
 
 def start(item, goal: str, *, first: str | None = None, last: str | None = None, tool: str = "", then: Callable[[], None] | None = None,

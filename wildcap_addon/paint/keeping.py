@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a painted mask gets to the capture: at once, or aside in a thread, so that compressing and writing never hold up a stroke.
+"""How a painted mask gets to the capture: at once, or aside in a thread, so that compressing and writing never hold up a stroke; Blender itself only
+reads the pixels, into an array that is kept, as a fresh one takes longer to come by than the reading.
 
 A mask in the capture that this session did not write (the one of before it, or one that another Blender or the command line has put there since)
 goes to the history first.
@@ -9,6 +10,7 @@ goes to the history first.
 import threading
 from pathlib import Path
 
+import bpy
 import numpy as np
 
 from ...core.capture import Capture
@@ -23,19 +25,25 @@ def store(mask: np.ndarray, capture: Capture, which: str, written: tuple) -> tup
     return _stamp(path) if mask_image.store(mask, capture, which, keep=_stamp(path) != tuple(written)) else written
 
 
-class Saving(threading.Thread):
-    """One `store` aside. It touches nothing of Blender's; `result` is for the main thread, once it has ended."""
+_pixels: np.ndarray | None = None  # of the last look; a session has one Saving at a time
 
-    def __init__(self, mask: np.ndarray, capture: Capture, which: str, written: tuple):
+
+class Saving(threading.Thread):
+    """One `store` of an image's mask aside. Its thread touches nothing of Blender's; `result` is for the main thread, once it has ended."""
+
+    def __init__(self, image: bpy.types.Image, capture: Capture, which: str, written: tuple):
+        global _pixels
         super().__init__(name="wildcap-mask", daemon=False)  # Blender waits for it when it closes
-        self._arguments = mask.copy(), capture, which, written
+        _pixels = mask_image.pixels(image, _pixels)
+        self._arguments = _pixels, capture, which, written
         self._stamp: tuple = written
         self._problem: Exception | None = None
         self.start()
 
     def run(self) -> None:
+        pixels, *rest = self._arguments
         try:
-            self._stamp = store(*self._arguments)
+            self._stamp = store(mask_image.from_top(pixels), *rest)
         except (Problem, OSError) as error:
             self._problem = error
 
@@ -45,6 +53,23 @@ class Saving(threading.Thread):
         if self._problem is not None:
             raise self._problem
         return self._stamp
+
+
+def prepare(image: bpy.types.Image) -> None:
+    """Comes by the array aside, when the painting begins."""
+    shape = image.size[1], image.size[0], image.channels
+
+    def work() -> None:
+        global _pixels
+        _pixels = np.full(shape, 1.0, np.float32)  # written to once: until then it has no memory
+
+    threading.Thread(target=work, name="wildcap-mask-array", daemon=True).start()
+
+
+def forget() -> None:
+    """Gives the kept array back, when the painting is over."""
+    global _pixels
+    _pixels = None
 
 
 def _stamp(path: Path) -> tuple:

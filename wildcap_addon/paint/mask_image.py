@@ -82,10 +82,20 @@ def refresh(image: bpy.types.Image, capture: Capture, which: str) -> None:
 
 def values(image: bpy.types.Image) -> np.ndarray:
     """The mask float32 [H, W] in [0, 1], rows from the top."""
-    width, height = image.size
-    pixels = np.empty(width * height * image.channels, np.float32)
-    image.pixels.foreach_get(pixels)
-    return np.flipud(pixels.reshape(height, width, image.channels)[..., 0])
+    return from_top(pixels(image))
+
+
+def pixels(image: bpy.types.Image, into: np.ndarray | None = None) -> np.ndarray:
+    """All that Blender keeps of a mask, float32 [H, W, channels], rows from the bottom; in the array `into` where that has the shape."""
+    shape = image.size[1], image.size[0], image.channels
+    found = into if into is not None and into.shape == shape else np.empty(shape, np.float32)
+    image.pixels.foreach_get(found.ravel())
+    return found
+
+
+def from_top(found: np.ndarray) -> np.ndarray:
+    """The mask [H, W], rows from the top, of an image's pixels. Knows no bpy: a thread may do it."""
+    return np.flipud(found[..., 0])
 
 
 def set_values(image: bpy.types.Image, mask: np.ndarray) -> None:

@@ -121,6 +121,7 @@ def begin(context, item, use_sheet: bool, which: str = 'SHADOW') -> None:
         before.put_back(context, _session.before)
         _session = None
         raise
+    keeping.prepare(image)
     _start_watching()
 
 
@@ -142,7 +143,7 @@ def end(context) -> None:
         image.reload()  # from the file, so that Blender does not ask to save it
     elif image is not None:
         bpy.data.images.remove(image)
-    _session = None
+    forget()
 
 
 def _keep_tint(context) -> None:
@@ -172,7 +173,7 @@ def keep_up(stroking: bool) -> None:
     image = bpy.data.images.get(_session.mask)
     if not stroking and image is not None and image.is_dirty and time.monotonic() - _session.looked >= KEEP_UP_S:
         _session.looked = time.monotonic()
-        _saving = keeping.Saving(mask_image.values(image), Capture(_session.root), _session.which, _session.written)
+        _saving = keeping.Saving(image, Capture(_session.root), _session.which, _session.written)
 
 
 def wait() -> None:
@@ -189,6 +190,7 @@ def forget() -> None:
     """Drops the session without touching Blender's data, for a file that is being replaced."""
     global _session
     _session = None
+    keeping.forget()
 
 
 def _turn(context, use_sheet: bool) -> None:

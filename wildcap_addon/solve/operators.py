@@ -25,9 +25,7 @@ class WILDCAP_OT_solve(BaseOperator, bpy.types.Operator):
         capture = captures.folder(item)
         if not (capture.texture.is_file() and (capture.shadow_mask.is_file() or capture.shadow_mask_auto.is_file())):
             raise Problem("There is no texture to solve yet.", "Click Reconstruct first.")
-        jobs.start(item, "solve", first="solve", on_preview=live.update)
-        preview.forget()
-        live.prepare(context, item)
+        begin(context, item)
 
 
 class WILDCAP_OT_solve_edited(BaseOperator, bpy.types.Operator):
@@ -41,16 +39,11 @@ class WILDCAP_OT_solve_edited(BaseOperator, bpy.types.Operator):
         if not jobs.can_start(cls, context):
             return False
         known = status.of(captures.active(context))
-        if known is None or known.whole_solve:
-            cls.poll_message_set("Looking at the capture ..." if known is None else f"{known.whole_solve} Click Solve for the whole map")
-            return False
-        return True
+        return (cls.allowed(known is not None, "Looking at the capture ...")
+                and cls.allowed(not known.whole_solve, f"{known.whole_solve} Click Solve for the whole map"))
 
     def work(self, context):
-        item = captures.require(context)
-        jobs.start(item, "solve", first="solve", edited_part=True, on_preview=live.update)
-        preview.forget()
-        live.prepare(context, item)
+        begin(context, captures.require(context), edited_part=True)
 
 
 class WILDCAP_OT_solve_all(BaseOperator, bpy.types.Operator):
@@ -68,7 +61,7 @@ class WILDCAP_OT_solve_all(BaseOperator, bpy.types.Operator):
         if not started:
             raise Problem("There is nothing to solve.", "Each capture is solved, is being worked on, or needs Reconstruct first.")
         for item in started:
-            jobs.start(item, "solve", first="solve", on_preview=live.update)
+            begin(context, item)
 
     def _ready(self, item) -> bool:
         capture = captures.folder(item)
@@ -89,6 +82,13 @@ class WILDCAP_OT_estimate_skin_tone(BaseOperator, bpy.types.Operator):
     def work(self, context):
         root = captures.root(captures.require(context))
         job = jobs.start(captures.require(context), "tool", tool="skin_tone", then=lambda: set_tone(root, job.figures["skin_tone_srgb"]))
+
+
+def begin(context, item, **shared) -> None:
+    """Starts a capture's solve, or puts it in line, and makes its head ready to show how far it is. Raises Problem when it cannot."""
+    jobs.start(item, "solve", first="solve", on_preview=live.update, **shared)
+    preview.forget()
+    live.prepare(context, item)
 
 
 def set_tone(root: str, tone: list[float]) -> None:
