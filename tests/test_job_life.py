@@ -209,6 +209,11 @@ def test_an_interrupted_solve_is_offered_to_go_on_when_the_file_is_opened_again(
     addon("status").refresh(bpy.context)
     step = addon("next_step").next_step(addon("panel").gather(bpy.context, addon("captures").active(bpy.context)))
     assert step.label == "Continue Solving" and step.operator == "wildcap.solve"
+    capture.job.write_text("{}")
+    os.utime(capture.job, (1, 1))
+    capture.shadow_mask.write_bytes((capture.root / "shadow_mask_auto.png").read_bytes())  # painted since: a checkpoint of another mask is of no use
+    addon("status").refresh(bpy.context)
+    assert addon("next_step").next_step(addon("panel").gather(bpy.context, addon("captures").active(bpy.context))).label == "Solve"
 
 
 def test_how_long_a_quality_takes_is_learned_from_the_last_solve(addon, jobs, tmp_path):

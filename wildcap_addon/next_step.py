@@ -74,7 +74,7 @@ def _step_of(facts: Facts, status: Status) -> Step:
         return Step("The head is ready.", "Bring In Head", "wildcap.bring_in_head", 'IMPORT')
     solved = status.has_maps and status.stages["solve"] in ("done", "absent")
     if not solved and status.interrupted:
-        words = "A solve was interrupted. It goes on from its last checkpoint, unless the mask or the settings changed."
+        words = "A solve was interrupted. It goes on from its last checkpoint, unless the settings changed."
         step = Step(words, "Continue Solving", "wildcap.solve", 'LIGHT')
         return step if facts.has_python else SET_UP
     if not solved and not status.has_mask:

@@ -34,7 +34,7 @@ class Status:
     maps_time: float = 0.0
     render: str = ""
     whole_solve: str = ""  # why an edited part of the mask cannot be solved alone; '' where it can
-    interrupted: bool = False  # a solve was stopped on its way and left a checkpoint
+    interrupted: bool = False  # a solve was stopped on its way, and can go on from its checkpoint
     findings: tuple[dict, ...] = ()  # what is wrong with the capture, as core.report.findings tells it
     problem: Problem | None = None
     missing: bool = False  # the folder is not there
@@ -81,7 +81,7 @@ def look(capture: Capture, settings) -> Status:
         source=record.get("source", ""), stages=states, whole_solve=_whole_solve(capture, states["solve"], settings),
         seconds={name: done["seconds"] for name, done in record["stages"].items()},
         has_head=capture.head.is_file(), head_time=_time(capture.head), has_mask=capture.shadow_mask.is_file(),
-        findings=tuple(report.findings(record)), interrupted=(capture.checkpoints / "solve.safetensors").is_file(),
+        findings=tuple(report.findings(record)), interrupted=_interrupted(capture),
         has_maps=all(path.is_file() for path in delivered(capture)), maps_time=maps_time, render=render.name if _time(render) >= maps_time else "",
     )
 
@@ -103,6 +103,12 @@ def _state(capture: Capture, stage: stages.Stage, record: dict, settings) -> str
 
 def _whole_solve(capture: Capture, state: str, settings) -> str:
     return "The mask is as it was at the last solve." if state == "done" else mask_edit.obstacle(capture, settings)
+
+
+def _interrupted(capture: Capture) -> bool:
+    """Whether a stopped solve left a checkpoint, and no mask was painted since it began: it goes on from there only with the masks it began with."""
+    began = _time(capture.job) or float("inf")
+    return (capture.checkpoints / "solve.safetensors").is_file() and max(map(_time, (capture.shadow_mask, capture.protect_mask))) <= began
 
 
 def _time(path: Path) -> float:
