@@ -47,6 +47,11 @@ class BaseOperator:
     def work(self, context):
         raise NotImplementedError
 
+    def warn(self, text: str) -> None:
+        """Tells something that does not stop the work; '' for nothing."""
+        if text:
+            self.report({'WARNING'}, text)
+
     def _refuse(self, root: str, problem: Problem):
         problems.show(root, problem)
         self.report({'ERROR'}, str(problem))

@@ -6,7 +6,7 @@ import bpy
 
 from ..core.capture import Capture
 from ..core.messages import Problem
-from . import captures
+from . import captures, colours
 
 PREVIEW = "WildCap Preview"
 """Name of the image node by which a running solve is shown on the head."""
@@ -76,12 +76,11 @@ def read_mesh(context, capture: Capture) -> bpy.types.Mesh:
     return mesh
 
 
-def load_image(path, colour_space: str) -> bpy.types.Image:
-    """The image of a file, read anew if Blender has it already. `colour_space` is 'sRGB' or 'Non-Color'."""
+def load_image(path, data: bool = False) -> bpy.types.Image:
+    """The image of a file, read anew if Blender has it already: a picture in sRGB, or data."""
     image = bpy.data.images.load(str(path), check_existing=True)
     image.reload()
-    if image.colorspace_settings.name != colour_space:
-        image.colorspace_settings.name = colour_space
+    (colours.as_data if data else colours.as_srgb)(image)
     return image
 
 
@@ -89,7 +88,7 @@ def _show_texture(head, capture: Capture) -> None:
     """A head without a material gets one that shows the texture, until Assemble Material builds the skin there."""
     if not capture.texture_png.is_file():
         return
-    image = load_image(capture.texture_png, 'sRGB')
+    image = load_image(capture.texture_png)
     if head.data.materials and head.data.materials[0] is not None:
         return
     material = bpy.data.materials.new(f"{head.name} Skin")

@@ -15,6 +15,7 @@ import numpy as np
 from ...core import mask_history
 from ...core.capture import Capture, replacing
 from ...core.messages import Problem
+from .. import colours
 
 
 def file_of(capture: Capture, which: str) -> Path:
@@ -37,7 +38,7 @@ def load(capture: Capture, which: str = 'SHADOW') -> bpy.types.Image:
         bpy.data.images.remove(image)
     image = bpy.data.images.load(str(path))
     image.name = name
-    image.colorspace_settings.name = 'Non-Color'
+    colours.as_data(image)
     if not image.size[0]:  # asking for the size reads the file
         bpy.data.images.remove(image)
         raise Problem(f"{path} is not a picture that can be read.", "Restore it from mask_history, or delete it to start from the proposal.")
@@ -75,7 +76,7 @@ def refresh(image: bpy.types.Image, capture: Capture, which: str) -> None:
     elif capture.shadow_mask_auto.is_file():
         image.source = 'FILE'
         set_values(image, proposal(image, capture.shadow_mask_auto) if which == 'SHADOW' else np.zeros_like(values(image)))
-    image.colorspace_settings.name = 'Non-Color'
+    colours.as_data(image)
     if not image.size[0]:
         raise Problem("The mask that was being painted is gone.", "Click Paint Mask: it is looked for again.")
 
@@ -113,7 +114,7 @@ def proposal(image: bpy.types.Image, path: Path) -> np.ndarray:
         raise Problem("This capture has no proposal for its shadow mask.", "Click Reconstruct, or paint the mask by hand.")
     other = bpy.data.images.load(str(path))
     try:
-        other.colorspace_settings.name = 'Non-Color'
+        colours.as_data(other)
         if tuple(other.size) != tuple(image.size):
             other.scale(*image.size)
         return values(other).copy()

@@ -101,7 +101,7 @@ def begin(context, item, use_sheet: bool, which: str = 'SHADOW') -> None:
     end(context)
     capture = captures.folder(item)
     obj = captures.require_head(context, item)
-    texture = head.load_image(capture.texture_png, 'sRGB') if capture.texture_png.is_file() else None
+    texture = head.load_image(capture.texture_png) if capture.texture_png.is_file() else None
     if texture is None:
         raise Problem("This capture has no texture to paint over.", "Click Reconstruct first.")
     image = mask_image.load(capture, which)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...core.capture import Capture
 from ...core.messages import Problem
+from .. import colours
 
 CARDS = {
     "shading": ("Takes the light of the surroundings out of every frame by the head's own shape.",
@@ -93,7 +94,7 @@ def forget() -> None:
 def _read(path: Path) -> np.ndarray:
     """A picture fitted into a square [SIDE, SIDE, 4], as the eye sees it (sRGB), transparent around it."""
     image = bpy.data.images.load(str(path))
-    image.colorspace_settings.is_data = True  # or Blender would linearise what has 16 bits, and what has 8 it would not
+    colours.as_data(image)  # or Blender would linearise what has 16 bits, and what has 8 it would not
     try:
         scale = SIDE / max(1, *image.size)
         image.scale(max(1, round(image.size[0] * scale)), max(1, round(image.size[1] * scale)))

@@ -38,7 +38,7 @@ class WILDCAP_OT_compare(BaseOperator, bpy.types.Operator):
         path = status.delivered(captures.folder(item))[0] if self.show == 'SOLVED' else captures.folder(item).comparison / name
         if not path.is_file():
             raise Problem(f"This capture has no {name} to show.", "Click Solve: it leaves what is compared, as long as the frames are there.")
-        skin(context).node_tree.nodes[ALBEDO].image = head.load_image(path, 'sRGB')
+        skin(context).node_tree.nodes[ALBEDO].image = head.load_image(path)
 
 
 def skin(context) -> bpy.types.Material | None:

@@ -13,10 +13,11 @@ from . import node_group
 
 KEY = "wildcap_skin"
 IMAGES = (
-    ("WildCap Albedo", "diffuse_albedo.png", 'sRGB'),
-    ("WildCap Specular", "specular_albedo.png", 'Non-Color'),
-    ("WildCap Normal", "normal.png", 'Non-Color'),
+    ("WildCap Albedo", "diffuse_albedo.png", False),
+    ("WildCap Specular", "specular_albedo.png", True),
+    ("WildCap Normal", "normal.png", True),
 )
+"""Node, its file, and whether that holds data, no colours."""
 
 
 def assemble(context, item) -> bpy.types.Material:
@@ -67,9 +68,9 @@ def _build(material, paths: dict, obj) -> None:
         node_group.skin_group()
     uv = _node(tree, "WildCap UV", 'ShaderNodeUVMap', (-760, 0))
     uv.uv_map = obj.data.uv_layers[0].name
-    for row, (name, file_name, colour_space) in enumerate(IMAGES):
+    for row, (name, file_name, data) in enumerate(IMAGES):
         node = _node(tree, name, 'ShaderNodeTexImage', (-540, 300 - 300 * row))
-        node.image = head.load_image(paths[file_name], colour_space)
+        node.image = head.load_image(paths[file_name], data)
         node.interpolation = 'Cubic' if node.interpolation == 'Linear' and KEY not in material else node.interpolation
         _link(tree, uv.outputs["UV"], node.inputs["Vector"])
     normal = _node(tree, "WildCap Normal Map", 'ShaderNodeNormalMap', (-200, -300))

@@ -4,7 +4,7 @@
 
 import bpy
 
-from .. import captures, hdri
+from .. import captures, colours, hdri
 from ..base_operator import BaseOperator
 from . import headless, material
 
@@ -21,7 +21,8 @@ class WILDCAP_OT_assemble_material(BaseOperator, bpy.types.Operator):
         return cls.in_object_mode(context) and cls.with_capture(context)
 
     def work(self, context):
-        material.assemble(context, captures.require(context))
+        skin = material.assemble(context, captures.require(context))
+        self.warn(colours.missing(skin.node_tree.nodes[material.IMAGES[0][0]].image))
 
 
 class WILDCAP_OT_render(BaseOperator, bpy.types.Operator):
@@ -37,6 +38,7 @@ class WILDCAP_OT_render(BaseOperator, bpy.types.Operator):
     def work(self, context):
         item = captures.require(context)
         props = context.scene.wildcap
+        self.warn(colours.missing_view(context.scene))
         light = hdri.chosen(props) if props.light == 'hdri' else props.light
         headless.render_light(captures.require_head(context, item), captures.folder(item).renders, light, props.resolution, props.samples,
                               wait=bpy.app.background)

@@ -13,6 +13,7 @@ import bpy
 from mathutils import Matrix, Vector
 
 from ...core.capture import storage_problem
+from .. import colours
 from ..hdri import Hdri
 from . import lights
 
@@ -39,7 +40,7 @@ def set_up(obj: bpy.types.Object, light: str | Hdri, resolution: int, samples: i
     render.use_file_extension = False
     scene.cycles.samples = samples
     scene.cycles.use_denoising = has_denoiser()
-    scene.view_settings.view_transform = 'Standard'
+    colours.without_a_look(scene)
     return scene
 
 
