@@ -5,6 +5,7 @@
 Both are children of the head if it is there, so that it may stand anywhere; their own coordinates are those of the capture's world (metres).
 """
 
+import contextlib
 import json
 
 import bpy
@@ -45,7 +46,8 @@ def bring_in_scan(context, item) -> bpy.types.Object:
     if not capture.scan.is_file():
         raise Problem("This capture has no scan yet.", "Click Reconstruct: it is made from the frames.")
     active, selected, before = context.view_layer.objects.active, list(context.selected_objects), set(context.scene.objects)
-    bpy.ops.wm.ply_import(filepath=str(capture.scan), forward_axis='Y', up_axis='Z')
+    with contextlib.suppress(RuntimeError):  # of a file that is no PLY: nothing came in
+        bpy.ops.wm.ply_import(filepath=str(capture.scan), forward_axis='Y', up_axis='Z')
     new = [thing for thing in context.scene.objects if thing not in before]
     if len(new) != 1 or new[0].type != 'MESH':
         for thing in new:
