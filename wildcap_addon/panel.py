@@ -66,7 +66,7 @@ class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
             state = "running" if job and job.stage == stage.name else found.stages.get(stage.name, "to do") if found else "to do"
             if state == "to do" and found and not found.source and found.has_head and stage.name in next_step.BEFORE_MASK:
                 state = "not needed"  # the sample head came without what it was made from
-            split = column.split(factor=0.42)
+            split = column.split(factor=0.47)
             split.label(text=stage.label, icon=STATE_ICONS[state])
             row = split.row()
             row.label(text=_words(state, found.seconds.get(stage.name) if found else None))
