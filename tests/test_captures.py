@@ -34,6 +34,23 @@ def project(addon, tmp_path) -> Path:
     return folder
 
 
+def test_the_row_that_is_clicked_is_the_face_of_the_tab_whichever_head_was_active(addon, project):
+    props, active = bpy.context.scene.wildcap, addon("captures").active
+    heads = [item.head for item in items()]
+    for index in (0, 1, 0):
+        props.active_index = index
+        assert active(bpy.context) == items()[index] and bpy.context.view_layer.objects.active == heads[index]
+        assert bpy.context.selected_objects == [heads[index]]
+    bpy.ops.object.mode_set(mode='SCULPT')
+    props.active_index = 1
+    assert bpy.context.mode == 'SCULPT' and bpy.context.view_layer.objects.active == heads[0], "nobody is thrown out of a stroke"
+    bpy.ops.object.mode_set(mode='OBJECT')
+    bpy.data.objects.remove(heads[1])
+    props.active_index = 0
+    props.active_index = 1
+    assert active(bpy.context) == items()[1], "also where its head is not in the scene"
+
+
 def test_what_is_dropped_becomes_captures(addon, tmp_path):
     addon("preferences").get().captures = str(tmp_path / "captures")
     for name in ("one.mp4", "TWO.MOV", "notes.txt"):

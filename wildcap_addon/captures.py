@@ -57,6 +57,23 @@ def add(context, path: Path) -> bpy.types.PropertyGroup:
     return props.captures[index]
 
 
+def choose(context) -> None:
+    """After a click in the list: that capture's head becomes the active object, or at least no other capture's stays it, for the active head decides.
+    Only in Object Mode: nobody is thrown out of a stroke."""
+    props = context.scene.wildcap
+    if context.view_layer is None or context.mode != 'OBJECT' or not 0 <= props.active_index < len(props.captures):
+        return
+    item, objects = props.captures[props.active_index], context.view_layer.objects
+    wanted = head(context, item)
+    if wanted is not None and wanted.name in objects:
+        for thing in objects:
+            if thing == wanted or HEAD_KEY in thing:
+                thing.select_set(thing == wanted)
+        objects.active = wanted
+    elif objects.active is not None and objects.active.get(HEAD_KEY) not in (None, item.path):
+        objects.active = None
+
+
 def head(context, item) -> bpy.types.Object | None:
     """The capture's head, if it is in this scene."""
     return item.head if item.head is not None and item.head.name in context.scene.objects else None

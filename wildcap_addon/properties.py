@@ -12,8 +12,8 @@ import bpy
 
 from ..core import settings as core_settings
 from ..core import stages
+from . import captures, preferences
 from . import hdri as worlds
-from . import preferences
 
 STAGE_KINDS = {stage.name: type(getattr(core_settings.Settings(), stage.name)) for stage in stages.STAGES}
 
@@ -87,11 +87,16 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
 WILDCAP_PG_capture.__annotations__ |= {stage: bpy.props.PointerProperty(type=group) for stage, group in GROUPS.items()}
 
 
+def _show_chosen(self, context):
+    if self.id_data == context.scene:
+        captures.choose(context)
+
+
 class WILDCAP_PG_scene(bpy.types.PropertyGroup):
     """The scene's captures and how they are lit."""
 
     captures: bpy.props.CollectionProperty(type=WILDCAP_PG_capture)
-    active_index: bpy.props.IntProperty(name="Capture", description="The capture that the panel shows while no head is active")
+    active_index: bpy.props.IntProperty(name="Capture", update=_show_chosen, description="The capture that the panel shows while no head is active")
     light: bpy.props.EnumProperty(
         name="Light", default='studio',
         items=[('studio', "Studio", "Key, fill and rim from three soft boxes"), ('sun', "Sun", "A low sun under a clear sky"),

@@ -11,7 +11,7 @@ from . import strip
 
 class WILDCAP_UL_captures(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_property):
-        layout.prop(item, "name", text="", emboss=False, icon='USER')
+        layout.prop(item, "name", text="", emboss=False, icon='CHECKMARK' if item == captures.active(context) else 'USER')  # the active head decides
 
 
 class WILDCAP_PT_capture(FoldedPanel, bpy.types.Panel):
