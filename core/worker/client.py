@@ -18,7 +18,7 @@ from pathlib import Path
 from ..capture import storage_problem
 from ..messages import FINAL, Cancelled, Failed, Log, Message, Problem, from_line
 
-GRACE_S = 0.9
+GRACE_S = 0.7
 """How long a cancelled worker may take to reach its next report before it is stopped."""
 
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")

@@ -53,11 +53,11 @@ def settings():
     return bpy.context.scene.wildcap.captures[0]
 
 
-def draft(steps: int, checkpoint_every: int) -> None:
+def draft(steps: int, checkpoint_every: int, size: int = 128) -> None:
     """Minutes matter in a test, detail does not."""
     item = settings()
     item.quality = "draft"
-    item.solve.size, item.solve.steps, item.solve.checkpoint_every = 128, steps, checkpoint_every
+    item.solve.size, item.solve.steps, item.solve.checkpoint_every = size, steps, checkpoint_every
     item.upscale.size = 1024
     item.transfer.scan = False
 

@@ -206,7 +206,8 @@ def browse(path: Path):
     yield 1.0
     folder = path if path.is_dir() else path.parent
     area.spaces.active.params.directory = os.fsencode(f"{folder}/")
-    area.spaces.active.params.filename = "" if folder == path else path.name
+    if path != folder:  # a browser for folders has no name to fill in
+        area.spaces.active.params.filename = path.name
     yield 0.5
     with bpy.context.temp_override(window=window(), area=area, region=next(r for r in area.regions if r.type == 'WINDOW')):
         bpy.ops.file.execute()
@@ -227,9 +228,9 @@ def under_cursor() -> str:
     return manager.clipboard
 
 
-def until(condition, what: str, limit_s: float = 60):
+def until(condition, what: str, limit_s: float = 60, every_s: float = 0.2):
     """Waits until `condition()` is true."""
     end = time.monotonic() + limit_s
     while not condition():
         assert time.monotonic() < end, f"{what} did not happen within {limit_s} s"
-        yield 0.2
+        yield every_s
