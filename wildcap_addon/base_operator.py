@@ -4,6 +4,9 @@
 
 import traceback
 
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
+
 from ..core.messages import Problem
 from . import captures, problems, status
 
@@ -17,7 +20,7 @@ class BaseOperator:
     def allowed(cls, condition, why_not: str) -> bool:
         """For `poll`: whether the condition holds; where it does not, the tooltip of the greyed-out button says why."""
         if not condition:
-            cls.poll_message_set(why_not)
+            cls.poll_message_set(iface_(why_not))
         return bool(condition)
 
     @classmethod
@@ -50,9 +53,9 @@ class BaseOperator:
     def warn(self, text: str) -> None:
         """Tells something that does not stop the work; '' for nothing."""
         if text:
-            self.report({'WARNING'}, text)
+            self.report({'WARNING'}, rpt_(text))
 
     def _refuse(self, root: str, problem: Problem):
         problems.show(root, problem)
-        self.report({'ERROR'}, str(problem))
+        self.report({'ERROR'}, f"{rpt_(problem.problem)} {rpt_(problem.remedy)}")
         return {'CANCELLED'}

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from ..core import messages, stages
 from ..core.messages import Problem
@@ -199,7 +200,7 @@ def eta(job: Job) -> str:
     seconds = job.progress.eta_s if job.progress else None
     if seconds is None:
         return ""
-    return f"{seconds:.0f} s left" if seconds < 90 else f"{seconds / 60:.0f} min left"
+    return iface_("{} s left").format(f"{seconds:.0f}") if seconds < 90 else iface_("{} min left").format(f"{seconds / 60:.0f}")
 
 
 def stage_label(job: Job) -> str:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -43,8 +44,9 @@ WORDS = {"reconstruct": "Reconstructing ...", "solve": "Solving ...",
          "install": "Installing the solver ...", "ask": "One moment ..."}
 
 
-def next_step(facts: Facts) -> Step:
-    """The one thing to do now. A stale stage never drags the artist back before the mask; its row says so."""
+def next_step(facts: Facts, translated: Callable[[str], str] = str) -> Step:
+    """The one thing to do now. A stale stage never drags the artist back before the mask; its row says so. `translated` is for the sentences that names
+    are put into; all others are translated as they are shown."""
     if facts.painting:
         return Step("Red is shadow, green is protected. Paint adds, Ctrl takes away.", "Save Mask and Leave", "wildcap.finish_mask", 'CHECKMARK')
     if facts.running:
@@ -58,17 +60,17 @@ def next_step(facts: Facts) -> Step:
         return Step("The folder of this capture is not where it was.", "Locate Capture", "wildcap.locate_capture", 'VIEWZOOM')
     if status.problem is not None:
         return Step("This capture cannot be used.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
-    return _step_of(facts, status)
+    return _step_of(facts, status, translated)
 
 
-def _step_of(facts: Facts, status: Status) -> Step:
+def _step_of(facts: Facts, status: Status, translated: Callable[[str], str]) -> Step:
     # A capture without a source (the sample head) came finished up to its mask; there is nothing to reconstruct it from.
     missing = [name for name in BEFORE_MASK if status.stages[name] == "to do"] if status.source or not status.has_head else []
     if missing and not status.source:
         return Step("This capture has no video yet.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
     if missing:
         begun = len(missing) < len(BEFORE_MASK)
-        state = f"Stopped before {stages.by_name(missing[0]).label}." if begun else "The video is chosen."
+        state = translated("Stopped before {}.").format(translated(stages.by_name(missing[0]).label)) if begun else "The video is chosen."
         return Step(state, "Continue Reconstruction" if begun else "Reconstruct", "wildcap.reconstruct", 'MESH_MONKEY') if facts.has_python else SET_UP
     if facts.head_time < status.head_time:
         return Step("The head is ready.", "Bring In Head", "wildcap.bring_in_head", 'IMPORT')
@@ -84,5 +86,5 @@ def _step_of(facts: Facts, status: Status) -> Step:
         return Step(state, "Solve", "wildcap.solve", 'LIGHT') if facts.has_python else SET_UP
     if facts.maps_time < status.maps_time:
         return Step("The maps are ready.", "Assemble Material", "wildcap.assemble_material", 'MATERIAL')
-    state = f"Rendered to renders/{status.render}." if status.render else "The head can be relit."
+    state = translated("Rendered to renders/{}.").format(status.render) if status.render else "The head can be relit."
     return Step(state, "Render", "wildcap.render", 'RENDER_STILL')

@@ -5,6 +5,7 @@
 from pathlib import Path
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from ..core import stages
 from . import captures, jobs, next_step, preferences, problems, status
@@ -21,7 +22,7 @@ class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
         layout = self.layout
         item = captures.active(context)
         root = captures.root(item)
-        step = next_step.next_step(gather(context, item))
+        step = next_step.next_step(gather(context, item), iface_)
         if item is not None:
             layout.label(text=item.name, icon='USER')
         width = context.region.width if context.region else 300
@@ -125,20 +126,20 @@ def draw_job(layout, job: jobs.Job, cancel: str = "") -> None:
     progress = job.progress
     factor = min(1.0, progress.done / progress.of) if progress and progress.of > 0 else 0.0
     row = layout.row(align=True)
-    row.progress(text=f"{jobs.stage_label(job)}  {factor:.0%}", factor=factor)
+    row.progress(text=f"{iface_(jobs.stage_label(job))}  {factor:.0%}", translate=False, factor=factor)
     if cancel:
         row.operator(cancel, text="", icon='CANCEL')
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for line in (progress.text if progress else "", jobs.eta(job)):
+    for line in (iface_(progress.text) if progress and progress.text else "", jobs.eta(job)):
         if line:
-            column.label(text=line[:1].upper() + line[1:])
+            column.label(text=line[:1].upper() + line[1:], translate=False)
 
 
 def _words(state: str, seconds: float | None) -> str:
     if state in ("done", "stale") and seconds is not None:
         time = f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
-        return f"done, {time}" if state == "done" else f"out of date, {time}"
+        return (iface_("done, {}") if state == "done" else iface_("out of date, {}")).format(time)
     return {"absent": "done", "stale": "out of date"}.get(state, state)
 
 

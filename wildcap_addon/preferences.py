@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from .. import __package__ as base_package
 
@@ -50,8 +51,11 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
 def draw_solver(layout, preferences) -> None:
     """Whether there is a solver, and the buttons that make, choose and remove one: here, and in the tab until there is one."""
     ready = python() is not None
-    device = f" ({DEVICES.get(preferences.device, preferences.device)})" if preferences.device else ""
-    layout.label(text=f"The solver is ready{device}" if ready else "There is no solver yet", icon='CHECKMARK' if ready else 'INFO')
+    device = DEVICES.get(preferences.device, preferences.device)
+    if ready and device:
+        layout.label(text=iface_("The solver is ready ({})").format(device), translate=False, icon='CHECKMARK')
+    else:
+        layout.label(text="The solver is ready" if ready else "There is no solver yet", icon='CHECKMARK' if ready else 'INFO')
     column = layout.column()
     column.use_property_split = True
     column.prop(preferences, "compute")

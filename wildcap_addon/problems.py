@@ -5,6 +5,7 @@
 import textwrap
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.messages import Problem
 
@@ -35,12 +36,12 @@ def draw(layout, problem: Problem | None, width: int) -> None:
 
 
 def draw_text(layout, text: str, width: int, icon: str = 'NONE') -> None:
-    """A text over as many lines as it needs."""
+    """A text, translated as a whole, over as many lines as it needs."""
     column = layout.column(align=True)
     column.scale_y = 0.8
-    lines = wrapped(text, width - (45 if icon != 'NONE' else 0))
+    lines = wrapped(iface_(text), width - (45 if icon != 'NONE' else 0))
     for i, line in enumerate(lines):
-        column.label(text=line, icon=icon if i == 0 else 'BLANK1' if icon != 'NONE' else 'NONE')
+        column.label(text=line, translate=False, icon=icon if i == 0 else 'BLANK1' if icon != 'NONE' else 'NONE')
 
 
 def wrapped(text: str, width: int) -> list[str]:

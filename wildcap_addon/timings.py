@@ -10,6 +10,7 @@ import json
 from pathlib import Path
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from .. import __package__ as base_package
 from ..core.capture import write_json
@@ -45,7 +46,7 @@ def work(settings: Settings) -> float:
 
 
 def _spoken(value: float) -> str:
-    return "under 1 min" if value < 1 else f"about {value:.0f} min"
+    return iface_("under 1 min") if value < 1 else iface_("about {} min").format(f"{value:.0f}")
 
 
 def _file() -> Path:

@@ -3,6 +3,7 @@
 """Panel: the captures of this scene."""
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from .. import captures
 from ..base_panel import CapturePanel, FoldedPanel
@@ -48,8 +49,9 @@ class WILDCAP_PT_frames(CapturePanel, bpy.types.Panel):
         if found is None:
             layout.label(text="No frames yet: they are taken from the video by Reconstruct", icon='INFO')
             return
-        blurred = f", {found.blurred} blurred" if found.blurred else ""
-        layout.label(text=f"{found.count} frames, {found.used} in the texture{blurred}")
+        counts = iface_("{} frames, {} in the texture").format(found.count, found.used)
+        blurred = iface_(", {} blurred").format(found.blurred) if found.blurred else ""
+        layout.label(text=counts + blurred, translate=False)
         grid = layout.grid_flow(row_major=True, columns=4, even_columns=True, align=True)
         for frame in found.frames:
             column = grid.column(align=True)

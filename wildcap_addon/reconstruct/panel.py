@@ -3,6 +3,7 @@
 """Panels: what the artist may choose up to the mask proposal, and the settings of those stages."""
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from ...core import stages
 from .. import captures, problems
@@ -41,7 +42,8 @@ class WILDCAP_PT_head_mesh(CapturePanel, bpy.types.Panel):
         item = captures.active(context)
         own = item.registration.template
         width = context.region.width if context.region else 300
-        problems.draw_text(layout, f"The built-in head, and {bpy.path.basename(own.rstrip('/'))} beside it." if own else "The built-in head.", width)
+        beside = iface_("The built-in head, and {} beside it.").format(bpy.path.basename(own.rstrip('/')))
+        problems.draw_text(layout, beside if own else "The built-in head.", width)
         column = layout.column(align=True)
         column.operator("wildcap.use_active_mesh", icon='OUTLINER_OB_MESH')
         column.operator("wildcap.choose_template", text="Choose OBJ or ICT-FaceKit Folder", icon='FILE_FOLDER')
@@ -69,7 +71,7 @@ class WILDCAP_PT_delighter(CapturePanel, bpy.types.Panel):
         name = delighters.shown(capture)
         if name:
             layout.template_icon(icon_value=delighters.icon(), scale=11)
-            layout.prop(context.window_manager, "wildcap_wipe", text=f"Frame {name}", slider=True)
+            layout.prop(context.window_manager, "wildcap_wipe", text=iface_("Frame {}").format(name), translate=False, slider=True)
 
 
 CLASSES = (WILDCAP_PT_reconstruct, WILDCAP_PT_head_mesh, WILDCAP_PT_delighter)

@@ -5,6 +5,7 @@
 from pathlib import Path
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.messages import Problem
 from ...core.worker import environment, index, installation
@@ -29,7 +30,8 @@ class Dialog(BaseOperator):
             return self._refuse("", problem)
         if self.lines is None:
             return {'CANCELLED'}
-        return context.window_manager.invoke_props_dialog(self, width=WIDTH, title=f"{self.bl_label}?", confirm_text=self.bl_label.partition(" ")[0])
+        title = f"{iface_(self.bl_label, 'Operator')}?"
+        return context.window_manager.invoke_props_dialog(self, width=WIDTH, title=title, confirm_text=self.bl_label.partition(" ")[0])
 
     def draw(self, context):
         for line in self.lines:
@@ -87,7 +89,8 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
         if size is None:
             asking.ask(("size", str(folder)), lambda task: measure(task, folder), "remove_solver")
             return None
-        return f"Deletes {folder} and frees {index.gigabytes(size)}.", "Captures, masks and maps stay; what pip keeps in its own cache stays, too."
+        return (iface_("Deletes {} and frees {}.").format(folder, index.gigabytes(size)),
+                "Captures, masks and maps stay; what pip keeps in its own cache stays, too.")
 
     def work(self, context):
         folder = preferences.environment_folder()
@@ -100,9 +103,9 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
 
 def told(plan: index.Plan, compute: str, folder: Path, free: int) -> tuple[str, ...]:
     """What an installation means, before the artist says yes; `free` bytes are on the folder's disk."""
-    return (f"PyTorch {plan.packages.get('torch', '')} for {COMPUTES[compute]} and {len(plan.packages) - 1} more packages.",
-            f"{index.gigabytes(plan.download)} to download from {', '.join(plan.hosts)}.",
-            f"{index.gigabytes(plan.disk)} on disk in {folder}, where {index.gigabytes(free)} are free.",
+    return (iface_("PyTorch {} for {} and {} more packages.").format(plan.packages.get("torch", ""), iface_(COMPUTES[compute]), len(plan.packages) - 1),
+            iface_("{} to download from {}.").format(index.gigabytes(plan.download), ", ".join(plan.hosts)),
+            iface_("{} on disk in {}, where {} are free.").format(index.gigabytes(plan.disk), folder, index.gigabytes(free)),
             "You can go on working meanwhile, cancel, and continue later.")
 
 
