@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A job of the real worker while its artist does other things: cancelled within two seconds and continued, gone on with through an undo past its start, a new
+scene and another .blend, beside an autosave; ended by disabling the add-on; and killed from outside, with what the tab then says."""
+
+import os
+import signal
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import addon  # noqa: E402
+import driver as d  # noqa: E402
+
+CANCEL_LIMIT_S = 2.0
+"""By the issue, from the click. Of two, for other programs may hold one up."""
+_cancelled: list[float] = []
+
+
+def flow():
+    addon.unfold("WILDCAP_PT_stages")
+    root = yield from addon.open_sample_head()
+    addon.use_solver()
+    addon.draft(steps=600, checkpoint_every=1, size=256)  # it outlasts what is done meanwhile on a fast machine, too
+    bpy.ops.wm.save_as_mainfile(filepath=str(root.parent / "project.blend"))
+    yield 1.5
+    yield from run_and_cancel(root)
+    yield from addon.continued(root)
+    yield from undo_past_start(root)
+    yield from new_scene(root)
+    yield from another_file(root)
+    yield from autosave(root)
+    yield from kill_worker(root)
+    yield from disable(root)
+
+
+def run_and_cancel(root: Path):
+    """The arrow beside the stage, progress in its row and in the bar, and the large button's Cancel."""
+    yield from d.press("wildcap.solve")
+    assert addon.job(root) is not None, addon.problem(root)
+    yield from stepped(root, 2)
+    yield 0.5
+    d.screenshot("jobs_1_running")
+    yield from cancelled(root)
+    yield from d.park()
+    yield 1.5
+    d.screenshot("jobs_2_cancelled")
+    assert "kept" in addon.problem(root)
+
+
+def undo_past_start(root: Path):
+    """Ctrl-Z to before the capture was in the scene, and forward again: the job takes no notice of it, and the tab tells of it in both."""
+    for _ in range(8):
+        yield from d.key('Z', ctrl=True)
+    assert len(bpy.context.scene.wildcap.captures) == 0, "undone past the sample head"
+    yield from told(root, "jobs_3_undone")
+    for _ in range(8):
+        yield from d.key('Z', ctrl=True, shift=True)
+    assert len(bpy.context.scene.wildcap.captures) == 1
+    yield from stepped(root, 1)
+    assert addon.next_step().operator == "wildcap.cancel"
+    d.say("undo past its start: the job goes on")
+
+
+def new_scene(root: Path):
+    bpy.ops.scene.new(type='NEW')
+    yield from told(root, "jobs_4_new_scene")
+    bpy.ops.scene.delete()
+    d.say("a new scene: the job goes on")
+
+
+def another_file(root: Path):
+    """Another .blend, where the capture is not known; and back to the project."""
+    bpy.ops.wm.read_homefile()
+    yield 2.0
+    yield from d.open_tab("WildCap")
+    assert len(bpy.context.scene.wildcap.captures) == 0
+    yield from told(root, "jobs_5_another_file")
+    bpy.ops.wm.open_mainfile(filepath=str(root.parent / "project.blend"))
+    yield 2.0
+    yield from d.open_tab("WildCap")
+    yield from stepped(root, 1)
+    assert addon.next_step().operator == "wildcap.cancel", addon.next_step()
+    d.say("another .blend: the job goes on")
+
+
+def told(root: Path, picture: str):
+    """Where the capture is not in the scene, the tab still tells how far its job is, and can cancel it."""
+    yield from stepped(root, 1)
+    yield from d.park()
+    d.screenshot(picture)
+    yield from d.find("wildcap.cancel", root.name)
+
+
+def autosave(root: Path):
+    """Blender's own autosave, a minute after its interval was set, with the job running."""
+    files = bpy.context.preferences.filepaths
+    files.auto_save_time, files.use_auto_save_temporary_files = 1, True
+    bpy.data.objects["Cube"].location.x += 1
+    bpy.ops.ed.undo_push()
+    started = time.time()
+    folder = Path(tempfile.gettempdir())
+    yield from d.until(lambda: any(path.stat().st_mtime > started for path in folder.glob("*autosave.blend")), f"an autosave in {folder}", 100)
+    assert addon.job(root) is not None, addon.problem(root)
+    d.say(f"autosaved after {time.time() - started:.0f} s, the job running")
+
+
+def kill_worker(root: Path):
+    """The worker is killed from outside: the tab says what that means and what to do, and the next click goes on."""
+    yield from stepped(root, 1)
+    os.kill(addon.worker_process(root).pid, signal.SIGKILL)
+    yield from d.until(lambda: addon.job(root) is None, "hearing of the worker's death", 5)
+    yield 1.5
+    d.screenshot("jobs_6_killed")
+    said = addon.problem(root)
+    assert "killed from outside during the stage solve" in said and "run again: finished stages are kept" in said, said
+    yield from addon.continued(root)
+    assert not addon.problem(root)
+    d.say("killed, and gone on with by the next click")
+
+
+def disable(root: Path):
+    """The add-on is disabled: its worker ends with it. Enabled again, the solve goes on."""
+    process = addon.worker_process(root)
+    bpy.ops.preferences.addon_disable(module=addon.INSTALLED)
+    yield from d.until(lambda: process.poll() is not None, "the worker's end with the add-on", 5)
+    bpy.ops.preferences.addon_enable(module=addon.INSTALLED)
+    yield 1.0
+    addon.use_solver()  # the preferences of an add-on go when it is disabled
+    yield from d.open_tab("WildCap")
+    yield from d.park()
+    d.screenshot("jobs_7_enabled_again")
+    yield from addon.continued(root)
+    yield from cancelled(root)
+    assert min(_cancelled) < CANCEL_LIMIT_S, _cancelled
+
+
+def cancelled(root: Path):
+    """Clicks Cancel, and takes the time until the worker is gone."""
+    process = addon.worker_process(root)
+    position = yield from d.find("wildcap.cancel")
+    clicked = time.monotonic()
+    yield from d.click(position)
+    yield from d.until(lambda: addon.job(root) is None and process.poll() is not None, "the end after Cancel", 10, every_s=d.TICK_S)
+    _cancelled.append(time.monotonic() - clicked)
+    d.say(f"cancelled {_cancelled[-1]:.1f} s after the click")
+
+
+def stepped(root: Path, steps: int):
+    """Waits until the solver has gone that many steps on."""
+    def step() -> float:
+        assert addon.job(root) is not None, f"the job is gone: {addon.problem(root)}"
+        progress = addon.job(root).progress
+        return progress.done if progress is not None and progress.text.startswith("sampling") else -1
+
+    yield from d.until(lambda: step() >= 0, "the first step", addon.START_LIMIT_S)
+    first = step()
+    yield from d.until(lambda: step() >= first + steps, f"{steps} more steps", addon.START_LIMIT_S)
+
+
+d.play(flow(), limit_s=900)
