@@ -71,12 +71,19 @@ def spend(profile: Path, *words: str, before: tuple[str, ...] = (), **environmen
     return json.loads(found[0]), printed
 
 
+def german(folder: Path) -> dict[str, str]:
+    """The environment of a German user, whose locale is made where the system has none; {} without its sources."""
+    command = ["localedef", "-i", "de_DE", "-f", "UTF-8", str(folder / "de_DE.UTF-8")]
+    made = shutil.which("localedef") and subprocess.run(command, capture_output=True).returncode == 0
+    return {"LC_ALL": "de_DE.UTF-8", "LOCPATH": str(folder)} if made else {}
+
+
 def test_a_folder_that_cannot_be_written_to_a_name_in_other_letters_and_decimal_commas(tmp_path):
-    """A German locale is made where the system has none; without its sources the point stays. Root ignores a folder's mode, so for root it is mounted."""
+    """Root ignores a folder's mode, so for root it is mounted."""
     profile = tmp_path / "Юзер 山田"
     profile.mkdir()
     folder = install(profile)
-    before, environment = (), {}
+    before: tuple[str, ...] = ()
     if os.geteuid():
         subprocess.run(["chmod", "-R", "a-w", str(folder)], check=True)
     else:
@@ -84,9 +91,7 @@ def test_a_folder_that_cannot_be_written_to_a_name_in_other_letters_and_decimal_
         probe = subprocess.run([*before, "touch", str(folder / "x")], capture_output=True, text=True)
         if "Read-only" not in probe.stderr:
             pytest.skip("this machine lets nobody mount a folder read-only")
-    german = ["localedef", "-i", "de_DE", "-f", "UTF-8", str(profile / "de_DE.UTF-8")]
-    if shutil.which("localedef") and subprocess.run(german, capture_output=True).returncode == 0:
-        environment = {"LC_ALL": "de_DE.UTF-8", "LOCPATH": str(profile)}
+    environment = german(profile)
     try:
         seen, _ = spend(profile, "worker", before=before, **environment)
     finally:
@@ -105,3 +110,19 @@ def test_a_studios_own_colour_configuration(tmp_path):
     assert seen["spaces"] == {"WildCap Albedo": "Studio Picture", "WildCap Specular": "Studio Numbers", "WildCap Normal": "Studio Numbers"}
     assert seen["mask_space"] == "Studio Numbers" and seen["mask"] == 0.5 and seen["render"]
     assert "no sRGB by a known name" in printed and "no view without a look" in printed, "the artist is told"
+
+
+def test_text_files_of_other_programs_are_read_with_decimal_commas(tmp_path):
+    """COLMAP's, Metashape's and RealityScan's text, and OBJ, in a process whose C library writes 1,5 for one and a half."""
+    environment = german(tmp_path)
+    if not environment:
+        pytest.skip("there is no localedef, or it lacks de_DE")
+    code = """
+import locale, sys
+locale.setlocale(locale.LC_ALL, "")
+assert locale.str(1.5) == "1,5"
+import pytest
+sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "tests/test_camera_import.py::test_known_cameras_come_back_exactly", "tests/test_template.py"]))
+"""
+    result = subprocess.run([sys.executable, "-c", code], env={**os.environ, **environment}, cwd=ROOT, capture_output=True, text=True)
+    assert result.returncode == 0 and "passed" in result.stdout, result.stdout[-3000:]
