@@ -6,6 +6,7 @@ The bpy wheel hangs at exit when a class stays registered, so the fixture disabl
 """
 
 import atexit
+import importlib.util
 import os
 import shutil
 import sys
@@ -15,6 +16,10 @@ from pathlib import Path
 
 import pytest
 
+import core.messages
+
+from . import message_sites
+
 ROOT = Path(__file__).resolve().parent.parent
 MODULE = "bl_ext.user_default.wildcap"
 STATUS = pytest.StashKey()
@@ -22,6 +27,33 @@ STATUS = pytest.StashKey()
 # Blender reads this when it starts, and any test may be the one that imports bpy first.
 os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="wildcap-test-")
 atexit.register(shutil.rmtree, os.environ["BLENDER_USER_RESOURCES"], ignore_errors=True)
+
+
+LAST = "test_messages_reached.py"
+WHOLE = pytest.StashKey()
+
+
+def pytest_addoption(parser):
+    parser.addoption("--messages", action="store_true", help="judge which messages were reached even where not all tests ran")
+
+
+def pytest_configure(config):
+    message_sites.watch_problems(core.messages.Problem)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config, items):
+    """The judgement of the messages comes last; it counts where no file was left out and no test deselected."""
+    items.sort(key=lambda item: item.path.name == LAST)
+    files = {path.name for path in Path(__file__).parent.glob("test_*.py")}
+    config.stash[WHOLE] = files <= {item.path.name for item in items} and not config.option.keyword and not config.option.markexpr
+
+
+@pytest.fixture
+def whole_run(request) -> bool:
+    """Whether all tests are run, with a Blender to run them in."""
+    ran = request.config.stash[WHOLE] and importlib.util.find_spec("bpy") is not None
+    return ran or request.config.option.messages
 
 
 @pytest.hookimpl(trylast=True)
@@ -49,6 +81,8 @@ def enabled_extension():
     repository.mkdir(parents=True, exist_ok=True)
     (repository / "wildcap").symlink_to(ROOT, target_is_directory=True)
     assert addon_utils.enable(MODULE, default_set=True) is not None, "Blender could not enable the extension"
+    message_sites.watch_problems(import_module(f"{MODULE}.core.messages").Problem)
+    message_sites.watch_reasons(import_module(f"{MODULE}.wildcap_addon.base_operator").BaseOperator)
     yield MODULE
     addon_utils.disable(MODULE, default_set=True)
 
