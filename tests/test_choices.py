@@ -35,8 +35,8 @@ def test_the_active_mesh_is_kept_as_it_is_with_its_uvs_and_without_modifiers(add
     mine.name = "Mein Kopf é"
     mine.modifiers.new("Smooth", 'SUBSURF')
     expected = [tuple(mine.matrix_world @ vertex.co) for vertex in mine.data.vertices]
-    bpy.context.scene.wildcap.active_index = 0
-    head.select_set(True)
+    bpy.context.scene.wildcap.active_index = 0  # makes the head active
+    bpy.context.view_layer.objects.active = mine
     bpy.ops.wildcap.use_active_mesh()
     path = Path(item.registration.template)
     assert path.parent == capture / "template" and path.suffix == ".obj"
