@@ -181,6 +181,21 @@ def test_a_task_ends_with_its_problem_or_at_once_when_cancelled():
     assert follow(task, 2) == [Cancelled("sleep")]
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows ends the command alone")
+def test_a_cancel_ends_what_the_command_has_started(tmp_path):
+    """venv runs pip's installer as a process of its own, which must not go on in a folder that the next installation begins with."""
+    late = tmp_path / "late"
+    child = f"import time, pathlib; pathlib.Path({str(tmp_path / 'begun')!r}).touch(); time.sleep(1); pathlib.Path({str(late)!r}).touch()"
+    task = Task("venv", lambda task: task.run([sys.executable, "-c", f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"]))
+    task.start()
+    while not (tmp_path / "begun").exists():
+        time.sleep(0.02)
+    task.cancel()
+    assert follow(task, 2) == [Cancelled("venv")]
+    time.sleep(1.3)
+    assert not late.exists()
+
+
 def test_other_peoples_folders_are_left_alone(local, tmp_path):
     mine = tmp_path / "photos"
     mine.mkdir()
