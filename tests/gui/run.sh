@@ -23,7 +23,12 @@ if [ "${mounts[0]}" = /usr/bin ]; then
     mounts[0]=$(readlink -f .venv/bin/python)  # of /usr/bin the one file: the rest is the chroot's own
 fi
 
-export root checkout zip
+# For the flow set_up, which installs the solver: a Python to begin with, pip's own variables, and whatever paths the caller names.
+base=$(.venv/bin/python -c 'import sys; print(sys.base_prefix)')
+IFS=: read -ra named <<< "${WILDCAP_MOUNTS:-}"
+mounts+=("${named[@]}")
+
+export root checkout zip base
 exec unshare --mount --pid --fork --kill-child --propagation private bash -c '
     set -euo pipefail
     mount -t proc proc "$root/proc"
@@ -39,6 +44,7 @@ exec unshare --mount --pid --fork --kill-child --propagation private bash -c '
     done
     while [ "$1" != -- ]; do shift; done
     shift
-    exec chroot "$chroot" env -i PATH=/usr/bin:/bin HOME=/root LANG=C.UTF-8 LIBGL_ALWAYS_SOFTWARE=1 GALLIUM_DRIVER=llvmpipe \
+    mapfile -t pip < <(env | grep -E "^(PIP_|SSL_CERT_)")
+    exec chroot "$chroot" env -i "${pip[@]}" PATH="/usr/bin:/bin:$base/bin" HOME=/root LANG=C.UTF-8 LIBGL_ALWAYS_SOFTWARE=1 GALLIUM_DRIVER=llvmpipe \
         python3 -B "$checkout/tests/gui/suite.py" "$checkout/$zip" "$@"
 ' run "${mounts[@]}" -- "$@"
