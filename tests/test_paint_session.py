@@ -73,6 +73,32 @@ def test_leaving_gives_back_what_the_artist_had(addon, capture, mode, shading):
     assert {name: (before[name], after[name]) for name in before if before[name] != after[name]} == {}
 
 
+def test_what_an_undo_brings_back_is_followed_and_nothing_of_the_painting_is_left_in_the_scene(addon, capture):
+    files, session = addon("paint.files"), addon("paint.session")
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.ops.wildcap.bring_in_head()
+    head, visible = bpy.context.object.name, {o.name for o in bpy.context.view_layer.objects if o.visible_get()}
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.wildcap.paint_mask()
+    bpy.ops.ed.undo_push(message="head")
+    bpy.ops.wildcap.paint_mask(on='SHEET')
+    bpy.ops.ed.undo_push(message="sheet")
+    assert session.on_sheet() and not bpy.data.objects[head].visible_get()
+    bpy.ops.wildcap.paint_mask(on='HEAD')
+    bpy.ops.ed.undo_push(message="head again")
+    bpy.ops.ed.undo()
+    files.settle()
+    assert session.on_sheet() and bpy.context.mode == 'PAINT_TEXTURE'
+    bpy.ops.wildcap.finish_mask()
+    assert "WildCap Mask Sheet" not in bpy.data.objects and {o.name for o in bpy.context.view_layer.objects if o.visible_get()} == visible
+    bpy.ops.ed.undo_push(message="left")
+    bpy.ops.ed.undo()  # into the painting that has ended
+    files.settle()
+    assert bpy.context.mode == 'OBJECT' and not session.active() and "WildCap Mask Sheet" not in bpy.data.objects
+    assert {o.name for o in bpy.context.view_layer.objects if o.visible_get()} == visible
+    assert not bpy.context.scene.tool_settings.image_paint.use_stencil_layer
+
+
 def test_mirrored_strokes_go_with_the_artist_to_the_sheet_and_back_and_stay_with_the_painting(addon, capture):
     bpy.ops.wildcap.bring_in_head()
     head = bpy.context.object

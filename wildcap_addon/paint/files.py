@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A painting session while .blend files are saved and opened: nothing that was painted is lost, and a file that was saved in the middle of it goes on."""
+"""A painting session while .blend files are saved and opened: nothing that was painted is lost, and a file that was saved in the middle of it goes on.
+And after an undo, which is as a file opened anew: what it did not bring back follows it."""
 
 import bpy
 
@@ -44,7 +45,22 @@ def _take_notes() -> list[str]:
     return notes
 
 
-_HANDLERS = (("save_pre", before_save), ("save_post", after_save), ("load_pre", before_load), ("load_post", after_load))
+@bpy.app.handlers.persistent
+def after_undo(*_):
+    """A moment later: in the handler itself Blender is still in the middle of it."""
+    if not bpy.app.timers.is_registered(settle):
+        bpy.app.timers.register(settle, first_interval=0.0)
+
+
+def settle() -> None:
+    window = next(iter(bpy.context.window_manager.windows), None)
+    if window is not None:
+        with bpy.context.temp_override(window=window):
+            session.after_undo(bpy.context)
+
+
+_HANDLERS = (("save_pre", before_save), ("save_post", after_save), ("load_pre", before_load), ("load_post", after_load),
+             ("undo_post", after_undo), ("redo_post", after_undo))
 
 
 def register():
@@ -54,5 +70,7 @@ def register():
 
 def unregister():
     session.stop()
+    if bpy.app.timers.is_registered(settle):
+        bpy.app.timers.unregister(settle)
     for name, handler in _HANDLERS:
         getattr(bpy.app.handlers, name).remove(handler)

@@ -16,7 +16,7 @@ import bpy
 from ...core.capture import Capture
 from ...core.messages import Problem
 from .. import captures, head, problems
-from . import before, brush, keeping, mask_image, sheet, view
+from . import before, brush, keeping, mask_image, places, sheet, view
 
 TINTS = {"SHADOW": "shadow_tint", "PROTECT": "protect_tint"}
 """The scene's properties that keep the colour in which a mask is shown."""
@@ -34,8 +34,7 @@ class Session:
     head: str
     mask: str
     which: str = 'SHADOW'  # or 'PROTECT'
-    on_sheet: bool = False
-    hidden: list[str] = field(default_factory=list)
+    faces_sheet: bool = False  # the views look at the sheet
     before: dict = field(default_factory=dict)
     brush: dict = field(default_factory=dict)
     looked: float = 0.0  # when the mask was last looked at (time.monotonic)
@@ -44,6 +43,7 @@ class Session:
 
 
 _session: Session | None = None
+_ended: Session | None = None  # the last one, for an undo may bring its scene back
 _saving: keeping.Saving | None = None
 
 
@@ -52,7 +52,7 @@ def active() -> bool:
 
 
 def on_sheet() -> bool:
-    return _session is not None and _session.on_sheet
+    return _session is not None and sheet.there()
 
 
 def which() -> str:
@@ -96,7 +96,7 @@ def begin(context, item, use_sheet: bool, which: str = 'SHADOW') -> None:
     """Enters Texture Paint on the head or on the sheet, the mask as its tinted stencil and the mask brush in hand."""
     global _session
     if _session is not None and _session.which == which:
-        _turn(context, use_sheet)
+        places.turn(context, _session, use_sheet)
         return
     end(context)
     capture = captures.folder(item)
@@ -115,7 +115,7 @@ def begin(context, item, use_sheet: bool, which: str = 'SHADOW') -> None:
     paint.stencil_color = getattr(props, TINTS[which])
     paint.invert_stencil = False
     try:
-        _enter(context, use_sheet)
+        places.enter(context, _session, use_sheet)
         _session.brush = brush.activate(context)
     except Exception:
         before.put_back(context, _session.before)
@@ -127,16 +127,16 @@ def begin(context, item, use_sheet: bool, which: str = 'SHADOW') -> None:
 
 def end(context) -> None:
     """Saves the mask and puts everything back. Safe to call when the artist has left the mode by other ways."""
-    global _session
+    global _ended
     session = _session
     if session is None:
         return
     save()  # a Problem here leaves the session open, and nothing is lost
-    if context.mode != 'PAINT_TEXTURE':  # only in this mode does Blender let go of a brush
-        _enter(context, session.on_sheet)
+    if context.mode != 'PAINT_TEXTURE' and session.head in context.scene.objects:  # only in this mode does Blender let go of a brush
+        places.enter(context, session, sheet.there())
     brush.restore(context, session.brush)
     _keep_tint(context)
-    _leave(context)
+    places.leave(context, session)
     before.put_back(context, session.before)
     image = bpy.data.images.get(session.mask)
     if image is not None and mask_image.file_of(Capture(session.root), session.which).is_file():
@@ -144,6 +144,19 @@ def end(context) -> None:
     elif image is not None:
         bpy.data.images.remove(image)
     forget()
+    _ended = session
+
+
+def after_undo(context) -> None:
+    """Undo and redo bring objects and modes back, but not what the views look at, and nothing of a painting that has ended: the mask stays as it was left."""
+    active = context.view_layer.objects.active
+    if _session is not None and context.mode == 'OBJECT':  # undone past its start: the watch ends it, and what was saved before goes to the history
+        _session.written = ()
+    elif _session is not None:
+        places.face(_session, sheet.there())
+    elif _ended is not None and context.mode == 'PAINT_TEXTURE' and active is not None and active.name in (_ended.head, sheet.NAME):
+        places.leave(context, _ended)
+        before.put_back(context, _ended.before)
 
 
 def _keep_tint(context) -> None:
@@ -188,51 +201,9 @@ def wait() -> None:
 
 def forget() -> None:
     """Drops the session without touching Blender's data, for a file that is being replaced."""
-    global _session
-    _session = None
+    global _session, _ended
+    _session = _ended = None
     keeping.forget()
-
-
-def _turn(context, use_sheet: bool) -> None:
-    """From the head to the sheet or back."""
-    if use_sheet != _session.on_sheet:
-        _leave(context)
-        _enter(context, use_sheet)
-
-
-def _enter(context, use_sheet: bool) -> None:
-    if context.mode != 'OBJECT':
-        bpy.ops.object.mode_set(mode='OBJECT')
-    target = bpy.data.objects.get(_session.head)
-    if target is None or target.name not in context.scene.objects:
-        raise Problem("The head is not in this scene any more.", "Undo, or bring the head in again.")
-    _session.on_sheet = use_sheet
-    if use_sheet:
-        target = sheet.make(context, context.scene.tool_settings.image_paint.canvas, target)
-        _session.hidden = [o.name for o in list(context.view_layer.objects) if o != target and not o.hide_get()]
-        for name in _session.hidden:
-            bpy.data.objects[name].hide_set(True)
-        view.face_sheet(_session.before["views"], target.location, sheet.SIDE_M)
-    context.view_layer.objects.active = target
-    target.select_set(True)
-    bpy.ops.object.mode_set(mode='TEXTURE_PAINT')
-
-
-def _leave(context) -> None:
-    """Back to Object Mode on the head, the sheet gone."""
-    if context.mode != 'OBJECT':
-        bpy.ops.object.mode_set(mode='OBJECT')
-    if _session.on_sheet:
-        sheet.remove(bpy.data.objects.get(_session.head))
-        view.face_head(_session.before["views"])
-        for name in _session.hidden:
-            if name in context.view_layer.objects:
-                context.view_layer.objects[name].hide_set(False)
-        _session.hidden, _session.on_sheet = [], False
-    obj = bpy.data.objects.get(_session.head)
-    if obj is not None and obj.name in context.view_layer.objects:
-        context.view_layer.objects.active = obj
-        obj.select_set(True)
 
 
 def _start_watching() -> None:

@@ -1,15 +1,27 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flat sheet: one square with the whole texture on it, looked at from straight above, to paint the mask in UV space."""
+"""The flat sheet: one square with the whole texture on it, looked at from straight above, to paint the mask in UV space.
+
+What it hides it keeps in a property of its own, which an undo brings back together with it.
+"""
+
+import json
 
 import bpy
 
 SIDE_M = 0.4
 NAME = "WildCap Mask Sheet"
+HIDDEN_KEY = "wildcap_hidden"
+
+
+def there() -> bool:
+    """Whether there is a sheet: by an undo it may come and go."""
+    return NAME in bpy.data.objects
 
 
 def make(context, image: bpy.types.Image, head: bpy.types.Object) -> bpy.types.Object:
-    """The sheet in the scene: SIDE_M wide, UV (0, 0) at its lower left, the texture in a material; painted with the head's symmetry."""
+    """The sheet in the scene: SIDE_M wide, UV (0, 0) at its lower left, the texture in a material, painted with the head's symmetry. Everything else
+    is hidden."""
     remove()
     mesh = bpy.data.meshes.new(NAME)
     half = SIDE_M / 2
@@ -26,15 +38,23 @@ def make(context, image: bpy.types.Image, head: bpy.types.Object) -> bpy.types.O
     sheet = bpy.data.objects.new(NAME, mesh)
     context.scene.collection.objects.link(sheet)
     context.view_layer.update()  # or whoever looks through its objects next finds one that is gone, and Blender ends
+    others = [thing for thing in context.view_layer.objects if thing != sheet and not thing.hide_get()]
+    sheet[HIDDEN_KEY] = json.dumps([thing.name for thing in others])
+    for thing in others:
+        thing.hide_set(True)
     return sheet
 
 
 def remove(head: bpy.types.Object | None = None) -> None:
-    """Takes the sheet and all it is made of away; the symmetry that was set on it goes over to the head."""
+    """Takes the sheet and all it is made of away, and shows what it hid; the symmetry that was set on it goes over to the head."""
     if head is not None and NAME in bpy.data.meshes:
         head.data.use_mirror_x = bpy.data.meshes[NAME].use_mirror_x
+    hidden = json.loads(bpy.data.objects[NAME].get(HIDDEN_KEY, "[]")) if there() else []
     for collection in (bpy.data.objects, bpy.data.meshes, bpy.data.materials):
         block = collection.get(NAME)
         if block is not None:
             collection.remove(block)
     bpy.context.view_layer.update()
+    for name in hidden:
+        if name in bpy.context.view_layer.objects:
+            bpy.context.view_layer.objects[name].hide_set(False)

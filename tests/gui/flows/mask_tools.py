@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strokes and buttons on the mask in any order: Ctrl-Z goes back through all of them, one by one, and Ctrl-Shift-Z forward again."""
+"""Strokes and buttons on the mask, on the head and on the sheet, in any order: Ctrl-Z goes back through all of them, one by one, and Ctrl-Shift-Z
+forward again."""
 
 import sys
 from pathlib import Path
@@ -15,29 +16,46 @@ from painting import dab, in_hand, mask  # noqa: E402
 
 
 def flow():
-    yield from addon.open_sample_head()
+    root = yield from addon.open_sample_head()
     yield from d.press("wildcap.paint_mask")
     yield from in_hand()
     yield from mirrored()
     x, y = d.middle()
     states = [mask()]
-    for step in (button('MIRROR'), stroke(x + 30, y), button('GROW'), button('SHRINK'), stroke(x - 30, y - 60), button('INVERT'), button('CLEAR')):
+    for step in (button('MIRROR'), stroke(x + 30, y), button('GROW'), button('SHRINK'), stroke(x - 30, y - 60, 'SHEET'), button('INVERT'),
+                 stroke(x + 20, y - 80, 'HEAD'), button('SOFTEN'), button('CLEAR'), button('PROPOSAL')):
         yield from step
         states.append(mask())
-    assert all(np.abs(a - b).max() > 0.4 for a, b in zip(states, states[1:], strict=False)), "each of them changed the mask"
+    assert all(np.abs(a - b).max() > 0.2 for a, b in zip(states, states[1:], strict=False)), "each of them changed the mask"
     d.screenshot("mask_tools")
     yield from walk(states[::-1], "Ctrl-Z", ctrl=True)
     yield from walk(states, "Ctrl-Shift-Z", ctrl=True, shift=True)
     assert bpy.context.mode == 'PAINT_TEXTURE'
+    yield from past_the_end(root)
+
+
+def past_the_end(root: Path):
+    """Once the painting is left, Ctrl-Z and Ctrl-Shift-Z neither lead back into half of it nor change the mask."""
+    yield from d.lead("wildcap.finish_mask")
+    yield from d.until(lambda: bpy.context.mode == 'OBJECT', "leaving", 5)
+    saved = (root / "shadow_mask.png").read_bytes()
+    for keys in ({}, {}, {}, {"shift": True}, {"shift": True}):
+        yield from d.key('Z', ctrl=True, **keys)
+        yield from d.until(lambda: bpy.context.mode == 'OBJECT', "Object Mode after an undo", 5)
+        assert "WildCap Mask Sheet" not in bpy.data.objects and not addon.module("paint.session").active()
+    assert (root / "shadow_mask.png").read_bytes() == saved
+    d.say("after leaving, undo and redo stay in Object Mode and keep the mask")
 
 
 def walk(states, name, **keys):
     """Presses the key until the last state is reached; every state must be passed, in order, and nothing else be seen."""
-    at, presses = 0, []
+    at, presses, session = 0, [], addon.module("paint.session")
     while at < len(states) - 1:
         presses.append(0)
         while True:
             yield from d.key('Z', **keys)
+            yield 0.3
+            assert session.on_sheet() == ("Sheet" in bpy.context.object.name), "the tab says where the mask is painted"
             presses[-1] += 1
             seen = mask()
             if np.abs(seen - states[at + 1]).max() < 0.01:
@@ -68,7 +86,11 @@ def mirrored():
     yield 0.5
 
 
-def stroke(x, y):
+def stroke(x, y, on: str = ''):
+    """A dab, after a turn to the sheet or to the head."""
+    if on:
+        yield from d.press("wildcap.paint_mask", on)
+        yield 0.5
     yield from dab(x, y, ctrl=bool(mask().mean() > 0.5))
 
 

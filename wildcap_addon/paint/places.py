@@ -1,0 +1,53 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where the mask of a session is painted: on the head, or on the flat sheet; into Texture Paint on either, and back. Which of them it is, the scene says,
+for an undo may take the sheet away or bring it back."""
+
+import bpy
+
+from ...core.messages import Problem
+from . import sheet, view
+
+
+def turn(context, session, use_sheet: bool) -> None:
+    """From the head to the sheet or back."""
+    if use_sheet != sheet.there():
+        leave(context, session)
+        enter(context, session, use_sheet)
+
+
+def enter(context, session, use_sheet: bool) -> None:
+    """Texture Paint on one of the two. Raises Problem when the head is gone."""
+    if context.mode != 'OBJECT':
+        bpy.ops.object.mode_set(mode='OBJECT')
+    target = bpy.data.objects.get(session.head)
+    if target is None or target.name not in context.scene.objects:
+        raise Problem("The head is not in this scene any more.", "Undo, or bring the head in again.")
+    if use_sheet:
+        target = sheet.make(context, context.scene.tool_settings.image_paint.canvas, target)
+    face(session, use_sheet)
+    context.view_layer.objects.active = target
+    target.select_set(True)
+    bpy.ops.object.mode_set(mode='TEXTURE_PAINT')
+
+
+def leave(context, session) -> None:
+    """Back to Object Mode on the head, the sheet gone."""
+    if context.mode != 'OBJECT':
+        bpy.ops.object.mode_set(mode='OBJECT')
+    if sheet.there():
+        sheet.remove(bpy.data.objects.get(session.head))
+    face(session, False)
+    obj = bpy.data.objects.get(session.head)
+    if obj is not None and obj.name in context.view_layer.objects:
+        context.view_layer.objects.active = obj
+        obj.select_set(True)
+
+
+def face(session, the_sheet: bool) -> None:
+    """Turns the views to the sheet, or back from it."""
+    if the_sheet and not session.faces_sheet:
+        view.face_sheet(session.before["views"], (0, 0, 0), sheet.SIDE_M)
+    elif session.faces_sheet and not the_sheet:
+        view.face_head(session.before["views"])
+    session.faces_sheet = the_sheet
