@@ -99,6 +99,20 @@ def test_what_an_undo_brings_back_is_followed_and_nothing_of_the_painting_is_lef
     assert not bpy.context.scene.tool_settings.image_paint.use_stencil_layer
 
 
+def test_a_painting_whose_head_was_undone_or_deleted_still_ends_and_keeps_its_mask(addon, capture):
+    session, values = addon("paint.session"), addon("paint.mask_image")
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.paint_mask()
+    painted = np.zeros_like(values.values(session.mask()))
+    painted[10:20, 30:40] = 1
+    values.set_values(session.mask(), painted)
+    bpy.ops.object.mode_set(mode='OBJECT')
+    bpy.data.objects.remove(bpy.context.object)
+    bpy.ops.wildcap.finish_mask()
+    assert not session.active() and (capture / "shadow_mask.png").read_bytes() == values.grey_png(painted)
+    assert "WildCap Mask" not in bpy.data.brushes and not bpy.context.scene.tool_settings.image_paint.use_stencil_layer
+
+
 def test_mirrored_strokes_go_with_the_artist_to_the_sheet_and_back_and_stay_with_the_painting(addon, capture):
     bpy.ops.wildcap.bring_in_head()
     head = bpy.context.object
