@@ -15,8 +15,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import driver as d  # noqa: E402
+from addon import CHECKOUT, module  # noqa: E402
+from painting import in_hand, mask  # noqa: E402
 
-CHECKOUT = Path(__file__).resolve().parents[3]
 VIDEO = CHECKOUT / "core" / "synthetic" / "sample" / "capture.mp4"
 
 
@@ -42,8 +43,7 @@ def flow():
     d.screenshot("walk_4_head")
 
     yield from d.lead("wildcap.paint_mask")
-    yield from d.until(lambda: bpy.context.mode == 'PAINT_TEXTURE', "texture painting", 5)
-    yield 1.0
+    yield from in_hand()
     before = mask()
     x, y = d.middle()
     yield from d.stroke([(x + 10 + 3 * i, y - 20) for i in range(12)], ctrl=bool(before.mean() > 0.5))
@@ -99,19 +99,8 @@ def work(command: str, root: str, picture: str, limit_s: float):
     d.say(f"    {stages.seconds if stages else ''}")
 
 
-def module(name: str):
-    return sys.modules[f"bl_ext.user_default.wildcap.wildcap_addon.{name}"]
-
-
 def head():
     return module("captures").head(bpy.context, bpy.context.scene.wildcap.captures[0])
-
-
-def mask() -> np.ndarray:
-    image = bpy.context.scene.tool_settings.image_paint.stencil_image
-    pixels = np.empty(len(image.pixels), np.float32)
-    image.pixels.foreach_get(pixels)
-    return pixels.reshape(image.size[1], image.size[0], -1)[..., 0].copy()
 
 
 d.play(flow(), limit_s=1700)
