@@ -8,6 +8,8 @@ import bpy.utils.previews
 from ...core.capture import Capture
 
 NAMES = ("albedo", "shading", "loss")
+ROW_SCALE = 11.5
+"""Width of a sidebar as Blender opens it, in buttons' heights"""
 
 _icons: bpy.utils.previews.ImagePreviewCollection | None = None
 _loaded: dict[str, int] = {}  # picture -> modification time of what is shown
@@ -20,7 +22,7 @@ def draw(layout, capture: Capture) -> None:
     row = layout.row(align=True)
     for path in found:
         column = row.column(align=True)
-        column.template_icon(icon_value=icon(path), scale=7.0)
+        column.template_icon(icon_value=icon(path), scale=ROW_SCALE / len(found))  # as high as a column is wide
         column.label(text=path.stem.title())
 
 
