@@ -165,7 +165,7 @@ def _hear(root: str, job: Job, message: messages.Message) -> None:
         case messages.Failed():
             problems.show(root, Problem(message.problem, message.remedy))
         case messages.Cancelled():
-            problems.show(root, Problem("Cancelled.", "What was finished is kept; click again to continue."))
+            problems.show(root, problems.CANCELLED)
 
 
 def _tick() -> float | None:

@@ -9,6 +9,9 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.messages import Problem
 
+CANCELLED = Problem("Cancelled.", "What was finished is kept; click again to continue.")
+"""What the artist asked for is told like a problem, but calmly."""
+
 _problems: dict[str, Problem] = {}  # capture folder ('' for none) -> its last problem
 
 
@@ -30,8 +33,8 @@ def draw(layout, problem: Problem | None, width: int) -> None:
         return
     box = layout.box()
     column = box.column()
-    column.alert = True
-    draw_text(column, problem.problem, width, 'ERROR')
+    column.alert = problem != CANCELLED
+    draw_text(column, problem.problem, width, 'ERROR' if column.alert else 'CHECKMARK')
     draw_text(box.column(), problem.remedy, width, 'INFO')
 
 

@@ -16,7 +16,8 @@ from .. import images
 from ..capture import Capture, replacing_folder
 from ..template import ASSETS
 
-COPIED = ("head.obj", "texture.exr", "texture.png", "texture_confidence.exr", "shadow_mask_auto.png")
+COPIED = ("head.obj", "texture.exr", "texture.png", "texture_confidence.exr", "texture_filmed.png", "shadow_mask_auto.png", "comparison/delit.png",
+          "comparison/filmed.png")
 DATA_MAPS = ("specular_albedo", "normal", "confidence")
 
 
@@ -24,6 +25,7 @@ def main() -> None:
     capture = Capture(Path(sys.argv[1]))
     with replacing_folder(ASSETS / "sample_head") as folder:
         for name in COPIED:
+            (folder / name).parent.mkdir(exist_ok=True)
             shutil.copyfile(capture.root / name, folder / name)
         for name in DATA_MAPS:
             images.write_data(folder / "maps" / f"{name}.png", images.read_data(capture.maps / f"{name}.png"))

@@ -18,7 +18,10 @@ import driver as d  # noqa: E402
 
 CHECKOUT = Path(__file__).resolve().parents[3]
 PERIOD_S = 0.01
-LIMIT_P99_MS = 50  # by the issue; asserted against idle, for a loaded machine is late by itself
+LIMIT_P99_MS, LIMIT_GAP_MS, SHARE = 50, 250, 0.8
+"""How late the main thread may be, how long two redraws may lie apart, and which part of the idle redraw rate must stay."""
+SLACK = 1.5
+"""Where Blender without a solver misses these already, as with a software renderer on two cores: how much worse it may be with one."""
 
 
 class Watch:
@@ -97,8 +100,10 @@ def flow():
     d.say(f"cancelled after {time.monotonic() - started:.1f} s with the clicking")
     yield 1.5
     step = module("next_step").next_step(module("panel").gather(bpy.context, settings))
-    assert step.label == "Continue Solving", step
-    assert busy["late_p99_ms"] < max(LIMIT_P99_MS, 2 * idle["late_p99_ms"]), (idle, busy)
+    assert step.label == "Solve", step  # not Continue: the mask is another one by now
+    assert busy["redraws_per_s"] > SHARE * idle["redraws_per_s"], (idle, busy)
+    assert busy["late_p99_ms"] < max(LIMIT_P99_MS, SLACK * idle["late_p99_ms"]), (idle, busy)
+    assert busy["worst_redraw_gap_ms"] < max(LIMIT_GAP_MS, SLACK * idle["worst_redraw_gap_ms"]), (idle, busy)
 
 
 def measured(watch: Watch):
