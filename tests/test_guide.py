@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guide speaks of what is there: its messages are the code's, its buttons have those names, its pictures exist."""
+"""The guide and the README speak of what is there: messages are the code's, buttons have those names, pictures exist."""
 
 import ast
 import re
@@ -13,7 +13,8 @@ from .conftest import ROOT
 GUIDE = (ROOT / "docs" / "guide.md").read_text(encoding="utf-8")
 TABLE = GUIDE[GUIDE.index("| message |"):]
 MESSAGES = re.findall(r"^\| (?!message|---|\*\*)(.+?) \|", TABLE, flags=re.MULTILINE)
-PROSE = GUIDE[:GUIDE.index("| message |")]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PROSE = GUIDE[:GUIDE.index("| message |")] + README
 BUTTONS = sorted({name.rstrip(".,:") for name in re.findall(r"\*\*(.+?)\*\*", PROSE, flags=re.DOTALL)})
 NOT_BUTTONS = {"WildCap"}  # the tab
 
@@ -46,5 +47,5 @@ def test_a_button_of_the_guide_is_there(button):
 
 
 def test_the_pictures_of_the_guide_are_there():
-    pictures = re.findall(r"\]\((pictures/[^)]+)\)", GUIDE)
-    assert len(pictures) > 6 and [p for p in pictures if not (ROOT / "docs" / p).is_file()] == []
+    pictures = [f"docs/{name}" for name in re.findall(r"\]\((pictures/[^)]+)\)", GUIDE)] + re.findall(r"\]\((docs/pictures/[^)]+)\)", README)
+    assert len(pictures) > 6 and [p for p in pictures if not (ROOT / p).is_file()] == []
