@@ -165,7 +165,7 @@ def _hear(root: str, job: Job, message: messages.Message) -> None:
         case messages.Failed():
             problems.show(root, Problem(message.problem, message.remedy))
         case messages.Cancelled():
-            problems.show(root, problems.CANCELLED)
+            problems.show(root, problems.Notice("Cancelled.", "What was finished is kept; click again to continue."))
 
 
 def _tick() -> float | None:

@@ -9,8 +9,10 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.messages import Problem
 
-CANCELLED = Problem("Cancelled.", "What was finished is kept; click again to continue.")
-"""What the artist asked for is told like a problem, but calmly."""
+
+class Notice(Problem):
+    """What the artist asked for, told in the place of a problem, but calmly."""
+
 
 _problems: dict[str, Problem] = {}  # capture folder ('' for none) -> its last problem
 
@@ -33,7 +35,7 @@ def draw(layout, problem: Problem | None, width: int) -> None:
         return
     box = layout.box()
     column = box.column()
-    column.alert = problem != CANCELLED
+    column.alert = not isinstance(problem, Notice)
     draw_text(column, problem.problem, width, 'ERROR' if column.alert else 'CHECKMARK')
     draw_text(box.column(), problem.remedy, width, 'INFO')
 
