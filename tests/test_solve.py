@@ -104,6 +104,23 @@ def test_the_artists_masks_win(capture):
     assert np.abs(protected - painted_empty).max() < 1e-3
 
 
+def test_a_shadow_that_the_artist_added_to_the_proposal_is_taken_away(capture):
+    """After a delighter the lights are held back, for a proposal takes dark skin along; where the artist has added to it, they are not."""
+    images.write_data(capture.shadow_mask, images.read_mask(capture.shadow_mask_auto))
+    y, x = np.mgrid[:SIZE, :SIZE] / SIZE
+    distance = np.hypot(x - 0.66, y - 0.55)
+    inside, around = distance < 0.07, (distance > 0.11) & (distance < 0.15)
+    truth = images.read_linear(capture.texture) / ((0.7 + 0.3 * x) * (1 - 0.5 / (1 + np.exp((distance - 0.09) / 0.006))))[..., None]
+    kept = []
+    for proposal in (images.read_mask(capture.shadow_mask_auto), np.zeros((SIZE, SIZE), np.float32)):
+        images.write_data(capture.shadow_mask_auto, proposal)
+        solve.run(capture, settings(), Reporter("solve"))
+        albedo = images.read_linear(capture.maps / "diffuse_albedo.exr")
+        step = [np.log(a[inside].mean() / a[around].mean()) for a in (albedo, truth)]
+        kept.append((step[0] - step[1]) / np.log(0.5))
+    assert kept[1] < 0.2 < kept[0], kept
+
+
 def test_unusable_inputs_are_problems(capture):
     with pytest.raises(Problem, match="not a colour"):
         solve.run(capture, settings(skin_tone="pink"), Reporter("solve"))

@@ -41,7 +41,8 @@ class Evidence:
     """texture [3, S, S] linear; weight [S, S]: how far it counts, 0 where nobody looked; alpha [S, S]: the soft shadow mask M; normal [3, S, S], unit, world
     space, N_c; covered bool [S, S]: texels of the head; skin [S, S]: facial skin without lips, brows and eyes; trust [S, S]: 1, less where a texel's
     colour says little of the light; protected [S, S]: what the artist keeps out of M; edge [S, S]: how far M's border lies on a shadow's edge that is
-    seen; taken [3]: the colour of what shadows take of the light, over its mean, zeros where that is not known."""
+    seen; taken [3]: the colour of what shadows take of the light, over its mean, zeros where that is not known; asked [S, S]: how far the
+    artist added to the proposal for M, None where the maps are in other UVs."""
 
     texture: torch.Tensor
     weight: torch.Tensor
@@ -54,6 +55,7 @@ class Evidence:
     edge: torch.Tensor
     taken: tuple[float, float, float] = (0.0, 0.0, 0.0)
     extent: Extent = Extent()
+    asked: torch.Tensor | None = None
 
     @property
     def size(self) -> int:
@@ -87,10 +89,9 @@ def read_evidence(capture: Capture, size: int) -> Evidence:
         raise Problem("The head's UV coordinates cover no texel.", "Run the registration stage again.")
     normal = raster.bleed(raster.interpolate(meshes.vertex_normals(head), head.faces, face, bary), covered)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-    mask = images.read_mask(capture.shadow_mask if capture.shadow_mask.is_file() else capture.shadow_mask_auto)
-    protected = images.read_mask(capture.protect_mask) if capture.protect_mask.is_file() else np.zeros_like(mask)
-    protected = _sized(protected, size)
-    alpha = softened(_sized(mask, size)) * (1 - protected)
+    mask, asked = _shadow_mask(capture, size)
+    protected = _sized(images.read_mask(capture.protect_mask), size) if capture.protect_mask.is_file() else np.zeros_like(mask)
+    alpha = softened(mask) * (1 - protected)
     skin = template.mask("skin", size) * template.mask("face", size)
     skin = skin * (1 - template.mask("eyes", size))
     weight = np.where(covered, np.clip(seen / TRUSTED, 0, 1), 0)
@@ -98,7 +99,16 @@ def read_evidence(capture: Capture, size: int) -> Evidence:
     unlike_skin = np.maximum.reduce([template.mask(name, size) for name in ("brows", "lips", "eyes", "nostrils", "scalp")])
     parts = [torch.from_numpy(np.ascontiguousarray(a, np.float32))
              for a in (skin, 1 - (1 - FEATURE_TRUST) * unlike_skin, protected, np.zeros_like(alpha))]
-    return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts)
+    return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts, asked=torch.from_numpy(asked))
+
+
+def _shadow_mask(capture: Capture, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """M [S, S] in [0, 1], the artist's before the proposal; and where the artist added to the proposal. That says more than a proposal, which takes dark
+    skin and beards along: there the light need not be held back."""
+    painted, proposed = capture.shadow_mask.is_file(), capture.shadow_mask_auto.is_file()
+    mask = _sized(images.read_mask(capture.shadow_mask if painted else capture.shadow_mask_auto), size)
+    proposal = _sized(images.read_mask(capture.shadow_mask_auto), size) if painted and proposed else mask
+    return mask, np.clip(mask - proposal, 0, 1)
 
 
 def softened(mask: np.ndarray) -> np.ndarray:
@@ -133,7 +143,8 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
         top, left = (start * whole // REFERENCE for start in (extent.top, extent.left))
         coords = coordinates(whole, slice(top, top + size), slice(left, left + size), extent.centred)
         shader = Shader(normal, modulation, cells, recipe.bilinear)
-        found[factor] = Observation(texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size)
+        held = 1.0 if evidence.asked is None else 1 - torch.from_numpy(_sized(evidence.asked.numpy(), size))
+        found[factor] = Observation(texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size, held)
     return found
 
 

@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How much of a shadow that is masked exactly stays in the albedo: python -m benchmarks.painted_shadow [--size N]
+
+A disc on the sample head's cheek is darkened in its texture and solved, once with the disc as the proposal, once as what the artist added to an empty
+one. Printed is the share of the darkening (logarithm of inside over around, less that of the untouched texture's solve) that is left in the albedo.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import tempfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from core import images, solve
+from core.capture import Capture
+from core.messages import Reporter
+from core.settings import from_json
+from core.template import ASSETS
+
+CENTRE, RADIUS, EDGE = (690, 600), 70, 2.0  # texels of a 1024 map: column and row, the disc, the blur of its edge
+LEFT = (0.4, 0.6, 0.8)
+"""Of the light, inside of the shadow."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.painted_shadow", description=__doc__.splitlines()[0])
+    parser.add_argument("--size", type=int, default=512)
+    size = parser.parse_args().size
+    y, x = np.mgrid[:1024, :1024].astype(np.float32)
+    distance = np.hypot(x - CENTRE[0], y - CENTRE[1])
+    disc = (distance < RADIUS).astype(np.float32)
+    inside, around = (images.resize(part.astype(np.float32), size, size) > 0.99 for part in (distance < RADIUS - 10, np.abs(distance - RADIUS - 20) < 10))
+    print("| light in the shadow | mask | left of the shadow in the albedo |\n| --- | --- | --- |")
+    for added in (False, True):
+        steps = {}
+        for left in (1.0, *LEFT):
+            albedo = solved(1 - (1 - left) * cv2.GaussianBlur(disc, (0, 0), EDGE), disc, added, size).mean(-1)
+            steps[left] = np.log(albedo[inside].mean() / albedo[around].mean())
+        for left in LEFT:
+            share = (steps[left] - steps[1.0]) / np.log(left)
+            print(f"| {left} | {'added by the artist' if added else 'proposed'} | {100 * share:.0f} % |", flush=True)
+
+
+def solved(darkening: np.ndarray, mask: np.ndarray, added: bool, size: int) -> np.ndarray:
+    """Linear albedo [size, size, 3] of the sample head whose texture is multiplied by `darkening` [1024, 1024]."""
+    with tempfile.TemporaryDirectory() as folder:
+        capture = Capture(Path(folder) / "head.wildcap")
+        capture.root.mkdir()
+        for name in ("head.obj", "texture_confidence.exr"):
+            shutil.copyfile(ASSETS / "sample_head" / name, capture.root / name)
+        images.write_linear(capture.texture, images.read_linear(ASSETS / "sample_head" / "texture.exr") * darkening[..., None])
+        images.write_data(capture.shadow_mask_auto, 0 * mask if added else mask)
+        if added:
+            images.write_data(capture.shadow_mask, mask)
+        solve.run(capture, from_json({"solve": {"size": size}}), Reporter("solve"))
+        return images.read_linear(capture.maps / "diffuse_albedo.exr")
+
+
+if __name__ == "__main__":
+    main()
