@@ -213,7 +213,7 @@ def test_the_worker_steps_back_behind_blender(root, capture, video):
         assert int(group.read_text().split()[-1]) > 0
     environment = Path(f"/proc/{worker._process.pid}/environ")
     if environment.exists():
-        assert b"OMP_NUM_THREADS=" in environment.read_bytes()
+        assert b"OMP_NUM_THREADS=" in environment.read_bytes() and b"GOMP_SPINCOUNT=" in environment.read_bytes()
     worker.terminate()
     assert isinstance(follow(worker)[-1], Cancelled)
 
