@@ -29,8 +29,7 @@ from .projection import Observation, Surface, observe
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """delit/, cameras/, head.obj -> texture.exr (linear), texture.png (sRGB), texture_confidence.exr [S, S] in [0, 1],
-    and texture_filmed.png (sRGB), the same with the light
-    in it, where the frames are still there.
+    and texture_filmed.png (sRGB), the same with the light in it, where the frames are still there.
 
     Raises Problem where no view was delit or none of them sees the head.
     """

@@ -63,8 +63,8 @@ def robust_weights(observations: list[Observation], tolerance: float = 0.10) -> 
 
 
 def blend(observations: list[Observation], report: Reporter, what: str = "delit", done: int = 2) -> np.ndarray:
-    """One log texture [S, S, 3]; zero weight everywhere leaves zeros. What is blended, and how much
-    was `done` before, are for the progress."""
+    """One log texture [S, S, 3]; zero weight everywhere leaves zeros. `what` is blended, and how much was
+    `done` before, are for the progress."""
     sums, norms = [0.0] * len(BANDS), [0.0] * len(BANDS)
     largest = np.maximum(np.max([o.weight for o in observations], axis=0), 1e-12)
     scale = len(largest) / 1024

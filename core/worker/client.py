@@ -24,7 +24,7 @@ GRACE_S = 0.7
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 SPINS = {"GOMP_SPINCOUNT": "2000"}
 """How long a thread of GCC's OpenMP (PyTorch's on Linux) spins before it sleeps while it waits for the others: its own 300,000 keep a core from the
-very thread that is waited for when Blender, or anything else, is busy on another core. That was twenty times slower; alone, this costs nothing."""
+very thread that is waited for when Blender, or anything else, is busy on another core, and everything stands still for its time slice."""
 
 
 class Worker:
