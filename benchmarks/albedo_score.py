@@ -109,20 +109,34 @@ def _render(caster: raster.RayCaster, texture: np.ndarray, view: View, shape: tu
 
 def compare(predicted: np.ndarray, true: Truth, mask: np.ndarray) -> dict:
     """One frame's figures: predicted albedo sRGB [H, W, 3] against the truth over the pixels of `mask`."""
-    rows, columns = (np.flatnonzero(mask.any(axis)) for axis in (1, 0))
-    box = tuple(slice(max(side[0] - 40, 0), side[-1] + 41) for side in (rows, columns))  # wider than any of the measures' filters
+    box = face_box(mask)
     predicted, mask = predicted[box], mask[box]
     true = Truth(true.frame, true.albedo[box], true.face[box], None if true.shadow is None else true.shadow[box])
-    linear_true, linear = images.srgb_to_linear(true.albedo), images.srgb_to_linear(predicted)
-    gain = linear_true[mask].mean(0) / np.maximum(linear[mask].mean(0), 1e-6)
-    figures = {"raw": _differences(predicted, true.albedo, mask), "gain": _differences(images.linear_to_srgb(linear * gain), true.albedo, mask)}
-    log_true, log = (np.log(np.maximum(picture[..., 1], 1e-3)) for picture in (linear_true, linear))
-    figures["detail"] = _detail(log, log_true, mask)
-    figures["shadow_step"] = _shadow_step(log - log_true, mask, true.shadow) if true.shadow is not None else math.nan
+    figures = {"raw": differences(predicted, true.albedo, mask), "gain": differences(with_gain(predicted, true.albedo, mask), true.albedo, mask)}
+    log_true, log = log_green(true.albedo), log_green(predicted)
+    figures["detail"] = detail(log, log_true, mask)
+    figures["shadow_step"] = shadow_step(log - log_true, mask, true.shadow) if true.shadow is not None else math.nan
     return figures
 
 
-def _differences(predicted: np.ndarray, true: np.ndarray, mask: np.ndarray) -> dict:
+def face_box(mask: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns about a mask [H, W], by a margin wider than any of the measures' filters."""
+    return tuple(slice(max(side[0] - 40, 0), side[-1] + 41) for side in (np.flatnonzero(mask.any(axis)) for axis in (1, 0)))
+
+
+def with_gain(predicted: np.ndarray, true: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """sRGB [H, W, 3] after the gain per channel, in linear light, that gives it the truth's mean over the mask."""
+    linear_true, linear = images.srgb_to_linear(true), images.srgb_to_linear(predicted)
+    return images.linear_to_srgb(linear * (linear_true[mask].mean(0) / np.maximum(linear[mask].mean(0), 1e-6)))
+
+
+def log_green(srgb: np.ndarray) -> np.ndarray:
+    """sRGB [H, W, 3] -> logarithm of linear green [H, W]."""
+    return np.log(np.maximum(images.srgb_to_linear(srgb)[..., 1], 1e-3))
+
+
+def differences(predicted: np.ndarray, true: np.ndarray, mask: np.ndarray) -> dict:
+    """PSNR in dB, SSIM and FLIP of sRGB pictures [H, W, 3] over a mask, both grey outside of it."""
     a, b = (np.where(mask[..., None], picture, 0.5).astype(np.float64) for picture in (predicted, true))
     error = ((a - b)[mask] ** 2).mean()
     _, ssim = structural_similarity(a, b, channel_axis=2, data_range=1.0, full=True)
@@ -130,7 +144,8 @@ def _differences(predicted: np.ndarray, true: np.ndarray, mask: np.ndarray) -> d
     return {"psnr": float(-10 * np.log10(max(error, 1e-12))), "ssim": float(ssim[mask].mean()), "flip": float(np.squeeze(flip)[mask].mean())}
 
 
-def _detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray) -> float:
+def detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray) -> float:
+    """Correlation of two logarithms [H, W] between 1 and 3 px; 0 where the first is flat."""
     inner = cv2.erode(mask.astype(np.uint8), np.ones((15, 15))) > 0
     bands = []
     for picture in (log, log_true):
@@ -139,13 +154,16 @@ def _detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray) -> float:
     return float(np.corrcoef(bands)[0, 1]) if bands[0].std() > 1e-9 else 0.0
 
 
-def _shadow_step(residual: np.ndarray, mask: np.ndarray, shadow: np.ndarray) -> float:
-    """nan where the boundary is too short to speak of."""
-    sides = []
-    for side in (~shadow, shadow):
-        distance = cv2.distanceTransform(side.astype(np.uint8), cv2.DIST_L2, 5)
-        sides.append(residual[side & mask & (distance > 4) & (distance < 12)])
+def shadow_step(residual: np.ndarray, mask: np.ndarray, shadow: np.ndarray) -> float:
+    """Median of log(predicted / true) [H, W] along the lit side of the shadow's edge less the dark side's; nan where the boundary is too short to speak of."""
+    sides = [residual[band & mask] for band in edge_bands(shadow)]
     return float(np.median(sides[0]) - np.median(sides[1])) if min(map(len, sides)) > 500 else math.nan
+
+
+def edge_bands(shadow: np.ndarray) -> list[np.ndarray]:
+    """The pixels 4 to 12 px from the edge of a shadow, bool [H, W]: on the lit side and on the dark one."""
+    distances = [cv2.distanceTransform(side.astype(np.uint8), cv2.DIST_L2, 5) for side in (~shadow, shadow)]
+    return [(distance > 4) & (distance < 12) for distance in distances]
 
 
 def mean_scores(results: list[dict]) -> dict:
