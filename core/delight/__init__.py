@@ -16,12 +16,15 @@ from .. import images
 from ..capture import Capture, replacing_folder
 from ..messages import Reporter
 from ..settings import Settings
-from .contract import Delighter
+from .contract import Delighter, Photographer
 from .folder import folder
+from .none import delight_photograph as leave_photograph
 from .none import none
 from .shading import shading
 
 DELIGHTERS: dict[str, Delighter] = {"none": none, "folder": folder, "shading": shading}
+PHOTOGRAPHERS: dict[str, Photographer] = {"none": leave_photograph}
+"""Those that also serve a photograph that belongs to no capture."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:

@@ -6,6 +6,9 @@
 
 It chooses which registered frames it can serve (the selected ones unless it says otherwise), may fit whatever it
 needs over all of them first, and reports progress and figures. The texture stage uses exactly the frames it yields.
+One that needs no capture has beside it a function of a single photograph:
+
+    def delight_photograph(srgb float32 [H, W, 3], settings) -> (albedo sRGB [H, W, 3], shadow [H, W] in [0, 1] or None)
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ import numpy as np
 
 from ..capture import Capture
 from ..messages import Reporter
-from ..settings import Settings
+from ..settings import DelightSettings, Settings
 from ..views import View
 
 
@@ -35,3 +38,4 @@ class Delit:
 
 
 Delighter = Callable[[Capture, Settings, Reporter], Iterator[Delit]]
+Photographer = Callable[[np.ndarray, DelightSettings], tuple[np.ndarray, np.ndarray | None]]

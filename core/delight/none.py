@@ -6,10 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from .. import images
 from ..capture import Capture
 from ..messages import Reporter
-from ..settings import Settings
+from ..settings import DelightSettings, Settings
 from ..views import read_views
 from .contract import Delit
 
@@ -20,3 +22,8 @@ def none(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Del
     for i, view in enumerate(views):
         report.progress(i, len(views), "Copying frames")
         yield Delit(view, images.read_srgb(view.path))
+
+
+def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.ndarray, None]:
+    """The photograph as it is."""
+    return srgb, None

@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How well the delighters take the light out of photographs whose albedo is known, set by set, beside no delighting and the flat true tone.
+
+    python -m benchmarks.delight [--data DIR] [--sets NAME ...] [--capture NAME=FOLDER ...] [--opendelight PATH] [--quick] [--json OUT] [--pictures FOLDER]
+
+Sets: faceolat (--data: laid out like ../shared/data/faceolat), lps_sun, sample, or any folder laid out as benchmarks/albedo_score.py says. A capture is
+registered anew unless --capture names one. Rows: none, flat true tone, then on captures each delighter of the chain that needs no pictures, no account and
+no checkpoint, and everywhere each that can do a single photograph. Figures (benchmarks/delight_measures.py) are means over the pictures:
+  PSNR, SSIM, FLIP   over the facial skin after one gain per channel; features: the distance in EfficientNet-Lite0's features, which is not LPIPS
+  detail             correlation of log green between 1 and 3 px with the truth's
+  shadow step        what is left of the light's step at the true shadow's edge, where it exceeds 0.2 in natural log; `none` has all of it
+Pictures of real people are written only where --pictures says.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from core import delight, images
+from core.capture import Capture, write_json
+from core.messages import Problem, Reporter
+from core.settings import Settings
+
+from .albedo_score import with_gain
+from .delight_measures import flat_tone, mean_of, score, sheet, table, tone_group
+from .delight_sets import Photograph, Photographs, frames, light_stage, registered
+
+SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
+SAMPLE = Path(__file__).resolve().parents[1] / "core" / "synthetic" / "sample"
+SETS = ("faceolat", "lps_sun", "sample")
+BROUGHT = ("none", "folder", "switchlight", "opendelight")
+"""Delighters that need something of the user's, or nothing at all: no rows of their own on captures."""
+QUICK = 4  # every n-th picture
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.delight", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, default=SHARED / "faceolat", help="photographs with their albedo, laid out like faceolat")
+    parser.add_argument("--sets", nargs="+", default=SETS, help=f"of {', '.join(SETS)}, or folders with capture.mp4, albedo and face")
+    parser.add_argument("--rows", nargs="+", help="only rows whose name begins with one of these")
+    parser.add_argument("--capture", action="append", default=[], metavar="NAME=FOLDER", help="a registered capture of that set")
+    parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_delight", help="where captures are made and kept")
+    parser.add_argument("--opendelight", default="", help="the authors' checkpoint")
+    parser.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
+    parser.add_argument("--quick", action="store_true", help=f"every {QUICK}th picture, without the feature distance")
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--pictures", type=Path, help="folder for SET.png: photographs, truth and rows side by side")
+    options = parser.parse_args()
+    settings = Settings(device=options.device)
+    if options.opendelight:
+        settings = replace(settings, delight=replace(settings.delight, checkpoint=options.opendelight))
+    captures = dict(pair.split("=", 1) for pair in options.capture)
+    results = {}
+    for name in options.sets:
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                chosen = _set(name, options, captures, Path(folder))
+                results[Path(name).name] = measure(chosen, settings, not options.quick, options.rows,
+                                                   options.pictures and options.pictures / f"{Path(name).name}.png")
+            except Problem as problem:
+                results[Path(name).name] = {"-": {"not_run": f"{problem.problem} {problem.remedy}"}}
+        if options.json:
+            write_json(options.json, results)
+    print(table(results))
+    if options.json is None:
+        print(json.dumps(results, indent=1))
+
+
+def measure(chosen: Photographs, settings: Settings, features: bool = True, only: list[str] | None = None, picture: Path | None = None) -> dict[str, dict]:
+    """Row -> {pictures, figures, groups, seconds_per_picture}, or {not_run: why}; `picture`: where to show them beside each other."""
+    results, shown = {}, []
+    spread = chosen.photographs[:: max(1, len(chosen.photographs) // 6)][:6]
+    for row in rows(chosen, settings):
+        if only and not any(row.startswith(name) for name in only):
+            continue
+        scores, groups, delit, seconds, started = [], {}, {}, 0.0, time.monotonic()
+        try:
+            for photograph, predicted in predictions(row, chosen, settings):
+                seconds += time.monotonic() - started
+                scores.append(score(predicted, photograph.srgb, photograph.truth, features))
+                groups.setdefault(photograph.group or tone_group(flat_tone(photograph.truth)), []).append(scores[-1])
+                delit[photograph.name] = predicted
+                print(f"\r{row}: {len(scores)}", end="", file=sys.stderr, flush=True)
+                started = time.monotonic()
+        except Problem as problem:
+            results[row] = {"not_run": f"{problem.problem} {problem.remedy}"}
+            continue
+        results[row] = {"pictures": len(scores), "figures": mean_of(scores), "seconds_per_picture": round(seconds / len(scores), 2),
+                        "groups": {group: {"pictures": len(found), "figures": mean_of(found)} for group, found in groups.items()}}
+        shown.append([_shown(delit[p.name], p) for p in spread])
+    print(file=sys.stderr)
+    if picture:
+        images.write_srgb(picture, sheet([[p.srgb, _shown(p.truth.albedo, p), *delit] for p, *delit in zip(spread, *shown, strict=True)]))
+    return results
+
+
+def rows(chosen: Photographs, settings: Settings) -> list[str]:
+    """What there is to compare on a set."""
+    on_captures = [name for name in delight.DELIGHTERS if name not in BROUGHT] if chosen.capture else []
+    single = [f"{name}, one photograph" for name in delight.PHOTOGRAPHERS if name != "none" and (name != "opendelight" or settings.delight.checkpoint)]
+    return ["none", "flat true tone", *on_captures, *single]
+
+
+def predictions(row: str, chosen: Photographs, settings: Settings) -> Iterator[tuple[Photograph, np.ndarray]]:
+    """Each photograph of a set with what a row takes for its albedo, sRGB [H, W, 3]."""
+    if row in ("none", "flat true tone"):
+        for photograph in chosen.photographs:
+            yield photograph, photograph.srgb if row == "none" else np.broadcast_to(flat_tone(photograph.truth), photograph.srgb.shape)
+    elif row.endswith(", one photograph"):
+        for photograph in chosen.photographs:
+            yield photograph, delight.PHOTOGRAPHERS[row.removesuffix(", one photograph")](photograph.srgb, settings.delight)[0]
+    else:
+        by_frame = {photograph.frame: photograph for photograph in chosen.photographs}
+        for delit in delight.DELIGHTERS[row](chosen.capture, settings, Reporter("delight")):
+            if (photograph := by_frame.get(delit.view.name)) is not None:
+                height, width = photograph.srgb.shape[:2]
+                yield photograph, delit.image if delit.image.shape[:2] == (height, width) else images.resize(delit.image, width, height)
+
+
+def _set(name: str, options: argparse.Namespace, captures: dict[str, str], work: Path) -> Photographs:
+    every = QUICK if options.quick else 1
+    if name == "faceolat":
+        return light_stage(options.data, every)
+    truth = {"lps_sun": SHARED / "lps_sun", "sample": SAMPLE}.get(name, Path(name))
+    capture = Capture(Path(captures[name]).resolve()) if name in captures else registered(truth, options.work)
+    return frames(truth, capture, work, every)
+
+
+def _shown(srgb: np.ndarray, photograph: Photograph) -> np.ndarray:
+    """A delit picture as it is compared: after the gain per channel, the skin alone."""
+    true = photograph.truth
+    return np.where(true.face[..., None], with_gain(np.asarray(srgb, np.float32), true.albedo, true.face), 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What benchmarks/delight.py measures of a delit picture, and the tables and sheets it makes of many.
+
+All figures are those of benchmarks/albedo_score.py after one gain per channel in linear light, so that neither the tone nor the light's colour counts.
+"""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+from skimage.color import rgb2lab
+
+from core import images
+
+from .ablation_measures import feature_distance
+from .albedo_score import Truth, detail, differences, edge_bands, face_box, log_green, shadow_step, with_gain
+
+FIGURES = ("psnr", "ssim", "flip", "features", "detail", "shadow_step")
+HIGHER_IS_BETTER = ("psnr", "ssim", "detail")
+LEAST_STEP = 0.2
+"""Least true step of the light at a shadow's edge, as a difference of logarithms, where what is left of it is measured."""
+TONES = (("very light", 55), ("light", 41), ("intermediate", 28), ("tan", 10), ("brown", -30), ("dark", -90))
+"""Groups of skin and the individual typology angle, in degrees, above which each lies (Chardon et al. 1991; Del Bino and Bernerd 2013)."""
+
+
+def score(predicted: np.ndarray, photograph: np.ndarray, true: Truth, features: bool = True) -> dict[str, float]:
+    """FIGURES of one delit picture sRGB [H, W, 3] over the facial skin of its truth; nan what cannot be told. `photograph`: what it was made from."""
+    box, mask = face_box(true.face), true.face
+    predicted, photograph, albedo, mask = predicted[box], photograph[box], true.albedo[box], mask[box]
+    evened = with_gain(predicted, albedo, mask)
+    found = differences(evened, albedo, mask)
+    distance = feature_distance(evened * mask[..., None], albedo * mask[..., None]) if features else None
+    log, log_true = log_green(predicted), log_green(albedo)
+    step = math.nan
+    if true.shadow is not None:
+        step = shadow_step(log - log_true, mask & stepping(log_green(photograph) - log_true, mask, true.shadow[box]), true.shadow[box])
+    return {**found, "features": float(distance[mask].mean()) if distance is not None else math.nan, "detail": detail(log, log_true, mask), "shadow_step": step}
+
+
+def stepping(log_shading: np.ndarray, mask: np.ndarray, shadow: np.ndarray) -> np.ndarray:
+    """Where along the shadow's edge the true light [H, W] (natural log) really steps, by LEAST_STEP or more: bool [H, W]."""
+    means, near = [], np.ones(mask.shape, bool)
+    for band in edge_bands(shadow):
+        weight = (band & mask).astype(np.float32)
+        around = cv2.GaussianBlur(weight, (0, 0), 6)
+        means.append(cv2.GaussianBlur(weight * log_shading.astype(np.float32), (0, 0), 6) / np.maximum(around, 1e-6))
+        near &= around > 0.02
+    return near & (means[0] - means[1] > LEAST_STEP)
+
+
+def flat_tone(true: Truth) -> np.ndarray:
+    """sRGB [3] of the linear mean of the true albedo over the facial skin."""
+    return images.linear_to_srgb(images.srgb_to_linear(true.albedo[true.face]).mean(0))
+
+
+def tone_group(srgb: np.ndarray) -> str:
+    """The group of a skin tone, sRGB [3], by its individual typology angle: atan((L* - 50) / b*)."""
+    lightness, _, b = rgb2lab(np.asarray(srgb, float)[None, None])[0, 0]
+    angle = math.degrees(math.atan2(lightness - 50, max(b, 1e-6)))
+    return next(name for name, above in TONES if angle > above or name == TONES[-1][0])
+
+
+def mean_of(scores: list[dict[str, float]]) -> dict[str, float | None]:
+    """The mean of each figure over the pictures that have it."""
+    return {name: float(np.mean(known)) if (known := [s[name] for s in scores if not math.isnan(s[name])]) else None for name in FIGURES}
+
+
+def table(results: dict[str, dict]) -> str:
+    """Markdown of set -> row -> {pictures, figures, groups}: a line per row, then a line per row for each group (person or skin tone) of several."""
+    lines = ["| set | delighter | pictures | PSNR | SSIM | FLIP | features | detail | shadow step |", "|" + " --- |" * 9]
+    for name, rows in results.items():
+        lines += [_line(name, row, found["pictures"], found["figures"]) if "figures" in found else f"| {name} | {row} | - | {found['not_run']} |" + " |" * 5
+                  for row, found in rows.items()]
+        groups = list(dict.fromkeys(group for found in rows.values() for group in found.get("groups", {})))
+        for group in groups if len(groups) > 1 else []:
+            lines += [_line(f"{name}: {group}", row, found["groups"][group]["pictures"], found["groups"][group]["figures"])
+                      for row, found in rows.items() if "figures" in found]
+    return "\n".join(lines)
+
+
+def sheet(columns: list[list[np.ndarray]], height: int = 256) -> np.ndarray:
+    """Pictures of equal shape side by side: a row per photograph, what `columns` holds of it next to each other; sRGB [H, W, 3]."""
+    return np.vstack([np.hstack([images.resize(np.asarray(p, np.float32), round(p.shape[1] * height / p.shape[0]), height) for p in row]) for row in columns])
+
+
+def _line(name: str, row: str, pictures: int, figures: dict) -> str:
+    digits = {"psnr": 2, "detail": 2, "shadow_step": 2}
+    return f"| {name} | {row} | {pictures} | " + " | ".join("-" if figures[f] is None else f"{figures[f]:.{digits.get(f, 3)}f}" for f in FIGURES) + " |"

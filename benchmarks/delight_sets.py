@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What benchmarks/delight.py measures on: photographs with a known albedo, single ones and those of a registered capture."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from core import images
+from core.capture import Capture, write_json
+from core.messages import Problem
+from core.views import read_views
+
+from .albedo_score import Truth, read_truth
+
+
+@dataclass(frozen=True)
+class Photograph:
+    """sRGB [H, W, 3] under some light, with its truth; group: what it is also averaged over; frame: its file's name where it belongs to a capture."""
+
+    name: str
+    srgb: np.ndarray
+    truth: Truth
+    group: str = ""
+    frame: str = ""
+
+
+@dataclass(frozen=True)
+class Photographs:
+    """A set of them; capture: a registered one whose selected frames are these, where they belong to one."""
+
+    photographs: list[Photograph]
+    capture: Capture | None = None
+
+
+def light_stage(folder: Path, every: int = 1) -> Photographs:
+    """align_image/PERSON/CAM/NNN.png with align_diffuse/PERSON_CAM.png and align_mask_face/PERSON_CAM.png; every n-th light of each.
+
+    Raises Problem where a picture's truth is missing, or there is no picture at all.
+    """
+    found = []
+    for camera in sorted(path for path in folder.glob("align_image/*/*") if path.is_dir()):
+        name = f"{camera.parent.name}_{camera.name}"
+        albedo, mask = (folder / kind / f"{name}.png" for kind in ("align_diffuse", "align_mask_face"))
+        if not (albedo.is_file() and mask.is_file()):
+            raise Problem(f"{folder} lacks align_diffuse/{name}.png or align_mask_face/{name}.png.", "Add it, or leave that camera out.")
+        truth = Truth(0, images.read_srgb(albedo), images.read_mask(mask) > 0.5, None)
+        found += [Photograph(f"{name}/{path.stem}", images.read_srgb(path), truth, camera.parent.name) for path in sorted(camera.glob("*.png"))[::every]]
+    if not found:
+        raise Problem(f"{folder} holds no photographs with a known albedo.", "It needs align_image/PERSON/CAM/NNN.png, align_diffuse and align_mask_face.")
+    return Photographs(found)
+
+
+def frames(truth: Path, capture: Capture, work: Path, every: int = 1) -> Photographs:
+    """The frames of a registered capture that have a truth (benchmarks/albedo_score.py says how it is laid out), selected in a copy in the folder `work`.
+
+    Raises Problem where the capture is not registered or none of its frames has a truth.
+    """
+    if not capture.head.is_file():
+        raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
+    copy = Capture(work / "copy.wildcap")
+    for part in (capture.frames, capture.cameras):
+        shutil.copytree(part, copy.root / part.name)
+    shutil.copy(capture.head, copy.head)
+    known = {true.frame: true for true in read_truth(truth)}
+    listed = json.loads(copy.frames_json.read_text(encoding="utf-8"))
+    registered = {view.name: view for view in read_views(copy)}
+    having = [frame for frame in listed["frames"] if frame["video_frame"] in known and frame["name"] in registered]
+    if not having:
+        raise Problem(f"No registered frame of {capture.root} has a true albedo in {truth}.", "Check that the two belong together.")
+    for frame in listed["frames"]:
+        frame["selected"] = frame in having  # the light is fitted to all of them, also where only some are scored
+    write_json(copy.frames_json, listed)
+    found = []
+    for frame in having[::every]:
+        true = known[frame["video_frame"]]
+        srgb = images.read_srgb(registered[frame["name"]].path)
+        if srgb.shape != true.albedo.shape:
+            srgb = images.resize(srgb, true.albedo.shape[1], true.albedo.shape[0])
+        found.append(Photograph(f"{frame['video_frame']:04d}", srgb, true, frame=frame["name"]))
+    return Photographs(found, copy)
+
+
+def registered(truth: Path, work: Path) -> Capture:
+    """The capture of `truth`/capture.mp4 in the folder `work`, run until its head is registered; kept there for the next time."""
+    capture = Capture(work / f"{truth.name}.wildcap")
+    if not capture.head.is_file():
+        command = [sys.executable, "-m", "core", "run", str(truth / "capture.mp4"), str(capture.root), "--until", "registration"]
+        if subprocess.run(command, stdout=sys.stderr, check=False).returncode != 0:
+            raise Problem(f"{truth / 'capture.mp4'} could not be registered.", f"Look at {capture.report}.")
+    return capture
