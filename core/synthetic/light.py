@@ -141,13 +141,13 @@ def _sun_seen(caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray,
     if shadows != "self":
         away = rng.uniform(0.25, 1.0)  # metres to what throws the shadow
         at = points[None, facing] + away * directions[:, None]
-        seen[:, facing] *= 1 - _in_the_way(at @ right, at @ up, away * radius * 2 / SUN_RAYS**0.5, shadows, rng)
+        seen[:, facing] *= 1 - in_the_way(at @ right, at @ up, away * radius * 2 / SUN_RAYS**0.5, shadows, rng)
     share = np.zeros(len(points))
     share[facing] = seen[:, facing].mean(0)
     return share
 
 
-def _in_the_way(x: np.ndarray, y: np.ndarray, blur: float, kind: str, rng: np.random.Generator) -> np.ndarray:
+def in_the_way(x: np.ndarray, y: np.ndarray, blur: float, kind: str, rng: np.random.Generator) -> np.ndarray:
     """How far an opaque sheet with holes covers (x, y) [...] in metres, in a plane across the sunlight; edges are `blur` metres wide,
     the distance between two of the sun's rays there, so that few rays make an even penumbra."""
     turn, shift = rng.uniform(0, np.pi), rng.uniform(-0.05, 0.05)

@@ -1,0 +1,58 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How a phone would show a lit face: what stands around it, the exposure that the camera's meter chooses, and the cast that its white balance leaves.
+
+The meter weighs the face and the surroundings against each other, as phones do that find faces, and holds the brightest skin below white; so the
+brightness of skin in a picture says little of the skin. The light is a black body's; automatic white balance takes most of its colour out and errs
+by a few degrees besides (recovery errors: Gijsenij, Gevers and van de Weijer, "Computational color constancy", 2011).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .pigment import LUMINANCE
+
+SURFACES = 14  # in view beside the person
+MIDDLE_GREY = 0.18
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """gain [3]: what scene light is multiplied by in the picture (exposure and the cast that is left, linear); surroundings [3]: the mean linear
+    colour in the picture of all that is not the person."""
+
+    gain: np.ndarray
+    surroundings: np.ndarray
+
+
+def phone_exposure(rng: np.random.Generator, skin: np.ndarray, light: np.ndarray) -> Exposure:
+    """The picture that a phone takes of linear skin colours [N, 3] in light whose mean colour on a white surface is `light` [3]."""
+    cast = _cast(rng)
+    reflectance = np.clip(np.exp(rng.normal(np.log(0.2), 0.8, (SURFACES, 1)) + rng.normal(0, 0.25, (SURFACES, 3))), 0.02, 0.9)
+    elsewhere = np.exp(rng.normal(0, 0.45)) * np.exp(rng.normal(0, 0.4, (SURFACES, 1)))  # it is rarely as light behind a person as on the face
+    behind = reflectance * elsewhere * light * np.exp(rng.normal(0, 0.06, 3))
+    share = rng.dirichlet(np.ones(SURFACES))[:, None]
+    face = rng.uniform(0.25, 0.85)  # weight of the face in the meter
+    metered = face * float((skin @ LUMINANCE).mean()) + (1 - face) * float((share * behind).sum(0) @ LUMINANCE)
+    level = MIDDLE_GREY * 2 ** rng.normal(0.5, 0.5) / metered
+    level = min(level, rng.uniform(0.85, 1.15) / float(np.percentile((skin * cast).max(1), 98)))
+    gain = level * cast
+    return Exposure(gain, (share * np.minimum(behind * gain, 1)).sum(0))
+
+
+def _cast(rng: np.random.Generator) -> np.ndarray:
+    """Linear gain [3] of luminance about 1 that light and white balance leave on a white surface."""
+    kelvin = np.exp(rng.uniform(np.log(2600), np.log(9000)))
+    left = rng.uniform(0.0, 0.35)  # of the light's colour
+    cast = _black_body(kelvin) ** left * np.exp(rng.normal(0, [0.05, 0.02, 0.06]))
+    return cast / (cast @ LUMINANCE)
+
+
+def _black_body(kelvin: float) -> np.ndarray:
+    """Linear RGB [3] of a black body over one of 6500 K, green 1, at one wavelength a channel (Planck's law)."""
+    nanometres = np.array([605.0, 545.0, 460.0])
+    radiance = 1 / (np.exp(1.4388e7 / (nanometres * kelvin)) - 1) * (np.exp(1.4388e7 / (nanometres * 6500)) - 1)
+    return radiance / radiance[1]

@@ -1,0 +1,248 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Portraits under any light, with their truth: a subject on the light stage, an environment, suns and lamps with what stands before them, a camera.
+
+`relit` makes as many pictures of one sight as there are lights; `portrait` is one of a subject by seed, for tests and benchmarks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from .. import images
+from .environments import Environment, made_environment, panorama_environment, seen
+from .identities import subject_mesh
+from .light import in_the_way, sh_basis
+from .olat import BASIS, DIRECTIONS, LIGHTS, LightStage, light_stage, mirrored, transport
+from .parameters import adorned, sample_parameters
+from .response import curve, develop, expose
+from .sight import MASKS, Sight, landmarks_of, look, random_camera
+from .skin import Skin, make_skin
+
+F0 = 0.08  # reflectance at normal incidence per Specular IOR Level of Blender's Principled BSDF
+GOBOS = ("none", "none", "none", "leaves", "leaves", "blinds", "edge")
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The light as a fit to the registered head would find it, up to its usual errors, times the skin's tone: ambient [P, 3] of a second-order sky,
+    sunlit [P, 3] the same and a sun that only the head itself blocks; smooth normals [P, 3] of the registered head."""
+
+    ambient: np.ndarray
+    sunlit: np.ndarray
+    normal: np.ndarray
+
+
+@dataclass(frozen=True)
+class Portrait:
+    """float32 pictures of side S. srgb [S, S, 3]: the file; albedo [S, S, 3]: linear, 0 off the head; shading [S, S, 3]: what the albedo was multiplied
+    by, highlights and clipping included; shadow [S, S] in [0, 1]: the share of the main light that is blocked or turned away, 0 where no light is
+    main; strong: that light's irradiance facing it over all other light's, as a share in [0, 1]; head, face and skin [S, S] in [0, 1]; fitted [P]."""
+
+    srgb: np.ndarray
+    albedo: np.ndarray
+    shading: np.ndarray
+    shadow: np.ndarray
+    strong: float
+    head: np.ndarray
+    face: np.ndarray
+    skin: np.ndarray
+    fitted: Fitted
+
+
+def portrait(seed: int, size: int = 256, light: int = 0, panoramas: list[np.ndarray] = (), texels: int = 1024) -> Portrait:
+    """The subject of a seed, seen and lit as (seed, light) decide: the same numbers give the same picture."""
+    stage, skin = light_stage(subject_mesh(seed)), make_skin(adorned(sample_parameters(seed), seed), texels)
+    sight = sight_of(stage, skin, np.random.default_rng([seed, 40, light]), size)
+    return relit(sight, stage, np.random.default_rng([seed, 41, light]), panoramas)
+
+
+def sight_of(stage: LightStage, skin: Skin, rng: np.random.Generator, size: int) -> Sight:
+    """A subject through a random camera."""
+    camera = random_camera(landmarks_of(stage), size, rng)
+    return look(stage, camera, skin.diffuse, F0 * skin.specular, skin.normal, rng, open_eyes=rng.random() < 0.7)
+
+
+def relit(sight: Sight, stage: LightStage, rng: np.random.Generator, panoramas: list[np.ndarray] = (), albedo: np.ndarray | None = None) -> Portrait:
+    """One picture of a sight under a random light. `albedo` [P, 3] replaces the sight's."""
+    albedo = sight.albedo if albedo is None else albedo
+    environment = panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas) and rng.random() < 0.6 else made_environment(rng)
+    carried = transport(stage, sight.vertices)
+    ambient, shine = _under(environment, sight, stage, carried)
+    lamps, colours, blocked = _lamps(environment, sight, rng)
+    softness = np.exp(rng.uniform(np.log(0.2), np.log(2.5))) * sight.size / 256
+    diffuse, specular = ambient, shine * _fresnel(sight)
+    for lamp, colour, reach in zip(lamps, colours, blocked, strict=True):
+        diffuse = diffuse + _softened(sight, np.maximum(sight.normal @ lamp, 0) * reach, softness) * colour
+        specular = specular + (_highlight(sight, lamp, rng.uniform(0.3, 0.5)) * reach)[:, None] * colour
+    radiance = sight.picture(albedo * diffuse + specular)
+    head = sight.picture(np.ones(len(sight.pixel), np.float32))
+    light = float(np.mean(ambient)) + sum(float(np.mean(c)) for c in colours) * 0.5
+    radiance = np.where(head[..., None] > 0, radiance, _background(environment, sight, light, rng))
+    face = sight.picture(sight.masks[:, MASKS.index("face")])
+    linear, gains = expose(radiance, face > 0.5 if (face > 0.5).any() else head > 0, rng)
+    clean = _haired(curve(linear, rng), sight, rng) if rng.random() < 0.35 else (curve(linear, rng), np.zeros_like(head))
+    picture, hair = clean
+    truth = sight.picture(albedo)
+    shading = images.srgb_to_linear(picture) / np.maximum(truth, 0.004)
+    shadow, strong = _shadow(sight, lamps, colours, blocked, ambient)
+    bare = 1 - hair
+    return Portrait(develop(picture, rng), truth, shading * (head * bare)[..., None], sight.picture(shadow), strong, head * bare, face * bare,
+                    sight.picture(sight.masks[:, MASKS.index("skin")] * (1 - sight.masks[:, MASKS.index("eyes")])) * bare,
+                    _fitted(sight, carried, environment, lamps, colours, albedo, gains, rng))
+
+
+def _under(environment: Environment, sight: Sight, stage: LightStage, carried: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shading by the environment and its mirror image, [P, 3] each; `carried` is the light transport of the vertices seen."""
+    lit = np.concatenate([carried @ environment.radiance, mirrored(stage, sight.vertices, environment.radiance, sight.eye)], 1)
+    ambient, shine = np.split(sight.at_pixels(lit), 2, 1)
+    relief = 1 + 0.5 * ((sight.normal - sight.smooth) @ _brightest(environment))[:, None]  # the stage's vertices know no pores: these turn to its bright side
+    return ambient * np.clip(relief, 0.5, 1.5), shine
+
+
+def _brightest(environment: Environment) -> np.ndarray:
+    """The environment's dipole [3]: where its light comes from, of length 1 where all of it comes from there."""
+    return (DIRECTIONS * environment.radiance.mean(1, keepdims=True)).mean(0).astype(np.float32) / max(float(environment.radiance.mean()), 1e-6)
+
+
+def _lamps(environment: Environment, sight: Sight, rng: np.random.Generator) -> tuple[list, list, list]:
+    """Up to two lamps beside the environment: unit directions, colours [3] as irradiance over pi, and the share [P] of each that arrives."""
+    lamps, colours, reach = [], [], []
+    for k in rng.permutation(len(sight.lamps))[:rng.choice([0, 1, 1, 1, 1, 2])]:
+        strength = np.exp(rng.uniform(np.log(0.35), np.log(9.0)))
+        warm = rng.normal(0.12, 0.22)
+        colour = strength * np.exp([0.6 * warm, rng.normal(0, 0.04), -warm])
+        if environment.colour.any() and rng.random() < 0.5:
+            colour = strength * environment.colour / max(float(environment.colour.mean()), 1e-6)
+        lamp = sight.lamps[k]
+        lamps.append(lamp)
+        colours.append(colour.astype(np.float32))
+        reach.append(sight.reach[k] * (1 - _gobo(sight, lamp, float(sight.radius[k]), str(rng.choice(GOBOS)), rng)))
+    return lamps, colours, reach
+
+
+def _gobo(sight: Sight, lamp: np.ndarray, radius: float, kind: str, rng: np.random.Generator) -> np.ndarray | float:
+    """The share [P] of a lamp's light that leaves, blinds or an edge before it take away."""
+    if kind == "none":
+        return 0.0
+    right = np.cross(lamp, [0.0, 0.0, 1.0] if abs(lamp[2]) < 0.9 else [1.0, 0.0, 0.0])
+    right /= np.linalg.norm(right)
+    away = rng.uniform(0.1, 0.8)
+    return in_the_way(sight.position @ right, sight.position @ np.cross(right, lamp), max(2 * away * min(radius, 0.03), 4e-4), kind, rng)
+
+
+def _fresnel(sight: Sight) -> np.ndarray:
+    """Schlick's reflectance [P, 1] towards the camera, damped at grazing angles as rough skin's is."""
+    cosine = np.clip(_dot(sight.towards, sight.normal), 0, 1)
+    return (sight.gloss + 0.25 * (1 - sight.gloss) * (1 - cosine) ** 5)[:, None]
+
+
+def _highlight(sight: Sight, lamp: np.ndarray, roughness: float) -> np.ndarray:
+    """The Cook-Torrance term times the cosine, times pi to suit irradiance over pi [P] (GGX; Walter et al. 2007)."""
+    lamp = lamp.astype(np.float32)
+    half = sight.towards + lamp
+    half /= np.sqrt(_dot(half, half))[:, None]
+    a2 = np.float32(roughness**4)
+    cosine, facing = np.maximum(sight.normal @ lamp, 0), np.maximum(_dot(sight.normal, sight.towards), 0.05)
+    ndf = a2 / (np.maximum(_dot(sight.normal, half), 0) ** 2 * (a2 - 1) + 1) ** 2  # times 1 / pi
+    masked = 0.5 / (cosine * np.sqrt(a2 + (1 - a2) * facing**2) + facing * np.sqrt(a2 + (1 - a2) * cosine**2) + 1e-4)
+    fresnel = sight.gloss + (1 - sight.gloss) * (1 - np.clip(_dot(half, sight.towards), 0, 1)) ** 5
+    return ndf * masked * fresnel * cosine
+
+
+def _softened(sight: Sight, direct: np.ndarray, radius: float) -> np.ndarray:
+    """Direct light [P] -> [P, 3] spread under the skin, red farthest (d'Eon et al. 2007); `radius` in pixels, of the red."""
+    picture, head = sight.picture(direct.astype(np.float32)), sight.picture(np.ones(len(direct), np.float32))
+    channels = []
+    for share in (1.0, 0.4, 0.2):
+        if share * radius < 0.25:
+            channels.append(direct)
+            continue
+        spread = cv2.GaussianBlur(picture, (0, 0), share * radius) / np.maximum(cv2.GaussianBlur(head, (0, 0), share * radius), 1e-3)
+        channels.append(spread.reshape(-1)[sight.pixel])
+    return np.stack(channels, -1).astype(np.float32)
+
+
+def _background(environment: Environment, sight: Sight, light: float, rng: np.random.Generator) -> np.ndarray:
+    """What lies behind the head [S, S, 3]: the panorama out of focus, a dark studio, or cloth and walls of any colour."""
+    kind = rng.random()
+    if kind < 0.45:
+        return seen(environment, sight.rays) * np.float32(np.exp(rng.normal(0, 0.3)))
+    if kind < 0.6:
+        ground = np.full((sight.size, sight.size, 3), 0.02, np.float32)
+    else:
+        ground = np.broadcast_to(rng.uniform(0.02, 0.7, 3), (sight.size, sight.size, 3)).astype(np.float32)
+    for scale in (4, 9, 24):
+        blobs = np.exp(rng.normal(0, 0.35, (scale, scale, 1)) + rng.normal(0, 0.12, (scale, scale, 3))).astype(np.float32)
+        blobs = cv2.resize(blobs, (sight.size,) * 2, interpolation=int(rng.choice([cv2.INTER_CUBIC, cv2.INTER_NEAREST])))
+        ground = ground * np.clip(blobs, 0.1, 5)
+    return ground * np.float32(light)
+
+
+def _haired(picture: np.ndarray, sight: Sight, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Strands from the crown over the forehead and down the sides, drawn onto an sRGB picture; the picture and where they cover [S, S]."""
+    rows = sight.pixel // sight.size
+    columns = sight.pixel % sight.size
+    top, left, right = np.quantile(rows, 0.01), np.quantile(columns, 0.02), np.quantile(columns, 0.98)
+    height = np.quantile(rows, 0.98) - top
+    colour = np.clip(np.array([0.13, 0.09, 0.07]) * np.exp(rng.normal(0.2, 0.9)) * np.exp(rng.normal(0, 0.15, 3)), 0, 0.8)
+    drawn, cover, out = picture.copy(), np.zeros(picture.shape[:2], np.uint8), picture
+    fringe, sides = rng.uniform(0.05, 0.35), rng.uniform(0.1, 0.9)
+    for _ in range(int(rng.integers(150, 500))):
+        u = rng.uniform(-1, 1)
+        start = np.array([(left + right) / 2 + u * (right - left) * 0.55, top - 0.03 * height])
+        length = (fringe if abs(u) < 0.7 else sides) * height * rng.uniform(0.5, 1.2)
+        t = np.linspace(0, 1, 6)[:, None]
+        along = [np.sign(u) * abs(u) ** 2 * 0.12 * height + rng.normal(0, 0.04) * height, length]
+        strand = start + t * along + np.sin(3 * t + rng.uniform(0, 6)) * 0.01 * height
+        points = [np.round(strand * 8).astype(np.int32)]
+        thick = max(1, round(rng.uniform(0.6, 2.2) * sight.size / 256))
+        cv2.polylines(drawn, points, False, (colour * np.exp(rng.normal(0, 0.35))).tolist(), thick, cv2.LINE_AA, 3)
+        cv2.polylines(cover, points, False, 1, thick, cv2.LINE_8, 3)
+    covered = cv2.dilate(cover, np.ones((3, 3), np.uint8))
+    return np.where(covered[..., None] > 0, drawn, out).astype(np.float32), covered.astype(np.float32)
+
+
+def _shadow(sight: Sight, lamps: list, colours: list, reach: list, ambient: np.ndarray) -> tuple[np.ndarray, float]:
+    """The lost share [P] of the lamps' light, weighted by their strength, and how much of all light they are, in [0, 1]."""
+    if not lamps:
+        return np.zeros(len(sight.pixel), np.float32), 0.0
+    strength = np.array([float(np.mean(c)) for c in colours])
+    facing = [np.clip(1 + (sight.smooth @ lamp) / 0.06, 0, 1) for lamp in lamps]  # what turns away from a lamp is in its shadow too
+    lost = sum(s * (1 - r * f) for s, r, f in zip(strength, reach, facing, strict=True))
+    return (lost / strength.sum()).astype(np.float32), float(strength.sum() / (strength.sum() + ambient.mean()))
+
+
+def _fitted(sight: Sight, carried: np.ndarray, environment: Environment, lamps: list, colours: list, albedo: np.ndarray, gains: np.ndarray,
+            rng: np.random.Generator) -> Fitted:
+    """What core/delight/light.py would find, without its search: the second-order sky and the strongest lamp, each a little off."""
+    transfer = carried @ BASIS.astype(np.float32)  # [N, 9]
+    main = int(np.argmax([c.mean() for c in colours])) if lamps else -1
+    sky = BASIS.T @ environment.radiance * (4 * np.pi / LIGHTS)
+    for k, (lamp, colour) in enumerate(zip(lamps, colours, strict=True)):
+        if k != main:
+            sky = sky + sh_basis(lamp)[:, None] * colour * np.pi
+    found = main >= 0 and rng.random() < 0.85
+    if main >= 0 and not found:
+        sky = sky + sh_basis(lamps[main])[:, None] * colours[main] * np.pi
+    sky = sky * np.exp(rng.normal(0, 0.1, 3)) + rng.normal(0, 0.08, sky.shape) * np.abs(sky[:1])
+    lit = sight.at_pixels(transfer @ sky)
+    lit = np.maximum(lit, 0.15 * np.median(lit, 0))
+    normal = sight.smooth + rng.normal(0, 0.05, 3)
+    normal = (normal / np.sqrt(_dot(normal, normal))[:, None]).astype(np.float32)
+    skin = sight.masks[:, MASKS.index("skin")] * (1 - sight.masks[:, MASKS.index("eyes")]) > 0.5
+    tone = (albedo[skin] if skin.any() else albedo).mean(0) * np.exp(rng.normal(0, 0.08) + rng.normal(0, 0.03, 3)) * gains
+    sunlit = lit
+    if found:
+        towards = lamps[main] + rng.normal(0, 0.06, 3)
+        towards /= np.linalg.norm(towards)
+        reach = sight.reach[np.argmax(sight.lamps @ lamps[main])]
+        sunlit = lit + (np.maximum(normal @ towards, 0) * reach)[:, None] * colours[main] * np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.05, 3))
+    return Fitted((lit * tone).astype(np.float32), (sunlit * tone).astype(np.float32), normal.astype(np.float32))
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("ij,ij->i", a, b)
