@@ -12,8 +12,8 @@ import torch
 
 from core import images, meshes, raster, template
 from core.capture import Capture
+from core.shadow_edges import penumbra
 from core.solve import initial, maps, witnesses
-from core.solve.edges import penumbra
 from core.solve.evidence import read_evidence
 from core.solve.marks import Mark, find, unlike_shadow
 from core.solve.prior import load

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..raster import RayCaster
+from ..skylight import fibonacci_sphere
 
 SIGMA_LUMINANCE = 0.2  # spread of skin about its tone, in log units: common to the three channels ...
 SIGMA_CHROMA = 0.08  # ... and of the differences between channels
@@ -78,37 +78,6 @@ def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray, re
     _, environment, sun, reached, inlier, _ = _expectation_maximisation(log, colours, transfer, cosine, visible, weights, best[5], iterations=30)
     ambient = transfer @ environment
     return Light(environment, best_direction, sun, FLOOR * np.median(ambient, 0)), reached, inlier
-
-
-def radiance_transfer(caster: RayCaster, points: np.ndarray, normals: np.ndarray, rays: int = 128,
-                      step: Callable[[int, int], None] = lambda done, of: None) -> np.ndarray:
-    """[N, 9]: irradiance / pi at surface points from each SH basis radiance, occluded by the mesh."""
-    transfer = np.zeros((len(points), 9))
-    directions = fibonacci_sphere(rays)
-    basis = sh_basis(directions)
-    for i, direction in enumerate(directions):
-        if i % 8 == 0:
-            step(i, rays)
-        cosine = normals @ direction
-        facing = np.flatnonzero(cosine > 0)
-        free = facing[~caster.blocked(points[facing] + 1e-3 * normals[facing], np.repeat(direction[None], len(facing), 0))]
-        transfer[free] += cosine[free, None] * basis[i] * (4 / rays)
-    return transfer
-
-
-def sh_basis(directions: np.ndarray) -> np.ndarray:
-    """Real orthonormal spherical harmonics to the second order at unit directions [..., 3] -> [..., 9]."""
-    x, y, z = np.moveaxis(directions, -1, 0)
-    return np.stack([0.282095 * np.ones_like(x), 0.488603 * y, 0.488603 * z, 0.488603 * x, 1.092548 * x * y, 1.092548 * y * z,
-                     0.315392 * (3 * z * z - 1), 1.092548 * x * z, 0.546274 * (x * x - y * y)], -1)
-
-
-def fibonacci_sphere(count: int) -> np.ndarray:
-    """Evenly spread unit directions [count, 3]."""
-    i = np.arange(count) + 0.5
-    z, angle = 1 - 2 * i / count, np.pi * (1 + 5 ** 0.5) * i
-    r = np.sqrt(1 - z * z)
-    return np.stack([r * np.cos(angle), r * np.sin(angle), z], -1)
 
 
 def log_likelihood(residual: np.ndarray) -> np.ndarray:

@@ -17,9 +17,10 @@ from ..capture import Capture
 from ..messages import Reporter
 from ..raster import RayCaster, bleed, interpolate, render_view
 from ..settings import Settings
+from ..skylight import radiance_transfer
 from ..views import View, read_views
 from .contract import Delit
-from .light import Light, fit_light, radiance_transfer
+from .light import Light, fit_light
 from .occlusion import seamless, sun_share
 from .surface import skin_weights, smooth_normals, vertex_colours
 

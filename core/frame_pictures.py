@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of a capture's frames that were made elsewhere, by any tool: which picture belongs to which frame.
+
+A picture belongs to the frame of the same name, or else to the frame whose number in the video is the picture's name,
+with any number of leading zeros. Pictures of registered frames are all used, selected or not.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from . import images
+from .capture import Capture
+from .messages import Problem
+from .views import View, read_views
+
+KINDS = (".png", ".jpg", ".jpeg", ".exr", ".tif", ".tiff", ".webp")
+
+
+def pictures_of(capture: Capture, folder: str, what: str) -> list[tuple[View, Path]]:
+    """Each registered view with its picture in `folder`, in frame order; `what`: a word for these pictures, "delit".
+
+    Raises Problem where none belongs to a registered frame.
+    """
+    return match(read_views(capture), _video_frames(capture), Path(folder), what, bool(folder))
+
+
+def read_picture(path: Path, view: View, what: str) -> np.ndarray:
+    """sRGB [H, W, 3] at the frame's size. Raises Problem where the picture has another shape than its frame."""
+    image = images.read_srgb(path)
+    if abs(image.shape[1] / image.shape[0] - view.width / view.height) > 0.01:
+        raise Problem(f"{path} is {image.shape[1]} x {image.shape[0]}, but its frame is {view.width} x {view.height}.",
+                      f"{what.title()} pictures are made from the frames in the capture's frames folder, without cropping or turning them.")
+    return image if image.shape[:2] == (view.height, view.width) else images.resize(image, view.width, view.height)
+
+
+def match(views: list[View], video_frames: dict[str, int], path: Path, what: str = "delit",
+          given: bool = True) -> list[tuple[View, Path]]:
+    """Each registered view with its picture in the folder `path`, in frame order; `video_frames`: frame name -> number in the video."""
+    if not given or not path.is_dir():
+        raise Problem(f"There is no folder {str(path)!r} with {what} pictures." if given else f"No folder of {what} pictures was chosen.",
+                      "Choose the folder that holds them, named like the frames of the capture.")
+    pictures = sorted(p for p in path.iterdir() if p.suffix.lower() in KINDS and not p.name.startswith("."))
+    by_stem = {p.stem: p for p in pictures}
+    by_number = {int(p.stem): p for p in pictures if p.stem.isascii() and p.stem.isdigit()}
+    named = [(view, by_stem[Path(view.name).stem]) for view in views if Path(view.name).stem in by_stem]
+    numbered = [(view, by_number[video_frames[view.name]]) for view in views if video_frames.get(view.name) in by_number]
+    pairs = max(named, numbered, key=len)  # not mixed: 00009.jpg may be frame 9 of the capture or of the video, but not both
+    if not pairs:
+        raise Problem(f"None of the {len(pictures)} pictures in {path} belongs to a registered frame.",
+                      f"Name them like the frames (for example {Path(views[0].name).stem}.png)." if views else "Run the stage cameras again.")
+    return pairs
+
+
+def _video_frames(capture: Capture) -> dict[str, int]:
+    frames = json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]
+    return {frame["name"]: frame["video_frame"] for frame in frames}

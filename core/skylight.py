@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How much of the sky each point of a head sees past the head itself: precomputed radiance transfer (Sloan, Kautz and Snyder 2002) in
+second-order spherical harmonics, and ambient occlusion, which is its part under an even sky.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .raster import RayCaster
+
+EVEN = 1 / 0.282095  # the coefficient of radiance 1 from everywhere
+
+
+def ambient_occlusion(caster: RayCaster, points: np.ndarray, normals: np.ndarray, rays: int = 128,
+                      step: Callable[[int, int], None] = lambda done, of: None) -> np.ndarray:
+    """[N] in [0, 1]: the share of an even sky's light that reaches surface points [N, 3] with unit normals [N, 3]; 1 where nothing is in the way."""
+    return np.clip(EVEN * radiance_transfer(caster, points, normals, rays, step)[:, 0], 0, 1)
+
+
+def radiance_transfer(caster: RayCaster, points: np.ndarray, normals: np.ndarray, rays: int = 128,
+                      step: Callable[[int, int], None] = lambda done, of: None) -> np.ndarray:
+    """[N, 9]: irradiance / pi at surface points from each SH basis radiance, occluded by the mesh."""
+    transfer = np.zeros((len(points), 9))
+    directions = fibonacci_sphere(rays)
+    basis = sh_basis(directions)
+    for i, direction in enumerate(directions):
+        if i % 8 == 0:
+            step(i, rays)
+        cosine = normals @ direction
+        facing = np.flatnonzero(cosine > 0)
+        free = facing[~caster.blocked(points[facing] + 1e-3 * normals[facing], np.repeat(direction[None], len(facing), 0))]
+        transfer[free] += cosine[free, None] * basis[i] * (4 / rays)
+    return transfer
+
+
+def sh_basis(directions: np.ndarray) -> np.ndarray:
+    """Real orthonormal spherical harmonics to the second order at unit directions [..., 3] -> [..., 9]."""
+    x, y, z = np.moveaxis(directions, -1, 0)
+    return np.stack([0.282095 * np.ones_like(x), 0.488603 * y, 0.488603 * z, 0.488603 * x, 1.092548 * x * y, 1.092548 * y * z,
+                     0.315392 * (3 * z * z - 1), 1.092548 * x * z, 0.546274 * (x * x - y * y)], -1)
+
+
+def fibonacci_sphere(count: int) -> np.ndarray:
+    """Evenly spread unit directions [count, 3]."""
+    i = np.arange(count) + 0.5
+    z, angle = 1 - 2 * i / count, np.pi * (1 + 5 ** 0.5) * i
+    r = np.sqrt(1 - z * z)
+    return np.stack([r * np.cos(angle), r * np.sin(angle), z], -1)
