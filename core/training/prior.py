@@ -63,7 +63,7 @@ def train_prior(config: str, out: Path, report: Reporter, minutes: float | None 
     t = CONFIGS[config]["training"]
     minutes = minutes or t["minutes"]
     device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
-    data = _data(t, skins, held_out)
+    data = named_data(t, skins, held_out)
     windows, seen, unseen = _windows(data, skins, work, report)
     held_out_windows = {kind: Windows(s, real=0.5).draw(96, t["patch"], np.random.default_rng(1)) for kind, s in unseen.items() if s.names}
     state = _begin(config, data, seen, windows)
@@ -133,7 +133,7 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     return card
 
 
-def _data(t: dict, skins: Path | None, held_out: list[str]) -> dict:
+def named_data(t: dict, skins: Path | None, held_out: list[str]) -> dict:
     """What is trained on and what is kept from it, by name."""
     seeds = [seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * t["skins"]) if seed not in reserved_seeds()][:t["skins"]]
     data = {"seeds": seeds, "held_out_seeds": list(range(HELD_OUT_SEED, HELD_OUT_SEED + t["held_out"])), "from": "", "skins": [], "held_out_skins": [],

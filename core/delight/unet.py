@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The delighting network: a small U-Net from a picture of a face to its log-shading and its shadows, at half the picture's resolution.
+
+What goes in is the same in training and in use: `network_input`. All logarithms are natural and of linear light.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import nn
+from torch.nn import functional
+
+from .. import images
+
+SIDE = 256  # of the picture it looks at
+CHANNELS = 16
+FINE = 24  # features at half the picture's resolution
+DARKEST = 0.004  # linear; below is noise
+MULTIPLE = 32  # of pixels, to be halved so often
+
+
+def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: np.ndarray | None = None, normal: np.ndarray | None = None,
+                  head: np.ndarray | None = None) -> tuple[np.ndarray, float]:
+    """[CHANNELS, S, S] and the middle of the picture's log, by which the log-shading that comes out is lower.
+
+    srgb [S, S, 3]. If the head's geometry is known: ambient and sunlit [S, S, 3], linear colour of its skin under the fitted sky alone and with the fitted
+    sun, normal [S, S, 3] in camera coordinates, head [S, S] where they hold. Without it these channels are 0, and so is the last, which says so.
+    """
+    log = np.log(np.maximum(images.srgb_to_linear(srgb), DARKEST))
+    side = len(log)
+    inner = slice(side // 4, 3 * side // 4)
+    middle = float(log[inner, inner].mean())
+    layers = np.zeros((CHANNELS, side, side), np.float32)
+    layers[0:3] = 2 * srgb.transpose(2, 0, 1) - 1
+    layers[3:6] = (log - middle).transpose(2, 0, 1)
+    if ambient is not None:
+        for first, light in ((6, ambient), (9, sunlit)):
+            layers[first:first + 3] = (np.clip(log - np.log(np.maximum(light, DARKEST / 4)), -2.5, 2.5) * head[..., None]).transpose(2, 0, 1)
+        layers[12:15] = (normal * head[..., None]).transpose(2, 0, 1)
+        layers[15] = head
+    return layers, middle
+
+
+class DelightNet(nn.Module):
+    """[N, CHANNELS, S, S] -> log-shading less the picture's middle [N, 3, S/2, S/2] and shadow logits [N, 1, S/2, S/2]. S is a multiple of MULTIPLE."""
+
+    def __init__(self, widths: list[int], depths: list[int]):
+        super().__init__()
+        self.stem, self.enter = nn.Conv2d(CHANNELS, FINE, 4, stride=2, padding=1), nn.Conv2d(FINE, widths[0], 2, stride=2)
+        self.down, self.up, self.halve, self.narrow = nn.ModuleList(), nn.ModuleList(), nn.ModuleList(), nn.ModuleList()
+        for level, (width, depth) in enumerate(zip(widths, depths, strict=True)):
+            self.down.append(nn.Sequential(*(_Block(width) for _ in range(depth))))
+            if level + 1 < len(widths):
+                self.halve.append(nn.Conv2d(width, widths[level + 1], 2, stride=2))
+                self.narrow.append(nn.Conv2d(widths[level + 1], width, 1))
+                self.up.append(nn.Sequential(*(_Block(width) for _ in range(depth))))
+        self.attention = _Attention(widths[-1])
+        self.leave = nn.Conv2d(widths[0], 4 * FINE, 1)  # the finest level, where pictures are large, is kept thin
+        self.last, self.out = nn.Conv2d(2 * FINE, 2 * FINE, 3, padding=1), nn.Conv2d(2 * FINE, 4, 3, padding=1)
+        nn.init.zeros_(self.out.weight)
+        nn.init.zeros_(self.out.bias)
+
+    def forward(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        fine = functional.gelu(self.stem(x))
+        x, kept = self.enter(fine), []
+        for level, blocks in enumerate(self.down):
+            x = blocks(x)
+            if level < len(self.halve):
+                kept.append(x)
+                x = self.halve[level](x)
+        x = self.attention(x)
+        for level in reversed(range(len(self.halve))):
+            x = kept[level] + functional.interpolate(self.narrow[level](x), scale_factor=2, mode="bilinear", align_corners=False)
+            x = self.up[level](x)
+        x = torch.cat([fine, functional.pixel_shuffle(self.leave(x), 2)], 1)
+        out = self.out(functional.gelu(self.last(x))).float()
+        return out[:, :3], out[:, 3:]
+
+
+class _Block(nn.Module):
+    """x + conv(gelu(conv(norm(x)))), and a gate per channel from the whole map's mean: exposure and light are matters of the whole picture."""
+
+    def __init__(self, width: int):
+        super().__init__()
+        self.norm = nn.GroupNorm(max(1, width // 16), width)
+        self.first, self.second = nn.Conv2d(width, width, 3, padding=1), nn.Conv2d(width, width, 3, padding=1)
+        self.gate = nn.Linear(width, width)
+        nn.init.zeros_(self.second.weight)
+        nn.init.zeros_(self.second.bias)
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        inner = functional.gelu(self.first(self.norm(x)))
+        inner = inner * (2 * torch.sigmoid(self.gate(inner.mean((2, 3)))))[:, :, None, None]
+        return x + self.second(inner)
+
+
+class _Attention(nn.Module):
+    """Self-attention over the coarsest map: one side of a face tells the colour of the other."""
+
+    def __init__(self, width: int, heads: int = 4):
+        super().__init__()
+        self.norm, self.heads = nn.LayerNorm(width), heads
+        self.qkv, self.out = nn.Linear(width, 3 * width), nn.Linear(width, width)
+        nn.init.zeros_(self.out.weight)
+        nn.init.zeros_(self.out.bias)
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        n, c, h, w = x.shape
+        tokens = x.flatten(2).transpose(1, 2)  # [N, H W, C]
+        q, k, v = self.qkv(self.norm(tokens)).reshape(n, h * w, 3, self.heads, c // self.heads).permute(2, 0, 3, 1, 4)
+        mixed = functional.scaled_dot_product_attention(q, k, v).transpose(1, 2).reshape(n, h * w, c)
+        return x + self.out(mixed).transpose(1, 2).reshape(n, c, h, w)

@@ -1,0 +1,220 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Trains the delighting network on synthetic portraits whose light is known.
+
+    python -m core train delighter --config cpu|gpu [--minutes 80] [--hdri FOLDER] [--skins FOLDER --held-out NAME ...] [--work DIR]
+    python -m core train delighter --export [--work DIR] [--out FILE]      write the running training's averaged weights now
+
+Needs neither Blender nor the internet. A second run goes on where the first was killed. FOLDERs: panoramas (.hdr, .exr) that may light portraits, and skins
+that `train carry` brought into our UVs; without them all light and skin is procedural.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+from safetensors.torch import save_file
+from torch.nn import functional
+from torch.utils.data import DataLoader, Dataset
+
+from ..capture import replacing
+from ..delight.unet import DelightNet
+from ..messages import Problem, Reporter
+from ..solve.prior import fast_dtype
+from .portraits import Batch, Portraits, mirrored, prepare
+from .prior import named_data
+
+WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "delighter.safetensors"
+_MODEL = {"widths": [64, 128, 192, 224], "depths": [2, 2, 2, 2]}
+CONFIGS = {
+    "cpu": {"model": _MODEL, "training": {"pairs": 4, "rate": 1.2e-3, "minutes": 80, "skins": 96, "views": 6, "held_out": 6, "seed": 0, "workers": 1}},
+    "gpu": {"model": _MODEL, "training": {"pairs": 16, "rate": 1.0e-3, "minutes": 24, "skins": 160, "views": 8, "held_out": 6, "seed": 0, "workers": 14}},
+}
+"""`skins` subjects are seen from `views` sides each; a step shows `pairs` of them under two lights each."""
+TONE, SLOPE, AGREEMENT, SHADOW = 0.25, 1.0, 0.25, 0.3
+"""Weights beside the log-shading's error: its mean over the face, its slopes, the albedo of one face under two lights, the shadows."""
+
+
+def train_delighter(config: str, out: Path, report: Reporter, minutes: float | None = None, hdri: Path | None = None, skins: Path | None = None,
+                    held_out: list[str] = (), work: Path | None = None) -> dict:
+    """Trains for `minutes` in all (those of earlier runs included, preparation not), writes `out` (safetensors, fp16) and its card, returns the card.
+
+    Raises Problem where the work folder holds a training on other data.
+    """
+    work = Path(work or Path(tempfile.gettempdir()) / "wildcap_delighter")
+    work.mkdir(parents=True, exist_ok=True)
+    t = CONFIGS[config]["training"]
+    minutes = minutes or t["minutes"]
+    device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
+    data = named_data(t, skins, held_out) | {"panoramas": sorted(p.name for p in Path(hdri).glob("*.hdr")) if hdri else []}
+    prepare(data["seeds"], t["views"], work, report, skins, data["skins"], max(2, t["workers"]))
+    prepare(data["held_out_seeds"], t["views"], work, report)
+    unseen = Portraits(data["held_out_seeds"], t["views"], work, hdri).draw(24, np.random.default_rng(1), augment=False)
+    torch.manual_seed(t["seed"])
+    network = DelightNet(**CONFIGS[config]["model"])
+    state = {"config": config, "data": data, "step": 0, "seconds": 0.0, "history": [], "network": network.state_dict(), "optimiser": {},
+             "average": {name: value.clone() for name, value in network.state_dict().items()}}
+    if (work / "state.pt").is_file():
+        state = torch.load(work / "state.pt", weights_only=True)
+        if state["data"] != data or state["config"] != config:
+            raise Problem(f"The training in {work} is on other data or of another configuration.", "Name another --work folder, or delete this one.")
+    network.load_state_dict(state["network"])
+    network.to(device, memory_format=torch.channels_last)
+    optimiser = torch.optim.AdamW(network.parameters(), lr=t["rate"], betas=(0.9, 0.98), weight_decay=1e-2)
+    if state["optimiser"]:
+        optimiser.load_state_dict(state["optimiser"])
+    average = {name: value.to(device) for name, value in state["average"].items()}
+    began, before, saved_at = time.monotonic(), state["seconds"], state["seconds"]
+    steps = _Steps(Portraits(data["seeds"], t["views"], work, hdri), t)
+    batches = DataLoader(steps, batch_size=None, sampler=range(state["step"], 10**9), num_workers=t["workers"], prefetch_factor=3)
+    for step, batch in zip(range(state["step"], 10**9), batches, strict=False):
+        share = state["seconds"] / (60 * minutes)
+        for group in optimiser.param_groups:
+            group["lr"] = t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * np.cos(np.pi * min(share, 1.0)))
+        loss = sum(losses(network, batch, device).values())
+        optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        optimiser.step()
+        decay = min(0.998, (step + 1) / (step + 10))
+        for name, value in network.state_dict().items():
+            average[name].lerp_(value, 1 - decay)
+        state["step"], state["seconds"] = step + 1, before + time.monotonic() - began
+        ended = state["seconds"] >= 60 * minutes
+        report.progress(min(state["seconds"], 60 * minutes), 60 * minutes, f"step {step + 1}")
+        if state["seconds"] - saved_at > 180 or ended:
+            state["history"].append([state["step"], round(state["seconds"]), figures(average, config, unseen, device)])
+            report.log(f"step {step + 1}, {state['seconds'] / 60:.1f} min, loss {loss.item():.3f}, held out {state['history'][-1][2]}")
+            state |= {"network": network.state_dict(), "optimiser": optimiser.state_dict(), "average": average}
+            with replacing(work / "state.pt") as temporary:
+                torch.save(state, temporary)
+            saved_at = state["seconds"]
+        if ended:
+            break
+    return export(work, out)
+
+
+def losses(network: DelightNet, batch: Batch, device: str) -> dict[str, torch.Tensor]:
+    """The terms of the loss, each a scalar."""
+    low = device == "cuda" or fast_dtype("cpu") == torch.bfloat16
+    with torch.autocast(device, torch.bfloat16, enabled=low):
+        shading, shadow = network(batch.layers.to(device, memory_format=torch.channels_last))
+    weight = batch.weight.to(device)
+    error = shading - batch.shading.to(device)
+    tone = (error * weight).sum((2, 3), keepdim=True) / weight.sum((2, 3), keepdim=True).clamp_min(1)
+    error = error - tone
+    total = weight.sum().clamp_min(1)
+    terms = {"shading": (error.abs() * weight).sum() / total / 3, "tone": TONE * tone.abs().mean()}
+    slopes = 0.0
+    for step in (1, 2, 4):
+        for axis in (2, 3):
+            size = error.shape[axis]
+            here, there = (torch.narrow(error, axis, first, size - step) for first in (0, step))
+            both = torch.narrow(weight, axis, 0, size - step) * torch.narrow(weight, axis, step, size - step)
+            slopes = slopes + ((there - here).abs() * both).sum() / total / 6
+    terms["slope"] = SLOPE * slopes / 3
+    one, other = error[0::2], error[1::2]  # the same albedo: what differs in the error is light
+    both = weight[0::2] * weight[1::2]
+    terms["agreement"] = AGREEMENT * ((one - other).abs() * both).sum() / both.sum().clamp_min(1) / 3
+    lost = functional.binary_cross_entropy_with_logits(shadow, batch.shadow.to(device), reduction="none")
+    sure = batch.shadow_weight.to(device)
+    terms["shadow"] = SHADOW * (lost * sure).sum() / sure.sum().clamp_min(1)
+    return terms
+
+
+@torch.no_grad()
+def figures(average: dict, config: str, batch: Batch, device: str) -> dict[str, float]:
+    """The averaged network on held-out portraits: deviation of the log-albedo about its mean over the skin, with and without geometry, beside that of the
+    picture as it is (natural log units), and the intersection over union of the shadows."""
+    network = DelightNet(**CONFIGS[config]["model"])
+    network.load_state_dict(average)
+    network.to(device, memory_format=torch.channels_last)
+    told = {}
+    layers = batch.layers.clone()
+    for name in ("geometry", "picture"):
+        if name == "picture":
+            layers[:, 6:] = 0
+        chosen = batch.layers[:, 15].amax((1, 2)) > 0
+        shading, shadow = (torch.cat([network(part.to(device))[k].cpu() for part in layers[chosen].split(8)]) for k in (0, 1))
+        told[name] = _deviation(shading - batch.shading[chosen], batch.weight[chosen])
+        found, true, sure = shadow > 0, batch.shadow[chosen] > 0.5, batch.shadow_weight[chosen] > 0.9
+        told[f"iou_{name}"] = ((found & true & sure).sum() / ((found | true) & sure).sum().clamp_min(1)).item()
+    told["none"] = _deviation(batch.shading[chosen], batch.weight[chosen])
+    return {name: round(float(value), 4) for name, value in told.items()}
+
+
+def _deviation(error: torch.Tensor, weight: torch.Tensor) -> float:
+    total = weight.sum((2, 3), keepdim=True).clamp_min(1)
+    error = error - (error * weight).sum((2, 3), keepdim=True) / total
+    return ((error.abs() * weight).sum((2, 3), keepdim=True) / total).mean().item()
+
+
+def export(work: Path, out: Path = WEIGHTS) -> dict:
+    """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from."""
+    state = torch.load(Path(work) / "state.pt", weights_only=True, map_location="cpu")
+    data = state["data"]
+    with replacing(out) as temporary:
+        save_file({name: value.half().contiguous() for name, value in state["average"].items()}, temporary)
+    told = "Synthetic portraits of core/synthetic on the built-in head, which derives from the MakeHuman base mesh (CC0)"
+    if data["skins"]:
+        told += f"; some wear one of {len(data['skins'])} skins of {data['from']}, carried into the built-in UVs"
+    if data["panoramas"]:
+        told += f"; light from procedural environments, lamps and {len(data['panoramas'])} panoramas (CC0)"
+    card = {**CONFIGS[state["config"]], "data": told, "licence": "GPL-3.0-or-later", "notices": data["notices"], "command": _command(state),
+            "steps": state["step"], "minutes": round(state["seconds"] / 60, 1), "parameters": sum(v.numel() for v in state["average"].values()),
+            "seeds": data["seeds"], "held_out_seeds": data["held_out_seeds"], "skins": data["skins"], "held_out_skins": data["held_out_skins"],
+            "panoramas": data["panoramas"],
+            "held_out": {**state["history"][-1][2], "what": "portraits of held-out subjects: mean error of the log-albedo about its own mean over the skin "
+                         "(natural log units), told the geometry or the picture only, beside the picture as it is; intersection over union of the shadows"}}
+    with replacing(Path(out).with_suffix(".json")) as temporary:
+        temporary.write_text(json.dumps(card, indent=1), encoding="utf-8")
+    return card
+
+
+class _Steps(Dataset):
+    """The batch of each step: it depends on the step alone, so a resumed training draws what an unbroken one would have."""
+
+    def __init__(self, portraits: Portraits, options: dict):
+        self.portraits, self.options = portraits, options
+
+    def __getitem__(self, step: int) -> Batch:
+        torch.set_num_threads(1)
+        rng = np.random.default_rng((self.options["seed"], step))
+        batch = self.portraits.draw(self.options["pairs"], rng)
+        return mirrored(batch) if rng.random() < 0.5 else batch
+
+
+def _command(state: dict) -> str:
+    data = state["data"]
+    skins = f" --skins {data['from']}_carried --held-out {' '.join(data['held_out_skins'])}" if data["skins"] else ""
+    return (f"python -m core train delighter --config {state['config']} --minutes {round(state['seconds'] / 60)}"
+            f"{' --hdri hdri' if data['panoramas'] else ''}{skins}")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser("python -m core train delighter", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--config", default="cpu", choices=tuple(CONFIGS))
+    parser.add_argument("--minutes", type=float, help="in all, those of earlier runs included; the configuration's by default")
+    parser.add_argument("--hdri", type=Path, metavar="FOLDER", help="panoramas whose licence lets weights trained with them be shipped")
+    parser.add_argument("--skins", type=Path, metavar="FOLDER", help="skins that `train carry` brought into our UVs")
+    parser.add_argument("--held-out", nargs="+", default=[], metavar="NAME", help="skins of FOLDER that are kept from training, each with its cluster")
+    parser.add_argument("--export", action="store_true", help="write the weights of the work folder's last checkpoint and stop")
+    parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_delighter")
+    parser.add_argument("--out", type=Path, default=WEIGHTS)
+    options = parser.parse_args(arguments)
+    if options.export:
+        export(options.work, options.out)
+        return 0
+    report = Reporter("train", emit=lambda message: print(message.text, flush=True) if type(message).__name__ == "Log" else None)
+    train_delighter(options.config, options.out, report, options.minutes, options.hdri, options.skins, options.held_out, options.work)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The pictures a delighter learns from: subjects on the light stage seen from many sides, lit anew for every step.
+
+What light does not change is made once per subject and kept in a work folder: sights and the stage's visibility (some seconds each).
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from multiprocessing import get_context
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from safetensors.torch import load_file
+
+from ..capture import replacing
+from ..delight.unet import SIDE, network_input
+from ..meshes import vertex_normals
+from ..messages import Reporter
+from ..solve.prior import WEIGHTS
+from ..synthetic import sight
+from ..synthetic.environments import read_panoramas
+from ..synthetic.identities import subject_mesh
+from ..synthetic.olat import LightStage, light_stage
+from ..synthetic.portrait import Portrait, relit, sight_of
+from ..synthetic.skin import Skin
+from .skins import Skins, carried_skins, synthetic_skins
+
+WITH_GEOMETRY = 0.55
+"""Share of the pictures whose geometry the network is told; single photographs have none."""
+CARRIED = 0.35
+"""Share of the subjects that wear a carried skin, where there are any."""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """layers [N, CHANNELS, SIDE, SIDE]; at half the size: shading [N, 3, ...] the true log-shading less the picture's middle, weight [N, 1, ...] of its error,
+    shadow [N, 1, ...] and shadow_weight [N, 1, ...]. 2 k and 2 k + 1 are the same sight under two lights."""
+
+    layers: torch.Tensor
+    shading: torch.Tensor
+    weight: torch.Tensor
+    shadow: torch.Tensor
+    shadow_weight: torch.Tensor
+
+
+def prepare(seeds: list[int], views: int, work: Path, report: Reporter, skins: Path | None = None, names: list[str] = (), processes: int = 2) -> None:
+    """Makes the sights of these subjects that the work folder lacks; `names` are carried skins of the folder `skins` that some of them wear."""
+    missing = [seed for seed in seeds if not (work / f"subject_{seed}" / f"{views - 1}.npz").is_file()]
+    jobs = [(seed, views, work, skins, list(names)) for seed in missing]
+    if processes < 2:
+        for i, job in enumerate(jobs):
+            _prepare_one(job)
+            report.progress(i + 1, len(jobs), f"subject {i + 1} of {len(jobs)}")
+        return
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        for i, _ in enumerate(pool.map(_prepare_one, jobs)):
+            report.progress(i + 1, len(jobs), f"subject {i + 1} of {len(jobs)}")
+
+
+class Portraits:
+    """Draws batches of the prepared subjects."""
+
+    def __init__(self, seeds: list[int], views: int, work: Path, panoramas: Path | None):
+        self.seeds, self.views, self.work = seeds, views, work
+        self.panoramas = read_panoramas(panoramas)
+        self.heads: dict[int, LightStage] = {}
+
+    def draw(self, pairs: int, rng: np.random.Generator, augment: bool = True) -> Batch:
+        """`pairs` sights under two lights each."""
+        drawn = [_example(portrait, seen, rng, augment) for portrait, seen in self.portraits(pairs, rng, augment)]
+        return Batch(*(torch.from_numpy(np.stack(part)) for part in zip(*drawn, strict=True)))
+
+    def portraits(self, pairs: int, rng: np.random.Generator, augment: bool):
+        for _ in range(pairs):
+            seed, view = self.seeds[rng.integers(len(self.seeds))], int(rng.integers(self.views))
+            seen = sight.full(sight.load(self.work / f"subject_{seed}" / f"{view}.npz"))
+            albedo = seen.albedo
+            if augment:  # other tones than the subjects' own
+                albedo = np.clip(albedo * np.exp(rng.normal(0, 0.12) + rng.normal(0, 0.04, 3)), 0.003, 0.9).astype(np.float32)
+            for _ in range(2):
+                yield relit(seen, self._stage(seed), rng, self.panoramas, albedo), seen
+
+    def _stage(self, seed: int) -> LightStage:
+        if seed not in self.heads:
+            bits = np.load(self.work / f"subject_{seed}" / "visible.npy")
+            mesh = subject_mesh(seed)
+            self.heads[seed] = LightStage(mesh, vertex_normals(mesh).astype(np.float32), np.unpackbits(bits, axis=1).astype(bool))
+        return self.heads[seed]
+
+
+def _example(portrait: Portrait, seen: sight.Sight, rng: np.random.Generator, augment: bool) -> tuple[np.ndarray, ...]:
+    geometry = ()
+    if rng.random() < WITH_GEOMETRY:
+        fitted, here = portrait.fitted, seen.picture(np.ones(len(seen.pixel), np.float32))
+        parts = [seen.picture(fitted.ambient), seen.picture(fitted.sunlit), seen.picture(fitted.normal @ seen.rotation.T.astype(np.float32)), here]
+        slip = np.float32([[1, 0, rng.normal(0, 0.8)], [0, 1, rng.normal(0, 0.8)]])  # a registered head lies a pixel off
+        geometry = [cv2.warpAffine(part, slip, (seen.size, seen.size)) for part in parts]
+    layers, middle = network_input(portrait.srgb, *geometry)
+    lit, albedo = _half(portrait.shading * portrait.albedo), _half(portrait.albedo * portrait.head[..., None])
+    whole = _half(portrait.head)
+    known = (whole > 0.99) & (albedo.min(-1) > 0.002)
+    shading = np.log(np.maximum(lit, 0.001)) - np.log(np.maximum(albedo, 0.001)) - middle
+    weight = known * (0.25 + 0.75 * _half(portrait.skin))
+    strong = portrait.strong
+    sure = 1.0 if strong > 0.4 or strong < 0.1 else 0.3  # in between it is a matter of taste what is a shadow
+    parts = (layers, shading.transpose(2, 0, 1), weight[None], _half(portrait.shadow)[None] * (strong > 0.2), (known * sure)[None])
+    parts = [np.ascontiguousarray(part, np.float32) for part in parts]
+    return tuple(parts)
+
+
+def mirrored(batch: Batch) -> Batch:
+    """Left and right exchanged; a normal's x changes its sign."""
+    layers = batch.layers.flip(-1)
+    layers[:, 12] *= -1
+    return replace(batch, layers=layers, **{name: getattr(batch, name).flip(-1) for name in ("shading", "weight", "shadow", "shadow_weight")})
+
+
+def _half(picture: np.ndarray) -> np.ndarray:
+    return cv2.resize(np.ascontiguousarray(picture, np.float32), (SIDE // 2, SIDE // 2), interpolation=cv2.INTER_AREA)
+
+
+def _prepare_one(job: tuple) -> None:
+    seed, views, work, folder, names = job
+    cv2.setNumThreads(1)
+    silent, rng = Reporter("train", emit=lambda message: None), np.random.default_rng([seed, 50])
+    skins = synthetic_skins([seed], work, silent)
+    skin = _skin(skins, 0)
+    if names and rng.random() < CARRIED:
+        mean = load_file(WEIGHTS)["mean_face"].float()
+        skin = _wearing(skin, skins, carried_skins(folder, [str(rng.choice(names))], mean, work, silent))
+    stage, place = light_stage(subject_mesh(seed)), work / f"subject_{seed}"
+    place.mkdir(exist_ok=True)
+    with replacing(place / "visible.npy") as temporary, open(temporary, "wb") as file:
+        np.save(file, np.packbits(stage.visible, axis=1))
+    for view in range(views):
+        sight.save(place / f"{view}.npz", sight_of(stage, skin, np.random.default_rng([seed, 51, view]), SIDE))
+
+
+def _skin(skins: Skins, index: int) -> Skin:
+    """A map of `skins` as the generator's own type; height is not needed."""
+    maps = skins.maps[1][index].float().numpy().transpose(1, 2, 0)
+    return Skin(np.ascontiguousarray((maps[..., :3] + 1) / 2), np.ascontiguousarray((maps[..., 6] + 1) / 2), np.zeros(maps.shape[:2], np.float32),
+                np.ascontiguousarray(maps[..., 3:6]), np.ones(maps.shape[:2], bool))
+
+
+def _wearing(skin: Skin, own: Skins, carried: Skins) -> Skin:
+    """The subject with another's colours where these are known, and its own, moved to that tone, elsewhere."""
+    known = cv2.GaussianBlur(carried.known[1][0].float().numpy(), (0, 0), 6)[..., None]
+    tone = (carried.tones[0] / own.tones[0]).numpy()
+    return replace(skin, diffuse=np.clip(known * _skin(carried, 0).diffuse + (1 - known) * skin.diffuse * tone, 0, 1).astype(np.float32))
