@@ -13,10 +13,10 @@ import pytest
 from core import images, meshes, raster, template
 from core.capture import Capture, write_json
 from core.delight import run
-from core.delight.light import fit_light
 from core.messages import Problem, Reporter
 from core.settings import from_json
 from core.skylight import fibonacci_sphere, radiance_transfer, sh_basis
+from core.sunlight import fit_light
 from core.views import read_views
 
 SKIN = np.array([0.45, 0.28, 0.20])

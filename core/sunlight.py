@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The light of a capture: a smooth environment (second-order spherical harmonics) and, where the skin shows one, a sun.
+
+Skin of one constant tone is lit by the environment as far as the head itself leaves it visible (precomputed radiance
+transfer; Sloan et al. 2002) and by the sun unless something stands in the way, on the head or off it. Which points the
+sun reaches is not known, so it is a hidden variable of each point and the light is fitted by expectation maximisation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .skylight import fibonacci_sphere
+
+SIGMA_LUMINANCE = 0.2  # spread of skin about its tone, in log units: common to the three channels ...
+SIGMA_CHROMA = 0.08  # ... and of the differences between channels
+OUTLIER = 0.05  # share of points that are neither (hair, highlights, misregistration)
+BOX = 3.0  # log units over which an outlier may lie, per channel
+RIDGE = 0.5  # skin varies in patches: a few dozen independent samples, against environments whose bands are a few tenths of their mean
+SUN_GAIN = 0.15  # log likelihood per point that a sun must be worth, or uneven skin passes for a shadow
+FLOOR = 0.15  # the environment's shading never falls below this share of its median
+
+
+@dataclass(frozen=True)
+class Light:
+    """environment float64 [9, 3]: SH coefficients of radiance times skin tone; sun unit direction [3] towards it, its colour [3] (zeros: no sun).
+
+    floor float64 [3] is the least environment shading. The tone is part of both: shading 1 would be a surface of the skin's own colour under unit light.
+    """
+
+    environment: np.ndarray
+    sun: np.ndarray
+    colour: np.ndarray
+    floor: np.ndarray
+
+    def ambient(self, transfer: np.ndarray) -> np.ndarray:
+        """transfer [..., 9] -> linear colour of the skin under the environment [..., 3]."""
+        return np.maximum(transfer @ self.environment, self.floor)
+
+    def direct(self, normals: np.ndarray) -> np.ndarray:
+        """unit normals [..., 3] -> what the unblocked sun adds [..., 3]."""
+        return np.maximum(normals @ self.sun, 0)[..., None] * self.colour
+
+    @property
+    def has_sun(self) -> bool:
+        return bool(self.colour.max() > 0)
+
+
+def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray, reaches: Callable[[np.ndarray], np.ndarray],
+              weights: np.ndarray, step: Callable[[int, int], None] = lambda done, of: None) -> tuple[Light, np.ndarray, np.ndarray]:
+    """The light that explains linear skin colours [N, 3] at points with unit normals [N, 3], transfer [N, 9] and weights [N].
+
+    `reaches(direction)` -> [N] in [0, 1]: whether the head itself lets light from there through. `step` hears of progress.
+    Returns the light, the posterior [N] that the sun reaches a point, and that a point is explained at all (an inlier) [N].
+    """
+    log = np.log(np.maximum(colours, 1e-4))
+    best = _expectation_maximisation(log, colours, transfer, np.zeros(len(colours)), np.zeros(len(colours)), weights)
+    none = best
+    best_direction = np.array([0.0, 0.0, 1.0])
+    candidates = fibonacci_sphere(160)
+    candidates = candidates[candidates[:, 2] > -0.3]  # what shines on a person stands above or beside
+    for spread in (None, 12.0, 4.0):
+        if spread is not None:
+            candidates = _around(best_direction, np.radians(spread))
+        for i, direction in enumerate(candidates):
+            step(i, len(candidates))
+            cosine = np.maximum(normals @ direction, 0)
+            found = _expectation_maximisation(log, colours, transfer, cosine, reaches(direction), weights, best[5] if spread else None)
+            if found[0] > best[0]:
+                best, best_direction = found, direction
+    if best[0] - none[0] <= SUN_GAIN * weights.sum():
+        best, best_direction = none, np.array([0.0, 0.0, 1.0])
+    cosine, visible = (np.maximum(normals @ best_direction, 0), reaches(best_direction)) if best is not none else (np.zeros(len(colours)),) * 2
+    _, environment, sun, reached, inlier, _ = _expectation_maximisation(log, colours, transfer, cosine, visible, weights, best[5], iterations=30)
+    ambient = transfer @ environment
+    return Light(environment, best_direction, sun, FLOOR * np.median(ambient, 0)), reached, inlier
+
+
+def log_likelihood(residual: np.ndarray) -> np.ndarray:
+    """Log density of a skin point's deviation [N, 3] (natural log units) from its expected colour."""
+    common = residual.mean(-1)
+    chroma = residual - common[..., None]
+    return (-0.5 * (3 * common ** 2 / SIGMA_LUMINANCE ** 2 + (chroma ** 2).sum(-1) / SIGMA_CHROMA ** 2)
+            - np.log(SIGMA_LUMINANCE * SIGMA_CHROMA ** 2 * (2 * np.pi) ** 1.5))
+
+
+def _around(direction: np.ndarray, spread: float) -> np.ndarray:
+    """Twelve directions on two rings about a direction, the outer one `spread` radians away."""
+    side = np.cross(direction, [0.0, 0.0, 1.0] if abs(direction[2]) < 0.9 else [1.0, 0.0, 0.0])
+    side /= np.linalg.norm(side)
+    up = np.cross(direction, side)
+    angles = np.arange(6) * np.pi / 3
+    rings = [direction + np.tan(spread * r) * (np.cos(a) * side + np.sin(a) * up) for r in (0.5, 1.0) for a in angles + r]
+    return np.array([d / np.linalg.norm(d) for d in rings])
+
+
+def _expectation_maximisation(log, colours, transfer, cosine, visible, weights, start=None, iterations: int = 12):
+    """-> (log likelihood, environment [9, 3], sun colour [3], reached [N], inlier [N], responsibilities to start another fit from)."""
+    count = len(colours)
+    prior = 0.03 + 0.67 * visible * (cosine > 0)  # that the sun reaches a point
+    # a first guess of the two states: the sky gives the darker skin its colour, sky and sun the brightest
+    bright = (log.mean(1) - np.quantile(log.mean(1), 0.3)) / max(np.quantile(log.mean(1), 0.97) - np.quantile(log.mean(1), 0.3), 1e-3)
+    lit = visible * (bright > 0.5) if start is None else start[0]
+    inlier = np.ones(count) if start is None else start[1]
+    scale = np.average(colours, axis=0, weights=weights)
+    has_sun = bool(cosine.any())
+    spread = SIGMA_LUMINANCE**2 if start is None else start[2]
+    for _ in range(iterations):
+        environment, sun = np.zeros((9, 3)), np.zeros(3)
+        for k in range(3):
+            environment[:, k], sun[k] = _weighted_fit(transfer, cosine, colours[:, k] / scale[k], lit, inlier * weights, has_sun, spread)
+        environment, sun = environment * scale, sun * scale
+        ambient = transfer @ environment
+        ambient = np.maximum(ambient, FLOOR * np.median(ambient, 0))
+        in_shade = log - np.log(np.maximum(ambient, 1e-4))
+        in_sun = log - np.log(np.maximum(ambient + cosine[:, None] * sun, 1e-4))
+        shaded, sunlit = log_likelihood(in_shade), log_likelihood(in_sun)
+        terms = np.stack([np.log(prior * (1 - OUTLIER)) + sunlit, np.log((1 - prior) * (1 - OUTLIER)) + shaded,
+                          np.full(count, np.log(OUTLIER) - 3 * np.log(BOX))])  # [3, N]
+        peak = terms.max(0)
+        shares = np.exp(terms - peak)
+        total = shares.sum(0)
+        lit, inlier = shares[0] / np.maximum(shares[0] + shares[1], 1e-30), 1 - shares[2] / total
+        spread = np.average(lit * (in_sun**2).mean(1) + (1 - lit) * (in_shade**2).mean(1), weights=inlier * weights + 1e-9)
+    return float(((peak + np.log(total)) * weights).sum()), environment, sun, lit, inlier, (lit, inlier, spread)
+
+
+def _weighted_fit(transfer, cosine, values, lit, weights, has_sun, spread) -> tuple[np.ndarray, float]:
+    """Relative least squares of values [N] ~ transfer @ e + lit * cosine * sun, each point once as sunlit and once as shaded.
+
+    The higher bands have a prior (a ridge) whose weight grows with the `spread` of the skin about its tone, a variance in log units: freckled,
+    flushed or bearded skin must not be told as light.
+    """
+    relative = 1 / np.maximum(values, 0.1)
+    a_lit = np.concatenate([transfer, cosine[:, None]], 1) * relative[:, None]
+    a_shade = np.concatenate([transfer, np.zeros((len(values), 1))], 1) * relative[:, None]
+    target = values * relative
+    w1, w0 = weights * lit, weights * (1 - lit)
+    normal = a_lit.T @ (a_lit * w1[:, None]) + a_shade.T @ (a_shade * w0[:, None])
+    right = a_lit.T @ (target * w1) + a_shade.T @ (target * w0)
+    ridge = np.diag([0.0, *[RIDGE] * 3, *[4 * RIDGE] * 5, 0.0]) * weights.sum() * spread
+    if not has_sun:
+        ridge[9, 9] = 1.0
+    solution = np.linalg.solve(normal + ridge + 1e-9 * np.eye(10), right)
+    if has_sun and solution[9] < 0:
+        return np.linalg.solve((normal + ridge)[:9, :9], right[:9]), 0.0
+    return solution[:9], float(solution[9]) if has_sun else 0.0
