@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-GROUND = {"capture", "hashes", "settings", "stages", "messages", "mask_history", "artist_landmarks", "report", "worker", "mask_edit"}
+GROUND = {"capture", "hashes", "settings", "stages", "messages", "mask_history", "artist_landmarks", "report", "worker", "mask_edit", "consent",
+          "switchlight_service", "delighter_cards"}
 """Standard library only: what Blender may import."""
 SHARED = {"images", "meshes", "raster", "surfaces", "atlas", "baking", "views", "template", "faces", "mask_import", "skylight", "shadow_edges",
-          "frame_pictures"}
+          "frame_pictures", "sunlight"}
 """What the rooms of the upper floor may import beside the ground floor."""
 LATE = {"core/__main__.py", "core/worker/runner.py"}
 """Ground floor files that import heavy things inside a function, once there is something for them to do."""
