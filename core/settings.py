@@ -66,10 +66,12 @@ class RegistrationSettings:
 
 @dataclass(frozen=True)
 class DelightSettings:
-    delighter: str = setting("shading", choices=("none", "folder", "shading"))
+    delighter: str = setting("shading", choices=("shading", "opendelight", "folder", "none"))
     """How the light is taken out of the frames before the texture is built"""
     folder: str = setting("")
     """Folder of delit pictures for the folder delighter, matched by name"""
+    checkpoint: str = setting("")
+    """OpenDelight's checkpoint as its authors publish it: the folder with base_delight_network.pth and unet_enhancer.pth"""
 
 
 @dataclass(frozen=True)

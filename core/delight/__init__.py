@@ -20,10 +20,12 @@ from .contract import Delighter, Photographer
 from .folder import folder
 from .none import delight_photograph as leave_photograph
 from .none import none
+from .opendelight import delight_photograph as delight_with_opendelight
+from .opendelight import opendelight
 from .shading import shading
 
-DELIGHTERS: dict[str, Delighter] = {"none": none, "folder": folder, "shading": shading}
-PHOTOGRAPHERS: dict[str, Photographer] = {"none": leave_photograph}
+DELIGHTERS: dict[str, Delighter] = {"shading": shading, "opendelight": opendelight, "folder": folder, "none": none}
+PHOTOGRAPHERS: dict[str, Photographer] = {"opendelight": delight_with_opendelight, "none": leave_photograph}
 """Those that also serve a photograph that belongs to no capture."""
 
 

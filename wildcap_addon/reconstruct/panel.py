@@ -66,6 +66,8 @@ class WILDCAP_PT_delighter(CapturePanel, bpy.types.Panel):
             problems.draw_text(card, line, width)
         if item.delight.delighter == "folder":
             layout.prop(item.delight, "folder", text="")
+        elif item.delight.delighter == "opendelight":
+            layout.prop(item.delight, "checkpoint", text="")
         capture = captures.folder(item)
         layout.operator("wildcap.compare_delit", icon='IMAGE_DATA')
         name = delighters.shown(capture)

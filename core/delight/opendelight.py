@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The delighter that runs the authors' OpenDelight checkpoint, where the user has it: faces are cut out aligned, delit, given their detail and put back.
+
+What is off the face stays as it was shot. It does not say where shadows were. Not verified on the authors' weights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from .. import images
+from ..capture import Capture
+from ..faces import Face, detect
+from ..messages import Problem, Reporter
+from ..settings import DelightSettings, Settings
+from ..views import read_views
+from .contract import Delit
+from .face_crop import alignment, cut, face_mask, put_back
+from .opendelight_checkpoint import Checkpoint, load
+from .opendelight_network import delit
+
+SIZE = 512
+MARGIN = 0.85  # of FFHQ's square, which the checkpoint was trained on
+
+
+def opendelight(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
+    """The selected frames in which a face is found. Raises Problem where none is, and for a checkpoint that is none."""
+    checkpoint = load(settings.delight.checkpoint, settings.device)
+    views = read_views(capture, selected_only=True)
+    face, found = None, 0
+    for i, view in enumerate(views):
+        def step(i: int = i) -> None:
+            report.progress(i, len(views), f"Delighting frame {i + 1} of {len(views)}")
+
+        step()
+        srgb = images.read_srgb(view.path)
+        face = detect(srgb, face)
+        if face is None:
+            report.log(f"No face was found in frame {view.name}; it is left out.")
+            continue
+        found += 1
+        yield Delit(view, delight_face(srgb, face, checkpoint, settings.device, step))
+    report.figure("frames_without_face", len(views) - found)
+    report.figure("detail_enhanced", checkpoint.enhancer is not None)
+    if not found:
+        raise Problem("OpenDelight found no face in any of the selected frames.", "Choose another delighter.")
+
+
+def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.ndarray, None]:
+    """A photograph sRGB [H, W, 3] whose face is delit, on the processor. Raises Problem where it shows no face."""
+    path = Path(settings.checkpoint)
+    checkpoint = _kept(settings.checkpoint, path.stat().st_mtime_ns if path.exists() else 0)
+    face = detect(srgb)
+    if face is None:
+        raise Problem("OpenDelight found no face in the photograph.", "Choose another photograph, or another delighter.")
+    return delight_face(srgb, face, checkpoint), None
+
+
+def delight_face(srgb: np.ndarray, face: Face, checkpoint: Checkpoint, device: str = "cpu", step: Callable[[], None] = lambda: None) -> np.ndarray:
+    """A frame sRGB [H, W, 3] with the albedo of one face in it."""
+    to_crop = alignment(face, SIZE, MARGIN)
+    crop, mask = cut(srgb, to_crop, SIZE), face_mask(face, to_crop, SIZE)
+    picture = torch.from_numpy((crop * mask[..., None]).transpose(2, 0, 1)[None].astype(np.float32)).to(device)
+    albedo = delit(checkpoint.base, checkpoint.enhancer, picture, step)[0].permute(1, 2, 0).cpu().numpy()
+    return put_back(srgb, crop, albedo, mask, to_crop)
+
+
+@lru_cache(maxsize=1)
+def _kept(path: str, modified: int) -> Checkpoint:
+    return load(path)
