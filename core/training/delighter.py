@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import tempfile
 import time
 from pathlib import Path
@@ -33,10 +34,13 @@ from .prior import named_data
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "delighter.safetensors"
 _MODEL = {"widths": [64, 128, 192, 224], "depths": [2, 2, 2, 2]}
 CONFIGS = {
-    "cpu": {"model": _MODEL, "training": {"pairs": 4, "rate": 1.2e-3, "minutes": 80, "skins": 96, "views": 6, "held_out": 6, "seed": 0, "workers": 1}},
-    "gpu": {"model": _MODEL, "training": {"pairs": 16, "rate": 1.0e-3, "minutes": 24, "skins": 160, "views": 8, "held_out": 6, "seed": 0, "workers": 14}},
+    "cpu": {"model": _MODEL,
+            "training": {"pairs": 2, "echo": 2, "rate": 8e-4, "minutes": 75, "skins": 96, "views": 6, "held_out": 6, "seed": 0, "workers": 1}},
+    "gpu": {"model": _MODEL,
+            "training": {"pairs": 16, "echo": 1, "rate": 1.0e-3, "minutes": 24, "skins": 160, "views": 8, "held_out": 6, "seed": 0, "workers": 14}},
 }
-"""`skins` subjects are seen from `views` sides each; a step shows `pairs` of them under two lights each."""
+"""`skins` subjects are seen from `views` sides each; a step shows `pairs` of them under two lights each. Every `echo` steps show the same portraits, mirrored
+in turn: where making them costs as much as learning from them, twice is cheaper than new."""
 TONE, SLOPE, AGREEMENT, SHADOW = 0.25, 1.0, 0.25, 0.3
 """Weights beside the log-shading's error: its mean over the face, its slopes, the albedo of one face under two lights, the shadows."""
 
@@ -72,11 +76,11 @@ def train_delighter(config: str, out: Path, report: Reporter, minutes: float | N
     average = {name: value.to(device) for name, value in state["average"].items()}
     began, before, saved_at = time.monotonic(), state["seconds"], state["seconds"]
     steps = _Steps(Portraits(data["seeds"], t["views"], work, hdri), t)
-    batches = DataLoader(steps, batch_size=None, sampler=range(state["step"], 10**9), num_workers=t["workers"], prefetch_factor=3)
+    batches = DataLoader(steps, batch_size=None, sampler=range(state["step"], 10**9), num_workers=t["workers"], prefetch_factor=3 if t["workers"] else None)
     for step, batch in zip(range(state["step"], 10**9), batches, strict=False):
         share = state["seconds"] / (60 * minutes)
         for group in optimiser.param_groups:
-            group["lr"] = t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * np.cos(np.pi * min(share, 1.0)))
+            group["lr"] = t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * min(share, 1.0)))
         loss = sum(losses(network, batch, device).values())
         optimiser.zero_grad(set_to_none=True)
         loss.backward()
@@ -182,12 +186,16 @@ class _Steps(Dataset):
 
     def __init__(self, portraits: Portraits, options: dict):
         self.portraits, self.options = portraits, options
+        self.drawn: tuple[int, Batch | None] = -1, None
 
     def __getitem__(self, step: int) -> Batch:
         torch.set_num_threads(1)
-        rng = np.random.default_rng((self.options["seed"], step))
-        batch = self.portraits.draw(self.options["pairs"], rng)
-        return mirrored(batch) if rng.random() < 0.5 else batch
+        index = step // self.options["echo"]
+        rng = np.random.default_rng((self.options["seed"], index))
+        if self.drawn[0] != index:
+            self.drawn = index, self.portraits.draw(self.options["pairs"], rng)
+        turned = step % 2 if self.options["echo"] > 1 else rng.random() < 0.5
+        return mirrored(self.drawn[1]) if turned else self.drawn[1]
 
 
 def _command(state: dict) -> str:

@@ -115,7 +115,7 @@ def _example(portrait: Portrait, seen: sight.Sight, rng: np.random.Generator, au
 
 def mirrored(batch: Batch) -> Batch:
     """Left and right exchanged; a normal's x changes its sign."""
-    layers = batch.layers.flip(-1)
+    layers = batch.layers.flip(-1)  # a copy
     layers[:, 12] *= -1
     return replace(batch, layers=layers, **{name: getattr(batch, name).flip(-1) for name in ("shading", "weight", "shadow", "shadow_weight")})
 

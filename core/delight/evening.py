@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One head has one albedo: what the frames say of it is averaged in the head's UV space, and each frame's shading is moved to agree with the mean.
+
+Only coarsely, as registration is a pixel off at times, and the frames' own shadow edges are to stay where they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from ..meshes import vertex_normals
+from ..raster import interpolate, rasterize_uv, sample, visible_from
+from ..views import View
+from .lit_head import LitHead
+
+UV_SIDE = 256
+SPREAD = 0.12  # natural log units from the others' opinion at which a frame's counts half
+COARSE = 3.0  # cells of the network's map below which nothing is moved
+LEAST = 0.05  # weight from which a texel is known
+
+
+@dataclass(frozen=True)
+class Look:
+    """What the network says of one picture. box: left, top and side in pixels of the square it saw; shading [h, h, 3] natural log, shadow [h, h] in
+    [0, 1] and log [h, h, 3], the picture's own at that size; face int [h, h] and bary [h, h, 3]: the head there (-1: none), if it is known."""
+
+    box: tuple[float, float, float]
+    shading: np.ndarray
+    shadow: np.ndarray
+    log: np.ndarray
+    face: np.ndarray | None = None
+    bary: np.ndarray | None = None
+
+
+def even_out(head: LitHead, views: list[View], looks: list[Look]) -> list[Look]:
+    """The looks of these views with shadings that agree about the head's albedo."""
+    mesh = head.mesh
+    if mesh.uvs is None or len(looks) < 2:
+        return looks
+    raster_face, raster_bary = rasterize_uv(mesh, UV_SIDE)
+    texel = np.flatnonzero(raster_face.ravel() >= 0)
+    points, normals = (interpolate(values, mesh.faces, raster_face, raster_bary).reshape(-1, 3)[texel] for values in (mesh.vertices, vertex_normals(mesh)))
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    found = [_opinion(head, view, look, points, normals) for view, look in zip(views, looks, strict=True)]
+    opinions, weights = (np.stack(part) for part in zip(*found, strict=True))
+    level = _levels(opinions, weights)
+    mean = _robust_mean(opinions - level[:, None], weights)
+    known = np.zeros(UV_SIDE**2, np.float32)
+    known[texel] = np.minimum(weights.sum(0) / LEAST, 1) * (weights.sum(0) > LEAST)
+    albedo = np.zeros((UV_SIDE**2, 3), np.float32)
+    albedo[texel] = mean
+    albedo, known = albedo.reshape(UV_SIDE, UV_SIDE, 3), known.reshape(UV_SIDE, UV_SIDE)
+    return [_agreeing(head, replace(look, shading=look.shading + off), albedo, known) for look, off in zip(looks, level, strict=True)]
+
+
+def _opinion(head: LitHead, view: View, look: Look, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Log-albedo [N, 3] that a look gives points of the surface, and how far it counts [N]."""
+    towards = view.centre - points
+    cosine = (towards * normals).sum(1) / np.linalg.norm(towards, axis=1)
+    pixels, _ = view.project(points)
+    side = len(look.shading)
+    at = (pixels - look.box[:2]) * side / look.box[2]
+    inside = ((at > 1) & (at < side - 1)).all(1) & ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)  # nan is not
+    seen = np.flatnonzero((cosine > 0.2) & inside)
+    seen = seen[visible_from(head.caster, points[seen], normals[seen], view.centre)]
+    values, weight = np.zeros((len(points), 3), np.float32), np.zeros(len(points), np.float32)
+    values[seen] = sample(look.log - look.shading, at[seen])
+    weight[seen] = cosine[seen] ** 2
+    return values, weight
+
+
+def _levels(opinions: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """How much higher than the others each view's log-albedo is as a whole [V, 3], of mean 0; without it a place that one view sees would keep its level."""
+    level = np.zeros((len(opinions), 3), np.float32)
+    shared = (weights > 0) & ((weights > 0).sum(0) > 1)
+    for _ in range(20):
+        mean = _robust_mean(opinions - level[:, None], weights)
+        for view in np.flatnonzero(shared.any(1)):
+            level[view] += np.median((opinions[view] - level[view] - mean)[shared[view]], 0)
+        level -= level.mean(0)
+    return level
+
+
+def _robust_mean(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Over the first axis of [V, N, 3] with weights [V, N]: frames far from the others count less (highlights move, albedo does not)."""
+    mean = (values * weights[..., None]).sum(0) / np.maximum(weights.sum(0), 1e-6)[:, None]
+    for _ in range(4):
+        trust = weights / (1 + (((values - mean) ** 2).mean(-1) / SPREAD**2))
+        mean = (values * trust[..., None]).sum(0) / np.maximum(trust.sum(0), 1e-6)[:, None]
+    return mean
+
+
+def _agreeing(head: LitHead, look: Look, albedo: np.ndarray, known: np.ndarray) -> Look:
+    uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
+    at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * UV_SIDE
+    weight = sample(known, at).reshape(look.face.shape) * (look.face >= 0)
+    weight = np.where(weight > 0.99, weight, 0).astype(np.float32)
+    off = (look.log - look.shading - sample(albedo, at).reshape(*look.face.shape, 3)) * weight[..., None]
+    carried = cv2.GaussianBlur(weight, (0, 0), COARSE)
+    off = cv2.GaussianBlur(off.astype(np.float32), (0, 0), COARSE) / np.maximum(carried, 0.02)[..., None]
+    mean = off[weight > 0].mean(0) if (weight > 0).any() else np.zeros(3, np.float32)
+    share = np.clip(carried / 0.3, 0, 1)[..., None]
+    return replace(look, shading=look.shading + share * off + (1 - share) * mean)

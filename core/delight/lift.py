@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Log-shading from a network's coarse map to every pixel, along the picture's own edges.
+
+In each small window the shading is taken for an affine function of the picture's log colour (He, Sun and Tang, Guided Image Filtering, 2013; fast form
+2015): at a shadow's edge it follows the picture, on even skin it is a constant. The guide knows no pores, so none can pass into the shading.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+WINDOW = 2  # radius, in cells of the coarse map
+STIFF = 0.06  # natural log units: what varies less in a window is skin and not an edge
+PORE_PX, PORE_LOG = 0.006, 0.25  # of the picture's side, and in log units: what is finer and fainter is left out of the guide
+
+
+def lift(shading: np.ndarray, log: np.ndarray) -> np.ndarray:
+    """Coarse log-shading [h, w, C] and the log of the linear picture [H, W, C] that it covers -> log-shading [H, W, C]."""
+    guide = without_pores(log)
+    height, width = shading.shape[:2]
+    small = cv2.resize(guide, (width, height), interpolation=cv2.INTER_AREA).reshape(shading.shape)
+    slope, offset = _affine(small, shading)
+    size = guide.shape[1::-1]
+    slope, offset = (cv2.resize(grid, size, interpolation=cv2.INTER_LINEAR).reshape(guide.shape) for grid in (slope, offset))
+    return slope * guide + offset
+
+
+def lift_share(share: np.ndarray, log: np.ndarray) -> np.ndarray:
+    """The same for a coarse share [h, w] in [0, 1], guided by luminance: [H, W] in [0, 1]."""
+    return np.clip(lift(share[..., None].astype(np.float32), log.mean(-1, keepdims=True))[..., 0], 0, 1)
+
+
+def without_pores(log: np.ndarray) -> np.ndarray:
+    """A log picture [H, W, C] smoothed where it varies finely and faintly; edges stay."""
+    reach = max(1.0, PORE_PX * max(log.shape[:2]))
+    channels = (np.ascontiguousarray(log[..., k], np.float32) for k in range(log.shape[-1]))
+    return np.stack([cv2.bilateralFilter(channel, -1, PORE_LOG, reach) for channel in channels], -1)
+
+
+def _affine(guide: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Per channel the slope and offset [h, w, C] that carry guide to values in each window, averaged over the windows a cell is in."""
+    def mean(x: np.ndarray) -> np.ndarray:
+        return cv2.blur(np.ascontiguousarray(x, np.float32), (2 * WINDOW + 1,) * 2).reshape(x.shape)
+
+    middle, level = mean(guide), mean(values)
+    variance, covariance = mean(guide * guide) - middle**2, mean(guide * values) - middle * level
+    slope = np.clip(covariance / (variance + STIFF**2), -0.2, 1.2)
+    return mean(slope), mean(level - slope * middle)

@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The registered head of a capture with the light that was fitted to its skin: what a delighter knows before it looks at single frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import meshes
+from ..capture import Capture
+from ..meshes import Mesh
+from ..messages import Reporter
+from ..raster import RayCaster, interpolate
+from ..skylight import radiance_transfer
+from ..views import View
+from .light import Light, fit_light
+from .surface import skin_weights, smooth_normals, vertex_colours
+
+BRIGHTEST = 0.85  # a tone's largest channel: more than skin reflects, so a brighter picture was over-exposed
+FIT_POINTS = 6000
+
+
+@dataclass(frozen=True)
+class LitHead:
+    """mesh with its ray caster; smoothed unit normals [V, 3]; transfer [V, 9] of the sky; not_brows [V]: 0 where dark hair is; the light; and
+    best_lit [3]: the linear colour of the best lit skin, taken for the colour of the skin itself."""
+
+    mesh: Mesh
+    caster: RayCaster
+    normals: np.ndarray
+    transfer: np.ndarray
+    not_brows: np.ndarray
+    light: Light
+    best_lit: np.ndarray
+
+    def at(self, face: np.ndarray, bary: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Where a raster (face [h, w], bary [h, w, 3]) shows the head: the linear colour of its skin under the sky [h, w, 3], what an unblocked sun adds
+        [h, w, 3], 1 where the head itself leaves the sun visible [h, w], unit normals [h, w, 3]."""
+        normal = interpolate(self.normals, self.mesh.faces, face, bary)
+        normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
+        ambient = self.light.ambient(interpolate(self.transfer, self.mesh.faces, face, bary))
+        free = np.zeros(face.shape)
+        if self.light.has_sun:
+            facing = (face >= 0) & (normal @ self.light.sun > 0)
+            position = interpolate(self.mesh.vertices, self.mesh.faces, face, bary)[facing] + 1e-3 * normal[facing]
+            free[facing] = ~self.caster.blocked(position, np.repeat(self.light.sun[None], len(position), 0))
+        return ambient, self.light.direct(normal), free, normal
+
+
+def lit_head(capture: Capture, views: list[View], report: Reporter) -> LitHead:
+    """Fits the light of these views to the head; half of the stage's progress. Raises Problem where the views hardly see it."""
+    mesh = meshes.read_obj(capture.head)
+    caster, normals = RayCaster(mesh), smooth_normals(mesh)
+    colours, count = vertex_colours(mesh, normals, caster, views, report)
+    transfer = radiance_transfer(caster, mesh.vertices, normals, step=lambda done, of: report.progress(of + done, 4 * of, "Casting rays at the sky"))
+    skin, not_brows = skin_weights(mesh)
+    light, reached = _fit(mesh, normals, transfer, caster, colours, skin * (count >= min(2, len(views))), report)
+    return LitHead(mesh, caster, normals, transfer, not_brows, light, _best_lit(light, normals, transfer, reached, count))
+
+
+def _fit(mesh, normals, transfer, caster, colours, weights, report) -> tuple[Light, np.ndarray]:
+    """The light from an even draw of skin vertices; the draw's posterior on all vertices [V] (0 where not drawn) and the figures."""
+    skin = np.flatnonzero((weights > 0.3) & (colours.min(1) > 1e-3))
+    drawn = skin[:: max(1, len(skin) // FIT_POINTS)]
+    origins = mesh.vertices[drawn] + 1e-3 * normals[drawn]
+
+    def reaches(direction: np.ndarray) -> np.ndarray:
+        free = normals[drawn] @ direction > 0
+        free[free] = ~caster.blocked(origins[free], np.repeat(direction[None], free.sum(), 0))
+        return free.astype(float)
+
+    light, lit, inlier = fit_light(colours[drawn], normals[drawn], transfer[drawn], reaches, weights[drawn],
+                                   step=lambda done, of: report.progress(of + done / 2, 2 * of, "Fitting the light"))
+    expected = light.ambient(transfer[drawn]) + lit[:, None] * light.direct(normals[drawn])
+    residual = np.abs(np.log(colours[drawn] / expected)).mean(1)
+    report.figure("inlier_percent", round(100 * float(inlier.mean()), 1))
+    report.figure("residual_log", round(float(np.median(residual[inlier > 0.5])), 3))
+    report.figure("environment_sh", np.round(light.environment, 4).tolist())
+    report.figure("sun_direction", np.round(light.sun, 3).tolist() if light.has_sun else None)
+    report.figure("sun_to_sky", round(float(light.colour[1] / np.median(light.ambient(transfer[drawn])[:, 1])), 2))
+    reached = np.zeros(len(normals))
+    reached[drawn] = lit
+    return light, reached
+
+
+def _best_lit(light, normals, transfer, reached, count) -> np.ndarray:
+    """[3]: the colour of the best lit tenth of the skin, taken for the colour of the skin itself."""
+    seen = count > 0
+    lit = (light.ambient(transfer) + reached[:, None] * light.direct(normals))[seen]
+    tone = lit[lit.mean(1) >= np.quantile(lit.mean(1), 0.9)].mean(0)
+    return tone * min(1.0, BRIGHTEST / tone.max())

@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The default delighter: our own network tells the shading and the shadows of a face, from the picture and from what is known of the head.
+
+It sees a square around the face at SIDE pixels and answers at half of that; the answer is lifted to the picture's pixels along its edges (lift.py), and the
+picture is divided by it, so pores are kept and none can be invented. In a capture the frames' answers are evened out over the head (evening.py).
+`core train delighter` makes the weights.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from safetensors.torch import load_file
+
+from .. import faces, images, template
+from ..capture import Capture
+from ..messages import Problem, Reporter
+from ..raster import sample
+from ..settings import DelightSettings, Settings
+from ..views import View, read_views
+from .contract import Delit
+from .evening import Look, even_out
+from .lift import lift, lift_share
+from .lit_head import BRIGHTEST, LitHead, lit_head
+from .unet import DARKEST, SIDE, DelightNet, network_input
+
+WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "delighter.safetensors"
+MARGIN = 1.6  # side of the square, in sides of the face's landmarks: the middle of what training shows
+
+
+def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
+    """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see the head."""
+    net, views = load(settings.device), read_views(capture, selected_only=True)
+    head = lit_head(capture, views, report)
+    looks = []
+    for i, view in enumerate(views):
+        report.progress(4 * len(views) + 3 * i, 8 * len(views), f"Looking at frame {i + 1} of {len(views)}")
+        looks.append(_look_at_view(net, view, head))
+    looks = even_out(head, views, looks)
+    for i, (view, look) in enumerate(zip(views, looks, strict=True)):
+        report.progress(7 * len(views) + i, 8 * len(views), f"Delighting frame {i + 1} of {len(views)}")
+        albedo, shadow = _divided(images.read_srgb(view.path), look)
+        yield Delit(view, albedo, shadow)
+
+
+def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.ndarray, np.ndarray]:
+    """A single photograph [H, W, 3] (sRGB) of a face -> its albedo [H, W, 3] (sRGB) and its shadows [H, W]. Raises Problem where no face is found."""
+    face = faces.detect(srgb)
+    if face is None:
+        raise Problem("No face was found in the photograph.", "Choose a photograph that shows the face from the front or half from the side.")
+    box = face_box(face.landmarks[:, :2])
+    picture = crop(srgb, box, SIDE)
+    return _divided(srgb, _look(load("cpu"), box, picture))
+
+
+def load(device: str) -> DelightNet:
+    """The shipped network. Raises Problem where its file or its card is missing."""
+    card = WEIGHTS.with_suffix(".json")
+    if not (WEIGHTS.is_file() and card.is_file()):
+        raise Problem("The weights of the delighting network are missing.", "Install the add-on again, or choose the delighter 'shading'.")
+    net = DelightNet(**json.loads(card.read_text(encoding="utf-8"))["model"])
+    net.load_state_dict({name: value.float() for name, value in load_file(WEIGHTS).items()})
+    return net.eval().to(torch.device(device), memory_format=torch.channels_last)
+
+
+def face_box(points: np.ndarray) -> tuple[float, float, float]:
+    """Left, top and side of the square around a face's landmarks [N, 2] in pixels."""
+    low, high = points.min(0), points.max(0)
+    side = MARGIN * float((high - low).max())
+    left, top = (low + high) / 2 - side / 2
+    return float(left), float(top), side
+
+
+def crop(picture: np.ndarray, box: tuple[float, float, float], size: int) -> np.ndarray:
+    """The square `box` of a picture [H, W(, C)] at size x size pixels; what lies beyond the border repeats it."""
+    left, top, side = box
+    scale = size / side
+    if scale < 0.6:  # the mean of what falls into a pixel, not one of them
+        step = max(1, round(1 / scale))
+        fine = crop(picture, box, size * step)
+        return cv2.resize(fine, (size, size), interpolation=cv2.INTER_AREA)
+    to_crop = np.float32([[scale, 0, -left * scale + 0.5 * (scale - 1)], [0, scale, -top * scale + 0.5 * (scale - 1)]])
+    return cv2.warpAffine(np.ascontiguousarray(picture, np.float32), to_crop, (size, size), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+
+
+def _look_at_view(net: DelightNet, view: View, head: LitHead) -> Look:
+    pixels, _ = view.project(_landmarks(head))
+    box = face_box(pixels[np.isfinite(pixels).all(1)])
+    y, x = np.mgrid[0:SIDE, 0:SIDE]
+    rays = view.rays((np.stack([x.ravel(), y.ravel()], -1) + 0.5) * box[2] / SIDE + box[:2])
+    face, bary, _ = head.caster.first_hits(np.repeat(view.centre[None], len(rays), 0), rays)
+    face, bary = face.reshape(SIDE, SIDE), bary.reshape(SIDE, SIDE, 3)
+    ambient, direct, free, normal = head.at(face, bary)
+    here = (face >= 0).astype(np.float32)
+    geometry = (ambient, ambient + free[..., None] * direct, normal @ view.rotation.T, here)
+    look = _look(net, box, crop(images.read_srgb(view.path), box, SIDE), geometry)
+    return replace(look, face=face[1::2, 1::2], bary=bary[1::2, 1::2])
+
+
+@torch.inference_mode()
+def _look(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray, geometry: tuple = ()) -> Look:
+    """The mean of what the network says of a square picture and of its mirror image."""
+    layers, middle = network_input(picture, *geometry)
+    mirrored = layers[:, :, ::-1].copy()
+    mirrored[12] *= -1
+    device = next(net.parameters()).device
+    both = torch.from_numpy(np.stack([layers, mirrored])).to(device, memory_format=torch.channels_last)
+    shading, shadow = net(both)
+    shading, shadow = ((part[0] + part[1].flip(-1)).cpu().numpy().transpose(1, 2, 0) / 2 for part in (shading, shadow.sigmoid()))
+    small = cv2.resize(images.srgb_to_linear(picture), (SIDE // 2, SIDE // 2), interpolation=cv2.INTER_AREA)
+    return Look(box, shading + middle, shadow[..., 0], np.log(np.maximum(small, DARKEST)))
+
+
+def _divided(srgb: np.ndarray, look: Look) -> tuple[np.ndarray, np.ndarray]:
+    """A picture without its shading, and its shadows at its own size. Beyond the square the shading is that of its border, and nothing is said of shadows."""
+    linear = images.srgb_to_linear(srgb)
+    size = round(look.box[2])
+    log = np.log(np.maximum(crop(linear, look.box, size), DARKEST))
+    shading, shadow = lift(look.shading, log), lift_share(look.shadow, log)
+    y, x = np.mgrid[0:srgb.shape[0], 0:srgb.shape[1]]
+    at = (np.stack([x.ravel(), y.ravel()], -1) + 0.5 - look.box[:2]) * size / look.box[2]
+    inside = ((at >= 0) & (at <= size)).all(1).reshape(srgb.shape[:2])
+    shading, shadow = (sample(part, at).reshape(*srgb.shape[:2], *part.shape[2:]) for part in (shading, shadow))
+    albedo = linear / np.exp(shading)
+    bright = float(np.quantile(albedo[inside].max(-1), 0.75)) if inside.any() else 0.0
+    return images.linear_to_srgb(albedo * min(1.0, BRIGHTEST / max(bright, 1e-6))), np.clip(shadow * inside, 0, 1).astype(np.float32)
+
+
+def _landmarks(head: LitHead) -> np.ndarray:
+    """Points [N, 3] that frame the face: MediaPipe's landmarks on the built-in topology, else all vertices."""
+    if head.mesh.faces.shape != template.load().faces.shape:
+        return head.mesh.vertices
+    face, bary = template.landmarks()
+    return (head.mesh.vertices[head.mesh.faces[face]] * bary[..., None]).sum(1)

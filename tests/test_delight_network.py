@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The delighting network and what surrounds it: input, lifting along edges, evening out over views, training that goes on."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+import torch
+
+from core import images, template
+from core.delight import network
+from core.delight.evening import Look, even_out
+from core.delight.lift import lift, lift_share
+from core.delight.lit_head import LitHead
+from core.delight.network import crop, face_box
+from core.delight.unet import CHANNELS, DelightNet, network_input
+from core.meshes import vertex_normals
+from core.messages import Problem, Reporter
+from core.raster import RayCaster, render_view
+from core.synthetic.sight import random_camera
+from core.training import delighter
+
+QUIET = Reporter("train", emit=lambda message: None)
+
+
+def test_a_lifted_shadow_edge_lies_where_the_picture_has_it():
+    """Skin with pores, and a shadow whose edge falls inside a coarse cell: the coarse answer blurs it, the lifted one does not, and no pore passes into it."""
+    rng = np.random.default_rng(0)
+    pores = 0.05 * cv2.GaussianBlur(rng.standard_normal((256, 256)).astype(np.float32), (0, 0), 0.8) / 0.35
+    shading = np.zeros((256, 256), np.float32)
+    shading[:, 101:] = -1.2
+    coarse = cv2.resize(shading, (64, 64), interpolation=cv2.INTER_AREA)
+    log = np.repeat((shading + pores - 1)[..., None], 3, -1)
+    lifted = lift(np.repeat(coarse[..., None], 3, -1), log)[..., 0]
+    plain = cv2.resize(coarse, (256, 256), interpolation=cv2.INTER_LINEAR)
+    edge = slice(97, 105)
+    assert np.abs(lifted - shading)[:, edge].mean() < 0.35 * np.abs(plain - shading)[:, edge].mean()
+    assert np.abs(lifted - shading)[:, :80].mean() < 0.02
+    left = (log[..., 0] - lifted)[:, 10:90]
+    assert np.corrcoef(left.ravel(), pores[:, 10:90].ravel())[0, 1] > 0.98
+
+
+def test_a_lifted_share_stays_a_share():
+    share = np.zeros((32, 32), np.float32)
+    share[:, 16:] = 1
+    log = np.repeat(-2 * cv2.resize(share, (128, 128), interpolation=cv2.INTER_NEAREST)[..., None], 3, -1)
+    lifted = lift_share(share, log)
+    assert lifted.min() >= 0 and lifted.max() <= 1
+    assert lifted[:, :52].max() < 0.05 and lifted[:, 76:].min() > 0.95 and lifted[:, 63].mean() < 0.35 and lifted[:, 64].mean() > 0.65
+
+
+def test_a_crop_finds_a_place_again():
+    y, x = np.mgrid[0:200, 0:300].astype(np.float32) + 0.5
+    picture = np.dstack([x, y])
+    box = (50.0, 20.0, 120.0)
+    for size in (240, 60, 30):
+        cut = crop(picture, box, size)
+        at = (np.arange(size) + 0.5) * 120 / size
+        assert np.abs(cut[size // 2, 2:-2, 0] - (50 + at[2:-2])).max() < 0.1
+        assert np.abs(cut[2:-2, size // 2, 1] - (20 + at[2:-2])).max() < 0.1
+    left, top, side = face_box(np.array([[100, 50], [140, 90.0]]))
+    assert (left + side / 2, top + side / 2) == pytest.approx((120, 70)) and side > 40
+
+
+def test_the_input_does_not_know_the_exposure():
+    rng = np.random.default_rng(0)
+    linear = rng.uniform(0.05, 0.4, (64, 64, 3)).astype(np.float32)
+    (one, middle), (other, brighter) = network_input(images.linear_to_srgb(linear)), network_input(images.linear_to_srgb(2 * linear))
+    assert brighter - middle == pytest.approx(np.log(2), abs=1e-3)
+    assert np.abs(one[3:6] - other[3:6]).max() < 1e-3 and not one[6:].any()
+
+
+def test_geometry_is_told_as_what_it_leaves_unexplained():
+    srgb = np.full((64, 64, 3), 0.5, np.float32)
+    light = np.repeat(images.srgb_to_linear(srgb) / np.e, 1, -1)
+    head = np.zeros((64, 64), np.float32)
+    head[:, :32] = 1
+    layers, _ = network_input(srgb, light, light, np.zeros((64, 64, 3), np.float32), head)
+    assert layers[6:12, :, :32] == pytest.approx(1, abs=1e-3) and not layers[6:12, :, 32:].any() and layers[15, 0, 0] == 1
+
+
+def test_an_untrained_network_says_nothing_and_sees_any_size():
+    net = DelightNet([16, 16, 16, 16], [1, 1, 1, 1])
+    for side in (64, 96):
+        shading, shadow = net(torch.randn(1, CHANNELS, side, side))
+        assert shading.shape == (1, 3, side // 2, side // 2) and not shading.any() and not shadow.any()
+
+
+def test_views_are_brought_to_one_albedo():
+    """Three looks at one head whose shadings are off by a constant and by a slope: afterwards what they leave as albedo agrees."""
+    mesh = template.load()
+    head = LitHead(mesh, RayCaster(mesh), vertex_normals(mesh), np.zeros((len(mesh.vertices), 9)), np.ones(len(mesh.vertices)), None, np.ones(3))
+    face, bary = template.landmarks()
+    landmarks = (mesh.vertices[mesh.faces[face]] * bary[..., None]).sum(1)
+    views, looks = [], []
+    for seed, off in ((1, 0.3), (2, -0.2), (3, 0.0)):
+        view = random_camera(landmarks, 96, np.random.default_rng(seed))
+        where, at, _ = render_view(head.caster, view)
+        slope = np.linspace(-0.2, 0.2, 96, dtype=np.float32)[None, :, None] * (seed == 2)
+        log = np.full((96, 96, 3), np.log(0.3), np.float32)
+        views.append(view)
+        looks.append(Look((0.0, 0.0, 96.0), log - np.log(0.4) + np.float32(off) + slope, np.zeros((96, 96), np.float32), log, where, at))
+    even = even_out(head, views, looks)
+
+    def spread(answers):
+        return np.std([np.median((a.log - a.shading)[a.face >= 0]) for a in answers])
+
+    assert spread(looks) > 0.15 and spread(even) < 0.02
+    slanted = (even[1].log - even[1].shading)[even[1].face >= 0]
+    assert slanted.std() < 0.5 * (looks[1].log - looks[1].shading)[looks[1].face >= 0].std()
+
+
+def test_missing_weights_are_named(monkeypatch, tmp_path):
+    monkeypatch.setattr(network, "WEIGHTS", tmp_path / "delighter.safetensors")
+    with pytest.raises(Problem, match="weights of the delighting network are missing"):
+        network.load("cpu")
+
+
+def test_a_training_goes_on_where_it_stopped(monkeypatch, tmp_path):
+    small = {"model": {"widths": [16, 16, 16, 16], "depths": [1, 1, 1, 1]},
+             "training": {"pairs": 1, "echo": 2, "rate": 1e-3, "minutes": 1, "skins": 1, "views": 1, "held_out": 1, "seed": 0, "workers": 0}}
+    monkeypatch.setitem(delighter.CONFIGS, "cpu", small)
+    monkeypatch.setattr(delighter, "prepare", lambda seeds, views, work, *rest: _prepared(seeds, work))
+    out = tmp_path / "out.safetensors"
+    first = delighter.train_delighter("cpu", out, QUIET, minutes=0.01, work=tmp_path / "work")
+    second = delighter.train_delighter("cpu", out, QUIET, minutes=0.02, work=tmp_path / "work")
+    assert second["steps"] > first["steps"] > 0
+    assert json.loads(out.with_suffix(".json").read_text(encoding="utf-8"))["held_out"]["none"] > 0
+    assert not set(second["seeds"]) & set(second["held_out_seeds"])
+
+
+def _prepared(seeds, work):
+    """Sights of subjects with plain skin: what `prepare` makes in seconds, in tenths of one."""
+    from core.delight.unet import SIDE
+    from core.synthetic import olat, sight
+    from core.synthetic.identities import subject_mesh
+
+    for seed in seeds:
+        place = work / f"subject_{seed}"
+        if place.is_dir():
+            continue
+        place.mkdir(parents=True)
+        mesh = subject_mesh(seed)
+        stage = olat.LightStage(mesh, vertex_normals(mesh).astype(np.float32), np.ones((len(mesh.vertices), olat.LIGHTS), bool))
+        np.save(place / "visible.npy", np.packbits(stage.visible, axis=1))
+        plain = np.broadcast_to(np.float32([0, 0, 1]), (64, 64, 3))
+        view = random_camera(sight.landmarks_of(stage), SIDE, np.random.default_rng(seed))
+        diffuse, gloss = np.full((64, 64, 3), 0.3, np.float32), np.full((64, 64), 0.03, np.float32)
+        sight.save(place / "0.npz", sight.look(stage, view, diffuse, gloss, plain, np.random.default_rng(seed)))
