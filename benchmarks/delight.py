@@ -4,9 +4,10 @@
 
     python -m benchmarks.delight [--data DIR] [--sets NAME ...] [--capture NAME=FOLDER ...] [--opendelight PATH] [--quick] [--json OUT] [--pictures FOLDER]
 
-Sets: faceolat (--data: laid out like ../shared/data/faceolat), lps_sun, sample, or any folder laid out as benchmarks/albedo_score.py says. A capture is
-registered anew unless --capture names one. Rows: none, flat true tone, then on captures each delighter of the chain that needs no pictures, no account and
-no checkpoint, and everywhere each that can do a single photograph. Figures (benchmarks/delight_measures.py) are means over the pictures:
+Sets: faceolat (--data: laid out like ../shared/data/faceolat), portraits (synthetic subjects that no training sees, six per group of skin tone, two lights
+each), lps_sun, sample, or any folder laid out as benchmarks/albedo_score.py says. A capture is registered anew unless --capture names one. Rows: none,
+flat true tone, then on captures each delighter of the chain that needs no pictures, no account and no checkpoint, and everywhere each that can do a single
+photograph. Figures (benchmarks/delight_measures.py) are means over the pictures:
   PSNR, SSIM, FLIP   over the facial skin after one gain per channel; features: the distance in EfficientNet-Lite0's features, which is not LPIPS
   detail             correlation of log green between 1 and 3 px with the truth's
   shadow step        what is left of the light's step at the true shadow's edge, where it exceeds 0.2 in natural log; `none` has all of it
@@ -32,12 +33,13 @@ from core.messages import Problem, Reporter
 from core.settings import Settings
 
 from .albedo_score import with_gain
-from .delight_measures import flat_tone, mean_of, score, sheet, table, tone_group
+from .delight_measures import flat_tone, mean_of, score, sheet, square, table, tone_group
+from .delight_portraits import portraits
 from .delight_sets import Photograph, Photographs, frames, light_stage, registered
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 SAMPLE = Path(__file__).resolve().parents[1] / "core" / "synthetic" / "sample"
-SETS = ("faceolat", "lps_sun", "sample")
+SETS = ("faceolat", "portraits", "lps_sun", "sample")
 BROUGHT = ("none", "folder", "switchlight", "opendelight")
 """Delighters that need something of the user's, or nothing at all: no rows of their own on captures."""
 QUICK = 4  # every n-th picture
@@ -100,7 +102,7 @@ def measure(chosen: Photographs, settings: Settings, features: bool = True, only
         shown.append([_shown(delit[p.name], p) for p in spread])
     print(file=sys.stderr)
     if picture:
-        images.write_srgb(picture, sheet([[p.srgb, _shown(p.truth.albedo, p), *delit] for p, *delit in zip(spread, *shown, strict=True)]))
+        images.write_srgb(picture, sheet([[square(p.srgb, p.truth.face), _shown(p.truth.albedo, p), *delit] for p, *delit in zip(spread, *shown, strict=True)]))
     return results
 
 
@@ -131,6 +133,8 @@ def _set(name: str, options: argparse.Namespace, captures: dict[str, str], work:
     every = QUICK if options.quick else 1
     if name == "faceolat":
         return light_stage(options.data, every)
+    if name == "portraits":
+        return portraits(options.work, every=every)
     truth = {"lps_sun": SHARED / "lps_sun", "sample": SAMPLE}.get(name, Path(name))
     capture = Capture(Path(captures[name]).resolve()) if name in captures else registered(truth, options.work)
     return frames(truth, capture, work, every)
@@ -139,7 +143,7 @@ def _set(name: str, options: argparse.Namespace, captures: dict[str, str], work:
 def _shown(srgb: np.ndarray, photograph: Photograph) -> np.ndarray:
     """A delit picture as it is compared: after the gain per channel, the skin alone."""
     true = photograph.truth
-    return np.where(true.face[..., None], with_gain(np.asarray(srgb, np.float32), true.albedo, true.face), 0)
+    return square(np.where(true.face[..., None], with_gain(np.asarray(srgb, np.float32), true.albedo, true.face), 0), true.face)
 
 
 if __name__ == "__main__":

@@ -11,9 +11,9 @@ import math
 
 import cv2
 import numpy as np
-from skimage.color import rgb2lab
 
 from core import images
+from core.synthetic import pigment
 
 from .ablation_measures import feature_distance
 from .albedo_score import Truth, detail, differences, edge_bands, face_box, log_green, shadow_step, with_gain
@@ -58,8 +58,7 @@ def flat_tone(true: Truth) -> np.ndarray:
 
 def tone_group(srgb: np.ndarray) -> str:
     """The group of a skin tone, sRGB [3], by its individual typology angle: atan((L* - 50) / b*)."""
-    lightness, _, b = rgb2lab(np.asarray(srgb, float)[None, None])[0, 0]
-    angle = math.degrees(math.atan2(lightness - 50, max(b, 1e-6)))
+    angle = float(pigment.typology_angle(images.srgb_to_linear(srgb)))
     return next(name for name, above in TONES if angle > above or name == TONES[-1][0])
 
 
@@ -81,9 +80,17 @@ def table(results: dict[str, dict]) -> str:
     return "\n".join(lines)
 
 
-def sheet(columns: list[list[np.ndarray]], height: int = 256) -> np.ndarray:
-    """Pictures of equal shape side by side: a row per photograph, what `columns` holds of it next to each other; sRGB [H, W, 3]."""
-    return np.vstack([np.hstack([images.resize(np.asarray(p, np.float32), round(p.shape[1] * height / p.shape[0]), height) for p in row]) for row in columns])
+def square(srgb: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """The square about a mask [H, W], black where the picture ends."""
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    half = round(0.55 * max(rows[-1] - rows[0], columns[-1] - columns[0]))
+    top, left = (rows[0] + rows[-1]) // 2, (columns[0] + columns[-1]) // 2  # of the padded picture, where the square begins
+    return np.pad(srgb, ((half, half), (half, half), (0, 0)))[top:top + 2 * half, left:left + 2 * half]
+
+
+def sheet(photographs: list[list[np.ndarray]], side: int = 192) -> np.ndarray:
+    """A row of square pictures for each photograph; sRGB [H, W, 3]."""
+    return np.vstack([np.hstack([images.resize(np.asarray(picture, np.float32), side, side) for picture in row]) for row in photographs])
 
 
 def _line(name: str, row: str, pictures: int, figures: dict) -> str:
