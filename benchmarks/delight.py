@@ -17,6 +17,7 @@ Pictures of real people are written only where --pictures says.
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import sys
 import tempfile
@@ -53,6 +54,7 @@ def main() -> None:
     parser.add_argument("--capture", action="append", default=[], metavar="NAME=FOLDER", help="a registered capture of that set")
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_delight", help="where captures are made and kept")
     parser.add_argument("--opendelight", default="", help="the authors' checkpoint")
+    parser.add_argument("--weights", type=Path, help="weights of our network, with their card beside them, instead of those that are shipped")
     parser.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
     parser.add_argument("--quick", action="store_true", help=f"every {QUICK}th picture, without the feature distance")
     parser.add_argument("--json", type=Path)
@@ -61,6 +63,8 @@ def main() -> None:
     settings = Settings(device=options.device)
     if options.opendelight:
         settings = replace(settings, delight=replace(settings.delight, checkpoint=options.opendelight))
+    if options.weights:
+        importlib.import_module("core.delight.network").WEIGHTS = options.weights
     captures = dict(pair.split("=", 1) for pair in options.capture)
     results = {}
     for name in options.sets:
@@ -79,25 +83,30 @@ def main() -> None:
 
 
 def measure(chosen: Photographs, settings: Settings, features: bool = True, only: list[str] | None = None, picture: Path | None = None) -> dict[str, dict]:
-    """Row -> {pictures, figures, groups, seconds_per_picture}, or {not_run: why}; `picture`: where to show them beside each other."""
+    """Row -> {pictures, refused, figures, groups, seconds_per_picture}, or {not_run: why}; `picture`: where to show them beside each other."""
     results, shown = {}, []
     spread = chosen.photographs[:: max(1, len(chosen.photographs) // 6)][:6]
     for row in rows(chosen, settings):
         if only and not any(row.startswith(name) for name in only):
             continue
-        scores, groups, delit, seconds, started = [], {}, {}, 0.0, time.monotonic()
+        scores, groups, delit, refused, seconds, started = [], {}, {}, [], 0.0, time.monotonic()
         try:
             for photograph, predicted in predictions(row, chosen, settings):
                 seconds += time.monotonic() - started
+                if isinstance(predicted, Problem):  # the artist would go on with the picture as it is
+                    refused.append(predicted)
+                    predicted = photograph.srgb
                 scores.append(score(predicted, photograph.srgb, photograph.truth, features))
                 groups.setdefault(photograph.group or tone_group(flat_tone(photograph.truth)), []).append(scores[-1])
                 delit[photograph.name] = predicted
                 print(f"\r{row}: {len(scores)}", end="", file=sys.stderr, flush=True)
                 started = time.monotonic()
+            if refused and len(refused) == len(scores):
+                raise refused[0]
         except Problem as problem:
             results[row] = {"not_run": f"{problem.problem} {problem.remedy}"}
             continue
-        results[row] = {"pictures": len(scores), "figures": mean_of(scores), "seconds_per_picture": round(seconds / len(scores), 2),
+        results[row] = {"pictures": len(scores), "refused": len(refused), "figures": mean_of(scores), "seconds_per_picture": round(seconds / len(scores), 2),
                         "groups": {group: {"pictures": len(found), "figures": mean_of(found)} for group, found in groups.items()}}
         shown.append([_shown(delit[p.name], p) for p in spread])
     print(file=sys.stderr)
@@ -113,14 +122,18 @@ def rows(chosen: Photographs, settings: Settings) -> list[str]:
     return ["none", "flat true tone", *on_captures, *single]
 
 
-def predictions(row: str, chosen: Photographs, settings: Settings) -> Iterator[tuple[Photograph, np.ndarray]]:
-    """Each photograph of a set with what a row takes for its albedo, sRGB [H, W, 3]."""
+def predictions(row: str, chosen: Photographs, settings: Settings) -> Iterator[tuple[Photograph, np.ndarray | Problem]]:
+    """Each photograph of a set with what a row takes for its albedo, sRGB [H, W, 3], or why it does not serve it."""
     if row in ("none", "flat true tone"):
         for photograph in chosen.photographs:
             yield photograph, photograph.srgb if row == "none" else np.broadcast_to(flat_tone(photograph.truth), photograph.srgb.shape)
     elif row.endswith(", one photograph"):
         for photograph in chosen.photographs:
-            yield photograph, delight.PHOTOGRAPHERS[row.removesuffix(", one photograph")](photograph.srgb, settings.delight)[0]
+            try:
+                predicted = delight.PHOTOGRAPHERS[row.removesuffix(", one photograph")](photograph.srgb, settings.delight)[0]
+            except Problem as problem:
+                predicted = problem
+            yield photograph, predicted
     else:
         by_frame = {photograph.frame: photograph for photograph in chosen.photographs}
         for delit in delight.DELIGHTERS[row](chosen.capture, settings, Reporter("delight")):

@@ -81,6 +81,19 @@ def test_rows_of_a_set_without_a_capture(truth):
     assert lines[2 + len(results)].startswith("| two lights: one | none | 1 |")
 
 
+def test_a_photograph_that_is_refused_stays_as_it_is(truth, monkeypatch):
+    def halves(srgb, settings):
+        if srgb.mean() < 0.4:
+            raise Problem("It is too dark.", "Take another.")
+        return srgb, None
+
+    monkeypatch.setattr(delight.delight, "PHOTOGRAPHERS", {"halves": halves, "never": lambda srgb, settings: halves(0 * srgb, settings)})
+    photographs = Photographs([Photograph(f"{light}", lit(truth, light), truth) for light in (0.9, 0.1)])
+    results = delight.measure(photographs, Settings(), features=False, only=["halves", "never"])
+    assert results["halves, one photograph"]["pictures"] == 2 and results["halves, one photograph"]["refused"] == 1
+    assert results["never, one photograph"] == {"not_run": "It is too dark. Take another."}
+
+
 def test_a_figure_that_no_picture_has_is_not_made_up():
     assert mean_of([dict.fromkeys(FIGURES, math.nan)]) == dict.fromkeys(FIGURES)
 
