@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m core: run, stages, status, mask, landmarks, doctor, train.
+"""python -m core: run, stages, delighters, status, mask, landmarks, doctor, train.
 
 The command line is one more host of the worker: it writes a job, starts the worker with this same Python and prints
 what it says. Failures are two lines, a problem and its remedy, and exit code 2; Ctrl-C ends with 130.
@@ -14,14 +14,13 @@ import signal
 import sys
 from pathlib import Path
 
-from . import __version__, artist_landmarks, report, settings, stages
+from . import __version__, artist_landmarks, consent, delighter_cards, report, settings, stages
 from .capture import Capture
 from .messages import Problem
 from .worker import terminal
 from .worker.job import read_job, write_job
 
 ROOT = Path(__file__).resolve().parent.parent
-DELIGHTERS = next(f for f in settings.DelightSettings.__dataclass_fields__.values() if f.name == "delighter").metadata["choices"]
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -51,8 +50,11 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--until", dest="last", metavar="STAGE", help="end with this stage")
     run.add_argument("--quality", choices=settings.QUALITIES, default="standard")
     run.add_argument("--skin-tone", metavar="R,G,B", help="sRGB in 0..1, the linear mean over facial skin; or auto")
-    run.add_argument("--delighter", choices=DELIGHTERS, help="how the light is taken out of the frames")
+    run.add_argument("--delighter", choices=delighter_cards.choices(), help="how the light is taken out of the frames")
     run.add_argument("--folder", metavar="FOLDER", type=Path, help="delit pictures for the folder delighter, matched by name")
+    run.add_argument("--preview", action="store_true", help="of SwitchLight, ask for small pictures at half the credits")
+    run.add_argument("--send-frames", action="store_true",
+                     help="you agree that SwitchLight gets the selected frames, a person's face, and charges you; without it, the run stops before")
     run.add_argument("--cameras", metavar="PATH", type=Path,
                      help="cameras of another program: COLMAP's folder, Metashape's .xml, RealityScan's .csv, Blender's .json")
     run.add_argument("--template", metavar="MESH", type=Path, help="your own head mesh, fitted too: an OBJ, or a folder with a neutral OBJ and its shapes")
@@ -64,6 +66,9 @@ def _parser() -> argparse.ArgumentParser:
     run.set_defaults(command=_run)
 
     commands.add_parser("stages", help="list the stages of the chain").set_defaults(command=_stages)
+    cards = commands.add_parser("delighters", help="say of each way to take the light out where it runs, what leaves the machine and what it costs")
+    cards.add_argument("--markdown", action="store_true", help="as docs/delighters.md has it")
+    cards.set_defaults(command=_delighters)
     status = commands.add_parser("status", help="say which stages of a capture are done")
     status.add_argument("capture", metavar="CAPTURE", type=Path)
     status.set_defaults(command=_status)
@@ -98,6 +103,10 @@ def _run(options: argparse.Namespace) -> int:
     delight = {"delighter": options.delighter} if options.delighter else {}
     if options.folder:
         delight["folder"] = str(options.folder.absolute())
+    if (options.preview or options.send_frames) and options.delighter != "switchlight":
+        raise Problem("--preview and --send-frames go with --delighter switchlight only.", "Add --delighter switchlight, or leave them out.")
+    if options.preview:
+        delight["switchlight_preview"] = True
     # A shell that starts a job in the background has it ignore Ctrl-C's signal; here the signal means cancel, whoever sends it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     values = {"seed": options.seed, "device": options.device, "delight": delight, "edited_part": options.edited_part}
@@ -114,12 +123,17 @@ def _run(options: argparse.Namespace) -> int:
         raise Problem(f"{capture.root} is no capture: it holds {strangers[0]}.", "Name a new folder, as NAME.wildcap, and it will be made.")
     job = write_job(capture, source="" if options.source == "-" else options.source, first=options.first, last=options.last, settings=values,
                     quality=options.quality)
-    return terminal.follow(ROOT, capture, job)
+    return terminal.follow(ROOT, capture, job, consent.by_flag(capture) if options.send_frames else {})
 
 
 def _stages(options: argparse.Namespace) -> int:
     for stage in stages.STAGES:
         print(f"{stage.name:13} {' '.join(stage.reads) or 'the video or photographs'} -> {' '.join(stage.writes)}")
+    return 0
+
+
+def _delighters(options: argparse.Namespace) -> int:
+    print(delighter_cards.markdown() if options.markdown else delighter_cards.text(), end="" if options.markdown else "\n")
     return 0
 
 

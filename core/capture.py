@@ -105,6 +105,8 @@ class Capture:
         self.own_head = self.root / "own_head.obj"
         self.own_head_skin = self.root / "own_head.json"
         self.delit = self.root / "delit"
+        self.consent = self.root / "consent.json"  # what the artist agreed to have sent, and nothing else
+        self.switchlight = self.root / "switchlight"  # answers that were paid for, named by what was sent
         self.texture = self.root / "texture.exr"
         self.texture_png = self.root / "texture.png"
         self.texture_filmed = self.root / "texture_filmed.png"

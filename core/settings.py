@@ -66,8 +66,10 @@ class RegistrationSettings:
 
 @dataclass(frozen=True)
 class DelightSettings:
-    delighter: str = setting("shading", choices=("shading", "opendelight", "folder", "none"))
+    delighter: str = setting("shading", choices=("shading", "switchlight", "opendelight", "folder", "none"))
     """How the light is taken out of the frames before the texture is built"""
+    switchlight_preview: bool = setting(False)
+    """Have SwitchLight answer with pictures of at most 512 px, at half the credits: to see whether it helps"""
     folder: str = setting("")
     """Folder of delit pictures for the folder delighter, matched by name"""
     checkpoint: str = setting("")

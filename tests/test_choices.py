@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from core.capture import Capture
-from core.settings import DelightSettings
 
 from . import standin
 
@@ -63,12 +62,6 @@ def test_a_template_is_an_obj_or_a_folder_with_a_neutral_one(addon, item, tmp_pa
     for wrong in ("notes.txt", "nothing.obj"):
         with pytest.raises(RuntimeError, match="neither an OBJ nor a folder"):
             bpy.ops.wildcap.choose_template(filepath=str(tmp_path / wrong))
-
-
-def test_every_delighter_has_a_card(addon):
-    cards = addon("reconstruct.delighters").CARDS
-    assert set(cards) == set(DelightSettings.__dataclass_fields__["delighter"].metadata["choices"])
-    assert all(len(card) == 3 and all(line.endswith(".") for line in card) for card in cards.values())
 
 
 def test_the_wipe_shows_a_frame_before_and_after_and_leaves_no_image_behind(addon, capture, item):

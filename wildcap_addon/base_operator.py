@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all operators share: any exception becomes a problem and a remedy in the panel, never a traceback in the artist's face."""
+"""What all operators share: any exception becomes a problem and a remedy in the panel, never a traceback in the artist's face; and how they ask first."""
 
 import traceback
 
@@ -9,6 +9,9 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core.messages import Problem
 from . import captures, problems, status
+
+WIDTH = 460
+"""Of a dialog, pixels"""
 
 
 class BaseOperator:
@@ -59,3 +62,23 @@ class BaseOperator:
         problems.show(root, problem)
         self.report({'ERROR'}, f"{rpt_(problem.problem)} {rpt_(problem.remedy)}")
         return {'CANCELLED'}
+
+
+class Dialog(BaseOperator):
+    """Mixin: an operator that asks for a yes to `lines`. `tell()` gives them, or None while they are being found out."""
+
+    lines: tuple[str, ...] = ()
+
+    def invoke(self, context, event):
+        try:
+            self.lines = self.tell()
+        except Problem as problem:
+            return self._refuse(captures.root(captures.active(context)), problem)
+        if self.lines is None:
+            return {'CANCELLED'}
+        title = f"{iface_(self.bl_label, 'Operator')}?"
+        return context.window_manager.invoke_props_dialog(self, width=WIDTH, title=title, confirm_text=self.bl_label.partition(" ")[0])
+
+    def draw(self, context):
+        for line in self.lines:
+            problems.draw_text(self.layout, line, WIDTH)

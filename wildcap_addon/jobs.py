@@ -78,8 +78,9 @@ def start(item, goal: str, *, first: str | None = None, last: str | None = None,
     for prepare in before_start:
         prepare()
     path = write_job(capture, first=first, last=last, tool=tool, settings={**properties.values(item), **shared})
-    job = begin(root, goal, Worker(python, ROOT, path, capture.logs / "worker.log"), then)
-    job.on_preview, job.settings = on_preview, read_job(path).settings
+    settings = read_job(path).settings
+    job = begin(root, goal, Worker(python, ROOT, path, capture.logs / "worker.log", preferences.worker_environment(settings.delight.delighter)), then)
+    job.on_preview, job.settings = on_preview, settings
     return job
 
 

@@ -39,6 +39,7 @@ class Step:
 
 BEFORE_MASK = stages.NAMES[:stages.NAMES.index(stages.MASK_STAGE) + 1]
 SET_UP = Step("The solver is not set up on this machine.", "Install Solver", "wildcap.install_solver", 'IMPORT')
+ASK = Step("SwitchLight waits for your consent. Nothing was sent.", "Allow Sending", "wildcap.allow_sending", 'LOCKED')
 WORDS = {"reconstruct": "Reconstructing ...", "solve": "Solving ...",
          "tool": "Looking at the texture ...", "wait": "Waiting for the job of another face ...",
          "install": "Installing the solver ...", "ask": "One moment ..."}
@@ -68,6 +69,8 @@ def _step_of(facts: Facts, status: Status, translated: Callable[[str], str]) -> 
     missing = [name for name in BEFORE_MASK if status.stages[name] == "to do"] if status.source or not status.has_head else []
     if missing and not status.source:
         return Step("This capture has no video yet.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
+    if missing[:1] == ["delight"] and status.sending and status.sending.frames and not status.agreed and facts.has_python:
+        return ASK
     if missing:
         begun = len(missing) < len(BEFORE_MASK)
         state = translated("Stopped before {}.").format(translated(stages.by_name(missing[0]).label)) if begun else "The video is chosen."

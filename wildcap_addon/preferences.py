@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The extension's preferences: the Python that runs the solver, and where captures go."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from .. import __package__ as base_package
+from ..core import switchlight_service
+from ..core.messages import Problem
 
 COMPUTES = [('auto', "Automatic", "For the GPU where there is an NVIDIA one or an Apple one, else for the CPU"),
             *([('apple', "Apple", "For Apple GPUs, by Metal; the CPU can be chosen as well")] if sys.platform == "darwin" else
@@ -40,12 +43,18 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
         description="Where new captures go while the .blend is not saved; empty: WildCap in the documents folder",
     )
 
+    switchlight_key: bpy.props.StringProperty(
+        name="SwitchLight Key", subtype='PASSWORD',
+        description="Your key for SwitchLight, a paid service. Blender keeps it readable in its preferences file; an environment variable does not",
+    )
+
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
         draw_solver(layout, self)
         layout.prop(self, "python")
         layout.prop(self, "captures")
+        draw_key(layout)
 
 
 def draw_solver(layout, preferences) -> None:
@@ -67,8 +76,36 @@ def draw_solver(layout, preferences) -> None:
     column.operator("wildcap.remove_solver", icon='TRASH')
 
 
+def draw_key(layout) -> None:
+    """Where the key of SwitchLight comes from: here, and beside the delighter."""
+    if os.environ.get(switchlight_service.KEY_VARIABLE):
+        text = iface_("The key is that of the environment variable {}").format(switchlight_service.KEY_VARIABLE)
+        layout.label(text=text, translate=False, icon='CHECKMARK')
+    else:
+        layout.prop(get(), "switchlight_key")
+
+
 def get() -> WILDCAP_AP_preferences:
     return bpy.context.preferences.addons[base_package].preferences
+
+
+def has_switchlight_key() -> bool:
+    return bool(os.environ.get(switchlight_service.KEY_VARIABLE) or get().switchlight_key)
+
+
+def worker_environment(delighter: str) -> dict[str, str]:
+    """What a worker is told by its environment alone: the key of a paid delighter, the machine's own first, and that Blender is to stay offline."""
+    if delighter != "switchlight":
+        return {}
+    key = {} if os.environ.get(switchlight_service.KEY_VARIABLE) else {switchlight_service.KEY_VARIABLE: get().switchlight_key}
+    return {**key, **({} if bpy.app.online_access else {switchlight_service.OFFLINE_VARIABLE: "1"})}
+
+
+def require_online(otherwise: str) -> None:
+    """Raises Problem while Blender is told to stay off the network; `otherwise` is what else the artist can do, as the end of a sentence."""
+    if not bpy.app.online_access:
+        where = "" if bpy.app.online_access_override else " (Preferences, System, Network)"
+        raise Problem("Blender is set to work offline.", f"Allow online access{where}, or {otherwise}.")
 
 
 def python() -> Path | None:

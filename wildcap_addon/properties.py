@@ -10,8 +10,8 @@ from pathlib import Path
 
 import bpy
 
+from ..core import delighter_cards, stages
 from ..core import settings as core_settings
-from ..core import stages
 from . import captures, preferences
 from . import hdri as worlds
 
@@ -21,7 +21,7 @@ STAGE_KINDS = {stage.name: type(getattr(core_settings.Settings(), stage.name)) f
 PATHS = {"folder": {"subtype": 'DIR_PATH'}, "checkpoint": {"subtype": 'DIR_PATH'},
          "prior": {"subtype": 'DIR_PATH'}, "template": {"subtype": 'FILE_PATH'}, "import_from": {"subtype": 'FILE_PATH'}}
 """Settings that name a place on the disk, and how they are chosen."""
-ABOUT_THE_FACE = ("skin_tone", "folder", "checkpoint", "delighter", "template", "new_atlas", "import_from", "mirrored", "prior")
+ABOUT_THE_FACE = ("skin_tone", "folder", "switchlight_preview", "checkpoint", "delighter", "template", "new_atlas", "import_from", "mirrored", "prior")
 """Settings that a quality leaves as they are."""
 
 
@@ -37,7 +37,7 @@ def _property(field, tooltip: str):
     common = {"name": name, "description": tooltip, "default": field.default}
     limits = {k: field.metadata[k] for k in ("min", "max") if k in field.metadata}
     if "choices" in field.metadata:
-        return bpy.props.EnumProperty(items=[(c, c.replace("_", " ").title(), "") for c in field.metadata["choices"]], **common)
+        return bpy.props.EnumProperty(items=[_choice(field.name, c) for c in field.metadata["choices"]], **common)
     if isinstance(field.default, bool):
         return bpy.props.BoolProperty(**common)
     if isinstance(field.default, int):
@@ -45,6 +45,12 @@ def _property(field, tooltip: str):
     if isinstance(field.default, float):
         return bpy.props.FloatProperty(**common, **limits)
     return bpy.props.StringProperty(**common, **PATHS.get(field.name, {}))
+
+
+def _choice(setting: str, value: str) -> tuple[str, str, str]:
+    """An item of an EnumProperty: identifier, name, description."""
+    card = delighter_cards.CARDS.get(value) if setting == "delighter" else None
+    return (value, card.title, card.what) if card else (value, value.replace("_", " ").title(), "")
 
 
 GROUPS = {stage: settings_group(stage, kind) for stage, kind in STAGE_KINDS.items()}

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import bpy
 
-from ..core import mask_edit, report, stages
+from ..core import consent, mask_edit, report, stages
 from ..core.capture import Capture
 from ..core.messages import Problem
 from . import captures, properties
@@ -38,6 +38,8 @@ class Status:
     findings: tuple[dict, ...] = ()  # what is wrong with the capture, as core.report.findings tells it
     problem: Problem | None = None
     missing: bool = False  # the folder is not there
+    sending: consent.Sending | None = None  # what SwitchLight, where it is chosen, would get of the frames; None before there are any
+    agreed: bool = False  # whether the artist agreed to that
 
 
 _known: dict[str, tuple[tuple, Status]] = {}  # capture folder -> (stamp, status)
@@ -83,6 +85,7 @@ def look(capture: Capture, settings) -> Status:
         has_head=capture.head.is_file(), head_time=_time(capture.head), has_mask=capture.shadow_mask.is_file(),
         findings=tuple(report.findings(record)), interrupted=_interrupted(capture),
         has_maps=all(path.is_file() for path in delivered(capture)), maps_time=maps_time, render=render.name if _time(render) >= maps_time else "",
+        **_sending(capture, settings),
     )
 
 
@@ -99,6 +102,16 @@ def _state(capture: Capture, stage: stages.Stage, record: dict, settings) -> str
         begun = (capture.logs / f"{stage.name}.log").is_file()  # and did not end: what is there is of another run, or half new
         return "absent" if all(capture.has(name) for name in stage.writes) and not begun else "to do"
     return capture.state(stage, settings)
+
+
+def _sending(capture: Capture, settings) -> dict:
+    if settings.delight.delighter != "switchlight":
+        return {}
+    try:
+        plan = consent.sending(capture, settings.delight.switchlight_preview)
+    except Problem:
+        return {}
+    return {"sending": plan, "agreed": consent.given(capture, plan)}
 
 
 def _whole_solve(capture: Capture, state: str, settings) -> str:
@@ -126,6 +139,7 @@ def _stamp(item) -> tuple[Capture, tuple]:
     capture = captures.folder(item)
     values = properties.values(item)
     watched = (capture.json, capture.head, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved, capture.checkpoints,
+               capture.frames_json, capture.consent, capture.switchlight,
                *delivered(capture), capture.renders)
     stamp = (repr(values), *(p.stat().st_mtime_ns if p.exists() else 0 for p in watched))
     return capture, stamp

@@ -23,8 +23,9 @@ from .none import none
 from .opendelight import delight_photograph as delight_with_opendelight
 from .opendelight import opendelight
 from .shading import shading
+from .switchlight import switchlight
 
-DELIGHTERS: dict[str, Delighter] = {"shading": shading, "opendelight": opendelight, "folder": folder, "none": none}
+DELIGHTERS: dict[str, Delighter] = {"shading": shading, "switchlight": switchlight, "opendelight": opendelight, "folder": folder, "none": none}
 PHOTOGRAPHERS: dict[str, Photographer] = {"opendelight": delight_with_opendelight, "none": leave_photograph}
 """Those that also serve a photograph that belongs to no capture."""
 

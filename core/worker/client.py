@@ -30,12 +30,14 @@ very thread that is waited for when Blender, or anything else, is busy on anothe
 class Worker:
     """One job in a process of its own. `poll` it several times a second until it is no longer `running`."""
 
-    def __init__(self, python: Path, root: Path, job: Path, log: Path):
-        """`python` runs the job file `job` with the code under `root` (the folder that holds core/); stderr goes to `log`."""
+    def __init__(self, python: Path, root: Path, job: Path, log: Path, environment: dict[str, str] | None = None):
+        """`python` runs the job file `job` with the code under `root` (the folder that holds core/); stderr goes to `log`. `environment` lies over the
+        caller's: what the worker is to know and no file and no command line may hold."""
         self.python = Path(python)
         self.root = Path(root)
         self.job = Path(job)
         self.log = Path(log)
+        self._own = environment or {}
         self._messages: queue.SimpleQueue[Message | int] = queue.SimpleQueue()
         self._process: subprocess.Popen | None = None
         self._stage = ""
@@ -58,7 +60,7 @@ class Worker:
         command = [str(self.python), "-E", "-s", "-B", "-X", "utf8", "-m", f"{_package()}.worker", str(self.job.absolute())]
         with log:
             try:
-                self._process = subprocess.Popen(command, cwd=self.root, env=_environment(), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log,
+                self._process = subprocess.Popen(command, cwd=self.root, env=_environment(self._own), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log,
                                                  **_apart())
             except OSError as error:
                 raise Problem(f"The worker's Python {self.python} could not be started ({error.strerror or error}).",
@@ -140,12 +142,12 @@ def _package() -> str:
     return __package__.split(".")[-2]
 
 
-def _environment() -> dict[str, str]:
-    """The caller's environment with the thread count of the libraries set and how they wait, unless the user has set it."""
+def _environment(own: dict[str, str]) -> dict[str, str]:
+    """The caller's environment with the thread count of the libraries set and how they wait, unless the user has set it; `own` lies over it."""
     affinity = getattr(os, "sched_getaffinity", None)
     cores = len(affinity(0)) if affinity else os.cpu_count() or 1
     threads = str(cores if cores <= 2 else cores - 1)
-    return {**{name: threads for name in THREAD_VARIABLES}, **SPINS, **os.environ}
+    return {**{name: threads for name in THREAD_VARIABLES}, **SPINS, **os.environ, **own}
 
 
 def _apart() -> dict:

@@ -17,9 +17,10 @@ from .client import Worker
 POLL_S = 0.1
 
 
-def follow(root: Path, capture: Capture, job: Path) -> int:
-    """Runs a job with this Python and prints what it says; returns the exit code: 0, 2 for a problem, 130 after Ctrl-C."""
-    worker = Worker(Path(sys.executable), root, job, capture.logs / "worker.log")
+def follow(root: Path, capture: Capture, job: Path, environment: dict[str, str]) -> int:
+    """Runs a job with this Python and prints what it says; returns the exit code: 0, 2 for a problem, 130 after Ctrl-C. `environment` is the worker's own,
+    beside ours."""
+    worker = Worker(Path(sys.executable), root, job, capture.logs / "worker.log", environment)
     line = _Line()
     worker.start()
     while True:

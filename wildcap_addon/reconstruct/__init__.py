@@ -4,9 +4,9 @@
 
 import bpy
 
-from . import choices, delighters, operators, panel
+from . import choices, delighters, operators, panel, sending
 
-_register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *choices.CLASSES, *panel.CLASSES))
+_register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *choices.CLASSES, *sending.CLASSES, *panel.CLASSES))
 
 
 def register():

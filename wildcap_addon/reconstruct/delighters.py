@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The card of each delighter, and what it did to a frame: before and after, with a wipe between them.
+"""What a delighter did to a frame: before and after, with a wipe between them.
 
 The wipe is an icon of its own: no data-block stays behind. Its frame is read when the artist asks for it, not while a panel is drawn.
 """
@@ -15,20 +15,6 @@ from ...core.capture import Capture
 from ...core.messages import Problem
 from .. import colours
 
-CARDS = {
-    "shading": ("Takes the light of the surroundings out of every frame by the head's own shape.",
-                "Needs nothing else, runs on any machine, seconds per frame.",
-                "The default. Hard shadows are left to the mask and the solver."),
-    "none": ("Leaves the frames as they were shot.",
-             "Needs nothing.",
-             "For a face that was filmed under an overcast sky or in a light tent."),
-    "opendelight": ("The published delighting network of the paper OpenDelight, where you have its weights.",
-                    "Needs the folder with the authors' two files; runs on your machine, and a GPU is of great help.",
-                    "Not verified on the real weights. It does not say where shadows were."),
-    "folder": ("Takes pictures that another program has delit, for instance a relighting network.",
-               "Needs a folder of pictures named like the frames, neither cropped nor turned.",
-               "For the best model that you have access to; its licence is yours to keep to."),
-}
 SIDE = 256
 """Of the square icon, pixels"""
 

@@ -8,7 +8,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from ...core import stages
 from .. import captures, problems
 from ..base_panel import CapturePanel, draw_settings
-from . import delighters, landmarks
+from . import card, delighters, landmarks
 
 
 class WILDCAP_PT_reconstruct(CapturePanel, bpy.types.Panel):
@@ -60,14 +60,7 @@ class WILDCAP_PT_delighter(CapturePanel, bpy.types.Panel):
         layout = self.layout
         item = captures.active(context)
         width = context.region.width if context.region else 300
-        layout.row().prop(item.delight, "delighter", expand=True)
-        card = layout.box().column()
-        for line in delighters.CARDS[item.delight.delighter]:
-            problems.draw_text(card, line, width)
-        if item.delight.delighter == "folder":
-            layout.prop(item.delight, "folder", text="")
-        elif item.delight.delighter == "opendelight":
-            layout.prop(item.delight, "checkpoint", text="")
+        card.draw(layout, item, width)
         capture = captures.folder(item)
         layout.operator("wildcap.compare_delit", icon='IMAGE_DATA')
         name = delighters.shown(capture)

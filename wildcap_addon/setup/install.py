@@ -7,35 +7,13 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.messages import Problem
 from ...core.worker import environment, index, installation
-from .. import jobs, preferences, problems
-from ..base_operator import BaseOperator
+from .. import jobs, preferences
+from ..base_operator import Dialog
 from . import asking
 from .checking import REQUIREMENTS, accept
 
 COMPUTES = {"cpu": "the CPU", "cuda": "NVIDIA GPUs (CUDA)", "apple": "Apple GPUs (Metal)"}
-WIDTH = 460
-
-
-class Dialog(BaseOperator):
-    """Mixin: an operator that asks for a yes to `lines`. `tell()` gives them, or None while they are being found out."""
-
-    lines: tuple[str, ...] = ()
-
-    def invoke(self, context, event):
-        try:
-            self.lines = self.tell()
-        except Problem as problem:
-            return self._refuse("", problem)
-        if self.lines is None:
-            return {'CANCELLED'}
-        title = f"{iface_(self.bl_label, 'Operator')}?"
-        return context.window_manager.invoke_props_dialog(self, width=WIDTH, title=title, confirm_text=self.bl_label.partition(" ")[0])
-
-    def draw(self, context):
-        for line in self.lines:
-            problems.draw_text(self.layout, line, WIDTH)
 
 
 class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
@@ -51,7 +29,7 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
 
     @staticmethod
     def tell() -> tuple[str, ...] | None:
-        require_online()
+        preferences.require_online("use a Python that has the packages already")
         compute, source, folder = *chosen(), preferences.environment_folder()
         plan = asking.answer(("plan", compute, source))
         if plan is None:
@@ -60,7 +38,7 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
         return told(plan, compute, folder, index.check_space(plan, folder))
 
     def work(self, context):
-        require_online()
+        preferences.require_online("use a Python that has the packages already")
         compute, source, folder = *chosen(), preferences.environment_folder()
         plan = asking.answer(("plan", compute, source))
         if plan is not None:
@@ -112,13 +90,6 @@ def told(plan: index.Plan, compute: str, folder: Path, free: int) -> tuple[str, 
 def chosen() -> tuple[str, str]:
     """(compute, source) of the preferences, with what Automatic means here. Raises Problem for what cannot be here."""
     return installation.compute_of(preferences.get().compute), preferences.get().packages
-
-
-def require_online() -> None:
-    """Raises Problem while Blender is told to stay off the network."""
-    if not bpy.app.online_access:
-        where = "" if bpy.app.online_access_override else " (Preferences, System, Network)"
-        raise Problem("Blender is set to work offline.", f"Allow online access{where}, or use a Python that has the packages already.")
 
 
 def look_up(task, compute: str, source: str) -> index.Plan:

@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a paid service would get of a capture, and whether the artist agreed to it: consent.json holds for these very pictures, here, and no others.
+
+Ground floor: standard library only. The record names the capture's place, the receiving machine, the credits and every picture by its content, so that a
+copy in another capture, a moved one or changed frames are not agreed to. Answers that have come lie in switchlight/, named by what was sent.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+from . import switchlight_service as service
+from .capture import Capture, storage_problem, write_json
+from .hashes import hash_file
+from .messages import Problem
+
+GIVEN_VARIABLE = "WILDCAP_SWITCHLIGHT_CONSENT"
+"""Environment variable by which the terminal's --send-frames reaches the worker: the place of the one capture that it is for."""
+TOLD = (
+    "{pictures} of this capture leave your machine: they show a person's face. Ask that person first.",
+    "They go to {company}, a company, at {host}, and nothing else goes there. What it does with them is told at {website}.",
+    "{company} charges your account with {credits}. {kept} came before and are not paid again.",
+    "What comes back may not be used to train a model, as its terms say.",
+)
+"""Said before anything is sent; `lines` fills it in."""
+
+
+@dataclass(frozen=True)
+class Sending:
+    """What a run would send: `frames` are name -> content hash of those without an answer yet, `kept` the number of those with one."""
+
+    host: str
+    frames: dict[str, str]
+    kept: int
+    preview: bool
+
+    @property
+    def credits(self) -> float:
+        return service.price(len(self.frames), self.preview)
+
+
+def sending(capture: Capture, preview: bool, names: Collection[str] | None = None) -> Sending:
+    """What of the frames `names` (None: the selected ones) has no answer yet. Raises Problem where there are no frames."""
+    names = selected(capture) if names is None else names
+    hashes = {name: hash_file(capture.frames / name) for name in sorted(names) if (capture.frames / name).is_file()}
+    missing = {name: content for name, content in hashes.items() if not answer(capture, content, preview).is_file()}
+    return Sending(service.host(), missing, len(hashes) - len(missing), preview)
+
+
+def selected(capture: Capture) -> list[str]:
+    """The frames that the texture is made from. Raises Problem where there are none yet."""
+    try:
+        names = [frame["name"] for frame in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"] if frame["selected"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        names = []
+    if not names:
+        raise Problem("This capture has no frames yet that could be agreed to.", "Reconstruct first: it stops before anything is sent.")
+    return names
+
+
+def answer(capture: Capture, content: str, preview: bool) -> Path:
+    """Where the answer to a picture of that content hash is kept: named by the hash of all that was sent."""
+    sent = json.dumps([content, service.form(preview)], sort_keys=True)
+    return capture.switchlight / f"{hashlib.blake2b(sent.encode(), digest_size=16).hexdigest()}.png"
+
+
+def lines(plan: Sending, translated=str) -> list[str]:
+    """What the artist is told, whole sentences; `translated` looks a template up."""
+    values = {"pictures": f"{len(plan.frames)} frame{'' if len(plan.frames) == 1 else 's'}", "company": service.COMPANY, "host": plan.host,
+              "website": service.WEBSITE, "credits": service.amount(plan.credits), "kept": plan.kept}
+    return [translated(line).format(**values) for line in TOLD]
+
+
+def give(capture: Capture, plan: Sending) -> None:
+    """Records that the artist agrees to it."""
+    write_json(capture.consent, {"capture": _place(capture), "company": service.COMPANY, "host": plan.host, "credits": plan.credits,
+                                 "preview": plan.preview, "frames": plan.frames, "given": time.strftime("%Y-%m-%dT%H:%M:%S")})
+
+
+def withdraw(capture: Capture) -> None:
+    """Takes the consent back: nothing more is sent. What has come stays."""
+    try:
+        capture.consent.unlink(missing_ok=True)
+    except OSError as error:
+        raise storage_problem(error, capture.consent) from error
+
+
+def given(capture: Capture, plan: Sending) -> bool:
+    """Whether all that would be sent was agreed to: these pictures, from this place, to this machine, for no more credits. Damaged records count as none."""
+    try:
+        record = json.loads(capture.consent.read_text(encoding="utf-8"))
+        return (record["capture"] == _place(capture) and record["host"] == plan.host and record["preview"] is plan.preview
+                and plan.credits <= record["credits"] and plan.frames.items() <= record["frames"].items())
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return False
+
+
+def require(capture: Capture, plan: Sending) -> None:
+    """Raises Problem unless it was agreed to, here or by the terminal's flag, which this records."""
+    if os.environ.get(GIVEN_VARIABLE) == _place(capture):
+        give(capture, plan)
+    if not given(capture, plan):
+        raise Problem(f"SwitchLight waits for your consent: {len(plan.frames)} frames that show a person's face would go to {service.COMPANY} ({plan.host}) "
+                      f"for {service.amount(plan.credits)}. Nothing was sent.",
+                      "Click Allow Sending beside the delighter, or add --send-frames in the terminal; or choose another delighter, which sends nothing.")
+
+
+def by_flag(capture: Capture) -> dict[str, str]:
+    """The environment of a worker that the terminal's flag allows to send this capture's frames."""
+    return {GIVEN_VARIABLE: _place(capture)}
+
+
+def _place(capture: Capture) -> str:
+    return str(capture.root.resolve())

@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators: agree that a paid service gets frames of this capture, told first what leaves the machine, to whom and for how much; and take that back."""
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+
+from ...core import consent
+from ...core.messages import Problem
+from .. import captures, preferences, properties
+from ..base_operator import BaseOperator, Dialog
+
+
+class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
+    """Agree that SwitchLight gets the chosen frames of this capture: first you are told what leaves your machine, who gets it, and what it costs.
+    Nothing is sent before that"""
+
+    bl_idname = "wildcap.allow_sending"
+    bl_label = "Allow Sending"
+
+    told: consent.Sending | None = None
+
+    @classmethod
+    def poll(cls, context):
+        return cls.with_capture(context) and cls.allowed(captures.active(context).delight.delighter == "switchlight",
+                                                         "Only SwitchLight sends anything: choose it as the delighter first")
+
+    def tell(self) -> tuple[str, ...]:
+        self.told = plan(captures.require(bpy.context))
+        return tuple(consent.lines(self.told, iface_))
+
+    def work(self, context):
+        item = captures.require(context)
+        now = plan(item)
+        if self.told is not None and now != self.told:
+            raise Problem("The frames have changed while you were asked.", "Click Allow Sending again, and look at what would be sent now.")
+        consent.give(captures.folder(item), now)
+
+
+class WILDCAP_OT_withdraw_consent(BaseOperator, bpy.types.Operator):
+    """Take your consent back: no frame of this capture is sent any more. What SwitchLight has answered stays in the capture"""
+
+    bl_idname = "wildcap.withdraw_consent"
+    bl_label = "Withdraw Consent"
+
+    @classmethod
+    def poll(cls, context):
+        return cls.with_capture(context)
+
+    def work(self, context):
+        consent.withdraw(captures.folder(captures.require(context)))
+
+
+def plan(item) -> consent.Sending:
+    """What would be sent of a capture. Raises Problem where nothing can be, or need be."""
+    preferences.require_online("choose another delighter")
+    found = consent.sending(captures.folder(item), properties.settings(item).delight.switchlight_preview)
+    if not found.frames:
+        raise Problem("There is nothing to send: every chosen frame has its answer.", "Click Reconstruct to go on.")
+    return found
+
+
+CLASSES = (WILDCAP_OT_allow_sending, WILDCAP_OT_withdraw_consent)
