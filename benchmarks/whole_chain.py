@@ -25,13 +25,13 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images, meshes, raster, template
+from core import images, template
 from core.capture import Capture
 from core.messages import Reporter
 from core.settings import Settings, from_json
-from core.shadow_mask.lift import lift_shadows
 
 from .albedo_score import score_capture
+from .shadow_captures import lifted_truth
 
 ROWS = ("chain", "solve_off", "raw_texture", "true_frames", "true_mask", "mask")
 
@@ -93,15 +93,8 @@ def _score_texture(capture: Capture, truth: Path, settings: Settings) -> dict:
 
 def _true_shadow(capture: Capture, truth: Path, size: int) -> tuple[np.ndarray, np.ndarray]:
     """The true shadow in UV and the texels of facial skin that are judged, both bool [size, size]."""
-    shutil.rmtree(capture.delit, ignore_errors=True)
-    numbers = {f["video_frame"]: f["name"] for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
-    for path in (truth / "shadow").glob("*.png"):
-        if int(path.stem) in numbers:
-            images.write_data(capture.delit / "shadow" / f"{Path(numbers[int(path.stem)]).stem}.png", images.read_mask(path))
-    head = meshes.read_obj(capture.head)
-    face, bary = raster.rasterize_uv(head, size)
     confidence = images.resize(images.read_data(capture.texture_confidence)[..., 0], size, size)
-    return lift_shadows(capture, head, face, bary, Reporter("shadow_mask")) > 0.5, (template.mask("skin", size) > 0.5) & (confidence > 0.1)
+    return lifted_truth(capture, truth, size), (template.mask("skin", size) > 0.5) & (confidence > 0.1)
 
 
 def _solve_settings(capture: Capture) -> dict:

@@ -55,6 +55,8 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--preview", action="store_true", help="of SwitchLight, ask for small pictures at half the credits")
     run.add_argument("--send-frames", action="store_true",
                      help="you agree that SwitchLight gets the selected frames, a person's face, and charges you; without it, the run stops before")
+    run.add_argument("--softened", metavar="FOLDER", type=Path,
+                     help="the frames with their shadows softened by any tool, matched by name: what that lightens is the mask's proposal")
     run.add_argument("--cameras", metavar="PATH", type=Path,
                      help="cameras of another program: COLMAP's folder, Metashape's .xml, RealityScan's .csv, Blender's .json")
     run.add_argument("--template", metavar="MESH", type=Path, help="your own head mesh, fitted too: an OBJ, or a folder with a neutral OBJ and its shapes")
@@ -110,6 +112,8 @@ def _run(options: argparse.Namespace) -> int:
     # A shell that starts a job in the background has it ignore Ctrl-C's signal; here the signal means cancel, whoever sends it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     values = {"seed": options.seed, "device": options.device, "delight": delight, "edited_part": options.edited_part}
+    if options.softened:
+        values["shadow_mask"] = {"softened": str(options.softened.absolute())}
     if options.cameras:
         values["cameras"] = {"import_from": str(options.cameras.absolute())}
     if options.new_atlas and not options.template:

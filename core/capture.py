@@ -196,7 +196,7 @@ class Capture:
         if not stage.reads:
             parts.append(source_stamp(record.get("source", "")) or record.get("source_stamp", []))
         named = {"delight": settings.delight.folder, "cameras": settings.cameras.import_from, "registration": settings.registration.template,
-                 "solve": settings.solve.prior}.get(stage.name)
+                 "shadow_mask": settings.shadow_mask.softened, "solve": settings.solve.prior}.get(stage.name)
         parts += [hash_tree(Path(named).expanduser())] if named else []  # what the artist keeps elsewhere
         if stage.name == "solve" and settings.solve.prior:  # it works in the UVs of the artist's own mesh
             parts += [[path.name, hash_tree(path)] for path in (self.own_head, self.own_head_skin)]

@@ -91,7 +91,9 @@ class ShadowMaskSettings:
     sensitivity: float = setting(0.5, min=0.0, max=1.0)
     """How readily a dark region is taken for a shadow"""
     dilate_px: int = setting(8, min=0, max=64, unit="px")
-    """How far the proposal is grown, at a 1024 px texture"""
+    """How far the proposal is grown, at a 1024 px texture; where the texture shows the shadow's edge it is laid on that"""
+    softened: str = setting("")
+    """Folder of the frames with their shadows softened by any tool, matched by name: what that lightens is proposed. Empty: the delighter tells"""
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,9 @@ from .raster import RayCaster
 EVEN = 1 / 0.282095  # the coefficient of radiance 1 from everywhere
 
 
-def ambient_occlusion(caster: RayCaster, points: np.ndarray, normals: np.ndarray, rays: int = 128,
-                      step: Callable[[int, int], None] = lambda done, of: None) -> np.ndarray:
-    """[N] in [0, 1]: the share of an even sky's light that reaches surface points [N, 3] with unit normals [N, 3]; 1 where nothing is in the way."""
-    return np.clip(EVEN * radiance_transfer(caster, points, normals, rays, step)[:, 0], 0, 1)
+def ambient_occlusion(transfer: np.ndarray) -> np.ndarray:
+    """radiance_transfer [..., 9] -> [...] in [0, 1]: the share of an even sky's light that reaches the surface; 1 where nothing is in the way."""
+    return np.clip(EVEN * transfer[..., 0], 0, 1)
 
 
 def radiance_transfer(caster: RayCaster, points: np.ndarray, normals: np.ndarray, rays: int = 128,

@@ -41,7 +41,7 @@ STAGES = (
     Stage("delight", "Delight", ("frames/", "cameras/", "head.obj"), ("delit/",), "core.delight"),
     Stage("texture", "Texture", ("frames/", "delit/", "cameras/", "head.obj"), ("texture.exr", "texture.png", "texture_confidence.exr"), "core.texture"),
     Stage("shadow_mask", "Shadow Mask", ("delit/", "cameras/", "head.obj", "texture.exr", "texture_confidence.exr"), ("shadow_mask_auto.png",),
-          "core.shadow_mask"),
+          "core.shadow_mask", wishes=("texture_filmed.png", "frames/")),
     Stage("solve", "Solve", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
           tuple(f"maps/{name}" for name in MAPS), "core.solve", shared=("seed",), data=("weights/prior.safetensors",),
           wishes=("shadow_mask.png", "protect_mask.png", "texture_filmed.png", "frames/", "cameras/", "delit/")),

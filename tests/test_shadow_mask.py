@@ -51,7 +51,7 @@ def skin_texture(seed: int = 0) -> np.ndarray:
 
 def proposed(capture: Capture, texture: np.ndarray, **settings) -> np.ndarray:
     images.write_linear(capture.texture, texture)
-    run(capture, from_json({"shadow_mask": settings}), Reporter("shadow_mask"))
+    run(capture, from_json({"delight": {"delighter": "shading"}, "shadow_mask": settings}), Reporter("shadow_mask"))
     return images.read_mask(capture.shadow_mask_auto)
 
 

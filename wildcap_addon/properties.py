@@ -19,9 +19,10 @@ STAGE_KINDS = {stage.name: type(getattr(core_settings.Settings(), stage.name)) f
 
 
 PATHS = {"folder": {"subtype": 'DIR_PATH'}, "checkpoint": {"subtype": 'DIR_PATH'},
-         "prior": {"subtype": 'DIR_PATH'}, "template": {"subtype": 'FILE_PATH'}, "import_from": {"subtype": 'FILE_PATH'}}
+         "prior": {"subtype": 'DIR_PATH'}, "template": {"subtype": 'FILE_PATH'}, "import_from": {"subtype": 'FILE_PATH'},
+         "softened": {"subtype": 'DIR_PATH'}}
 """Settings that name a place on the disk, and how they are chosen."""
-ABOUT_THE_FACE = ("skin_tone", "folder", "switchlight_preview", "checkpoint", "delighter", "template", "new_atlas", "import_from", "mirrored", "prior")
+ABOUT_THE_FACE = ("skin_tone", "folder", "switchlight_preview", "checkpoint", "delighter", "template", "new_atlas", "import_from", "mirrored", "softened", "prior")
 """Settings that a quality leaves as they are."""
 
 
@@ -129,7 +130,8 @@ def values(item: WILDCAP_PG_capture) -> dict:
     """The settings of a capture as a job file holds them: stage -> {name: value}, seed, device."""
     found = {stage: {f.name: getattr(getattr(item, stage), f.name) for f in fields(kind)} for stage, kind in STAGE_KINDS.items()}
     found["solve"]["skin_tone"] = ",".join(f"{c:.4f}" for c in item.skin_tone) if item.use_skin_tone else "auto"
-    for stage, name in (("cameras", "import_from"), ("delight", "folder"), ("delight", "checkpoint"), ("registration", "template"), ("solve", "prior")):
+    for stage, name in (("cameras", "import_from"), ("delight", "folder"), ("delight", "checkpoint"), ("shadow_mask", "softened"),
+                        ("registration", "template"), ("solve", "prior")):
         if found[stage][name]:
             found[stage][name] = str(Path(bpy.path.abspath(found[stage][name])))
     return {**found, "seed": item.seed, "device": device(item)}

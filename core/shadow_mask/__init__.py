@@ -1,76 +1,137 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A first proposal of the shadow mask M, in UV: what the delighter saw shaded, and what is still dark in I_UV.
+"""A first proposal of the shadow mask M, in UV: what single frames show to be in shadow, what is still dark in I_UV, and occlusion baked into it.
 
 Writes shadow_mask_auto.png only (8 bit grey, soft edges); shadow_mask.png is the artist's and is never touched.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .. import images, meshes, template
 from ..capture import Capture
-from ..meshes import Mesh
 from ..messages import Reporter
-from ..raster import interpolate, rasterize_uv
+from ..raster import bleed, interpolate
 from ..settings import Settings
-from .lift import lift_shadows
+from ..skylight import ambient_occlusion, radiance_transfer
+from .frames import shadow_frames, source_of
+from .lift import Unfolded, lift_shadows
+from .occlusion import baked_occlusion
 from .residual import find_shadow
-from .tidy import cohere, tidy
+from .snap import snapped
+from .sunless import out_of_sun
+from .tidy import cohere, over_brows, tidy
 
 WORKING_SIZE = 512
 SEEN = 0.05  # least confidence of a texel that is judged
+SKY_RAYS = 64
+UNLIKE_SKIN = ("lips", "brows", "eyes", "nostrils", "scalp")  # their darkness is their own
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """At the working size: texture (I_UV) and filmed (with its light) linear [S, S, 3]; normals [S, S, 3]; visible [S, S]: the sky's share that
+    reaches the surface; judged bool [S, S]: texels of the face that somebody saw; skin, brows [S, S] in [0, 1]: plain skin, and brows."""
+
+    texture: np.ndarray
+    filmed: np.ndarray
+    normals: np.ndarray
+    visible: np.ndarray
+    judged: np.ndarray
+    skin: np.ndarray
+    brows: np.ndarray
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """texture.exr, texture_confidence.exr, head.obj and delit/shadow -> shadow_mask_auto.png at the texture's size."""
-    texture = images.read_linear(capture.texture)
-    confidence = images.read_data(capture.texture_confidence)[..., 0]
-    head = meshes.read_obj(capture.head)
-    size = len(texture)
-    work = min(WORKING_SIZE, size)
-    report.progress(0, 4, "Unfolding the head")
-    face, bary = rasterize_uv(head, work)
-    small = images.resize(texture, work, work)
-    judged = (face >= 0) & (images.resize(confidence, work, work) > SEEN) & (_region(head, "face", work) > 0.5)
-    lifted = lift_shadows(capture, head, face, bary, report)
-    still, residual, step = propose(small, _normals(head, face, bary), judged, _region(head, "skin", work) * (1 - _region(head, "eyes", work)) > 0.5,
-                                    settings.shadow_mask.sensitivity)
-    threshold = 0.75 - 0.5 * settings.shadow_mask.sensitivity
-    mask = tidy((still | (lifted > threshold)) & judged, judged, settings.shadow_mask.dilate_px * work / 1024)
-    images.write_data(capture.shadow_mask_auto, np.clip(images.resize(mask, size, size), 0, 1))
-
-    report.figure("masked_percent", round(100 * float(mask[judged].mean()) if judged.any() else 0.0, 1))
-    report.figure("seen_in_frames_percent", round(100 * float((lifted > threshold)[judged].mean()) if judged.any() else 0.0, 1))
-    report.figure("left_in_texture_percent", round(100 * float(still[judged].mean()) if judged.any() else 0.0, 1))
-    report.figure("threshold_log", round(float(step.mean()) / 2, 3))
-    shown = np.repeat(np.clip(0.5 + residual.mean(-1) / 2, 0, 1)[..., None], 3, -1) * judged[..., None]
-    images.write_srgb(capture.picture("shadow_mask", "texture_residual_mask"),
-                      np.hstack([images.linear_to_srgb(small), shown.astype(np.float32), np.repeat(mask[..., None], 3, -1)]))
+    """texture.exr, texture_confidence.exr, head.obj, and where they are there texture_filmed.png and the frames' shadows -> shadow_mask_auto.png at the
+    texture's size. Raises Problem where the folder of softened pictures holds none of a registered frame."""
+    report.progress(0, 8, "Unfolding the head")
+    mesh = meshes.read_obj(capture.head)
+    width = images.size(capture.texture)[0]
+    head = Unfolded.of(mesh, min(WORKING_SIZE, width))
+    transfer = radiance_transfer(head.caster, mesh.vertices, meshes.vertex_normals(mesh), SKY_RAYS,
+                                 lambda done, of: report.progress(done, 4 * of, "Casting rays at the sky"))
+    evidence = _evidence(capture, head, ambient_occlusion(transfer))
+    source = source_of(capture, settings)
+    seen = np.zeros_like(evidence.judged)
+    if source == "texture":
+        seen = out_of_sun(evidence.filmed, transfer, head, evidence.judged, evidence.skin > 0.5, settings.shadow_mask.sensitivity, report)
+    elif source:
+        seen = over_brows(lift_shadows(head, *shadow_frames(capture, settings, source), report), evidence.judged, evidence.brows) > 0.5
+    report.progress(7, 8, "Looking for shadows in the texture")
+    found = propose(evidence, seen, settings.shadow_mask.sensitivity, settings.shadow_mask.dilate_px)
+    images.write_data(capture.shadow_mask_auto, np.clip(images.resize(found.mask, width, width), 0, 1))
+    _leave_figures(capture, report, source or "nothing", evidence, found)
 
 
-def propose(texture: np.ndarray, normals: np.ndarray, judged: np.ndarray, skin: np.ndarray, sensitivity: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Linear texture and unit normals [S, S, 3]; bool [S, S]: texels to judge, and those of plain skin (lips, brows and the like are dark by themselves).
+@dataclass(frozen=True)
+class Proposal:
+    """mask [S, S] in [0, 1], and what it came from: frames and texture bool [S, S], occlusion [S, S] in [0, 1], edges [S, S]: where it was laid on one."""
 
-    Returns the shadow still in the texture bool [S, S], the residual against lit skin [S, S, 3] in log units, and the shadow's colour [3] in log units.
-    """
-    odds, residual = np.full(judged.shape, -12.0), np.zeros(texture.shape)
-    found, deviation, step = find_shadow(texture[judged], normals[judged], skin[judged])
-    odds[judged], residual[judged] = found, deviation
+    mask: np.ndarray
+    frames: np.ndarray
+    texture: np.ndarray
+    occlusion: np.ndarray
+    edges: np.ndarray
+
+
+def propose(evidence: Evidence, seen: np.ndarray, sensitivity: float, dilate_px: float) -> Proposal:
+    """The proposal from the evidence and where the frames or the filmed texture show a shadow, bool [S, S]. dilate_px: at 1024 texels."""
+    judged, skin = evidence.judged, evidence.skin
+    texture = still_dark(evidence.texture, evidence.normals, judged, skin > 0.5, sensitivity)
+    mask = tidy((seen & judged) | texture, judged, dilate_px * len(judged) / 1024)
+    mask, edges = snapped(mask, evidence.filmed, evidence.normals, np.where(judged, 0.2 + 0.8 * skin, 0).astype(np.float32))
+    luminance = np.log(np.maximum(evidence.texture.mean(-1), 2e-3))
+    occlusion = baked_occlusion(luminance, evidence.visible, np.where(judged, skin, 0) * (1 - mask))
+    return Proposal((np.maximum(mask, occlusion) * judged).astype(np.float32), seen & judged, texture, occlusion, edges)
+
+
+def still_dark(texture: np.ndarray, normals: np.ndarray, judged: np.ndarray, skin: np.ndarray, sensitivity: float) -> np.ndarray:
+    """bool [S, S]: shadow in a linear texture [S, S, 3] with unit normals [S, S, 3]; judged, skin bool [S, S]: what is looked at, and plain skin."""
+    odds = np.full(judged.shape, -12.0)
+    found, _, step = find_shadow(texture[judged], normals[judged], skin[judged])
     if not step.any():
-        return np.zeros_like(judged), residual, step
-    odds = np.where(skin, np.clip(odds + 6 * (sensitivity - 0.5), -12, 12), 0)  # what is not skin follows its neighbours
-    return cohere(odds, judged), residual, step
+        return np.zeros_like(judged)
+    odds[judged] = found
+    return cohere(np.where(skin, np.clip(odds + 6 * (sensitivity - 0.5), -12, 12), 0), judged)  # what is not skin follows its neighbours
 
 
-def _normals(head: Mesh, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
-    normals = interpolate(meshes.vertex_normals(head), head.faces, face, bary)
-    return normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-9)
+def _evidence(capture: Capture, head: Unfolded, visible: np.ndarray) -> Evidence:
+    """visible [V]: the sky's share that reaches the head's vertices."""
+    size = len(head.face)
+    texture = images.resize(images.read_linear(capture.texture), size, size)
+    filmed = images.resize(images.read_linear(capture.texture_filmed), size, size) if capture.texture_filmed.is_file() else texture
+    confidence = images.resize(images.read_data(capture.texture_confidence)[..., 0], size, size)
+    built_in = head.mesh.faces.shape == template.load().faces.shape  # on a head of another topology everything is face and skin
+    face, skin = (template.mask(name, size) if built_in else np.ones((size, size), np.float32) for name in ("face", "skin"))
+    brows = template.mask("brows", size) if built_in else np.zeros_like(skin)
+    for name in UNLIKE_SKIN if built_in else ():
+        skin = skin * (1 - template.mask(name, size))
+    visible = interpolate(visible[:, None], head.mesh.faces, head.face, head.bary)[..., 0]
+    return Evidence(texture, filmed, bleed(head.spread(head.normals), head.covered), bleed(visible, head.covered).astype(np.float32),
+                    head.covered & (confidence > SEEN) & (face > 0.5), skin, brows)
 
 
-def _region(head: Mesh, name: str, size: int) -> np.ndarray:
-    """A UV mask of the template [S, S]; on a head of another topology everything is face and skin."""
-    if head.faces.shape == template.load().faces.shape:
-        return template.mask(name, size)
-    return np.full((size, size), float(name in ("face", "skin")), np.float32)
+def _leave_figures(capture: Capture, report: Reporter, source: str, evidence: Evidence, found: Proposal) -> None:
+    def percent(part: np.ndarray) -> float:
+        return round(100 * float(part[evidence.judged].mean()) if evidence.judged.any() else 0.0, 1)
+
+    report.figure("masked_percent", percent(found.mask))
+    report.figure("frames_judged_by", source)
+    report.figure("seen_in_frames_percent", percent(found.frames))
+    report.figure("left_in_texture_percent", percent(found.texture))
+    report.figure("occlusion_percent", percent(found.occlusion > 0.1))
+    report.figure("laid_on_edges_percent", round(100 * float(found.edges.sum() / max(_border(found.mask).sum(), 1)), 1))
+    filmed = images.linear_to_srgb(evidence.filmed)
+    shown = np.stack([found.frames, found.texture, found.occlusion / max(float(found.occlusion.max()), 0.25)], -1).astype(np.float32)  # red, green, blue
+    tinted = 0.55 * filmed + 0.45 * shown
+    images.write_srgb(capture.picture("shadow_mask", "filmed__red_in_frames_green_in_texture_blue_occlusion__proposal"),
+                      np.hstack([filmed, tinted, np.repeat(found.mask[..., None], 3, -1)]))
+
+
+def _border(mask: np.ndarray) -> np.ndarray:
+    inside = mask > 0.5
+    return (inside ^ np.roll(inside, 1, 0)) | (inside ^ np.roll(inside, 1, 1))

@@ -1,39 +1,79 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shadows that the delighter saw in the frames, carried to the texture (paper, appendix "Shadow Detection")."""
+"""Shadows seen in the frames, carried to the texture (paper, appendix "Shadow Detection"): each texel is judged by the views that see it well."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterable
+from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
-from .. import images
-from ..capture import Capture
 from ..meshes import Mesh, vertex_normals
 from ..messages import Reporter
-from ..raster import RayCaster, interpolate, sample, visible_from
-from ..views import read_views
+from ..raster import RayCaster, interpolate, rasterize_uv, render_view, sample, visible_from
+from ..views import View
+
+GRAZING = 0.2  # cosine of the steepest angle under which a texel is judged
+EDGE_PX = 0.012  # of the frame's longer side: so near a silhouette a small error of the head shows what lies behind
 
 
-def lift_shadows(capture: Capture, mesh: Mesh, face: np.ndarray, bary: np.ndarray, report: Reporter) -> np.ndarray:
-    """Mean over the views that see a texel of delit/shadow/NNNNN.png: [S, S] in [0, 1] for a UV raster (face, bary) of the mesh; 0 where there is none."""
-    views = [(view, path) for view in read_views(capture) if (path := (capture.delit / "shadow" / view.name).with_suffix(".png")).is_file()]
-    texels = np.flatnonzero(face.ravel() >= 0)
-    points, normals = (interpolate(values, mesh.faces, face, bary).reshape(-1, 3)[texels] for values in (mesh.vertices, vertex_normals(mesh)))
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-    caster = RayCaster(mesh)
-    total, weight = np.zeros(len(texels)), np.zeros(len(texels))
-    for i, (view, path) in enumerate(views):
-        report.progress(i, len(views) + 3, "Lifting the frames' shadows")
-        towards = view.centre - points
-        cosine = (towards * normals).sum(1) / np.linalg.norm(towards, axis=1)
-        pixels, _ = view.project(points)
-        seen = np.flatnonzero((cosine > 0.2) & ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1))
-        seen = seen[visible_from(caster, points[seen], normals[seen], view.centre)]
-        trust = cosine[seen] ** 2
-        total[seen] += trust * sample(images.read_mask(Path(path)), pixels[seen])
+@dataclass(frozen=True)
+class Unfolded:
+    """A mesh in its UVs: face int [S, S] (-1: none) and bary [S, S, 3] of the raster; points and unit normals [N, 3] of its N covered texels."""
+
+    mesh: Mesh
+    caster: RayCaster
+    face: np.ndarray
+    bary: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+
+    @classmethod
+    def of(cls, mesh: Mesh, size: int) -> Unfolded:
+        face, bary = rasterize_uv(mesh, size)
+        inside = face >= 0
+        points, normals = (interpolate(values, mesh.faces, face[inside], bary[inside]) for values in (mesh.vertices, vertex_normals(mesh)))
+        return cls(mesh, RayCaster(mesh), face, bary, points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9))
+
+    @property
+    def covered(self) -> np.ndarray:
+        """bool [S, S]"""
+        return self.face >= 0
+
+    def spread(self, values: np.ndarray) -> np.ndarray:
+        """Per covered texel [N(, C)] -> float32 [S, S(, C)], 0 elsewhere."""
+        out = np.zeros((*self.face.shape, *values.shape[1:]), np.float32)
+        out[self.covered] = values
+        return out
+
+
+def lift_shadows(head: Unfolded, count: int, masks: Iterable[tuple[View, np.ndarray]], report: Reporter) -> np.ndarray:
+    """Of `count` views' shadow masks [H, W] in [0, 1]: the share [S, S] of the votes for shadow, 0 where nobody votes.
+
+    A view's vote counts less where it sees the surface at a glancing angle or near a silhouette.
+    """
+    total, weight = np.zeros(len(head.points)), np.zeros(len(head.points))
+    for i, (view, mask) in enumerate(masks):
+        report.progress(count + 2 * i, 4 * count, "Lifting the frames' shadows")
+        towards = view.centre - head.points
+        cosine = (towards * head.normals).sum(1) / np.linalg.norm(towards, axis=1)
+        pixels, _ = view.project(head.points)
+        seen = np.flatnonzero((cosine > GRAZING) & ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1))
+        seen = seen[visible_from(head.caster, head.points[seen], head.normals[seen], view.centre)]
+        inner = np.clip(sample(_silhouette_distance(head.caster, view), pixels[seen]) / (EDGE_PX * max(view.width, view.height)), 0.02, 1)
+        trust = cosine[seen] ** 2 * inner
+        total[seen] += trust * sample(mask, pixels[seen])
         weight[seen] += trust
-    lifted = np.zeros(face.size, np.float32)
-    lifted[texels] = total / np.maximum(weight, 1e-6)
-    return lifted.reshape(face.shape)
+    return head.spread(total / np.maximum(weight, 1e-6))
+
+
+def _silhouette_distance(caster: RayCaster, view: View, scale: float = 0.25) -> np.ndarray:
+    """[H, W]: pixels to where the head ends or a nearer part of it hides a farther one."""
+    _, _, distance = render_view(caster, view, scale)
+    depth = np.where(np.isfinite(distance), distance, 1e3).astype(np.float32)
+    footprint = 1 / (scale * view.camera.mean_focal_length())  # metres across a pixel, per metre of distance
+    jump = cv2.morphologyEx(depth, cv2.MORPH_GRADIENT, np.ones((3, 3))) > 12 * footprint * depth
+    away = cv2.distanceTransform((~jump).astype(np.uint8), cv2.DIST_L2, 5) / scale
+    return cv2.resize(away, (view.width, view.height), interpolation=cv2.INTER_LINEAR)

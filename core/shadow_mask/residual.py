@@ -27,7 +27,7 @@ def find_shadow(colours: np.ndarray, normals: np.ndarray, skin: np.ndarray) -> t
     log units, and the shadow's colour [3] in log units (zeros: none).
     """
     log = np.log(np.maximum(colours, 1e-4))
-    basis = _smooth_basis(normals)
+    basis = smooth_basis(normals)
     drawn = np.flatnonzero(skin)
     drawn = drawn[:: max(1, len(drawn) // 6000)]
     none = (np.zeros(len(log)) - 12, log - np.median(log, 0), np.zeros(3))
@@ -71,7 +71,7 @@ def _log_likelihood(residual: np.ndarray) -> np.ndarray:
     return -0.5 * (3 * common**2 / SIGMA_LUMINANCE**2 + (chroma**2).sum(-1) / SIGMA_CHROMA**2) - np.log(SIGMA_LUMINANCE * SIGMA_CHROMA**2 * (2 * np.pi) ** 1.5)
 
 
-def _smooth_basis(normals: np.ndarray) -> np.ndarray:
+def smooth_basis(normals: np.ndarray) -> np.ndarray:
     """The polynomials of degree two in the normal [N, 9] (the span of the second-order spherical harmonics), centred."""
     x, y, z = normals.T
     columns = np.stack([x, y, z, x * y, y * z, x * z, x * x - y * y, 3 * z * z - 1], 1)

@@ -4,6 +4,7 @@
 
 import bpy
 
+from .. import captures
 from ..base_panel import CapturePanel, WildcapPanel
 from . import session
 from .operators import EDITS
@@ -45,6 +46,11 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
             row = layout.row(align=True)
             row.operator("wildcap.detect_mask", icon='VIEWZOOM')
             row.operator("wildcap.snap_mask", icon='SNAP_ON')
+            item = captures.active(context)
+            if item is not None:
+                column = layout.column(align=True)
+                column.label(text="Frames With Softened Shadows")
+                column.prop(item.shadow_mask, "softened", text="")
             found = session.offered()
             if found == 'SNAPPED':
                 layout.operator("wildcap.edit_mask", text="Take Snapped Mask", icon='CHECKMARK', depress=True).kind = found

@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Captures with a known shadow mask, for benchmarks/shadow_mask.py: synthetic people under a sun that the head itself and leaves, blinds or an edge block.
+
+The light of core/synthetic/light.py is baked into a subject's UVs and photographed by known cameras, with noise and JPEG; the registered head
+is the true one, off by half a millimetre here and there, as a fit leaves it.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pycolmap
+
+from core import images, meshes, raster, template
+from core.capture import Capture, replacing_folder, write_json
+from core.meshes import Mesh
+from core.messages import Reporter
+from core.shadow_mask.lift import Unfolded, lift_shadows
+from core.synthetic.identities import subject_mesh
+from core.synthetic.light import bake, random_light
+from core.synthetic.noise import noise
+from core.synthetic.parameters import sample_parameters
+from core.synthetic.skin import make_skin
+from core.views import View, read_views
+from tests.painted_head import camera
+
+SIZE = 512
+"""Texels of the truth, and of the texture."""
+AZIMUTHS, SCALE = (-52, -34, -17, 0, 17, 34, 52, 0), 1.6  # degrees; of a picture of 300 x 400
+OFF_M, OFF_MM = 0.0005, 25.0  # deviation of the registered head in metres, and over how many millimetres it varies
+NOISE = 0.012  # of the pictures, sRGB
+DARKER = 0.4  # least share of the light that the cast shadow takes, on the median: what takes less is no sun ...
+SOFTEST = 0.03  # ... and a lamp of a larger angular radius (in radians) throws no shadow that ends somewhere
+SHARE = 0.06, 0.75  # of the face in shadow
+KINDS = ("self", "leaves", "blinds", "edge")
+
+
+def synthetic_capture(seed: int, kind: str, folder: Path) -> tuple[Capture, np.ndarray]:
+    """A capture with frames, cameras and head in `folder` (made once) and the true shadow in its head's UVs, bool [SIZE, SIZE]:
+    where the sun does not reach, be it that the surface turns away from it."""
+    capture = Capture(folder)
+    if not (capture.root / "truth.png").is_file():
+        mesh, skin = subject_mesh(seed), make_skin(sample_parameters(seed), SIZE)
+        shading, shadow = _lit(mesh, seed, kind)
+        lit = skin.diffuse * shading
+        lit *= 0.85 / np.percentile(lit[skin.covered].max(-1), 99.5)
+        _photograph(capture, mesh, np.clip(lit, 0, 1).astype(np.float32), np.random.default_rng([seed, 32]))
+        meshes.write_obj(capture.head, _registered(mesh, seed))
+        images.write_data(capture.root / "truth.png", shadow.astype(np.float32))
+    return capture, images.read_mask(capture.root / "truth.png") > 0.5
+
+
+def lifted_truth(capture: Capture, truth: Path, size: int = SIZE) -> np.ndarray:
+    """The true shadow of TRUTH/shadow/NNNN.png (NNNN: frame of the video) in the UVs of a capture's head, bool [size, size]."""
+    numbers = {f["name"]: f["video_frame"] for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
+    pictures = {int(path.stem): path for path in (truth / "shadow").glob("*.png")}
+    views = [(view, pictures[numbers[view.name]]) for view in read_views(capture) if numbers[view.name] in pictures]
+    masks = ((view, images.read_mask(path)) for view, path in views)
+    return lift_shadows(Unfolded.of(meshes.read_obj(capture.head), size), len(views), masks, Reporter("shadow_mask")) > 0.5
+
+
+def _lit(mesh: Mesh, seed: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
+    """Shading [S, S, 3] and the true shadow bool [S, S] under the first of the seed's random lights whose shadow is one."""
+    face = template.mask("face", 64) > 0.5
+    for i in range(1000):
+        sky, sun, colour, radius = random_light(np.random.default_rng([seed, 30, i]))
+        if radius > SOFTEST:
+            continue
+        _, shadow, takes = _shadow(mesh, 64, sky, sun, colour, radius, kind, (seed, 31, i))
+        if SHARE[0] < shadow[face].mean() < SHARE[1] and np.median(takes[face & shadow & (takes > 0)]) > DARKER:
+            break
+    shading, shadow, _ = _shadow(mesh, SIZE, sky, sun, colour, radius, kind, (seed, 31, i))
+    return shading, shadow
+
+
+def _shadow(mesh: Mesh, size: int, sky, sun, colour, radius: float, kind: str, seeds: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Shading [S, S, 3], where the sun does not reach bool [S, S], and the share of the light that whatever stands in the sun's way takes [S, S]."""
+    shading, blocked, normal = bake(mesh, size, sky, sun, colour, radius, kind, np.random.default_rng(seeds))
+    cosine = normal @ sun
+    sunlit = shading.mean(-1) + np.maximum(cosine, 0) * blocked * colour.mean()
+    return shading, (blocked > 0.5) | (cosine <= 0.02), 1 - shading.mean(-1) / np.maximum(sunlit, 1e-4)
+
+
+def _registered(mesh: Mesh, seed: int) -> Mesh:
+    off = noise(1000 * mesh.vertices, OFF_MM, np.random.default_rng([seed, 33]), smooth=True)
+    return mesh.moved(mesh.vertices + meshes.vertex_normals(mesh) * (OFF_M * off / max(float(off.std()), 1e-6))[:, None])
+
+
+def _photograph(capture: Capture, mesh: Mesh, texture: np.ndarray, rng: np.random.Generator) -> None:
+    """frames/ with frames.json, and cameras/, of a lit texture, linear [S, S, 3]."""
+    caster = raster.RayCaster(mesh)
+    views = [camera(azimuth, 0.0 if i < len(AZIMUTHS) - 1 else -0.25, scale=SCALE) for i, azimuth in enumerate(AZIMUTHS)]
+    model = pycolmap.Reconstruction()
+    model.add_camera_with_trivial_rig(views[0].camera)
+    frames = []
+    with replacing_folder(capture.frames) as folder:
+        for i, view in enumerate(views):
+            name = f"{i:05d}.jpg"
+            images.write_srgb(folder / name, _picture(caster, view, texture, rng), quality=90)
+            image = pycolmap.Image(name=name, camera_id=1, image_id=i + 1)
+            pose = pycolmap.Rigid3d(pycolmap.Rotation3d(view.rotation), view.translation)
+            model.add_image_with_trivial_frame(image, pose)
+            frames.append({"name": name, "video_frame": i, "time_s": float(i), "sharpness": 1.0, "selected": True})
+        write_json(folder / "frames.json", {"frames": frames})
+    capture.cameras.mkdir(parents=True, exist_ok=True)
+    model.write_binary(str(capture.cameras))
+
+
+def _picture(caster: raster.RayCaster, view: View, texture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """sRGB [H, W, 3] before a dim, uneven background."""
+    face, bary, _ = raster.render_view(caster, view, 2)
+    uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
+    at = np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(texture)
+    colour = raster.sample(texture, at).reshape(*face.shape, 3) * (face >= 0)[..., None]
+    head, cover = (images.resize(a.astype(np.float32), view.width, view.height) for a in (colour, face >= 0))
+    wall = cv2.resize(rng.uniform(0.02, 0.3, (9, 7, 3)).astype(np.float32), (view.width, view.height), interpolation=cv2.INTER_CUBIC)
+    seen = images.linear_to_srgb(cv2.GaussianBlur(head + (1 - cover)[..., None] * wall, (0, 0), 0.6))
+    return np.clip(seen + rng.normal(0, NOISE, seen.shape), 0, 1).astype(np.float32)

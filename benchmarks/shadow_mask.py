@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How well the automatic shadow mask finds the true shadow inside the face:
+
+    python -m benchmarks.shadow_mask [--seeds N ...] [--capture CAPTURE TRUTH] [--delighters NAME ...] [--work FOLDER] [--pictures]
+
+Of each synthetic subject (seeds that nothing was chosen on) a capture is made, delit and textured; a CAPTURE that has been run up to its texture from
+TRUTH/capture.mp4 is judged against TRUTH/shadow instead. Printed per mask: intersection over union, precision and recall over the facial skin that
+was seen, the F-score of its border at 3 texels of a 1024 map, and the seconds that the stage shadow_mask took.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import tempfile
+import time
+from importlib import import_module
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from core import images, template
+from core.capture import Capture
+from core.messages import Reporter
+from core.settings import from_json
+
+from .shadow_captures import KINDS, SIZE, lifted_truth, synthetic_capture
+
+HELD_OUT = (200, 201, 202, 203, 204, 205)
+NEAR = 3.0  # texels of a 1024 map
+COLUMNS = ("true", "masked", "IoU", "precision", "recall", "border F", "seconds")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.shadow_mask", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, nargs="*", default=HELD_OUT)
+    parser.add_argument("--capture", type=Path, nargs=2, action="append", default=[], metavar=("CAPTURE", "TRUTH"))
+    parser.add_argument("--delighters", nargs="+", default=["shading", "none"])
+    parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_shadow_masks")
+    parser.add_argument("--pictures", action="store_true", help="leave the filmed texture, the true mask and the proposal side by side in the work folder")
+    asked = parser.parse_args()
+    print("| capture | delighter | " + " | ".join(COLUMNS) + " |\n| --- | --- |" + " --- |" * len(COLUMNS))
+    for delighter in asked.delighters:
+        rows = [_row(*_synthetic(seed, delighter, asked.work), f"synthetic {seed}, {KINDS[seed % len(KINDS)]}", delighter, asked) for seed in asked.seeds]
+        if len(rows) > 1:
+            _print("mean of the synthetic", delighter, np.mean(rows, 0))
+        for capture, truth in asked.capture:
+            _row(*_filmed(capture, truth, delighter, asked.work), f"{capture.stem}, filmed", delighter, asked)
+
+
+def scores(found: np.ndarray, true: np.ndarray, judged: np.ndarray) -> tuple[float, ...]:
+    """Shares of the judged texels that are in shadow and masked, intersection over union, precision, recall and the F-score of the border
+    at NEAR texels of a 1024 map, of masks bool [S, S] over texels bool [S, S]."""
+    both = (found & true)[judged].sum()
+    reach = NEAR * len(found) / 1024
+    borders = [_border(mask) & cv2.erode(judged.astype(np.uint8), np.ones((5, 5))).astype(bool) for mask in (found, true)]
+    hits = [float((_distance(other) <= reach)[own].mean()) if own.any() else 0.0 for own, other in (borders, borders[::-1])]
+    return (float(true[judged].mean()), float(found[judged].mean()), float(both / max((found | true)[judged].sum(), 1)),
+            float(both / max(found[judged].sum(), 1)), float(both / max(true[judged].sum(), 1)), 2 * hits[0] * hits[1] / max(sum(hits), 1e-9))
+
+
+def _row(capture: Capture, true: np.ndarray, name: str, delighter: str, asked: argparse.Namespace) -> tuple[float, ...]:
+    began = time.perf_counter()
+    _run(capture, delighter, "shadow_mask")
+    seconds = time.perf_counter() - began
+    mask = images.resize(images.read_mask(capture.shadow_mask_auto), SIZE, SIZE)
+    confidence = images.resize(images.read_data(capture.texture_confidence)[..., 0], SIZE, SIZE)
+    skin = (template.mask("skin", SIZE) > 0.5) & (template.mask("face", SIZE) > 0.5)
+    found = (*scores(mask > 0.5, true, skin & (confidence > 0.1)), seconds)
+    _print(name, delighter, found)
+    if asked.pictures:
+        filmed = images.resize(images.read_srgb(capture.texture_filmed), SIZE, SIZE)
+        grey = [np.repeat(m.astype(np.float32)[..., None], 3, -1) for m in (true, mask)]
+        images.write_srgb(asked.work / f"{capture.root.stem}_{delighter}.png", np.hstack([filmed, *grey]))
+    return found
+
+
+def _print(name: str, delighter: str, values) -> None:
+    print(f"| {name} | {delighter} | " + " | ".join(f"{v:.2f}" for v in values[:-1]) + f" | {values[-1]:.1f} |", flush=True)
+
+
+def _synthetic(seed: int, delighter: str, work: Path) -> tuple[Capture, np.ndarray]:
+    capture, true = synthetic_capture(seed, KINDS[seed % len(KINDS)], work / f"{seed}.wildcap")
+    return _delit(capture, delighter, work / f"{seed}_{delighter}.wildcap"), true
+
+
+def _filmed(source: Path, truth: Path, delighter: str, work: Path) -> tuple[Capture, np.ndarray]:
+    capture = _delit(Capture(source), delighter, work / f"{source.stem}_{delighter}.wildcap")
+    return capture, lifted_truth(capture, truth)
+
+
+def _delit(capture: Capture, delighter: str, folder: Path) -> Capture:
+    """A copy of what the delighter needs, delit and textured by today's code."""
+    copy = Capture(folder)
+    shutil.rmtree(copy.root, ignore_errors=True)
+    for part in (capture.frames, capture.cameras):
+        shutil.copytree(part, copy.root / part.name)
+    shutil.copyfile(capture.head, copy.head)
+    _run(copy, delighter, "delight", "texture")
+    return copy
+
+
+def _run(capture: Capture, delighter: str, *stages: str) -> None:
+    settings = from_json({"delight": {"delighter": delighter}, "texture": {"size": SIZE}})
+    for stage in stages:
+        import_module(f"core.{stage}").run(capture, settings, Reporter(stage))
+
+
+def _border(mask: np.ndarray) -> np.ndarray:
+    return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((2, 2), np.uint8)) > 0
+
+
+def _distance(border: np.ndarray) -> np.ndarray:
+    return cv2.distanceTransform((~border).astype(np.uint8), cv2.DIST_L2, 5)
+
+
+if __name__ == "__main__":
+    main()
