@@ -43,12 +43,13 @@ def cut(srgb: np.ndarray, to_crop: np.ndarray, size: int) -> np.ndarray:
     return np.clip(cv2.warpAffine(source, _from_centres(to_crop), (size, size), flags=cv2.INTER_CUBIC), 0, 1)
 
 
-def face_mask(face: Face, to_crop: np.ndarray, size: int) -> np.ndarray:
-    """[size, size] in {0, 1}: the hull of the landmarks, carried on over the forehead."""
+def face_mask(face: Face, to_crop: np.ndarray, size: int, growth: float = 1.0) -> np.ndarray:
+    """[size, size] in {0, 1}: the hull of the landmarks, carried on over the forehead and enlarged by a factor."""
     points = face.landmarks[:, :2] @ to_crop[:, :2].T + to_crop[:, 2]
     brow = points[list(BROWS), 1].mean()
     points[:, 1] += FOREHEAD * np.minimum(points[:, 1] - brow, 0)  # upright in the crop
-    hull = cv2.convexHull(points.astype(np.float32))
+    middle = (points.min(0) + points.max(0)) / 2
+    hull = cv2.convexHull((middle + growth * (points - middle)).astype(np.float32))
     mask = np.zeros((size, size), np.uint8)
     cv2.fillConvexPoly(mask, np.round(16 * (hull - 0.5)).astype(np.int32), 1, shift=4)
     return mask.astype(np.float32)

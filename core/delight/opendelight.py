@@ -16,7 +16,7 @@ import torch
 
 from .. import images
 from ..capture import Capture
-from ..faces import Face, detect
+from ..faces import Face, detect, segment_person
 from ..messages import Problem, Reporter
 from ..settings import DelightSettings, Settings
 from ..views import read_views
@@ -27,6 +27,7 @@ from .opendelight_network import delit
 
 SIZE = 512
 MARGIN = 0.85  # of FFHQ's square, which the checkpoint was trained on
+RIM = 1.14  # how far beyond the landmarks there is skin, where there is a person at all
 
 
 def opendelight(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
@@ -65,7 +66,8 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
 def delight_face(srgb: np.ndarray, face: Face, checkpoint: Checkpoint, device: str = "cpu", step: Callable[[], None] = lambda: None) -> np.ndarray:
     """A frame sRGB [H, W, 3] with the albedo of one face in it."""
     to_crop = alignment(face, SIZE, MARGIN)
-    crop, mask = cut(srgb, to_crop, SIZE), face_mask(face, to_crop, SIZE)
+    crop = cut(srgb, to_crop, SIZE)
+    mask = np.maximum(face_mask(face, to_crop, SIZE), face_mask(face, to_crop, SIZE, RIM) * (segment_person(crop) > 0.5))
     picture = torch.from_numpy((crop * mask[..., None]).transpose(2, 0, 1)[None].astype(np.float32)).to(device)
     albedo = delit(checkpoint.base, checkpoint.enhancer, picture, step)[0].permute(1, 2, 0).cpu().numpy()
     return put_back(srgb, crop, albedo, mask, to_crop)
