@@ -52,6 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--skin-tone", metavar="R,G,B", help="sRGB in 0..1, the linear mean over facial skin; or auto")
     run.add_argument("--delighter", choices=delighter_cards.choices(), help="how the light is taken out of the frames")
     run.add_argument("--folder", metavar="FOLDER", type=Path, help="delit pictures for the folder delighter, matched by name")
+    run.add_argument("--checkpoint", metavar="FOLDER", type=Path, help="the authors' two files, for the opendelight delighter")
     run.add_argument("--preview", action="store_true", help="of SwitchLight, ask for small pictures at half the credits")
     run.add_argument("--send-frames", action="store_true",
                      help="you agree that SwitchLight gets the selected frames, a person's face, and charges you; without it, the run stops before")
@@ -105,6 +106,10 @@ def _run(options: argparse.Namespace) -> int:
     delight = {"delighter": options.delighter} if options.delighter else {}
     if options.folder:
         delight["folder"] = str(options.folder.absolute())
+    if options.checkpoint and options.delighter != "opendelight":
+        raise Problem("--checkpoint goes with --delighter opendelight only.", "Add --delighter opendelight, or leave --checkpoint out.")
+    if options.checkpoint:
+        delight["checkpoint"] = str(options.checkpoint.absolute())
     if (options.preview or options.send_frames) and options.delighter != "switchlight":
         raise Problem("--preview and --send-frames go with --delighter switchlight only.", "Add --delighter switchlight, or leave them out.")
     if options.preview:

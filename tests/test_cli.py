@@ -108,8 +108,8 @@ def test_a_failure_is_two_lines(tiny, capture, film):
 
 @pytest.mark.parametrize("words", [
     ("run", "a", "b", "--from", "solve", "--until", "frames"), ("run", "a", "b", "--until", "lunch"), ("run", "/no/such/video.mp4", "CAPTURE"),
-    ("run", "-", "CAPTURE"), ("run", "a", "b", "--folder", "c"), ("status", "/no/such/capture"), ("mask", "import", "CAPTURE", "mask.png"), ("train",),
-    ("train", "patience"),
+    ("run", "-", "CAPTURE"), ("run", "a", "b", "--folder", "c"), ("run", "a", "b", "--checkpoint", "c"),
+    ("status", "/no/such/capture"), ("mask", "import", "CAPTURE", "mask.png"), ("train",), ("train", "patience"),
 ])
 def test_what_cannot_be_is_refused_in_two_lines(capture, words):
     refused(*(capture.root if word == "CAPTURE" else word for word in words))

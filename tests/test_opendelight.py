@@ -15,6 +15,7 @@ import torch
 from torch import nn
 
 from benchmarks.opendelight_cost import base, enhancer, write_random
+from core import __main__ as terminal
 from core import images
 from core.capture import Capture
 from core.delight.face_crop import alignment, cut, face_mask, put_back
@@ -23,6 +24,7 @@ from core.delight.opendelight_network import base_shapes, delit, enhancer_shapes
 from core.faces import Face
 from core.messages import CancelledError, Problem, Reporter
 from core.settings import DelightSettings, from_json
+from core.worker.job import read_job
 from tests.painted_head import camera, photograph
 
 room = importlib.import_module("core.delight.opendelight")  # the package names its function alike
@@ -283,3 +285,11 @@ def test_a_width_that_has_no_heads_is_refused(tmp_path):
     write_random(tmp_path, width=80, depth=1, channels=12, unet=4)
     with pytest.raises(Problem, match="no multiple of 64"):
         load(str(tmp_path))
+
+
+def test_the_terminal_names_the_checkpoint(tmp_path, monkeypatch):
+    monkeypatch.setattr(terminal.terminal, "follow", lambda *_: 0)
+    (tmp_path / "film.mp4").write_bytes(b"film")
+    command = ["run", str(tmp_path / "film.mp4"), str(tmp_path / "c.wildcap"), "--delighter", "opendelight", "--checkpoint", str(tmp_path)]
+    assert terminal.main(command) == 0
+    assert read_job(Capture(tmp_path / "c.wildcap").job).settings.delight.checkpoint == str(tmp_path)
