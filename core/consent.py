@@ -16,7 +16,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from . import switchlight_service as service
+from . import switchlight_api as service
 from .capture import Capture, storage_problem, write_json
 from .hashes import hash_file
 from .messages import Problem

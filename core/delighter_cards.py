@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-from . import switchlight_service as service
+from . import switchlight_api as service
 from .settings import DelightSettings
 
 

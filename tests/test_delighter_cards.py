@@ -7,7 +7,7 @@ import sys
 from dataclasses import fields
 
 from core import delighter_cards
-from core import switchlight_service as service
+from core import switchlight_api as service
 from core.settings import DelightSettings
 
 from .conftest import ROOT

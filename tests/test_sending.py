@@ -8,7 +8,7 @@ import os
 import pytest
 
 from core import delighter_cards
-from core import switchlight_service as service
+from core import switchlight_api as service
 
 from . import standin
 from .drawn import Layout, drawn

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from core import consent, images
-from core import switchlight_service as service
+from core import switchlight_api as service
 from core.capture import Capture, write_json
 from core.delight import run, switchlight_calls
 from core.delight.switchlight_line import Patience

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from core import consent
-from core import switchlight_service as service
+from core import switchlight_api as service
 from core.__main__ import main
 from core.worker.job import write_job
 

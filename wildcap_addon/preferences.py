@@ -10,7 +10,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from .. import __package__ as base_package
-from ..core import switchlight_service
+from ..core import switchlight_api
 from ..core.messages import Problem
 
 COMPUTES = [('auto', "Automatic", "For the GPU where there is an NVIDIA one or an Apple one, else for the CPU"),
@@ -78,8 +78,8 @@ def draw_solver(layout, preferences) -> None:
 
 def draw_key(layout) -> None:
     """Where the key of SwitchLight comes from: here, and beside the delighter."""
-    if os.environ.get(switchlight_service.KEY_VARIABLE):
-        text = iface_("The key is that of the environment variable {}").format(switchlight_service.KEY_VARIABLE)
+    if os.environ.get(switchlight_api.KEY_VARIABLE):
+        text = iface_("The key is that of the environment variable {}").format(switchlight_api.KEY_VARIABLE)
         layout.label(text=text, translate=False, icon='CHECKMARK')
     else:
         layout.prop(get(), "switchlight_key")
@@ -90,15 +90,15 @@ def get() -> WILDCAP_AP_preferences:
 
 
 def has_switchlight_key() -> bool:
-    return bool(os.environ.get(switchlight_service.KEY_VARIABLE) or get().switchlight_key)
+    return bool(os.environ.get(switchlight_api.KEY_VARIABLE) or get().switchlight_key)
 
 
 def worker_environment(delighter: str) -> dict[str, str]:
     """What a worker is told by its environment alone: the key of a paid delighter, the machine's own first, and that Blender is to stay offline."""
     if delighter != "switchlight":
         return {}
-    key = {} if os.environ.get(switchlight_service.KEY_VARIABLE) else {switchlight_service.KEY_VARIABLE: get().switchlight_key}
-    return {**key, **({} if bpy.app.online_access else {switchlight_service.OFFLINE_VARIABLE: "1"})}
+    key = {} if os.environ.get(switchlight_api.KEY_VARIABLE) else {switchlight_api.KEY_VARIABLE: get().switchlight_key}
+    return {**key, **({} if bpy.app.online_access else {switchlight_api.OFFLINE_VARIABLE: "1"})}
 
 
 def require_online(otherwise: str) -> None:

@@ -3,7 +3,7 @@
 """The delighter that the paper uses: SwitchLight, a paid service of Beeble (Kim et al., CVPR 2024). The selected frames leave the machine.
 
 Nothing is sent without the artist's consent (core/consent.py), nothing twice: answers are kept in the capture by the hash of what was sent. They say
-nothing about shadows. What is known of the service, and how well, is in core/switchlight_service.py.
+nothing about shadows. What is known of the service, and how well, is in core/switchlight_api.py.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from concurrent.futures import Future, wait
 import numpy as np
 
 from .. import consent, images
-from .. import switchlight_service as service
+from .. import switchlight_api as service
 from ..capture import Capture
 from ..hashes import hash_file
 from ..messages import Problem, Reporter

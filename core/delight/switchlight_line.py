@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .. import images
-from .. import switchlight_service as service
+from .. import switchlight_api as service
 from ..capture import replacing
 from ..messages import Problem, Reporter
 from .switchlight_calls import Account, AgainError, albedo

@@ -6,7 +6,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ...core import delighter_cards
-from ...core import switchlight_service as service
+from ...core import switchlight_api as service
 from .. import preferences, problems, status
 
 COLUMNS = 3

@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""SwitchLight in the window: its card, the large button that asks before anything is sent, the dialog, and the worker that then sends two frames to a
+server on this machine, once."""
+
+import struct
+import sys
+import time
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+import addon  # noqa: E402
+import driver as d  # noqa: E402
+
+from tests import standin  # noqa: E402
+from tests.switchlight_server import KEY, Service  # noqa: E402
+
+
+def flow():
+    addon.unfold("WILDCAP_PT_reconstruct", "WILDCAP_PT_delighter")
+    bpy.context.preferences.system.use_online_access = True
+    yield from d.open_tab("WildCap")
+    yield from d.park()
+    addon.use_solver()
+    root = Path.home() / "Documents" / "WildCap" / "Zoë.wildcap"
+    make(root)
+    bpy.ops.wildcap.open_capture(directory=str(root))
+    item = addon.settings()
+    d.region('UI').tag_redraw()
+    yield 2.0
+    d.screenshot("sending_1_default")
+    item.delight.delighter = "switchlight"
+    registered(root, item)
+    yield from d.until(lambda: known().sending is not None, "a look at the frames", 20)
+    yield 1.5
+    yield from d.park()
+    d.screenshot("sending_2_card")
+    addon.module("preferences").get().switchlight_key = KEY
+    yield from d.lead("wildcap.allow_sending")
+    yield 1.0
+    d.screenshot("sending_3_asked")
+    assert not (root / "consent.json").exists()
+    yield from d.key('RET')
+    yield from d.until((root / "consent.json").is_file, "the consent", 10)
+    yield from d.until(lambda: known().agreed, "another look", 10)
+    yield 1.5
+    d.screenshot("sending_4_agreed")
+    with Service(answer=standin.png([[(200, 150, 120)] * 36] * 48)) as server:
+        addon.module("preferences").switchlight_api.os.environ["WILDCAP_SWITCHLIGHT_URL"] = server.url
+        yield 2.5
+        assert not known().agreed, "another machine than the one that was agreed to"
+        yield from d.press("wildcap.allow_sending")
+        yield 1.0
+        yield from d.key('RET')
+        yield from d.until(lambda: known().agreed, "the consent to this machine", 10)
+        yield 1.0
+        started = time.monotonic()
+        yield from d.lead("wildcap.reconstruct")
+        yield from d.until(lambda: len(server.charged) == 2 and (root / "delit" / "00002.png").is_file(), "the answers", addon.START_LIMIT_S)
+        d.say(f"two frames were sent and answered {time.monotonic() - started:.0f} s after the click")
+        if addon.job(root) is not None:
+            addon.module("jobs").cancel(str(root))
+        yield from d.until(lambda: addon.job(root) is None, "the end of the job", 10)
+        assert set(server.charged.values()) == {1} and {call["key"] for call in server.calls} == {KEY}
+    yield 2.5
+    yield from d.park()
+    d.screenshot("sending_5_answered")
+    bpy.ops.wm.save_as_mainfile(filepath=str(root.parent / "face.blend"), compress=False)
+    left = [path for path in root.parent.rglob("*") if path.is_file()]
+    assert len(left) > 10 and not [path for path in left if KEY.encode() in path.read_bytes()], "the key is nowhere"
+
+
+def known():
+    status = addon.module("status")
+    return status.of(addon.settings()) or status.Status()
+
+
+def make(root: Path) -> None:
+    """A capture with frames, cameras, a scan and a head, and nothing after that."""
+    standin.make(root, solved=False)
+    standin.add_evidence(root)
+    for name in ("texture.png", "texture.exr", "texture_confidence.exr", "shadow_mask_auto.png"):
+        (root / name).unlink()
+    for path in (root / "delit").iterdir():
+        path.unlink()
+    (root / "cameras" / "points3D.bin").write_bytes(struct.pack("<Q", 0))
+    (root / "landmarks.json").write_text('{"points": {}}', encoding="ascii")
+    (root / "face.mp4").write_bytes(b"stands in")
+
+
+def registered(root: Path, item) -> None:
+    """Writes the record that its first four stages would have left."""
+    captures, properties, stages = addon.module("captures"), addon.module("properties"), addon.module("jobs").stages
+    capture, settings = captures.folder(item), properties.settings(item)
+    capture.set_source(root / "face.mp4")
+    for stage in stages.STAGES[:stages.NAMES.index("delight")]:
+        capture.finish(stage, capture.stage_key(stage, settings), 1.0, settings, {}, "0.1.0")
+
+
+d.play(flow(), limit_s=900)
