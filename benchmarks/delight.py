@@ -57,7 +57,7 @@ def main() -> None:
     parser.add_argument("--weights", type=Path, help="weights of our network, with their card beside them, instead of those that are shipped")
     parser.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
     parser.add_argument("--quick", action="store_true", help=f"every {QUICK}th picture, without the feature distance")
-    parser.add_argument("--json", type=Path)
+    parser.add_argument("--json", type=Path, help="where the results go; what it holds of other sets and rows stays")
     parser.add_argument("--pictures", type=Path, help="folder for SET.png: photographs, truth and rows side by side")
     options = parser.parse_args()
     settings = Settings(device=options.device)
@@ -66,15 +66,16 @@ def main() -> None:
     if options.weights:
         importlib.import_module("core.delight.network").WEIGHTS = options.weights
     captures = dict(pair.split("=", 1) for pair in options.capture)
-    results = {}
+    results = json.loads(options.json.read_text(encoding="utf-8")) if options.json and options.json.is_file() else {}
     for name in options.sets:
+        title = Path(name).name
         with tempfile.TemporaryDirectory() as folder:
             try:
-                chosen = _set(name, options, captures, Path(folder))
-                results[Path(name).name] = measure(chosen, settings, not options.quick, options.rows,
-                                                   options.pictures and options.pictures / f"{Path(name).name}.png")
+                found = measure(_set(name, options, captures, Path(folder)), settings, not options.quick, options.rows,
+                                options.pictures and options.pictures / f"{title}.png")
             except Problem as problem:
-                results[Path(name).name] = {"-": {"not_run": f"{problem.problem} {problem.remedy}"}}
+                found = {"-": {"not_run": f"{problem.problem} {problem.remedy}"}}
+        results[title] = {**results.get(title, {}), **found}
         if options.json:
             write_json(options.json, results)
     print(table(results))
