@@ -11,6 +11,7 @@ import numpy as np
 import pycolmap
 import pytest
 
+from benchmarks.shadow_mask import scores
 from core import images, meshes, raster, template
 from core.capture import Capture, write_json
 from core.messages import Reporter
@@ -109,3 +110,13 @@ def test_specks_go_and_edges_are_soft():
     assert mask[102, 102] == 0 and mask[250, 250] == 1
     edge = mask[250, 180:205]
     assert ((edge > 0.1) & (edge < 0.9)).any() and mask[250, 197] == 1
+
+
+def test_the_benchmark_s_scores_of_masks_with_known_overlap():
+    disc, shifted = (painted_blob(centre, 0.2) > 0.5 for centre in ((0.5, 0.5), (0.52, 0.5)))
+    half = disc & (np.arange(SIZE) < SIZE // 2)
+    everywhere = np.ones_like(disc)
+    assert scores(disc, disc, everywhere)[2:] == (1, 1, 1, 1)
+    assert scores(half, disc, everywhere)[2:5] == pytest.approx((0.5, 1, 0.5), abs=0.02)
+    assert scores(shifted, disc, everywhere)[5] < 0.4  # by 20 texels of a 1024 map: only where the borders cross do they meet
+    assert scores(~disc, disc, everywhere)[2:5] == (0, 0, 0)
