@@ -50,6 +50,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--until", dest="last", metavar="STAGE", help="end with this stage")
     run.add_argument("--quality", choices=settings.QUALITIES, default="standard")
     run.add_argument("--skin-tone", metavar="R,G,B", help="sRGB in 0..1, the linear mean over facial skin; or auto")
+    run.add_argument("--white-point", metavar="R,G,B", help="linear colour of a white surface in the face's light, as `white` prints it; or auto")
     run.add_argument("--delighter", choices=delighter_cards.choices(), help="how the light is taken out of the frames")
     run.add_argument("--folder", metavar="FOLDER", type=Path, help="delit pictures for the folder delighter, matched by name")
     run.add_argument("--checkpoint", metavar="FOLDER", type=Path, help="the authors' two files, for the opendelight delighter")
@@ -95,6 +96,12 @@ def _parser() -> argparse.ArgumentParser:
     many.add_argument("capture", metavar="CAPTURE", type=Path)
     many.add_argument("file", metavar="JSON", type=Path)
     many.set_defaults(command=_landmarks)
+    white = commands.add_parser("white", help="measure the white point on a ColorChecker, a grey card or white paper in the frames")
+    white.add_argument("capture", metavar="CAPTURE", type=Path)
+    white.add_argument("--frame", metavar="NAME", help="the frame with the card, as in the capture's frames folder; without it a ColorChecker is looked for")
+    white.add_argument("--at", metavar=("X", "Y"), nargs=2, type=float, help="a pixel of the card, from the frame's upper left")
+    white.add_argument("--card", choices=settings.CARDS, default="grey")
+    white.set_defaults(command=_white)
     commands.add_parser("doctor", help="say what is installed, what is missing and what to do").set_defaults(command=_doctor)
     commands.add_parser("train", help="train a network, or bring other skins in for it (developers): train prior --help, train carry --help")
     return parser
@@ -125,7 +132,8 @@ def _run(options: argparse.Namespace) -> int:
         raise Problem("--new-atlas goes with --template only.", "Name your head mesh with --template, or leave --new-atlas out.")
     if options.template:
         values["registration"] = {"template": str(options.template.absolute()), "new_atlas": options.new_atlas}
-    values["solve"] = {**({"skin_tone": options.skin_tone} if options.skin_tone else {}), **({"prior": str(options.prior.absolute())} if options.prior else {})}
+    values["solve"] = {**({"skin_tone": options.skin_tone} if options.skin_tone else {}), **({"prior": str(options.prior.absolute())} if options.prior else {}),
+                       **({"white_point": options.white_point} if options.white_point else {})}
     capture = Capture(options.capture)
     strangers = [path.name for path in capture.root.iterdir() if path not in vars(capture).values()] if capture.root.is_dir() else []
     if strangers and not capture.json.is_file():
@@ -177,6 +185,28 @@ def _landmarks(options: argparse.Namespace) -> int:
     points = artist_landmarks.read(options.file) if "file" in options else {options.index: options.position}
     count = len(artist_landmarks.put(Capture(options.capture), points))
     print(f"{count} landmark{'' if count == 1 else 's'} put by hand; the stage registration comes next.")
+    return 0
+
+
+def _white(options: argparse.Namespace) -> int:
+    from .images import read_srgb  # these need OpenImageIO, OpenCV and torch
+    from .messages import Reporter
+    from .solve import white_point
+
+    capture = Capture(options.capture)
+    if bool(options.frame) != bool(options.at):
+        raise Problem("--frame and --at go together.", "Name a frame and a pixel of the card in it, or neither to look for a ColorChecker.")
+    if options.frame:
+        path = capture.frames / options.frame
+        if not path.is_file():
+            raise Problem(f"There is no frame {path}.", "Name one of the pictures in the capture's frames folder.")
+        white = white_point.card_white(read_srgb(path), *options.at, options.card).tolist()
+    else:
+        report = Reporter("white_point")
+        white_point.run(capture, settings.Settings(), report)
+        white = report.figures["white_point"]
+        print(f"ColorChecker in {report.figures['white_point_frame']}")
+    print(f"--white-point {','.join(f'{v:.4f}' for v in white)}")
     return 0
 
 

@@ -110,6 +110,8 @@ class SolveSettings:
     """Cells per side of the texel grid of lights over the whole map's face crop (96 cells of 8 texels at 1024)"""
     skin_tone: str = setting("auto")
     """Skin tone as sRGB R,G,B in 0..1 (linear mean over facial skin), or auto"""
+    white_point: str = setting("auto")
+    """What a white surface in the face's light is in the frames, linear R,G,B, from a ColorChecker, a grey card or white paper; auto: from the scene"""
     prior: str = setting("")
     """The authors' prior: the folder with its config.json and ckpt.pth. It needs ICT-FaceKit fitted as template, in whose UVs it works; empty: ours"""
     checkpoint_every: int = setting(5, min=1, max=600, deciding=False)
@@ -155,6 +157,8 @@ class Settings:
     transfer: TransferSettings = field(default_factory=TransferSettings)
 
 
+CARDS = {"grey": 0.18, "white": 0.88}
+"""Reflectance of what a white point may be measured on: a grey card, and white paper"""
 QUALITIES = ("draft", "standard", "film")
 _PRESETS = {
     "draft": {"solve": {"size": 512, "steps": 30, "guidance": "proximal"}, "scan": {"pairs": 16}},

@@ -43,7 +43,7 @@ STAGES = (
     Stage("shadow_mask", "Shadow Mask", ("delit/", "cameras/", "head.obj", "texture.exr", "texture_confidence.exr"), ("shadow_mask_auto.png",),
           "core.shadow_mask", wishes=("texture_filmed.png", "frames/")),
     Stage("solve", "Solve", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
-          tuple(f"maps/{name}" for name in MAPS), "core.solve", shared=("seed",), data=("weights/prior.safetensors",),
+          tuple(f"maps/{name}" for name in MAPS), "core.solve", shared=("seed",), data=("weights/prior.safetensors", "weights/tones.json"),
           wishes=("shadow_mask.png", "protect_mask.png", "texture_filmed.png", "frames/", "cameras/", "delit/")),
     Stage("upscale", "4K Maps", tuple(f"maps/{name}" for name in MAPS), tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale"),
     Stage("transfer", "Delivery", ("head.obj", *(f"maps/{name}" for name in MAPS)), ("delivery/",), "core.transfer",
@@ -54,6 +54,7 @@ TOOLS = (
     Stage("mask_edges", "Snap to Edges", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"), ("shadow_mask_edges.png",),
           "core.solve.snapping"),
     Stage("skin_tone", "Skin Tone", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"), (), "core.solve.tone"),
+    Stage("white_point", "White Point", ("frames/",), (), "core.solve.white_point"),
 )
 """What a worker does for one button: no stage of the chain depends on it, and nothing of it is recorded."""
 LABELS = {stage.name: stage.label for stage in (*STAGES, *TOOLS)}

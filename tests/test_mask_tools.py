@@ -76,7 +76,7 @@ def test_a_tool_without_what_it_reads_says_what_is_missing(tmp_path):
     capture.root.mkdir()
     for tool in stages.TOOLS:
         ended = run_job(write_job(capture, tool=tool.name))
-        assert isinstance(ended, Failed) and "texture.exr" in ended.problem and ended.remedy
+        assert isinstance(ended, Failed) and tool.reads[0] in ended.problem and ended.remedy
 
 
 def test_what_a_worker_prepared_waits_for_a_click(addon, capture, monkeypatch):

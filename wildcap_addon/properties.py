@@ -22,7 +22,8 @@ PATHS = {"folder": {"subtype": 'DIR_PATH'}, "checkpoint": {"subtype": 'DIR_PATH'
          "prior": {"subtype": 'DIR_PATH'}, "template": {"subtype": 'FILE_PATH'}, "import_from": {"subtype": 'FILE_PATH'},
          "softened": {"subtype": 'DIR_PATH'}}
 """Settings that name a place on the disk, and how they are chosen."""
-ABOUT_THE_FACE = ("skin_tone", "folder", "switchlight_preview", "checkpoint", "delighter", "template", "new_atlas", "import_from", "mirrored", "softened", "prior")
+ABOUT_THE_FACE = ("skin_tone", "white_point", "folder", "switchlight_preview", "checkpoint", "delighter", "template", "new_atlas",
+                  "import_from", "mirrored", "softened", "prior")
 """Settings that a quality leaves as they are."""
 
 
@@ -90,6 +91,10 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
         name="Skin Tone", subtype='COLOR_GAMMA', size=3, min=0, max=1, default=(0.69, 0.54, 0.45),
         description="Mean colour of the facial skin without lips, brows and stubble, as the eye sees it (sRGB)",
     )
+    estimated_tone: bpy.props.FloatVectorProperty(name="Estimated Tone", size=3, options={'HIDDEN'}, description="What the last estimate was")
+    tone_group: bpy.props.StringProperty(name="Tone Group", options={'HIDDEN'}, description="What such a tone is called")
+    tone_source: bpy.props.StringProperty(name="Tone Source", options={'HIDDEN'}, description="What the last estimate was taken from")
+    tone_deviation: bpy.props.FloatProperty(name="Tone Deviation", options={'HIDDEN'}, description="One deviation of its lightness L*")
 
 
 WILDCAP_PG_capture.__annotations__ |= {stage: bpy.props.PointerProperty(type=group) for stage, group in GROUPS.items()}

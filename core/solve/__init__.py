@@ -20,7 +20,7 @@ from ..capture import Capture
 from ..hashes import hash_tree
 from ..messages import Reporter
 from ..settings import Settings, deciding
-from . import checkpoint, comparison, drawing, initial, layout, maps
+from . import checkpoint, comparison, drawing, initial, layout, maps, tone
 from .checkpoint import Solution
 from .confidence import spread
 from .draft import restored
@@ -68,7 +68,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         return
     conditions = mask_edit.conditions(capture, settings)
     witness = (lambda marks: confirmed(capture, marks, evidence.size)) if elsewhere is None else list
-    start = initial.start(prior, evidence, options.skin_tone, cell, recipe, witness)
+    start = initial.start(prior, evidence, tone.asked(capture, settings, known, report), cell, recipe, witness)
     report.figure("marks_kept_from_light", len(start.marks))
     images.write_srgb(capture.picture("solve", "edges_and_marks"), drawing.edges_and_marks(evidence, start.alpha, start.marks))
     state, seen = start.state, start.observations

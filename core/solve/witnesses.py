@@ -33,18 +33,18 @@ def confirmed(capture: Capture, marks: list[Mark], size: int) -> list[Mark]:
     there = points[at], normals[at] / np.maximum(np.linalg.norm(normals[at], axis=1, keepdims=True), 1e-9)
     seen, agreed = np.zeros(len(marks), int), np.zeros(len(marks), int)
     for view, path in pictures:
-        visible = _visible(view, caster, *there) & covered[at]
-        if not visible.any():
+        shown = visible(view, caster, *there) & covered[at]
+        if not shown.any():
             continue
         picture = np.log(np.maximum(images.read_linear(path), 1e-3)).mean(-1)
-        for k in np.flatnonzero(visible):
+        for k in np.flatnonzero(shown):
             contrast = _contrast(view, picture, points, covered, marks[k])
             seen[k] += contrast is not None
             agreed[k] += contrast is not None and contrast > SHOWN * marks[k].contrast
     return [mark for mark, s, a in zip(marks, seen, agreed, strict=True) if s < FEWEST or a >= AGREED * s]
 
 
-def _visible(view: View, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def visible(view: View, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """bool [N] of surface points [N, 3] with unit normals [N, 3]."""
     towards = view.centre - points
     facing = (towards * normals).sum(1) > FACING * np.linalg.norm(towards, axis=1)

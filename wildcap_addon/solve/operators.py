@@ -70,7 +70,7 @@ class WILDCAP_OT_solve_all(BaseOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_estimate_skin_tone(BaseOperator, bpy.types.Operator):
-    """Look at the texture's skin outside of the shadow mask, and set the skin tone from it; light and lightness cannot be told apart, so correct it by eye"""
+    """Look at the skin outside of the shadow mask in all frames, and set the skin tone from it, with how sure it is; a measured white point helps most"""
 
     bl_idname = "wildcap.estimate_skin_tone"
     bl_label = "Estimate"
@@ -81,7 +81,7 @@ class WILDCAP_OT_estimate_skin_tone(BaseOperator, bpy.types.Operator):
 
     def work(self, context):
         root = captures.root(captures.require(context))
-        job = jobs.start(captures.require(context), "tool", tool="skin_tone", then=lambda: set_tone(root, job.figures["skin_tone_srgb"]))
+        job = jobs.start(captures.require(context), "tool", tool="skin_tone", then=lambda: set_tone(root, job.figures))
 
 
 def begin(context, item, **shared) -> None:
@@ -91,12 +91,15 @@ def begin(context, item, **shared) -> None:
     live.prepare(context, item)
 
 
-def set_tone(root: str, tone: list[float]) -> None:
+def set_tone(root: str, figures: dict) -> None:
     """The estimated tone into the settings of the capture, in whichever scene lists it."""
     for scene in bpy.data.scenes:
         for item in scene.wildcap.captures:
             if captures.root(item) == root:
-                item.skin_tone, item.use_skin_tone = tone, True
+                item.skin_tone, item.use_skin_tone = figures["skin_tone_srgb"], True
+                item.estimated_tone = figures["skin_tone_srgb"]
+                item.tone_group, item.tone_source = figures.get("skin_tone_group", ""), figures.get("skin_tone_source", "")
+                item.tone_deviation = figures.get("skin_tone_deviation_l", 0.0)
 
 
 CLASSES = (WILDCAP_OT_solve, WILDCAP_OT_solve_edited, WILDCAP_OT_solve_all, WILDCAP_OT_estimate_skin_tone)

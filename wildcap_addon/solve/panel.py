@@ -3,6 +3,7 @@
 """Panel: quality, skin tone and the solver's settings; the preview while it runs."""
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from ...core import stages
 from .. import captures, jobs, properties, timings
@@ -42,6 +43,9 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         row.prop(item, "skin_tone")
         row.operator("wildcap.pick_skin_tone", text="", icon='EYEDROPPER')
         row.operator("wildcap.estimate_skin_tone")
+        if item.use_skin_tone:
+            layout.label(text=tone_words(item), icon='INFO')
+        _draw_white_point(layout, item)
         layout.prop(item, "device")
         layout.prop(item, "seed")
         row = layout.row(align=True)
@@ -50,7 +54,29 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         if len(context.scene.wildcap.captures) > 1:
             layout.operator("wildcap.solve_all")
         for stage in stages.STAGES[stages.NAMES.index(stages.MASK_STAGE) + 1:]:
-            draw_settings(layout, item, stage, without=("skin_tone",))
+            draw_settings(layout, item, stage, without=("skin_tone", "white_point"))
+
+
+def tone_words(item) -> str:
+    """Where the skin tone comes from and how sure it is."""
+    if max(abs(a - b) for a, b in zip(item.skin_tone, item.estimated_tone, strict=True)) > 1e-4:
+        return iface_("Chosen by you: it wins over every estimate")
+    if not item.tone_group:
+        return iface_("Estimated from the texture alone")
+    source = {"scene": iface_("from the scene"), "white point": iface_("from the measured white point")}.get(item.tone_source, item.tone_source)
+    return iface_("Estimated: {}, ± {} L*, {}").format(iface_(item.tone_group), round(item.tone_deviation), source)
+
+
+def _draw_white_point(layout, item) -> None:
+    measured = item.solve.white_point != "auto"
+    row = layout.row(align=True)
+    row.label(text=iface_("White Point: {}").format(item.solve.white_point if measured else iface_("from the scene")))
+    if measured:
+        row.operator("wildcap.clear_white_point", text="", icon='X')
+    row = layout.row(align=True)
+    row.operator("wildcap.find_color_checker")
+    row.operator("wildcap.pick_white_point", text="Grey Card", icon='EYEDROPPER').card = 'grey'
+    row.operator("wildcap.pick_white_point", text="White Paper", icon='EYEDROPPER').card = 'white'
 
 
 CLASSES = (WILDCAP_PT_preview, WILDCAP_PT_solve)

@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How true the estimated skin tone is, for each of six groups of skin, under random lights, exposures and white balances:
+
+    python -m benchmarks.skin_tone [--each 6] [--capture CAPTURE TONE.txt ...]
+
+Held-out subjects (seeds from 9000 up, and the reserved ones), at least `--each` a group, each in three lights by two phones. Rows: `before`, what auto
+took until the estimate was there (the best lit skin, as if a delighter had been perfect); `scene`, the estimate; `measured`, the same with a white card
+before the face. Columns: mean signed and root mean square error of L*, mean delta E 2000, the stated deviation of L*, and how often the truth lies
+within two of those. A capture is a finished one with the sRGB of its true tone in a text file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+import torch
+from skimage.color import deltaE_ciede2000
+
+from core import images
+from core.capture import Capture
+from core.delight.shading import BRIGHTEST
+from core.messages import Reporter
+from core.settings import Settings, from_json
+from core.solve.evidence import read_evidence
+from core.solve.initial import skin_tone
+from core.solve.look import Look
+from core.solve.population import GROUPS, Tone, estimate, group, lab
+from core.solve.prior import WEIGHTS
+from core.solve.tone import SIZE, automatic
+from core.synthetic.identities import reserved_seeds
+from core.training.prior import HELD_OUT_SEED
+from core.training.tones import PHONES, photographed, scenes_of
+
+MOST = 400  # subjects looked at until each group has enough
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--each", type=int, default=6, help="subjects of each group, at least")
+    parser.add_argument("--capture", nargs=2, action="append", default=[], metavar=("CAPTURE", "TONE"))
+    asked = parser.parse_args()
+    known = json.loads(WEIGHTS.with_suffix(".json").read_text(encoding="utf-8"))["tones"]
+    rows: dict[str, list] = {"before": [], "scene": [], "measured": []}
+    subjects = dict.fromkeys((name for _, name in GROUPS), 0)
+    for seed in (*sorted(reserved_seeds()), *range(HELD_OUT_SEED, HELD_OUT_SEED + MOST)):
+        scenes = scenes_of(seed)
+        name = group(scenes[0].tone)
+        if min(subjects.values()) >= asked.each:
+            break
+        if subjects[name] >= 3 * asked.each:
+            continue
+        subjects[name] += 1
+        for light, scene in enumerate(scenes):
+            for phone in range(PHONES):
+                look, card = photographed(scene, np.random.default_rng([seed, light, phone, 33]))
+                for row, tone in (("before", before(look, known)), ("scene", estimate(look)), ("measured", estimate(look, card))):
+                    rows[row].append((name, *errors(tone, scene.tone)))
+    table(rows, subjects)
+    for folder, truth in asked.capture:
+        of_capture(Capture(folder), np.array([float(v) for v in Path(truth).read_text(encoding="ascii").split("#")[0].split(",")]), known)
+
+
+def before(look: Look, known: list) -> Tone:
+    """What auto took of a texture whose light was all taken out: the best lit skin."""
+    colour = torch.from_numpy(np.asarray(look.best * min(1, BRIGHTEST / look.best.max()), np.float32))
+    linear = skin_tone("auto", colour[:, None, None].expand(3, 8, 8).contiguous(), torch.ones(8, 8), known).numpy()
+    return Tone(linear, np.nan, np.nan, group(linear))
+
+
+def errors(tone: Tone, truth: np.ndarray) -> tuple[float, float, float]:
+    """Signed error of L*, delta E 2000, and the stated deviation of L*."""
+    found, true = lab(tone.linear), lab(truth)
+    return float(found[0] - true[0]), float(deltaE_ciede2000(true, found)), tone.deviation
+
+
+def table(rows: dict[str, list], subjects: dict[str, int]) -> None:
+    print(f"{'row':9} {'group':13} {'subjects':>8} {'L* mean':>8} {'L* rms':>7} {'delta E':>8} {'stated':>7} {'in two':>7}")
+    for row, found in rows.items():
+        for name in (*subjects, "all"):
+            chosen = np.array([values for group_name, *values in found if name in (group_name, "all")])
+            if len(chosen):
+                signed, colour, stated = chosen.T
+                print(f"{row:9} {name:13} {subjects.get(name, sum(subjects.values())):8} {signed.mean():+8.2f} {np.sqrt((signed**2).mean()):7.2f} "
+                      f"{colour.mean():8.2f} {stated.mean():7.2f} {np.mean(np.abs(signed) <= 2 * stated):7.2f}")
+
+
+def of_capture(capture: Capture, srgb: np.ndarray, known: list) -> None:
+    """One finished capture: its name, then the estimate's and the earlier auto's error of L* and delta E."""
+    truth = images.srgb_to_linear(srgb)
+    evidence, settings = read_evidence(capture, SIZE), from_json({}, Settings())
+    lit = evidence.skin * evidence.weight * (1 - evidence.alpha)
+    linear = skin_tone("auto", evidence.texture, lit, known).numpy()
+    for row, tone in (("before", Tone(linear, np.nan, np.nan, group(linear))), ("scene", automatic(capture, settings, evidence, Reporter("skin_tone")))):
+        signed, colour, stated = errors(tone, truth)
+        print(f"{row:9} {capture.root.name:20} {group(truth):13} L* {lab(truth)[0]:.1f} error {signed:+.2f} delta E {colour:.2f} stated {stated:.2f}")
+
+
+if __name__ == "__main__":
+    main()

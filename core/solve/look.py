@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a camera shows of a person's skin, in three colours: the best lit skin, the skin that faces as the face does, and all that is not the person.
+
+Over a capture's views each point of the head has one colour, a low quantile of what the views show: highlights move with the camera, the skin's own
+colour does not. Lips, brows, beard, shadow and what is burnt out do not count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from .. import faces, images, meshes, raster, template
+from ..capture import Capture
+from ..messages import Reporter
+from ..views import View, read_views
+from .witnesses import visible
+
+FRONT = np.array([0.0, -1.0, 0.0])
+QUANTILE = 0.3  # over the views: below the median, as every highlight brightens and nothing but shadow darkens
+BEST_LIT = 0.75, 0.95  # quantiles of luminance between which skin is best lit; what is above is highlights that stood still
+BURNT = 0.98  # sRGB from which a channel has lost its value
+FEWEST = 60  # points of skin
+PERSON = 0.2  # sureness from which a pixel may be the person
+SURROUNDED = 0.05  # least share of the frame that is surroundings
+SMOOTHED = 0.003  # of the frame's longer side: what noise and a head that is off by a pixel amount to
+LIKE = 0.75, 1.35  # brightness over that of evenly lit skin outside of which a point is shadow, mark or highlight
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+BEARD = 0.42  # v of the texture below which a beard may grow, whose colour is not the skin's
+
+
+@dataclass(frozen=True)
+class Look:
+    """Linear colours [3] as the camera shows them. best: skin in the best light; front: skin whose normal is -Y, the way the face looks; surroundings:
+    the mean of what is not the person, None where little of it is in view."""
+
+    best: np.ndarray
+    front: np.ndarray
+    surroundings: np.ndarray | None = None
+
+
+def look(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray, surroundings: np.ndarray | None = None) -> Look:
+    """From linear colours [N, 3] of facial skin with unit normals [N, 3] and weights [N] in [0, 1], 0 for what is shadowed or no skin."""
+    brightness = colours @ LUMINANCE
+    order = np.argsort(brightness)
+    rank = np.cumsum(weight[order]) / weight.sum()
+    best = order[(rank >= BEST_LIT[0]) & (rank <= BEST_LIT[1])]
+    return Look(np.average(colours[best], axis=0, weights=weight[best] + 1e-9), _facing_front(colours, normals, weight), surroundings)
+
+
+def capture_look(capture: Capture, shadow: np.ndarray, report: Reporter) -> Look | None:
+    """From the selected frames as they were filmed. `shadow` [S, S]: the soft mask in UV. None where the frames or cameras are gone, or hardly any
+    skin is seen."""
+    if not capture.frames_json.is_file() or not capture.cameras.is_dir():
+        return None
+    views = [view for view in read_views(capture, selected_only=True) if view.path.is_file()]
+    head = meshes.read_obj(capture.head)
+    if not views or not template.is_built_in(head):
+        return None
+    normals = meshes.vertex_normals(head)
+    uv = np.zeros((len(head.vertices), 2))
+    uv[head.faces] = head.uvs[head.face_uvs]
+    weight = raster.sample(skin_weight(512, shadow), np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512)
+    points = np.flatnonzero(weight > 0.05)
+    caster = raster.RayCaster(head)
+    seen = np.full((len(views), len(points), 3), np.nan)
+    around = []
+    for i, view in enumerate(views):
+        report.progress(0, len(views), f"looking at the skin in frame {i + 1} of {len(views)}")
+        frame = images.read_srgb(view.path)
+        seen[i] = _seen(view, frame, caster, head.vertices[points], normals[points])
+        around.append(_surroundings(frame))
+    known = np.isfinite(seen[..., 0]).sum(0) >= min(2, len(views))
+    if known.sum() < FEWEST:
+        return None
+    colours = _low_quantile(seen[:, known])
+    around = [each for each in around if each is not None]
+    return look(colours, normals[points[known]], weight[points[known]], np.median(around, 0) if around else None)
+
+
+def skin_weight(size: int, shadow: np.ndarray) -> np.ndarray:
+    """[size, size] in [0, 1]: facial skin that is out of the `shadow` [S, S], without lips, brows, eyes, nostrils and where a beard may grow."""
+    skin = template.mask("skin", size) * template.mask("face", size)
+    for name in ("lips", "brows", "eyes", "nostrils"):
+        skin = skin * (1 - template.mask(name, size))
+    skin[round(size * (1 - BEARD)):] = 0
+    shadow = cv2.dilate(images.resize(shadow.astype(np.float32), size, size), np.ones((3, 3)))
+    return skin * np.clip(1 - 3 * shadow, 0, 1)  # half a shadow is none of the skin's own brightness either
+
+
+def _facing_front(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """The colour [3] of skin whose normal is FRONT, by a light of second-order spherical harmonics fitted to the skin that turns that way."""
+    weight = weight * np.clip(normals @ FRONT, 0, None)
+    basis, there = _polynomials(normals), _polynomials(FRONT[None])[0]
+    kept = np.ones(len(colours))
+    for _ in range(5):
+        weighted = basis * (weight * kept)[:, None]
+        ridge = np.diag([1e-6, *[0.01] * 3, *[0.1] * 5]) * (weight * kept).sum()
+        light = np.linalg.solve(basis.T @ weighted + ridge, weighted.T @ colours)
+        ratio = (colours @ LUMINANCE) / np.maximum(basis @ light @ LUMINANCE, 1e-6)
+        kept = ((ratio > LIKE[0]) & (ratio < LIKE[1])).astype(float)
+        if (weight * kept).sum() < 0.1 * weight.sum():
+            break
+    return np.maximum(there @ light, 1e-4)
+
+
+def _polynomials(normals: np.ndarray) -> np.ndarray:
+    """[N, 9] of unit normals [N, 3]: what second-order spherical harmonics span."""
+    x, y, z = normals.T
+    return np.stack([np.ones_like(x), x, y, z, x * y, y * z, x * z, z * z - 1 / 3, x * x - y * y], 1)
+
+
+def _seen(view: View, frame: np.ndarray, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Linear colours [N, 3] of surface points in an sRGB frame, nan where it does not see them or is burnt out."""
+    found = np.full((len(points), 3), np.nan)
+    facing = np.flatnonzero(visible(view, caster, points, normals))
+    if len(facing):
+        pixels, _ = view.project(points[facing])
+        smooth = cv2.GaussianBlur(images.srgb_to_linear(frame), (0, 0), SMOOTHED * max(frame.shape[:2]))
+        whole = raster.sample(frame.max(-1), pixels) < BURNT
+        found[facing[whole]] = raster.sample(smooth, pixels[whole])
+    return found
+
+
+def _surroundings(frame: np.ndarray) -> np.ndarray | None:
+    """Mean linear colour [3] of what is not the person in an sRGB frame."""
+    side = max(frame.shape[:2])
+    small = images.resize(frame, round(256 * frame.shape[1] / side), round(256 * frame.shape[0] / side))
+    away = faces.segment_person(small) < PERSON
+    return images.srgb_to_linear(small)[away].mean(0) if away.mean() > SURROUNDED else None
+
+
+def _low_quantile(seen: np.ndarray) -> np.ndarray:
+    """[N, 3]: the QUANTILE over the views of [V, N, 3], whose nan do not count; each point has at least one value."""
+    count = np.isfinite(seen[..., 0]).sum(0)
+    at = np.floor(QUANTILE * (count - 1)).astype(int)
+    return np.take_along_axis(np.sort(seen, 0), at[None, :, None], 0)[0]  # sort puts nan last

@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators: the white point, from a ColorChecker that the solver's Python finds in the frames, or from a click on a grey card or white paper in one."""
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
+
+from ...core.messages import Problem
+from ...core.settings import CARDS
+from .. import captures, jobs
+from ..base_operator import BaseOperator
+from .eyedropper import colour_at
+
+BURNT, BLACK = 0.97, 0.04
+"""sRGB beyond which a channel has lost its value"""
+
+
+class WILDCAP_OT_find_color_checker(BaseOperator, bpy.types.Operator):
+    """Look for a ColorChecker in the frames and take the white point from its greys; the colour of the light then no longer has to be guessed"""
+
+    bl_idname = "wildcap.find_color_checker"
+    bl_label = "Find ColorChecker"
+
+    @classmethod
+    def poll(cls, context):
+        return jobs.can_start(cls, context)
+
+    def work(self, context):
+        root = captures.root(captures.require(context))
+        job = jobs.start(captures.require(context), "tool", tool="white_point", then=lambda: set_white(root, job.figures["white_point"]))
+
+
+class WILDCAP_OT_pick_white_point(BaseOperator, bpy.types.Operator):
+    """Shows a frame: click on a grey card or white paper that is in the face's light. Mouse wheel or arrow keys go to other frames, Esc leaves it"""
+
+    bl_idname = "wildcap.pick_white_point"
+    bl_label = "Pick White Point"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    card: bpy.props.EnumProperty(name="Card", items=[('grey', "Grey Card", "Of 18 percent"), ('white', "White Paper", "Plain paper, not glossy")])
+    frame: bpy.props.StringProperty(name="Frame", description="Name of the frame's file")
+    uv: bpy.props.FloatVectorProperty(name="UV", size=2, description="Where on the frame to look; a click says it")
+
+    @classmethod
+    def poll(cls, context):
+        return cls.with_capture(context)
+
+    def invoke(self, context, event):
+        self._frames = frame_names(captures.folder(captures.require(context)))
+        if not self._frames or context.area is None or context.area.type != 'VIEW_3D':
+            return self.execute(context)
+        self._at, self._area, self._shown = len(self._frames) // 2, context.area, None
+        self._area.type = 'IMAGE_EDITOR'
+        self._show(context)
+        context.window.cursor_modal_set('EYEDROPPER')
+        context.window_manager.modal_handler_add(self)
+        return {'RUNNING_MODAL'}
+
+    def modal(self, context, event):
+        step = {'WHEELUPMOUSE': -1, 'LEFT_ARROW': -1, 'WHEELDOWNMOUSE': 1, 'RIGHT_ARROW': 1}.get(event.type)
+        if step is not None and event.value == 'PRESS':
+            self._at = (self._at + step) % len(self._frames)
+            self._show(context)
+        if event.type in ('ESC', 'RIGHTMOUSE'):
+            self._leave(context)
+            return {'CANCELLED'}
+        if event.type != 'LEFTMOUSE' or event.value != 'PRESS':
+            return {'RUNNING_MODAL'}
+        region = next(r for r in self._area.regions if r.type == 'WINDOW')
+        u, v = region.view2d.region_to_view(event.mouse_x - region.x, event.mouse_y - region.y)
+        self._leave(context)
+        self.frame, self.uv = self._frames[self._at], (u, v)
+        return self.execute(context)
+
+    def work(self, context):
+        item = captures.require(context)
+        path = captures.folder(item).frames / self.frame
+        if not self.frame or not path.is_file():
+            raise Problem("There is no such frame in this capture.", "Click Reconstruct first: the frames come with it.")
+        if not all(0 <= c < 1 for c in self.uv):
+            raise Problem("That was beside the frame: nothing was measured.", "Click on the card.")
+        image = bpy.data.images.load(str(path))
+        try:
+            colour = np.array(colour_at(image, self.uv))
+        finally:
+            bpy.data.images.remove(image)
+        if colour.max() > BURNT or colour.min() < BLACK:
+            raise Problem("The card is burnt out or black there.", "Choose another frame or place, or a grey card instead of white paper.")
+        linear = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4) / CARDS[self.card]
+        set_white(captures.root(item), linear.tolist())
+
+    def _show(self, context):
+        """Puts the frame into the editor in place of the one before."""
+        before, self._shown = self._shown, bpy.data.images.load(str(captures.folder(captures.require(context)).frames / self._frames[self._at]))
+        self._area.spaces.active.image = self._shown
+        if before is not None:
+            bpy.data.images.remove(before)
+        self._area.header_text_set(iface_("Frame {}: click on the card, wheel or arrows for other frames, Esc to leave").format(self._frames[self._at]))
+
+    def _leave(self, context):
+        context.window.cursor_modal_restore()
+        self._area.header_text_set(None)
+        self._area.type = 'VIEW_3D'
+        bpy.data.images.remove(self._shown)
+
+
+class WILDCAP_OT_clear_white_point(BaseOperator, bpy.types.Operator):
+    """Forget the measured white point: the scene tells it again"""
+
+    bl_idname = "wildcap.clear_white_point"
+    bl_label = "Clear White Point"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        return cls.with_capture(context)
+
+    def work(self, context):
+        captures.require(context).solve.white_point = "auto"
+
+
+def frame_names(capture) -> list[str]:
+    """File names of a capture's frames, in order."""
+    return sorted(path.name for path in capture.frames.glob("*.jpg"))
+
+
+def set_white(root: str, linear: list[float]) -> None:
+    """The measured white point into the settings of the capture, in whichever scene lists it."""
+    for scene in bpy.data.scenes:
+        for item in scene.wildcap.captures:
+            if captures.root(item) == root:
+                item.solve.white_point = ",".join(f"{v:.4f}" for v in linear)
+
+
+CLASSES = (WILDCAP_OT_find_color_checker, WILDCAP_OT_pick_white_point, WILDCAP_OT_clear_white_point)
