@@ -34,7 +34,7 @@ from core.messages import Problem, Reporter
 from core.settings import Settings
 
 from .albedo_score import with_gain
-from .delight_measures import flat_tone, mean_of, score, sheet, square, table, tone_group
+from .delight_measures import flat_tone, mean_of, score, sheet, shortfalls, square, table, tone_group
 from .delight_portraits import portraits
 from .delight_sets import Photograph, Photographs, frames, light_stage, registered
 
@@ -43,6 +43,7 @@ SAMPLE = Path(__file__).resolve().parents[1] / "core" / "synthetic" / "sample"
 SETS = ("faceolat", "portraits", "lps_sun", "sample")
 BROUGHT = ("none", "folder", "switchlight", "opendelight")
 """Delighters that need something of the user's, or nothing at all: no rows of their own on captures."""
+FLAT = "flat true tone"
 QUICK = 4  # every n-th picture
 
 
@@ -79,6 +80,7 @@ def main() -> None:
         if options.json:
             write_json(options.json, results)
     print(table(results))
+    print("", "Where the network is no better than no delighting or the delighter shading:", *(shortfalls(results) or ["nowhere."]), sep="\n")
     if options.json is None:
         print(json.dumps(results, indent=1))
 
@@ -90,14 +92,16 @@ def measure(chosen: Photographs, settings: Settings, features: bool = True, only
     for row in rows(chosen, settings):
         if only and not any(row.startswith(name) for name in only):
             continue
-        scores, groups, delit, refused, seconds, started = [], {}, {}, [], 0.0, time.monotonic()
+        scores, groups, delit, refused, alike, seconds, started = [], {}, {}, [], {}, 0.0, time.monotonic()
         try:
             for photograph, predicted in predictions(row, chosen, settings):
                 seconds += time.monotonic() - started
                 if isinstance(predicted, Problem):  # the artist would go on with the picture as it is
                     refused.append(predicted)
                     predicted = photograph.srgb
-                scores.append(score(predicted, photograph.srgb, photograph.truth, features))
+                flat = id(photograph.truth) if row == FLAT and photograph.truth.shadow is None else None  # scores the same under every light
+                scores.append(alike.get(flat) or score(predicted, photograph.srgb, photograph.truth, features))
+                alike |= {flat: scores[-1]} if flat else {}
                 groups.setdefault(photograph.group or tone_group(flat_tone(photograph.truth)), []).append(scores[-1])
                 delit[photograph.name] = predicted
                 print(f"\r{row}: {len(scores)}", end="", file=sys.stderr, flush=True)
@@ -120,12 +124,12 @@ def rows(chosen: Photographs, settings: Settings) -> list[str]:
     """What there is to compare on a set."""
     on_captures = [name for name in delight.DELIGHTERS if name not in BROUGHT] if chosen.capture else []
     single = [f"{name}, one photograph" for name in delight.PHOTOGRAPHERS if name != "none" and (name != "opendelight" or settings.delight.checkpoint)]
-    return ["none", "flat true tone", *on_captures, *single]
+    return ["none", FLAT, *on_captures, *single]
 
 
 def predictions(row: str, chosen: Photographs, settings: Settings) -> Iterator[tuple[Photograph, np.ndarray | Problem]]:
     """Each photograph of a set with what a row takes for its albedo, sRGB [H, W, 3], or why it does not serve it."""
-    if row in ("none", "flat true tone"):
+    if row in ("none", FLAT):
         for photograph in chosen.photographs:
             yield photograph, photograph.srgb if row == "none" else np.broadcast_to(flat_tone(photograph.truth), photograph.srgb.shape)
     elif row.endswith(", one photograph"):

@@ -20,6 +20,7 @@ from .albedo_score import Truth, detail, differences, edge_bands, face_box, log_
 
 FIGURES = ("psnr", "ssim", "flip", "features", "detail", "shadow_step")
 HIGHER_IS_BETTER = ("psnr", "ssim", "detail")
+RIVALS = ("none", "shading")
 LEAST_STEP = 0.2
 """Least true step of the light at a shadow's edge, as a difference of logarithms, where what is left of it is measured."""
 TONES = (("very light", 55), ("light", 41), ("intermediate", 28), ("tan", 10), ("brown", -30), ("dark", -90))
@@ -78,6 +79,21 @@ def table(results: dict[str, dict]) -> str:
             lines += [_line(f"{name}: {group}", row, found["groups"][group]["pictures"], found["groups"][group]["figures"])
                       for row, found in rows.items() if "figures" in found]
     return "\n".join(lines)
+
+
+def shortfalls(results: dict[str, dict], ours: str = "network") -> list[str]:
+    """Where rows whose name begins with `ours` are no better than a RIVALS row of the same set, or of the same group in it; detail is not asked for."""
+    found = []
+    for name, rows in results.items():
+        done = {row: {"": result["figures"], **{group: part["figures"] for group, part in result["groups"].items()}}
+                for row, result in rows.items() if "figures" in result}
+        for row in (row for row in done if row.startswith(ours)):
+            for rival in (rival for rival in RIVALS if rival in done):
+                for group, figures in done[row].items():
+                    found += [f"{name}{group and ': ' + group}: {figure} {mine:.3f} of {row}, {theirs:.3f} of {rival}" for figure in FIGURES
+                              if figure != "detail" and None not in (mine := figures[figure], theirs := done[rival][group][figure])
+                              and not (mine > theirs if figure in HIGHER_IS_BETTER else abs(mine) < abs(theirs))]
+    return found
 
 
 def square(srgb: np.ndarray, mask: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ pytest.importorskip("flip_evaluator")
 
 from benchmarks import albedo_score, delight  # noqa: E402
 from benchmarks.albedo_score import Truth  # noqa: E402
-from benchmarks.delight_measures import FIGURES, flat_tone, mean_of, score, table, tone_group  # noqa: E402
+from benchmarks.delight_measures import FIGURES, flat_tone, mean_of, score, shortfalls, table, tone_group  # noqa: E402
 from benchmarks.delight_sets import Photograph, Photographs, light_stage  # noqa: E402
 from core import images  # noqa: E402
 from core.messages import Problem  # noqa: E402
@@ -79,6 +79,18 @@ def test_rows_of_a_set_without_a_capture(truth):
     lines = table({"two lights": results}).splitlines()
     assert len(lines) == 2 + 3 * len(results) and lines[2].startswith("| two lights | none | 2 |")
     assert lines[2 + len(results)].startswith("| two lights: one | none | 1 |")
+
+
+def test_where_the_network_is_no_better_is_told():
+    def row(**figures):
+        known = {**dict.fromkeys(FIGURES), **figures}
+        return {"pictures": 1, "figures": known, "groups": {"dark": {"pictures": 1, "figures": {**known, "ssim": 0.7}}}}
+
+    network = row(psnr=20, ssim=0.8, flip=0.3, detail=0.4, shadow_step=-0.1)
+    results = {"set": {"none": row(psnr=18, ssim=0.7, flip=0.4, detail=0.6, shadow_step=0.9), "shading": {"not_run": "why"}, "network": network}}
+    assert shortfalls(results) == ["set: dark: ssim 0.700 of network, 0.700 of none"]
+    results["set"]["shading"] = row(psnr=21, ssim=0.7, flip=0.4, shadow_step=-0.05)
+    assert {line.split(" of ")[0] for line in shortfalls(results)} >= {"set: psnr 20.000", "set: shadow_step -0.100", "set: dark: psnr 20.000"}
 
 
 def test_a_photograph_that_is_refused_stays_as_it_is(truth, monkeypatch):
