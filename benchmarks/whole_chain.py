@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which stage costs what: a solved capture's score beside the scores with one stage replaced by the truth or switched off.
 
-    python -m benchmarks.whole_chain CAPTURE TRUTH [--rows NAME ...]
+    python -m benchmarks.whole_chain CAPTURE TRUTH [--rows NAME ...] [--delighters NAME ...]
 
 CAPTURE has been run from TRUTH/capture.mp4 with the true skin tone; TRUTH is laid out as benchmarks/albedo_score.py says. Prints one JSON:
   chain         the capture's own maps
@@ -10,6 +10,7 @@ CAPTURE has been run from TRUTH/capture.mp4 with the true skin tone; TRUTH is la
   raw_texture   the same without any delighting: what geometry and light leave
   true_frames   the true albedo frames through the folder delighter: what geometry, texture and solver cost
   true_mask     the true shadow as shadow_mask.png: what the automatic mask costs
+  delighters    per delighter that needs nothing of the user's: the chain with it, and its solve_off
   mask          recall and intersection over union of the automatic mask with the true shadow, over texels of the face
 """
 
@@ -33,7 +34,8 @@ from core.settings import Settings, from_json
 from .albedo_score import score_capture
 from .shadow_captures import lifted_truth
 
-ROWS = ("chain", "solve_off", "raw_texture", "true_frames", "true_mask", "mask")
+ROWS = ("chain", "solve_off", "raw_texture", "true_frames", "true_mask", "mask", "delighters")
+DELIGHTERS = ("none", "shading", "network")
 
 
 def main() -> None:
@@ -41,11 +43,16 @@ def main() -> None:
     parser.add_argument("capture", type=Path)
     parser.add_argument("truth", type=Path)
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS)
+    parser.add_argument("--delighters", nargs="+", default=DELIGHTERS, help="of the row delighters")
     arguments = parser.parse_args()
     capture = Capture(arguments.capture.resolve())
     tone = (arguments.truth / "skin_tone.txt").read_text(encoding="ascii").split("#")[0].replace(" ", "").strip()
     settings = from_json({"solve": {**_solve_settings(capture), "skin_tone": tone}})
-    print(json.dumps({row: _row(row, capture, arguments.truth, settings) for row in arguments.rows}, indent=1))
+    rows = {row: _row(row, capture, arguments.truth, settings) for row in arguments.rows if row != "delighters"}
+    if "delighters" in arguments.rows:
+        chosen = {name: from_json({"delight": {"delighter": name}}, settings) for name in arguments.delighters}
+        rows["delighters"] = {name: _row("delighter", capture, arguments.truth, of) for name, of in chosen.items()}
+    print(json.dumps(rows, indent=1))
 
 
 def _row(row: str, capture: Capture, truth: Path, settings: Settings) -> dict:
@@ -61,6 +68,9 @@ def _row(row: str, capture: Capture, truth: Path, settings: Settings) -> dict:
             settings = from_json({"delight": {"delighter": "none"}}, settings)
             _run(copy, settings, "delight", "texture")
             return _score_texture(copy, truth, settings)
+        if row == "delighter":
+            _run(copy, settings, "delight", "texture", "shadow_mask", "solve")
+            return {**score_capture(copy, truth), "solve_off": _score_texture(copy, truth, settings)}
         if row == "true_frames":
             _run(copy, from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings), "delight", "texture", "shadow_mask", "solve")
             return {**score_capture(copy, truth), "solve_off": _score_texture(copy, truth, settings)}

@@ -11,6 +11,7 @@ import torch
 
 from core import images, template
 from core.delight import network
+from core.delight.casts import without_casts
 from core.delight.evening import Look, even_out
 from core.delight.lift import lift, lift_share
 from core.delight.lit_head import LitHead
@@ -110,6 +111,28 @@ def test_views_are_brought_to_one_albedo():
     assert spread(looks) > 0.15 and spread(even) < 0.02
     slanted = (even[1].log - even[1].shading)[even[1].face >= 0]
     assert slanted.std() < 0.5 * (looks[1].log - looks[1].shading)[looks[1].face >= 0].std()
+
+
+def test_the_hue_of_the_shade_leaves_the_albedo_and_that_of_lips_stays():
+    """One skin under a sun and a bluer shade, whose difference the shading missed by a third; lips are redder by themselves."""
+    rng = np.random.default_rng(0)
+    shadow = np.zeros((64, 64), np.float32)
+    shadow[:, 30:] = 1
+    light = shadow[..., None] * np.float32([-1.5, -1.3, -1.1]) + 0.02 * rng.standard_normal((64, 64, 3)).astype(np.float32)
+    albedo = np.log(np.float32([0.5, 0.35, 0.27])) + np.zeros((64, 64, 3), np.float32)
+    albedo[40:44, 10:50] += np.float32([0.1, -0.4, -0.3])
+    said = light - shadow[..., None] * np.float32([-0.07, 0, 0.07])
+    (mended,) = without_casts([Look((0, 0, 64), said, shadow, light + albedo)], [np.ones((64, 64), np.float32)])
+
+    def hue(look):
+        left = look.log - look.shading
+        return left - left.mean(-1, keepdims=True)
+
+    before, after = (hue(look)[:, 30:].mean((0, 1)) - hue(look)[:, :30].mean((0, 1)) for look in (Look((0, 0, 64), said, shadow, light + albedo), mended))
+    assert np.abs(before).max() > 0.06 and np.abs(after).max() < 0.01
+    lips = hue(mended)[41:43, 12:48].mean((0, 1)) - hue(mended)[:38].mean((0, 1))
+    assert lips == pytest.approx([0.3, -0.2, -0.1], abs=0.02)
+    assert np.abs((mended.shading - said).mean(-1)).max() < 1e-3  # luminance is left alone
 
 
 def test_missing_weights_are_named(monkeypatch, tmp_path):

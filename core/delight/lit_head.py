@@ -14,8 +14,8 @@ from ..meshes import Mesh
 from ..messages import Reporter
 from ..raster import RayCaster, interpolate
 from ..skylight import radiance_transfer
+from ..sunlight import Light, fit_light
 from ..views import View
-from .light import Light, fit_light
 from .surface import skin_weights, smooth_normals, vertex_colours
 
 BRIGHTEST = 0.85  # a tone's largest channel: more than skin reflects, so a brighter picture was over-exposed

@@ -22,13 +22,15 @@ from safetensors.torch import load_file
 from .. import faces, images, template
 from ..capture import Capture
 from ..messages import Problem, Reporter
-from ..raster import sample
+from ..raster import interpolate, sample
 from ..settings import DelightSettings, Settings
 from ..views import View, read_views
+from .casts import without_casts
 from .contract import Delit
 from .evening import Look, even_out
 from .lift import lift, lift_share
 from .lit_head import BRIGHTEST, LitHead, lit_head
+from .surface import skin_weights
 from .unet import DARKEST, SIDE, DelightNet, network_input
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "delighter.safetensors"
@@ -44,6 +46,7 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
         report.progress(4 * len(views) + 3 * i, 8 * len(views), f"Looking at frame {i + 1} of {len(views)}")
         looks.append(_look_at_view(net, view, head))
     looks = even_out(head, views, looks)
+    looks = without_casts(looks, [_skin_seen(head, look) for look in looks])
     for i, (view, look) in enumerate(zip(views, looks, strict=True)):
         report.progress(7 * len(views) + i, 8 * len(views), f"Delighting frame {i + 1} of {len(views)}")
         albedo, shadow = _divided(images.read_srgb(view.path), look)
@@ -56,8 +59,8 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
     if face is None:
         raise Problem("No face was found in the photograph.", "Choose a photograph that shows the face from the front or half from the side.")
     box = face_box(face.landmarks[:, :2])
-    picture = crop(srgb, box, SIDE)
-    return _divided(srgb, _look(load("cpu"), box, picture))
+    look = _look(load("cpu"), box, crop(srgb, box, SIDE))
+    return _divided(srgb, without_casts([look], [_hull(face.landmarks[:, :2], look)])[0])
 
 
 def load(device: str) -> DelightNet:
@@ -116,6 +119,20 @@ def _look(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray,
     shading, shadow = ((part[0] + part[1].flip(-1)).cpu().numpy().transpose(1, 2, 0) / 2 for part in (shading, shadow.sigmoid()))
     small = cv2.resize(images.srgb_to_linear(picture), (SIDE // 2, SIDE // 2), interpolation=cv2.INTER_AREA)
     return Look(box, shading + middle, shadow[..., 0], np.log(np.maximum(small, DARKEST)))
+
+
+def _skin_seen(head: LitHead, look: Look) -> np.ndarray:
+    """Where a look shows bare skin of the head, [h, h] in [0, 1]."""
+    weight, _ = skin_weights(head.mesh)
+    return interpolate(weight[:, None], head.mesh.faces, look.face, look.bary)[..., 0]
+
+
+def _hull(points: np.ndarray, look: Look) -> np.ndarray:
+    """The face within its landmarks [N, 2] (pixels), [h, h] in {0, 1}. Brows, eyes and lips are in it: they are few, and unlike skin."""
+    side = len(look.shading)
+    inside = np.zeros((side, side), np.uint8)
+    cv2.fillConvexPoly(inside, cv2.convexHull(np.round((points - look.box[:2]) * side / look.box[2] - 0.5).astype(np.int32)), 1)
+    return inside.astype(np.float32)
 
 
 def _divided(srgb: np.ndarray, look: Look) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Skin does not change its hue where a shadow falls: what is left of the light's colour in the albedo is found by that, and taken out.
+
+Sun and sky differ in colour, and a network learns the difference of usual ones. So the hue of the albedo is regressed on the brightness of the shading
+and on the shadow over all skin of the capture; what the regression explains is light and moves to the shading. Luminance is left alone: beards grow in shade.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .evening import Look
+
+RIDGE = 0.01  # of the features' mean square, against pictures whose light hardly varies
+USUAL = 0.08  # natural log units of hue from which skin is something else: lips, make-up, a burnt highlight
+LEAST = 200  # cells of skin below which nothing is said
+
+
+def without_casts(looks: list[Look], skins: list[np.ndarray]) -> list[Look]:
+    """The looks with one hue of skin in light and shade. skins: [h, h] each, above 0.5 where a look shows bare skin."""
+    where = [skin > 0.5 for skin in skins]
+    if sum(int(w.sum()) for w in where) < LEAST:
+        return looks
+    middle = np.mean(np.concatenate([look.shading.mean(-1)[w] for look, w in zip(looks, where, strict=True)]))
+    features = [_features(look, middle) for look in looks]
+    x = np.concatenate([f[w] for f, w in zip(features, where, strict=True)])  # [N, 4]
+    y = np.concatenate([_hue(look.log - look.shading)[w] for look, w in zip(looks, where, strict=True)])  # [N, 3]
+    trust = np.ones(len(x))
+    for _ in range(4):
+        centre, level = np.average(x, axis=0, weights=trust), np.average(y, axis=0, weights=trust)
+        weighted = (x - centre) * trust[:, None]
+        slopes = np.linalg.solve(weighted.T @ (x - centre) + RIDGE * len(x) * np.eye(x.shape[1]), weighted.T @ (y - level))  # [4, 3]
+        trust = 1 / (1 + ((y - level - (x - centre) @ slopes) ** 2).sum(1) / USUAL**2)
+    return [replace(look, shading=(look.shading + (f - centre) @ slopes).astype(np.float32)) for look, f in zip(looks, features, strict=True)]
+
+
+def _features(look: Look, middle: float) -> np.ndarray:
+    """What light may depend on [h, h, 4]: the shading's brightness, its square, the shadow, and both."""
+    bright = np.clip(look.shading.mean(-1) - middle, -2.5, 2.5)
+    return np.stack([bright, bright**2, look.shadow, bright * look.shadow], -1)
+
+
+def _hue(log: np.ndarray) -> np.ndarray:
+    """A log colour [..., 3] without its luminance."""
+    return log - log.mean(-1, keepdims=True)
