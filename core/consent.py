@@ -26,10 +26,11 @@ GIVEN_VARIABLE = "WILDCAP_SWITCHLIGHT_CONSENT"
 TOLD = (
     "{pictures} of this capture leave your machine: they show a person's face. Ask that person first.",
     "They go to {company}, a company, at {host}, and nothing else goes there. What it does with them is told at {website}.",
-    "{company} charges your account with {credits}. {kept} came before and are not paid again.",
+    "{company} charges your account with {credits}.",
     "What comes back may not be used to train a model, as its terms say.",
 )
 """Said before anything is sent; `lines` fills it in."""
+TOLD_AGAIN = "{kept} more have their answer already and are not paid again."
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def lines(plan: Sending, translated=str) -> list[str]:
     """What the artist is told, whole sentences; `translated` looks a template up."""
     values = {"pictures": f"{len(plan.frames)} frame{'' if len(plan.frames) == 1 else 's'}", "company": service.COMPANY, "host": plan.host,
               "website": service.WEBSITE, "credits": service.amount(plan.credits), "kept": plan.kept}
-    return [translated(line).format(**values) for line in TOLD]
+    return [translated(line).format(**values) for line in (*TOLD, *([TOLD_AGAIN] if plan.kept else []))]
 
 
 def give(capture: Capture, plan: Sending) -> None:

@@ -23,10 +23,10 @@ class Asked:
     def __init__(self):
         self.names = []
 
-    def __getattr__(self, _):
+    def __getattr__(self, name):
         def call(*arguments, **options):
             self.names += arguments[1:2]
-            return self
+            return (self, self) if name == "panel" else self
 
         return call
 
@@ -86,7 +86,7 @@ def test_nothing_leaves_before_the_artist_agreed_to_these_frames(addon, item, ca
     assert "2 frames would go to Beeble for 2 credits" in words(addon) and not addon("status").of(item).agreed
     operator = addon("reconstruct.sending").WILDCAP_OT_allow_sending
     told = " ".join(operator.tell(type("Dialog", (), {})()))
-    for part in ("2 frames", "a person's face", "Beeble, a company, at sdk.beeble.ai", "2 credits", "0 came before", "not be used to train"):
+    for part in ("2 frames", "a person's face", "Beeble, a company, at sdk.beeble.ai", "2 credits", "not be used to train"):
         assert part in told
     bpy.ops.wildcap.allow_sending()
     assert "You agreed: 2 frames go to Beeble for 2 credits." in words(addon) and addon("status").of(item).agreed
@@ -168,7 +168,7 @@ def test_the_key_is_told_to_the_worker_of_that_delighter_alone(addon, item, capt
     jobs.start(item, "reconstruct")
     assert started[-1][4] == offline, "what the machine is set up with comes first"
     found: list = []
-    preferences.draw_key(Layout(found))
+    preferences.draw_key(Layout(found), "Key")
     assert "WILDCAP_SWITCHLIGHT_KEY" in found[0][0]
     item.delight.delighter = "shading"
     jobs.start(item, "reconstruct")

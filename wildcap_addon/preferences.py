@@ -54,7 +54,7 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
         draw_solver(layout, self)
         layout.prop(self, "python")
         layout.prop(self, "captures")
-        draw_key(layout)
+        draw_key(layout, "SwitchLight Key")
 
 
 def draw_solver(layout, preferences) -> None:
@@ -76,13 +76,13 @@ def draw_solver(layout, preferences) -> None:
     column.operator("wildcap.remove_solver", icon='TRASH')
 
 
-def draw_key(layout) -> None:
+def draw_key(layout, label: str) -> None:
     """Where the key of SwitchLight comes from: here, and beside the delighter."""
     if os.environ.get(switchlight_api.KEY_VARIABLE):
         text = iface_("The key is that of the environment variable {}").format(switchlight_api.KEY_VARIABLE)
         layout.label(text=text, translate=False, icon='CHECKMARK')
     else:
-        layout.prop(get(), "switchlight_key")
+        layout.prop(get(), "switchlight_key", text=label)
 
 
 def get() -> WILDCAP_AP_preferences:

@@ -10,7 +10,9 @@ from ...core import switchlight_api as service
 from .. import preferences, problems, status
 
 COLUMNS = 3
-LOOKS = {"best_for": 'CHECKMARK', "runs": 'MEMORY', "leaves": 'HIDE_OFF', "costs": 'FUND', "shadows": 'LIGHT_SUN', "weights": 'FILE_BLANK', "licence": 'TEXT'}
+LOOKS = {"best_for": 'CHECKMARK', "leaves": 'HIDE_OFF', "costs": 'DISC', "runs": 'MEMORY', "shadows": 'LIGHT_SUN', "weights": 'FILE_BLANK', "licence": 'TEXT'}
+FOLDED = ("runs", "shadows", "weights", "licence")
+"""Facts of a card that are shown when it is unfolded."""
 LABELS = {"switchlight_preview": "Small Pictures at Half the Credits"}
 
 
@@ -25,13 +27,16 @@ def draw(layout, item, width: int) -> None:
     card = delighter_cards.CARDS[chosen]
     box = layout.box()
     problems.draw_text(box, card.what, width)
-    for field, label in delighter_cards.FACTS:
-        problems.draw_text(box, iface_("{}: {}").format(iface_(label), iface_(getattr(card, field))), width, LOOKS[field])
+    _draw_facts(box, card, width, folded=False)
+    header, more = layout.panel("wildcap_card", default_closed=True)
+    header.label(text="More of It")
+    if more:
+        _draw_facts(more, card, width, folded=True)
     column = layout.column()
     for name in card.settings:
         column.prop(item.delight, name, **({"text": LABELS[name]} if name in LABELS else {}))
     if chosen == "switchlight":
-        preferences.draw_key(column)
+        preferences.draw_key(column, "Key")
         _draw_sending(column, item, width)
     for why in lacks(item, chosen):
         problems.draw_text(layout.column(), iface_(why).format(service.WEBSITE), width, 'ERROR')
@@ -45,6 +50,12 @@ def lacks(item, name: str) -> list[str]:
     if name == "switchlight" and not bpy.app.online_access:
         found.append("Blender is set to work offline (Preferences, System, Network).")
     return found
+
+
+def _draw_facts(layout, card: delighter_cards.Card, width: int, folded: bool) -> None:
+    for field, label in delighter_cards.FACTS:
+        if (field in FOLDED) == folded:
+            problems.draw_text(layout, iface_("{}: {}").format(iface_(label), iface_(getattr(card, field))), width, LOOKS[field])
 
 
 def _draw_sending(layout, item, width: int) -> None:

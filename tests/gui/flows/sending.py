@@ -3,6 +3,7 @@
 """SwitchLight in the window: its card, the large button that asks before anything is sent, the dialog, and the worker that then sends two frames to a
 server on this machine, once."""
 
+import os
 import struct
 import sys
 import time
@@ -15,11 +16,18 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 import addon  # noqa: E402
 import driver as d  # noqa: E402
 
+from core import switchlight_api  # noqa: E402
 from tests import standin  # noqa: E402
 from tests.switchlight_server import KEY, Service  # noqa: E402
 
 
 def flow():
+    with Service(answer=standin.png([[(200, 150, 120)] * 36] * 48)) as server:
+        os.environ[switchlight_api.BASE_VARIABLE] = server.url
+        yield from artist(server)
+
+
+def artist(server: Service):
     addon.unfold("WILDCAP_PT_reconstruct", "WILDCAP_PT_delighter")
     bpy.context.preferences.system.use_online_access = True
     yield from d.open_tab("WildCap")
@@ -37,40 +45,47 @@ def flow():
     yield from d.until(lambda: known().sending is not None, "a look at the frames", 20)
     yield 1.5
     yield from d.park()
-    d.screenshot("sending_2_card")
+    d.screenshot("sending_2_asks")
+    yield from turn(30)
+    d.screenshot("sending_3_card")
+    yield from turn(-60)
     addon.module("preferences").get().switchlight_key = KEY
     yield from d.lead("wildcap.allow_sending")
     yield 1.0
-    d.screenshot("sending_3_asked")
+    d.screenshot("sending_4_dialog")
     assert not (root / "consent.json").exists()
     yield from d.key('RET')
     yield from d.until((root / "consent.json").is_file, "the consent", 10)
     yield from d.until(lambda: known().agreed, "another look", 10)
     yield 1.5
-    d.screenshot("sending_4_agreed")
-    with Service(answer=standin.png([[(200, 150, 120)] * 36] * 48)) as server:
-        addon.module("preferences").switchlight_api.os.environ["WILDCAP_SWITCHLIGHT_URL"] = server.url
-        yield 2.5
-        assert not known().agreed, "another machine than the one that was agreed to"
-        yield from d.press("wildcap.allow_sending")
-        yield 1.0
-        yield from d.key('RET')
-        yield from d.until(lambda: known().agreed, "the consent to this machine", 10)
-        yield 1.0
-        started = time.monotonic()
-        yield from d.lead("wildcap.reconstruct")
-        yield from d.until(lambda: len(server.charged) == 2 and (root / "delit" / "00002.png").is_file(), "the answers", addon.START_LIMIT_S)
-        d.say(f"two frames were sent and answered {time.monotonic() - started:.0f} s after the click")
-        if addon.job(root) is not None:
-            addon.module("jobs").cancel(str(root))
-        yield from d.until(lambda: addon.job(root) is None, "the end of the job", 10)
-        assert set(server.charged.values()) == {1} and {call["key"] for call in server.calls} == {KEY}
+    d.screenshot("sending_5_agreed")
+    started = time.monotonic()
+    yield from d.lead("wildcap.reconstruct")
+    yield from d.until(lambda: len(server.charged) == 2 and (root / "delit" / "00002.png").is_file(), "the answers", addon.START_LIMIT_S)
+    d.say(f"two frames were sent and answered {time.monotonic() - started:.0f} s after the click")
+    if addon.job(root) is not None:
+        addon.module("jobs").cancel(str(root))
+    yield from d.until(lambda: addon.job(root) is None, "the end of the job", 10)
+    assert set(server.charged.values()) == {1} and {call["key"] for call in server.calls} == {KEY}
     yield 2.5
     yield from d.park()
-    d.screenshot("sending_5_answered")
+    yield from turn(30)
+    d.screenshot("sending_6_answered")
     bpy.ops.wm.save_as_mainfile(filepath=str(root.parent / "face.blend"), compress=False)
     left = [path for path in root.parent.rglob("*") if path.is_file()]
     assert len(left) > 10 and not [path for path in left if KEY.encode() in path.read_bytes()], "the key is nowhere"
+
+
+def turn(steps: int):
+    """Turns the wheel over the sidebar, down where `steps` is positive."""
+    sidebar = d.region('UI')
+    position = sidebar.x + sidebar.width // 2, sidebar.y + sidebar.height // 2
+    yield from d.move(position)
+    for _ in range(abs(steps)):
+        d.event('WHEELDOWNMOUSE' if steps > 0 else 'WHEELUPMOUSE', 'PRESS', position)
+        yield 0.02
+    yield from d.park()
+    yield 0.7
 
 
 def known():
