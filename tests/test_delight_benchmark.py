@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("flip_evaluator")
 
-from benchmarks import albedo_score, delight  # noqa: E402
+from benchmarks import albedo_score, delight, delight_portraits  # noqa: E402
 from benchmarks.albedo_score import Truth  # noqa: E402
 from benchmarks.delight_measures import FIGURES, flat_tone, mean_of, score, shortfalls, table, tone_group  # noqa: E402
 from benchmarks.delight_sets import Photograph, Photographs, light_stage  # noqa: E402
@@ -116,6 +116,26 @@ def test_a_folder_without_photographs_is_refused(tmp_path):
     images.write_srgb(tmp_path / "align_image" / "ann" / "Cam01" / "000.png", np.ones((8, 8, 3)))
     with pytest.raises(Problem, match="lacks align_diffuse/ann_Cam01.png"):
         light_stage(tmp_path)
+
+
+def test_portraits_are_of_people_that_no_training_sees(monkeypatch):
+    from core.training.prior import HELD_OUT_SEED
+
+    assert delight_portraits.FIRST_SEED > HELD_OUT_SEED
+    seeds = delight_portraits.subjects_by_tone(1)
+    assert list(seeds) == ["very light", "light", "intermediate", "tan", "brown", "dark"] and min(map(min, seeds.values())) >= delight_portraits.FIRST_SEED
+
+
+def test_a_portrait_is_made_once_and_is_its_albedo_in_some_light(tmp_path, monkeypatch):
+    for name, value in {"SIZE": 96, "TEXELS": 128, "subjects_by_tone": lambda count: {"tan": [9110]}}.items():
+        monkeypatch.setattr(delight_portraits, name, value)
+    (made,) = delight_portraits.portraits(tmp_path, lights=1).photographs
+    monkeypatch.setattr(delight_portraits, "_sight", None)
+    (kept,) = delight_portraits.portraits(tmp_path, lights=1).photographs
+    assert np.array_equal(made.srgb, kept.srgb) and np.array_equal(made.truth.albedo, kept.truth.albedo)
+    face = made.truth.face
+    assert made.group == "tan" and face.mean() > 0.05 and (made.truth.albedo[face] > 0.05).all()
+    assert made.srgb[face].std() > 0.02 and 10 < score(made.srgb, made.srgb, made.truth, features=False)["psnr"] < 40
 
 
 @pytest.mark.skipif(not FACEOLAT.is_dir(), reason="the light stage's photographs are not at hand")
