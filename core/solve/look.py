@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import faces, images, meshes, raster, template
 from ..capture import Capture
-from ..messages import Reporter
+from ..messages import Problem, Reporter
 from ..views import View, read_views
 from .witnesses import visible
 
@@ -126,10 +126,13 @@ def _seen(view: View, frame: np.ndarray, caster: raster.RayCaster, points: np.nd
 
 
 def _surroundings(frame: np.ndarray) -> np.ndarray | None:
-    """Mean linear colour [3] of what is not the person in an sRGB frame."""
+    """Mean linear colour [3] of what is not the person in an sRGB frame; None where that is little, or cannot be told."""
     side = max(frame.shape[:2])
     small = images.resize(frame, round(256 * frame.shape[1] / side), round(256 * frame.shape[0] / side))
-    away = faces.segment_person(small) < PERSON
+    try:
+        away = faces.segment_person(small) < PERSON
+    except Problem:  # the networks are not installed: the skin alone must do
+        return None
     return images.srgb_to_linear(small)[away].mean(0) if away.mean() > SURROUNDED else None
 
 

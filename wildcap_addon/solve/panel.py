@@ -70,11 +70,12 @@ def tone_words(item) -> str:
 def _draw_white_point(layout, item) -> None:
     measured = item.solve.white_point != "auto"
     row = layout.row(align=True)
-    row.label(text=iface_("White Point: {}").format(item.solve.white_point if measured else iface_("from the scene")))
+    words = ", ".join(part[:4] for part in item.solve.white_point.split(",")) if measured else iface_("from the scene")
+    row.label(text=iface_("White Point: {}").format(words))
     if measured:
         row.operator("wildcap.clear_white_point", text="", icon='X')
+    layout.operator("wildcap.find_color_checker")
     row = layout.row(align=True)
-    row.operator("wildcap.find_color_checker")
     row.operator("wildcap.pick_white_point", text="Grey Card", icon='EYEDROPPER').card = 'grey'
     row.operator("wildcap.pick_white_point", text="White Paper", icon='EYEDROPPER').card = 'white'
 

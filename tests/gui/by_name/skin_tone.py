@@ -46,7 +46,7 @@ def flow():
     assert all(abs(v - 1) < 0.05 for v in white), "the card's light is what it was drawn in"
     assert d.view().type == 'VIEW_3D', "the 3D view is back"
     bpy.ops.wildcap.estimate_skin_tone()
-    yield from d.until(lambda: addon.settings().tone_source == "white point", "the estimate", 240)
+    yield from d.until(lambda: addon.settings().tone_source == "white point", "the estimate", 500)
     item = addon.settings()
     d.say("estimated", tuple(round(c, 3) for c in item.skin_tone), item.tone_group, item.tone_deviation)
     assert item.use_skin_tone and item.tone_deviation > 0
@@ -72,4 +72,4 @@ def draw_card(frames: Path) -> None:
         bpy.data.images.remove(image)
 
 
-d.play(flow(), limit_s=500)
+d.play(flow(), limit_s=1000)
