@@ -66,7 +66,7 @@ CARDS = {
         runs=f"On the machines of {service.COMPANY}, at {service.BASE.split('/')[2]}; about five seconds per frame, three at a time.",
         leaves="The chosen frames, which show a person's face, and your key. Only after you agreed to it for this capture.",
         costs=f"Per frame {service.amount(service.CREDITS_PER_PICTURE)} of your account, or {service.amount(service.CREDITS_PER_PREVIEW)} for a small picture "
-              f"of {service.PREVIEW_PX} px at most. No frame is paid for twice.",
+              f"of {service.PREVIEW_PX} px at most. An answer that has come is never paid for again.",
         shadows="No.",
         weights="None on your machine.",
         licence=f"{service.COMPANY}'s terms ({service.WEBSITE}): what comes back may not be used to train a model.",
