@@ -15,6 +15,7 @@ import numpy as np
 
 from .. import raster, template
 from ..meshes import Mesh, vertex_normals
+from ..skylight import radiance_transfer, sh_basis
 from .noise import noise
 from .parameters import sample_parameters
 from .skin import make_skin
@@ -99,27 +100,7 @@ def bake(mesh: Mesh, size: int, sky: np.ndarray, sun: np.ndarray, colour: np.nda
 
 def transfer(points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster, rays: int = TRANSFER_RAYS) -> np.ndarray:
     """[N, 9]: shading of points [N, 3] per coefficient of the sky's radiance, blocked where the mesh is in the way; an open surface under radiance 1 gets 1."""
-    total = np.zeros((len(points), 9))
-    for direction in fibonacci_sphere(rays):
-        cosine = normals @ direction
-        facing = np.flatnonzero(cosine > 0)
-        free = facing[~caster.blocked(points[facing] + 1e-3 * normals[facing], np.repeat(direction[None], len(facing), 0))]
-        total[free] += cosine[free, None] * sh_basis(direction) * (4 / rays)
-    return total
-
-
-def sh_basis(directions: np.ndarray) -> np.ndarray:
-    """Real orthonormal spherical harmonics to the second order at unit directions [..., 3] -> [..., 9]."""
-    x, y, z = np.moveaxis(np.asarray(directions), -1, 0)
-    return np.stack([0.282095 * np.ones_like(x), 0.488603 * y, 0.488603 * z, 0.488603 * x, 1.092548 * x * y, 1.092548 * y * z,
-                     0.315392 * (3 * z * z - 1), 1.092548 * x * z, 0.546274 * (x * x - y * y)], -1)
-
-
-def fibonacci_sphere(count: int) -> np.ndarray:
-    """Evenly spread unit directions [count, 3]."""
-    i = np.arange(count) + 0.5
-    z, angle = 1 - 2 * i / count, np.pi * (1 + 5**0.5) * i
-    return np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z], -1)
+    return radiance_transfer(caster, points, normals, rays)
 
 
 def _sun_seen(caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray, sun: np.ndarray, radius: float, shadows: str,

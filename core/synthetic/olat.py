@@ -14,7 +14,7 @@ import numpy as np
 
 from ..meshes import Mesh, vertex_normals
 from ..raster import RayCaster
-from .light import fibonacci_sphere, sh_basis
+from ..skylight import fibonacci_sphere, sh_basis
 
 LIGHTS = 256
 LIFT = 1e-3  # metres off the surface from which a ray starts

@@ -218,7 +218,7 @@ def _shadow(sight: Sight, lamps: list, colours: list, reach: list, ambient: np.n
 
 def _fitted(sight: Sight, carried: np.ndarray, environment: Environment, lamps: list, colours: list, albedo: np.ndarray, gains: np.ndarray,
             rng: np.random.Generator) -> Fitted:
-    """What core/delight/light.py would find, without its search: the second-order sky and the strongest lamp, each a little off."""
+    """What core/sunlight.py would find, without its search: the second-order sky and the strongest lamp, each a little off."""
     transfer = carried @ BASIS.astype(np.float32)  # [N, 9]
     main = int(np.argmax([c.mean() for c in colours])) if lamps else -1
     sky = BASIS.T @ environment.radiance * (4 * np.pi / LIGHTS)
