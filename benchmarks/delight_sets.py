@@ -84,7 +84,7 @@ def frames(truth: Path, capture: Capture, work: Path, every: int = 1) -> Photogr
         srgb = images.read_srgb(registered[frame["name"]].path)
         if srgb.shape != true.albedo.shape:
             srgb = images.resize(srgb, true.albedo.shape[1], true.albedo.shape[0])
-        found.append(Photograph(f"{frame['video_frame']:04d}", srgb, true, frame=frame["name"]))
+        found.append(Photograph(f"{frame['video_frame']:04d}", srgb, true, truth.name, frame["name"]))
     return Photographs(found, copy)
 
 
