@@ -25,7 +25,7 @@ GIVEN_VARIABLE = "WILDCAP_SWITCHLIGHT_CONSENT"
 """Environment variable by which the terminal's --send-frames reaches the worker: the place of the one capture that it is for."""
 TOLD = (
     "{pictures} of this capture leave your machine: they show a person's face. Ask that person first.",
-    "They go to {company}, a company, at {host}, and nothing else goes there. What it does with them is told at {website}.",
+    "They go to {company}, a company, at {host}, with your key and nothing else. What it does with them is told at {website}.",
     "{company} charges your account with {credits}.",
     "What comes back may not be used to train a model, as its terms say.",
 )
