@@ -80,7 +80,8 @@ def main() -> None:
         if options.json:
             write_json(options.json, results)
     print(table(results))
-    print("", "Where the network is no better than no delighting or the delighter shading:", *(shortfalls(results) or ["nowhere."]), sep="\n")
+    if any(row.startswith("network") and "figures" in found for rows_ in results.values() for row, found in rows_.items()):
+        print("", "Where the network is no better than no delighting or the delighter shading:", *(shortfalls(results) or ["nowhere."]), sep="\n")
     if options.json is None:
         print(json.dumps(results, indent=1))
 
