@@ -59,10 +59,10 @@ def test_the_panel_says_where_the_tone_comes_from(addon, capture, item):
     words, set_tone = addon("solve.panel").tone_words, addon("solve.operators").set_tone
     root = addon("captures").root(item)
     set_tone(root, {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_group": "tan", "skin_tone_deviation_l": 6.4, "skin_tone_source": "scene"})
-    assert words(item) == "Estimated: tan, ± 6 L*, from the scene" and item.use_skin_tone
+    assert words(item) == "tan, ± 6 L*, by scene" and item.use_skin_tone
     set_tone(root, {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_group": "tan", "skin_tone_deviation_l": 2.0, "skin_tone_source": "white point"})
-    assert words(item) == "Estimated: tan, ± 2 L*, from the measured white point"
+    assert words(item) == "tan, ± 2 L*, by white point"
     set_tone(root, {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_source": "texture"})
-    assert words(item) == "Estimated from the texture alone"
+    assert words(item) == "Told by the texture alone"
     item.skin_tone = (0.6, 0.4, 0.3)
-    assert words(item) == "Chosen by you: it wins over every estimate"
+    assert words(item) == "Chosen by you: this wins"

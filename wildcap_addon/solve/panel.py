@@ -60,11 +60,10 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
 def tone_words(item) -> str:
     """Where the skin tone comes from and how sure it is."""
     if max(abs(a - b) for a, b in zip(item.skin_tone, item.estimated_tone, strict=True)) > 1e-4:
-        return iface_("Chosen by you: it wins over every estimate")
+        return iface_("Chosen by you: this wins")
     if not item.tone_group:
-        return iface_("Estimated from the texture alone")
-    source = {"scene": iface_("from the scene"), "white point": iface_("from the measured white point")}.get(item.tone_source, item.tone_source)
-    return iface_("Estimated: {}, ± {} L*, {}").format(iface_(item.tone_group), round(item.tone_deviation), source)
+        return iface_("Told by the texture alone")
+    return iface_("{}, ± {} L*, by {}").format(iface_(item.tone_group), round(item.tone_deviation), iface_(item.tone_source))  # a sidebar is narrow
 
 
 def _draw_white_point(layout, item) -> None:
