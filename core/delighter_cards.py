@@ -49,7 +49,7 @@ CARDS = {
         leaves=NOTHING, costs=NOTHING,
         shadows="Yes: it says of every pixel how much of the main light is blocked there.",
         weights="Come with the extension.",
-        licence="GPL-3.0-or-later, code and weights; trained on synthetic faces of our own.",
+        licence="GPL-3.0-or-later, code and weights; trained on synthetic faces of our own, with some painted skins (MIT) and panoramas (CC0).",
     ),
     "shading": Card(
         "Shading", "Takes the light of the surroundings out of every frame by the head's own shape. No network is involved, so nothing can be invented.",

@@ -66,7 +66,7 @@ class RegistrationSettings:
 
 @dataclass(frozen=True)
 class DelightSettings:
-    delighter: str = setting("shading", choices=("shading", "switchlight", "opendelight", "folder", "none"))
+    delighter: str = setting("network", choices=("network", "shading", "switchlight", "opendelight", "folder", "none"))
     """How the light is taken out of the frames before the texture is built"""
     switchlight_preview: bool = setting(False)
     """Have SwitchLight answer with pictures of at most 512 px, at half the credits: to see whether it helps"""

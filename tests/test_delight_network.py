@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The delighting network and what surrounds it: input, lifting along edges, evening out over views, training that goes on."""
 
+import importlib
 import json
 
 import cv2
@@ -10,16 +11,17 @@ import pytest
 import torch
 
 from core import images, template
-from core.delight import network
 from core.delight.casts import without_casts
 from core.delight.evening import Look, even_out
 from core.delight.lift import lift, lift_share
 from core.delight.lit_head import LitHead
-from core.delight.network import crop, face_box
+from core.delight.network import WEIGHTS, crop, face_box, load
+from core.delight.second_opinion import FITTED, of_both
 from core.delight.unet import CHANNELS, DelightNet, network_input
 from core.meshes import vertex_normals
 from core.messages import Problem, Reporter
 from core.raster import RayCaster, render_view
+from core.synthetic.identities import reserved_seeds
 from core.synthetic.sight import random_camera
 from core.training import delighter
 
@@ -136,9 +138,29 @@ def test_the_hue_of_the_shade_leaves_the_albedo_and_that_of_lips_stays():
 
 
 def test_missing_weights_are_named(monkeypatch, tmp_path):
-    monkeypatch.setattr(network, "WEIGHTS", tmp_path / "delighter.safetensors")
+    module = importlib.import_module("core.delight.network")  # the package has a function of that name
+    monkeypatch.setattr(module, "WEIGHTS", tmp_path / "delighter.safetensors")
     with pytest.raises(Problem, match="weights of the delighting network are missing"):
-        network.load("cpu")
+        load("cpu")
+
+
+def test_the_shipped_network_is_the_one_its_card_tells_of():
+    card = json.loads(WEIGHTS.with_suffix(".json").read_text(encoding="utf-8"))
+    net = load("cpu")
+    assert sum(v.numel() for v in net.parameters()) == card["parameters"] and WEIGHTS.stat().st_size < 15e6
+    assert not set(card["seeds"]) & (set(card["held_out_seeds"]) | set(reserved_seeds())) and not set(card["skins"]) & set(card["held_out_skins"])
+    assert card["held_out"]["geometry"] < card["held_out"]["picture"] < 0.5 * card["held_out"]["none"]
+
+
+def test_two_answers_are_weighed_where_they_agree_and_the_network_wins_where_they_do_not():
+    face, skin = np.zeros((32, 32), int), np.ones((32, 32), np.float32)
+    look = Look((0, 0, 32), np.zeros((32, 32, 3), np.float32), skin, np.zeros((32, 32, 3), np.float32), face)
+    fitted = np.zeros((32, 32, 3), np.float32) + 5  # a level is no difference
+    fitted[:4] += 0.1
+    fitted[-4:] += 7
+    (both,) = of_both([look], [fitted], [skin])
+    assert both.shading[:4] == pytest.approx(FITTED * 0.1, rel=0.05)
+    assert both.shading[8:-8] == pytest.approx(0, abs=1e-6) and np.abs(both.shading[-4:]).max() < 0.15
 
 
 def test_a_training_goes_on_where_it_stopped(monkeypatch, tmp_path):

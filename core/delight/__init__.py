@@ -18,6 +18,8 @@ from ..messages import Reporter
 from ..settings import Settings
 from .contract import Delighter, Photographer
 from .folder import folder
+from .network import delight_photograph as delight_with_network
+from .network import network
 from .none import delight_photograph as leave_photograph
 from .none import none
 from .opendelight import delight_photograph as delight_with_opendelight
@@ -25,8 +27,9 @@ from .opendelight import opendelight
 from .shading import shading
 from .switchlight import switchlight
 
-DELIGHTERS: dict[str, Delighter] = {"shading": shading, "switchlight": switchlight, "opendelight": opendelight, "folder": folder, "none": none}
-PHOTOGRAPHERS: dict[str, Photographer] = {"opendelight": delight_with_opendelight, "none": leave_photograph}
+DELIGHTERS: dict[str, Delighter] = {"network": network, "shading": shading, "switchlight": switchlight, "opendelight": opendelight, "folder": folder,
+                                    "none": none}
+PHOTOGRAPHERS: dict[str, Photographer] = {"network": delight_with_network, "opendelight": delight_with_opendelight, "none": leave_photograph}
 """Those that also serve a photograph that belongs to no capture."""
 
 

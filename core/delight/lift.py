@@ -11,8 +11,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-WINDOW = 2  # radius, in cells of the coarse map
-STIFF = 0.06  # natural log units: what varies less in a window is skin and not an edge
+WINDOW = 1  # radius, in cells of the coarse map
+STIFF = 0.02  # natural log units: what varies less in a window is skin and not an edge
 PORE_PX, PORE_LOG = 0.006, 0.25  # of the picture's side, and in log units: what is finer and fainter is left out of the guide
 
 

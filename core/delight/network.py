@@ -3,7 +3,8 @@
 """The default delighter: our own network tells the shading and the shadows of a face, from the picture and from what is known of the head.
 
 It sees a square around the face at SIDE pixels and answers at half of that; the answer is lifted to the picture's pixels along its edges (lift.py), and the
-picture is divided by it, so pores are kept and none can be invented. In a capture the frames' answers are evened out over the head (evening.py).
+picture is divided by it, so pores are kept and none can be invented. In a capture the frames' answers are evened out over the head (evening.py) and brought
+together with the light that was fitted to all frames (second_opinion.py).
 `core train delighter` makes the weights.
 """
 
@@ -30,23 +31,27 @@ from .contract import Delit
 from .evening import Look, even_out
 from .lift import lift, lift_share
 from .lit_head import BRIGHTEST, LitHead, lit_head
+from .second_opinion import coarse, of_both
+from .shading import light_seen
 from .surface import skin_weights
 from .unet import DARKEST, SIDE, DelightNet, network_input
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "delighter.safetensors"
-MARGIN = 1.6  # side of the square, in sides of the face's landmarks: the middle of what training shows
+MARGIN = 1.35  # side of the square, in sides of the face's landmarks; training shows 1.25 to 2
 
 
 def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
     """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see the head."""
     net, views = load(settings.device), read_views(capture, selected_only=True)
     head = lit_head(capture, views, report)
-    looks = []
+    looks, fitted = [], []
     for i, view in enumerate(views):
         report.progress(4 * len(views) + 3 * i, 8 * len(views), f"Looking at frame {i + 1} of {len(views)}")
-        looks.append(_look_at_view(net, view, head))
-    looks = even_out(head, views, looks)
-    looks = without_casts(looks, [_skin_seen(head, look) for look in looks])
+        look, log = _look_at_view(net, view, head)
+        looks.append(look)
+        fitted.append(log)
+    skins = [_skin_seen(head, look) for look in looks]
+    looks = without_casts(of_both(even_out(head, views, looks), fitted, skins), skins)
     for i, (view, look) in enumerate(zip(views, looks, strict=True)):
         report.progress(7 * len(views) + i, 8 * len(views), f"Delighting frame {i + 1} of {len(views)}")
         albedo, shadow = _divided(images.read_srgb(view.path), look)
@@ -93,7 +98,8 @@ def crop(picture: np.ndarray, box: tuple[float, float, float], size: int) -> np.
     return cv2.warpAffine(np.ascontiguousarray(picture, np.float32), to_crop, (size, size), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
-def _look_at_view(net: DelightNet, view: View, head: LitHead) -> Look:
+def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[Look, np.ndarray]:
+    """What the network says of a frame, and the log-shading of the fitted light at the same size."""
     pixels, _ = view.project(_landmarks(head))
     box = face_box(pixels[np.isfinite(pixels).all(1)])
     y, x = np.mgrid[0:SIDE, 0:SIDE]
@@ -101,10 +107,11 @@ def _look_at_view(net: DelightNet, view: View, head: LitHead) -> Look:
     face, bary, _ = head.caster.first_hits(np.repeat(view.centre[None], len(rays), 0), rays)
     face, bary = face.reshape(SIDE, SIDE), bary.reshape(SIDE, SIDE, 3)
     ambient, direct, free, normal = head.at(face, bary)
-    here = (face >= 0).astype(np.float32)
-    geometry = (ambient, ambient + free[..., None] * direct, normal @ view.rotation.T, here)
-    look = _look(net, box, crop(images.read_srgb(view.path), box, SIDE), geometry)
-    return replace(look, face=face[1::2, 1::2], bary=bary[1::2, 1::2])
+    geometry = (ambient, ambient + free[..., None] * direct, normal @ view.rotation.T, (face >= 0).astype(np.float32))
+    picture = crop(images.read_srgb(view.path), box, SIDE)
+    look = _look(net, box, picture, geometry)
+    light, _ = light_seen(images.srgb_to_linear(picture), head, face, bary, round(max(view.width, view.height) * SIDE / box[2]))
+    return replace(look, face=face[1::2, 1::2], bary=bary[1::2, 1::2]), coarse(light, SIDE // 2)
 
 
 @torch.inference_mode()

@@ -38,14 +38,15 @@ def _delight(view: View, head: LitHead) -> Delit:
     shadow = np.zeros(face.shape, np.float32)
     if (face >= 0).any():
         box = _box(face >= 0)  # the rest of the frame is never looked at
-        lit, share = _light_seen(images.srgb_to_linear(srgb[box]), head, face[box], bary[box], max(face.shape))
+        lit, share = light_seen(images.srgb_to_linear(srgb[box]), head, face[box], bary[box], max(face.shape))
         srgb[box] = images.linear_to_srgb(images.srgb_to_linear(srgb[box]) / lit * head.best_lit)
         shadow[box] = (1 - share) * (face[box] >= 0)
     return Delit(view, srgb, shadow if head.light.has_sun else None)
 
 
-def _light_seen(linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
-    """The skin's expected linear colour [h, w, 3], carried on past the head's edge, and the share of the sun [h, w]."""
+def light_seen(linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
+    """The skin's expected linear colour [h, w, 3], carried on past the head's edge, and the share of the sun [h, w], where a raster (face [h, w],
+    bary [h, w, 3]) shows the head in a linear picture [h, w, 3]; `side`: the longer side of the frame at the picture's scale."""
     here = face >= 0
     ambient, direct, free, _ = head.at(face, bary)
     share = np.ones(here.shape, np.float32)

@@ -59,7 +59,7 @@ def train_delighter(config: str, out: Path, report: Reporter, minutes: float | N
     data = named_data(t, skins, held_out) | {"panoramas": sorted(p.name for p in Path(hdri).glob("*.hdr")) if hdri else []}
     prepare(data["seeds"], t["views"], work, report, skins, data["skins"], max(2, t["workers"]))
     prepare(data["held_out_seeds"], t["views"], work, report)
-    unseen = Portraits(data["held_out_seeds"], t["views"], work, hdri).draw(24, np.random.default_rng(1), augment=False)
+    unseen = Portraits(data["held_out_seeds"], t["views"], work, hdri).draw(4 * t["held_out"], np.random.default_rng(1), augment=False)
     torch.manual_seed(t["seed"])
     network = DelightNet(**CONFIGS[config]["model"])
     state = {"config": config, "data": data, "step": 0, "seconds": 0.0, "history": [], "network": network.state_dict(), "optimiser": {},
