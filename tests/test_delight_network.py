@@ -16,7 +16,7 @@ from core.delight.evening import Look, even_out
 from core.delight.lift import lift, lift_share
 from core.delight.lit_head import LitHead
 from core.delight.network import WEIGHTS, crop, face_box, load
-from core.delight.second_opinion import FITTED, of_both
+from core.delight.second_opinion import FITTED, beyond, of_both
 from core.delight.unet import CHANNELS, DelightNet, network_input
 from core.meshes import vertex_normals
 from core.messages import Problem, Reporter
@@ -135,6 +135,23 @@ def test_the_hue_of_the_shade_leaves_the_albedo_and_that_of_lips_stays():
     lips = hue(mended)[41:43, 12:48].mean((0, 1)) - hue(mended)[:38].mean((0, 1))
     assert lips == pytest.approx([0.3, -0.2, -0.1], abs=0.02)
     assert np.abs((mended.shading - said).mean(-1)).max() < 1e-3  # luminance is left alone
+
+
+def test_beyond_the_square_the_fitted_light_takes_over_at_the_same_level():
+    """A scalp that the network's square does not reach: there its border's shading gives way to the fit's, whose level is another."""
+    shading, shadow = np.full((40, 30, 3), -0.5, np.float32), np.zeros((40, 30), np.float32)
+    known = np.zeros((40, 30), np.float32)
+    known[15:] = 1
+    light = np.exp(np.full((40, 30, 3), 1.5, np.float32))  # 2 above the network's
+    light[:10] *= np.float32(0.3)
+    share, here = np.ones((40, 30), np.float32), np.ones((40, 30), bool)
+    share[:10] = 0
+    box = (slice(0, 40), slice(0, 30))
+    whole, dark = beyond(shading, shadow, known, box, light, share, here)
+    assert whole[10:] == pytest.approx(-0.5, abs=1e-5) and whole[:10] == pytest.approx(-0.5 + np.log(0.3), abs=1e-5)
+    assert dark[:10] == pytest.approx(1) and not dark[10:].any()
+    same, _ = beyond(shading, shadow, np.zeros_like(known), box, light, share, here)
+    assert np.array_equal(same, shading)  # nothing to take the level from
 
 
 def test_missing_weights_are_named(monkeypatch, tmp_path):

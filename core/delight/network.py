@@ -31,13 +31,14 @@ from .contract import Delit
 from .evening import Look, even_out
 from .lift import lift, lift_share
 from .lit_head import BRIGHTEST, LitHead, lit_head
-from .second_opinion import coarse, of_both
-from .shading import light_seen
+from .second_opinion import beyond, coarse, of_both
+from .shading import light_in_frame, light_seen
 from .surface import skin_weights
 from .unet import DARKEST, SIDE, DelightNet, network_input
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "delighter.safetensors"
 MARGIN = 1.35  # side of the square, in sides of the face's landmarks; training shows 1.25 to 2
+FADE = 0.06  # of the square's side: along its border it gives way to the fitted light
 
 
 def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
@@ -54,7 +55,8 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
     looks = without_casts(of_both(even_out(head, views, looks), fitted, skins), skins)
     for i, (view, look) in enumerate(zip(views, looks, strict=True)):
         report.progress(7 * len(views) + i, 8 * len(views), f"Delighting frame {i + 1} of {len(views)}")
-        albedo, shadow = _divided(images.read_srgb(view.path), look)
+        srgb = images.read_srgb(view.path)
+        albedo, shadow = _divided(srgb, look, light_in_frame(view, head, srgb))
         yield Delit(view, albedo, shadow)
 
 
@@ -142,19 +144,24 @@ def _hull(points: np.ndarray, look: Look) -> np.ndarray:
     return inside.astype(np.float32)
 
 
-def _divided(srgb: np.ndarray, look: Look) -> tuple[np.ndarray, np.ndarray]:
-    """A picture without its shading, and its shadows at its own size. Beyond the square the shading is that of its border, and nothing is said of shadows."""
+def _divided(srgb: np.ndarray, look: Look, fitted: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """A picture without its shading, and its shadows at its own size. Beyond the square `fitted` (of light_in_frame) is taken; without it the shading is
+    that of the square's border, and nothing is said of shadows."""
     linear = images.srgb_to_linear(srgb)
     size = round(look.box[2])
     log = np.log(np.maximum(crop(linear, look.box, size), DARKEST))
     shading, shadow = lift(look.shading, log), lift_share(look.shadow, log)
     y, x = np.mgrid[0:srgb.shape[0], 0:srgb.shape[1]]
     at = (np.stack([x.ravel(), y.ravel()], -1) + 0.5 - look.box[:2]) * size / look.box[2]
-    inside = ((at >= 0) & (at <= size)).all(1).reshape(srgb.shape[:2])
+    within = np.minimum(at, size - at).min(1).reshape(srgb.shape[:2])  # pixels to the square's border
+    inside = within >= 0
     shading, shadow = (sample(part, at).reshape(*srgb.shape[:2], *part.shape[2:]) for part in (shading, shadow))
+    shadow = shadow * inside
+    if fitted is not None:
+        shading, shadow = beyond(shading, shadow, np.clip(within / (FADE * size), 0, 1).astype(np.float32), *fitted)
     albedo = linear / np.exp(shading)
     bright = float(np.quantile(albedo[inside].max(-1), 0.75)) if inside.any() else 0.0
-    return images.linear_to_srgb(albedo * min(1.0, BRIGHTEST / max(bright, 1e-6))), np.clip(shadow * inside, 0, 1).astype(np.float32)
+    return images.linear_to_srgb(albedo * min(1.0, BRIGHTEST / max(bright, 1e-6))), np.clip(shadow, 0, 1).astype(np.float32)
 
 
 def _landmarks(head: LitHead) -> np.ndarray:

@@ -28,6 +28,21 @@ def of_both(looks: list[Look], fitted: list[np.ndarray], skins: list[np.ndarray]
     return [_towards(look, log - level) for look, log in zip(looks, fitted, strict=True)]
 
 
+def beyond(shading: np.ndarray, shadow: np.ndarray, known: np.ndarray, box: tuple[slice, slice], light: np.ndarray, share: np.ndarray,
+           here: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A frame's log-shading [H, W, 3] and shadow [H, W], where known [H, W] in [0, 1] falls to 0 taken over by the fitted light [h, w, 3] and its share
+    [h, w] in the part `box` of the frame, at the level of the rest; here bool [h, w]: the head. Scalp and neck lie beyond what the network sees."""
+    log = np.log(np.maximum(light, 1e-4))
+    sure = here & (known[box] > 0.99)
+    if not sure.any():
+        return shading, shadow
+    level = np.median((log - shading[box])[sure], 0)
+    shading, shadow, weight = shading.copy(), shadow.copy(), known[box]
+    shading[box] = weight[..., None] * shading[box] + (1 - weight[..., None]) * (log - level)
+    shadow[box] = weight * shadow[box] + (1 - weight) * (1 - share) * here
+    return shading, shadow
+
+
 def coarse(light: np.ndarray, side: int) -> np.ndarray:
     """The log [side, side, 3] of the light in a square picture, linear [S, S, 3], averaged as the eye would."""
     return np.log(np.maximum(cv2.resize(np.asarray(light, np.float32), (side, side), interpolation=cv2.INTER_AREA), 1e-4))

@@ -34,14 +34,22 @@ def shading(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
 
 def _delight(view: View, head: LitHead) -> Delit:
     srgb = images.read_srgb(view.path)
-    face, bary, _ = render_view(head.caster, view)
-    shadow = np.zeros(face.shape, np.float32)
-    if (face >= 0).any():
-        box = _box(face >= 0)  # the rest of the frame is never looked at
-        lit, share = light_seen(images.srgb_to_linear(srgb[box]), head, face[box], bary[box], max(face.shape))
+    shadow = np.zeros(srgb.shape[:2], np.float32)
+    if (seen := light_in_frame(view, head, srgb)) is not None:
+        box, lit, share, here = seen
         srgb[box] = images.linear_to_srgb(images.srgb_to_linear(srgb[box]) / lit * head.best_lit)
-        shadow[box] = (1 - share) * (face[box] >= 0)
+        shadow[box] = (1 - share) * here
     return Delit(view, srgb, shadow if head.light.has_sun else None)
+
+
+def light_in_frame(view: View, head: LitHead, srgb: np.ndarray) -> tuple[tuple[slice, slice], np.ndarray, np.ndarray, np.ndarray] | None:
+    """Where a frame [H, W, 3] shows the head, with a margin: that part of it, and there what `light_seen` says and where the head is; None if nowhere."""
+    face, bary, _ = render_view(head.caster, view)
+    if not (face >= 0).any():
+        return None
+    box = _box(face >= 0)  # the rest of the frame is never looked at
+    lit, share = light_seen(images.srgb_to_linear(srgb[box]), head, face[box], bary[box], max(face.shape))
+    return box, lit, share, face[box] >= 0
 
 
 def light_seen(linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
