@@ -1,0 +1,31 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The maps of a head as arrays: what the steps of this room hand on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .. import images
+
+
+@dataclass(frozen=True)
+class Maps:
+    """All float32 on S x S texels. diffuse [S, S, 3]: albedo, linear sRGB; normal [S, S, 3]: unit, tangent space, OpenGL Y+; specular [S, S]: Principled
+    BSDF's Specular IOR Level; confidence [S, S] in [0, 1]; shading [S, S, 3]: linear, albedo x shading = texture."""
+
+    diffuse: np.ndarray
+    normal: np.ndarray
+    specular: np.ndarray
+    confidence: np.ndarray
+    shading: np.ndarray
+
+
+def read_maps(folder: Path) -> Maps:
+    """The maps that the solver wrote."""
+    normal = images.read_data(folder / "normal.png")[..., :3] * 2 - 1
+    return Maps(images.read_linear(folder / "diffuse_albedo.exr"), normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
+                images.read_mask(folder / "specular_albedo.png"), images.read_mask(folder / "confidence.png"), images.read_linear(folder / "shading.exr"))
