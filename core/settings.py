@@ -124,6 +124,8 @@ class SolveSettings:
 class UpscaleSettings:
     size: int = setting(4096, min=1024, max=8192, unit="px")
     """Side of the delivered maps"""
+    method: str = setting("lanczos", choices=("network", "lanczos"))
+    """How albedo, normals and specular become four times as large: by the network, which sharpens, or by Lanczos resampling, which is quick"""
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,20 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Upscale: the same maps, larger; smooth signals are met, normals stay unit, and it says what it is."""
+"""Upscale: the same maps, larger; smooth signals are met, normals stay unit, strips leave no seam, and it says what it is."""
 
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+import torch
 
 from core import images, stages, upscale
 from core.capture import Capture
-from core.messages import CancelledError, Reporter
+from core.messages import CancelledError, Problem, Reporter
 from core.settings import from_json
+from core.training import fine_windows, upscaler
+from core.upscale import network
+from core.upscale.enlarge import enlarge, load_network
+from core.upscale.maps import Maps, read_maps
 
 SMALL, LARGE = 256, 1024
 
@@ -42,7 +47,7 @@ def capture(tmp_path) -> Capture:
 
 def test_every_map_is_met_at_the_new_size(capture):
     report = Reporter("upscale")
-    upscale.run(capture, from_json({"upscale": {"size": LARGE}}), report)
+    upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos"}}), report)
     assert {path.name for path in capture.maps_4k.iterdir()} == set(stages.MAPS)
     truth, inner = wave(LARGE), np.s_[16:-16, 16:-16]  # the border has no neighbours to interpolate from
     linear = np.stack([truth, truth ** 2, truth / 2], 2)
@@ -53,7 +58,7 @@ def test_every_map_is_met_at_the_new_size(capture):
     ):
         got = read(capture.maps_4k / name)
         assert got.shape == expected.shape and np.abs(got - expected)[inner].max() < tolerance, name
-    assert report.figures["method"].startswith("Lanczos") and (report.figures["size_from_px"], report.figures["size_px"]) == (SMALL, LARGE)
+    assert report.figures["method"] == "lanczos" and (report.figures["size_from_px"], report.figures["size_px"]) == (SMALL, LARGE)
 
 
 def test_normals_are_unit_edges_do_not_overshoot_and_files_keep_their_depth(capture):
@@ -61,7 +66,7 @@ def test_normals_are_unit_edges_do_not_overshoot_and_files_keep_their_depth(capt
     noise /= np.linalg.norm(noise, axis=2, keepdims=True)
     images.write_data(capture.maps / "normal.png", noise * 0.5 + 0.5, bits=16)
     images.write_linear(capture.maps / "diffuse_albedo.exr", np.where(noise > 0, 0.7, 0.0).astype(np.float32))
-    upscale.run(capture, from_json({"upscale": {"size": LARGE}}), Reporter("upscale"))
+    upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos"}}), Reporter("upscale"))
     lengths = np.linalg.norm(images.read_data(capture.maps_4k / "normal.png")[..., :3] * 2 - 1, axis=2)
     assert np.percentile(np.abs(lengths - 1), 99) < 1e-3
     albedo = images.read_linear(capture.maps_4k / "diffuse_albedo.exr")
@@ -72,23 +77,154 @@ def test_normals_are_unit_edges_do_not_overshoot_and_files_keep_their_depth(capt
 
 
 def test_maps_of_the_wanted_size_are_left_as_they_are(capture):
-    upscale.run(capture, from_json({"upscale": {"size": LARGE}}), Reporter("upscale"))
+    upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos"}}), Reporter("upscale"))
     again = Capture(capture.root.with_name("again.wildcap"))
     capture.maps_4k.rename(capture.root / "kept")
     again.root.mkdir()
     (capture.root / "kept").rename(again.maps)
-    upscale.run(again, from_json({"upscale": {"size": LARGE}}), Reporter("upscale"))
+    upscale.run(again, from_json({"upscale": {"size": LARGE, "method": "lanczos"}}), Reporter("upscale"))
     for name in ("diffuse_albedo.exr", "shading.exr", "specular_albedo.png"):
         assert np.abs(images.read_data(again.maps_4k / name) - images.read_data(again.maps / name)).max() < 1e-4
 
 
 def test_a_cancel_between_maps_leaves_no_folder(capture):
-    left = [3]
+    left = [2]
 
     def soon() -> bool:
         left[0] -= 1
         return left[0] < 0
 
     with pytest.raises(CancelledError):
-        upscale.run(capture, from_json({"upscale": {"size": LARGE}}), Reporter("upscale", cancelled=soon))
+        upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos"}}), Reporter("upscale", cancelled=soon))
     assert not capture.maps_4k.exists() and not list(capture.root.glob(".*"))
+
+
+def rough_maps(size: int) -> Maps:
+    rng = np.random.default_rng(0)
+    normal = rng.normal(0, 0.2, (size, size, 3)).astype(np.float32) + np.float32([0, 0, 1])
+    return Maps(rng.random((size, size, 3)).astype(np.float32), normal / np.linalg.norm(normal, axis=2, keepdims=True),
+                rng.random((size, size)).astype(np.float32), np.ones((size, size), np.float32), np.ones((size, size, 3), np.float32))
+
+
+@pytest.fixture(scope="module")
+def busy() -> network.Rcan:
+    """A small network of random weights, so that whatever goes wrong shows."""
+    torch.manual_seed(0)
+    small = network.Rcan(groups=2, blocks=2, width=16)
+    for value in small.parameters():
+        torch.nn.init.normal_(value, 0, 0.1)
+    return small.eval()
+
+
+def test_strips_are_the_whole(busy, monkeypatch):
+    maps = rough_maps(70)
+    stripped = {rows: _with_strips(monkeypatch, rows, maps, busy) for rows in (9, 32, 70)}
+    assert np.ptp(stripped[70][..., :3]) > 0.9 and np.abs(stripped[70] - enlarge(maps, lambda share: None, network=network.Rcan(1, 1, 16))).max() > 0.01
+    for rows in (9, 32):
+        assert np.abs(stripped[rows] - stripped[70]).max() < 1e-5, rows
+
+
+def _with_strips(monkeypatch, rows: int, maps: Maps, net: network.Rcan) -> np.ndarray:
+    monkeypatch.setattr("core.upscale.enlarge.STRIP", rows)
+    return enlarge(maps, lambda share: None, network=net)
+
+
+def test_the_body_sees_the_whole_map(busy):
+    """Channel attention takes its means over the map: a change in one corner reaches the other."""
+    maps, changed = rough_maps(40), rough_maps(40)
+    changed.diffuse[:8, :8] = 1
+    far = np.s_[-16:, -16:]
+    assert np.abs(enlarge(maps, lambda share: None, network=busy)[far] - enlarge(changed, lambda share: None, network=busy)[far]).max() > 1e-5
+
+
+def test_an_untrained_network_resamples(capture):
+    """Its tail begins with zeros, so a smooth signal is met as by bicubic resampling."""
+    large = enlarge(read_maps(capture.maps), lambda share: None, network=network.Rcan(1, 1, 16))
+    truth, inner = wave(LARGE), np.s_[16:-16, 16:-16]
+    linear = np.stack([truth, truth ** 2, truth / 2], 2)
+    assert np.abs(images.srgb_to_linear(large[..., :3]) - linear)[inner].max() < 2e-3
+    assert np.abs(large[..., 3:6] - tilted(LARGE))[inner].max() < 4e-3 and np.abs(large[..., 6] - truth)[inner].max() < 2e-3
+
+
+def test_a_block_begins_as_the_identity():
+    features = torch.randn(1, 16, 8, 8)
+    assert torch.equal(network.Block(16, 4)(features), features)
+
+
+def test_the_stage_takes_the_network(capture, busy, monkeypatch):
+    monkeypatch.setattr("core.upscale.enlarge.load_network", lambda: busy)
+    report = Reporter("upscale")
+    upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "network"}}), report)
+    assert report.figures["method"] == "network"
+    linear, coded = images.read_linear(capture.maps_4k / "diffuse_albedo.exr"), images.read_linear(capture.maps_4k / "diffuse_albedo.png")
+    assert coded.shape == (LARGE, LARGE, 3) and np.abs(linear - coded).max() < 2e-3
+    assert np.abs(coded - images.resize(images.read_linear(capture.maps / "diffuse_albedo.exr"), LARGE, LARGE)).max() > 0.02
+
+
+@pytest.mark.parametrize("size", [96, 128, 200])
+def test_the_network_ends_at_any_size(busy, monkeypatch, size):
+    """Four times 32 is what it gives; more or less is resampled from that."""
+    monkeypatch.setattr("core.upscale.enlarge.load_network", lambda: busy)
+    large = upscale.enlarged(rough_maps(32), size, "network", "cpu", lambda share: None)
+    assert large.shape == (size, size, 7) and np.abs(np.linalg.norm(large[..., 3:6], axis=2) - 1).max() < 1e-5
+    assert 0 <= large[..., :3].min() and large[..., :3].max() <= 1
+
+
+def test_missing_weights_are_told(tmp_path):
+    with pytest.raises(Problem, match="weights are missing"):
+        load_network(tmp_path / "upscaler.safetensors")
+
+
+@pytest.fixture(scope="module")
+def windows(tmp_path_factory):
+    """A work folder of a tiny training: windows of noise stand in for painted skins."""
+    work, rng = tmp_path_factory.mktemp("upscaler"), np.random.default_rng(0)
+    for seed in (1000, 1001, 9000):
+        rough = rng.random((7, 24, 24)).astype(np.float32)
+        large = np.stack([images.resize(channel, 96, 96) for channel in rough]).clip(0, 1)
+        large[3:6] = (np.float32([0, 0, 1])[:, None, None] + 0.3 * (large[3:6] - 0.5))
+        large[3:6] /= np.linalg.norm(large[3:6], axis=0)
+        np.save(work / f"window_{seed}_0.npy", large.astype(np.float16))
+    return work
+
+
+def test_a_training_goes_on_where_it_stopped(windows, tmp_path, monkeypatch):
+    tiny = {"model": {"groups": 1, "blocks": 2, "width": 16},
+            "training": {"patch": 8, "batch": 4, "rate": 5e-3, "minutes": 1, "skins": 2, "views": 1, "held_out": 1, "seed": 0, "workers": 0}}
+    monkeypatch.setitem(upscaler.CONFIGS, "cpu", tiny)
+    out = tmp_path / "upscaler.safetensors"
+    first = upscaler.train_upscaler("cpu", out, Reporter("train"), minutes=0.02, work=windows)
+    second = upscaler.train_upscaler("cpu", out, Reporter("train"), minutes=0.05, work=windows)
+    assert second["steps"] > first["steps"] > 0 and second["parameters"] == sum(p.numel() for p in network.Rcan(**tiny["model"]).parameters())
+    assert load_network(out).tail.weight.abs().max() > 0 and out.with_suffix(".json").is_file()
+    monkeypatch.setitem(upscaler.CONFIGS, "gpu", tiny)
+    with pytest.raises(Problem, match="other data or of another configuration"):
+        upscaler.train_upscaler("gpu", out, Reporter("train"), work=windows)
+
+
+def test_degrading_keeps_the_mean_and_halves_a_relief_as_asked():
+    large = np.zeros((7, 32, 32), np.float32)
+    large[:3], large[3], large[5], large[6] = images.linear_to_srgb(np.float32(0.25)), 0.3, np.sqrt(1 - 0.09), 0.4
+    small = fine_windows.degraded(large, fine_windows.Degradation(0.0, 0.0, 0.0, 0.5), np.random.default_rng(0))
+    assert small.shape == (7, 8, 8) and np.allclose(images.srgb_to_linear(small[:3]), 0.25, atol=1e-4) and np.allclose(small[6], 0.4)
+    tilt = small[3] / small[5]
+    assert np.allclose(tilt, 0.5 * 0.3 / np.sqrt(1 - 0.09), rtol=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_turned_window_is_a_turned_surface(seed):
+    """The normals of a turned height field are the turned normals."""
+    height = np.random.default_rng(9).normal(0, 0.2, (16, 16)).astype(np.float32)
+    turned = fine_windows._turned(_relief(height), np.random.default_rng(seed))
+    candidates = [np.transpose(h) if t else h for h in (height, height[:, ::-1], height[::-1], height[::-1, ::-1]) for t in (False, True)]
+    assert any(np.allclose(turned, _relief(candidate), atol=1e-5) for candidate in candidates)
+
+
+def _relief(height: np.ndarray) -> np.ndarray:
+    """Maps [7, S, S] with the normals of a height field; x along columns, y against rows."""
+    down, right = np.gradient(height)
+    normal = np.stack([-right, down, np.ones_like(height)])
+    maps = np.zeros((7, *height.shape), np.float32)
+    maps[3:6] = normal / np.linalg.norm(normal, axis=0)
+    maps[6] = height  # tells which turn it was
+    return maps

@@ -75,17 +75,17 @@ def test_a_stage_without_its_inputs_is_refused(root, capture, video):
     assert isinstance(final, Failed) and final.stage == "solve" and "texture.exr" in final.problem
 
 
-@pytest.mark.parametrize("name", stages.NAMES)
-def test_kill_in_any_stage_loses_that_stage_at_most(root, capture, video, tmp_path, name):
-    worker = start(root, capture, {name: "slow"}, source=video)
-    follow(worker, until=lambda m: isinstance(m, Progress) and m.text == "half written")
-    worker._process.send_signal(signal.SIGKILL)
-    final = follow(worker)[-1]
-    assert isinstance(final, Failed) and final.stage == name and str(capture.logs) in final.remedy
-    messages = follow(start(root, capture))
-    assert isinstance(messages[-1], Done), messages[-1]
-    assert finished(messages) == {stage: stages.NAMES.index(stage) < stages.NAMES.index(name) for stage in stages.NAMES}
-    assert not leftovers(capture)
+def test_killed_in_stage_after_stage_the_chain_loses_that_stage_at_most(root, capture, video, tmp_path):
+    for i, name in enumerate((*stages.NAMES, None)):
+        worker = start(root, capture, {name: "slow"}, source=video)
+        messages = follow(worker, until=lambda m: isinstance(m, Progress) and m.text == "half written")
+        # all but the stage that was killed before this one are there, and that one is done again
+        assert finished(messages) == {done: done != stages.NAMES[i - 1] for done in stages.NAMES[:i]}, name
+        if name is not None:
+            worker._process.send_signal(signal.SIGKILL)
+            final = follow(worker)[-1]
+            assert isinstance(final, Failed) and final.stage == name and str(capture.logs) in final.remedy
+    assert isinstance(messages[-1], Done) and not leftovers(capture)
     unharmed = Capture(tmp_path / "unharmed.wildcap")
     follow(start(root, unharmed, source=video))
     assert contents(capture) == contents(unharmed)

@@ -16,8 +16,10 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .. import raster, template
+from .. import images, raster, template
 from ..meshes import Mesh, vertex_normals
+
+MASK_SIZE = 1024  # of the template's masks; they are soft, so a window takes its part of them enlarged
 
 
 @dataclass(frozen=True)
@@ -85,20 +87,42 @@ class Canvas:
 def canvas(size: int) -> Canvas:
     """The built-in template's canvas; made once per size and process."""
     mesh = template.load()
-    face, bary = template.landmarks()
-    points = (mesh.vertices[mesh.faces[face]] * bary[..., None]).sum(1)
-    return make_canvas(mesh, size, points, lambda name: template.mask(name, size))
+    return make_canvas(mesh, size, _landmarks(mesh), lambda name: template.mask(name, size))
 
 
 def make_canvas(mesh: Mesh, size: int, landmarks: np.ndarray, mask: Callable[[str], np.ndarray]) -> Canvas:
     """Of any head in metres (face towards -Y) with UVs, its MediaPipe landmarks [468, 3] in metres and masks [S, S] by name."""
-    face, bary = raster.rasterize_uv(mesh, size)
+    return _canvas(mesh, size, *raster.rasterize_uv(mesh, size), landmarks, mask)
+
+
+def window_canvas(size: int, row: int, column: int, side: int) -> Canvas:
+    """A square window, `side` texels wide, of the built-in template's canvas of `size`: what is painted on it is what the whole would show there, but for
+    what is laid onto the nearest texel from outside (hairs and scars that begin beyond its border)."""
+    mesh = template.load()
+    face, bary = raster.rasterize_uv(mesh, size, (row, row + side))
+    columns, factor = slice(column, column + side), size // MASK_SIZE
+
+    def mask(name: str) -> np.ndarray:
+        whole = template.mask(name, MASK_SIZE)[row // factor:-(-(row + side) // factor), column // factor:-(-(column + side) // factor)]
+        return images.resize(whole, side, side)
+
+    return _canvas(mesh, size, face[:, columns], bary[:, columns], _landmarks(mesh), mask)
+
+
+def _landmarks(mesh: Mesh) -> np.ndarray:
+    """[468, 3] in metres."""
+    face, bary = template.landmarks()
+    return (mesh.vertices[mesh.faces[face]] * bary[..., None]).sum(1)
+
+
+def _canvas(mesh: Mesh, size: int, face: np.ndarray, bary: np.ndarray, landmarks: np.ndarray, mask: Callable[[str], np.ndarray]) -> Canvas:
+    """The canvas of rastered texels [S, S]; `size`: of the map that they are of."""
     covered = face >= 0
     position = raster.interpolate(mesh.vertices * 1000, mesh.faces, face[covered], bary[covered]).astype(np.float32)
     normal = raster.interpolate(vertex_normals(mesh), mesh.faces, face[covered], bary[covered]).astype(np.float32)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-6)
     masks = {name: np.asarray(mask(name), np.float32)[covered] for name in ("skin", "lips", "brows", "eyes", "ears", "neck", "scalp", "nose")}
-    return Canvas(size, covered, position, normal, _metric(mesh, size)[face[covered]], masks, landmarks * 1000)
+    return Canvas(len(face), covered, position, normal, _metric(mesh, size)[face[covered]], masks, landmarks * 1000)
 
 
 def _metric(mesh: Mesh, size: int) -> np.ndarray:

@@ -15,19 +15,19 @@ import argparse
 import json
 import math
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
 import torch
 from safetensors.torch import save_file
 from torch.nn import functional
-from torch.utils.data import DataLoader, Dataset
+from torch.utils.data import Dataset
 
 from ..capture import replacing
 from ..delight.unet import DelightNet
-from ..messages import Problem, Reporter
+from ..messages import Reporter
 from ..solve.prior import fast_dtype
+from . import descent
 from .portraits import Batch, Portraits, mirrored, prepare
 from .prior import named_data
 
@@ -62,45 +62,12 @@ def train_delighter(config: str, out: Path, report: Reporter, minutes: float | N
     unseen = Portraits(data["held_out_seeds"], t["views"], work, hdri).draw(4 * t["held_out"], np.random.default_rng(1), augment=False)
     torch.manual_seed(t["seed"])
     network = DelightNet(**CONFIGS[config]["model"])
-    state = {"config": config, "data": data, "step": 0, "seconds": 0.0, "history": [], "network": network.state_dict(), "optimiser": {},
-             "average": {name: value.clone() for name, value in network.state_dict().items()}}
-    if (work / "state.pt").is_file():
-        state = torch.load(work / "state.pt", weights_only=True)
-        if state["data"] != data or state["config"] != config:
-            raise Problem(f"The training in {work} is on other data or of another configuration.", "Name another --work folder, or delete this one.")
-    network.load_state_dict(state["network"])
-    network.to(device, memory_format=torch.channels_last)
-    optimiser = torch.optim.AdamW(network.parameters(), lr=t["rate"], betas=(0.9, 0.98), weight_decay=1e-2)
-    if state["optimiser"]:
-        optimiser.load_state_dict(state["optimiser"])
-    average = {name: value.to(device) for name, value in state["average"].items()}
-    began, before, saved_at = time.monotonic(), state["seconds"], state["seconds"]
-    steps = _Steps(Portraits(data["seeds"], t["views"], work, hdri), t)
-    batches = DataLoader(steps, batch_size=None, sampler=range(state["step"], 10**9), num_workers=t["workers"], prefetch_factor=3 if t["workers"] else None)
-    for step, batch in zip(range(state["step"], 10**9), batches, strict=False):
-        share = state["seconds"] / (60 * minutes)
-        for group in optimiser.param_groups:
-            group["lr"] = t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * min(share, 1.0)))
-        loss = sum(losses(network, batch, device).values())
-        optimiser.zero_grad(set_to_none=True)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-        optimiser.step()
-        decay = min(0.998, (step + 1) / (step + 10))
-        for name, value in network.state_dict().items():
-            average[name].lerp_(value, 1 - decay)
-        state["step"], state["seconds"] = step + 1, before + time.monotonic() - began
-        ended = state["seconds"] >= 60 * minutes
-        report.progress(min(state["seconds"], 60 * minutes), 60 * minutes, f"step {step + 1}")
-        if state["seconds"] - saved_at > 180 or ended:
-            state["history"].append([state["step"], round(state["seconds"]), figures(average, config, unseen, device)])
-            report.log(f"step {step + 1}, {state['seconds'] / 60:.1f} min, loss {loss.item():.3f}, held out {state['history'][-1][2]}")
-            state |= {"network": network.state_dict(), "optimiser": optimiser.state_dict(), "average": average}
-            with replacing(work / "state.pt") as temporary:
-                torch.save(state, temporary)
-            saved_at = state["seconds"]
-        if ended:
-            break
+    state = descent.resumed(work, descent.beginning(config, data, network))
+    recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
+                            betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"], save_every=180)
+    descent.descend(network, state, _Steps(Portraits(data["seeds"], t["views"], work, hdri), t),
+                    lambda batch, step, share: sum(losses(network, batch, device).values()),
+                    lambda average: figures(average, config, unseen, device), recipe, minutes, work, device, report)
     return export(work, out)
 
 
@@ -161,7 +128,7 @@ def _deviation(error: torch.Tensor, weight: torch.Tensor) -> float:
 
 def export(work: Path, out: Path = WEIGHTS) -> dict:
     """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from."""
-    state = torch.load(Path(work) / "state.pt", weights_only=True, map_location="cpu")
+    state = descent.read_state(work)
     data = state["data"]
     with replacing(out) as temporary:
         save_file({name: value.half().contiguous() for name, value in state["average"].items()}, temporary)

@@ -14,19 +14,19 @@ from __future__ import annotations
 import argparse
 import json
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
 import torch
 from safetensors.torch import save_file
-from torch.utils.data import DataLoader, Dataset
+from torch.utils.data import Dataset
 
 from ..capture import replacing
 from ..messages import Problem, Reporter
 from ..solve.network import UNet, denoise
 from ..solve.prior import BLIND, WEIGHTS, build, condition, fast_dtype
 from ..synthetic.identities import reserved_seeds
+from . import descent
 from .patches import Batch, Windows, mean_map, reference_skins, spread_about
 from .skins import SCALES, Skins, carried_names, carried_skins, clusters, synthetic_skins
 
@@ -66,52 +66,26 @@ def train_prior(config: str, out: Path, report: Reporter, minutes: float | None 
     data = named_data(t, skins, held_out)
     windows, seen, unseen = _windows(data, skins, work, report)
     held_out_windows = {kind: Windows(s, real=0.5).draw(96, t["patch"], np.random.default_rng(1)) for kind, s in unseen.items() if s.names}
-    state = _begin(config, data, seen, windows)
-    if (work / "state.pt").is_file():
-        state |= torch.load(work / "state.pt", weights_only=True)  # a training begun by an older version lacks the newer entries
-        if state["data"] != data or state["config"] != config:
-            raise Problem(f"The training in {work} is on other data or of another configuration.", "Name another --work folder, or delete this one.")
+    state = descent.resumed(work, _begin(config, data, seen, windows))
     network = build(CONFIGS[config])
-    network.load_state_dict(state["network"])
-    network.to(device, memory_format=torch.channels_last)
     statistics = {name: value.to(device) for name, value in state["statistics"].items()}
-    optimiser = torch.optim.AdamW(network.parameters(), lr=t["rate"], betas=(0.9, 0.99), weight_decay=1e-3)
-    if state["optimiser"]:
-        optimiser.load_state_dict(state["optimiser"])
-    average = {name: value.to(device) for name, value in state["average"].items()}
-    began, before, saved_at = time.monotonic(), state["seconds"], state["seconds"]
-    batches = DataLoader(_Steps(windows, t), batch_size=None, sampler=range(state["step"], 10**9), num_workers=t["workers"])
-    for step, batch in zip(range(state["step"], 10**9), batches, strict=False):
-        share = state["seconds"] / (60 * minutes)
-        for group in optimiser.param_groups:
-            group["lr"] = t["rate"] * min(1.0, (step + 1) / 200) * max(0.02, min(1.0, 2 * (1 - share)))  # constant, then linear to zero over the second half
-        loss = _loss(network, statistics, batch, np.random.default_rng((t["seed"], step, 1)), device).mean()
-        optimiser.zero_grad(set_to_none=True)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-        optimiser.step()
-        decay = min(0.9995, (step + 1) / (step + 10))
-        for name, value in network.state_dict().items():
-            average[name].lerp_(value, 1 - decay)
-        state["step"], state["seconds"] = step + 1, before + time.monotonic() - began
-        ended = state["seconds"] >= 60 * minutes
-        report.progress(min(state["seconds"], 60 * minutes), 60 * minutes, f"step {step + 1}")
-        if state["seconds"] - saved_at > 120 or ended:
-            losses = {kind: _held_out_loss(average, statistics, config, b, device) for kind, b in held_out_windows.items()}
-            state["history"].append([state["step"], round(state["seconds"]), losses])
-            report.log(f"step {step + 1}, {state['seconds'] / 60:.1f} min, held-out loss per scale {losses}")
-            state |= {"network": network.state_dict(), "optimiser": optimiser.state_dict(), "average": average}
-            with replacing(work / "state.pt") as temporary:
-                torch.save(state, temporary)
-            saved_at = state["seconds"]
-        if ended:
-            break
+
+    def loss(batch: Batch, step: int, share: float) -> torch.Tensor:
+        return _loss(network, statistics, batch, np.random.default_rng((t["seed"], step, 1)), device).mean()
+
+    def figures(average: dict) -> dict:
+        return {kind: _held_out_loss(average, statistics, config, b, device) for kind, b in held_out_windows.items()}
+
+    # constant, then linear to zero over the second half
+    recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.02, min(1.0, 2 * (1 - share))),
+                            betas=(0.9, 0.99), weight_decay=1e-3, averaging=0.9995, workers=t["workers"], save_every=120)
+    descent.descend(network, state, _Steps(windows, t), loss, figures, recipe, minutes, work, device, report)
     return export(work, out)
 
 
 def export(work: Path, out: Path = WEIGHTS) -> dict:
     """The averaged weights, the mean face and the reference skins of a training folder as fp16 safetensors, with the card that says where they come from."""
-    state = torch.load(Path(work) / "state.pt", weights_only=True, map_location="cpu")
+    state = descent.read_state(work)
     data = state["data"]
     tensors = {**state["average"], **state["statistics"], "references": state["references"]}
     with replacing(out) as temporary:
@@ -164,11 +138,8 @@ def _begin(config: str, data: dict, skins: Skins, windows: Windows) -> dict:
     t = CONFIGS[config]["training"]
     torch.manual_seed(t["seed"])
     mean = mean_map(skins)
-    network = build(CONFIGS[config]).state_dict()
-    return {"config": config, "data": data, "step": 0, "seconds": 0.0, "history": [], "network": network, "optimiser": {},
-            "average": {name: value.clone() for name, value in network.items()}, "tones": skins.tones.tolist(),
-            "statistics": {"mean_face": mean, "spread": spread_about(windows, mean, t["patch"])},
-            "references": reference_skins(skins)}
+    return descent.beginning(config, data, build(CONFIGS[config]), tones=skins.tones.tolist(), references=reference_skins(skins),
+                             statistics={"mean_face": mean, "spread": spread_about(windows, mean, t["patch"])})
 
 
 class _Steps(Dataset):

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stage upscale: maps/ becomes maps_4k/, the same names at settings.upscale.size.
 
-By resampling: it adds no detail, and the report says so. Light and albedo are resampled in linear light.
+Albedo, normals and specular are enlarged by a network, or by Lanczos resampling, which adds no detail; light and confidence by resampling.
 """
 
 from __future__ import annotations
@@ -13,44 +13,71 @@ from .. import images
 from ..capture import Capture, replacing_folder
 from ..messages import Reporter
 from ..settings import Settings
+from .maps import Maps, read_maps
 
-METHOD = "Lanczos resampling, no network yet"
 STRIP = 256
 """Rows that are worked on at once: a whole 4096 map in float32 is 200 MB, and each operation on it would make another."""
 CROP = 0.12
 """Side of the report's picture, as a share of the map."""
+SHARES = {"network": 0.7, "lanczos": 0.2}  # of the time that the enlarging takes
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """Writes capture.maps_4k, whole or not at all."""
-    size = settings.upscale.size
-    with replacing_folder(capture.maps_4k) as folder:
-        report.progress(0, 5, "diffuse albedo")
-        diffuse = _enlarged(images.read_linear(capture.maps / "diffuse_albedo.exr"), size)
-        images.write_linear(folder / "diffuse_albedo.exr", diffuse)
-        report.progress(1, 5, "diffuse albedo")
-        _by_strips(diffuse, images.linear_to_srgb)
-        images.write_srgb(folder / "diffuse_albedo.png", diffuse, bits=16)
-        _picture(capture, diffuse)
-        del diffuse
-        report.progress(2, 5, "normals")
-        normal = _enlarged(images.read_data(capture.maps / "normal.png")[..., :3], size)
-        _by_strips(normal, _unit)
-        images.write_data(folder / "normal.png", normal, bits=16)
-        del normal
-        report.progress(3, 5, "specular albedo and confidence")
-        images.write_data(folder / "specular_albedo.png", _enlarged(images.read_mask(capture.maps / "specular_albedo.png"), size), bits=16)
-        images.write_data(folder / "confidence.png", _enlarged(images.read_mask(capture.maps / "confidence.png"), size))
-        report.progress(4, 5, "shading")
-        images.write_linear(folder / "shading.exr", _enlarged(images.read_linear(capture.maps / "shading.exr"), size))
-        report.progress(5, 5)
-    height, width = images.read_mask(capture.maps / "confidence.png").shape
-    report.figure("method", METHOD)
-    report.figure("size_from_px", max(height, width))
+    size, method = settings.upscale.size, settings.upscale.method
+    maps = read_maps(capture.maps)
+    report.figure("method", method)
+    report.figure("size_from_px", len(maps.diffuse))
     report.figure("size_px", size)
+    share = SHARES[method]
+    large = enlarged(maps, size, method, settings.device, lambda done: report.progress(share * done, 1, "enlarging"))
+    with replacing_folder(capture.maps_4k) as folder:
+        report.progress(share, 1, "writing the albedo")
+        srgb = large[..., :3]
+        images.write_srgb(folder / "diffuse_albedo.png", srgb, bits=16)
+        _picture(capture, srgb)
+        _by_strips(srgb, images.srgb_to_linear)
+        images.write_linear(folder / "diffuse_albedo.exr", srgb)
+        report.progress(share + 0.6 * (1 - share), 1, "writing normals and specular albedo")
+        normal = large[..., 3:6]
+        _by_strips(normal, lambda vectors: vectors * 0.5 + 0.5)
+        images.write_data(folder / "normal.png", normal, bits=16)
+        images.write_data(folder / "specular_albedo.png", large[..., 6], bits=16)
+        del large, srgb, normal
+        report.progress(share + 0.8 * (1 - share), 1, "writing light and confidence")
+        images.write_data(folder / "confidence.png", _resampled(maps.confidence, size))
+        images.write_linear(folder / "shading.exr", _resampled(maps.shading, size))
+    report.progress(1, 1)
 
 
-def _enlarged(image: np.ndarray, size: int) -> np.ndarray:
+def enlarged(maps: Maps, size: int, method: str, device: str, progress) -> np.ndarray:
+    """Diffuse (sRGB), unit normal and specular at `size`: float32 [size, size, 7]. `progress` hears the share done.
+
+    The network makes four times as many texels of a side; more or fewer than that are resampled.
+    """
+    if method == "network" and size > len(maps.diffuse):
+        from .enlarge import enlarge  # torch is only needed here
+
+        large = enlarge(maps, progress, device)
+        if len(large) == size:
+            return large
+        return _joined(images.srgb_to_linear(large[..., :3]), large[..., 3:6], large[..., 6], size, progress)
+    return _joined(maps.diffuse, maps.normal, maps.specular, size, progress)
+
+
+def _joined(diffuse: np.ndarray, normal: np.ndarray, specular: np.ndarray, size: int, progress) -> np.ndarray:
+    """Maps [S, S(, C)], the diffuse linear, resampled to float32 [size, size, 7], the diffuse sRGB."""
+    joined = np.empty((size, size, 7), np.float32)
+    joined[..., :3], joined[..., 6] = _resampled(diffuse, size), _resampled(specular, size)
+    progress(0.6)
+    joined[..., 3:6] = _resampled(normal, size)
+    progress(1.0)
+    _by_strips(joined[..., :3], images.linear_to_srgb)
+    _by_strips(joined[..., 3:6], lambda vectors: vectors / np.maximum(np.linalg.norm(vectors, axis=2, keepdims=True), 1e-6))
+    return joined
+
+
+def _resampled(image: np.ndarray, size: int) -> np.ndarray:
     """[H, W(, C)] -> [size, size(, C)], within the range of `image`: Lanczos overshoots at hard edges, and no albedo is negative."""
     if image.shape[:2] == (size, size):
         return image
@@ -61,12 +88,6 @@ def _by_strips(image: np.ndarray, operation) -> None:
     """Applies a texel-wise operation in place."""
     for row in range(0, len(image), STRIP):
         image[row:row + STRIP] = operation(image[row:row + STRIP])
-
-
-def _unit(packed: np.ndarray) -> np.ndarray:
-    """Normals packed into [0, 1], [H, W, 3], made unit again."""
-    vectors = packed * 2 - 1
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=2, keepdims=True), 1e-6) * 0.5 + 0.5
 
 
 def _picture(capture: Capture, srgb: np.ndarray) -> None:

@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Trains the network that enlarges the solved maps four times (paper, supplement "Super-Resolution Network").
+
+    python -m core train upscaler --config cpu|gpu|paper [--minutes 70] [--work DIR]
+    python -m core train upscaler --export [--work DIR] [--out FILE]      write the running training's averaged weights now
+
+Needs neither Blender nor the internet. A second run goes on where the first was killed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import torch
+from safetensors.torch import save_file
+from torch.utils.data import Dataset
+
+from ..capture import replacing
+from ..messages import Reporter
+from ..solve.prior import fast_dtype
+from ..upscale.enlarge import WEIGHTS
+from ..upscale.network import MISSED, Rcan, bicubic
+from . import descent
+from .fine_windows import FineWindows, prepare
+from .prior import named_data
+
+_MODEL = {"groups": 5, "blocks": 10, "width": 64}
+CONFIGS = {
+    "cpu": {"model": _MODEL, "training": {"patch": 48, "batch": 8, "rate": 8e-4, "minutes": 70, "skins": 32, "views": 3, "held_out": 6, "seed": 0,
+                                          "workers": 0}},
+    "gpu": {"model": _MODEL, "training": {"patch": 48, "batch": 32, "rate": 5e-4, "minutes": 20, "skins": 96, "views": 4, "held_out": 6, "seed": 0,
+                                          "workers": 12}},
+    "paper": {"model": {"groups": 10, "blocks": 20, "width": 64},
+              "training": {"patch": 48, "batch": 16, "rate": 2e-4, "minutes": 600, "skins": 160, "views": 6, "held_out": 6, "seed": 0, "workers": 12}},
+}
+"""`views` windows of each of `skins` subjects. `paper` has the size of the paper's network; nothing of ours was trained with it."""
+GROWTH = ((0.0, 2), (0.3, 5), (0.6, None))
+"""From which share of the time on how many blocks of each group take part: a shallow network learns most of what there is at a fraction of the cost, and
+new blocks begin as the identity (progressive stacking, Gong et al. 2019)."""
+
+
+def train_upscaler(config: str, out: Path, report: Reporter, minutes: float | None = None, work: Path | None = None) -> dict:
+    """Trains for `minutes` in all (those of earlier runs included, preparation not), writes `out` (safetensors, fp16) and its card, returns the card.
+
+    Raises Problem where the work folder holds a training of another configuration.
+    """
+    work = Path(work or Path(tempfile.gettempdir()) / "wildcap_upscaler")
+    work.mkdir(parents=True, exist_ok=True)
+    t = CONFIGS[config]["training"]
+    device = "cuda" if config != "cpu" and torch.cuda.is_available() else "cpu"
+    data = named_data(t, None, [])
+    for seeds in (data["seeds"], data["held_out_seeds"]):
+        prepare(seeds, t["views"], work, report, max(2, t["workers"]))
+    held_out = FineWindows(data["held_out_seeds"], t["views"], work).draw(4 * t["held_out"], t["patch"], np.random.default_rng(1))
+    torch.manual_seed(t["seed"])
+    network = Rcan(**CONFIGS[config]["model"])
+    state = descent.resumed(work, descent.beginning(config, data, network))
+
+    def loss(batch, step, share):
+        return _error(network, batch, device, max(growth for growth in GROWTH if growth[0] <= share)[1]).mean()
+
+    recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 100) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
+                            betas=(0.9, 0.99), weight_decay=1e-4, averaging=0.995, workers=t["workers"], save_every=180)
+    descent.descend(network, state, _Steps(FineWindows(data["seeds"], t["views"], work), t), loss,
+                    lambda average: figures(average, config, held_out, device), recipe, minutes or t["minutes"], work, device, report)
+    return export(work, out)
+
+
+def _error(network: Rcan, pairs: tuple[torch.Tensor, torch.Tensor], device: str, depth: int | None) -> torch.Tensor:
+    """Absolute error per channel [7], in the channels' own units."""
+    small, large = (x.to(device, memory_format=torch.channels_last) for x in pairs)
+    missing = large - bicubic(small)
+    with torch.autocast(device, torch.bfloat16, enabled=device == "cuda" or fast_dtype("cpu") == torch.bfloat16):
+        found = network(small, depth)
+    return (found.float() - missing).abs().mean((0, 2, 3)) / torch.tensor(MISSED, device=device)
+
+
+@torch.no_grad()
+def figures(average: dict, config: str, pairs: tuple[torch.Tensor, torch.Tensor], device: str) -> dict[str, float]:
+    """The averaged network's mean absolute error on held-out patches as a share of bicubic resampling's: diffuse, normal, specular."""
+    network = Rcan(**CONFIGS[config]["model"]).to(device, memory_format=torch.channels_last)
+    network.load_state_dict(average)
+    parts = [tuple(x[i:i + 4] for x in pairs) for i in range(0, len(pairs[0]), 4)]
+    error = sum(_error(network, part, device, None).cpu() for part in parts) / len(parts)
+    missed = (pairs[1] - bicubic(pairs[0])).abs().mean((0, 2, 3)) / torch.tensor(MISSED)
+    return {name: round(float(error[channels].sum() / missed[channels].sum()), 4)
+            for name, channels in (("diffuse", slice(0, 3)), ("normal", slice(3, 6)), ("specular", slice(6, 7)))}
+
+
+def export(work: Path, out: Path = WEIGHTS) -> dict:
+    """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from."""
+    state = descent.read_state(work)
+    data = state["data"]
+    with replacing(out) as temporary:
+        save_file({name: value.half().contiguous() for name, value in state["average"].items()}, temporary)
+    card = {**CONFIGS[state["config"]], "growth": GROWTH, "licence": "GPL-3.0-or-later", "notices": data["notices"],
+            "data": "Windows of procedural skins of core/synthetic at 4096 on the built-in head, which derives from the MakeHuman base mesh (CC0)",
+            "command": f"python -m core train upscaler --config {state['config']} --minutes {round(state['seconds'] / 60)}",
+            "steps": state["step"], "minutes": round(state["seconds"] / 60, 1), "parameters": sum(v.numel() for v in state["average"].values()),
+            "seeds": data["seeds"], "held_out_seeds": data["held_out_seeds"],
+            "held_out": {**state["history"][-1][2], "what": "mean absolute error on degraded patches of held-out skins, as a share of bicubic resampling's"}}
+    with replacing(Path(out).with_suffix(".json")) as temporary:
+        temporary.write_text(json.dumps(card, indent=1), encoding="utf-8")
+    return card
+
+
+class _Steps(Dataset):
+    """The batch of each step, which depends on the step alone."""
+
+    def __init__(self, windows: FineWindows, options: dict):
+        self.windows, self.options = windows, options
+
+    def __getitem__(self, step: int) -> tuple[torch.Tensor, torch.Tensor]:
+        return self.windows.draw(self.options["batch"], self.options["patch"], np.random.default_rng((self.options["seed"], step)))
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser("python -m core train upscaler", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--config", default="cpu", choices=tuple(CONFIGS))
+    parser.add_argument("--minutes", type=float, help="in all, those of earlier runs included; the configuration's by default")
+    parser.add_argument("--export", action="store_true", help="write the weights of the work folder's last checkpoint and stop")
+    parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_upscaler")
+    parser.add_argument("--out", type=Path, default=WEIGHTS)
+    options = parser.parse_args(arguments)
+    if options.export:
+        export(options.work, options.out)
+        return 0
+    report = Reporter("train", emit=lambda message: print(message.text, flush=True) if type(message).__name__ == "Log" else None)
+    train_upscaler(options.config, options.out, report, options.minutes, options.work)
+    return 0
