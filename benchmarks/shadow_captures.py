@@ -9,6 +9,7 @@ is the true one, off by half a millimetre here and there, as a fit leaves it.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 
 import cv2
@@ -49,7 +50,7 @@ def synthetic_capture(seed: int, kind: str, folder: Path) -> tuple[Capture, np.n
         lit = skin.diffuse * shading
         lit *= 0.85 / np.percentile(lit[skin.covered].max(-1), 99.5)
         _photograph(capture, mesh, np.clip(lit, 0, 1).astype(np.float32), np.random.default_rng([seed, 32]))
-        meshes.write_obj(capture.head, _registered(mesh, seed))
+        meshes.write_obj(capture.head, registered(mesh, seed))
         images.write_data(capture.root / "truth.png", shadow.astype(np.float32))
     return capture, images.read_mask(capture.root / "truth.png") > 0.5
 
@@ -85,7 +86,8 @@ def _shadow(mesh: Mesh, size: int, sky, sun, colour, radius: float, kind: str, s
     return shading, (blocked > 0.5) | (cosine <= 0.02), 1 - shading.mean(-1) / np.maximum(sunlit, 1e-4)
 
 
-def _registered(mesh: Mesh, seed: int) -> Mesh:
+def registered(mesh: Mesh, seed: int) -> Mesh:
+    """The true head as a fit leaves it: off by OFF_M along its normals, smoothly over OFF_MM."""
     off = noise(1000 * mesh.vertices, OFF_MM, np.random.default_rng([seed, 33]), smooth=True)
     return mesh.moved(mesh.vertices + meshes.vertex_normals(mesh) * (OFF_M * off / max(float(off.std()), 1e-6))[:, None])
 
@@ -94,13 +96,18 @@ def _photograph(capture: Capture, mesh: Mesh, texture: np.ndarray, rng: np.rando
     """frames/ with frames.json, and cameras/, of a lit texture, linear [S, S, 3]."""
     caster = raster.RayCaster(mesh)
     views = [camera(azimuth, 0.0 if i < len(AZIMUTHS) - 1 else -0.25, scale=SCALE) for i, azimuth in enumerate(AZIMUTHS)]
+    write_views(capture, views, (_picture(caster, view, texture, rng) for view in views))
+
+
+def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarray]) -> None:
+    """frames/ with frames.json, and cameras/: sRGB pictures [H, W, 3] with the known cameras that took them, which share one lens."""
     model = pycolmap.Reconstruction()
     model.add_camera_with_trivial_rig(views[0].camera)
     frames = []
     with replacing_folder(capture.frames) as folder:
-        for i, view in enumerate(views):
+        for i, (view, picture) in enumerate(zip(views, pictures, strict=True)):
             name = f"{i:05d}.jpg"
-            images.write_srgb(folder / name, _picture(caster, view, texture, rng), quality=90)
+            images.write_srgb(folder / name, picture, quality=90)
             image = pycolmap.Image(name=name, camera_id=1, image_id=i + 1)
             pose = pycolmap.Rigid3d(pycolmap.Rotation3d(view.rotation), view.translation)
             model.add_image_with_trivial_frame(image, pose)

@@ -43,13 +43,14 @@ def main() -> None:
     camera.data.lens = job["focal_px"] * 24 / job["height"]
     camera.data.clip_start = 0.05
     for number in job["frames"]:
-        path = Path(job["out"]) / f"{number:05d}.png"
+        path = Path(job["out"]) / f"{number:05d}{job['suffix']}"
         if path.exists():
             continue
         camera.matrix_world = Matrix(job["cameras"][number])
-        scene.render.filepath = str(path.with_suffix(".part.png"))
+        part = path.with_suffix(f".part{job['suffix']}")
+        scene.render.filepath = str(part)
         bpy.ops.render.render(write_still=True)
-        os.replace(path.with_suffix(".part.png"), path)
+        os.replace(part, path)
         print(f"frame {number}", flush=True)
 
 
@@ -63,7 +64,7 @@ def _settings(scene: bpy.types.Scene, job: dict) -> None:
     scene.cycles.seed = job["seed"] % 65536
     scene.render.resolution_x, scene.render.resolution_y = job["width"], job["height"]
     scene.render.resolution_percentage = 100
-    scene.render.image_settings.file_format = 'PNG'
+    scene.render.image_settings.file_format = 'OPEN_EXR' if job["suffix"] == ".exr" else 'PNG'  # an EXR holds linear light
     scene.render.use_persistent_data = True
     scene.view_settings.view_transform = 'Standard'
 
@@ -134,14 +135,30 @@ def _principled(name: str):
 
 
 def _light(scene: bpy.types.Scene, job: dict) -> None:
-    sun = bpy.data.lights.new("sun", 'SUN')
-    sun.energy, sun.angle, sun.color = job["sun"]["strength"], job["sun"]["angle"], job["sun"]["colour"]
-    thing = bpy.data.objects.new("sun", sun)
-    thing.rotation_euler = Vector(job["sun"]["direction"]).to_track_quat('Z', 'Y').to_euler()  # a lamp shines along its -z
-    scene.collection.objects.link(thing)
+    if job["sun"]:
+        sun = bpy.data.lights.new("sun", 'SUN')
+        sun.energy, sun.angle, sun.color = job["sun"]["strength"], job["sun"]["angle"], job["sun"]["colour"]
+        _hang(scene, sun, Vector(job["sun"]["direction"]), Vector())
+    for lamp in job["lamps"]:
+        area = bpy.data.lights.new("lamp", 'AREA')
+        area.energy, area.size, area.color = lamp["power"], lamp["size"], lamp["colour"]
+        _hang(scene, area, Vector(lamp["position"]), Vector(lamp["position"]))
     scene.world = bpy.data.worlds.new("sky")
     scene.world.use_nodes = True
-    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (*job["sky"], 1)
+    nodes = scene.world.node_tree.nodes
+    if isinstance(job["sky"], str):
+        panorama = nodes.new("ShaderNodeTexEnvironment")
+        panorama.image = bpy.data.images.load(job["sky"])
+        scene.world.node_tree.links.new(panorama.outputs["Color"], nodes["Background"].inputs["Color"])
+    else:
+        nodes["Background"].inputs["Color"].default_value = (*job["sky"], 1)
+
+
+def _hang(scene: bpy.types.Scene, light: bpy.types.Light, towards: Vector, position: Vector) -> None:
+    """Puts a light in the direction `towards` of the head; a lamp shines along its -z."""
+    thing = bpy.data.objects.new(light.name, light)
+    thing.rotation_euler, thing.location = towards.to_track_quat('Z', 'Y').to_euler(), position
+    scene.collection.objects.link(thing)
 
 
 def _room(seed: int, count: int = 90) -> None:

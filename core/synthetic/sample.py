@@ -16,6 +16,7 @@ import json
 import subprocess
 import sys
 import tempfile
+from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
 
@@ -55,24 +56,31 @@ def main() -> None:
 
 
 def render_frames(work: Path, seed: int, skin: Skin, cameras: np.ndarray, frames: list[int], samples: int, scale: float = 1.0,
-                  leaves: bool = True, room: bool = True) -> None:
+                  leaves: bool = True, room: bool = True, light: scene.Light | None = None, suffix: str = ".png") -> None:
     """work/NNNNN.png of these frames (numbers into cameras [N, 4, 4]) by Cycles in a process of its own; files that exist are kept.
 
-    `scale`: of the pictures' size; `leaves`: whether they stand between the sun and the head; `room`: whether there is anything behind it.
+    `scale`: of the pictures' size; `leaves`: whether they stand between the sun and the head; `room`: whether there is anything behind it; `light`: instead
+    of the sample's sun, sky and leaves; `suffix`: .exr for linear light.
     """
     work.mkdir(parents=True, exist_ok=True)
     sun = scene.sun_of(seed)
+    light = light or scene.Light(scene.SKY, sun, scene.leaves(seed, sun) if leaves else None)
     meshes.write_obj(work / "head.obj", subject_mesh(seed))
-    if leaves:
-        meshes.write_obj(work / "leaves.obj", scene.leaves(seed, sun))
+    if light.blockers:
+        meshes.write_obj(work / "leaves.obj", light.blockers)
+    sky = light.sky
+    if isinstance(sky, np.ndarray):
+        images.write_linear(work / "sky.exr", sky)
+        sky = str(work / "sky.exr")
     images.write_srgb(work / "diffuse.png", images.linear_to_srgb(skin.diffuse), bits=16)
     images.write_data(work / "specular.png", skin.specular, bits=16)
     images.write_data(work / "normal.png", skin.normal / 2 + 0.5, bits=16)
     write_json(work / "job.json", {
-        "seed": seed, "room": room, "head": str(work / "head.obj"), "leaves": str(work / "leaves.obj") if leaves else None,
-        "out": str(work), "frames": frames, "samples": samples,
+        "seed": seed, "room": room, "head": str(work / "head.obj"), "leaves": str(work / "leaves.obj") if light.blockers else None,
+        "suffix": suffix, "out": str(work), "frames": frames, "samples": samples,
         "maps": {name: str(work / f"{name}.png") for name in ("diffuse", "specular", "normal")}, "cameras": cameras.tolist(),
-        "sun": {"direction": sun.direction.tolist(), "strength": sun.strength, "angle": sun.angle, "colour": sun.colour}, "sky": scene.SKY,
+        "sun": asdict(light.sun) | {"direction": light.sun.direction.tolist()} if light.sun else None, "sky": sky,
+        "lamps": [asdict(lamp) for lamp in light.lamps],
         "width": round(scene.WIDTH * scale), "height": round(scene.HEIGHT * scale), "focal_px": scene.FOCAL * scale})
     subprocess.run([sys.executable, "-m", "core.synthetic.render", str(work / "job.json")], cwd=Path(__file__).parents[2], check=True)
 
@@ -85,7 +93,7 @@ def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> N
                                       "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
     write_video(out / "capture.mp4", [work / f"{k:05d}.png" for k in range(frames)])
     head, sun = subject_mesh(seed), scene.sun_of(seed)
-    opaque = _together(head, scene.leaves(seed, sun))
+    opaque = together(head, scene.leaves(seed, sun))
     total, count = np.zeros(3), 0
     for frame in truth_frames(frames):
         albedo, alpha, face, shadow = frame_truth(head, opaque, skin, view_of(cameras[frame]), sun.direction)
@@ -106,15 +114,17 @@ def truth_frames(frames: int) -> list[int]:
     return np.unique(np.linspace(3, frames - 4, TRUTHS).round().astype(int)).tolist()
 
 
-def view_of(matrix: np.ndarray) -> View:
-    """A Blender camera-to-world matrix [4, 4] (looks along -z, y up) as a view."""
+def view_of(matrix: np.ndarray, scale: float = 1.0) -> View:
+    """A Blender camera-to-world matrix [4, 4] (looks along -z, y up) as a view; `scale`: of the picture's size."""
     rotation = np.diag([1, -1, -1]) @ matrix[:3, :3].T
-    camera = pycolmap.Camera(model="PINHOLE", width=scene.WIDTH, height=scene.HEIGHT, params=[scene.FOCAL, scene.FOCAL, scene.WIDTH / 2, scene.HEIGHT / 2])
+    width, height, focal = round(scene.WIDTH * scale), round(scene.HEIGHT * scale), scene.FOCAL * scale
+    camera = pycolmap.Camera(camera_id=1, model="PINHOLE", width=width, height=height, params=[focal, focal, width / 2, height / 2])
     return View("", Path(), camera, rotation, -rotation @ matrix[:3, 3], True)
 
 
-def frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarray, over: int = 2) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Linear albedo [h, w, 3], alpha [h, w], and bool [h, w] each: facial skin, and the part of the head that the sun (unit direction) does not reach.
+def frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarray | None,
+                over: int = 2) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Linear albedo [h, w, 3], alpha [h, w], and bool [h, w] each: facial skin, and the part of the head that the sun (unit direction, or None) does not reach.
 
     `opaque` is all that throws shadows, the head included; `over`: rays along a pixel's side.
     """
@@ -131,8 +141,9 @@ def frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarra
     in_face[hit] = raster.sample(template.mask("face", 1024), at * 1024 / MAPS)
     points, normals = raster.interpolate(head.vertices, head.faces, face, bary), raster.interpolate(vertex_normals(head), head.faces, face, bary)
     dark = np.zeros(hit.shape, np.float32)
-    away = (normals[hit] @ sun) <= 0
-    dark[hit] = away | raster.RayCaster(opaque).blocked(points[hit] + 5e-4 * normals[hit], np.repeat(sun[None], hit.sum(), 0))
+    if sun is not None:
+        away = (normals[hit] @ sun) <= 0
+        dark[hit] = away | raster.RayCaster(opaque).blocked(points[hit] + 5e-4 * normals[hit], np.repeat(sun[None], hit.sum(), 0))
     return albedo, cover, (_shrunk(in_face, over) > 0.5) & (cover > 0.99), _shrunk(dark, over) > 0.5
 
 
@@ -147,7 +158,8 @@ def write_video(path: Path, frames: list[Path]) -> None:
         container.mux(stream.encode())
 
 
-def _together(a: Mesh, b: Mesh) -> Mesh:
+def together(a: Mesh, b: Mesh) -> Mesh:
+    """Two meshes as one, without UVs."""
     return Mesh(np.concatenate([a.vertices, b.vertices]), np.concatenate([a.faces, b.faces + len(a.vertices)]))
 
 

@@ -31,6 +31,27 @@ SKY = (0.42, 0.55, 0.80)
 """Radiance of the sky, linear sRGB."""
 
 
+@dataclass(frozen=True)
+class Lamp:
+    """A square area lamp that shines at the head: where it is [3] and its side in metres, its power in watts, its colour in linear sRGB."""
+
+    position: tuple[float, float, float]
+    size: float
+    power: float
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Light:
+    """All that lights a subject. sky: its radiance everywhere, [3], or an equirectangular panorama [H, W, 3] as Blender reads one (its middle column is +X);
+    blockers: what stands between the lights and the head, unseen by the camera."""
+
+    sky: tuple[float, float, float] | np.ndarray = SKY
+    sun: Sun | None = None
+    blockers: Mesh | None = None
+    lamps: tuple[Lamp, ...] = ()
+
+
 def sun_of(seed: int) -> Sun:
     """High and to one side, in front of the face."""
     rng = np.random.default_rng([seed, 20])

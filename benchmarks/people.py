@@ -1,0 +1,166 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Six synthetic people of six skin tones, none known to any training, each photographed in another light, with their truth; and their solve.
+
+    python -m benchmarks.people FOLDER [--only NAME ...] [--until STAGE] [--quality NAME] [--no-solve]
+
+FOLDER/NAME.wildcap is the capture, FOLDER/NAME its truth in the layout that benchmarks/albedo_score.py says, with maps/ (the true maps, 2048) and head.obj
+besides. Path-traced by Cycles (shadows, two bounces, highlights; no scattering under the skin, so that albedo is what the truth says), then exposed,
+balanced, blurred, made noisy and compressed. The cameras are the true ones and the head is half a millimetre off, so the chain begins at delight, with the
+true skin tone. What is there is not made again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from core import images, meshes
+from core.capture import Capture, replacing, write_json
+from core.messages import Done, StageDone
+from core.settings import QUALITIES, from_json, preset
+from core.stages import STAGES
+from core.synthetic import sample, scene
+from core.synthetic.identities import subject_mesh
+from core.synthetic.parameters import sample_parameters
+from core.synthetic.skin import Skin, make_skin
+from core.worker.job import write_job
+from core.worker.runner import run_job
+
+from .people_lights import KINDS
+from .shadow_captures import registered, write_views
+
+
+@dataclass(frozen=True)
+class Person:
+    """name: the group of skin tone (benchmarks/delight_measures.py) and the capture's name; light: one of people_lights.KINDS."""
+
+    name: str
+    seed: int
+    light: str
+
+
+PEOPLE = (
+    Person("very_light", 900111, "noon sun behind leaves"),
+    Person("light", 900103, "overcast"),
+    Person("intermediate", 900119, "window bars"),
+    Person("tan", 900104, "mixed lamps"),
+    Person("brown", 900101, "hazy sun"),
+    Person("dark", 900102, "noon sun behind leaves"),
+)
+"""The first seed from 900101 on in each group: nothing was chosen by eye. reserved.json keeps them from training."""
+VIEWS, EVERY, SCALE, SAMPLES = 12, 5, 5 / 6, 7  # frames, how many of a video lie between two, their size (600 x 800), rays per pixel before denoising
+TRUTH_EVERY = 2  # frames
+BALANCED = 0.75  # share of the light's colour that the white balance takes out
+WHITE_AT, TO = 99.0, 0.8  # percentile of the brightest channel on the face that the exposure brings to this linear level
+BLUR_PX, NOISE = 0.6, 0.006  # deviations; of the noise in sRGB at mid grey
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
+    parser.add_argument("--until", choices=[s.name for s in STAGES[4:]], default="upscale")
+    parser.add_argument("--quality", choices=QUALITIES, default="standard")
+    parser.add_argument("--no-solve", action="store_true", help="make the captures and their truth only")
+    arguments = parser.parse_args()
+    for person in (p for p in PEOPLE if p.name in arguments.only):
+        capture = make(person, arguments.folder.resolve())
+        if not arguments.no_solve:
+            solve(capture, arguments.folder / person.name, arguments.until, arguments.quality)
+
+
+def make(person: Person, folder: Path) -> Capture:
+    """The person's capture and truth, made if they are not there."""
+    capture, truth = Capture(folder / f"{person.name}.wildcap"), folder / person.name
+    if (truth / "skin_tone.txt").exists():  # written last
+        return capture
+    skin = make_skin(sample_parameters(person.seed), sample.MAPS)
+    light, cameras = KINDS[person.light](person.seed), scene.camera_path(person.seed, VIEWS * EVERY)[EVERY // 2::EVERY]
+    work = folder / "rendered" / person.name
+    sample.render_frames(work, person.seed, skin, cameras, list(range(VIEWS)), SAMPLES, SCALE, room=False, light=light, suffix=".exr")
+    head = subject_mesh(person.seed)
+    meshes.write_obj(truth / "head.obj", head)
+    write_maps(truth / "maps", skin)
+    write_json(truth / "cameras.json", {"name": person.name, "light": person.light, "focal_px": scene.FOCAL * SCALE, "width": round(scene.WIDTH * SCALE),
+                                        "height": round(scene.HEIGHT * SCALE),
+                                        "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
+    faces, total, count = {}, np.zeros(3), 0
+    opaque = sample.together(head, light.blockers) if light.blockers else head
+    for frame in range(0, VIEWS, TRUTH_EVERY):
+        albedo, alpha, face, shadow = sample.frame_truth(head, opaque, skin, sample.view_of(cameras[frame], SCALE), light.sun.direction if light.sun else None)
+        faces[frame] = albedo, face
+        _write_truth(truth, frame, albedo, alpha, face, shadow if light.sun else None)
+        total, count = total + albedo[face].sum(0, dtype=np.float64), count + int(face.sum())
+    write_views(capture, [sample.view_of(matrix, SCALE) for matrix in cameras], _developed(work, faces, person.seed))
+    meshes.write_obj(capture.head, registered(head, person.seed))
+    with replacing(truth / "skin_tone.txt") as temporary:
+        temporary.write_text(",".join(f"{c:.4f}" for c in images.linear_to_srgb(total / count)) + "\n", encoding="ascii")
+    return capture
+
+
+def write_maps(folder: Path, skin: Skin) -> None:
+    """A subject's true maps under the solved maps' names and in their encoding."""
+    folder.mkdir(parents=True, exist_ok=True)
+    images.write_srgb(folder / "diffuse_albedo.png", images.linear_to_srgb(skin.diffuse), bits=16)
+    images.write_data(folder / "specular_albedo.png", skin.specular, bits=16)
+    images.write_data(folder / "normal.png", skin.normal / 2 + 0.5, bits=16)
+
+
+def solve(capture: Capture, truth: Path, until: str, quality: str) -> None:
+    """Runs the chain from delight on, as the worker would, as far as it is not fresh. Raises SystemExit with what was wrong where a stage fails."""
+    values = {"solve": {"skin_tone": skin_tone(truth)}}
+    names, settings = [stage.name for stage in STAGES], from_json(values, preset(quality))
+    asked = STAGES[names.index("delight"):names.index(until) + 1]
+    stale = [stage.name for stage in asked if capture.state(stage, settings) != "done"]
+    if not stale:
+        return
+    job = write_job(capture, first=stale[0], last=until, settings=values, quality=quality)
+    ended = run_job(job, lambda message: print(message, flush=True) if isinstance(message, StageDone) else None)
+    if not isinstance(ended, Done):
+        raise SystemExit(str(ended))
+
+
+def skin_tone(truth: Path) -> str:
+    """The true skin tone as the command line takes it: sRGB R,G,B."""
+    return (truth / "skin_tone.txt").read_text(encoding="ascii").split("#")[0].replace(" ", "").strip()
+
+
+def _write_truth(truth: Path, frame: int, albedo: np.ndarray, alpha: np.ndarray, face: np.ndarray, shadow: np.ndarray | None) -> None:
+    name = f"{frame:04d}.png"
+    for folder in ("albedo", "face", *(["shadow"] if shadow is not None else [])):
+        (truth / folder).mkdir(parents=True, exist_ok=True)
+    images.write_srgb(truth / "albedo" / name, np.concatenate([images.linear_to_srgb(albedo), alpha[..., None]], -1))
+    images.write_data(truth / "face" / name, face.astype(np.float32))
+    if shadow is not None:
+        images.write_data(truth / "shadow" / name, shadow.astype(np.float32))
+
+
+def _developed(work: Path, faces: dict[int, tuple[np.ndarray, np.ndarray]], seed: int) -> Iterator[np.ndarray]:
+    """The rendered frames as a phone would show them, sRGB [H, W, 3]; `faces`: per frame with truth its albedo [H, W, 3] and facial skin [H, W]."""
+    gain = exposure({frame: images.read_linear(work / f"{frame:05d}.exr") for frame in faces}, faces)
+    for frame in range(VIEWS):
+        rng = np.random.default_rng([seed, 51, frame])
+        linear = cv2.GaussianBlur(images.read_linear(work / f"{frame:05d}.exr") * gain, (0, 0), BLUR_PX)
+        srgb = images.linear_to_srgb(linear)
+        yield np.clip(srgb + rng.normal(0, NOISE, srgb.shape) * np.sqrt(np.clip(srgb, 0.05, 1) / 0.5), 0, 1).astype(np.float32)
+
+
+def exposure(frames: dict[int, np.ndarray], faces: dict[int, tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """One gain [3] for all frames: BALANCED of the light's colour goes, and the WHITE_AT percentile of the face comes to TO, as a phone meters faces."""
+    lit = np.concatenate([frames[k][face] for k, (_, face) in faces.items()])
+    albedo = np.concatenate([true[face] for true, face in faces.values()])
+    cast = lit.mean(0) / albedo.mean(0)
+    gain = (cast / cast.mean()) ** -BALANCED
+    return gain * TO / np.percentile((lit * gain).max(1), WHITE_AT)
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    main()

@@ -1,0 +1,143 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Solved heads under new light beside the true subjects under the same light: the number that artists feel.
+
+    python -m benchmarks.relit WORK [--sample CAPTURE] [--people FOLDER [--only NAME ...]]
+
+CAPTURE was solved from core/synthetic/sample, FOLDER was made by benchmarks/people.py. Rendered by Cycles with the add-on's own material and lights, of which
+none lit a capture, as linear EXR; both heads are the registered one. A picture is exposed so that the true subject's face has the mean luminance MIDDLE (one
+gain per light, the same for all rows), encoded by the sRGB curve and clipped: no AgX. Figures are of the face, each the mean over the lights:
+  raw            the filmed texture for albedo       delit          the delit texture for albedo
+  solved         all three maps as delivered         plain          the solved albedo, with no relief and an even gloss
+  true_albedo, true_normal, true_specular            solved, with one map swapped for the true one: what that map costs
+  floor          the truth with other random numbers: what the rendering's noise costs
+All albedos share the true skin tone as mean, and all rows but plain the solved relief and gloss. WORK keeps the renders; what is there is not made again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from core import images
+from core.capture import Capture, write_json
+from core.synthetic import sample
+from core.synthetic.parameters import sample_parameters
+from core.synthetic.pigment import LUMINANCE
+from core.synthetic.skin import make_skin
+
+from .albedo_score import differences, face_box
+from .people import PEOPLE, write_maps
+from .relit_maps import face_mask, read_rows, read_worn, write_row
+
+ROOT = Path(__file__).resolve().parent.parent
+LIGHTS = ("three_point", "window", "sun", "coloured", "city.exr", "interior.exr")
+ROWS = ("raw", "delit", "solved", "plain", "true_albedo", "true_normal", "true_specular", "floor")
+SHOWN = ("truth", "solved", "delit", "raw")
+RESOLUTION, SAMPLES = 320, 24
+MIDDLE = 0.18
+OVER_RAW, OVER_DELIT = 1.0, 0.5  # dB that are asked for
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("work", type=Path)
+    parser.add_argument("--sample", type=Path)
+    parser.add_argument("--people", type=Path)
+    parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
+    parser.add_argument("--lights", nargs="+", default=LIGHTS)
+    arguments = parser.parse_args()
+    work, results = arguments.work.resolve(), {}
+    for name, capture, truth in _subjects(arguments, work):
+        render(capture, truth, work / name, arguments.lights)
+        results[name] = score(work / name, arguments.lights)
+        write_json(work / f"{name}.json", results[name])
+        print(f"{name}: {shortfall(mean_over_lights(results[name])) or 'as asked'}", file=sys.stderr)
+    print(table({name: mean_over_lights(found) for name, found in results.items()}))
+    return 0
+
+
+def _subjects(arguments: argparse.Namespace, work: Path) -> Iterator[tuple[str, Capture, Path]]:
+    """Name, solved capture and folder of true maps of each subject that was asked for and has been solved."""
+    if arguments.sample:
+        maps = work / "sample_truth"
+        if not (maps / "normal.png").exists():  # written last
+            write_maps(maps, make_skin(sample_parameters(sample.RESERVED["sample"]), sample.MAPS))
+        yield "sample", Capture(arguments.sample.resolve()), maps
+    for person in (p for p in PEOPLE if arguments.people and p.name in arguments.only):
+        capture = Capture(arguments.people.resolve() / f"{person.name}.wildcap")
+        if (capture.maps / "normal.png").is_file():
+            yield person.name, capture, arguments.people.resolve() / person.name / "maps"
+        else:
+            print(f"{person.name} has not been solved and is left out.", file=sys.stderr)
+
+
+def render(capture: Capture, truth: Path, work: Path, lights: list[str]) -> None:
+    """work/renders/ROW_LIGHT.exr of all rows, and face.exr."""
+    renders, mask = work / "renders", work / "mask.png"
+    renders.mkdir(parents=True, exist_ok=True)
+    if all((renders / f"{row}_{light}.exr").exists() for row in ("truth", *ROWS) for light in lights) and (renders / "face.exr").exists():
+        return
+    face_mask(mask)
+    rows = []
+    for name, worn in read_rows(capture, read_worn(truth)).items():
+        folder = work / f"{name}.wildcap"
+        write_row(folder, capture, worn)
+        rows.append({"name": name, "capture": str(folder), "seed": int(name == "floor")})
+    write_json(work / "job.json", {"rows": rows, "lights": list(lights), "out": str(renders), "mask": str(mask), "resolution": RESOLUTION, "samples": SAMPLES})
+    subprocess.run([sys.executable, "-m", "benchmarks.relit_renders", str(work / "job.json")], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+
+
+def score(work: Path, lights: list[str]) -> dict[str, dict[str, dict]]:
+    """Light -> row -> PSNR, SSIM and FLIP over the face; and pictures of SHOWN side by side, work/LIGHT.png."""
+    face = images.read_data(work / "renders" / "face.exr")[..., 0] > 0.5
+    box, found = face_box(face), {}
+    for light in lights:
+        linear = {row: images.read_linear(work / "renders" / f"{row}_{light}.exr") for row in ("truth", *ROWS)}
+        gain = exposure(linear["truth"], face)
+        shown = {row: images.linear_to_srgb(picture * gain) for row, picture in linear.items()}
+        images.write_srgb(work / f"{Path(light).stem}.png", np.hstack([shown[row] for row in SHOWN]))
+        found[light] = {row: differences(shown[row][box], shown["truth"][box], face[box]) for row in ROWS}
+    return found
+
+
+def exposure(truth: np.ndarray, face: np.ndarray) -> float:
+    """The gain that brings the mean luminance of a linear picture [H, W, 3] over the pixels `face` bool [H, W] to MIDDLE."""
+    return MIDDLE / float((truth[face] @ LUMINANCE).mean())
+
+
+def mean_over_lights(found: dict[str, dict[str, dict]]) -> dict[str, dict[str, float]]:
+    """Row -> figures, each the mean over the lights."""
+    rows = next(iter(found.values()))
+    return {row: {figure: float(np.mean([found[light][row][figure] for light in found])) for figure in rows[row]} for row in rows}
+
+
+def shortfall(rows: dict[str, dict[str, float]]) -> str:
+    """What is missing to what is asked for, in words; empty where nothing is."""
+    gains = {row: rows["solved"]["psnr"] - rows[row]["psnr"] for row in ("raw", "delit")}
+    return ", ".join(f"{gains[row]:+.2f} dB over {row} where {asked:.1f} is asked for"
+                     for row, asked in (("raw", OVER_RAW), ("delit", OVER_DELIT)) if gains[row] < asked)
+
+
+def table(results: dict[str, dict[str, dict[str, float]]]) -> str:
+    """Markdown: a line per row, and for each subject PSNR, SSIM and FLIP; last the mean over the people of benchmarks/people.py."""
+    people = [name for name in results if name != "sample"]
+    columns = dict(results)
+    if len(people) > 1:
+        columns[f"mean of {len(people)}"] = mean_over_lights({name: results[name] for name in people})
+    lines = ["| row | " + " | ".join(name.replace("_", " ") for name in columns) + " |", "|" + " --- |" * (len(columns) + 1)]
+    for row in ROWS:
+        cells = (f"{c[row]['psnr']:.2f} dB, {c[row]['ssim']:.3f}, {c[row]['flip']:.3f}" for c in columns.values())
+        lines.append(f"| {row.replace('_', ' ')} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    sys.exit(main())

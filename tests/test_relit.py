@@ -1,0 +1,125 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The people that benchmarks photograph, and the measure of relit heads: answers known beforehand."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("flip_evaluator")
+
+from benchmarks import people, people_lights, relit  # noqa: E402
+from benchmarks.delight_measures import TONES, tone_group  # noqa: E402
+from benchmarks.relit_maps import Worn, read_worn, rows_of, write_row  # noqa: E402
+from core import images  # noqa: E402
+from core.capture import Capture  # noqa: E402
+from core.synthetic import pigment  # noqa: E402
+from core.synthetic.identities import reserved_seeds  # noqa: E402
+from core.synthetic.parameters import sample_parameters  # noqa: E402
+
+SIZE = 16
+
+
+@pytest.fixture
+def maps():
+    """What a solver found and the truth, each map of another value throughout."""
+    def worn(albedo, tilt, gloss):
+        normal = np.broadcast_to(np.float32([tilt, 0, np.sqrt(1 - tilt**2)]), (SIZE, SIZE, 3))
+        return Worn(np.full((SIZE, SIZE, 3), albedo, np.float32), normal, np.full((SIZE, SIZE), gloss, np.float32))
+    return worn(0.3, 0.2, 0.4), worn(0.4, 0.6, 0.3)
+
+
+def test_the_people_are_six_tones_that_no_training_may_take():
+    assert {p.seed for p in people.PEOPLE} <= reserved_seeds()
+    for person in people.PEOPLE:
+        p = sample_parameters(person.seed)
+        colour = pigment.reflectance(np.array([p.melanin]), np.array([p.blood]), p.oxygen, p.scattering, p.slope, p.chroma)[0]
+        assert tone_group(images.linear_to_srgb(colour)).replace(" ", "_") == person.name
+    assert len({p.name for p in people.PEOPLE}) == len(TONES) and {p.light for p in people.PEOPLE} == set(people_lights.KINDS)
+
+
+def test_a_panorama_is_bright_where_its_sky_and_window_are():
+    light = people_lights.KINDS["window bars"](7)
+    side = np.sign(light.sun.direction[0])
+    rows, columns = np.nonzero(light.sky.mean(-1) > 1)
+    middle = people_lights._directions()[rows, columns].mean(0)
+    assert np.sign(middle[0]) == side and middle[1] < 0 < middle[2]  # the window is on the sun's side, before the face and above
+    sky = people_lights.panorama((3, 3, 3), (1, 1, 1), (0.1, 0.1, 0.1))
+    assert sky[0, 0, 0] == pytest.approx(3, rel=0.01) and sky[people_lights.HEIGHT // 2 - 1, 0, 0] == pytest.approx(1, rel=0.06)
+    assert sky[-1, 0, 0] == pytest.approx(0.1)
+
+
+def test_bars_stand_in_the_light_and_let_most_of_it_through():
+    direction = np.array([0.5, -0.8, 0.33]) / np.linalg.norm([0.5, -0.8, 0.33])
+    mesh = people_lights.bars(direction)
+    np.testing.assert_allclose(mesh.vertices @ direction, 0.6, atol=1e-9)  # a plane across it
+    from core.raster import RayCaster
+
+    starts = np.random.default_rng(0).uniform(-0.08, 0.08, (2000, 3))
+    assert 0.3 < RayCaster(mesh).blocked(starts, np.repeat(direction[None], len(starts), 0)).mean() < 0.55
+
+
+def test_exposure_takes_the_lights_colour_out_and_brings_the_face_to_its_level():
+    rng = np.random.default_rng(0)
+    albedo, face = rng.uniform(0.3, 0.5, (40, 40, 3)), np.ones((40, 40), bool)
+    gain = people.exposure({0: albedo * [4.0, 2.0, 1.0]}, {0: (albedo, face)})
+    left = gain * [4.0, 2.0, 1.0]
+    assert left[0] / left[2] == pytest.approx(4 ** (1 - people.BALANCED))
+    assert np.percentile((albedo * left).max(-1), people.WHITE_AT) == pytest.approx(people.TO)
+
+
+def test_each_swapped_row_takes_one_true_map_and_no_other(maps):
+    solved, true = maps
+    skin = np.ones((SIZE, SIZE))
+    rows = rows_of(np.full((SIZE, SIZE, 3), 0.1, np.float32), np.full((SIZE, SIZE, 3), 0.2, np.float32), solved, true, skin)
+    assert set(rows) == {"truth", *relit.ROWS}
+    taken = {name: [name for name in ("albedo", "normal", "specular") if getattr(row, name) is getattr(true, name)] for name, row in rows.items()}
+    assert taken == {"truth": ["albedo", "normal", "specular"], "floor": ["albedo", "normal", "specular"], "raw": [], "delit": [], "solved": [], "plain": [],
+                     "true_albedo": ["albedo"], "true_normal": ["normal"], "true_specular": ["specular"]}
+    for name in ("raw", "delit"):  # other albedos of the true tone, the solver's other maps
+        np.testing.assert_allclose(rows[name].albedo, 0.4, rtol=1e-5)
+        assert rows[name].normal is solved.normal and rows[name].specular is solved.specular
+    np.testing.assert_allclose(rows["plain"].normal[..., 2], 1)
+    np.testing.assert_allclose(rows["plain"].specular, 0.4, rtol=1e-6)
+    assert rows["plain"].albedo is solved.albedo
+
+
+def test_a_row_is_a_capture_that_holds_its_maps(maps, tmp_path):
+    source = Capture(tmp_path / "a.wildcap")
+    source.root.mkdir()
+    source.head.write_text("v 0 0 0\n")
+    write_row(tmp_path / "row.wildcap", source, maps[1])
+    assert (tmp_path / "row.wildcap" / "head.obj").read_text() == "v 0 0 0\n"
+    back = read_worn(tmp_path / "row.wildcap" / "maps", SIZE)
+    for name in ("albedo", "normal", "specular"):
+        np.testing.assert_allclose(getattr(back, name), getattr(maps[1], name), atol=1e-4)
+
+
+def test_the_same_head_scores_infinite_one_and_nought_and_a_known_gain_its_decibels(tmp_path):
+    """Every linear value times a gain g turns 12.92 x into 12.92 g x below sRGB's bend: a difference that is known."""
+    renders = tmp_path / "renders"
+    renders.mkdir()
+    truth = np.full((100, 100, 3), 0.0020, np.float32)
+    truth[:20] = 1.0  # off the face: neither exposure nor figures may see it
+    face = np.zeros((100, 100, 3), np.float32)
+    face[45:95, 45:95, 0] = 1
+    images.write_linear(renders / "face.exr", face)
+    for row in ("truth", *relit.ROWS):
+        images.write_linear(renders / f"{row}_window.exr", truth * (0.5 if row == "raw" else 1))
+    relit_middle, relit.MIDDLE = relit.MIDDLE, 0.0020
+    try:
+        found = relit.score(tmp_path, ["window"])["window"]
+    finally:
+        relit.MIDDLE = relit_middle
+    assert found["solved"]["psnr"] == pytest.approx(120) and found["solved"]["ssim"] == 1 and found["solved"]["flip"] == 0  # 120 dB stands for infinite
+    assert found["raw"]["psnr"] == pytest.approx(-20 * np.log10(12.92 * 0.0010), abs=0.01)
+    assert (tmp_path / "window.png").is_file()
+    missing = relit.shortfall(relit.mean_over_lights({"window": found}))
+    assert "over delit" in missing and "over raw" not in missing
+
+
+def test_the_table_gives_the_mean_over_people_and_leaves_the_sample_out():
+    def rows(psnr):
+        return {row: {"psnr": psnr, "ssim": 0.5, "flip": 0.1} for row in relit.ROWS}
+    lines = relit.table({"sample": rows(90.0), "dark": rows(20.0), "light": rows(30.0)}).splitlines()
+    assert lines[0] == "| row | sample | dark | light | mean of 2 |" and len(lines) == 2 + len(relit.ROWS)
+    assert "| 25.00 dB, 0.500, 0.100 |" in lines[2]
