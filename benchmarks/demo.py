@@ -23,7 +23,7 @@ from .albedo_score import score_capture, score_floors
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLE = ROOT / "core" / "synthetic" / "sample"
-LIGHTS = ("studio", "sun", "window")
+LIGHTS = ("three_point", "sun", "window")
 
 
 def main() -> int:

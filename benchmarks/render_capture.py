@@ -2,23 +2,42 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Renders a solved capture with Cycles through the installed extension's own functions, in a process of its own.
 
-    python -m benchmarks.render_capture CAPTURE LIGHT [LIGHT ...]
+    python -m benchmarks.render_capture CAPTURE [LIGHT ...] [--resolution PX] [--samples N]
+
+Each light (default: all presets; the name of one of Blender's worlds means that) gives renders/LIGHT.png, shown without a look, and the linear
+renders/LIGHT.exr.
 """
 
 from __future__ import annotations
 
+import argparse
+import contextlib
 import os
-import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 
 
 def main() -> None:
-    capture, *lights = sys.argv[1:]
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("capture", type=Path)
+    parser.add_argument("lights", nargs="*", metavar="LIGHT")
+    parser.add_argument("--resolution", type=int, default=640)
+    parser.add_argument("--samples", type=int, default=32)
+    asked = parser.parse_args()
+    with extension():
+        from bl_ext.user_default.wildcap.wildcap_addon.relight import headless
+
+        for path in headless.render_relit(asked.capture, asked.lights or headless.ALL, asked.resolution, asked.samples):
+            print(path, flush=True)
+
+
+@contextlib.contextmanager
+def extension() -> Iterator[None]:
+    """The checkout, enabled in this process's Blender under the very name users get: bl_ext.user_default.wildcap."""
     with tempfile.TemporaryDirectory() as extensions:
-        # Blender finds the checkout as an installed extension, under the very name users get.
         repository = Path(extensions) / "user_default"
         repository.mkdir()
         (repository / "wildcap").symlink_to(ROOT, target_is_directory=True)
@@ -28,11 +47,8 @@ def main() -> None:
 
         if addon_utils.enable("bl_ext.user_default.wildcap") is None:
             raise SystemExit("Blender could not enable the extension.")
-        from bl_ext.user_default.wildcap.wildcap_addon.relight.headless import render_relit
-
         try:
-            for path in render_relit(Path(capture), lights):
-                print(path, flush=True)
+            yield
         finally:
             addon_utils.disable("bl_ext.user_default.wildcap")  # a class left registered crashes the wheel at exit
 

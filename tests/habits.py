@@ -35,7 +35,7 @@ def main() -> None:
     props = bpy.context.scene.wildcap
     props.resolution, props.samples = 16, 1
     bpy.ops.wildcap.render()
-    seen["render"] = (capture.renders / "studio.png").is_file()
+    seen["render"] = (capture.renders / "three_point.png").is_file()
     bpy.ops.wildcap.paint_mask(on='HEAD')
     mask, image = addon["paint.mask_image"], addon["paint.session"].mask()
     seen["mask_space"] = image.colorspace_settings.name

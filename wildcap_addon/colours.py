@@ -27,9 +27,11 @@ def as_data(image: bpy.types.Image) -> None:
         image.colorspace_settings.is_data = True
 
 
-def without_a_look(scene: bpy.types.Scene) -> None:
-    """Has a scene shown as it is, where the configuration has such a view."""
-    _choose(scene.view_settings, "view_transform", VIEWS)
+def show_by(scene: bpy.types.Scene, view: str) -> None:
+    """Has a scene shown by a view transform; where the configuration has none of that name, as it is."""
+    _choose(scene.view_settings, "view_transform", (view, *VIEWS))
+    _choose(scene.view_settings, "look", ("None",))
+    scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
 
 
 def of_pictures() -> str:

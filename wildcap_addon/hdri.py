@@ -15,10 +15,9 @@ _items: list[tuple[str, str, str]] = []  # Blender keeps no reference to the str
 
 @dataclass(frozen=True)
 class Hdri:
-    """An equirectangular picture, turned about the head's axis by `rotation` radians (counter-clockwise from above), times `strength`."""
+    """An equirectangular picture of the surroundings, times `strength`."""
 
     path: Path
-    rotation: float = 0.0
     strength: float = 1.0
 
 
@@ -29,6 +28,19 @@ def items(self, context):
     return _items
 
 
+def light(props) -> str | Hdri:
+    """What the scene's settings ask for: a preset's name, or a picture."""
+    return chosen(props) if props.light == 'hdri' else props.light
+
+
+def named(name: str) -> Hdri:
+    """One of the worlds that Blender knows, by its file's name with or without the suffix. Raises Problem where there is none."""
+    for world in _worlds():
+        if name in (world.name, Path(world.name).stem):
+            return Hdri(Path(world.path))
+    raise Problem(f"There is no light named {name}.", f"Blender's worlds here are {', '.join(sorted(Path(world.name).stem for world in _worlds()))}.")
+
+
 def chosen(props) -> Hdri:
     """What the scene's settings ask for. Raises Problem where there is no such picture."""
     path = Path(bpy.path.abspath(props.hdri_file)) if props.hdri_file else next((Path(light.path) for light in _worlds() if light.name == props.hdri), None)
@@ -36,18 +48,18 @@ def chosen(props) -> Hdri:
         raise Problem("This Blender came without pictures of surroundings.", "Choose an HDRI file of your own.")
     if not path.is_file():
         raise Problem(f"There is no picture at {path}.", "Choose another HDRI file, or none for one of Blender's.")
-    return Hdri(path, props.hdri_rotation, props.hdri_strength)
+    return Hdri(path, props.hdri_strength)
 
 
 def light_with(world: bpy.types.World, hdri: Hdri, turned: float) -> None:
-    """Makes the picture the world's background. `turned` is the angle of the head itself about +Z, radians: the light goes along with it."""
+    """Makes the picture the world's background, turned about +Z by `turned` radians, counter-clockwise from above."""
     nodes, links = world.node_tree.nodes, world.node_tree.links
     background = next(n for n in nodes if n.type == 'BACKGROUND')
     coordinates, mapping, picture = (nodes.new(kind) for kind in ('ShaderNodeTexCoord', 'ShaderNodeMapping', 'ShaderNodeTexEnvironment'))
     for node, x in ((coordinates, -900), (mapping, -700), (picture, -450)):
         node.location = (x, 0)
     # Turning what is looked up one way turns the surroundings the other way.
-    mapping.inputs["Rotation"].default_value = (0, 0, -((hdri.rotation + turned) % tau))
+    mapping.inputs["Rotation"].default_value = (0, 0, -(turned % tau))
     picture.image = bpy.data.images.load(str(hdri.path), check_existing=True)
     background.inputs["Strength"].default_value = hdri.strength
     links.new(coordinates.outputs["Generated"], mapping.inputs["Vector"])

@@ -105,20 +105,30 @@ def _show_chosen(self, context):
         captures.choose(context)
 
 
+LIGHTS = (
+    ('three_point', "Three-Point", "Key, fill and rim from three soft boxes", 0),
+    ('window', "Window", "One large window from the side", 2),
+    ('sun', "Sun", "A low sun under a clear sky", 1),
+    ('overcast', "Overcast", "A bright grey sky, three times as bright above as at the horizon; no lamp", 4),
+    ('rim', "Rim", "Two strips from behind, and a breath of light from in front", 5),
+    ('coloured', "Coloured", "Teal from one side, magenta from the other, a white strip from above", 6),
+    ('hdri', "HDRI", "The surroundings of a panoramic picture", 3),
+)
+"""Identifier, name, tooltip, and the number by which files keep it (0 was once named studio)"""
+
+
 class WILDCAP_PG_scene(bpy.types.PropertyGroup):
     """The scene's captures and how they are lit."""
 
     captures: bpy.props.CollectionProperty(type=WILDCAP_PG_capture)
     active_index: bpy.props.IntProperty(name="Capture", update=_show_chosen, description="The capture that the panel shows while no head is active")
     light: bpy.props.EnumProperty(
-        name="Light", default='studio',
-        items=[('studio', "Studio", "Key, fill and rim from three soft boxes"), ('sun', "Sun", "A low sun under a clear sky"),
-               ('window', "Window", "One large window from the side"), ('hdri', "HDRI", "The surroundings of a panoramic picture")],
+        name="Light", default='three_point', items=[(name, label, what, "", number) for name, label, what, number in LIGHTS],
         description="The light for Render",
     )
     hdri: bpy.props.EnumProperty(name="Surroundings", items=worlds.items, description="Blender's own worlds, and those installed in its preferences (Lights)")
     hdri_file: bpy.props.StringProperty(name="Own File", subtype='FILE_PATH', description="A panoramic HDR picture of your own; it comes before the one above")
-    hdri_rotation: bpy.props.FloatProperty(name="Rotation", subtype='ANGLE', description="Turns the surroundings about the head, counter-clockwise from above")
+    hdri_rotation: bpy.props.FloatProperty(name="Rotation", subtype='ANGLE', description="Turns the light about the head, counter-clockwise from above")
     hdri_strength: bpy.props.FloatProperty(name="Strength", min=0, soft_max=4, default=1, description="How bright the surroundings are")
     shadow_tint: bpy.props.FloatVectorProperty(
         name="Shadow Tint", subtype='COLOR', size=3, min=0, max=1, default=(1.0, 0.0, 0.0), description="Colour in which the shadow mask is shown",

@@ -4,16 +4,16 @@
 
 import bpy
 
-from . import compare, operators, panel, picture
+from . import compare, operators, output, panel
 
 _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *compare.CLASSES, *panel.CLASSES))
 
 
 def register():
     _register()
-    picture.register()
+    output.register()
 
 
 def unregister():
-    picture.unregister()
+    output.unregister()
     _unregister()

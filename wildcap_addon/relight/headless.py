@@ -7,26 +7,42 @@ from pathlib import Path
 
 import bpy
 
-from .. import captures, head
+from .. import captures, colours, hdri, head
 from ..hdri import Hdri
-from . import lights, material, picture
+from . import lights, material, output, picture
+
+ALL = tuple(lights.PRESETS)
 
 
-def render_relit(capture_folder: Path, presets: Iterable[str] = tuple(lights.PRESETS), resolution: int = 640, samples: int = 32) -> list[Path]:
-    """Brings in the head, assembles its material and renders renders/PRESET.png for each light. Returns the pictures.
+def render_relit(capture_folder: Path, names: Iterable[str | Hdri] = ALL, resolution: int = 640, samples: int = 32) -> list[Path]:
+    """Brings in the head, assembles its material and renders renders/NAME.png and the linear renders/NAME.exr for each light: a preset, one of Blender's
+    worlds by its name, or a picture. Returns the PNGs.
 
-    Empties the open file first. Raises Problem when the capture has no head or no maps.
+    Empties the open file first. Raises Problem when the capture has no head or no maps, or there is no such light.
     """
+    chosen = [light_of(name) for name in names]
+    obj, item = open_head(capture_folder)
+    return [render_light(obj, captures.folder(item).renders, light, resolution, samples) for light in chosen]
+
+
+def light_of(name: str | Hdri) -> str | Hdri:
+    """A preset's name as it is, else the world that Blender knows by it."""
+    return name if isinstance(name, Hdri) or name in lights.PRESETS or name in lights.NAMED_BEFORE else hdri.named(name)
+
+
+def open_head(capture_folder: Path):
+    """A file with nothing but the capture's head in its material, and the capture's list item."""
     bpy.ops.wm.read_homefile(use_empty=True)
-    context = bpy.context
-    item = captures.add(context, Path(capture_folder).absolute())
-    obj = head.bring_in(context, item)
-    material.assemble(context, item)
-    return [render_light(obj, captures.folder(item).renders, preset, resolution, samples) for preset in presets]
+    item = captures.add(bpy.context, Path(capture_folder).absolute())
+    obj = head.bring_in(bpy.context, item)
+    material.assemble(bpy.context, item)
+    return obj, item
 
 
-def render_light(obj, folder: Path, light: str | Hdri, resolution: int, samples: int, wait: bool = True) -> Path:
-    """One light: folder/PRESET.png, or that of the surroundings' picture."""
+def render_light(
+    obj, folder: Path, light: str | Hdri, resolution: int, samples: int, turn: float = 0.0, view: str = colours.VIEWS[0], wait: bool = True,
+) -> Path:
+    """One light: folder/PRESET.png and folder/PRESET.exr, or those of the surroundings' picture."""
     path = folder / f"{light if isinstance(light, str) else light.path.stem}.png"
-    picture.render(picture.set_up(obj, light, resolution, samples), path, wait)
+    output.still(picture.set_up(obj, light, resolution, samples, turn, view), path, wait)
     return path

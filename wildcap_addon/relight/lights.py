@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lights for a first look at a head: three of lamps, or the surroundings of a picture. Built in a scene of their own, around a head of any place,
-turn and size.
+"""Lights for a first look at a head: six of lamps under a sky, or the surroundings of a picture. Built in a scene of their own, around a head of any
+place, turn and size.
 
 Directions are the head's: +X its left, -Y where it looks, +Z up. Distances are in head radii, powers are for a head of the reference radius.
 """
@@ -13,8 +13,11 @@ import bpy
 from mathutils import Matrix, Vector
 
 from ..hdri import Hdri, light_with
+from . import sky
 
 REFERENCE_RADIUS_M = 0.15
+RIG = "WildCap Lights"
+"""The empty at the head's centre that carries the lamps: turning it turns the light."""
 
 
 @dataclass(frozen=True)
@@ -32,35 +35,81 @@ class Lamp:
 
 @dataclass(frozen=True)
 class Preset:
+    """Lamps under a sky."""
+
     lamps: tuple[Lamp, ...]
-    world: tuple[float, float, float]
+    sky: sky.Sky
 
 
 PRESETS = {
-    "studio": Preset((
+    "three_point": Preset((
         Lamp("Key", (-0.9, -1.0, 0.7), 16.0, (1.0, 0.96, 0.92), size=3.0),
         Lamp("Fill", (1.2, -0.8, 0.1), 4.0, (0.92, 0.96, 1.0), size=4.0),
         Lamp("Rim", (0.9, 1.2, 0.5), 6.0, size=2.0),
-    ), (0.02, 0.02, 0.022)),
-    "sun": Preset((Lamp("Sun", (0.75, -1.0, 0.7), 3.5, (1.0, 0.9, 0.76)),), (0.16, 0.21, 0.3)),
-    "window": Preset((Lamp("Window", (-1.3, -0.45, 0.25), 22.0, (0.93, 0.97, 1.0), size=5.0, distance=5.0),), (0.012, 0.011, 0.01)),
+    ), sky.even((0.02, 0.02, 0.022))),
+    "window": Preset((
+        Lamp("Window", (-1.3, -0.45, 0.25), 22.0, (0.93, 0.97, 1.0), size=5.0, distance=5.0),
+    ), sky.even((0.012, 0.011, 0.01))),
+    "sun": Preset((
+        Lamp("Sun", (0.75, -1.0, 0.7), 4.2, (1.0, 0.9, 0.76)),
+    ), sky.Sky((0.14, 0.21, 0.34), (0.2, 0.24, 0.29), (0.13, 0.11, 0.085))),
+    "overcast": Preset((), sky.Sky((2.1, 2.16, 2.25), (0.7, 0.72, 0.75), (0.26, 0.24, 0.22))),
+    "rim": Preset((
+        Lamp("Left Rim", (1.0, 0.85, 0.3), 18.0, (1.0, 0.97, 0.94), size=1.6, distance=5.0),
+        Lamp("Right Rim", (-1.0, 0.95, 0.35), 14.0, (0.9, 0.95, 1.0), size=1.6, distance=5.0),
+        Lamp("Front", (0.1, -1.0, 0.35), 1.6, size=4.0),
+    ), sky.even((0.006, 0.006, 0.007))),
+    "coloured": Preset((
+        Lamp("Teal", (-1.2, -0.7, 0.25), 12.0, (0.05, 0.62, 0.9), size=2.5),
+        Lamp("Magenta", (1.15, -0.55, 0.2), 12.0, (1.0, 0.1, 0.42), size=2.5),
+        Lamp("Above", (0.0, -0.5, 1.3), 3.0, size=2.0),
+    ), sky.even((0.008, 0.007, 0.012))),
 }
+"""By the identifiers of properties.LIGHTS, which has their names and tooltips"""
+NAMED_BEFORE = {"studio": "three_point"}
 
 
-def build(scene: bpy.types.Scene, light: str | Hdri, frame: Matrix, radius: float) -> None:
+def preset(name: str) -> Preset:
+    """A preset by its identifier, or by the one it had before."""
+    return PRESETS[NAMED_BEFORE.get(name, name)]
+
+
+def build(scene: bpy.types.Scene, light: str | Hdri | None, frame: Matrix, radius: float, turn: float = 0.0) -> None:
     """Replaces the lamps and the world of `scene` by those of a preset or of a picture. `frame` [4, 4] is the head's place without scale, `radius` its
-    size in scene units."""
-    for obj in [o for o in scene.objects if o.type == 'LIGHT']:
-        bpy.data.lights.remove(obj.data)  # takes its object along
-    preset = PRESETS[light] if isinstance(light, str) else Preset((), (0.0, 0.0, 0.0))
-    for lamp in preset.lamps:
-        scene.collection.objects.link(_lamp(lamp, frame, radius))
-    scene.world = _world(preset.world)
+    size in scene units; `turn` turns the light about the head, in radians, counter-clockwise from above."""
+    clear(scene)
+    frame = frame @ Matrix.Rotation(turn, 4, 'Z')
+    scene.world = sky.world()
     if isinstance(light, Hdri):
         light_with(scene.world, light, frame.to_euler().z)
+    elif light is not None:
+        add_lamps(scene, preset(light).lamps, frame, radius)
+        sky.show(scene.world, preset(light).sky, frame)
 
 
-def _lamp(lamp: Lamp, frame: Matrix, radius: float) -> bpy.types.Object:
+def clear(scene: bpy.types.Scene) -> None:
+    """Takes the lamps away, and what turned them."""
+    for obj in [o for o in scene.objects if o.type == 'LIGHT']:
+        bpy.data.lights.remove(obj.data)  # takes its object along
+    for obj in [o for o in scene.objects if o.type == 'EMPTY' and o.name.startswith(RIG)]:
+        bpy.data.objects.remove(obj)
+
+
+def add_lamps(scene: bpy.types.Scene, lamps: tuple[Lamp, ...], frame: Matrix, radius: float) -> list[bpy.types.Object]:
+    """The lamps around the head, carried by the scene's rig."""
+    rig = next((o for o in scene.objects if o.type == 'EMPTY' and o.name.startswith(RIG)), None)
+    if rig is None:
+        rig = bpy.data.objects.new(RIG, None)
+        rig.matrix_world = frame
+        scene.collection.objects.link(rig)
+    made = [_lamp(lamp, radius) for lamp in lamps]
+    for obj in made:
+        scene.collection.objects.link(obj)
+        obj.parent = rig
+    return made
+
+
+def _lamp(lamp: Lamp, radius: float) -> bpy.types.Object:
     data = bpy.data.lights.new(f"WildCap {lamp.name}", 'AREA' if lamp.size else 'SUN')
     data.color = lamp.colour
     if lamp.size:
@@ -71,16 +120,5 @@ def _lamp(lamp: Lamp, frame: Matrix, radius: float) -> bpy.types.Object:
         data.angle = radians(lamp.angle)
     obj = bpy.data.objects.new(data.name, data)
     direction = Vector(lamp.direction).normalized()
-    obj.matrix_world = frame @ Matrix.Translation(direction * lamp.distance * radius) @ direction.to_track_quat('Z', 'Y').to_matrix().to_4x4()
+    obj.matrix_local = Matrix.Translation(direction * lamp.distance * radius) @ direction.to_track_quat('Z', 'Y').to_matrix().to_4x4()
     return obj
-
-
-def _world(colour: tuple[float, float, float]) -> bpy.types.World:
-    world = bpy.data.worlds.get("WildCap Relight") or bpy.data.worlds.new("WildCap Relight")
-    world.use_nodes = True
-    for node in [n for n in world.node_tree.nodes if n.type not in ('BACKGROUND', 'OUTPUT_WORLD')]:
-        world.node_tree.nodes.remove(node)
-    background = next(n for n in world.node_tree.nodes if n.type == 'BACKGROUND')
-    background.inputs["Color"].default_value = (*colour, 1.0)
-    background.inputs["Strength"].default_value = 1.0
-    return world

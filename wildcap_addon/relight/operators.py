@@ -39,9 +39,8 @@ class WILDCAP_OT_render(BaseOperator, bpy.types.Operator):
         item = captures.require(context)
         props = context.scene.wildcap
         self.warn(colours.missing_view(context.scene))
-        light = hdri.chosen(props) if props.light == 'hdri' else props.light
-        headless.render_light(captures.require_head(context, item), captures.folder(item).renders, light, props.resolution, props.samples,
-                              wait=bpy.app.background)
+        headless.render_light(captures.require_head(context, item), captures.folder(item).renders, hdri.light(props), props.resolution, props.samples,
+                              props.hdri_rotation, wait=bpy.app.background)
 
 
 CLASSES = (WILDCAP_OT_assemble_material, WILDCAP_OT_render)

@@ -1,59 +1,68 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A relit picture: the head in a scene of its own with a camera and a light, rendered by Cycles to the capture's renders/.
+"""The relight scene: the head in a scene of its own with a camera and a light, for Cycles.
 
 The artist's scene (camera, world, lights, render settings) is not touched.
 """
 
-import os
 from math import tan
-from pathlib import Path
 
 import bpy
 from mathutils import Matrix, Vector
 
-from ...core.capture import storage_problem
 from .. import colours
 from ..hdri import Hdri
 from . import lights
+from .output import SCENE
 
-SCENE = "WildCap Relight"
 CAMERA_DIRECTION = (-0.28, -1.0, 0.05)
 FOCAL_LENGTH_MM = 85.0
 
 
-def set_up(obj: bpy.types.Object, light: str | Hdri, resolution: int, samples: int) -> bpy.types.Scene:
-    """The relight scene with this head alone in it, framed and lit."""
+def set_up(obj: bpy.types.Object, light: str | Hdri | None, resolution: int, samples: int, turn: float = 0.0, view: str = colours.VIEWS[0]) -> bpy.types.Scene:
+    """The relight scene with this head alone in it, framed and lit (None: dark); the light is turned by `turn` radians about the head. The picture is shown
+    by the view transform `view`, and its file says so."""
     scene = bpy.data.scenes.get(SCENE) or bpy.data.scenes.new(SCENE)
     for other in [o for o in scene.collection.objects if o.type not in ('CAMERA', 'LIGHT')]:
         scene.collection.objects.unlink(other)
     scene.collection.objects.link(obj)
     frame, radius = frame_of(obj)
-    lights.build(scene, light, frame, radius)
+    lights.build(scene, light, frame, radius, turn)
     _camera(scene, frame, radius)
+    scene.frame_set(1)
     render = scene.render
     render.engine = 'CYCLES'
     render.resolution_x = render.resolution_y = resolution
     render.resolution_percentage = 100
-    render.image_settings.file_format = 'PNG'
-    render.image_settings.color_mode = 'RGB'
-    render.use_file_extension = False
+    as_picture(scene)
     scene.cycles.samples = samples
     scene.cycles.use_denoising = has_denoiser()
-    colours.without_a_look(scene)
+    colours.show_by(scene, view)
+    _label(scene)
     return scene
 
 
-def render(scene: bpy.types.Scene, path: Path, wait: bool) -> None:
-    """Renders to `path`. wait=False returns at once and shows Blender's render window. Raises Problem when the folder cannot be written."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(f".{path.name}")
-        temporary.touch()
-    except OSError as error:
-        raise storage_problem(error, path) from error
-    scene.render.filepath = str(temporary)
-    bpy.ops.render.render('EXEC_DEFAULT' if wait else 'INVOKE_DEFAULT', write_still=True, scene=scene.name)
+def as_picture(scene: bpy.types.Scene) -> None:
+    """Renders are written as PNG."""
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):  # Blender 5
+        settings.media_type = 'IMAGE'
+    settings.file_format, settings.color_mode, settings.color_depth = 'PNG', 'RGB', '8'
+    scene.render.use_file_extension = False
+
+
+def view_label(scene: bpy.types.Scene) -> str:
+    """What pictures of this scene say of their colours."""
+    return f"View transform: {scene.view_settings.view_transform}"
+
+
+def _label(scene) -> None:
+    """The files' metadata name the view transform, and neither places nor persons."""
+    render = scene.render
+    for name in (p.identifier for p in render.bl_rna.properties if p.identifier.startswith("use_stamp_")):
+        setattr(render, name, name == "use_stamp_note")
+    render.use_stamp = False
+    render.stamp_note_text = view_label(scene)
 
 
 def frame_of(obj) -> tuple[Matrix, float]:
@@ -85,19 +94,3 @@ def _camera(scene, frame: Matrix, radius: float) -> None:
     distance = radius * 1.12 / tan(camera.data.angle / 2)
     camera.matrix_world = frame @ Matrix.Translation(direction * (distance + radius * 0.2)) @ direction.to_track_quat('Z', 'Y').to_matrix().to_4x4()
     camera.data.clip_start, camera.data.clip_end = distance * 0.01, distance * 100
-
-
-@bpy.app.handlers.persistent
-def name_when_complete(scene, *_):
-    """Gives the finished picture its name: a file that exists under it is complete."""
-    path = Path(scene.render.filepath)
-    if scene.name == SCENE and path.name.startswith(".") and path.is_file():
-        os.replace(path, path.with_name(path.name[1:]))
-
-
-def register():
-    bpy.app.handlers.render_write.append(name_when_complete)
-
-
-def unregister():
-    bpy.app.handlers.render_write.remove(name_when_complete)

@@ -172,10 +172,10 @@ def relight(root: Path):
     bpy.context.scene.wildcap.resolution, bpy.context.scene.wildcap.samples = 256, 8
     yield 1.5
     yield from d.press("wildcap.render")
-    yield from d.until(lambda: (root / "renders" / "studio.png").is_file(), "the picture", 120)
+    yield from d.until(lambda: (root / "renders" / "three_point.png").is_file(), "the picture", 120)
     yield 2.0
     d.screenshot("8_rendered")
-    shutil.copyfile(root / "renders" / "studio.png", d.OUT / "9_studio.png")
+    shutil.copyfile(root / "renders" / "three_point.png", d.OUT / "9_three_point.png")
 
 
 d.play(flow(), limit_s=1700)

@@ -62,7 +62,7 @@ def flow():
     bpy.context.scene.wildcap.resolution, bpy.context.scene.wildcap.samples = 512, 16
     yield 1.5
     yield from d.lead("wildcap.render")
-    picture = Path(root) / "renders" / "studio.png"
+    picture = Path(root) / "renders" / "three_point.png"
     yield from d.until(picture.is_file, "the picture", 180)
     yield 2.0
     d.screenshot("walk_8_rendered")

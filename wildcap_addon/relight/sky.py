@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The world of the relight scene: a sky that goes from the horizon to the zenith, over a ground.
+
+Radiance is linear in the sine of the elevation: with a zenith three times as bright as the horizon that is the overcast sky of Moon and Spencer (1942),
+the CIE's traditional one.
+"""
+
+from dataclasses import astuple, dataclass
+
+import bpy
+from mathutils import Matrix
+
+WORLD = "WildCap Relight"
+HORIZON_BLEND = 0.04
+"""Sine of the elevation above and below the horizon over which ground and sky meet."""
+COLOURS = ("WildCap Sky", "A"), ("WildCap Sky", "B"), ("WildCap Ground", "A")
+"""Where the three colours of a Sky lie: the node and which of its colours."""
+
+
+@dataclass(frozen=True)
+class Sky:
+    """Radiances, linear RGB."""
+
+    zenith: tuple[float, float, float]
+    horizon: tuple[float, float, float]
+    ground: tuple[float, float, float]
+
+
+def even(colour: tuple[float, float, float]) -> Sky:
+    """The same from everywhere."""
+    return Sky(colour, colour, colour)
+
+
+def world() -> bpy.types.World:
+    """The relight scene's world, with a background at strength 1 and nothing before it."""
+    found = bpy.data.worlds.get(WORLD) or bpy.data.worlds.new(WORLD)
+    found.use_nodes = True
+    found.node_tree.animation_data_clear()
+    for node in [n for n in found.node_tree.nodes if n.type not in ('BACKGROUND', 'OUTPUT_WORLD')]:
+        found.node_tree.nodes.remove(node)
+    background = next(n for n in found.node_tree.nodes if n.type == 'BACKGROUND')
+    background.inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
+    background.inputs["Strength"].default_value = 1.0
+    found.cycles.sampling_method = 'AUTOMATIC'
+    return found
+
+
+def show(found: bpy.types.World, sky: Sky, frame: Matrix) -> None:
+    """Makes the sky the world's background, upright with the head whose place is `frame` [4, 4]."""
+    nodes, links = found.node_tree.nodes, found.node_tree.links
+    background = next(n for n in nodes if n.type == 'BACKGROUND')
+    coordinates, upright, split, edge, rise = (nodes.new(kind) for kind in (
+        'ShaderNodeTexCoord', 'ShaderNodeMapping', 'ShaderNodeSeparateXYZ', 'ShaderNodeMapRange', 'ShaderNodeClamp'))
+    above, below = _mix(nodes, "WildCap Sky"), _mix(nodes, "WildCap Ground")
+    for node, x in ((coordinates, -1100), (upright, -920), (split, -740), (rise, -560), (edge, -560), (above, -380), (below, -200)):
+        node.location = (x, -160 if node == edge else 0)
+    upright.inputs["Rotation"].default_value = frame.to_quaternion().inverted().to_euler()
+    edge.inputs["From Min"].default_value, edge.inputs["From Max"].default_value = -HORIZON_BLEND, HORIZON_BLEND
+    links.new(coordinates.outputs["Generated"], upright.inputs["Vector"])
+    links.new(upright.outputs["Vector"], split.inputs["Vector"])
+    links.new(split.outputs["Z"], rise.inputs["Value"])
+    links.new(split.outputs["Z"], edge.inputs["Value"])
+    links.new(rise.outputs["Result"], above.inputs[0])
+    links.new(edge.outputs["Result"], below.inputs[0])
+    links.new(_colour(above, "Result", 'outputs'), _colour(below, "B"))
+    links.new(_colour(below, "Result", 'outputs'), background.inputs["Color"])
+    found.cycles.sampling_method, found.cycles.sample_map_resolution = 'MANUAL', 128  # it is smooth; a fine map of it would take a second to make
+    for socket, colour in zip(sockets(found), colours(sky), strict=True):
+        socket.default_value = colour
+
+
+def sockets(found: bpy.types.World) -> list[bpy.types.NodeSocket]:
+    """Those that hold the horizon's, the zenith's and the ground's colour."""
+    return [_colour(found.node_tree.nodes[node], name) for node, name in COLOURS]
+
+
+def colours(sky: Sky) -> list[tuple]:
+    """As `sockets` takes them."""
+    zenith, horizon, ground = astuple(sky)
+    return [(*colour, 1.0) for colour in (horizon, zenith, ground)]
+
+
+def _mix(nodes, name: str) -> bpy.types.Node:
+    node = nodes.new('ShaderNodeMix')
+    node.name = node.label = name
+    node.data_type = 'RGBA'
+    return node
+
+
+def _colour(node, name: str, side: str = 'inputs') -> bpy.types.NodeSocket:
+    """A mix node has a socket of each name for every type of data."""
+    return next(s for s in getattr(node, side) if s.name == name and s.type == 'RGBA')
