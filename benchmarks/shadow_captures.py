@@ -23,7 +23,7 @@ from core.messages import Reporter
 from core.shadow_mask.lift import Unfolded, lift_shadows
 from core.synthetic.identities import subject_mesh
 from core.synthetic.light import bake, random_light
-from core.synthetic.noise import noise
+from core.noise import noise
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
 from core.views import View, read_views

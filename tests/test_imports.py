@@ -14,7 +14,7 @@ GROUND = {"capture", "hashes", "settings", "stages", "messages", "mask_history",
           "switchlight_api", "delighter_cards"}
 """Standard library only: what Blender may import."""
 SHARED = {"images", "meshes", "raster", "surfaces", "atlas", "baking", "views", "template", "faces", "mask_import", "skylight", "shadow_edges",
-          "frame_pictures", "sunlight"}
+          "frame_pictures", "sunlight", "noise"}
 """What the rooms of the upper floor may import beside the ground floor."""
 LATE = {"core/__main__.py", "core/worker/runner.py"}
 """Ground floor files that import heavy things inside a function, once there is something for them to do."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from .canvas import Canvas
-from .noise import octaves
+from ..noise import octaves
 from .spots import strew
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from .. import raster, template
 from ..meshes import Mesh, vertex_normals
 from ..skylight import radiance_transfer, sh_basis
-from .noise import noise
+from ..noise import noise
 from .parameters import sample_parameters
 from .skin import make_skin
 

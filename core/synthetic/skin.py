@@ -14,7 +14,7 @@ import numpy as np
 
 from . import adornment, hairs, pigment
 from .canvas import Canvas, canvas
-from .noise import noise, octaves
+from ..noise import noise, octaves
 from .parameters import SkinParameters, sample_parameters
 from .regions import creases, lid_lines, regions
 from .relief import normals

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from .canvas import Canvas
-from .noise import noise
+from ..noise import noise
 
 
 def strew(ground: Canvas, density: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
