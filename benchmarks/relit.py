@@ -35,12 +35,13 @@ from core.synthetic.skin import make_skin
 from .albedo_score import differences, face_box
 from .people import PEOPLE, write_maps
 from .relit_maps import face_mask, read_rows, read_worn, write_row
+from .relit_renders import MARGIN
 
 ROOT = Path(__file__).resolve().parent.parent
 LIGHTS = ("three_point", "window", "sun", "coloured", "city.exr", "interior.exr")
 ROWS = ("raw", "delit", "solved", "plain", "true_albedo", "true_normal", "true_specular", "floor")
 SHOWN = ("truth", "solved", "delit", "raw")
-RESOLUTION, SAMPLES = 320, 24
+RESOLUTION, SAMPLES = 320, 16
 MIDDLE = 0.18
 OVER_RAW, OVER_DELIT = 1.0, 0.5  # dB that are asked for
 
@@ -52,11 +53,12 @@ def main() -> int:
     parser.add_argument("--people", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
     parser.add_argument("--lights", nargs="+", default=LIGHTS)
+    parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS)
     arguments = parser.parse_args()
     work, results = arguments.work.resolve(), {}
     for name, capture, truth in _subjects(arguments, work):
-        render(capture, truth, work / name, arguments.lights)
-        results[name] = score(work / name, arguments.lights)
+        render(capture, truth, work / name, arguments.lights, arguments.rows)
+        results[name] = score(work / name, arguments.lights, arguments.rows)
         write_json(work / f"{name}.json", results[name])
         print(f"{name}: {shortfall(mean_over_lights(results[name])) or 'as asked'}", file=sys.stderr)
     print(table({name: mean_over_lights(found) for name, found in results.items()}))
@@ -78,15 +80,17 @@ def _subjects(arguments: argparse.Namespace, work: Path) -> Iterator[tuple[str, 
             print(f"{person.name} has not been solved and is left out.", file=sys.stderr)
 
 
-def render(capture: Capture, truth: Path, work: Path, lights: list[str]) -> None:
+def render(capture: Capture, truth: Path, work: Path, lights: list[str], wanted: list[str]) -> None:
     """work/renders/ROW_LIGHT.exr of all rows, and face.exr."""
     renders, mask = work / "renders", work / "mask.png"
     renders.mkdir(parents=True, exist_ok=True)
-    if all((renders / f"{row}_{light}.exr").exists() for row in ("truth", *ROWS) for light in lights) and (renders / "face.exr").exists():
+    if all((renders / f"{row}_{Path(light).stem}.exr").exists() for row in ("truth", *wanted) for light in lights) and (renders / "face.exr").exists():
         return
     face_mask(mask)
     rows = []
     for name, worn in read_rows(capture, read_worn(truth)).items():
+        if name not in ("truth", *wanted):
+            continue
         folder = work / f"{name}.wildcap"
         write_row(folder, capture, worn)
         rows.append({"name": name, "capture": str(folder), "seed": int(name == "floor")})
@@ -94,22 +98,28 @@ def render(capture: Capture, truth: Path, work: Path, lights: list[str]) -> None
     subprocess.run([sys.executable, "-m", "benchmarks.relit_renders", str(work / "job.json")], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
 
 
-def score(work: Path, lights: list[str]) -> dict[str, dict[str, dict]]:
+def score(work: Path, lights: list[str], rows: list[str] = ROWS) -> dict[str, dict[str, dict]]:
     """Light -> row -> PSNR, SSIM and FLIP over the face; and pictures of SHOWN side by side, work/LIGHT.png."""
     face = images.read_data(work / "renders" / "face.exr")[..., 0] > 0.5
-    box, found = face_box(face), {}
+    box, seen, found = face_box(face), rendered(face), {}
     for light in lights:
-        linear = {row: images.read_linear(work / "renders" / f"{row}_{light}.exr") for row in ("truth", *ROWS)}
+        linear = {row: images.read_linear(work / "renders" / f"{row}_{Path(light).stem}.exr") for row in ("truth", *rows)}
         gain = exposure(linear["truth"], face)
         shown = {row: images.linear_to_srgb(picture * gain) for row, picture in linear.items()}
-        images.write_srgb(work / f"{Path(light).stem}.png", np.hstack([shown[row] for row in SHOWN]))
-        found[light] = {row: differences(shown[row][box], shown["truth"][box], face[box]) for row in ROWS}
+        images.write_srgb(work / f"{Path(light).stem}.png", np.hstack([shown[row][seen] for row in SHOWN if row in shown]))
+        found[light] = {row: differences(shown[row][box], shown["truth"][box], face[box]) for row in rows}
     return found
 
 
 def exposure(truth: np.ndarray, face: np.ndarray) -> float:
     """The gain that brings the mean luminance of a linear picture [H, W, 3] over the pixels `face` bool [H, W] to MIDDLE."""
     return MIDDLE / float((truth[face] @ LUMINANCE).mean())
+
+
+def rendered(face: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns of the rectangle about the face, bool [H, W], that is rendered (benchmarks/relit_renders.py)."""
+    margin = int(MARGIN * len(face)) - 1
+    return tuple(slice(max(side[0] - margin, 0), side[-1] + margin) for side in (np.flatnonzero(face.any(axis)) for axis in (1, 0)))
 
 
 def mean_over_lights(found: dict[str, dict[str, dict]]) -> dict[str, dict[str, float]]:
@@ -132,7 +142,7 @@ def table(results: dict[str, dict[str, dict[str, float]]]) -> str:
     if len(people) > 1:
         columns[f"mean of {len(people)}"] = mean_over_lights({name: results[name] for name in people})
     lines = ["| row | " + " | ".join(name.replace("_", " ") for name in columns) + " |", "|" + " --- |" * (len(columns) + 1)]
-    for row in ROWS:
+    for row in (row for row in ROWS if all(row in column for column in columns.values())):
         cells = (f"{c[row]['psnr']:.2f} dB, {c[row]['ssim']:.3f}, {c[row]['flip']:.3f}" for c in columns.values())
         lines.append(f"| {row.replace('_', ' ')} | " + " | ".join(cells) + " |")
     return "\n".join(lines)

@@ -7,10 +7,10 @@ import pytest
 
 pytest.importorskip("flip_evaluator")
 
-from benchmarks import people, people_lights, relit  # noqa: E402
+from benchmarks import gallery, people, people_lights, relit  # noqa: E402
 from benchmarks.delight_measures import TONES, tone_group  # noqa: E402
 from benchmarks.relit_maps import Worn, read_worn, rows_of, write_row  # noqa: E402
-from core import images  # noqa: E402
+from core import images, template  # noqa: E402
 from core.capture import Capture  # noqa: E402
 from core.synthetic import pigment  # noqa: E402
 from core.synthetic.identities import reserved_seeds  # noqa: E402
@@ -123,3 +123,28 @@ def test_the_table_gives_the_mean_over_people_and_leaves_the_sample_out():
     lines = relit.table({"sample": rows(90.0), "dark": rows(20.0), "light": rows(30.0)}).splitlines()
     assert lines[0] == "| row | sample | dark | light | mean of 2 |" and len(lines) == 2 + len(relit.ROWS)
     assert "| 25.00 dB, 0.500, 0.100 |" in lines[2]
+
+
+def test_only_the_rectangle_about_the_face_is_shown():
+    face = np.zeros((200, 300), bool)
+    face[50:100, 120:160] = True
+    rows, columns = relit.rendered(face)
+    assert 44 <= rows.start < 50 and 100 <= rows.stop <= 106 and 114 <= columns.start < 120 and 160 <= columns.stop <= 166
+
+
+def test_the_gallerys_close_up_lies_on_the_right_cheek():
+    column, row = gallery.landmark_uv(gallery.CHEEK)
+    skin = template.mask("skin", 256)
+    assert skin[int(row * 256), int(column * 256)] > 0.9
+    nose, side = gallery.landmark_uv(4), gallery.CLOSE_UP
+    assert side / 4 < abs(column - nose[0]) < 2 * side and column != pytest.approx(gallery.landmark_uv(423)[0], abs=side / 2)  # 423: the other side
+
+
+def test_a_gallery_row_is_two_lines_and_small_enough(tmp_path):
+    noise = np.random.default_rng(0).random((gallery.TILE, gallery.TILE, 3), np.float32)
+    row = gallery.sheet([noise] * 14)
+    assert row.shape == (2 * gallery.TILE, 7 * gallery.TILE, 3)
+    np.testing.assert_array_equal(row[gallery.TILE:, -gallery.TILE:], noise)
+    gallery.write_small(tmp_path / "plain.jpg", gallery.sheet([np.full((8, 8, 3), 0.5, np.float32)] * 13))
+    assert (tmp_path / "plain.jpg").stat().st_size < gallery.MOST_BYTES
+    assert not gallery.sheet([noise] * 13)[gallery.TILE:, -gallery.TILE:].any()  # what is missing is black
