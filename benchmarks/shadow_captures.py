@@ -20,10 +20,10 @@ from core import images, meshes, raster, template
 from core.capture import Capture, replacing_folder, write_json
 from core.meshes import Mesh
 from core.messages import Reporter
+from core.noise import noise
 from core.shadow_mask.lift import Unfolded, lift_shadows
 from core.synthetic.identities import subject_mesh
 from core.synthetic.light import bake, random_light
-from core.noise import noise
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
 from core.views import View, read_views
