@@ -234,6 +234,7 @@ def test_only_protocol_lines_leave_by_stdout(root, capture, video):
     (capture.root / "mood.json").write_text('{"frames": "print"}')
     job = tiny_chain.write_job(capture, source=video, last="frames")
     command = [sys.executable, "-E", "-s", "-B", "-m", "core.worker", str(job)]
-    with subprocess.Popen(command, cwd=root, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+    with subprocess.Popen(command, cwd=root, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+                          start_new_session=True) as process:  # it steps back with its whole session, which shall not be this one
         lines = process.stdout.read().splitlines()
     assert [json.loads(line)["kind"] for line in lines][-2:] == ["StageDone", "Done"]
