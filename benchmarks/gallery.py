@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images, meshes, template
+from core import images, meshes, raster, template
 from core.capture import Capture
 from core.views import View, read_views
 
@@ -48,10 +48,12 @@ def captured(capture: Capture) -> list[np.ndarray]:
     head = meshes.read_obj(capture.head)
     view = max((v for v in views if (capture.delit / f"{Path(v.name).stem}.png").is_file()), key=lambda v: v.axis[1])  # from the front
     box = face_square(view, head)
+    cover = (raster.render_view(raster.RayCaster(head), view)[0] >= 0)[..., None]  # a delighter knows nothing of what is behind the head
     texture = images.read_srgb(capture.texture_png)
     mask = images.read_mask(capture.shadow_mask if capture.shadow_mask.exists() else capture.shadow_mask_auto)
     mask = images.resize(mask, texture.shape[1], texture.shape[0])[..., None]
-    return [images.read_srgb(view.path)[box], images.read_srgb(capture.delit / f"{Path(view.name).stem}.png")[box], texture,
+    delit = images.read_srgb(capture.delit / f"{Path(view.name).stem}.png") * cover
+    return [images.read_srgb(view.path)[box], delit[box], texture,
             texture * (1 - 0.6 * mask) + mask * np.float32([0.6, 0, 0])]
 
 
