@@ -7,12 +7,12 @@ import OpenImageIO as oiio
 import pytest
 import torch
 
-from core import images, stages, upscale
+from core import images, stages, template, upscale
 from core.capture import Capture
 from core.messages import CancelledError, Problem, Reporter
 from core.settings import from_json
 from core.training import fine_windows, upscaler
-from core.upscale import network
+from core.upscale import gloss, network
 from core.upscale.enlarge import enlarge, load_network
 from core.upscale.maps import Maps, read_maps
 
@@ -228,3 +228,14 @@ def _relief(height: np.ndarray) -> np.ndarray:
     maps[3:6] = normal / np.linalg.norm(normal, axis=0)
     maps[6] = height  # tells which turn it was
     return maps
+
+
+def test_the_mean_specular_is_that_of_cheeks_and_forehead():
+    """Nose, lips, eyes and what no frame saw have other values, which do not count."""
+    specular = np.full((256, 256), 0.3, np.float32)
+    for name in ("nose", "lips", "eyes", "scalp", "neck", "ears"):
+        specular[template.mask(name, 256) > 0.5] = 0.9
+    confidence = np.ones_like(specular)
+    specular[:, :100], confidence[:, :100] = 0.7, 0
+    assert gloss.on_cheeks_and_forehead(specular, confidence) == pytest.approx(0.3)
+    assert gloss.on_cheeks_and_forehead(specular, 0 * confidence) > 0.35

@@ -13,6 +13,7 @@ from .. import images
 from ..capture import Capture, replacing_folder
 from ..messages import Reporter
 from ..settings import Settings
+from . import gloss
 from .maps import Maps, read_maps
 
 STRIP = 256
@@ -29,6 +30,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.figure("method", method)
     report.figure("size_from_px", len(maps.diffuse))
     report.figure("size_px", size)
+    report.figure("specular_mean", round(gloss.on_cheeks_and_forehead(maps.specular, maps.confidence), 4))
     share = SHARES[method]
     large = enlarged(maps, size, method, settings.device, lambda done: report.progress(share * done, 1, "enlarging"))
     with replacing_folder(capture.maps_4k) as folder:

@@ -3,13 +3,17 @@
 """Assemble Material: the capture's maps, each with its colour space, into WildCap Skin on the head. Again in place, keeping values.
 
     UV Map -> Albedo (sRGB), Specular (Non-Color), Normal (Non-Color) -> Normal Map -> WildCap Skin -> Material Output
+              Displacement (Non-Color, where the scan gave one) and the regions' attribute -> WildCap Skin
 """
+
+from math import isclose
 
 import bpy
 
+from ...core.capture import Capture
 from ...core.messages import Problem
 from .. import captures, head, status
-from . import node_group
+from . import asset, node_group, regions
 
 KEY = "wildcap_skin"
 IMAGES = (
@@ -18,6 +22,9 @@ IMAGES = (
     ("WildCap Normal", "normal.png", True),
 )
 """Node, its file, and whether that holds data, no colours."""
+DISPLACEMENT = ("WildCap Displacement", "displacement.exr", True)
+SET = "wildcap_set"
+"""Where the material keeps what was set by itself: a value that is another one now is the artist's"""
 
 
 def assemble(context, item) -> bpy.types.Material:
@@ -29,7 +36,11 @@ def assemble(context, item) -> bpy.types.Material:
     if missing:
         raise Problem(f"This capture has no {', '.join(missing)} yet.", "Click Solve first.")
     material = _material(obj)
-    _build(material, {path.name: path for path in maps}, obj)
+    before = _set_before(material, obj)
+    regions.write(obj.data)
+    height = capture.delivery / DISPLACEMENT[1]
+    _build(material, {path.name: path for path in (*maps, height) if path.is_file()}, obj)
+    _set(material, {"Specular Amount": _specular_amount(capture), "Subsurface Scale": node_group.SCATTERING_M * _scale(obj)}, before)
     obj["wildcap_maps_time"] = max(path.stat().st_mtime for path in maps)
     return material
 
@@ -60,15 +71,18 @@ def _build(material, paths: dict, obj) -> None:
     if KEY not in material:
         tree.nodes.clear()  # ours and new: a preview of the texture, or Blender's default
     skin = _node(tree, "WildCap Skin", 'ShaderNodeGroup', (80, 0))
+    group = node_group.skin_group()
     if skin.node_tree is None:
-        skin.node_tree = node_group.skin_group()
+        skin.node_tree = group
         skin.width = 200
-        skin.inputs["Subsurface Scale"].default_value = node_group.SCATTERING_M * _scale(obj)
-    else:
-        node_group.skin_group()
+    asset.mark(group)
     uv = _node(tree, "WildCap UV", 'ShaderNodeUVMap', (-760, 0))
     uv.uv_map = obj.data.uv_layers[0].name
-    for row, (name, file_name, data) in enumerate(IMAGES):
+    for row, (name, file_name, data) in enumerate((*IMAGES, DISPLACEMENT)):
+        if file_name not in paths:
+            continue
+        if file_name == DISPLACEMENT[1] and name not in tree.nodes:
+            material.displacement_method = 'DISPLACEMENT'  # the surface itself moves, once the socket says so
         node = _node(tree, name, 'ShaderNodeTexImage', (-540, 300 - 300 * row))
         node.image = head.load_image(paths[file_name], data)
         node.interpolation = 'Cubic' if node.interpolation == 'Linear' and KEY not in material else node.interpolation
@@ -76,12 +90,17 @@ def _build(material, paths: dict, obj) -> None:
     normal = _node(tree, "WildCap Normal Map", 'ShaderNodeNormalMap', (-200, -300))
     normal.space = 'TANGENT'
     normal.uv_map = obj.data.uv_layers[0].name
+    attribute = _node(tree, "WildCap Regions", 'ShaderNodeAttribute', (-200, -520))
+    attribute.attribute_name = regions.ATTRIBUTE
     output = next((n for n in tree.nodes if n.type == 'OUTPUT_MATERIAL'), None) or _node(tree, "Material Output", 'ShaderNodeOutputMaterial', (340, 0))
     for source, socket, target, name in (
         ("WildCap Albedo", "Color", skin, "Albedo"), ("WildCap Specular", "Color", skin, "Specular"),
         ("WildCap Normal", "Color", normal, "Color"), ("WildCap Normal Map", "Normal", skin, "Normal"), ("WildCap Skin", "BSDF", output, "Surface"),
+        ("WildCap Regions", "Fac", skin, "Region"), ("WildCap Displacement", "Color", skin, "Height"), ("WildCap Skin", "Displacement", output, "Displacement"),
     ):
-        _link(tree, tree.nodes[source].outputs[socket], target.inputs[name])
+        if source in tree.nodes and (name != "Displacement" or "WildCap Displacement" in tree.nodes):
+            outputs = tree.nodes[source].outputs
+            _link(tree, outputs["Factor" if socket == "Fac" and "Factor" in outputs else socket], target.inputs[name])  # its name from Blender 5 on
     tree.nodes.active = tree.nodes["WildCap Albedo"]  # what Solid shading shows
     material[KEY] = True
 
@@ -101,26 +120,28 @@ def _link(tree, output, socket) -> None:
         tree.links.new(output, socket)
 
 
+def _set_before(material, obj) -> dict[str, float]:
+    """What Assemble Material set the last time; {} for a material that is new."""
+    if KEY not in material:
+        return {}
+    return material[SET].to_dict() if SET in material else {"Specular Amount": 1.44, "Subsurface Scale": 0.0037 * _scale(obj)}  # of the group's version 1
+
+
+def _set(material, values: dict[str, float], before: dict[str, float]) -> None:
+    """Sets sockets of the skin to what this capture and the head's size ask for, but for those that the artist changed since."""
+    sockets = material.node_tree.nodes["WildCap Skin"].inputs
+    for name, value in values.items():
+        if name not in before or isclose(sockets[name].default_value, before[name], rel_tol=1e-4):
+            sockets[name].default_value = value
+    material[SET] = values
+
+
+def _specular_amount(capture: Capture) -> float:
+    """What makes the mean of cheeks and forehead a Specular IOR Level of one half, by the worker's figure."""
+    figures = capture.read()["stages"].get("upscale", {}).get("figures", {})
+    return 0.5 / (figures.get("specular_mean") or node_group.TYPICAL_SPECULAR)
+
+
 def _scale(obj) -> float:
     """How large the head is against metres: scattering keeps its size on skin."""
     return sum(obj.matrix_world.to_scale()) / 3
-
-
-def as_text(tree, indent: str = "") -> list[str]:
-    """A node tree as sorted lines (nodes with images, colour spaces and values; links): two trees are equal if these are."""
-    lines = []
-    for node in tree.nodes:
-        details = []
-        if getattr(node, "image", None) is not None:
-            details.append(f"{bpy.path.basename(node.image.filepath)} {node.image.colorspace_settings.name}")
-        if hasattr(node, "uv_map"):
-            details.append(node.uv_map)
-        for socket in node.inputs:
-            value = getattr(socket, "default_value", None)
-            if isinstance(value, float) and not socket.is_linked:
-                details.append(f"{socket.name}={value:.4g}")
-        lines.append(f"{indent}{node.bl_idname} {node.name}: {', '.join(details)}")
-        if getattr(node, "node_tree", None) is not None:
-            lines += as_text(node.node_tree, f"{indent}{node.name} / ")
-    lines += [f"{indent}{link.from_node.name}.{link.from_socket.name} -> {link.to_node.name}.{link.to_socket.name}" for link in tree.links]
-    return sorted(lines)

@@ -2,77 +2,120 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The node group WildCap Skin: a Principled BSDF set up as skin, with the few sockets an artist turns.
 
-Sockets are addressed by name, which is the same from Blender 4.2 to 5.x.
+    Specular x Specular Amount, clamped -> Specular IOR Level        Roughness x (1 + Region) -> Roughness
+    Height, Midlevel, Displacement -> Displacement, in the object's own units
+
+Sockets are addressed by name, which is the same from Blender 4.2 to 5.x. A group of an older version is rebuilt inside: sockets, their values, and an
+artist's own nodes and links stay.
 """
 
 import bpy
 
 NAME = "WildCap Skin"
-VERSION = 1
+VERSION = 2
 
-SCATTERING_M = 0.0037
-"""Mean free path of red light in skin, 3.7 mm (Jensen et al. 2001, skin1: 3.67, 1.37 and 0.68 mm)"""
+SCATTERING_M = 0.003
+"""Scale of the scattering, 3 mm, by which SCATTERING_RGB is multiplied"""
 SCATTERING_RGB = (1.0, 0.37, 0.19)
+"""Mean free paths of red, green and blue light over red's (Jensen et al. 2001, skin1: 3.67, 1.37 and 0.68 mm)"""
+TYPICAL_SPECULAR = 0.35
+"""Mean of the specular map on cheeks and forehead where nobody measured it. The map holds levels for an IOR of 1.5, of which 0.35 is skin's 2.8 percent"""
 
-SPECULAR_AMOUNT = 1.44
-"""The specular map holds levels for an IOR of 1.5 (4 % at normal incidence); at skin's 1.4 (2.8 %) the same light needs 4 / 2.8 as much"""
-
-# name, socket type, default, range; what the maps feed comes first
+# name, socket type, default, range, tooltip; what the maps feed comes first
 INPUTS = (
-    ("Albedo", 'NodeSocketColor', (0.5, 0.35, 0.28, 1.0), None),
-    ("Specular", 'NodeSocketFloat', 0.5, (0.0, 1.0)),
-    ("Normal", 'NodeSocketVector', (0.0, 0.0, 0.0), None),
-    ("Specular Amount", 'NodeSocketFloat', SPECULAR_AMOUNT, (0.0, 4.0)),
-    ("Roughness", 'NodeSocketFloat', 0.45, (0.0, 1.0)),
-    ("IOR", 'NodeSocketFloat', 1.4, (1.0, 3.0)),
-    ("Subsurface", 'NodeSocketFloat', 1.0, (0.0, 1.0)),
-    ("Subsurface Scale", 'NodeSocketFloat', SCATTERING_M, (0.0, 10.0)),
+    ("Albedo", 'NodeSocketColor', (0.5, 0.35, 0.28, 1.0), None, "Diffuse albedo"),
+    ("Specular", 'NodeSocketFloat', 0.5, (0.0, 1.0), "Specular albedo, as solved"),
+    ("Normal", 'NodeSocketVector', (0.0, 0.0, 0.0), None, "The skin's relief"),
+    ("Specular Amount", 'NodeSocketFloat', 0.5 / TYPICAL_SPECULAR, (0.0, 10.0),
+     "Times the specular albedo: the Specular IOR Level, at most 1. Half over the map's mean on cheeks and forehead gives these the 2.8 percent of skin"),
+    ("Roughness", 'NodeSocketFloat', 0.45, (0.0, 1.0), "Roughness of the cheeks; the other regions follow in their proportions"),
+    ("IOR", 'NodeSocketFloat', 1.4, (1.0, 3.0), "Index of refraction; 1.4 reflects 2.8 percent at normal incidence"),
+    ("Subsurface", 'NodeSocketFloat', 1.0, (0.0, 1.0), "How much of the diffuse light goes through the skin"),
+    ("Subsurface Scale", 'NodeSocketFloat', SCATTERING_M, (0.0, 10.0), "Mean free path of red light: 3 mm at the head's size"),
+    ("Region", 'NodeSocketFloat', 0.0, (-1.0, 1.0), "How much rougher than the cheeks this region is, as a share"),
+    ("Height", 'NodeSocketFloat', 0.0, (-10.0, 10.0), "How far the surface stands out, in metres of the head's own space"),
+    ("Displacement", 'NodeSocketFloat', 0.0, (0.0, 10.0), "Times the height; 1 is the scan's own relief, 0 is none"),
+    ("Midlevel", 'NodeSocketFloat', 0.0, (-10.0, 10.0), "Height that displaces nothing"),
+)
+OUTPUTS = (("BSDF", 'NodeSocketShader'), ("Displacement", 'NodeSocketVector'))
+
+# name, type, name it had in version 1, place
+NODES = (
+    ("WildCap Input", 'NodeGroupInput', "Group Input", (-700, 0)),
+    ("WildCap Specular Level", 'ShaderNodeMath', "Math", (-400, 80)),
+    ("WildCap Regions", 'ShaderNodeMath', None, (-400, -120)),
+    ("WildCap Principled", 'ShaderNodeBsdfPrincipled', "Principled BSDF", (0, 0)),
+    ("WildCap Displacement", 'ShaderNodeDisplacement', None, (0, -420)),
+    ("WildCap Output", 'NodeGroupOutput', "Group Output", (340, 0)),
+)
+LINKS = (
+    ("WildCap Input", "Specular", "WildCap Specular Level", 0), ("WildCap Input", "Specular Amount", "WildCap Specular Level", 1),
+    ("WildCap Specular Level", 0, "WildCap Principled", "Specular IOR Level"),
+    ("WildCap Input", "Region", "WildCap Regions", 0), ("WildCap Input", "Roughness", "WildCap Regions", 1),
+    ("WildCap Input", "Roughness", "WildCap Regions", 2),
+    ("WildCap Regions", 0, "WildCap Principled", "Roughness"),
+    ("WildCap Input", "Albedo", "WildCap Principled", "Base Color"), ("WildCap Input", "Normal", "WildCap Principled", "Normal"),
+    ("WildCap Input", "IOR", "WildCap Principled", "IOR"), ("WildCap Input", "Subsurface", "WildCap Principled", "Subsurface Weight"),
+    ("WildCap Input", "Subsurface Scale", "WildCap Principled", "Subsurface Scale"), ("WildCap Principled", "BSDF", "WildCap Output", "BSDF"),
+    ("WildCap Input", "Height", "WildCap Displacement", "Height"), ("WildCap Input", "Midlevel", "WildCap Displacement", "Midlevel"),
+    ("WildCap Input", "Displacement", "WildCap Displacement", "Scale"), ("WildCap Displacement", "Displacement", "WildCap Output", "Displacement"),
 )
 
 
 def skin_group() -> bpy.types.NodeTree:
-    """The group, made once per file; one of an older version is rebuilt inside, its sockets and their values stay."""
+    """The group, made once per file; one of an older version is rebuilt inside."""
     group = bpy.data.node_groups.get(NAME)
     if group is None:
         group = bpy.data.node_groups.new(NAME, 'ShaderNodeTree')
     if group.get("wildcap_version") != VERSION:
         _sockets(group)
-        _nodes(group)
+        _set_up(_nodes(group))
+        _wire(group)
         group["wildcap_version"] = VERSION
     return group
 
 
 def _sockets(group) -> None:
-    present = {item.name for item in group.interface.items_tree if item.item_type == 'SOCKET'}
-    for name, kind, default, limits in INPUTS:
-        if name in present:
-            continue
-        socket = group.interface.new_socket(name, in_out='INPUT', socket_type=kind)
-        socket.default_value = default
-        socket.hide_value = name == "Normal"
+    present = {(item.in_out, item.name): item for item in group.interface.items_tree if item.item_type == 'SOCKET'}
+    for name, kind, default, limits, what in INPUTS:
+        socket = present.get(('INPUT', name))
+        if socket is None:
+            socket = group.interface.new_socket(name, in_out='INPUT', socket_type=kind)
+            socket.default_value = default
+            socket.hide_value = name == "Normal"
+        socket.description = what
         if limits:
             socket.min_value, socket.max_value = limits
-    if "BSDF" not in present:
-        group.interface.new_socket("BSDF", in_out='OUTPUT', socket_type='NodeSocketShader')
+    for name, kind in OUTPUTS:
+        if ('OUTPUT', name) not in present:
+            group.interface.new_socket(name, in_out='OUTPUT', socket_type=kind)
 
 
-def _nodes(group) -> None:
-    nodes, links = group.nodes, group.links
-    nodes.clear()
-    source = nodes.new('NodeGroupInput')
-    amount = nodes.new('ShaderNodeMath')
-    shader = nodes.new('ShaderNodeBsdfPrincipled')
-    result = nodes.new('NodeGroupOutput')
-    for node, x in ((source, -500), (amount, -250), (shader, 0), (result, 320)):
-        node.location = (x, 0)
-    amount.operation = 'MULTIPLY'
-    amount.use_clamp = True
+def _nodes(group) -> dict[str, bpy.types.Node]:
+    """Ours, by name; those of version 1 are taken over with what the artist set in them."""
+    for name, kind, before, location in NODES:
+        node = group.nodes.get(name) or (group.nodes.get(before) if before else None)
+        if node is None:
+            node = group.nodes.new(kind)
+        if node.name != name:
+            node.name = node.label = name
+            node.location = location
+    return {name: group.nodes[name] for name, *_ in NODES}
+
+
+def _set_up(nodes: dict[str, bpy.types.Node]) -> None:
+    nodes["WildCap Specular Level"].operation, nodes["WildCap Specular Level"].use_clamp = 'MULTIPLY', True
+    nodes["WildCap Regions"].operation, nodes["WildCap Regions"].use_clamp = 'MULTIPLY_ADD', True
+    shader = nodes["WildCap Principled"]
     shader.subsurface_method = 'RANDOM_WALK'
     shader.inputs["Subsurface Radius"].default_value = SCATTERING_RGB
-    links.new(source.outputs["Specular"], amount.inputs[0])
-    links.new(source.outputs["Specular Amount"], amount.inputs[1])
-    links.new(amount.outputs[0], shader.inputs["Specular IOR Level"])
-    for name, socket in (("Albedo", "Base Color"), ("Normal", "Normal"), ("Roughness", "Roughness"), ("IOR", "IOR"),
-                         ("Subsurface", "Subsurface Weight"), ("Subsurface Scale", "Subsurface Scale")):
-        links.new(source.outputs[name], shader.inputs[socket])
-    links.new(shader.outputs["BSDF"], result.inputs["BSDF"])
+    nodes["WildCap Displacement"].space = 'OBJECT'  # heights are in the head's own units: they grow with the object's scale
+
+
+def _wire(group) -> None:
+    """Links ours with each other; where an artist's node feeds one of ours, it goes on doing so."""
+    for source, output, target, socket in LINKS:
+        into = group.nodes[target].inputs[socket]
+        if into.is_linked and into.links[0].from_node.name not in {name for name, *_ in NODES}:
+            continue
+        group.links.new(group.nodes[source].outputs[output], into)

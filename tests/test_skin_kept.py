@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""WildCap Skin through time: the same tree in all Blenders, files of an older version, a folder that moved, an asset library."""
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+from . import flat_patch, node_text  # noqa: E402
+from .flat_patch import assembled, height_map, paint, seen, sockets, white_world  # noqa: E402
+
+EXPECTED = """
+ShaderNodeAttribute WildCap Regions: attribute_name=wildcap_roughness
+ShaderNodeGroup WildCap Skin: Specular Amount=1.25, Roughness=0.45, IOR=1.4, Subsurface=1, Subsurface Scale=0.003, Displacement=0, Midlevel=0
+ShaderNodeNormalMap WildCap Normal Map: uv_map=UVMap
+ShaderNodeOutputMaterial Material Output
+ShaderNodeTexImage WildCap Albedo: diffuse_albedo.png sRGB, interpolation=Cubic
+ShaderNodeTexImage WildCap Displacement: displacement.exr Non-Color, interpolation=Cubic
+ShaderNodeTexImage WildCap Normal: normal.png Non-Color, interpolation=Cubic
+ShaderNodeTexImage WildCap Specular: specular_albedo.png Non-Color, interpolation=Cubic
+ShaderNodeUVMap WildCap UV: uv_map=UVMap
+WildCap Albedo.Color -> WildCap Skin.Albedo
+WildCap Displacement.Color -> WildCap Skin.Height
+WildCap Normal Map.Normal -> WildCap Skin.Normal
+WildCap Normal.Color -> WildCap Normal Map.Color
+WildCap Regions.Fac -> WildCap Skin.Region
+WildCap Skin / NodeGroupInput WildCap Input
+WildCap Skin / NodeGroupOutput WildCap Output
+WildCap Skin / ShaderNodeBsdfPrincipled WildCap Principled: Subsurface Radius=1 0.37 0.19
+WildCap Skin / ShaderNodeDisplacement WildCap Displacement
+WildCap Skin / ShaderNodeMath WildCap Regions: operation=MULTIPLY_ADD, use_clamp=True
+WildCap Skin / ShaderNodeMath WildCap Specular Level: operation=MULTIPLY, use_clamp=True
+WildCap Skin / WildCap Displacement.Displacement -> WildCap Output.Displacement
+WildCap Skin / WildCap Input.Albedo -> WildCap Principled.Base Color
+WildCap Skin / WildCap Input.Displacement -> WildCap Displacement.Scale
+WildCap Skin / WildCap Input.Height -> WildCap Displacement.Height
+WildCap Skin / WildCap Input.IOR -> WildCap Principled.IOR
+WildCap Skin / WildCap Input.Midlevel -> WildCap Displacement.Midlevel
+WildCap Skin / WildCap Input.Normal -> WildCap Principled.Normal
+WildCap Skin / WildCap Input.Region -> WildCap Regions.Value
+WildCap Skin / WildCap Input.Roughness -> WildCap Regions.Value
+WildCap Skin / WildCap Input.Roughness -> WildCap Regions.Value
+WildCap Skin / WildCap Input.Specular -> WildCap Specular Level.Value
+WildCap Skin / WildCap Input.Specular Amount -> WildCap Specular Level.Value
+WildCap Skin / WildCap Input.Subsurface -> WildCap Principled.Subsurface Weight
+WildCap Skin / WildCap Input.Subsurface Scale -> WildCap Principled.Subsurface Scale
+WildCap Skin / WildCap Principled.BSDF -> WildCap Output.BSDF
+WildCap Skin / WildCap Regions.Value -> WildCap Principled.Roughness
+WildCap Skin / WildCap Specular Level.Value -> WildCap Principled.Specular IOR Level
+WildCap Skin.BSDF -> Material Output.Surface
+WildCap Skin.Displacement -> Material Output.Displacement
+WildCap Specular.Color -> WildCap Skin.Specular
+WildCap UV.UV -> WildCap Albedo.Vector
+WildCap UV.UV -> WildCap Displacement.Vector
+WildCap UV.UV -> WildCap Normal.Vector
+WildCap UV.UV -> WildCap Specular.Vector
+"""
+
+
+@pytest.fixture
+def patch(addon, tmp_path):
+    """An open capture whose head is a flat square."""
+    return flat_patch.make(tmp_path / "patch.wildcap")
+
+
+def test_the_material_as_text(patch):
+    """The same in all Blenders."""
+    height_map(patch, 0.1)
+    found = "\n".join(node_text.lines(assembled().node_tree))
+    assert found == EXPECTED.strip(), found
+
+
+def test_a_file_of_version_1_is_rebuilt_inside_and_keeps_what_the_artist_did(patch, addon):
+    """The group and the material as version 1 made them, with an artist's roughness, a clear coat inside the group, and nodes of their own."""
+    group = version_1()
+    inside = group.nodes.new('ShaderNodeHueSaturation')
+    group.links.new(group.nodes["Group Input"].outputs["Albedo"], inside.inputs["Color"])
+    group.links.new(inside.outputs["Color"], group.nodes["Principled BSDF"].inputs["Base Color"])
+    group.nodes["Principled BSDF"].inputs["Coat Weight"].default_value = 0.2
+    bpy.ops.wildcap.bring_in_head()
+    head = bpy.context.view_layer.objects.active
+    material = head.active_material or bpy.data.materials.new("Skin")
+    material["wildcap_skin"] = True
+    material.node_tree.nodes.clear()
+    skin, note = material.node_tree.nodes.new('ShaderNodeGroup'), material.node_tree.nodes.new('NodeReroute')
+    skin.node_tree, skin.name = group, "WildCap Skin"
+    for name, value in (("Specular Amount", 1.44), ("Roughness", 0.31), ("Subsurface Scale", 0.01)):
+        skin.inputs[name].default_value = value
+    assert assembled() == material and sockets(material) == skin.inputs
+    values = [skin.inputs[name].default_value for name in ("Specular Amount", "Roughness", "Subsurface Scale", "Region")]
+    assert values == pytest.approx([1.25, 0.31, 0.01, 0.0]), "what was version 1's own is this capture's now, what was not is the artist's"
+    assert note.name in material.node_tree.nodes and len([n for n in group.nodes if n.bl_idname == 'ShaderNodeBsdfPrincipled']) == 1
+    principled = group.nodes["WildCap Principled"]
+    assert principled.inputs["Base Color"].links[0].from_node == inside and principled.inputs["Coat Weight"].default_value == pytest.approx(0.2)
+    without = [line for line in node_text.lines(group) if "HueSat" not in line and "Hue/" not in line and "Principled BSDF" not in line]
+    inside_expected = [line.split("WildCap Skin / ", 1)[1] for line in EXPECTED.splitlines() if line.startswith("WildCap Skin / ")]
+    assert set(inside_expected) - set(without) <= {"WildCap Input.Albedo -> WildCap Principled.Base Color",
+                                                   "ShaderNodeBsdfPrincipled WildCap Principled: Subsurface Radius=1 0.37 0.19"}
+    skin.inputs["Specular Amount"].default_value = 2.0
+    assembled()
+    assert skin.inputs["Specular Amount"].default_value == pytest.approx(2.0)
+
+
+def version_1():
+    """The group WildCap Skin as version 1 of the extension made it."""
+    group = bpy.data.node_groups.new("WildCap Skin", 'ShaderNodeTree')
+    for name, kind in (("Albedo", 'NodeSocketColor'), ("Specular", 'NodeSocketFloat'), ("Normal", 'NodeSocketVector'), ("Specular Amount", 'NodeSocketFloat'),
+                       ("Roughness", 'NodeSocketFloat'), ("IOR", 'NodeSocketFloat'), ("Subsurface", 'NodeSocketFloat'),
+                       ("Subsurface Scale", 'NodeSocketFloat')):
+        group.interface.new_socket(name, in_out='INPUT', socket_type=kind)
+    group.interface.new_socket("BSDF", in_out='OUTPUT', socket_type='NodeSocketShader')
+    source, amount, shader, result = (group.nodes.new(kind) for kind in ('NodeGroupInput', 'ShaderNodeMath', 'ShaderNodeBsdfPrincipled', 'NodeGroupOutput'))
+    amount.operation, amount.use_clamp, shader.subsurface_method = 'MULTIPLY', True, 'RANDOM_WALK'
+    shader.inputs["Subsurface Radius"].default_value = (1.0, 0.37, 0.19)
+    for output, target in ((source.outputs["Specular"], amount.inputs[0]), (source.outputs["Specular Amount"], amount.inputs[1]),
+                           (amount.outputs[0], shader.inputs["Specular IOR Level"]), (shader.outputs["BSDF"], result.inputs["BSDF"]),
+                           (source.outputs["Normal"], shader.inputs["Normal"]), (source.outputs["Roughness"], shader.inputs["Roughness"])):
+        group.links.new(output, target)
+    group["wildcap_version"] = 1
+    return group
+
+
+def test_saved_moved_and_opened_again_it_gives_the_same_pixels(patch, tmp_path):
+    folder = tmp_path / "before"
+    folder.mkdir()
+    patch.rename(folder / "patch.wildcap")
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.wildcap.open_capture(directory=str(folder / "patch.wildcap"))
+    paint(folder / "patch.wildcap", "diffuse_albedo.png", [[(0.8, 0.5, 0.3), (0.2, 0.3, 0.4)], [(0.5, 0.5, 0.5), (0.9, 0.1, 0.2)]])
+    sockets(assembled())["Roughness"].default_value = 0.33
+    white_world()
+    before = seen(tmp_path / "shot.exr")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"))
+    folder.rename(tmp_path / "after")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "after" / "scene.blend"))
+    material = bpy.data.objects["patch"].active_material
+    images = {node.name: node.image for node in material.node_tree.nodes if node.bl_idname == 'ShaderNodeTexImage'}
+    assert all(bpy.path.abspath(image.filepath).startswith(str(tmp_path / "after")) for image in images.values())
+    assert [images[f"WildCap {name}"].colorspace_settings.name for name in ("Albedo", "Specular", "Normal")] == ["sRGB", "Non-Color", "Non-Color"]
+    assert np.array_equal(seen(tmp_path / "shot.exr"), before) and before.std() > 0.01
+
+
+def test_the_group_is_an_asset_with_a_preview_and_a_catalogue(patch, addon, tmp_path):
+    asset = addon("relight.asset")
+    library = bpy.context.preferences.filepaths.asset_libraries.new(name="Mine", directory=str(tmp_path))
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+        for _ in range(2):
+            assembled()
+        group = bpy.data.node_groups["WildCap Skin"]
+        assert group.asset_data.catalog_id == asset.CATALOGUE and "skin" in group.asset_data.tags
+        pixels = np.array(group.preview.image_pixels_float).reshape(*group.preview.image_size, 4)
+        middle = pixels[asset.SIDE // 2, asset.SIDE // 2]
+        assert middle[3] == pytest.approx(1) and 1 > middle[0] > middle[1] > middle[2] > 0.2 and pixels[0, 0, 3] == 0
+        assert (tmp_path / asset.FILE).read_text(encoding="utf-8").splitlines().count(asset.LINE) == 1
+        group.asset_clear()
+        assembled()
+        assert group.asset_data is None, "who takes it out of the assets is not overruled"
+    finally:
+        bpy.context.preferences.filepaths.asset_libraries.remove(library)

@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How rough each region of the head is against the cheeks, as a vertex attribute: no map, and it stays with the mesh.
+
+Forehead and nose are oilier than cheeks, lips moister than both; the amounts are chosen by eye, nobody measured this face's.
+"""
+
+from functools import cache
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+ATTRIBUTE = "wildcap_roughness"
+MASKS = Path(__file__).resolve().parents[2] / "core" / "assets" / "masks"
+STEP = 4
+"""Every fourth texel of the masks' 1024 is finer than the mesh"""
+SHARES = {"neck": 0.1, "ears": 0.05, "scalp": 0.15, "forehead": -0.14, "nose": -0.2, "eyes": -0.1, "lips": -0.28}
+"""Region -> how much rougher than the cheeks, as a share; later ones win where they meet"""
+
+
+def write(mesh: bpy.types.Mesh) -> None:
+    """Writes the attribute: 0 is the cheeks' roughness, -0.2 a fifth less. The mesh has the built-in head's UVs; what has none of its own stays 0."""
+    uvs, corners = np.empty(2 * len(mesh.loops), np.float32), np.empty(len(mesh.loops), np.int32)
+    mesh.uv_layers[0].data.foreach_get("uv", uvs)
+    mesh.loops.foreach_get("vertex_index", corners)
+    shares = _shares()
+    texel = np.clip((uvs.reshape(-1, 2) * len(shares)).astype(int), 0, len(shares) - 1)
+    values = np.zeros(len(mesh.vertices), np.float32)
+    values[corners] = shares[texel[:, 1], texel[:, 0]]
+    attribute = mesh.attributes.get(ATTRIBUTE)
+    if attribute is not None and (attribute.domain, attribute.data_type) != ('POINT', 'FLOAT'):
+        mesh.attributes.remove(attribute)
+        attribute = None
+    if attribute is None:
+        attribute = mesh.attributes.new(ATTRIBUTE, 'FLOAT', 'POINT')
+    attribute.data.foreach_set("value", values)
+
+
+@cache
+def _shares() -> np.ndarray:
+    """[S, S], rows from the bottom as v goes."""
+    masks = {name: _mask(name) for name in ("face", "brows", "neck", "ears", "scalp", "nose", "eyes", "lips")}
+    rows = np.arange(len(masks["face"]))
+    above = np.clip((rows - np.flatnonzero(masks["brows"].max(1) > 0.5).max()) / (0.03 * len(rows)), 0, 1)
+    masks["forehead"] = masks["face"] * above[:, None]
+    result = np.zeros_like(masks["face"])
+    for name, share in SHARES.items():
+        result += masks[name] * (share - result)
+    return result
+
+
+def _mask(name: str) -> np.ndarray:
+    image = bpy.data.images.load(str(MASKS / f"{name}.png"))
+    image.colorspace_settings.is_data = True
+    pixels = np.empty(4 * image.size[0] * image.size[1], np.float32)
+    image.pixels.foreach_get(pixels)
+    width, height = image.size
+    bpy.data.images.remove(image)
+    return pixels.reshape(height, width, 4)[::STEP, ::STEP, 0].copy()
