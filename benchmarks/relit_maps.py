@@ -16,6 +16,7 @@ import numpy as np
 
 from core import images, template
 from core.capture import Capture, write_json
+from core.upscale.gloss import on_cheeks_and_forehead
 
 SIZE = 1024
 """Texels of every row's maps; what is delivered at 4096 is averaged to it, for a texel is smaller than a pixel of the pictures as it is."""
@@ -70,12 +71,14 @@ def read_rows(capture: Capture, true: Worn) -> dict[str, Worn]:
 
 
 def write_row(folder: Path, capture: Capture, worn: Worn) -> None:
-    """A capture with the other one's head and record and these maps, which the add-on opens as solved."""
-    row = Capture(folder)
+    """A capture with the other one's head and record and these maps, which the add-on opens as solved; the record says how glossy these maps are."""
+    row, record = Capture(folder), capture.read()
+    seen = _sized(images.read_data(capture.texture_confidence)[..., 0], len(worn.specular))
+    record["stages"].setdefault("upscale", {"key": ""}).setdefault("figures", {})["specular_mean"] = on_cheeks_and_forehead(worn.specular, seen)
     shutil.rmtree(folder, ignore_errors=True)
     row.maps.mkdir(parents=True)
     shutil.copyfile(capture.head, row.head)
-    write_json(row.json, capture.read())
+    write_json(row.json, record)
     images.write_srgb(row.maps / "diffuse_albedo.png", images.linear_to_srgb(worn.albedo), bits=16)
     images.write_data(row.maps / "specular_albedo.png", worn.specular, bits=16)
     images.write_data(row.maps / "normal.png", worn.normal / 2 + 0.5, bits=16)
