@@ -65,6 +65,16 @@ def size(path: Path) -> tuple[int, int]:
     return width, height
 
 
+def bits(path: Path) -> int:
+    """Bits per channel as stored: 8, 16 or 32."""
+    image = oiio.ImageInput.open(str(path))
+    if image is None:
+        raise Problem(f"{path} is not a picture that can be read ({oiio.geterror().strip()}).", "Run the stage that makes it again, or save it anew.")
+    size = image.spec().format.size()
+    image.close()
+    return 8 * size
+
+
 def read_focal_35mm(path: Path) -> float | None:
     """The focal length in millimetres of 35 mm film that a photograph's EXIF tells, or None."""
     image = oiio.ImageInput.open(str(path))
@@ -85,19 +95,28 @@ def read_profile(path: Path) -> str:
     return name or ""
 
 
-def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8, quality: int = 92) -> None:
-    """sRGB [H, W, 3 or 4] (alpha stays as it is) to PNG (8 or 16 bit) or JPEG (8 bit, of that quality), atomically."""
-    _write(path, np.clip(srgb, 0, 1), f"uint{bits}", "sRGB", quality)
+def write_packed(path: Path, channels: np.ndarray, bits: int = 8, srgb: bool = False) -> None:
+    """Four channels [H, W, 4] in [0, 1] that have nothing to do with each other, to PNG or EXR, atomically: no colour is multiplied or divided by the
+    fourth, as happens to what is written as a picture with alpha. `srgb`: the first three are colours encoded so."""
+    _write(path, channels, "half" if _is_linear(path) else f"uint{bits}", "sRGB" if srgb else "raw", straight=True)
 
 
-def write_linear(path: Path, linear: np.ndarray) -> None:
-    """Linear [H, W, C] to a half-float ZIP EXR, atomically."""
-    _write(path, linear, "half", "lin_srgb")
+def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8, quality: int = 92, small: bool = False) -> None:
+    """sRGB [H, W, 3 or 4] (alpha stays as it is) to PNG (8 or 16 bit) or JPEG (8 bit, of that quality), atomically.
+
+    `small`, here and below: what is shipped is packed as tightly as it goes, at ten times the time; an EXR loses what the eye does not see (DWAA).
+    """
+    _write(path, np.clip(srgb, 0, 1), f"uint{bits}", "sRGB", quality, small=small)
 
 
-def write_data(path: Path, data: np.ndarray, bits: int = 8) -> None:
+def write_linear(path: Path, linear: np.ndarray, small: bool = False) -> None:
+    """Linear [H, W, C] to a half-float ZIP EXR, or in [0, 1] to a 16 bit PNG, atomically."""
+    _write(path, linear, "half" if _is_linear(path) else "uint16", "lin_srgb", small=small)
+
+
+def write_data(path: Path, data: np.ndarray, bits: int = 8, small: bool = False) -> None:
     """Data [H, W] or [H, W, C] in [0, 1] to PNG (8 or 16 bit), or to a half-float EXR, atomically; no colour space."""
-    _write(path, data, "half" if _is_linear(path) else f"uint{bits}", "raw")
+    _write(path, data, "half" if _is_linear(path) else f"uint{bits}", "raw", small=small)
 
 
 def resize(image: np.ndarray, width: int, height: int) -> np.ndarray:
@@ -123,19 +142,21 @@ def _read(path: Path) -> np.ndarray:
     return np.asarray(image.get_pixels(oiio.FLOAT), np.float32)
 
 
-def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str, quality: int = 92) -> None:
+def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str, quality: int = 92, straight: bool = False, small: bool = False) -> None:
     path = Path(path)
     pixels = np.ascontiguousarray(pixels if pixels.ndim == 3 else pixels[..., None], np.float32)
     height, width, channels = pixels.shape
     spec = oiio.ImageSpec(width, height, channels, kind)
     spec.attribute("oiio:ColorSpace", colour_space)
+    if straight:
+        spec.attribute("oiio:UnassociatedAlpha", 1)
     spec.attribute("DateTime", "2000:01:01 00:00:00")  # an EXR would carry the hour, and the same pixels would not be the same file
     if _is_linear(path):
-        spec.attribute("compression", "zip")
+        spec.attribute("compression", "dwaa:45" if small else "zip")
     elif path.suffix.lower() in (".jpg", ".jpeg"):
         spec.attribute("Compression", f"jpeg:{quality}")
     else:
-        spec.attribute("png:compressionLevel", 3)
+        spec.attribute("png:compressionLevel", 9 if small else 3)
     with replacing(path) as temporary:
         _need_space(temporary.parent, pixels.size * (1 if kind == "uint8" else 2))
         output = oiio.ImageOutput.create(str(temporary))

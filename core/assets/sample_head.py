@@ -2,34 +2,48 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The finished head that the extension opens without a solver: python -m core.assets.sample_head CAPTURE
 
-CAPTURE is the demo's, solved from the sample video. Maps are stored at 1K with 8 bits, so that the extension stays small; the texture keeps
-its linear EXR, so that the head can be solved again after a stroke of the mask.
+CAPTURE is the demo's, solved from the sample video. Maps and textures are stored at 1K with 8 bits and packed tightly, so that the extension stays
+small; the texture keeps a linear EXR, so that the head can be solved again after a stroke of the mask. Of the head there are the vertices only: UVs and
+faces are those of assets/head.obj.
 """
 
 from __future__ import annotations
 
-import shutil
 import sys
 from pathlib import Path
 
 from .. import images
 from ..capture import Capture, replacing_folder
+from ..messages import Problem
 from ..template import ASSETS
 
-COPIED = ("head.obj", "texture.exr", "texture.png", "texture_confidence.exr", "texture_filmed.png", "shadow_mask_auto.png", "comparison/delit.png",
-          "comparison/filmed.png")
-DATA_MAPS = ("specular_albedo", "normal", "confidence")
+PICTURES = ("texture.png", "texture_filmed.png", "comparison/delit.png", "comparison/filmed.png", "maps/diffuse_albedo.png")
+DATA = ("shadow_mask_auto.png", "maps/specular_albedo.png", "maps/normal.png")
+SURE = 256
+"""Side of the confidence, which is only looked at."""
 
 
 def main() -> None:
     capture = Capture(Path(sys.argv[1]))
     with replacing_folder(ASSETS / "sample_head") as folder:
-        for name in COPIED:
+        for name in PICTURES:
             (folder / name).parent.mkdir(exist_ok=True)
-            shutil.copyfile(capture.root / name, folder / name)
-        for name in DATA_MAPS:
-            images.write_data(folder / "maps" / f"{name}.png", images.read_data(capture.maps / f"{name}.png"))
-        images.write_srgb(folder / "maps" / "diffuse_albedo.png", images.read_srgb(capture.maps / "diffuse_albedo.png"))
+        (folder / "head_vertices.obj").write_text(_vertices(capture.head), encoding="ascii")
+        for name in PICTURES:
+            images.write_srgb(folder / name, images.read_srgb(capture.root / name), small=True)
+        for name in DATA:
+            images.write_data(folder / name, images.read_data(capture.root / name), small=True)
+        images.write_linear(folder / "texture.exr", images.read_linear(capture.texture), small=True)
+        images.write_data(folder / "texture_confidence.exr", images.read_data(capture.texture_confidence), small=True)
+        images.write_data(folder / "maps/confidence.png", images.resize(images.read_mask(capture.maps / "confidence.png"), SURE, SURE), small=True)
+
+
+def _vertices(head: Path) -> str:
+    """The lines of an OBJ that place its vertices. Raises Problem where the others are not those of the built-in head."""
+    lines, own = (path.read_text(encoding="utf-8").splitlines() for path in (head, ASSETS / "head.obj"))
+    if [line for line in lines if not line.startswith("v ")] != [line for line in own if not line.startswith("v ")]:
+        raise Problem(f"{head} has not the built-in head's faces and UVs.", "Name a capture whose template is the built-in head.")
+    return "".join(line + "\n" for line in lines if line.startswith("v "))
 
 
 if __name__ == "__main__":

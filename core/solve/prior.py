@@ -104,6 +104,18 @@ class ReleasedPrior(Prior):
         return {"condition": self.noise[0][:, rows, columns].transpose(0, 1)}
 
 
+def packed(maps: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Maps [N, C, R, R] in 256 levels of each channel's range: uint8 [N, C, R, R] and that range, lowest and highest, [C, 2]. A quarter of float32's size."""
+    limits = torch.stack([maps.amin((0, 2, 3)), maps.amax((0, 2, 3))], 1)
+    low, high = limits[:, 0, None, None], limits[:, 1, None, None]
+    return ((maps - low) / (high - low).clamp_min(1e-6) * 255).round().to(torch.uint8), limits
+
+
+def unpacked(levels: torch.Tensor, limits: torch.Tensor) -> torch.Tensor:
+    """What `packed` packed, to a 510th of each channel's range."""
+    return limits[:, 0, None, None] + levels.float() / 255 * (limits[:, 1] - limits[:, 0])[:, None, None]
+
+
 def condition(coords: torch.Tensor, octaves: int, mean_face: torch.Tensor, spread: torch.Tensor, tone: torch.Tensor,
               blind: torch.Tensor | None) -> dict[str, torch.Tensor]:
     """What our network is told of maps at coords [N, 2, H, W] of skins of tone [N, 3]: `denoise`'s arguments by name. blind [N] is 1 where the normals
@@ -177,7 +189,7 @@ def _load_ours(path: Path) -> Prior:
     card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     with safe_open(path, "pt") as file:
         tensors = {name: file.get_tensor(name).float() for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
-    mean_face, spread, references = tensors.pop("mean_face"), tensors.pop("spread"), tensors.pop("references", None)
+    mean_face, spread, references = tensors.pop("mean_face"), tensors.pop("spread"), unpacked(tensors.pop("references"), tensors.pop("references_range"))
     network = build(card)
     network.load_state_dict(tensors)
     return Prior(network, card["cond"]["pos_enc_freq"], mean_face, spread, card["tones"], references)

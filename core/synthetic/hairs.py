@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .canvas import Canvas
 from ..noise import octaves
+from .canvas import Canvas
 from .spots import strew
 
 

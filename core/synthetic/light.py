@@ -15,8 +15,8 @@ import numpy as np
 
 from .. import raster, template
 from ..meshes import Mesh, vertex_normals
-from ..skylight import radiance_transfer, sh_basis
 from ..noise import noise
+from ..skylight import radiance_transfer, sh_basis
 from .parameters import sample_parameters
 from .skin import make_skin
 

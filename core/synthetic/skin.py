@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..noise import noise, octaves
 from . import adornment, hairs, pigment
 from .canvas import Canvas, canvas
-from ..noise import noise, octaves
 from .parameters import SkinParameters, sample_parameters
 from .regions import creases, lid_lines, regions
 from .relief import normals

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .canvas import Canvas
 from ..noise import noise
+from .canvas import Canvas
 
 
 def strew(ground: Canvas, density: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

@@ -24,7 +24,7 @@ from torch.utils.data import Dataset
 from ..capture import replacing
 from ..messages import Problem, Reporter
 from ..solve.network import UNet, denoise
-from ..solve.prior import BLIND, WEIGHTS, build, condition, fast_dtype
+from ..solve.prior import BLIND, WEIGHTS, build, condition, fast_dtype, packed
 from ..synthetic.identities import reserved_seeds
 from . import descent
 from .patches import Batch, Windows, mean_map, reference_skins, spread_about
@@ -87,9 +87,10 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     """The averaged weights, the mean face and the reference skins of a training folder as fp16 safetensors, with the card that says where they come from."""
     state = descent.read_state(work)
     data = state["data"]
-    tensors = {**state["average"], **state["statistics"], "references": state["references"]}
+    levels, limits = packed(state["references"])
+    tensors = {name: value.half().contiguous() for name, value in {**state["average"], **state["statistics"]}.items()}
     with replacing(out) as temporary:
-        save_file({name: value.half().contiguous() for name, value in tensors.items()}, temporary)
+        save_file({**tensors, "references": levels, "references_range": limits}, temporary)
     told = "Procedural skins of core/synthetic on the built-in head, which derives from the MakeHuman base mesh (CC0)"
     if data["skins"]:
         told += f"; {len(data['skins'])} skins of {data['from']}, carried into the built-in UVs, diffuse only"

@@ -13,6 +13,8 @@ from .. import captures, preferences, status
 from ..base_operator import BaseOperator
 
 SHIPPED = Path(__file__).resolve().parents[2] / "core" / "assets" / "sample_head"
+VERTICES = "head_vertices.obj"
+"""In place of head.obj: where its vertices are. The rest of it is the built-in head's."""
 
 
 class WILDCAP_OT_open_sample_head(BaseOperator, bpy.types.Operator):
@@ -34,13 +36,17 @@ class WILDCAP_OT_open_sample_head(BaseOperator, bpy.types.Operator):
 
 def copy_to(folder: Path) -> Capture:
     """A writable copy of the sample head in `folder`; one that is there already is kept with the artist's work in it."""
-    if not (SHIPPED / "head.obj").is_file():
+    if not (SHIPPED / VERTICES).is_file():
         raise Problem("The sample head is missing from this installation.", "Install the extension's zip again.")
     capture = Capture(folder / "sample_head.wildcap")
     if not capture.head.is_file():
         try:
             with replacing_folder(capture.root) as temporary:
                 shutil.copytree(SHIPPED, temporary, dirs_exist_ok=True, copy_function=shutil.copyfile)
+                moved = (temporary / VERTICES).read_text(encoding="ascii")
+                built_in = (SHIPPED.parent / "head.obj").read_text(encoding="ascii").splitlines(keepends=True)
+                (temporary / capture.head.name).write_text(moved + "".join(line for line in built_in if not line.startswith("v ")), encoding="ascii")
+                (temporary / VERTICES).unlink()
         except shutil.Error as error:  # a list of (source, target, reason)
             raise storage_problem(OSError(0, str(error.args[0][0][2])), capture.root) from error
     return capture
