@@ -3,9 +3,10 @@
 """Renders a solved capture with Cycles through the installed extension's own functions, in a process of its own.
 
     python -m benchmarks.render_capture CAPTURE [LIGHT ...] [--resolution PX] [--samples N]
+    python -m benchmarks.render_capture CAPTURE --contact-sheet
 
 Each light (default: all presets; the name of one of Blender's worlds means that) gives renders/LIGHT.png, shown without a look, and the linear
-renders/LIGHT.exr.
+renders/LIGHT.exr; --contact-sheet joins all presets to renders/contact_sheet.png. (With Blender itself: blender --command wildcap ...)
 """
 
 from __future__ import annotations
@@ -26,10 +27,14 @@ def main() -> None:
     parser.add_argument("lights", nargs="*", metavar="LIGHT")
     parser.add_argument("--resolution", type=int, default=640)
     parser.add_argument("--samples", type=int, default=32)
+    parser.add_argument("--contact-sheet", action="store_true")
     asked = parser.parse_args()
     with extension():
         from bl_ext.user_default.wildcap.wildcap_addon.relight import headless
 
+        if asked.contact_sheet:
+            print(headless.render_contact_sheet(asked.capture, asked.resolution, asked.samples), flush=True)
+            return
         for path in headless.render_relit(asked.capture, asked.lights or headless.ALL, asked.resolution, asked.samples):
             print(path, flush=True)
 

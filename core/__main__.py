@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m core: run, stages, delighters, status, mask, landmarks, doctor, train.
+"""python -m core: run, deliver, stages, delighters, presets, status, mask, landmarks, doctor, train.
 
 The command line is one more host of the worker: it writes a job, starts the worker with this same Python and prints
 what it says. Failures are two lines, a problem and its remedy, and exit code 2; Ctrl-C ends with 130.
@@ -14,7 +14,7 @@ import signal
 import sys
 from pathlib import Path
 
-from . import __version__, artist_landmarks, consent, delighter_cards, report, settings, stages
+from . import __version__, artist_landmarks, consent, delighter_cards, delivery_plan, delivery_presets, report, settings, stages
 from .capture import Capture
 from .messages import Problem
 from .worker import terminal
@@ -69,6 +69,17 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--edited-part", action="store_true", help="solve only what a mask edit touched since the last solve, where that can be done")
     run.set_defaults(command=_run)
 
+    deliver = commands.add_parser("deliver", help="the maps as another program wants them, with the mesh as OBJ; other files and shape keys need the add-on")
+    deliver.add_argument("capture", metavar="CAPTURE", type=Path)
+    for name in ("preset", "what", "size", "pictures", "colour", "udim"):
+        known = settings.DeliverSettings.__dataclass_fields__[name]
+        deliver.add_argument(f"--{name}", choices=known.metadata["choices"], default=known.default, help=settings.tooltips(settings.DeliverSettings)[name])
+    deliver.add_argument("--clean", action="store_true", help=settings.tooltips(settings.DeliverSettings)["clean"])
+    deliver.add_argument("--no-hair", action="store_true", help="leave the masks of brows, lashes and beard out")
+    deliver.add_argument("--to", metavar="FOLDER", type=Path, help="deliver to this folder; without it to exports in the capture's")
+    deliver.set_defaults(command=_deliver)
+    table = commands.add_parser("presets", help="say how each program gets its maps, and what each format drops: the tables of docs/guide.md")
+    table.set_defaults(command=_presets)
     commands.add_parser("stages", help="list the stages of the chain").set_defaults(command=_stages)
     cards = commands.add_parser("delighters", help="say of each way to take the light out where it runs, what leaves the machine and what it costs")
     cards.add_argument("--markdown", action="store_true", help="as docs/delighters.md has it")
@@ -141,6 +152,27 @@ def _run(options: argparse.Namespace) -> int:
     job = write_job(capture, source="" if options.source == "-" else options.source, first=options.first, last=options.last, settings=values,
                     quality=options.quality)
     return terminal.follow(ROOT, capture, job, consent.by_flag(capture) if options.send_frames else {})
+
+
+def _deliver(options: argparse.Namespace) -> int:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    capture = Capture(options.capture)
+    if not capture.json.is_file():
+        raise Problem(f"There is no capture at {capture.root}.", "Check the name; `python -m core run SOURCE CAPTURE` makes one.")
+    wanted = {name: getattr(options, name) for name in ("preset", "what", "size", "pictures", "colour", "udim", "clean")}
+    wanted |= {"hair": not options.no_hair, "folder": str(options.to.absolute()) if options.to else "", "format": "obj", "whole": True}
+    before = read_job(capture.job).settings if capture.job.is_file() else settings.Settings()  # job.json is also what `status` judges the stages by
+    chosen = {**settings.to_json(before), "deliver": wanted}
+    plan = delivery_plan.plan(capture, settings.from_json(chosen).deliver)
+    code = terminal.follow(ROOT, capture, write_job(capture, tool="deliver", settings=chosen), {})
+    if code == 0:
+        print(plan.target)
+    return code
+
+
+def _presets(options: argparse.Namespace) -> int:
+    print(delivery_presets.markdown())
+    return 0
 
 
 def _stages(options: argparse.Namespace) -> int:

@@ -120,6 +120,7 @@ class Capture:
         self.solved = self.maps / "solved.safetensors"  # what a later solve of an edited part goes on from
         self.maps_4k = self.root / "maps_4k"
         self.delivery = self.root / "delivery"
+        self.exports = self.root / "exports"  # deliveries, where no other folder is chosen
         self.comparison = self.root / "comparison"
         self.preview = self.root / "preview"
         self.checkpoints = self.root / "checkpoints"

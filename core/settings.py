@@ -13,6 +13,7 @@ import inspect
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
 
+from . import delivery_presets
 from .messages import Problem
 
 
@@ -141,6 +142,36 @@ class TransferSettings:
 
 
 @dataclass(frozen=True)
+class DeliverSettings:
+    """What a delivery is made for; names and packing of every preset stand in delivery_presets.py."""
+
+    preset: str = setting("blender", choices=tuple(delivery_presets.PRESETS))
+    """The program it is for: its names of the maps, its units, its normals"""
+    what: str = setting("head", choices=tuple(delivery_presets.WHAT))
+    """Which mesh is delivered"""
+    format: str = setting("preset", choices=("preset", *delivery_presets.FORMATS))
+    """File of the mesh; preset: what that program likes best"""
+    size: str = setting("4096", choices=("4096", "2048", "1024"), unit="px")
+    """Side of the maps; maps that are smaller are not enlarged"""
+    pictures: str = setting("preset", choices=("preset", *delivery_presets.PICTURES))
+    """File of the maps"""
+    colour: str = setting("preset", choices=("preset", "srgb", "linear"))
+    """Colour space of the albedo; preset: sRGB in PNG, linear in EXR"""
+    udim: str = setting("preset", choices=("preset", "numbered", "plain"))
+    """Whether the maps' names carry the number of their UV tile (1001); maps of several tiles always do"""
+    hair: bool = setting(True)
+    """Masks of brows, lashes and beard and the skin below them go along, where the capture has them"""
+    clean: bool = setting(False)
+    """The albedo without brows, lashes and beard, to groom hair over it, in place of the one with them"""
+    folder: str = setting("")
+    """Folder to deliver to; empty: exports in the capture's folder"""
+    roughness: float = setting(0.45, min=0.0, max=1.0)
+    """Roughness of the skin, in the maps and materials that hold it; Blender puts in what the head's material has"""
+    whole: bool = setting(False)
+    """Write the mesh as well, without Blender, as OBJ"""
+
+
+@dataclass(frozen=True)
 class Settings:
     """All stages' settings, with what they share."""
 
@@ -157,6 +188,7 @@ class Settings:
     solve: SolveSettings = field(default_factory=SolveSettings)
     upscale: UpscaleSettings = field(default_factory=UpscaleSettings)
     transfer: TransferSettings = field(default_factory=TransferSettings)
+    deliver: DeliverSettings = field(default_factory=DeliverSettings)
 
 
 CARDS = {"grey": 0.18, "white": 0.88}

@@ -56,6 +56,7 @@ TOOLS = (
           "core.solve.snapping"),
     Stage("skin_tone", "Skin Tone", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"), (), "core.solve.tone"),
     Stage("white_point", "White Point", ("frames/",), (), "core.solve.white_point"),
+    Stage("deliver", "Deliver", ("head.obj", *(f"maps/{name}" for name in MAPS)), (), "core.deliver"),
 )
 """What a worker does for one button: no stage of the chain depends on it, and nothing of it is recorded."""
 LABELS = {stage.name: stage.label for stage in (*STAGES, *TOOLS)}

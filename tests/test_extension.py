@@ -23,7 +23,7 @@ WANTED = (
     r"__init__\.py", r"blender_manifest\.toml", r"LICENSE", r"README\.md", r"requirements/(worker|nets|perceptual|cuda)\.txt",
     r"wildcap_addon/([a-z_]+/)?[a-z_]+\.py",
     r"core/README\.md", r"core/[a-z_]+\.py",
-    r"core/(worker|frames|cameras|scan|registration|delight|texture|shadow_mask|solve|transfer|upscale)/[a-z0-9_]+\.py",
+    r"core/(worker|frames|cameras|scan|registration|delight|texture|shadow_mask|solve|transfer|upscale|deliver)/[a-z0-9_]+\.py",
     r"core/weights/[a-z0-9_]+\.(safetensors|json)", r"core/assets/([A-Z]+\.md|head\.obj|head\.json|identity\.npz|masks/[a-z_]+\.png)",
     r"core/assets/[a-z_]+\.(png|json|npz|md)", r"core/assets/sample_head/.+\.(obj|png|exr|json)",
     r"core/[a-z_]+/(README\.md|[a-z0-9_]+\.(npz|json))",

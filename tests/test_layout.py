@@ -14,8 +14,8 @@ from core import stages
 ROOT = Path(__file__).resolve().parent.parent
 TOP = {".ci", ".gitignore", "LICENSE", "Makefile", "README.md", "__init__.py", "benchmarks", "blender_manifest.toml", "core", "docs", "pyproject.toml",
        "requirements", "tests", "wildcap_addon"}
-ROOMS = {"assets", "cameras", "delight", "frames", "registration", "scan", "shadow_mask", "solve", "synthetic", "texture", "training", "transfer", "upscale",
-         "weights", "worker"}
+ROOMS = {"assets", "cameras", "delight", "deliver", "frames", "registration", "scan", "shadow_mask", "solve", "synthetic", "texture", "training", "transfer",
+         "upscale", "weights", "worker"}
 VAGUE = {"util", "utils", "helper", "helpers", "common", "manager", "service", "misc"}
 LONGEST = 300
 TREE_BYTES = 55_000_000

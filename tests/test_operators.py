@@ -15,7 +15,8 @@ ASKS = {"choose_video": {"filepath": "/none.mp4"}, "open_capture": {"directory":
 def operators(addon, monkeypatch, tmp_path):
     """All of the add-on's operators; whatever would start a process, a browser or a long render is kept from it."""
     monkeypatch.setattr(addon("jobs"), "start", lambda *_, **__: None)
-    monkeypatch.setattr(addon("relight.output"), "still", lambda *_: None)
+    for name in ("still", "stills", "frames"):
+        monkeypatch.setattr(addon("relight.output"), name, lambda *_: None)
     addon("preferences").get().captures = str(tmp_path / "captures")
     return sorted(name for name in dir(bpy.ops.wildcap) if not name.startswith("_"))
 

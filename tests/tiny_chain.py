@@ -20,7 +20,7 @@ from core.worker.job import write_job
 
 ROOT = Path(__file__).resolve().parent.parent
 GROUND = ("__init__.py", "__main__.py", "capture.py", "hashes.py", "settings.py", "stages.py", "messages.py", "mask_history.py", "artist_landmarks.py",
-          "report.py", "consent.py", "switchlight_api.py", "delighter_cards.py")
+          "report.py", "consent.py", "switchlight_api.py", "delighter_cards.py", "delivery_presets.py", "delivery_plan.py")
 
 ROOM = '''
 import errno, hashlib, json, os, sys, time

@@ -139,6 +139,19 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
     tint_strength: bpy.props.FloatProperty(name="Tint Strength", min=0.05, max=1, default=0.45, description="How strongly a mask covers the texture")
     resolution: bpy.props.IntProperty(name="Resolution", subtype='PIXEL', min=16, max=8192, default=1024, description="Side of the rendered picture")
     samples: bpy.props.IntProperty(name="Samples", min=1, max=65536, default=128, description="Cycles samples per pixel")
+    view: bpy.props.EnumProperty(
+        name="View", default='Standard', description="How the picture is shown; the linear EXR beside it is the same in both",
+        items=[('Standard', "Standard", "Colours as they are; what is brighter than white is cut off"),
+               ('AgX', "AgX", "As on film: bright lights and strong colours fade softly; a skin's tone is not what it was")],
+    )
+    turns: bpy.props.EnumProperty(
+        name="Turns", default='HEAD', description="What goes once around",
+        items=[('HEAD', "Head", "The head, under a light that stays"), ('LIGHT', "Light", "The light, around a head that stays")],
+    )
+    turn_frames: bpy.props.IntProperty(name="Frames", min=2, max=1000, default=48, description="Pictures of one turn; a film shows 24 in a second")
+    turn_file: bpy.props.EnumProperty(
+        name="As", default='MP4', description="What renders/turntable gets", items=[('MP4', "Film", "One MP4"), ('PNG', "Frames", "A PNG per frame")],
+    )
 
 
 def values(item: WILDCAP_PG_capture) -> dict:

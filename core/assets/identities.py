@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -20,10 +21,7 @@ _LEFT_OUT = re.compile(r"head-trans|head-angle|head-scale-horiz|head-back|eye-sc
 
 def identity_space(base: Base, builder: HeadBuilder, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """Mean head [V, 3] in metres, exactly symmetric, and displacements [K, V, 3] per standard deviation, largest first."""
-    rng = np.random.default_rng(seed)
-    controls = _controls(base)
-    macros = {name: base.target(name) for name in base.target_names("macrodetails") if re.search("young|old", name)}
-    heads = np.stack([builder.head(base.vertices + _macro(macros, rng) + _details(controls, rng)) for _ in range(SAMPLES)])
+    heads = np.stack([builder.head(body) for body in bodies(base, SAMPLES, seed)])
     front = (heads[0, :, 1] < 0.045) & (heads[0, :, 2] > -0.12)
     heads = np.stack([_aligned(head, heads[0], front) for head in heads])
     mirrored = heads[:, builder.mirror] * [-1, 1, 1]
@@ -34,6 +32,15 @@ def identity_space(base: Base, builder: HeadBuilder, seed: int = 0) -> tuple[np.
     order = np.argsort(values)[::-1][:COMPONENTS]
     components = (vectors[:, order].T @ difference / np.sqrt(SAMPLES)).reshape(COMPONENTS, -1, 3)
     return mean, components
+
+
+def bodies(base: Base, count: int, seed: int = 0) -> Iterator[np.ndarray]:
+    """Random bodies [N, 3], decimetres: those the identity space is made of."""
+    rng = np.random.default_rng(seed)
+    controls = _controls(base)
+    macros = {name: base.target(name) for name in base.target_names("macrodetails") if re.search("young|old", name)}
+    for _ in range(count):
+        yield base.vertices + _macro(macros, rng) + _details(controls, rng)
 
 
 def _controls(base: Base) -> list[tuple[float, list[np.ndarray]]]:

@@ -57,6 +57,17 @@ class Base:
         offset[rows[:, 0].astype(int)] = rows[:, 1:]
         return offset
 
+    def helper_faces(self, group: str) -> list[tuple[int, ...]]:
+        """Faces of one helper (teeth, tongue), which MakeHuman keeps beside the body."""
+        faces, current = [], ""
+        for line in (self.folder / "mpfb2/3dobjs/base.obj").read_text().splitlines():
+            key, *rest = line.split() or [""]
+            if key == "g":
+                current = rest[0]
+            elif key == "f" and current == group:
+                faces.append(tuple(int(corner.split("/")[0]) - 1 for corner in rest))
+        return faces
+
     def target_names(self, folder: str) -> list[str]:
         """Names of all targets in one folder below mpfb2/targets/."""
         return sorted(f"{folder}/{p.name.split('.')[0]}" for p in (self.folder / "mpfb2/targets" / folder).glob("*.target.gz"))
@@ -211,12 +222,11 @@ class HeadBuilder:
 
 def catmull_clark(polygons: list[list[int]], count: int) -> tuple[sparse.csr_matrix, np.ndarray]:
     """One Catmull-Clark step as a matrix [V', count] and its triangles [F, 3] (each quad split along its new face point)."""
-    edges, edge_faces = {}, []
+    edges = edge_numbers(polygons)
+    edge_faces = [[] for _ in edges]
     for k, polygon in enumerate(polygons):
         for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True):
-            e = edges.setdefault((min(a, b), max(a, b)), len(edges))
-            edge_faces += [[]] if e == len(edge_faces) else []
-            edge_faces[e].append(k)
+            edge_faces[edges[min(a, b), max(a, b)]].append(k)
     ends = np.array(list(edges))
     inner = np.array([len(f) == 2 for f in edge_faces])
     face_point = _matrix([(k, i, 1 / len(p)) for k, p in enumerate(polygons) for i in p], len(polygons), count)
@@ -240,6 +250,15 @@ def catmull_clark(polygons: list[list[int]], count: int) -> tuple[sparse.csr_mat
             right = count + edges[min(here, after), max(here, after)]
             triangles += [(here, right, centre), (here, centre, left)]
     return sparse.vstack([vertex_point, edge_point, face_point]).tocsr(), np.array(triangles)
+
+
+def edge_numbers(polygons: list[list[int]]) -> dict[tuple[int, int], int]:
+    """(lower, higher vertex) -> number of the edge, as it is first met."""
+    edges = {}
+    for polygon in polygons:
+        for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True):
+            edges.setdefault((min(a, b), max(a, b)), len(edges))
+    return edges
 
 
 def _matrix(entries: list[tuple[int, int, float]], rows: int, columns: int) -> sparse.csr_matrix:

@@ -41,11 +41,11 @@ def _show(message: Message, capture: Capture, line: _Line) -> int:
         case Progress():
             share = message.done / message.of if message.of else 0
             left = f", {_duration(message.eta_s)} left" if message.eta_s and message.eta_s >= 1 else ""
-            line.show(f"{stages.by_name(message.stage).label:12} {share:4.0%}  {message.text}{left}", step=(message.stage, int(share * 4)))
+            line.show(f"{stages.LABELS[message.stage]:12} {share:4.0%}  {message.text}{left}", step=(message.stage, int(share * 4)))
         case Log():
             line.keep(message.text)
         case StageDone():
-            line.keep(f"{stages.by_name(message.stage).label:12} " + ("unchanged" if message.skipped else f"done in {_duration(message.seconds)}"))
+            line.keep(f"{stages.LABELS[message.stage]:12} " + ("unchanged" if message.skipped else f"done in {_duration(message.seconds)}"))
         case Done():
             line.keep(f"Finished in {_duration(message.seconds)}. {capture.report} has the pictures and figures.")
             return 0

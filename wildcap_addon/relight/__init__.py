@@ -4,7 +4,7 @@
 
 import bpy
 
-from . import compare, operators, output, panel
+from . import command, compare, operators, output, panel
 
 _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *compare.CLASSES, *panel.CLASSES))
 
@@ -12,8 +12,10 @@ _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES,
 def register():
     _register()
     output.register()
+    command.register()
 
 
 def unregister():
+    command.unregister()
     output.unregister()
     _unregister()

@@ -7,11 +7,13 @@ from pathlib import Path
 
 import bpy
 
+from ...core.messages import Problem
 from .. import captures, colours, hdri, head
 from ..hdri import Hdri
-from . import lights, material, output, picture
+from . import contact_sheet, lights, material, output, picture, reel
 
 ALL = tuple(lights.PRESETS)
+FRAMES_PER_SECOND = 24
 
 
 def render_relit(capture_folder: Path, names: Iterable[str | Hdri] = ALL, resolution: int = 640, samples: int = 32) -> list[Path]:
@@ -23,6 +25,33 @@ def render_relit(capture_folder: Path, names: Iterable[str | Hdri] = ALL, resolu
     chosen = [light_of(name) for name in names]
     obj, item = open_head(capture_folder)
     return [render_light(obj, captures.folder(item).renders, light, resolution, samples) for light in chosen]
+
+
+def render_contact_sheet(capture_folder: Path, resolution: int = 512, samples: int = 32, view: str = colours.VIEWS[0]) -> Path:
+    """As `render_relit`, in all presets, joined to renders/contact_sheet.png, which is returned."""
+    obj, item = open_head(capture_folder)
+    return contact_sheet.render(obj, captures.folder(item).renders, True, resolution=resolution, samples=samples, view=view)
+
+
+def render_turntable(
+    capture_folder: Path, name: str | Hdri = ALL[0], turns: str = 'HEAD', frames: int = 48, film: bool = False, resolution: int = 512, samples: int = 32,
+) -> Path:
+    """The 'HEAD' or the 'LIGHT' once around, to renders/turntable/, which is returned: PNG frames, or one film. Raises Problem as `render_relit` does."""
+    light = light_of(name)
+    obj, item = open_head(capture_folder)
+    return turntable(obj, captures.folder(item).renders, light, turns, frames, film, True, resolution=resolution, samples=samples)
+
+
+def turntable(obj, renders: Path, light: str | Hdri, turns: str, frames: int, film: bool, wait: bool, **look) -> Path:
+    """renders/turntable/. `look`: as picture.set_up takes it. Raises Problem where a film is asked of a Blender that cannot write one."""
+    if film and not reel.can_film():
+        raise Problem("This Blender was built without FFmpeg: it cannot write MP4.", "Choose PNG frames.")
+    scene = reel.turning(obj, light, turns, frames, **look)
+    if film:
+        reel.as_film(scene, FRAMES_PER_SECOND)
+    folder = renders / "turntable"
+    output.frames(scene, folder, "turntable.mp4" if film else "####.png", frames, wait)
+    return folder
 
 
 def light_of(name: str | Hdri) -> str | Hdri:

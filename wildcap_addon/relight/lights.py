@@ -88,24 +88,39 @@ def build(scene: bpy.types.Scene, light: str | Hdri | None, frame: Matrix, radiu
 
 
 def clear(scene: bpy.types.Scene) -> None:
-    """Takes the lamps away, and what turned them."""
-    for obj in [o for o in scene.objects if o.type == 'LIGHT']:
-        bpy.data.lights.remove(obj.data)  # takes its object along
-    for obj in [o for o in scene.objects if o.type == 'EMPTY' and o.name.startswith(RIG)]:
-        bpy.data.objects.remove(obj)
+    """Takes the lamps away, and what carried them."""
+    for obj in [o for o in scene.objects if o.type in ('LIGHT', 'EMPTY') and o.name.startswith("WildCap ")]:
+        stop(obj)
+        if obj.data is not None:
+            bpy.data.lights.remove(obj.data)  # takes its object along
+        else:
+            bpy.data.objects.remove(obj)
+
+
+def stop(thing: bpy.types.ID) -> None:
+    """Takes away what moved it over the frames."""
+    action = thing.animation_data.action if thing.animation_data else None
+    thing.animation_data_clear()
+    if action is not None and action.users == 0:
+        bpy.data.actions.remove(action)
+
+
+def rig(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """What carries the scene's lamps."""
+    return next((o for o in scene.objects if o.type == 'EMPTY' and o.name.startswith(RIG)), None)
 
 
 def add_lamps(scene: bpy.types.Scene, lamps: tuple[Lamp, ...], frame: Matrix, radius: float) -> list[bpy.types.Object]:
     """The lamps around the head, carried by the scene's rig."""
-    rig = next((o for o in scene.objects if o.type == 'EMPTY' and o.name.startswith(RIG)), None)
-    if rig is None:
-        rig = bpy.data.objects.new(RIG, None)
-        rig.matrix_world = frame
-        scene.collection.objects.link(rig)
+    carrier = rig(scene)
+    if carrier is None:
+        carrier = bpy.data.objects.new(RIG, None)
+        carrier.matrix_world = frame
+        scene.collection.objects.link(carrier)
     made = [_lamp(lamp, radius) for lamp in lamps]
     for obj in made:
         scene.collection.objects.link(obj)
-        obj.parent = rig
+        obj.parent = carrier
     return made
 
 

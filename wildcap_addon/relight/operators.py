@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: the maps into a material, and a picture under a light."""
+"""Operators: the maps into a material, and pictures under a light, all lights, or one that goes around."""
 
 import bpy
 
 from .. import captures, colours, hdri
 from ..base_operator import BaseOperator
-from . import headless, material
+from . import contact_sheet, headless, material, output
 
 
 class WILDCAP_OT_assemble_material(BaseOperator, bpy.types.Operator):
@@ -25,22 +25,56 @@ class WILDCAP_OT_assemble_material(BaseOperator, bpy.types.Operator):
         self.warn(colours.missing(skin.node_tree.nodes[material.IMAGES[0][0]].image))
 
 
-class WILDCAP_OT_render(BaseOperator, bpy.types.Operator):
-    """Render the head with Cycles under the chosen light, to renders in the capture folder"""
+class Render(BaseOperator):
+    """Mixin: renders the active head; Blender's render window shows it, and Esc there stops it."""
+
+    @classmethod
+    def poll(cls, context):
+        return (cls.in_object_mode(context) and cls.with_capture(context)
+                and cls.allowed(not output.busy(), "Blender is rendering: wait for it, or press Esc in its window"))
+
+    def work(self, context):
+        item = captures.require(context)
+        self.warn(colours.missing_view(context.scene))
+        self.render(captures.require_head(context, item), captures.folder(item).renders, context.scene.wildcap)
+
+    def render(self, obj, folder, props):
+        raise NotImplementedError
+
+
+class WILDCAP_OT_render(Render, bpy.types.Operator):
+    """Render the head with Cycles under the chosen light, to renders in the capture folder: a picture, and a linear EXR beside it"""
 
     bl_idname = "wildcap.render"
     bl_label = "Render"
 
-    @classmethod
-    def poll(cls, context):
-        return cls.in_object_mode(context) and cls.with_capture(context)
-
-    def work(self, context):
-        item = captures.require(context)
-        props = context.scene.wildcap
-        self.warn(colours.missing_view(context.scene))
-        headless.render_light(captures.require_head(context, item), captures.folder(item).renders, hdri.light(props), props.resolution, props.samples,
-                              props.hdri_rotation, wait=bpy.app.background)
+    def render(self, obj, folder, props):
+        headless.render_light(obj, folder, hdri.light(props), wait=bpy.app.background, **look(props))
 
 
-CLASSES = (WILDCAP_OT_assemble_material, WILDCAP_OT_render)
+class WILDCAP_OT_contact_sheet(Render, bpy.types.Operator):
+    """Render the head in all of the lights, joined to one picture: renders/contact_sheet.png"""
+
+    bl_idname = "wildcap.contact_sheet"
+    bl_label = "Contact Sheet"
+
+    def render(self, obj, folder, props):
+        contact_sheet.render(obj, folder, bpy.app.background, **look(props))
+
+
+class WILDCAP_OT_turntable(Render, bpy.types.Operator):
+    """Render the head or the light once around, to renders/turntable"""
+
+    bl_idname = "wildcap.turntable"
+    bl_label = "Turntable"
+
+    def render(self, obj, folder, props):
+        headless.turntable(obj, folder, hdri.light(props), props.turns, props.turn_frames, props.turn_file == 'MP4', bpy.app.background, **look(props))
+
+
+def look(props) -> dict:
+    """What the scene's settings ask of picture.set_up."""
+    return {"resolution": props.resolution, "samples": props.samples, "turn": props.hdri_rotation, "view": props.view}
+
+
+CLASSES = (WILDCAP_OT_assemble_material, WILDCAP_OT_render, WILDCAP_OT_contact_sheet, WILDCAP_OT_turntable)

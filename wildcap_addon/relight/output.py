@@ -31,10 +31,15 @@ class Running:
 _running = Running()
 
 
+def busy() -> bool:
+    """Whether Blender is rendering: it does one render at a time."""
+    return bpy.app.is_job_running('RENDER')
+
+
 def still(scene: bpy.types.Scene, path: Path, wait: bool) -> None:
     """Renders `path`, a PNG, and its EXR. wait=False returns at once and shows Blender's render window. Raises Problem when the folder cannot be written."""
     global _running
-    _make_room(path)
+    make_room(path)
     _running = Running(stills={scene.frame_current: path})
     scene.render.filepath = str(_hidden(path))
     bpy.ops.render.render('EXEC_DEFAULT' if wait else 'INVOKE_DEFAULT', write_still=True, scene=scene.name)
@@ -43,7 +48,7 @@ def still(scene: bpy.types.Scene, path: Path, wait: bool) -> None:
 def stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: Callable[[], None]) -> None:
     """As `still`, for the frames 1, 2, ... of the scene; `then` is called when all are there."""
     global _running
-    _make_room(paths[0])
+    make_room(paths[0])
     scene.frame_start, scene.frame_end = 1, len(paths)
     _running = Running(stills=dict(enumerate(paths, 1)), then=then)
     _animate(scene, _hidden(paths[0]).with_name(".frame_####.png"), wait)
@@ -52,7 +57,7 @@ def stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: Callable
 def frames(scene: bpy.types.Scene, folder: Path, name: str, count: int, wait: bool) -> None:
     """Renders the frames 1 to `count` to folder/name, which holds #### or is a film's; the folder replaces the one before when all are there."""
     global _running
-    _make_room(folder / name)
+    make_room(folder / name)
     hidden = _hidden(folder)
     shutil.rmtree(hidden, ignore_errors=True)
     scene.frame_start, scene.frame_end = 1, count
@@ -66,7 +71,8 @@ def _animate(scene, path: Path, wait: bool) -> None:
     bpy.ops.render.render('EXEC_DEFAULT' if wait else 'INVOKE_DEFAULT', animation=True, scene=scene.name)
 
 
-def _make_room(path: Path) -> None:
+def make_room(path: Path) -> None:
+    """Makes the folder of a file. Raises Problem when it cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         probe = _hidden(path)

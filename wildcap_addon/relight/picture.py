@@ -89,6 +89,7 @@ def _camera(scene, frame: Matrix, radius: float) -> None:
         camera = bpy.data.objects.new(data.name, data)
         scene.collection.objects.link(camera)
         scene.camera = camera
+    lights.stop(camera)
     camera.data.lens = FOCAL_LENGTH_MM
     direction = Vector(CAMERA_DIRECTION).normalized()
     distance = radius * 1.12 / tan(camera.data.angle / 2)

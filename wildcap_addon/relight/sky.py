@@ -36,7 +36,10 @@ def world() -> bpy.types.World:
     """The relight scene's world, with a background at strength 1 and nothing before it."""
     found = bpy.data.worlds.get(WORLD) or bpy.data.worlds.new(WORLD)
     found.use_nodes = True
+    action = found.node_tree.animation_data.action if found.node_tree.animation_data else None
     found.node_tree.animation_data_clear()
+    if action is not None and action.users == 0:
+        bpy.data.actions.remove(action)
     for node in [n for n in found.node_tree.nodes if n.type not in ('BACKGROUND', 'OUTPUT_WORLD')]:
         found.node_tree.nodes.remove(node)
     background = next(n for n in found.node_tree.nodes if n.type == 'BACKGROUND')

@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The map set of a delivery: channels packed, normals flipped, sizes, bit depth and colour space as the target wants them.
+
+A map that the capture lacks is left out.
+"""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+from .. import images
+from ..delivery_plan import Plan
+from ..delivery_presets import COLOUR, NORMAL, Picture
+
+F0 = 0.0278
+"""What skin of an IOR of 1.4 reflects at normal incidence, ((1.4 - 1) / (1.4 + 1))^2, where the specular map is at its mean of facial skin."""
+UNREAL_F0 = 0.08
+"""What Unreal's Specular of 1 reflects at normal incidence."""
+STRIP = 256
+"""Rows that are worked on at once."""
+
+
+class Sources:
+    """The maps of one UV tile, read when they are asked for, at one size. `paths`: albedo, normal, specular, clean, lit ... -> file;
+    `mean` is the specular map's mean on facial skin, `roughness` what holds where there is no map of it, `unit` the metres that 1 is."""
+
+    def __init__(self, paths: dict[str, Path], size: int, roughness: float, mean: float, unit: float = 1.0):
+        self.paths, self.roughness, self.mean, self.unit = paths, roughness, mean, unit
+        stored = [images.size(path)[0] for name, path in paths.items() if name in ("albedo", "normal")]
+        self.size = min([size, *stored])
+        self._read: dict[str, np.ndarray] = {}
+
+    def has(self, picture: Picture) -> bool:
+        """Whether all files are there that the picture's channels come from; roughness needs none."""
+        return {_file_of(term) for term in picture.channels} - {"roughness", ""} <= set(self.paths)
+
+    def channel(self, term: str) -> np.ndarray:
+        """One channel float32 [S, S]: linear light of albedo, clean and lit, x, y, z of the normal in [-1, 1], stored values of the rest."""
+        name, _, part = term.partition(".")
+        if part:
+            return self._file(name)[..., "rgbxyz".index(part) % 3]
+        if term in ("0", "1"):
+            return np.full((self.size, self.size), float(term), np.float32)
+        if term in ("roughness", "smoothness"):
+            rough = self._file("roughness") if "roughness" in self.paths else np.full((self.size, self.size), self.roughness, np.float32)
+            return rough if term == "roughness" else 1 - rough
+        if term in ("level", "weight", "f0", "unreal_specular"):
+            level = np.clip(0.5 * self._file("specular") / max(self.mean, 1e-6), 0, 1)  # as the node group WildCap Skin has it
+            return (level * {"level": 1.0, "weight": 2.0, "f0": 2 * F0, "unreal_specular": 2 * F0 / UNREAL_F0}[term]).astype(np.float32)
+        values = self._file(term)
+        return values / self.unit if term == "displacement" else values
+
+    def _file(self, name: str) -> np.ndarray:
+        if name not in self._read:
+            read = {"albedo": images.read_linear, "clean": images.read_linear, "lit": images.read_linear, "normal": _read_normal}.get(name, images.read_mask)
+            self._read[name] = _sized(read(self.paths[name]), self.size, name == "normal")
+        return self._read[name]
+
+
+def write(picture: Picture, sources: Sources, path: Path, plan: Plan) -> None:
+    """One file of the set, atomically. The picture's files must be there (Sources.has)."""
+    bits = {"png8": 8, "png16": 16, "exr": 16}[plan.pictures]
+    as_it_is = picture.channels[0].endswith((".r", ".x")) and len(picture.channels) == 3 and _file_of(picture.channels[0])
+    if as_it_is and _stored_alike(picture, sources, plan, as_it_is):
+        shutil.copyfile(sources.paths[as_it_is], path)  # byte for byte what the worker's stage wrote
+        return
+    pixels = np.stack([sources.channel(term) for term in picture.channels], 2)
+    if picture.kind == NORMAL:
+        if plan.normals == "directx":
+            pixels[..., 1] *= -1
+        images.write_data(path, pixels * 0.5 + 0.5, bits)
+        return
+    if picture.kind == COLOUR and plan.colour == "srgb":
+        for row in range(0, len(pixels), STRIP):
+            pixels[row:row + STRIP, :, :3] = images.linear_to_srgb(pixels[row:row + STRIP, :, :3])
+    if pixels.shape[2] == 4:
+        images.write_packed(path, pixels, bits, srgb=picture.kind == COLOUR and plan.colour == "srgb")
+    elif picture.kind == COLOUR:
+        images.write_linear(path, pixels) if plan.colour == "linear" else images.write_srgb(path, pixels, bits)
+    else:
+        images.write_data(path, pixels[..., 0] if pixels.shape[2] == 1 else pixels, bits)
+
+
+def _file_of(term: str) -> str:
+    """The file that a channel comes from, '' for a constant."""
+    if term in ("0", "1"):
+        return ""
+    name = term.partition(".")[0]
+    return {"level": "specular", "weight": "specular", "f0": "specular", "unreal_specular": "specular", "smoothness": "roughness"}.get(name, name)
+
+
+def _stored_alike(picture: Picture, sources: Sources, plan: Plan, name: str) -> bool:
+    """Whether the capture's own file is the one that is wanted: 16 bit PNG of that size, sRGB or OpenGL."""
+    source = sources.paths[name]
+    right = plan.colour == "srgb" if picture.kind == COLOUR else plan.normals == "opengl"
+    return right and plan.pictures == "png16" and source.suffix == ".png" and images.bits(source) == 16 and images.size(source) == (sources.size, sources.size)
+
+
+def _read_normal(path: Path) -> np.ndarray:
+    return images.read_data(path)[..., :3] * 2 - 1
+
+
+def _sized(pixels: np.ndarray, size: int, unit: bool) -> np.ndarray:
+    """[S, S(, C)] made smaller by averaging; normals stay of length 1."""
+    if pixels.shape[:2] == (size, size):
+        return pixels
+    pixels = images.resize(pixels, size, size)
+    return pixels / np.maximum(np.linalg.norm(pixels, axis=2, keepdims=True), 1e-6) if unit else pixels

@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What one delivery comes to: the settings with the preset's own choices filled in, its folder, and how that is put in place as a whole.
+
+Ground floor: standard library only. The worker makes the maps in a folder beside the target, Blender adds the mesh, and then the folder gets its name.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import unicodedata
+from dataclasses import dataclass
+from pathlib import Path
+
+from .capture import Capture, storage_problem
+from .delivery_presets import FORMATS, PICTURES, PRESETS, WHAT, Format, Preset
+from .messages import Problem
+from .settings import DeliverSettings
+
+PROVENANCE = "provenance.json"
+PACKING = "packing.json"
+TEXTURES = "textures"
+MADE_BY = "WildCap for Blender"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """`name` begins every file's name; `pictures` is 'png8', 'png16' or 'exr'; `colour` 'srgb' or 'linear'; `normals` 'opengl' or 'directx'; `unit` 'm'
+    or 'cm'; `target` is the folder, `staged` what it is until it is whole."""
+
+    name: str
+    what: str
+    preset: Preset
+    format: Format
+    pictures: str
+    colour: str
+    normals: str
+    unit: str
+    numbered: bool
+    target: Path
+    staged: Path
+
+    @property
+    def suffix(self) -> str:
+        return ".exr" if self.pictures == "exr" else ".png"
+
+    @property
+    def mesh(self) -> str:
+        """The mesh file's name."""
+        return self.name + self.format.suffix
+
+    def material(self, tile: int, several: bool) -> str:
+        """Name of the material of a UV tile."""
+        return f"{self.name}_{tile}" if several else self.name
+
+
+def plan(capture: Capture, settings: DeliverSettings) -> Plan:
+    """Raises Problem for choices that do not go together, and for a folder that holds what is not ours."""
+    preset = PRESETS[settings.preset]
+    format_name = preset.format if settings.format == "preset" else settings.format
+    format = FORMATS[format_name]
+    pictures = preset.pictures if settings.pictures == "preset" else settings.pictures
+    if pictures not in format.pictures:
+        if settings.pictures != "preset":
+            raise Problem(f"{format.title} cannot hold {PICTURES[pictures]} pictures.", "Choose PNG, or another format.")
+        pictures = "png16"
+    colour = ("linear" if pictures == "exr" else "srgb") if settings.colour == "preset" else settings.colour
+    if colour == "linear" and format.pictures == ("png8", "png16"):
+        raise Problem("glTF takes its colours as sRGB only.", "Choose sRGB, or another format.")
+    if colour == "srgb" and pictures == "exr":
+        raise Problem("EXR pictures hold linear light.", "Choose Linear, or PNG for sRGB.")
+    if colour == "linear" and pictures == "png8":
+        raise Problem("8 bits are too few for linear colours: dark skin would show steps.", "Choose PNG with 16 bit, EXR, or sRGB.")
+    name = safe_name(capture.root.stem)
+    base = Path(settings.folder).expanduser() if settings.folder else capture.exports
+    target = base / f"{name}_{settings.what}_{settings.preset}_{format_name}"
+    _check(target)
+    numbered = preset.numbered if settings.udim == "preset" else settings.udim == "numbered"
+    return Plan(name, settings.what, preset, format, pictures, colour, format.normals or preset.normals, format.unit or preset.unit, numbered,
+                target, target.with_name(f".{target.name}.staged"))
+
+
+def safe_name(text: str) -> str:
+    """Letters, digits, hyphens and underscores, which every program takes in a file's name; accents are dropped. 'head' where nothing is left."""
+    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    return re.sub(r"[^A-Za-z0-9_-]+", "_", plain).strip("_") or "head"
+
+
+def needs(capture: Capture, what: str) -> Path:
+    """The mesh that is delivered. Raises Problem where the capture does not have it."""
+    mesh = {"head": capture.head, "own_mesh": capture.delivery / "own_head.obj", "scan": capture.delivery / "scan.obj"}[what]
+    if not mesh.is_file():
+        remedy = {"head": "Click Reconstruct first.", "own_mesh": "Choose your mesh under Reconstruction, Head Mesh, and run the stages to the end.",
+                  "scan": "Run the stage Delivery with its scan switched on."}[what]
+        raise Problem(f"This capture has no {WHAT[what][0].lower()} to deliver.", remedy)
+    return mesh
+
+
+def put_in_place(plan: Plan) -> None:
+    """The staged folder gets its name; an older delivery there goes only then. Raises Problem where that cannot be."""
+    old = plan.target.with_name(f".{plan.target.name}.old")
+    try:
+        _check(plan.target)
+        shutil.rmtree(old, ignore_errors=True)
+        if plan.target.exists():
+            os.replace(plan.target, old)
+        try:
+            os.replace(plan.staged, plan.target)
+        except OSError:
+            if old.exists():
+                os.replace(old, plan.target)
+            raise
+        shutil.rmtree(old, ignore_errors=True)
+    except OSError as error:
+        raise storage_problem(error, plan.target) from error
+
+
+def discard(plan: Plan) -> None:
+    """Removes what a delivery that did not end has left."""
+    for left in [plan.staged, *plan.target.parent.glob(f".{plan.staged.name}.*.tmp")]:
+        shutil.rmtree(left, ignore_errors=True)
+
+
+def _check(target: Path) -> None:
+    """Raises Problem for a folder that no delivery has made: it would be replaced as a whole."""
+    try:
+        if not target.exists() or target.is_dir() and not any(target.iterdir()):
+            return
+        made_by = json.loads((target / PROVENANCE).read_text(encoding="utf-8")).get("made_by")
+    except (OSError, ValueError, AttributeError):
+        made_by = None
+    if made_by != MADE_BY:
+        raise Problem(f"{target} holds files that no delivery has put there.", "Move them away, or choose another folder to deliver to.")

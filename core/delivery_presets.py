@@ -1,0 +1,154 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a head goes: per target the names, packing, units and normals of its maps; per file format what it cannot hold. Written here and nowhere else.
+
+Ground floor: standard library only. Shown by the add-on beside the choice, by `python -m core presets`, and in docs/guide.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+COLOUR, NORMAL, DATA = "colour", "normal", "data"
+ALBEDO = ("albedo.r", "albedo.g", "albedo.b")
+TANGENT = ("normal.x", "normal.y", "normal.z")
+F0 = ("f0", "f0", "f0")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One file of a map set. `channels` are terms of core/deliver/maps.py or the constants "0" and "1"; COLOUR is stored in the chosen colour space,
+    NORMAL as OpenGL or DirectX, DATA as it is. `slot` is the input of the exported material that the file is linked to, '' for none."""
+
+    name: str
+    channels: tuple[str, ...]
+    kind: str = DATA
+    slot: str = ""
+
+
+@dataclass(frozen=True)
+class Format:
+    """A mesh file. `unit` and `normals` '': the preset decides. `pictures`: the kinds it can refer to. `drops`: what it loses, whole sentences."""
+
+    title: str
+    suffix: str
+    drops: tuple[str, ...]
+    unit: str = ""
+    normals: str = ""
+    pictures: tuple[str, ...] = ("png8", "png16", "exr")
+    shape_keys: bool = True
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A target. `hint` says in one sentence how it is brought in there. Y is up in every format but USD, which says its own axis."""
+
+    title: str
+    hint: str
+    format: str
+    unit: str
+    normals: str
+    pictures: str
+    numbered: bool
+    maps: tuple[Picture, ...]
+
+
+_GLTF = (
+    "glTF has no subsurface scattering and no displacement: set them in the program that opens it.",
+    "The specular map is not linked in it; it lies beside the file.",
+)
+FORMATS = {
+    "glb": Format("glTF, one file", ".glb", _GLTF, unit="m", normals="opengl", pictures=("png8", "png16")),
+    "gltf": Format("glTF with files", ".gltf", _GLTF, unit="m", normals="opengl", pictures=("png8", "png16")),
+    "usd": Format("USD", ".usdc", ("USD's preview material has no subsurface scattering; displacement and specular map lie beside the file.",),
+                  unit="m", normals="opengl"),
+    "fbx": Format("FBX", ".fbx", ("FBX's material has no subsurface scattering, so no scale of it either, and no displacement.",
+                                  "What does not read FBX's roughness and specular links needs those maps set by hand."), unit="cm"),
+    "obj": Format("OBJ", ".obj", ("OBJ has no shape keys and no units.", "Its MTL has no subsurface scattering, and many programs ignore its normal map."),
+                  shape_keys=False),
+}
+
+PICTURES = {"png8": "PNG, 8 bit", "png16": "PNG, 16 bit", "exr": "EXR, half float"}
+
+PRESETS = {
+    "blender": Preset(
+        "Blender", "Import it: the maps are linked; for skin with scattering, Assemble Material in this add-on.", "glb", "m", "opengl", "png16", False, (
+            Picture("{name}_albedo", ALBEDO, COLOUR, "base_color"),
+            Picture("{name}_normal", TANGENT, NORMAL, "normal"),
+            Picture("{name}_roughness", ("roughness",), DATA, "roughness"),
+            Picture("{name}_specular_level", ("level",)),
+        )),
+    "metahuman": Preset(
+        "MetaHuman from Mesh", "Import it as a static mesh for a MetaHuman Identity, which wants to see open eyes.", "fbx", "cm", "directx", "png8", False, (
+            Picture("T_{name}_Color", ALBEDO, COLOUR, "base_color"),
+        )),
+    "unreal": Preset(
+        "Unreal", "Leave Flip Green Channel off; switch sRGB off for all maps but BaseColor.", "fbx", "cm", "directx", "png8", False, (
+            Picture("T_{name}_BaseColor", ALBEDO, COLOUR, "base_color"),
+            Picture("T_{name}_N", TANGENT, NORMAL, "normal"),
+            Picture("T_{name}_ORM", ("1", "roughness", "0")),
+            Picture("T_{name}_Specular", ("unreal_specular",), DATA, "specular"),
+        )),
+    "unity_hdrp": Preset(
+        "Unity HDRP", "A Lit material of the type Subsurface Scattering; reflectance at normal incidence comes from its diffusion profile (IOR 1.4).",
+        "fbx", "cm", "opengl", "png8", False, (
+            Picture("{name}_BaseMap", ALBEDO, COLOUR, "base_color"),
+            Picture("{name}_NormalMap", TANGENT, NORMAL, "normal"),
+            Picture("{name}_MaskMap", ("0", "1", "1", "smoothness")),
+        )),
+    "unity_urp": Preset(
+        "Unity URP", "A Lit material with the workflow Specular; its smoothness is in the specular map's alpha.", "fbx", "cm", "opengl", "png8", False, (
+            Picture("{name}_BaseMap", ALBEDO, COLOUR, "base_color"),
+            Picture("{name}_BumpMap", TANGENT, NORMAL, "normal"),
+            Picture("{name}_SpecGlossMap", (*F0, "smoothness"), COLOUR),
+        )),
+    "character_creator": Preset(
+        "Character Creator", "Give it to Headshot's mesh mode, or as a prop with the maps in its PBR channels.", "obj", "cm", "opengl", "png8", False, (
+            Picture("{name}_Diffuse", ALBEDO, COLOUR, "base_color"),
+            Picture("{name}_Normal", TANGENT, NORMAL, "normal"),
+            Picture("{name}_Roughness", ("roughness",), DATA, "roughness"),
+            Picture("{name}_Specular", ("weight",), DATA, "specular"),
+        )),
+    "arnold": Preset(
+        "Arnold", "The files are named after standard_surface's parameters: specular is a weight for specular_IOR 1.4.", "fbx", "cm", "opengl", "exr", True, (
+            Picture("{name}_base_color", ALBEDO, COLOUR, "base_color"),
+            Picture("{name}_normal_camera", TANGENT, NORMAL, "normal"),
+            Picture("{name}_specular", ("weight",), DATA, "specular"),
+            Picture("{name}_specular_roughness", ("roughness",), DATA, "roughness"),
+            Picture("{name}_displacement", ("displacement",)),
+        )),
+    "redshift": Preset(
+        "Redshift", "The files are named after the Standard Material's inputs: refl_weight is for refl_ior 1.4.", "fbx", "cm", "opengl", "exr", True, (
+            Picture("{name}_base_color", ALBEDO, COLOUR, "base_color"),
+            Picture("{name}_bump_input", TANGENT, NORMAL, "normal"),
+            Picture("{name}_refl_weight", ("weight",), DATA, "specular"),
+            Picture("{name}_refl_roughness", ("roughness",), DATA, "roughness"),
+            Picture("{name}_displacement", ("displacement",)),
+        )),
+}
+
+HAIR = (
+    Picture("{name}_brows_mask", ("brows",)), Picture("{name}_lashes_mask", ("lashes",)), Picture("{name}_beard_mask", ("beard",)),
+    Picture("{name}_clean_albedo", ("clean.r", "clean.g", "clean.b"), COLOUR),
+)
+"""What goes along with every preset where the capture has it: masks to groom hair by, and the skin below."""
+
+WHAT = {
+    "head": ("Head", "The head in its own UVs, with its shape keys"),
+    "own_mesh": ("My Mesh", "Your own head mesh, fitted to the face, with the maps in its UVs"),
+    "scan": ("Scan", "The raw scan with UVs, as filmed and as albedo"),
+}
+SCAN_MAPS = (Picture("{name}_albedo", ALBEDO, COLOUR, "base_color"), Picture("{name}_lit", ("lit.r", "lit.g", "lit.b"), COLOUR))
+"""Of the scan, whatever the preset: it has no other maps."""
+
+
+def markdown() -> str:
+    """The table of docs/guide.md."""
+    lines = ["| preset | mesh | unit | normals | pictures | maps |", "| --- | --- | --- | --- | --- | --- |"]
+    for preset in PRESETS.values():
+        names = ", ".join(f"`{picture.name.format(name='NAME')}{'.1001' if preset.numbered else ''}`" for picture in preset.maps)
+        normals = {"opengl": "OpenGL, Y+", "directx": "DirectX, Y-"}[FORMATS[preset.format].normals or preset.normals]
+        lines.append(f"| {preset.title} | {FORMATS[preset.format].title} | {FORMATS[preset.format].unit or preset.unit} | {normals} "
+                     f"| {PICTURES[preset.pictures]} | {names} |")
+    lines += ["", "| format | what it drops |", "| --- | --- |"]
+    return "\n".join([*lines, *(f"| {each.title} (`{each.suffix}`) | {' '.join(each.drops)} |" for each in FORMATS.values())])

@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The contact sheet: a head in all light presets in one picture, each with its name, and below them how all of it is shown.
+
+    renders/contact_sheet.png, and the pictures it is made of as renders/PRESET.png and .exr
+"""
+
+import os
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
+
+from ..properties import LIGHTS
+from . import captions, lights, output, picture, reel
+
+NAME = "contact_sheet.png"
+COLUMNS = 3
+GROUND = 0.07
+"""Of the caption rows, sRGB"""
+
+
+def render(obj: bpy.types.Object, folder: Path, wait: bool, **look) -> Path:
+    """Renders the head in every preset and joins the pictures. `look`: as picture.set_up takes it. wait=False returns at once. Raises Problem when the
+    folder cannot be written."""
+    presets = tuple(name for name, *_ in LIGHTS if name in lights.PRESETS)
+    scene = reel.each_light(obj, presets, **look)
+    size = look["resolution"]
+    names = {name: iface_(label) for name, label, *_ in LIGHTS}
+    rows = [[names[p] for p in presets[i:i + COLUMNS]] for i in range(0, len(presets), COLUMNS)]
+    about = [iface_("{} · {} · Cycles, {} samples").format(obj.name, picture.view_label(scene), look["samples"])]
+    paths, sheet = [folder / f"{name}.png" for name in presets], folder / NAME
+    output.make_room(sheet)
+    strips = captions.draw([*rows, about], COLUMNS * size, max(size // 14, 8), folder)
+    output.stills(scene, paths, wait, lambda: _save(_joined(paths, strips, size), sheet))
+    return sheet
+
+
+def _joined(paths: list[Path], strips: list[np.ndarray], size: int) -> np.ndarray:
+    """[H, W, 3], rows from the bottom: rows of pictures, each over its captions, and the last strip."""
+    strips = [GROUND + (1 - GROUND) * np.repeat(strip, 3, 2) for strip in strips]
+    rows = []
+    for i, strip in zip(range(0, len(paths), COLUMNS), strips, strict=False):
+        cells = [_read(path) for path in paths[i:i + COLUMNS]]
+        cells += [np.full((size, size, 3), GROUND, np.float32)] * (COLUMNS - len(cells))
+        rows += [np.hstack(cells), strip]
+    return np.vstack([*rows, strips[-1]][::-1])
+
+
+def _read(path: Path) -> np.ndarray:
+    """A picture's numbers [H, W, 3] as they are in the file, rows from the bottom."""
+    image = bpy.data.images.load(str(path))
+    image.colorspace_settings.is_data = True
+    pixels = np.empty(4 * image.size[0] * image.size[1], np.float32)
+    image.pixels.foreach_get(pixels)
+    shape = image.size[1], image.size[0], 4
+    bpy.data.images.remove(image)
+    return pixels.reshape(shape)[..., :3]
+
+
+def _save(pixels: np.ndarray, path: Path) -> None:
+    image = bpy.data.images.new(NAME, pixels.shape[1], pixels.shape[0])
+    image.pixels.foreach_set(np.concatenate([pixels, np.ones_like(pixels[..., :1])], 2).astype(np.float32).ravel())
+    temporary = path.with_name(f".{path.name}")
+    image.file_format, image.filepath_raw = 'PNG', str(temporary)
+    image.save()
+    bpy.data.images.remove(image)
+    os.replace(temporary, path)

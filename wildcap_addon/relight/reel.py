@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Several pictures in one render, which Esc stops as it does any of Blender's: each frame has a light of its own, or the head or the light turns.
+
+Every frame has its key, so nothing lies in between; the head, which is the artist's object, has none: where it turns, all else turns the other way.
+"""
+
+from math import tau
+
+import bpy
+from mathutils import Matrix
+
+from ..hdri import Hdri
+from . import lights, picture, sky
+
+
+def each_light(obj: bpy.types.Object, presets: tuple[str, ...], **look) -> bpy.types.Scene:
+    """The relight scene in which frame i, from 1 on, has the light presets[i - 1]. `look`: as picture.set_up takes it."""
+    scene = picture.set_up(obj, presets[0], **look)
+    lights.clear(scene)
+    frame, radius = picture.frame_of(obj)
+    frame = frame @ Matrix.Rotation(look.get("turn", 0.0), 4, 'Z')
+    for i, name in enumerate(presets, 1):
+        preset = lights.preset(name)
+        for lamp in lights.add_lamps(scene, preset.lamps, frame, radius):
+            for at in range(1, len(presets) + 1):
+                lamp.hide_render = at != i
+                lamp.keyframe_insert("hide_render", frame=at)
+        for socket, colour in zip(sky.sockets(scene.world), sky.colours(preset.sky), strict=True):
+            socket.default_value = colour
+            socket.keyframe_insert("default_value", frame=i)
+    return scene
+
+
+def turning(obj: bpy.types.Object, light: str | Hdri, turns: str, frames: int, **look) -> bpy.types.Scene:
+    """The relight scene in which, over the frames 1 to `frames`, the 'HEAD' or the 'LIGHT' goes once around, counter-clockwise from above."""
+    scene = picture.set_up(obj, light, **look)
+    frame, _ = picture.frame_of(obj)
+    rig, camera = lights.rig(scene), scene.camera
+    moved = [o for o in (rig, camera if turns == 'HEAD' else None) if o is not None]
+    start = {o: o.matrix_world.copy() for o in moved}
+    mapping = next((n for n in scene.world.node_tree.nodes if n.type == 'MAPPING'), None) if isinstance(light, Hdri) else None
+    first = mapping.inputs["Rotation"].default_value[2] if mapping else 0.0
+    for i in range(frames):
+        angle = tau * i / frames * (-1 if turns == 'HEAD' else 1)
+        around = frame @ Matrix.Rotation(angle, 4, 'Z') @ frame.inverted()
+        for o in moved:
+            o.matrix_world = around @ start[o]
+            o.keyframe_insert("location", frame=i + 1)
+            o.keyframe_insert("rotation_euler", frame=i + 1)
+        if mapping:
+            mapping.inputs["Rotation"].default_value[2] = first - angle
+            mapping.inputs["Rotation"].keyframe_insert("default_value", frame=i + 1)
+    return scene
+
+
+def as_film(scene: bpy.types.Scene, frames_per_second: int) -> None:
+    """Frames go into one MP4 (H.264)."""
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):  # Blender 5
+        settings.media_type = 'VIDEO'
+    settings.file_format = 'FFMPEG'
+    film = scene.render.ffmpeg
+    film.format, film.codec, film.constant_rate_factor, film.audio_codec = 'MPEG4', 'H264', 'HIGH', 'NONE'
+    scene.render.fps, scene.render.fps_base = frames_per_second, 1.0
+
+
+def can_film() -> bool:
+    """Whether this Blender was built with FFmpeg."""
+    return bool(bpy.app.build_options.codec_ffmpeg)
