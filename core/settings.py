@@ -127,6 +127,10 @@ class UpscaleSettings:
     """Side of the delivered maps"""
     method: str = setting("lanczos", choices=("network", "lanczos"))
     """How albedo, normals and specular become four times as large: by the network, which sharpens, or by Lanczos resampling, which is quick"""
+    whole_head: bool = setting(True)
+    """Complete neck, ears, scalp and the back of the head from the solved face where no camera saw them; off: the mean face's plain tone"""
+    hair: bool = setting(True)
+    """Find brows, lashes and beard: a mask of each, and the albedo of the skin below them, to groom hair over"""
 
 
 @dataclass(frozen=True)

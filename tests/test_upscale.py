@@ -17,6 +17,7 @@ from core.upscale.enlarge import enlarge, load_network
 from core.upscale.maps import Maps, read_maps
 
 SMALL, LARGE = 256, 1024
+PLAIN = {"whole_head": False, "hair": False}  # test_whole_head.py and test_hair.py look at these
 
 
 def wave(size: int) -> np.ndarray:
@@ -47,7 +48,7 @@ def capture(tmp_path) -> Capture:
 
 def test_every_map_is_met_at_the_new_size(capture):
     report = Reporter("upscale")
-    upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos"}}), report)
+    upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos", **PLAIN}}), report)
     assert {path.name for path in capture.maps_4k.iterdir()} == set(stages.MAPS)
     truth, inner = wave(LARGE), np.s_[16:-16, 16:-16]  # the border has no neighbours to interpolate from
     linear = np.stack([truth, truth ** 2, truth / 2], 2)
@@ -66,7 +67,7 @@ def test_normals_are_unit_edges_do_not_overshoot_and_files_keep_their_depth(capt
     noise /= np.linalg.norm(noise, axis=2, keepdims=True)
     images.write_data(capture.maps / "normal.png", noise * 0.5 + 0.5, bits=16)
     images.write_linear(capture.maps / "diffuse_albedo.exr", np.where(noise > 0, 0.7, 0.0).astype(np.float32))
-    upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos"}}), Reporter("upscale"))
+    upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos", **PLAIN}}), Reporter("upscale"))
     lengths = np.linalg.norm(images.read_data(capture.maps_4k / "normal.png")[..., :3] * 2 - 1, axis=2)
     assert np.percentile(np.abs(lengths - 1), 99) < 1e-3
     albedo = images.read_linear(capture.maps_4k / "diffuse_albedo.exr")
@@ -77,12 +78,12 @@ def test_normals_are_unit_edges_do_not_overshoot_and_files_keep_their_depth(capt
 
 
 def test_maps_of_the_wanted_size_are_left_as_they_are(capture):
-    upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos"}}), Reporter("upscale"))
+    upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos", **PLAIN}}), Reporter("upscale"))
     again = Capture(capture.root.with_name("again.wildcap"))
     capture.maps_4k.rename(capture.root / "kept")
     again.root.mkdir()
     (capture.root / "kept").rename(again.maps)
-    upscale.run(again, from_json({"upscale": {"size": LARGE, "method": "lanczos"}}), Reporter("upscale"))
+    upscale.run(again, from_json({"upscale": {"size": LARGE, "method": "lanczos", **PLAIN}}), Reporter("upscale"))
     for name in ("diffuse_albedo.exr", "shading.exr", "specular_albedo.png"):
         assert np.abs(images.read_data(again.maps_4k / name) - images.read_data(again.maps / name)).max() < 1e-4
 
@@ -95,7 +96,7 @@ def test_a_cancel_between_maps_leaves_no_folder(capture):
         return left[0] < 0
 
     with pytest.raises(CancelledError):
-        upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos"}}), Reporter("upscale", cancelled=soon))
+        upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos", **PLAIN}}), Reporter("upscale", cancelled=soon))
     assert not capture.maps_4k.exists() and not list(capture.root.glob(".*"))
 
 
@@ -154,7 +155,7 @@ def test_a_block_begins_as_the_identity():
 def test_the_stage_takes_the_network(capture, busy, monkeypatch):
     monkeypatch.setattr("core.upscale.enlarge.load_network", lambda: busy)
     report = Reporter("upscale")
-    upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "network"}}), report)
+    upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "network", **PLAIN}}), report)
     assert report.figures["method"] == "network"
     linear, coded = images.read_linear(capture.maps_4k / "diffuse_albedo.exr"), images.read_linear(capture.maps_4k / "diffuse_albedo.png")
     assert coded.shape == (LARGE, LARGE, 3) and np.abs(linear - coded).max() < 2e-3

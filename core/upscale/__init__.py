@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stage upscale: maps/ becomes maps_4k/, the same names at settings.upscale.size.
+"""Stage upscale: maps/ becomes maps_4k/, the same names at settings.upscale.size, the head completed; with masks of the hair and the skin below it.
 
 Albedo, normals and specular are enlarged by a network, or by Lanczos resampling, which adds no detail; light and confidence by resampling.
 """
@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import images
+from .. import images, meshes
 from ..capture import Capture, replacing_folder
 from ..messages import Reporter
 from ..settings import Settings
-from . import gloss
+from . import drawing, gloss, hair
 from .maps import Maps, read_maps
+from .surface import lay_out
+from .whole_head import complete
 
 STRIP = 256
 """Rows that are worked on at once: a whole 4096 map in float32 is 200 MB, and each operation on it would make another."""
@@ -31,6 +33,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.figure("size_from_px", len(maps.diffuse))
     report.figure("size_px", size)
     report.figure("specular_mean", round(gloss.on_cheeks_and_forehead(maps.specular, maps.confidence), 4))
+    maps, found = _whole(capture, maps, settings, report)
     share = SHARES[method]
     large = enlarged(maps, size, method, settings.device, lambda done: report.progress(share * done, 1, "enlarging"))
     with replacing_folder(capture.maps_4k) as folder:
@@ -38,6 +41,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         srgb = large[..., :3]
         images.write_srgb(folder / "diffuse_albedo.png", srgb, bits=16)
         _picture(capture, srgb)
+        if found is not None:
+            hair.write(folder, srgb, *found)
         _by_strips(srgb, images.srgb_to_linear)
         images.write_linear(folder / "diffuse_albedo.exr", srgb)
         report.progress(share + 0.6 * (1 - share), 1, "writing normals and specular albedo")
@@ -50,6 +55,29 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         images.write_data(folder / "confidence.png", _resampled(maps.confidence, size))
         images.write_linear(folder / "shading.exr", _resampled(maps.shading, size))
     report.progress(1, 1)
+
+
+def _whole(capture: Capture, maps: Maps, settings: Settings, report: Reporter) -> tuple[Maps, tuple | None]:
+    """The maps of the whole head; the hair's masks, the albedo without it and where that differs, or None where they are not asked for."""
+    options = settings.upscale
+    if not (options.whole_head or options.hair):
+        return maps, None
+    report.progress(0, 1, "laying out the head")
+    surface = lay_out(meshes.read_obj(capture.head), len(maps.diffuse), report.check)
+    if options.whole_head:
+        report.progress(0, 1, "completing neck, ears and scalp")
+        seen, maps = maps, complete(maps, surface, report, settings.seed)
+        images.write_srgb(capture.picture("upscale", "before_and_after_completion"), drawing.turned(surface, [seen, maps]))
+    if not options.hair:
+        return maps, None
+    report.progress(0, 1, "finding brows, lashes and beard")
+    found = hair.find(maps, surface)
+    report.check()
+    cleaned, share = hair.clean(maps, found, surface, settings.seed)
+    for name in ("brows", "lashes", "beard"):
+        report.figure(f"{name}_cm2", round(float((getattr(found, name) * surface.texel**2).sum()) / 100, 2))
+    images.write_srgb(capture.picture("upscale", "albedo_hair_skin_below"), drawing.masks(maps.diffuse, found, cleaned))
+    return maps, (found, cleaned, share)
 
 
 def enlarged(maps: Maps, size: int, method: str, device: str, progress) -> np.ndarray:

@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pores and mottling like those of the solved skin, where no camera saw any: their strength and their colours are measured band by band on the skin that
+was seen, and noise of the same bands is painted at points in space, so that no UV seam shows.
+
+Colour, gloss and height share one noise where they go together on the solved skin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from scipy.optimize import nnls
+
+from ..noise import noise
+from .surface import HeadSurface
+
+SIGMAS = (0.24, 0.48, 0.96, 1.92)
+"""mm; the bands lie between them, the first one below the first."""
+WAVELENGTHS = (0.55, 1.1, 2.2, 4.4)
+"""mm; of the noises that are mixed, one for each band. What is larger differs from place to place for a reason (blood, bone, light) and is left to the tone:
+repeated as noise it looks like a stain."""
+STEP = 0.05
+"""mm between two points of whose heights a slope is taken."""
+BLUNT = 1.2
+"""How many texels a wavelength must span at least to be painted in full."""
+SAMPLE = 200_000
+"""So many texels are enough to measure how a noise answers to the bands."""
+
+
+@dataclass(frozen=True)
+class Grain:
+    """Per wavelength: mix [K, 4, 4], from independent noises (the first carries the most) to log albedo [3] and specular; slope [K]: height's
+    contribution to either slope of the normal; tie [K]: 1 where bright is high."""
+
+    mix: np.ndarray
+    slope: np.ndarray
+    tie: np.ndarray
+
+
+def measure(channels: np.ndarray, slopes: np.ndarray, weight: np.ndarray, surface: HeadSurface, seed: int = 0) -> Grain:
+    """channels [S, S, 4]: log albedo and specular; slopes [S, S, 2]: of the normal, x / z and y / z; weight [S, S]: where there is skin to learn from."""
+    where = weight > 0.99
+    texel = float(np.median(surface.texel[where])) if where.any() else 1.0
+    parts = [bands(picture, weight, texel) for picture in (channels, slopes)]
+    found = [[np.cov(_clipped(band[where]), rowvar=False) if where.sum() > 100 else np.zeros((band.shape[-1],) * 2) for band in part] for part in parts]
+    answer, answer_slope = _answers(surface, where, texel, np.random.default_rng([seed, 1]))
+    mix, tie = np.zeros((len(WAVELENGTHS), 4, 4)), np.ones(len(WAVELENGTHS))
+    strength = np.stack([nnls(answer, [cov[i, i] for cov in found[0]])[0] for i in range(4)], 1)  # [K, 4] variances
+    for k, variance in enumerate(strength):
+        deviation = np.sqrt(np.maximum(np.diag(found[0][k]), 1e-12))
+        together = found[0][k] / np.outer(deviation, deviation)
+        values, vectors = np.linalg.eigh(together * np.sqrt(np.outer(variance, variance)))
+        mix[k] = (vectors * np.sqrt(np.maximum(values, 0)))[:, ::-1]
+        tie[k] = 1.0 if mix[k][:3, 0].sum() >= 0 else -1.0
+    slope = np.sqrt(nnls(answer_slope, [np.trace(cov) / 2 for cov in found[1]])[0])
+    return Grain(mix, slope, tie)
+
+
+def paint(grain: Grain, surface: HeadSurface, where: np.ndarray, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Log albedo and specular [N, 4] and slopes [N, 2] of mean 0 at the texels of bool [S, S]. The same seed paints the same head alike at any size."""
+    points, texel = surface.position[where], surface.texel[where]
+    tangent, bitangent = surface.frames(where)
+    channels, slopes = np.zeros((len(points), 4), np.float32), np.zeros((len(points), 2), np.float32)
+    for k, wavelength in enumerate(WAVELENGTHS):
+        fits = np.exp(-0.5 * (BLUNT * np.maximum(texel - surface.texel.min(), 0) / wavelength) ** 2)[:, None]
+        height = noise(points, wavelength, _begun(seed, k, 0))
+        parts = np.stack([height, *(noise(points, wavelength, _begun(seed, k, i)) for i in (1, 2, 3))], 1)
+        channels += fits * (parts @ grain.mix[k].T.astype(np.float32))
+        if grain.slope[k] > 0:
+            rise = [noise(points + np.float32(STEP) * way.astype(np.float32), wavelength, _begun(seed, k, 0)) - height for way in (tangent, bitangent)]
+            slopes -= np.float32(grain.slope[k] * grain.tie[k] / STEP) * fits * np.stack(rise, 1)
+    return channels, slopes
+
+
+def bands(picture: np.ndarray, weight: np.ndarray, texel: float) -> list[np.ndarray]:
+    """The bands [S, S, C] of a picture, fine to coarse, by means that count texels by their weight [S, S]; texel in mm."""
+    found, finer = [], picture
+    for sigma in SIGMAS:
+        coarser = blurred(picture, weight, sigma / texel)
+        found.append(finer - coarser)
+        finer = coarser
+    return found
+
+
+def blurred(picture: np.ndarray, weight: np.ndarray, sigma: float) -> np.ndarray:
+    """Gaussian mean of [S, S, C] by weight [S, S]; sigma in texels."""
+    top = cv2.GaussianBlur(picture * weight[..., None], (0, 0), max(sigma, 0.3)).reshape(picture.shape)
+    return top / np.maximum(cv2.GaussianBlur(weight, (0, 0), max(sigma, 0.3)), 1e-4)[..., None]
+
+
+def _answers(surface: HeadSurface, where: np.ndarray, texel: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Variances [band, wavelength] that a noise of deviation 1, and the slopes of such a height, have in each band of the map."""
+    rows, columns = np.nonzero(where)
+    side = int(min(np.sqrt(SAMPLE), surface.size))
+    top, left = (int(np.clip(np.median(at) - side / 2, 0, surface.size - side)) if len(at) else 0 for at in (rows, columns))
+    part = np.s_[top:top + side, left:left + side]
+    points, inner = surface.position[part].reshape(-1, 3), np.ones((side, side), np.float32)
+    there = np.zeros(surface.covered.shape, bool)
+    there[part] = True
+    tangent = surface.frames(there)[0].astype(np.float32)
+    found = np.zeros((2, len(SIGMAS), len(WAVELENGTHS)))
+    for k, wavelength in enumerate(WAVELENGTHS):
+        seed = int(rng.integers(1 << 31))
+        height = noise(points, wavelength, np.random.default_rng(seed))
+        rise = (noise(points + np.float32(STEP) * tangent, wavelength, np.random.default_rng(seed)) - height) / STEP
+        both = np.stack([height, rise], 1).reshape(side, side, 2)
+        for b, band in enumerate(bands(both, inner, texel)):
+            found[:, b, k] = band.reshape(-1, 2).var(0)
+    return found[0], found[1]
+
+
+def _begun(seed: int, wavelength: int, part: int) -> np.random.Generator:
+    return np.random.default_rng([seed, 2, wavelength, part])
+
+
+def _clipped(values: np.ndarray) -> np.ndarray:
+    """Without what is no grain: moles, hairs and the edges of shadows lie far out."""
+    middle, (low, high) = np.median(values, 0), np.percentile(values, [16, 84], axis=0)
+    reach = 2.5 * np.maximum(high - low, 1e-9) / 2
+    return np.clip(values, middle - reach, middle + reach)

@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The whole head from the part that the cameras saw: tone from a smooth field over the surface, pores and mottling from the solved skin's own statistics.
+
+Scalp goes on as scalp and skin as skin: where cropped hair was seen, unseen scalp takes its tone. What was seen well keeps its values.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from .. import template
+from ..messages import Reporter
+from ..noise import noise
+from . import grain
+from .maps import Maps
+from .surface import HeadSurface
+
+UNSEEN, SEEN = 0.05, 0.30
+"""Confidence at which a texel counts as not seen, and from which on as seen well."""
+SPECK = 1.5
+"""mm: darker lines and dots of the confidence are hairs and marks, not holes in what was seen."""
+SKIRT, FEATHER = 2.5, 5.0
+"""mm inside the border of the seen part: the skirt was seen at glancing angles only, and the solver mixed it with the mean face; then comes the fade."""
+REACH = 2.5
+"""mm below which detail is no tone."""
+ODD = 0.20
+"""Difference of log albedo from its surroundings at which the fringe of the seen part loses half of its say: stray light, clothes, hair in front."""
+LEAST_SCALP = 1500.0
+"""mm^2 of scalp that must have been seen for it to have a tone of its own."""
+FEATURES = ("brows", "lips", "eyes", "nostrils")
+DARKEST = 0.004
+
+
+def complete(maps: Maps, surface: HeadSurface, report: Reporter, seed: int = 0) -> Maps:
+    """The maps with what was not seen replaced; shading and confidence as they were. Texels whose `seen_well` is 1 keep their bytes."""
+    report.check()
+    seen = seen_well(maps.confidence, surface)
+    size = surface.size
+    holes = (seen < 1) & surface.covered
+    report.figure("completed_share_percent", round(100 * float(((1 - seen) * surface.covered * surface.texel**2).sum()
+                                                               / (surface.covered * surface.texel**2).sum()), 1))
+    if not holes.any() or seen.max() < 1:
+        return maps
+    channels, slopes = apart(maps)
+    tone = _tone(channels, seen, surface, seed)
+    report.check()
+    skin = template.mask("skin", size) * seen
+    learnt = grain.measure(channels, slopes, (skin >= 0.99).astype(np.float32), surface, seed)
+    report.check()
+    painted, tilt = grain.paint(learnt, surface, holes, seed)
+    share, own = seen[holes][:, None], channels - _low(channels, seen, surface)
+    loud = 1 / np.sqrt(share**2 + (1 - share) ** 2)  # two grains that know nothing of each other would cancel where they mix
+    found = tone[holes] + (channels - own - tone)[holes] * share + (own[holes] * share + painted * (1 - share)) * loud
+    tilted = (slopes[holes] * share + tilt * (1 - share)) * loud
+    return joined(maps, holes, found, tilted)
+
+
+def seen_well(confidence: np.ndarray, surface: HeadSurface) -> np.ndarray:
+    """[S, S] in [0, 1]: 1 where the cameras saw enough, 0 where the solver had nothing but the mean face, and a soft border on the seen side.
+
+    Holes in the face's features count as seen: their shape comes with the mean face, and no smooth field knows it.
+    """
+    texel = float(np.median(surface.texel))
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * max(1, round(SPECK / texel)) + 1,) * 2)
+    closed = cv2.morphologyEx(confidence, cv2.MORPH_CLOSE, disc)
+    closed = np.maximum(closed, _features(surface.size))
+    seen = _smoothstep((closed - UNSEEN) / (SEEN - UNSEEN))
+    inside = cv2.distanceTransform(np.pad((closed >= UNSEEN) | ~surface.covered, 1, mode="edge").astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
+    return (seen * _smoothstep((np.minimum(inside, 1e4) * surface.texel - SKIRT) / FEATHER) * surface.covered).astype(np.float32)
+
+
+def apart(maps: Maps) -> tuple[np.ndarray, np.ndarray]:
+    """Log albedo and specular [S, S, 4], and the normal's slopes [S, S, 2]."""
+    channels = np.concatenate([np.log(np.maximum(maps.diffuse, DARKEST)), maps.specular[..., None]], 2)
+    return channels, maps.normal[..., :2] / np.maximum(maps.normal[..., 2:], 0.1)
+
+
+def joined(maps: Maps, where: np.ndarray, channels: np.ndarray, slopes: np.ndarray | None = None) -> Maps:
+    """`maps` with new values at the texels of bool [S, S]: what `apart` makes of them, [N, 4] and [N, 2]."""
+    diffuse, specular, normal = maps.diffuse.copy(), maps.specular.copy(), maps.normal.copy()
+    diffuse[where] = np.clip(np.exp(channels[:, :3]), DARKEST, 1)
+    specular[where] = np.clip(channels[:, 3], 0, 1)
+    if slopes is not None:
+        tilted = np.concatenate([slopes, np.ones_like(slopes[:, :1])], 1)
+        normal[where] = tilted / np.linalg.norm(tilted, axis=1, keepdims=True)
+    return replace(maps, diffuse=diffuse, specular=specular, normal=normal)
+
+
+def _features(size: int) -> np.ndarray:
+    """[S, S] in [0, 1]."""
+    return np.minimum(1, 2 * np.maximum.reduce([template.mask(name, size) for name in FEATURES]))
+
+
+def _tone(channels: np.ndarray, seen: np.ndarray, surface: HeadSurface, seed: int) -> np.ndarray:
+    """Log albedo and specular [S, S, 4] without detail, everywhere: that of skin, and on the scalp that of scalp where enough of it was seen."""
+    scalp = template.mask("scalp", surface.size)
+    bare = seen * (1 - _features(surface.size))
+    measured = float((bare * scalp * surface.texel**2).sum())
+    if measured < LEAST_SCALP:
+        return surface.smooth(channels, bare, REACH, ODD)
+    of_skin, of_scalp = (surface.smooth(channels, bare * part, REACH, ODD) for part in (1 - scalp, scalp))
+    uneven = noise(surface.position.reshape(-1, 3), 3.0, np.random.default_rng([seed, 3])).reshape(scalp.shape)
+    soft = surface.smooth(scalp[..., None], np.ones_like(scalp), 3.0)[..., 0]
+    share = _smoothstep(np.clip(soft + 0.12 * uneven * (4 * soft * (1 - soft)), 0, 1))[..., None]  # no hairline is a drawn line
+    return of_skin * (1 - share) + of_scalp * share
+
+
+def _low(channels: np.ndarray, seen: np.ndarray, surface: HeadSurface) -> np.ndarray:
+    return grain.blurred(channels, np.maximum(seen, 1e-3).astype(np.float32), REACH / float(np.median(surface.texel)))
+
+
+def _smoothstep(share: np.ndarray) -> np.ndarray:
+    share = np.clip(share, 0, 1)
+    return share * share * (3 - 2 * share)

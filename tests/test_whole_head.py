@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whole head: a painted head known everywhere loses all but its face, and is completed; nothing seen changes, no seam shows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core import template
+from core.messages import Reporter
+from core.upscale import grain
+from core.upscale.maps import Maps
+from core.upscale.whole_head import complete, seen_well
+
+from .hairy_head import SIZE, painted, surface
+
+WRONG = np.float32([1.4, 1.0, 0.8])
+"""What the unseen part is off by: another tone, as the solver's mean face has it."""
+
+
+@pytest.fixture(scope="module")
+def truth() -> Maps:
+    return painted()
+
+
+@pytest.fixture(scope="module")
+def cut(truth) -> Maps:
+    """The same where only the face was seen: elsewhere one plain tone, flat and dull."""
+    seen = template.mask("face", SIZE)
+    hidden = seen < 0.5
+    plain = truth.diffuse[template.mask("skin", SIZE) > 0.99].mean(0) * WRONG
+    return replace(truth, confidence=0.7 * seen, diffuse=np.where(hidden[..., None], plain, truth.diffuse).astype(np.float32),
+                   normal=np.where(hidden[..., None], np.float32([0, 0, 1]), truth.normal), specular=np.where(hidden, np.float32(0.2), truth.specular))
+
+
+@pytest.fixture(scope="module")
+def done(cut) -> Maps:
+    return complete(cut, surface(), Reporter("upscale"))
+
+
+def spread(values: np.ndarray) -> float:
+    """Half the width of the middle two thirds: what wrinkles add to the face's deviation is no grain."""
+    return float(np.subtract(*np.percentile(values, [83, 17]))) / 2
+
+
+def hidden() -> np.ndarray:
+    return template.mask("face", SIZE) < 0.02
+
+
+def test_what_was_seen_well_keeps_its_bytes(cut, done):
+    seen = seen_well(cut.confidence, surface()) >= 1
+    assert 0.3 < seen.mean() < 0.65
+    for name in ("diffuse", "normal", "specular"):
+        assert getattr(done, name)[seen].tobytes() == getattr(cut, name)[seen].tobytes()
+    assert np.array_equal(done.confidence, cut.confidence) and np.array_equal(done.shading, cut.shading)
+
+
+def test_the_hidden_skin_comes_nearer_to_its_tone(truth, cut, done):
+    """Log albedo, means over the head's hidden texels; the plain tone is off by WRONG."""
+    off = [np.abs(np.log(maps.diffuse[hidden()]) - np.log(truth.diffuse[hidden()])).mean() for maps in (cut, done)]
+    assert off[1] < 0.6 * off[0]
+    dull = [abs(float((maps.specular - truth.specular)[hidden()].mean())) for maps in (cut, done)]
+    assert dull[1] < 0.5 * dull[0]
+
+
+def test_pores_go_on_with_the_strength_they_have_on_the_face(truth, done):
+    """A fine band's spread of log albedo, and the normals' tilt, on the hidden neck beside the seen face, within a factor of 1.6."""
+    neck = hidden() & (template.mask("neck", SIZE) > 0.9) & (surface().texel < 1.5 * np.median(surface().texel))
+    face = template.mask("skin", SIZE) > 0.99
+    assert neck.sum() > 300
+    every = np.ones((SIZE, SIZE), np.float32)
+    light = np.log(done.diffuse)
+    fine = grain.bands(light, every, float(np.median(surface().texel)))[2]
+    assert 1 / 1.6 < spread(fine[neck]) / spread(fine[face]) < 1.6
+    tilt = done.normal[..., :2]
+    assert 1 / 1.6 < spread(tilt[neck]) / spread(tilt[face]) < 1.6
+    assert np.abs(np.linalg.norm(done.normal, axis=2) - 1).max() < 1e-5
+
+
+def test_the_border_of_the_seen_part_is_no_step(cut, done):
+    """Means on both sides of the border, 6 mm apart, differ by no more than those of bands as far apart within the skin; before, by far more."""
+    signed = template.mask("face", SIZE)
+    soft = grain.blurred(signed[..., None], np.ones_like(signed), 12.0)[..., 0]
+    inner, outer = (soft > 0.60) & (soft < 0.75), (soft > 0.25) & (soft < 0.40)
+    step = [np.abs(np.log(maps.diffuse[inner]).mean(0) - np.log(maps.diffuse[outer]).mean(0)).max() for maps in (cut, done)]
+    within = np.abs(np.log(done.diffuse[(soft > 0.75) & (soft < 0.9)]).mean(0) - np.log(done.diffuse[inner]).mean(0)).max()
+    assert step[1] < within + 0.05 and step[1] < 0.5 * step[0]
+
+
+def test_no_uv_seam_shows(done):
+    """Texels on both edges of the map's cut that lie within a millimetre and a half of each other differ no more than neighbours do."""
+    edge = np.zeros((SIZE, SIZE), bool)
+    edge[[0, -1]] = edge[:, [0, -1]] = True
+    at, place = np.argwhere(edge & hidden()), surface().position[edge & hidden()]
+    far = np.abs(at[:, None] - at[None]).max(2) > 20
+    near = np.linalg.norm(place[:, None] - place[None], axis=2) < 1.5
+    first, second = np.nonzero(near & far)
+    assert len(first) > 50
+    light = np.log(done.diffuse).mean(2)
+    across = np.abs(light[tuple(at[first].T)] - light[tuple(at[second].T)]).mean()
+    beside = np.abs(np.diff(light, axis=1))[hidden()[:, 1:] & (surface().texel[:, 1:] > 2 * np.median(surface().texel))].mean()
+    assert across < 1.5 * beside + 0.01
+
+
+def test_seen_hair_is_carried_on_over_the_scalp(cut):
+    """The front half of the scalp was seen, and is dark: so is the back then, and the nape is not."""
+    scalp = template.mask("scalp", SIZE) > 0.5
+    front = scalp & (surface().position[..., 1] < np.median(surface().position[scalp][:, 1]))
+    diffuse, confidence = cut.diffuse.copy(), cut.confidence.copy()
+    diffuse[front], confidence[front] = 0.05, 0.7
+    done = complete(replace(cut, diffuse=diffuse, confidence=confidence), surface(), Reporter("upscale"))
+    back = scalp & ~front & (surface().position[..., 1] > np.percentile(surface().position[scalp][:, 1], 75))
+    neck = (template.mask("neck", SIZE) > 0.9) & hidden()
+    assert np.median(done.diffuse[back]) < 0.08 and np.median(done.diffuse[neck]) > 0.15
+
+
+def test_a_head_seen_all_over_or_not_at_all_stays_as_it_is(truth):
+    assert complete(truth, surface(), Reporter("upscale")) is truth
+    blind = replace(truth, confidence=np.zeros_like(truth.confidence))
+    assert np.isfinite(complete(blind, surface(), Reporter("upscale")).diffuse).all()
