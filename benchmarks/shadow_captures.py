@@ -96,7 +96,7 @@ def _photograph(capture: Capture, mesh: Mesh, texture: np.ndarray, rng: np.rando
     """frames/ with frames.json, and cameras/, of a lit texture, linear [S, S, 3]."""
     caster = raster.RayCaster(mesh)
     views = [camera(azimuth, 0.0 if i < len(AZIMUTHS) - 1 else -0.25, scale=SCALE) for i, azimuth in enumerate(AZIMUTHS)]
-    write_views(capture, views, (_picture(caster, view, texture, rng) for view in views))
+    write_views(capture, views, (picture(caster, view, texture, rng) for view in views))
 
 
 def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarray]) -> None:
@@ -117,7 +117,7 @@ def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarr
     model.write_binary(str(capture.cameras))
 
 
-def _picture(caster: raster.RayCaster, view: View, texture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def picture(caster: raster.RayCaster, view: View, texture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """sRGB [H, W, 3] before a dim, uneven background."""
     face, bary, _ = raster.render_view(caster, view, 2)
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)

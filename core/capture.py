@@ -111,6 +111,7 @@ class Capture:
         self.texture_png = self.root / "texture.png"
         self.texture_filmed = self.root / "texture_filmed.png"
         self.texture_confidence = self.root / "texture_confidence.exr"
+        self.texture_detail = self.root / "texture_detail.exr"  # what the frames show beyond the texture's texels; absent where they show no more
         self.shadow_mask_auto = self.root / "shadow_mask_auto.png"
         self.shadow_mask = self.root / "shadow_mask.png"
         self.protect_mask = self.root / "protect_mask.png"

@@ -127,6 +127,8 @@ class UpscaleSettings:
     """Side of the delivered maps"""
     method: str = setting("lanczos", choices=("network", "lanczos"))
     """How albedo, normals and specular become four times as large: by the network, which sharpens, or by Lanczos resampling, which is quick"""
+    frames_detail: bool = setting(True)
+    """Take pores and the edges of moles from the frames, where those show more than the texture can hold"""
     whole_head: bool = setting(True)
     """Complete neck, ears, scalp and the back of the head from the solved face where no camera saw them; off: the mean face's plain tone"""
     hair: bool = setting(True)

@@ -46,7 +46,8 @@ STAGES = (
     Stage("solve", "Solve", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
           tuple(f"maps/{name}" for name in MAPS), "core.solve", shared=("seed",), data=("weights/prior.safetensors", "weights/tones.json"),
           wishes=("shadow_mask.png", "protect_mask.png", "texture_filmed.png", "frames/", "cameras/", "delit/")),
-    Stage("upscale", "4K Maps", ("head.obj", *(f"maps/{name}" for name in MAPS)), tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale"),
+    Stage("upscale", "4K Maps", ("head.obj", *(f"maps/{name}" for name in MAPS)), tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale",
+          wishes=("texture_detail.exr",)),
     Stage("transfer", "Delivery", ("head.obj", *(f"maps/{name}" for name in MAPS)), ("delivery/",), "core.transfer",
           wishes=(*(f"maps_4k/{name}" for name in MAPS), "own_head.obj", "own_head.json", "scan.ply", "frames/", "cameras/")),
 )

@@ -21,6 +21,7 @@ from ..settings import Settings
 from ..views import read_views
 from .align import align
 from .blend import bands_of, blend, equalise, robust_weights
+from .detail import fine_detail
 from .fill import fill
 from .filmed import filmed
 from .foreign import clothes, leave_out_background
@@ -29,7 +30,7 @@ from .projection import Observation, Surface, observe
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """delit/, cameras/, head.obj -> texture.exr (linear), texture.png (sRGB), texture_confidence.exr [S, S] in [0, 1],
-    and texture_filmed.png (sRGB), the same with the light in it, where the frames are still there.
+    texture_filmed.png (sRGB), the same with the light in it, where the frames are still there, and texture_detail.exr where they show more than a texel.
 
     Raises Problem where no view was delit or none of them sees the head.
     """
@@ -46,6 +47,12 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     images.write_srgb(capture.texture_png, images.linear_to_srgb(texture))
     images.write_data(capture.texture_confidence, built.confidence)
     _leave_figures(capture, report, observations, built, texture, surface.covered)
+    detail = fine_detail(observations, surface, report)
+    capture.texture_detail.unlink(missing_ok=True)
+    if detail is not None:
+        images.write_data(capture.texture_detail, detail)
+        report.figure("fine_detail_size_px", len(detail))
+        report.figure("fine_detail_agreed_percent", round(100 * float(detail[..., 1][detail[..., 1] > 0].mean()), 1) if detail[..., 1].any() else 0.0)
     lit = filmed(observations, report)
     if lit is not None:
         images.write_srgb(capture.texture_filmed, images.linear_to_srgb(fill(lit, built.confidence, surface.covered)))

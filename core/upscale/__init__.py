@@ -13,7 +13,7 @@ from .. import images, meshes
 from ..capture import Capture, replacing_folder
 from ..messages import Reporter
 from ..settings import Settings
-from . import drawing, gloss, hair
+from . import detail, drawing, gloss, hair
 from .maps import Maps, read_maps
 from .surface import lay_out
 from .whole_head import complete
@@ -28,10 +28,12 @@ SHARES = {"network": 0.7, "lanczos": 0.2}  # of the time that the enlarging take
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """Writes capture.maps_4k, whole or not at all."""
     size, method = settings.upscale.size, settings.upscale.method
+    guided = settings.upscale.frames_detail and capture.texture_detail.is_file()
     maps = read_maps(capture.maps)
     report.figure("method", method)
     report.figure("size_from_px", len(maps.diffuse))
     report.figure("size_px", size)
+    report.figure("frames_detail", "used" if guided else "none")
     report.figure("specular_mean", round(gloss.on_cheeks_and_forehead(maps.specular, maps.confidence), 4))
     maps, found = _whole(capture, maps, settings, report)
     share = SHARES[method]
@@ -39,6 +41,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     with replacing_folder(capture.maps_4k) as folder:
         report.progress(share, 1, "writing the albedo")
         srgb = large[..., :3]
+        if guided:
+            texture = len(images.read_mask(capture.texture_confidence))
+            detail.guide(srgb, images.read_data(capture.texture_detail), texture, lambda done: report.progress(share, 1, "fine detail"))
         images.write_srgb(folder / "diffuse_albedo.png", srgb, bits=16)
         _picture(capture, srgb)
         if found is not None:

@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Detail finer than the texture: taken from frames that hold it, shrunk by what the views disagree on, put in the place of what was made up."""
+
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+
+from core import images
+from core.messages import Reporter
+from core.texture.detail import fine_detail, finer
+from core.texture.projection import Observation, log_colours
+from core.upscale.detail import guide
+
+SIZE = 64
+QUIET = Reporter("texture")
+HEAD = SimpleNamespace(covered=np.ones((SIZE, SIZE), bool))
+
+
+def seen_flat(log_luminance: np.ndarray, density: float, weight: float = 1.0) -> Observation:
+    """A view that looks straight at the map: `density` pixels per texel, its picture the exponential of log_luminance [density S, density S]."""
+    picture = np.repeat(np.exp(log_luminance - 1.5)[..., None], 3, 2).astype(np.float32)
+    at = ((np.arange(SIZE) + 0.5) * density).astype(np.float32)
+    pixels = np.stack(np.meshgrid(at, at), -1)
+    even = np.full((SIZE, SIZE), weight, np.float32)
+    return Observation(SimpleNamespace(name="a view"), picture, pixels, log_colours(picture, pixels), even, even)
+
+
+def pattern(size: int, deviation: float, seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).normal(0, deviation, (size, size)).astype(np.float32)
+
+
+@pytest.mark.parametrize(("density", "factor"), [(0.5, 1), (1.2, 1), (1.5, 2), (2.0, 2), (3.0, 4)])
+def test_the_frames_tell_how_fine_a_map_they_fill(density, factor):
+    flat = np.zeros((int(SIZE * density),) * 2, np.float32)
+    assert finer([seen_flat(flat, density)]) == factor
+
+
+def test_frames_without_more_detail_leave_none():
+    flat = np.zeros((SIZE, SIZE), np.float32)
+    assert fine_detail([seen_flat(flat, 1.0)] * 3, HEAD, QUIET) is None
+    assert fine_detail([seen_flat(np.zeros((2 * SIZE, 2 * SIZE), np.float32), 2.0)], HEAD, QUIET) is None  # one view: nobody to agree with
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1, 0.3])
+def test_what_views_agree_on_is_kept_and_what_they_do_not_is_shrunk(noise):
+    """Wiener: of a band of power s^2 seen by V views with noise n^2 each, the share s^2 / (s^2 + n^2 / V)."""
+    skin, views = pattern(2 * SIZE, 0.1, 0), 6
+    observations = [seen_flat(skin + pattern(2 * SIZE, noise, 1 + i), 2.0) for i in range(views)]
+    band, agreed = np.moveaxis(fine_detail(observations, HEAD, QUIET), -1, 0)
+    inner = np.s_[16:-16, 16:-16]
+    expected = 0.1**2 / (0.1**2 + noise**2 / views)
+    assert abs(agreed[inner].mean() - expected) < 0.08
+    true = (skin - cv2.GaussianBlur(skin, (0, 0), 2.0))[inner]
+    slope = (band[inner] * true).sum() / (true**2).sum()
+    assert abs(slope - expected) < 0.1 and np.abs(band[inner] - true).std() < 1.05 * np.sqrt(1 - expected) * true.std() + 0.005
+
+
+def test_the_band_takes_the_place_of_what_was_made_up():
+    """Where it is certain the albedo has the frames' band and its own coarse rest; where it is not, it stays."""
+    size = 128
+    true, invented = pattern(size, 0.1, 3), pattern(size, 0.1, 4)
+    coarse = cv2.GaussianBlur(pattern(size, 2.0, 5), (0, 0), 12) - 1.5
+    sigma = size / 32
+    bands = [x - cv2.GaussianBlur(x, (0, 0), sigma) for x in (true, invented)]
+    albedo = images.linear_to_srgb(np.repeat(np.exp(coarse + bands[1])[..., None], 3, 2)).astype(np.float32)
+    before = albedo.copy()
+    certain = np.zeros((size, size), np.float32)
+    certain[:, size // 2:] = 1
+    guide(albedo, np.stack([bands[0] * certain, certain], -1), 32, lambda done: None)
+    assert np.abs(albedo - before)[:, :size // 2].max() < 1e-5
+    log = np.log(images.srgb_to_linear(albedo)).mean(-1)[16:-16, size // 2 + 16:-16]
+    there = np.s_[16:-16, size // 2 + 16:-16]
+    got = (log - coarse[there]).ravel()
+    assert np.corrcoef(got, bands[0][there].ravel())[0, 1] > 0.97 and abs(np.corrcoef(got, bands[1][there].ravel())[0, 1]) < 0.2
