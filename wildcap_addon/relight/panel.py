@@ -15,6 +15,7 @@ class WILDCAP_PT_relight(CapturePanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
+        layout.use_property_decorate = False
         props = context.scene.wildcap
         layout.operator("wildcap.assemble_material")
         row = layout.row(align=True)

@@ -15,7 +15,7 @@ ATTRIBUTE = "wildcap_roughness"
 MASKS = Path(__file__).resolve().parents[2] / "core" / "assets" / "masks"
 STEP = 4
 """Every fourth texel of the masks' 1024 is finer than the mesh"""
-SHARES = {"neck": 0.1, "ears": 0.05, "scalp": 0.15, "forehead": -0.14, "nose": -0.2, "eyes": -0.1, "lips": -0.28}
+SHARES = {"neck": 0.1, "ears": 0.05, "scalp": 0.15, "forehead": -0.1, "nose": -0.16, "eyes": -0.1, "lips": -0.25}
 """Region -> how much rougher than the cheeks, as a share; later ones win where they meet"""
 
 
