@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The head object of a capture: head.obj brought into the scene with its UVs and its texture; again in place when it changed."""
 
+from pathlib import Path
+
 import bpy
 
 from ..core.capture import Capture
@@ -10,6 +12,9 @@ from . import captures, colours
 
 PREVIEW = "WildCap Preview"
 """Name of the image node by which a running solve is shown on the head."""
+
+FOLLOWERS = []
+"""Functions (head object, new mesh) of rooms that made more of a head's mesh: whether it now has the new mesh's shape, which is then not needed."""
 
 
 def bring_in(context, item) -> bpy.types.Object:
@@ -24,11 +29,7 @@ def bring_in(context, item) -> bpy.types.Object:
         context.collection.objects.link(head)
         item.head = head
     else:
-        old, head.data = head.data, mesh
-        for material in old.materials:
-            mesh.materials.append(material)
-        if old.users == 0:
-            bpy.data.meshes.remove(old)
+        mesh = _in_place(head, mesh)
     mesh.name = item.name
     head[captures.HEAD_KEY] = item.path
     head["wildcap_head_time"] = capture.head.stat().st_mtime
@@ -38,6 +39,19 @@ def bring_in(context, item) -> bpy.types.Object:
         other.select_set(other == head)
     context.view_layer.objects.active = head
     return head
+
+
+def _in_place(head, mesh) -> bpy.types.Mesh:
+    """The new mesh on an existing head, with its materials; or the mesh it has, where that has followed."""
+    if any(follow(head, mesh) for follow in FOLLOWERS):
+        bpy.data.meshes.remove(mesh)
+        return head.data
+    old, head.data = head.data, mesh
+    for material in old.materials:
+        mesh.materials.append(material)
+    if old.users == 0:
+        bpy.data.meshes.remove(old)
+    return mesh
 
 
 def look_at(context, head: bpy.types.Object) -> None:
@@ -58,13 +72,18 @@ def look_at(context, head: bpy.types.Object) -> None:
 
 def read_mesh(context, capture: Capture) -> bpy.types.Mesh:
     """head.obj as mesh data: metres, +Z up, its one UV map named UVMap, smooth."""
+    return read_mesh_file(context, capture.head)
+
+
+def read_mesh_file(context, path: Path) -> bpy.types.Mesh:
+    """As `read_mesh`, of any of a capture's OBJ files."""
     before = set(context.scene.objects)
-    bpy.ops.wm.obj_import(filepath=str(capture.head), forward_axis='Y', up_axis='Z', import_vertex_groups=False, validate_meshes=False)
+    bpy.ops.wm.obj_import(filepath=str(path), forward_axis='Y', up_axis='Z', import_vertex_groups=False, validate_meshes=False)
     new = [o for o in context.scene.objects if o not in before]
     if len(new) != 1 or new[0].type != 'MESH' or not new[0].data.uv_layers:
         for o in new:
             bpy.data.objects.remove(o)
-        raise Problem(f"{capture.head.name} is not one mesh with UVs.", "Reconstruct again, or restore the file.")
+        raise Problem(f"{path.name} is not one mesh with UVs.", "Reconstruct again, or restore the file.")
     mesh = new[0].data
     bpy.data.objects.remove(new[0])
     for material in list(mesh.materials):
@@ -103,4 +122,7 @@ def _show_texture(head, capture: Capture) -> None:
     shader.inputs["Roughness"].default_value = 0.6
     nodes.active = node
     material["wildcap_texture"] = True
-    head.data.materials.append(material)
+    if head.data.materials:
+        head.data.materials[0] = material  # its slot was there, and empty
+    else:
+        head.data.materials.append(material)

@@ -39,7 +39,8 @@ class OpenHead:
     anchors: np.ndarray  # [P, ANCHORS] vertices of the rims that carry it
     weights: np.ndarray  # [P, ANCHORS], sum 1
     rest: np.ndarray  # [V + C + P, 3] metres, lids and lips closed
-    seam: np.ndarray  # [n] which of the copies are of the lips (0), the left lids (1), the right ones (2)
+    seam: np.ndarray  # [C] which of the copies are of the lips (0), the left lids (1), the right ones (2)
+    ends: np.ndarray  # [3, 2] the vertices in which each seam ends
     matrix: sparse.csr_matrix  # [V + C + P, N] from a displacement of the body to one of this, both in MakeHuman's axes
     balls: np.ndarray  # [2, 4] centre and radius of the left and the right eyeball, metres
 
@@ -106,6 +107,7 @@ def open_head(base: Base, builder: HeadBuilder, body: np.ndarray, uvs: np.ndarra
     balls = np.array([[*_placed(centre[None], body, base)[0], radius * scale] for centre, radius in balls])
     return OpenHead(copies, np.stack([face, corner, outer[face, corner]], 1), np.concatenate(faces), np.concatenate(slot_rows), np.concatenate(uv_rows), kinds,
                     np.pad(anchors, ((0, missing), (0, 0))), np.pad(weights, ((0, missing), (0, 0))), rest, _seam(rest, copies),
+                    np.searchsorted(builder.used, [[chain[0], chain[-1]] for chain in (builder._lips[0], *(upper for upper, _ in builder._lids.values()))]),
                     sparse.vstack(matrices).tocsr(), balls)
 
 

@@ -22,6 +22,7 @@ from .makehuman import PUPIL_DISTANCE, Base, HeadBuilder, read_base
 STEP = 2e-5  # metres: one count of the stored displacements
 LEAST = 5e-5  # metres: what moves less stays
 REACH = 0.009  # metres: how far from a seam a displacement is bent so that its rims do not cross
+SOFT_WITHIN = 0.002  # metres: along a seam
 THROUGH = ("mouthClose",)
 """Units that undo another one (the open jaw): alone they are no pose."""
 
@@ -92,9 +93,10 @@ def apart(head: OpenHead, moved: np.ndarray) -> np.ndarray:
             here = head.seam == k
             if not amount[here].any():
                 continue
-            gap = np.linalg.norm(head.rest[near, None] - head.rest[rim[here]][None], axis=2)
-            weight = np.exp(-gap / 0.002) + 1e-12
-            value = (weight * amount[here]).sum(1) / weight.sum(1)
+            held = np.append(rim[here], head.ends[k])  # in the corners nothing crosses
+            gap = np.linalg.norm(head.rest[near, None] - head.rest[held][None], axis=2)
+            weight = np.exp((gap.min(1, keepdims=True) - gap) / SOFT_WITHIN)
+            value = (weight * np.append(amount[here], [0, 0])).sum(1) / weight.sum(1)
             moved[near, 2] += value * np.clip(1 - gap.min(1) / REACH, 0, 1)
     middle = (moved[below, 2] + moved[head.copies, 2]) / 2
     crossed = moved[below, 2] > moved[head.copies, 2]

@@ -1,0 +1,20 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A head that can act: the lips and lids of the registered head opened, eyes and mouth behind them, ARKit's face units as shape keys."""
+
+import bpy
+
+from .. import head
+from . import mesh, operators, panel
+
+_register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *panel.CLASSES))
+
+
+def register():
+    _register()
+    head.FOLLOWERS.append(mesh.renewed)
+
+
+def unregister():
+    head.FOLLOWERS.remove(mesh.renewed)
+    _unregister()

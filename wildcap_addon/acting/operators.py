@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators: face units onto the head, the iris' colour, and all sliders back to zero."""
+
+import bpy
+
+from ...core.messages import Problem
+from .. import captures
+from ..base_operator import BaseOperator
+from . import materials, mesh
+
+
+class _OnHead(BaseOperator):
+    @classmethod
+    def poll(cls, context):
+        return cls.in_object_mode(context) and cls.with_capture(context)
+
+
+class WILDCAP_OT_add_face_units(_OnHead, bpy.types.Operator):
+    """Open the head's lips and lids, put eyes and a mouth behind them, and give it ARKit's face units as shape keys"""
+
+    bl_idname = "wildcap.add_face_units"
+    bl_label = "Add Face Units"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    iris: bpy.props.EnumProperty(name="Iris", description="Colour of the eyes", items=[(name, name.title(), "") for name in materials.IRISES])
+
+    def work(self, context):
+        item = captures.require(context)
+        obj = captures.require_head(context, item)
+        if mesh.has(obj):
+            raise Problem("This head has its face units already.", "Move their sliders, here or under Shape Keys in the mesh's properties.")
+        mesh.add(obj, self.iris)
+
+
+class WILDCAP_OT_iris(_OnHead, bpy.types.Operator):
+    """Colour of the eyes"""
+
+    bl_idname = "wildcap.iris"
+    bl_label = "Iris"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    iris: bpy.props.EnumProperty(name="Iris", description="Colour of the eyes", items=[(name, name.title(), "") for name in materials.IRISES])
+
+    def work(self, context):
+        materials.recolour(_acting(context), self.iris)
+
+
+class WILDCAP_OT_rest_face(_OnHead, bpy.types.Operator):
+    """Bring all face units back to zero: the head as it was solved"""
+
+    bl_idname = "wildcap.rest_face"
+    bl_label = "Rest"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    def work(self, context):
+        mesh.rest(_acting(context))
+
+
+def _acting(context):
+    """The capture's head with its units. Raises Problem if it has none."""
+    obj = captures.require_head(context, captures.require(context))
+    if not mesh.has(obj):
+        raise Problem("This head has no face units yet.", "Click Add Face Units.")
+    return obj
+
+
+CLASSES = (WILDCAP_OT_add_face_units, WILDCAP_OT_iris, WILDCAP_OT_rest_face)
