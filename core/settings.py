@@ -171,8 +171,8 @@ class DeliverSettings:
     """The albedo without brows, lashes and beard, to groom hair over it, in place of the one with them"""
     folder: str = setting("")
     """Folder to deliver to; empty: exports in the capture's folder"""
-    roughness: float = setting(0.45, min=0.0, max=1.0)
-    """Roughness of the skin, in the maps and materials that hold it; Blender puts in what the head's material has"""
+    roughness: int = setting(45, min=0, max=100, unit="percent")
+    """Roughness of the cheeks, in the maps and materials that hold it; Blender puts in what the head's material has"""
     whole: bool = setting(False)
     """Write the mesh as well, without Blender, as OBJ"""
 

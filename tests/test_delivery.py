@@ -68,7 +68,7 @@ def test_what_needs_no_change_is_the_solvers_file_byte_for_byte(capture):
 def test_channels_are_packed_as_unity_and_unreal_read_them(capture):
     """The specular map is 0.2 on one half and 0.4 on the other, its mean where it is sure 0.3: skin of an IOR of 1.4 reflects 2.8 % there."""
     for preset in ("unity_hdrp", "unity_urp", "unreal", "arnold"):
-        assert isinstance(delivered.deliver(capture, preset=preset, roughness=0.4, **OBJ), Done)
+        assert isinstance(delivered.deliver(capture, preset=preset, roughness=40, **OBJ), Done)
     mask = four_channels(folder(capture, preset="unity_hdrp") / "textures" / "Zoe_et_moi_MaskMap.png")
     assert np.allclose(mask, [0, 1, 1, 0.6], atol=0.003)
     urp = four_channels(folder(capture, preset="unity_urp") / "textures" / "Zoe_et_moi_SpecGlossMap.png")

@@ -41,7 +41,7 @@ BEFORE_MASK = stages.NAMES[:stages.NAMES.index(stages.MASK_STAGE) + 1]
 SET_UP = Step("The solver is not set up on this machine.", "Install Solver", "wildcap.install_solver", 'IMPORT')
 ASK = Step("SwitchLight waits for your consent. Nothing was sent.", "Allow Sending", "wildcap.allow_sending", 'LOCKED')
 WORDS = {"reconstruct": "Reconstructing ...", "solve": "Solving ...",
-         "tool": "Looking at the texture ...", "wait": "Waiting for the job of another face ...",
+         "tool": "Looking at the texture ...", "deliver": "Writing the maps ...", "wait": "Waiting for the job of another face ...",
          "install": "Installing the solver ...", "ask": "One moment ..."}
 
 

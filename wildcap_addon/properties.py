@@ -10,12 +10,12 @@ from pathlib import Path
 
 import bpy
 
-from ..core import delighter_cards, stages
+from ..core import delighter_cards, delivery_presets, stages
 from ..core import settings as core_settings
 from . import captures, preferences
 from . import hdri as worlds
 
-STAGE_KINDS = {stage.name: type(getattr(core_settings.Settings(), stage.name)) for stage in stages.STAGES}
+STAGE_KINDS = {name: type(getattr(core_settings.Settings(), name)) for name in (*stages.NAMES, "deliver")}
 
 
 PATHS = {"folder": {"subtype": 'DIR_PATH'}, "checkpoint": {"subtype": 'DIR_PATH'},
@@ -52,7 +52,14 @@ def _property(field, tooltip: str):
 def _choice(setting: str, value: str) -> tuple[str, str, str]:
     """An item of an EnumProperty: identifier, name, description."""
     card = delighter_cards.CARDS.get(value) if setting == "delighter" else None
-    return (value, card.title, card.what) if card else (value, value.replace("_", " ").title(), "")
+    if setting == "preset":
+        return value, delivery_presets.PRESETS[value].title, delivery_presets.PRESETS[value].hint
+    if setting == "format" and value != "preset":
+        return value, delivery_presets.FORMATS[value].title, " ".join(delivery_presets.FORMATS[value].drops)
+    if setting == "what":
+        return value, *delivery_presets.WHAT[value]
+    named = {"preset": "As the Preset", "srgb": "sRGB", **delivery_presets.PICTURES}
+    return (value, card.title, card.what) if card else (value, named.get(value) or value.replace("_", " ").title(), "")
 
 
 GROUPS = {stage: settings_group(stage, kind) for stage, kind in STAGE_KINDS.items()}
@@ -60,8 +67,8 @@ GROUPS = {stage: settings_group(stage, kind) for stage, kind in STAGE_KINDS.item
 
 def _apply_quality(self, context):
     preset = core_settings.preset(self.quality)
-    for stage, kind in STAGE_KINDS.items():
-        for f in fields(kind):
+    for stage in stages.NAMES:
+        for f in fields(STAGE_KINDS[stage]):
             if f.name not in ABOUT_THE_FACE:
                 setattr(getattr(self, stage), f.name, getattr(getattr(preset, stage), f.name))
 
@@ -159,7 +166,7 @@ def values(item: WILDCAP_PG_capture) -> dict:
     found = {stage: {f.name: getattr(getattr(item, stage), f.name) for f in fields(kind)} for stage, kind in STAGE_KINDS.items()}
     found["solve"]["skin_tone"] = ",".join(f"{c:.4f}" for c in item.skin_tone) if item.use_skin_tone else "auto"
     for stage, name in (("cameras", "import_from"), ("delight", "folder"), ("delight", "checkpoint"), ("shadow_mask", "softened"),
-                        ("registration", "template"), ("solve", "prior")):
+                        ("registration", "template"), ("solve", "prior"), ("deliver", "folder")):
         if found[stage][name]:
             found[stage][name] = str(Path(bpy.path.abspath(found[stage][name])))
     return {**found, "seed": item.seed, "device": device(item)}

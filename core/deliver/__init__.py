@@ -36,7 +36,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         (folder / TEXTURES).mkdir()
         made, size = [], 0
         for i, (tile, paths) in enumerate(tiles.items()):
-            sources = maps.Sources(paths, int(settings.deliver.size), settings.deliver.roughness, _mean_specular(capture), METRES[plan.unit])
+            sources = maps.Sources(paths, int(settings.deliver.size), settings.deliver.roughness / 100, _mean_specular(capture), METRES[plan.unit])
             wanted = [picture for picture in pictures if sources.has(picture)]
             for j, picture in enumerate(wanted):
                 number = f".{tile}" if plan.numbered or several else ""
@@ -48,10 +48,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         report.progress(len(tiles), len(tiles), "writing what it was made from")
         write_json(folder / delivery_plan.PROVENANCE, provenance.collect(capture, plan, settings, report.check))
         if settings.deliver.whole:
-            wavefront.write(mesh, folder / plan.mesh, plan, made, settings.deliver.roughness)
+            wavefront.write(mesh, folder / plan.mesh, plan, made, settings.deliver.roughness / 100)
             provenance.finish(folder)
         else:
-            packing = {"name": plan.name, "mesh": plan.mesh, "several": several, "maps": made, "roughness": settings.deliver.roughness}
+            packing = {"name": plan.name, "mesh": plan.mesh, "several": several, "maps": made, "roughness": settings.deliver.roughness / 100}
             (folder / PACKING).write_text(json.dumps(packing, indent=1), encoding="utf-8")
     if settings.deliver.whole:
         delivery_plan.put_in_place(plan)

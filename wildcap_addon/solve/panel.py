@@ -54,7 +54,8 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         if len(context.scene.wildcap.captures) > 1:
             layout.operator("wildcap.solve_all")
         for stage in stages.STAGES[stages.NAMES.index(stages.MASK_STAGE) + 1:]:
-            draw_settings(layout, item, stage, without=("skin_tone", "white_point"))
+            if stage.name != "transfer":  # it stands under Deliver
+                draw_settings(layout, item, stage, without=("skin_tone", "white_point"))
 
 
 def tone_words(item) -> str:

@@ -1,0 +1,228 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on's part of a delivery: each file that Blender writes is read back by another reader, which finds mesh, unit, UVs, maps and shape keys."""
+
+import json
+import shutil
+import struct
+import subprocess
+import sys
+from importlib import import_module, util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+Vector = pytest.importorskip("mathutils").Vector
+pytest.importorskip("OpenImageIO", reason="the worker's part needs its packages")
+
+from core.messages import Done  # noqa: E402
+
+from . import delivered  # noqa: E402
+from .delivered import SIDE  # noqa: E402
+from .drawn import drawn  # noqa: E402
+
+KEYS = {"jawOpen": (0.0, -0.01, -0.02), "eyeBlinkLeft": (0.005, 0.0, 0.0)}
+MOVED = slice(100, 140)
+
+
+@pytest.fixture
+def capture(addon, tmp_path, monkeypatch):
+    """A solved capture whose head is in the scene, turned and with two shape keys that are in use; jobs run here at once."""
+    capture = delivered.make(tmp_path / "face.wildcap")
+    bpy.ops.wildcap.open_capture(directory=str(capture.root))
+    bpy.ops.wildcap.bring_in_head()
+    head = bpy.context.view_layer.objects.active
+    head.location, head.rotation_euler = (1, 2, 3), (0.1, 0.2, 0.3)
+    head.shape_key_add(name="Basis")
+    for name, move in KEYS.items():
+        key = head.shape_key_add(name=name, from_mix=False)
+        key.value = 0.7
+        for i in range(len(key.data))[MOVED]:
+            key.data[i].co += Vector(move)
+
+    def start(item, goal, *, tool, then, **shared):
+        ended = delivered.deliver(capture, **shared["deliver"])
+        assert isinstance(ended, Done), ended
+        then()
+
+    monkeypatch.setattr(addon("jobs"), "start", start)
+    return capture
+
+
+def deliver(capture, **settings) -> Path:
+    """Clicks Deliver with these settings; the folder it made."""
+    group = bpy.context.scene.wildcap.captures[0].deliver
+    for name, value in settings.items():
+        setattr(group, name, value)
+    before = {kind: len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "materials", "images", "scenes", "shape_keys")}
+    assert bpy.ops.wildcap.deliver() == {'FINISHED'}
+    after = {kind: len(getattr(bpy.data, kind)) for kind in before}
+    assert after == before and bpy.context.window.scene.name != "WildCap Delivery", "nothing of it stays in the .blend"
+    made = [path for path in capture.exports.iterdir() if not path.name.startswith(".")]
+    assert len(made) == 1 and not list(capture.exports.glob(".*"))
+    told = json.loads((made[0] / "provenance.json").read_text())
+    assert told["versions"]["Blender"] == bpy.app.version_string and f"textures/{sorted((made[0] / 'textures').iterdir())[0].name}" in told["files"]
+    assert str(capture.root) not in (made[0] / "provenance.json").read_text() and not (made[0] / "packing.json").exists()
+    return made[0]
+
+
+def truth() -> np.ndarray:
+    """The head's vertices at rest, [V, 3], metres, Z up."""
+    mesh = bpy.data.objects["face"].data
+    out = np.zeros(3 * len(mesh.vertices), np.float32)
+    mesh.shape_keys.reference_key.data.foreach_get("co", out)
+    return out.reshape(-1, 3)
+
+
+def y_up(points: np.ndarray) -> np.ndarray:
+    return np.stack([points[:, 0], points[:, 2], -points[:, 1]], 1)
+
+
+def same_points(a: np.ndarray, b: np.ndarray, size: float) -> None:
+    """The same set of points, whatever their order."""
+    from scipy.spatial import cKDTree
+
+    assert cKDTree(a).query(b)[0].max() < 1e-5 * size and cKDTree(b).query(a)[0].max() < 1e-5 * size
+
+
+def glb(path: Path) -> tuple[dict, bytes]:
+    data = path.read_bytes()
+    length = struct.unpack("<I", data[12:16])[0]
+    return json.loads(data[20:20 + length]), data[28 + length:]
+
+
+def by_another_reader(path: Path) -> dict:
+    result = subprocess.run([sys.executable, Path(__file__).with_name("mesh_reader.py"), path], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    return json.loads(result.stdout)
+
+
+def test_gltf_in_one_file(capture):
+    trimesh = pytest.importorskip("trimesh")
+    folder = deliver(capture)
+    read = next(iter(trimesh.load_scene(folder / "face.glb", process=False).geometry.values()))
+    same_points(np.asarray(read.vertices), y_up(truth()), 0.2)
+    assert abs(read.visual.uv[:, 0].max() - 1) < 1e-6 and read.visual.material.baseColorTexture.size == (SIDE, SIDE)
+    document, binary = glb(folder / "face.glb")
+    stored = []
+    for image in document["images"]:
+        view = document["bufferViews"][image["bufferView"]]
+        stored.append(binary[view["byteOffset"]:view["byteOffset"] + view["byteLength"]])
+    assert {(folder / "textures" / f"face_{name}.png").read_bytes() for name in ("albedo", "normal")} == set(stored), "the worker's bytes, not saved again"
+    mesh = document["meshes"][0]
+    assert mesh["extras"]["targetNames"] == list(KEYS) and mesh.get("weights", [0, 0]) == [0, 0]
+    for i, move in enumerate(KEYS.values()):
+        accessor = document["accessors"][mesh["primitives"][0]["targets"][i]["POSITION"]]
+        low, high = np.array(accessor["min"]), np.array(accessor["max"])
+        assert np.allclose(np.where(np.abs(low) > high, low, high), y_up(np.array([move]))[0], atol=1e-6), "metres, Y up"
+
+
+def test_gltf_with_files_refers_to_the_delivered_maps(capture):
+    folder = deliver(capture, format="gltf", preset="unreal")
+    document = json.loads((folder / "face.gltf").read_text())
+    uris = {image["uri"] for image in document["images"]}
+    assert uris == {"textures/T_face_BaseColor.png", "textures/T_face_N.png"} and all((folder / uri).is_file() for uri in uris)
+    normal = (folder / "textures" / "T_face_N.png").stat().st_size
+    assert normal and json.loads((folder / "provenance.json").read_text())["delivery"]["normals"] == "opengl", "glTF has no other"
+
+
+def test_fbx_in_centimetres_with_shape_keys(capture):
+    pytest.importorskip("ufbx")
+    folder = deliver(capture, preset="unreal")
+    read = by_another_reader(folder / "face.fbx")
+    assert read["metres_per_unit"] == pytest.approx(0.01) and read["y_up"]
+    assert np.allclose(read["points"], 100 * y_up(truth()), atol=1e-4), "in the order of the head's own vertices"
+    assert np.allclose(read["scale"], 1) and np.allclose(read["turn"], [1, 0, 0, 0]) and read["has_uvs"]
+    assert read["faces"] == len(bpy.data.objects["face"].data.polygons) and set(read["shapes"]) == set(KEYS)
+    for name, move in KEYS.items():
+        offsets = np.array(read["shapes"][name])
+        moving = np.linalg.norm(offsets, axis=1) > 1e-6
+        assert moving.sum() == 40 and np.allclose(offsets[moving], 100 * y_up(np.array([move])), atol=1e-4)
+    assert {"textures/T_face_BaseColor.png", "textures/T_face_N.png"} <= set(read["textures"])
+    assert all((folder / name).is_file() for name in read["textures"])
+    assert str(capture.root).encode() not in (folder / "face.fbx").read_bytes(), "where it was made is nobody's business"
+
+
+def test_usd_with_blend_shapes_and_colour_spaces(capture):
+    if util.find_spec("pxr") is None or not bpy.app.build_options.usd:
+        pytest.skip("no usd-core here, or a Blender without USD")
+    folder = deliver(capture, format="usd")
+    read = by_another_reader(folder / "face.usdc")
+    assert (read["metres_per_unit"], read["up"], read["subdivision"]) == (1, "Z", "none") and np.allclose(read["to_world"], np.eye(4))
+    assert np.allclose(read["points"], truth(), atol=1e-6) and {"st", "UVMap"} & set(read["primvars"])
+    assert set(read["shapes"]) == set(KEYS)
+    for name, move in KEYS.items():
+        offsets = np.array(read["shapes"][name])
+        assert np.allclose(offsets[np.linalg.norm(offsets, axis=1) > 1e-6], move, atol=1e-6)
+    assert {Path(name).name: space for name, space in read["textures"].items()} == {
+        "face_albedo.png": "sRGB", "face_normal.png": "raw", "face_roughness.png": "raw"}
+    assert all(not Path(name).is_absolute() and (folder / name).is_file() for name in read["textures"])
+
+
+def test_obj_for_character_creator(capture):
+    trimesh = pytest.importorskip("trimesh")
+    folder = deliver(capture, preset="character_creator")
+    read = next(iter(trimesh.load_scene(folder / "face.obj", process=False).geometry.values()))
+    same_points(np.asarray(read.vertices), 100 * y_up(truth()), 20)
+    named = [line.split()[-1] for line in (folder / "face.mtl").read_text().splitlines() if line.startswith("map_")]
+    assert {"textures/face_Diffuse.png", "textures/face_Normal.png"} <= set(named) and all((folder / name).is_file() for name in named)
+
+
+def test_the_artists_own_mesh_has_a_material_per_tile(capture):
+    delivered.in_tiles(capture)
+    folder = deliver(capture, what="own_mesh", format="glb")
+    document, _ = glb(folder / "face.glb")
+    assert sorted(material["name"] for material in document["materials"]) == ["face_1001", "face_1002"] and len(document["meshes"][0]["primitives"]) == 2
+    assert {path.name for path in (folder / "textures").glob("*albedo*")} == {"face_albedo.1001.png", "face_albedo.1002.png"}
+
+
+def test_what_comes_before_the_files_is_told_in_panel_and_dialog(addon, capture):
+    presets = import_module(f"{addon('deliver').__name__.rsplit('.', 2)[0]}.core.delivery_presets")
+    said = " ".join(text for text, _ in drawn(bpy.types.WILDCAP_PT_deliver))
+    assert "glTF, one file, m, PNG, 16 bit" in said and "no subsurface scattering" in said
+    deliver(capture)
+    told = addon("deliver.operators").WILDCAP_OT_deliver.tell(None)
+    assert set(presets.FORMATS["glb"].drops) <= set(told) and any("replaced as a whole" in line for line in told)
+
+
+def test_a_delivery_waits_for_the_artist_to_leave_a_mode_and_a_failure_keeps_the_old_one(addon, capture, monkeypatch):
+    folder = deliver(capture)
+    before = {path: path.read_bytes() for path in folder.rglob("*.*")}
+    waiting, files = addon("deliver.waiting"), addon("deliver.files")
+    with pytest.raises(RuntimeError, match="No delivery waits"):
+        bpy.ops.wildcap.finish_delivery()
+    operators = addon("deliver.operators")
+    plan, root = operators.planned(bpy.context), str(capture.root)
+    delivered.deliver(capture)
+    bpy.ops.object.mode_set(mode='SCULPT')
+    waiting.maps_made(root, plan)
+    assert waiting.ready(root) == plan
+    bpy.ops.object.mode_set(mode='OBJECT')
+    monkeypatch.setattr(files, "_gltf", lambda path: None)
+    with pytest.raises(RuntimeError, match="wrote no face.glb"):
+        bpy.ops.wildcap.finish_delivery()
+    waiting._ready[root] = plan
+    with pytest.raises(RuntimeError, match="not there any more"):
+        bpy.ops.wildcap.finish_delivery()
+    assert {path: path.read_bytes() for path in folder.rglob("*.*")} == before and not list(capture.exports.glob(".*"))
+    shutil.rmtree(folder)
+    with pytest.raises(RuntimeError, match="is not there any more"):
+        bpy.ops.wildcap.open_delivery()
+    waiting.forget()
+    with pytest.raises(RuntimeError, match="Nothing was delivered"):
+        bpy.ops.wildcap.open_delivery()
+
+
+def test_a_blender_without_an_exporter_says_so(addon, capture, monkeypatch, tmp_path):
+    files = addon("deliver.files")
+    problem = import_module(f"{files.__name__.split('.wildcap_addon')[0]}.core.messages").Problem
+    monkeypatch.setitem(files.ADDONS, ".glb", "none of these")
+    with pytest.raises(problem, match="switched off"):
+        files.check(".glb")
+    monkeypatch.setattr(files, "has_usd", lambda: False)
+    with pytest.raises(problem, match="without USD"):
+        files.check(".usdc")
+    with pytest.raises(problem, match="exporter failed"):
+        files._call(bpy.ops.export_scene.fbx, tmp_path / "none" / "x.fbx", use_selection=True)

@@ -1,0 +1,18 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The head, or what else was made of it, for other programs."""
+
+import bpy
+
+from . import operators, panel, waiting
+
+_register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *panel.CLASSES))
+
+
+def register():
+    _register()
+
+
+def unregister():
+    waiting.forget()
+    _unregister()

@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators: deliver the head, the artist's own mesh or the scan to another program; the maps are the worker's, the mesh file is Blender's."""
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+
+from ...core import delivery_plan
+from ...core.delivery_plan import Plan
+from ...core.messages import Problem
+from .. import captures, jobs, properties
+from ..base_operator import BaseOperator, Dialog
+from . import files, waiting
+
+
+class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
+    """Write the mesh with its maps as another program wants them, in a folder of their own"""
+
+    bl_idname = "wildcap.deliver"
+    bl_label = "Deliver"
+
+    @classmethod
+    def poll(cls, context):
+        return cls.in_object_mode(context) and jobs.can_start(cls, context)
+
+    def tell(self) -> tuple[str, ...]:
+        """What is written where, what of an older delivery goes, and what the format drops."""
+        plan = planned(bpy.context)
+        where = iface_("{} with its maps, for {}, goes to {}").format(plan.mesh, plan.preset.title, plan.target)
+        replaced = (iface_("The delivery that is there is replaced as a whole, once the new one is complete."),) if plan.target.exists() else ()
+        return (where, *replaced, *plan.format.drops, plan.preset.hint)
+
+    def work(self, context):
+        item = captures.require(context)
+        plan, root = planned(context), captures.root(item)
+        chosen = {**properties.values(item)["deliver"], "roughness": roughness(captures.head(context, item)), "whole": False}
+        jobs.start(item, "deliver", tool="deliver", then=lambda: waiting.maps_made(root, plan), deliver=chosen)
+
+
+class WILDCAP_OT_finish_delivery(BaseOperator, bpy.types.Operator):
+    """The maps are written: add the mesh, and give the folder its name"""
+
+    bl_idname = "wildcap.finish_delivery"
+    bl_label = "Finish Delivery"
+
+    @classmethod
+    def poll(cls, context):
+        ready = cls.with_capture(context) and waiting.ready(captures.root(captures.active(context))) is not None
+        return cls.in_object_mode(context) and cls.allowed(ready, "No delivery waits for its mesh: click Deliver")
+
+    def work(self, context):
+        folder = waiting.finish(context, captures.require(context))
+        self.report({'INFO'}, iface_("Delivered to {}").format(folder))
+
+
+class WILDCAP_OT_open_delivery(BaseOperator, bpy.types.Operator):
+    """Show the folder of the last delivery in the system's file manager"""
+
+    bl_idname = "wildcap.open_delivery"
+    bl_label = "Open Folder"
+
+    @classmethod
+    def poll(cls, context):
+        known = cls.with_capture(context) and waiting.last(captures.root(captures.active(context))) is not None
+        return cls.allowed(known, "Nothing was delivered since Blender was started")
+
+    def work(self, context):
+        folder = waiting.last(captures.root(captures.require(context)))
+        if not folder.is_dir():
+            raise Problem(f"The delivery {folder.name} is not there any more.", "Click Deliver to write it again.")
+        bpy.ops.wm.path_open(filepath=str(folder))
+
+
+def planned(context) -> Plan:
+    """The delivery that the settings ask for. Raises Problem where it cannot be made."""
+    item = captures.require(context)
+    settings = properties.settings(item).deliver
+    capture = captures.folder(item)
+    plan = delivery_plan.plan(capture, settings)
+    delivery_plan.needs(capture, plan.what)
+    if plan.what == "head":
+        captures.require_head(context, item)
+    files.check(plan.format.suffix)
+    return plan
+
+
+def roughness(head) -> int:
+    """The roughness of the head's skin material in percent; 45 where there is none."""
+    for slot in head.material_slots if head is not None else ():
+        for node in slot.material.node_tree.nodes if slot.material is not None and slot.material.node_tree is not None else ():
+            if node.type == 'GROUP' and "Roughness" in node.inputs and not node.inputs["Roughness"].is_linked:
+                return round(100 * min(1.0, max(0.0, node.inputs["Roughness"].default_value)))
+    return 45
+
+
+CLASSES = (WILDCAP_OT_deliver, WILDCAP_OT_finish_delivery, WILDCAP_OT_open_delivery)

@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is exported: copies of the meshes in a scene of their own, in the delivery's unit, with plain materials that refer to the delivered maps.
+
+The artist's objects, materials and scene stay as they are; all of it is gone again when the export has ended.
+"""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import floor
+from pathlib import Path
+
+import bpy
+from mathutils import Matrix
+
+from ...core.delivery_plan import PACKING, Plan
+from .. import colours, head
+
+SCENE = "WildCap Delivery"
+HEAD_TILE = 1001
+FACTORS = {"m": 1.0, "cm": 100.0}
+LINKED = {".glb": ("base_color", "normal"), ".gltf": ("base_color", "normal"), ".usdc": ("base_color", "normal", "roughness"),
+          ".fbx": ("base_color", "normal", "roughness", "specular"), ".obj": ("base_color", "normal", "roughness", "specular")}
+"""What each format's exporter writes as it is. glTF's would make new pictures of roughness and specular."""
+SOCKETS = {"base_color": "Base Color", "roughness": "Roughness", "specular": "Specular IOR Level"}
+
+
+@contextmanager
+def standing(context, plan: Plan, source: bpy.types.Object | Path) -> Iterator[bpy.types.Object]:
+    """The copy to export, selected and active in a scene of its own; `source` is the object in the scene, or the mesh file. The packing in plan.staged says
+    which maps there are."""
+    packing = json.loads((plan.staged / PACKING).read_text(encoding="utf-8"))
+    before = {name: set(getattr(bpy.data, name)) for name in ("materials", "images", "meshes", "objects", "scenes", "shape_keys")}
+    window, shown = context.window, context.window.scene
+    try:
+        scene = bpy.data.scenes.new(SCENE)
+        scene.unit_settings.scale_length = 1 / FACTORS[plan.unit]
+        mesh = source.data.copy() if isinstance(source, bpy.types.Object) else head.read_mesh_file(context, source)
+        obj = bpy.data.objects.new(plan.name, mesh)
+        mesh.name = plan.name
+        _at_rest(mesh)
+        mesh.transform(Matrix.Scale(FACTORS[plan.unit], 4), shape_keys=True)
+        _materials(mesh, plan, packing)
+        scene.collection.objects.link(obj)
+        window.scene = scene
+        obj.select_set(True, view_layer=scene.view_layers[0])
+        scene.view_layers[0].objects.active = obj
+        yield obj
+    finally:
+        window.scene = shown
+        for name in ("scenes", "objects", "meshes", "materials", "images"):
+            kept = getattr(bpy.data, name)
+            for thing in set(kept) - before[name]:
+                kept.remove(thing)
+
+
+def _at_rest(mesh) -> None:
+    """Shape keys at zero: what is delivered is the neutral head, and the keys."""
+    if mesh.shape_keys is not None:
+        mesh.shape_keys.animation_data_clear()
+        for key in mesh.shape_keys.key_blocks:
+            key.value, key.mute = 0.0, False
+
+
+def _materials(mesh, plan: Plan, packing: dict) -> None:
+    """The skin's slot becomes the delivered material, one per UV tile where there are several; other slots (eyes) plain ones of the same name and colour."""
+    several, tiles = packing["several"], sorted({entry["tile"] for entry in packing["maps"]})
+    others = [slot for slot in list(mesh.materials)[1:]]
+    mesh.materials.clear()
+    for tile in tiles:
+        maps = [entry for entry in packing["maps"] if entry["tile"] == tile]
+        mesh.materials.append(_skin(plan.material(tile, several), plan, maps, packing["roughness"], mesh.uv_layers[0].name))
+    for other in others:
+        mesh.materials.append(_plain(other))
+    if several:
+        layer = mesh.uv_layers[0].uv
+        for polygon in mesh.polygons:
+            middle = [sum(layer[i].vector[axis] for i in polygon.loop_indices) / polygon.loop_total for axis in (0, 1)]
+            tile = HEAD_TILE + floor(middle[0]) + 10 * floor(middle[1])
+            polygon.material_index = tiles.index(tile) if tile in tiles else 0
+
+
+def _skin(name: str, plan: Plan, maps: list[dict], roughness: float, uv_map: str) -> bpy.types.Material:
+    material, shader = _new(name)
+    shader.inputs["Roughness"].default_value = roughness
+    shader.inputs["IOR"].default_value = 1.4
+    tree = material.node_tree
+    for entry in maps:
+        if entry["slot"] not in LINKED[plan.format.suffix]:
+            continue
+        node = tree.nodes.new('ShaderNodeTexImage')
+        node.image = bpy.data.images.load(str(plan.staged / entry["file"]))
+        if entry["kind"] != "colour":
+            colours.as_data(node.image)
+        elif plan.colour == "srgb":
+            colours.as_srgb(node.image)
+        if entry["slot"] == "normal":
+            bump = tree.nodes.new('ShaderNodeNormalMap')
+            bump.uv_map = uv_map
+            tree.links.new(node.outputs["Color"], bump.inputs["Color"])
+            tree.links.new(bump.outputs["Normal"], shader.inputs["Normal"])
+        else:
+            tree.links.new(node.outputs["Color"], shader.inputs[SOCKETS[entry["slot"]]])
+    return material
+
+
+def _plain(other) -> bpy.types.Material:
+    """A plain material in another's place, with its name and its colour in the viewport."""
+    material, shader = _new(f"{other.name} Delivered" if other is not None else "Plain")
+    if other is not None:
+        shader.inputs["Base Color"].default_value = other.diffuse_color
+        shader.inputs["Roughness"].default_value = other.roughness
+    return material
+
+
+def _new(name: str):
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    return material, next(node for node in material.node_tree.nodes if node.type == 'BSDF_PRINCIPLED')

@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Deliveries whose maps are made: Blender adds the mesh at once where the artist is in Object Mode and not in the middle of a move, else at the next click.
+
+Run-time state only, per capture folder.
+"""
+
+from pathlib import Path
+
+import bpy
+
+from ...core import delivery_plan, provenance
+from ...core.delivery_plan import PACKING, Plan
+from ...core.messages import Problem
+from .. import captures, problems
+from . import files, stand
+
+_ready: dict[str, Plan] = {}
+_last: dict[str, Path] = {}
+
+
+def ready(root: str) -> Plan | None:
+    """The capture's delivery that lacks its mesh alone."""
+    return _ready.get(root)
+
+
+def last(root: str) -> Path | None:
+    """Where the capture was last delivered to, in this session."""
+    return _last.get(root)
+
+
+def maps_made(root: str, plan: Plan) -> None:
+    """What follows the worker. Raises Problem as `finish` does."""
+    _ready[root] = plan
+    window = next(iter(bpy.context.window_manager.windows), None)
+    if window is None or window.modal_operators:
+        return
+    with bpy.context.temp_override(window=window):
+        item = next((item for item in bpy.context.scene.wildcap.captures if captures.root(item) == root), None)
+        if bpy.context.mode == 'OBJECT' and item is not None:
+            finish(bpy.context, item)
+
+
+def finish(context, item) -> Path:
+    """The mesh beside the maps, and the folder by its name; returns it. Raises Problem, and then what was delivered before is as it was."""
+    root = captures.root(item)
+    plan = _ready.pop(root, None)
+    if plan is None or not (plan.staged / PACKING).is_file():
+        raise Problem("The maps of this delivery are not there any more.", "Click Deliver again.")
+    try:
+        mesh = captures.require_head(context, item) if plan.what == "head" else delivery_plan.needs(captures.folder(item), plan.what)
+        files.check(plan.format.suffix)
+        with stand.standing(context, plan, mesh):
+            files.export(plan)
+        (plan.staged / PACKING).unlink()
+        provenance.finish(plan.staged, Blender=bpy.app.version_string)
+        delivery_plan.put_in_place(plan)
+    except BaseException:
+        delivery_plan.discard(plan)
+        raise
+    _last[root] = plan.target
+    problems.show(root, problems.Notice(f"Delivered to {plan.target.name}.", "Open Folder, under Deliver, shows it."))
+    return plan.target
+
+
+def forget() -> None:
+    for plan in _ready.values():
+        delivery_plan.discard(plan)
+    _ready.clear()
+    _last.clear()
