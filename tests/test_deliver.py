@@ -226,3 +226,27 @@ def test_a_blender_without_an_exporter_says_so(addon, capture, monkeypatch, tmp_
         files.check(".usdc")
     with pytest.raises(problem, match="exporter failed"):
         files._call(bpy.ops.export_scene.fbx, tmp_path / "none" / "x.fbx", use_selection=True)
+
+
+def test_a_head_with_face_units_keeps_their_names_their_moves_and_its_eyes(capture):
+    head = bpy.context.view_layer.objects.active
+    head.shape_key_clear()
+    shutil.copyfile(Path(__file__).resolve().parent.parent / "core/assets/head.obj", capture.head)
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.add_face_units()
+    keys = head.data.shape_keys
+    keys["eyesOpen"] = 1.0  # posed: the neutral head is delivered all the same
+    document, binary = glb(deliver(capture) / "face.glb")
+    mesh = document["meshes"][0]
+    names = mesh["extras"]["targetNames"]
+    assert names == [key.name for key in keys.key_blocks[1:]] and len(names) == 54 and not any(mesh.get("weights", []))
+    assert [document["materials"][part["material"]]["name"].split()[-2:][0] for part in mesh["primitives"]][1:] == ["Eyes", "Mouth", "Teeth"]
+    eyes = document["materials"][mesh["primitives"][1]["material"]]["pbrMetallicRoughness"]
+    assert "baseColorTexture" in eyes, "iris and white"
+    basis, moved = (np.array([point.co for point in key.data]) for key in (keys.reference_key, keys.key_blocks["jawOpen"]))
+    span = np.abs(moved - basis).max(0)
+    found = [document["accessors"][part["targets"][names.index("jawOpen")]["POSITION"]] for part in mesh["primitives"]]
+    stored = np.abs([(accessor["min"], accessor["max"]) for accessor in found]).max((0, 1))
+    assert np.allclose(stored, span[[0, 2, 1]], atol=1e-6), "metres, Y up"
+    eyes = np.array([i for polygon in head.data.polygons if polygon.material_index == 1 for i in polygon.vertices])
+    assert np.abs(moved - basis)[eyes].max() == 0 and not np.any([found[1]["min"], found[1]["max"]]), "eyes stay when the jaw opens"

@@ -66,16 +66,18 @@ def _at_rest(mesh) -> None:
 def _materials(mesh, plan: Plan, packing: dict) -> None:
     """The skin's slot becomes the delivered material, one per UV tile where there are several; other slots (eyes) plain ones of the same name and colour."""
     several, tiles = packing["several"], sorted({entry["tile"] for entry in packing["maps"]})
-    others = [slot for slot in list(mesh.materials)[1:]]
-    mesh.materials.clear()
+    slots, others = [polygon.material_index for polygon in mesh.polygons], list(mesh.materials)[1:]
+    mesh.materials.clear()  # and every polygon is in the first slot
     for tile in tiles:
         maps = [entry for entry in packing["maps"] if entry["tile"] == tile]
         mesh.materials.append(_skin(plan.material(tile, several), plan, maps, packing["roughness"], mesh.uv_layers[0].name))
     for other in others:
-        mesh.materials.append(_plain(other))
-    if several:
-        layer = mesh.uv_layers[0].uv
-        for polygon in mesh.polygons:
+        mesh.materials.append(_plain(other, plan))
+    layer = mesh.uv_layers[0].uv
+    for polygon, slot in zip(mesh.polygons, slots, strict=True):
+        if 0 < slot <= len(others):
+            polygon.material_index = len(tiles) - 1 + slot
+        elif several:
             middle = [sum(layer[i].vector[axis] for i in polygon.loop_indices) / polygon.loop_total for axis in (0, 1)]
             tile = HEAD_TILE + floor(middle[0]) + 10 * floor(middle[1])
             polygon.material_index = tiles.index(tile) if tile in tiles else 0
@@ -105,13 +107,32 @@ def _skin(name: str, plan: Plan, maps: list[dict], roughness: float, uv_map: str
     return material
 
 
-def _plain(other) -> bpy.types.Material:
-    """A plain material in another's place, with its name and its colour in the viewport."""
+def _plain(other, plan: Plan) -> bpy.types.Material:
+    """A plain material in another's place, with its name, its colour in the viewport and the picture of its colour, if that is packed (the eyes')."""
     material, shader = _new(f"{other.name} Delivered" if other is not None else "Plain")
-    if other is not None:
-        shader.inputs["Base Color"].default_value = other.diffuse_color
-        shader.inputs["Roughness"].default_value = other.roughness
+    if other is None:
+        return material
+    shader.inputs["Base Color"].default_value = other.diffuse_color
+    shader.inputs["Roughness"].default_value = other.roughness
+    packed = _packed(other)
+    if packed is not None:
+        path = plan.staged / "textures" / f"{plan.name}_{other.name.split()[-1].lower()}.png"
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(packed.packed_file.data)
+        node = material.node_tree.nodes.new('ShaderNodeTexImage')
+        node.image = bpy.data.images.load(str(path))
+        material.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
     return material
+
+
+def _packed(other) -> bpy.types.Image | None:
+    """The packed PNG before a material's Base Color."""
+    for node in other.node_tree.nodes if other.node_tree is not None else ():
+        socket = node.inputs.get("Base Color")
+        image = getattr(socket.links[0].from_node, "image", None) if socket is not None and socket.is_linked else None
+        if image is not None and image.packed_file is not None and image.packed_file.data[:4] == b"\x89PNG":
+            return image
+    return None
 
 
 def _new(name: str):
