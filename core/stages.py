@@ -47,7 +47,7 @@ STAGES = (
           tuple(f"maps/{name}" for name in MAPS), "core.solve", shared=("seed",), data=("weights/prior.safetensors", "weights/tones.json"),
           wishes=("shadow_mask.png", "protect_mask.png", "texture_filmed.png", "frames/", "cameras/", "delit/")),
     Stage("upscale", "4K Maps", ("head.obj", *(f"maps/{name}" for name in MAPS)), tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale",
-          wishes=("texture_detail.exr",)),
+          shared=("seed",), data=("weights/prior.safetensors",), wishes=("texture_detail.exr",)),
     Stage("transfer", "Delivery", ("head.obj", *(f"maps/{name}" for name in MAPS)), ("delivery/",), "core.transfer",
           wishes=(*(f"maps_4k/{name}" for name in MAPS), "own_head.obj", "own_head.json", "scan.ply", "frames/", "cameras/")),
 )

@@ -76,9 +76,9 @@ def _whole(capture: Capture, maps: Maps, settings: Settings, report: Reporter) -
     if not options.hair:
         return maps, None
     report.progress(0, 1, "finding brows, lashes and beard")
-    found = hair.find(maps, surface)
+    found = hair.find(maps, surface, report.check)
     report.check()
-    cleaned, share = hair.clean(maps, found, surface, settings.seed)
+    cleaned, share = hair.clean(maps, found, surface, settings.seed, report.check)
     for name in ("brows", "lashes", "beard"):
         report.figure(f"{name}_cm2", round(float((getattr(found, name) * surface.texel**2).sum()) / 100, 2))
     images.write_srgb(capture.picture("upscale", "albedo_hair_skin_below"), drawing.masks(maps.diffuse, found, cleaned))

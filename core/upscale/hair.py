@@ -7,6 +7,7 @@ Hair is what is darker than the skin around it would be there, where such hair g
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,6 +26,8 @@ BEARD = (((132, 58, 172, 136, 150, 149, 176, 148, 152, 377, 400, 378, 379, 365, 
 """MediaPipe landmarks about which a beard grows, and how far in mm: jaw, upper lip, chin, before the ears, lower cheeks."""
 BELOW_JAW = (0.0, 14.0, -22.0), 18.0
 """mm from the jaw to where the beard goes on below it, and how far it reaches there."""
+STEP = 4
+"""Every so many texels the beard's zone, which is soft, is worked out."""
 LIDS = (33, 7, 163, 144, 145, 153, 154, 155, 133), (263, 249, 390, 373, 374, 380, 381, 382, 362)
 """Along the lower rims of the lids; where they are closed the lashes lie there."""
 LASHES = 1.6
@@ -50,21 +53,23 @@ class Hair:
     beard: np.ndarray
 
 
-def find(maps: Maps, surface: HeadSurface) -> Hair:
-    """The hair that the albedo shows."""
+def find(maps: Maps, surface: HeadSurface, check: Callable[[], None] = lambda: None) -> Hair:
+    """The hair that the albedo shows. `check` may raise to cancel, here and below."""
     channels, _ = apart(maps)
     light = channels[..., :3].mean(2)
     zones, texel = _zones(surface), float(np.median(surface.texel))
+    check()
     bare = (template.mask("skin", surface.size) > 0.99) & (zones["beard"] < 0.05) & (zones["brows"] < 0.01) & (seen_well(maps.confidence, surface) >= 1)
     fine = _fine(light, texel)
     usual = _deviation(fine[bare])
     present = _beard(fine, usual, bare, zones["beard"], surface)
-    skin = _skin(channels, zones, present, surface)[..., :3].mean(2)
+    check()
+    skin = _skin(light[..., None], zones, present, surface)[..., 0]
     around = _closed(light, texel)
     return Hair(_cover(skin - light, zones["brows"], usual), _cover(around - light, zones["lashes"], usual), _cover(skin - light, present, usual))
 
 
-def clean(maps: Maps, hair: Hair, surface: HeadSurface, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def clean(maps: Maps, hair: Hair, surface: HeadSurface, seed: int = 0, check: Callable[[], None] = lambda: None) -> tuple[np.ndarray, np.ndarray]:
     """Linear albedo [S, S, 3] without the hair, and how far each texel was replaced [S, S]; 0 leaves the albedo's bytes."""
     channels, slopes = apart(maps)
     zones, texel = _zones(surface), float(np.median(surface.texel))
@@ -77,10 +82,13 @@ def clean(maps: Maps, hair: Hair, surface: HeadSurface, seed: int = 0) -> tuple[
     if not where.any():
         return maps.diffuse, share
     skin = _skin(channels, zones, cv2.dilate((hair.beard > 0.02).astype(np.float32), _disc(2.0 / texel)), surface)
-    bare = template.mask("skin", surface.size) * (1 - np.clip(20 * share, 0, 1)) * seen_well(maps.confidence, surface)
+    check()
     lids = zones["lashes"][..., None]
     skin = skin * (1 - lids) + _closed(channels, texel) * lids  # a field from beyond the sockets knows no lid
+    bare = template.mask("skin", surface.size) * (1 - np.clip(20 * share, 0, 1)) * seen_well(maps.confidence, surface)
+    check()
     learnt = grain.measure(channels, slopes, (bare > 0.99).astype(np.float32), surface, seed)
+    check()
     painted, _ = grain.paint(learnt, surface, where, seed + 1)
     below = np.clip(np.exp((skin[where] + painted)[:, :3]), 0, 1)
     cleaned, part = maps.diffuse.copy(), share[where][:, None]
@@ -112,24 +120,29 @@ def _zones(surface: HeadSurface) -> dict[str, np.ndarray]:
     size, position = surface.size, surface.position
     near = [(points[list(which)], radius) for which, radius in BEARD]
     near.append((points[list(BEARD[0][0])] + BELOW_JAW[0], BELOW_JAW[1]))
-    beard = np.zeros((size, size), np.float32)
+    coarse = np.ascontiguousarray(position[STEP // 2::STEP, STEP // 2::STEP])
+    beard = np.zeros(coarse.shape[:2], np.float32)
     for centres, radius in near:
         for centre in centres:
-            np.maximum(beard, np.clip(1.8 - ((position - centre.astype(np.float32)) ** 2).sum(-1) / np.float32(radius**2), 0, 1), out=beard)
+            np.maximum(beard, np.clip(1.8 - ((coarse - centre.astype(np.float32)) ** 2).sum(-1) / np.float32(radius**2), 0, 1), out=beard)
+    beard = cv2.resize(beard, (size, size), interpolation=cv2.INTER_LINEAR)
     bar = np.maximum.reduce([template.mask(name, size) for name in ("lips", "ears", "scalp", "nostrils", "nose")])
-    rims = np.full((size, size), np.inf, np.float32)
+    eyes = template.mask("eyes", size) > 0
+    rims = np.full(eyes.sum(), np.inf, np.float32)
     for side in LIDS:
         for a, b in zip(points[list(side)][:-1], points[list(side)][1:], strict=True):
-            rims = np.minimum(rims, _off(position, a.astype(np.float32), b.astype(np.float32)))
+            rims = np.minimum(rims, _off(position[eyes], a.astype(np.float32), b.astype(np.float32)))
+    lashes = np.zeros((size, size), np.float32)
+    lashes[eyes] = np.clip(2 - 2 * rims / LASHES, 0, 1)
     brows = cv2.dilate(template.mask("brows", size), _disc(1.5 / float(np.median(surface.texel))))
-    return {"brows": brows, "lashes": np.clip(2 - 2 * rims / LASHES, 0, 1), "beard": beard * (1 - bar)}
+    return {"brows": brows, "lashes": lashes, "beard": beard * (1 - bar)}
 
 
 def _off(position: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Distance [S, S] of points [S, S, 3] from the line between a and b."""
+    """Distance [N] of points [N, 3] from the line between a and b."""
     along = b - a
     share = np.clip(((position - a) @ along) / max(float(along @ along), 1e-9), 0, 1)
-    return np.linalg.norm(position - a - share[..., None] * along, axis=-1)
+    return np.linalg.norm(position - a - share[:, None] * along, axis=1)
 
 
 def _beard(fine: np.ndarray, usual: float, bare: np.ndarray, zone: np.ndarray, surface: HeadSurface) -> np.ndarray:
@@ -145,7 +158,7 @@ def _beard(fine: np.ndarray, usual: float, bare: np.ndarray, zone: np.ndarray, s
 
 
 def _skin(channels: np.ndarray, zones: dict[str, np.ndarray], beard: np.ndarray, surface: HeadSurface) -> np.ndarray:
-    """Log albedo and specular [S, S, 4] of the skin as it would be without hair, without detail."""
+    """Channels [S, S, C] of the skin as they would be without hair, without detail."""
     size = surface.size
     other = np.maximum.reduce([*(template.mask(name, size) for name in (*FEATURES, "scalp")), zones["brows"]])
     weight = (1 - np.clip(1.5 * other, 0, 1)) * (1 - np.clip(4 * beard, 0, 1))

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The whole head from the part that the cameras saw: tone from a smooth field over the surface, pores and mottling from the solved skin's own statistics.
+"""The whole head from the part that the cameras saw: its tone differs from that of the mean face by a smooth field over the surface, its pores and
+mottling come from the solved skin's own statistics.
 
 Scalp goes on as scalp and skin as skin: where cropped hair was seen, unseen scalp takes its tone. What was seen well keeps its values.
 """
@@ -8,9 +9,11 @@ Scalp goes on as scalp and skin as skin: where cropped hair was seen, unseen sca
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
+from safetensors import safe_open
 
 from .. import template
 from ..messages import Reporter
@@ -31,6 +34,7 @@ ODD = 0.20
 """Difference of log albedo from its surroundings at which the fringe of the seen part loses half of its say: stray light, clothes, hair in front."""
 LEAST_SCALP = 1500.0
 """mm^2 of scalp that must have been seen for it to have a tone of its own."""
+MEAN_FACE = Path(__file__).resolve().parent.parent / "weights" / "prior.safetensors"
 FEATURES = ("brows", "lips", "eyes", "nostrils")
 DARKEST = 0.004
 
@@ -96,17 +100,29 @@ def _features(size: int) -> np.ndarray:
 
 
 def _tone(channels: np.ndarray, seen: np.ndarray, surface: HeadSurface, seed: int) -> np.ndarray:
-    """Log albedo and specular [S, S, 4] without detail, everywhere: that of skin, and on the scalp that of scalp where enough of it was seen."""
-    scalp = template.mask("scalp", surface.size)
+    """Log albedo and specular [S, S, 4] without detail, everywhere: what is usual there, and a smooth field of how this person differs from it.
+
+    Bare skin goes on over the scalp too, unless enough of the scalp was seen: then it has a field of its own.
+    """
+    scalp, usual = template.mask("scalp", surface.size), usual_skin(surface.size)
     bare = seen * (1 - _features(surface.size))
-    measured = float((bare * scalp * surface.texel**2).sum())
-    if measured < LEAST_SCALP:
-        return surface.smooth(channels, bare, REACH, ODD)
-    of_skin, of_scalp = (surface.smooth(channels, bare * part, REACH, ODD) for part in (1 - scalp, scalp))
+    bald = surface.smooth(usual, (1 - _features(surface.size)) * (1 - scalp) ** 4, REACH)
+    of_skin = bald + surface.smooth(channels - bald, bare * (1 - scalp), REACH, ODD)
+    if float((bare * scalp * surface.texel**2).sum()) < LEAST_SCALP:
+        return of_skin
+    of_scalp = usual + surface.smooth(channels - usual, bare * scalp, REACH, ODD)
     uneven = noise(surface.position.reshape(-1, 3), 3.0, np.random.default_rng([seed, 3])).reshape(scalp.shape)
     soft = surface.smooth(scalp[..., None], np.ones_like(scalp), 3.0)[..., 0]
     share = _smoothstep(np.clip(soft + 0.12 * uneven * (4 * soft * (1 - soft)), 0, 1))[..., None]  # no hairline is a drawn line
     return of_skin * (1 - share) + of_scalp * share
+
+
+def usual_skin(size: int) -> np.ndarray:
+    """The prior's mean face in the form of `apart`'s channels, [S, S, 4], its albedo over the skin tone: necks are paler than cheeks, ears redder."""
+    with safe_open(MEAN_FACE, "numpy") as file:
+        mean = file.get_tensor("mean_face").astype(np.float32).transpose(1, 2, 0)
+    mean = cv2.resize(mean, (size, size), interpolation=cv2.INTER_LINEAR)
+    return np.concatenate([np.log(np.maximum(mean[..., :3], 0.05)), (mean[..., 6:] + 1) / 2], 2)
 
 
 def _low(channels: np.ndarray, seen: np.ndarray, surface: HeadSurface) -> np.ndarray:
