@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Solved heads under new light beside the true subjects under the same light: the number that artists feel.
 
-    python -m benchmarks.relit WORK [--sample CAPTURE] [--people FOLDER [--only NAME ...]]
+    python -m benchmarks.relit WORK [--sample CAPTURE] [--people FOLDER [--only NAME ...]] [--picture OUT.jpg]
 
 CAPTURE was solved from core/synthetic/sample, FOLDER was made by benchmarks/people.py. Rendered by Cycles with the add-on's own material and lights, of which
 none lit a capture, as linear EXR; both heads are the registered one. A picture is exposed so that the true subject's face has the mean luminance MIDDLE (one
@@ -52,6 +52,7 @@ def main() -> int:
     parser.add_argument("--sample", type=Path)
     parser.add_argument("--people", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
+    parser.add_argument("--picture", type=Path, help="a JPEG of the first subject under all lights: truth, solved, delit, raw")
     parser.add_argument("--lights", nargs="+", default=LIGHTS)
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS)
     arguments = parser.parse_args()
@@ -61,6 +62,9 @@ def main() -> int:
         results[name] = score(work / name, arguments.lights, arguments.rows)
         write_json(work / f"{name}.json", results[name])
         print(f"{name}: {shortfall(mean_over_lights(results[name])) or 'as asked'}", file=sys.stderr)
+    if arguments.picture and results:
+        images.write_srgb(arguments.picture, side_by_side([images.read_srgb(work / next(iter(results)) / f"{Path(light).stem}.png")
+                                                           for light in arguments.lights]), quality=86)
     print(table({name: mean_over_lights(found) for name, found in results.items()}))
     return 0
 
@@ -120,6 +124,13 @@ def rendered(face: np.ndarray) -> tuple[slice, slice]:
     """Rows and columns of the rectangle about the face, bool [H, W], that is rendered (benchmarks/relit_renders.py)."""
     margin = int(MARGIN * len(face)) - 1
     return tuple(slice(max(side[0] - margin, 0), side[-1] + margin) for side in (np.flatnonzero(face.any(axis)) for axis in (1, 0)))
+
+
+def side_by_side(pictures: list[np.ndarray]) -> np.ndarray:
+    """Pictures of one size in two columns, sRGB [H, W, 3]; an odd one out is followed by black."""
+    half = (len(pictures) + 1) // 2
+    columns = pictures + [np.zeros_like(pictures[0])] * (2 * half - len(pictures))
+    return np.hstack([np.vstack(columns[:half]), np.vstack(columns[half:])])
 
 
 def mean_over_lights(found: dict[str, dict[str, dict]]) -> dict[str, dict[str, float]]:
