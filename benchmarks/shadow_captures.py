@@ -117,9 +117,9 @@ def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarr
     model.write_binary(str(capture.cameras))
 
 
-def picture(caster: raster.RayCaster, view: View, texture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """sRGB [H, W, 3] before a dim, uneven background."""
-    face, bary, _ = raster.render_view(caster, view, 2)
+def picture(caster: raster.RayCaster, view: View, texture: np.ndarray, rng: np.random.Generator, rays: int = 2) -> np.ndarray:
+    """sRGB [H, W, 3] before a dim, uneven background; `rays` along each side of a pixel."""
+    face, bary, _ = raster.render_view(caster, view, rays)
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
     at = np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(texture)
     colour = raster.sample(texture, at).reshape(*face.shape, 3) * (face >= 0)[..., None]

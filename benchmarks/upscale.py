@@ -2,20 +2,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Four times as many texels of a side: the network against Lanczos on subjects that no training saw, and what the frames add.
 
-    python -m benchmarks.upscale [--rows enlarging frames] [--work DIR] [--json FILE] [--picture FILE]
+    python -m benchmarks.upscale [--rows enlarging frames cost] [--work DIR] [--json FILE] [--picture FILE]
 
 enlarging: windows of the benchmark's subjects painted at 4096, reduced to 1024 as they are (plain) and softened as a solver leaves them (soft). PSNR, SSIM
 per map, FLIP and the distance in EfficientNet-Lite0's features (not LPIPS) for the diffuse, the mean angle in degrees for the normals.
 frames: a subject filmed closely by known cameras in even light; what stage texture finds in the frames goes into the enlarged albedo. Besides PSNR and SSIM
 at 2048, pores is the correlation with the truth of what is finer than a texel of the 1024 map, moles the share of their depth that is left in it.
+cost: 1024 to 4096 in a process of its own, seconds and peak memory.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import resource
 import tempfile
+import time
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 
 import cv2
@@ -46,13 +50,13 @@ VIEWS = 2
 KINDS = {"plain": Degradation(0.0, 0.0, 0.0, 1.0), "soft": Degradation(0.5, 0.8, 0.003, 0.9)}
 METHODS = ("lanczos", "network")
 BORDER = 16
-CLOSE = 6.4
-"""Scale of the frames: 1920 x 2560 pixels."""
+CLOSE = 9.0
+"""Scale of the frames: 2700 x 3600 pixels, about a 4K video's."""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rows", nargs="+", choices=("enlarging", "frames"), default=("enlarging", "frames"))
+    parser.add_argument("--rows", nargs="+", choices=("enlarging", "frames", "cost"), default=("enlarging", "frames", "cost"))
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_upscale_benchmark")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--picture", type=Path, help="close-ups of small map, Lanczos, network and truth side by side")
@@ -63,6 +67,9 @@ def main() -> None:
         found["enlarging"] = enlarging(arguments.work, arguments.picture)
     if "frames" in arguments.rows:
         found["frames"] = from_frames(arguments.work)
+    if "cost" in arguments.rows:
+        with get_context("spawn").Pool(1, maxtasksperchild=1) as pool:  # each in a fresh process, whose peak is its own
+            found["cost"] = {method: pool.apply(cost, (method,)) for method in METHODS}
     print("\n\n".join(_table(name, rows) for name, rows in found.items()))
     if arguments.json:
         arguments.json.write_text(json.dumps(found, indent=1), encoding="utf-8")
@@ -108,6 +115,15 @@ def compare(result: np.ndarray, true: np.ndarray) -> dict[str, float]:
     return figures
 
 
+def cost(method: str, size: int = 1024) -> dict[str, float]:
+    """Seconds and peak memory in GiB of enlarging maps of that size, in the process it is called in."""
+    rng, blank = np.random.default_rng(0), np.ones((size, size, 3), np.float32)
+    maps = Maps(rng.random((size, size, 3), np.float32), blank / np.sqrt(3), rng.random((size, size), np.float32), blank[..., 0], blank)
+    began = time.perf_counter()
+    enlarged(maps, FACTOR * size, method, "cpu", lambda done: None)
+    return {"seconds": round(time.perf_counter() - began, 1), "peak GiB": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20, 2)}
+
+
 def _enlarged(small: np.ndarray, method: str) -> np.ndarray:
     """Maps [7, H, W] in the network's channels, four times as large: [4H, 4W, 7]."""
     diffuse, normal = images.srgb_to_linear(np.moveaxis(small[:3], 0, -1)), np.moveaxis(small[3:6], 0, -1)
@@ -147,9 +163,9 @@ def filmed(seed: int, folder: Path) -> tuple[Capture, np.ndarray]:
     capture = Capture(folder)
     if not (capture.root / "truth.png").is_file():
         mesh, true, rng = subject_mesh(seed), make_skin(sample_parameters(seed), 2048).diffuse, np.random.default_rng([seed, 50])
-        views = [camera(azimuth, 0.0, scale=CLOSE) for azimuth in (-52, -34, -17, -6, 6, 17, 34, 52)]
+        views = [camera(azimuth, 0.0, scale=CLOSE) for azimuth in (-45, -25, -8, 8, 25, 45)]
         caster = raster.RayCaster(mesh)
-        write_views(capture, views, (picture(caster, view, 0.8 * true, rng) for view in views))
+        write_views(capture, views, (picture(caster, view, 0.8 * true, rng, rays=1) for view in views))
         meshes.write_obj(capture.head, registered(mesh, seed))
         with replacing_folder(capture.delit) as delit:
             for path in sorted(capture.frames.glob("*.jpg")):

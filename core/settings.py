@@ -125,7 +125,7 @@ class SolveSettings:
 class UpscaleSettings:
     size: int = setting(4096, min=1024, max=8192, unit="px")
     """Side of the delivered maps"""
-    method: str = setting("lanczos", choices=("network", "lanczos"))
+    method: str = setting("network", choices=("network", "lanczos"))
     """How albedo, normals and specular become four times as large: by the network, which sharpens, or by Lanczos resampling, which is quick"""
     frames_detail: bool = setting(True)
     """Take pores and the edges of moles from the frames, where those show more than the texture can hold"""

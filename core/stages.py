@@ -47,7 +47,8 @@ STAGES = (
           tuple(f"maps/{name}" for name in MAPS), "core.solve", shared=("seed",), data=("weights/prior.safetensors", "weights/tones.json"),
           wishes=("shadow_mask.png", "protect_mask.png", "texture_filmed.png", "frames/", "cameras/", "delit/")),
     Stage("upscale", "4K Maps", ("head.obj", *(f"maps/{name}" for name in MAPS)), tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale",
-          shared=("seed",), data=("weights/prior.safetensors",), wishes=("texture_detail.exr",)),
+          shared=("seed", "device"), data=("weights/prior.safetensors", "weights/upscaler.safetensors", "weights/upscaler.json"),
+          wishes=("texture_detail.exr",)),
     Stage("transfer", "Delivery", ("head.obj", *(f"maps/{name}" for name in MAPS)), ("delivery/",), "core.transfer",
           wishes=(*(f"maps_4k/{name}" for name in MAPS), "own_head.obj", "own_head.json", "scan.ply", "frames/", "cameras/")),
 )
@@ -57,7 +58,7 @@ TOOLS = (
           "core.solve.snapping"),
     Stage("skin_tone", "Skin Tone", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"), (), "core.solve.tone"),
     Stage("white_point", "White Point", ("frames/",), (), "core.solve.white_point"),
-    Stage("deliver", "Deliver", ("head.obj", *(f"maps/{name}" for name in MAPS)), (), "core.deliver"),
+    Stage("deliver", "Deliver", ("head.obj", *(f"maps/{name}" for name in MAPS if name.endswith(".png"))), (), "core.deliver"),
 )
 """What a worker does for one button: no stage of the chain depends on it, and nothing of it is recorded."""
 LABELS = {stage.name: stage.label for stage in (*STAGES, *TOOLS)}
