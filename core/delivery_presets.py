@@ -55,12 +55,12 @@ class Preset:
 
 _GLTF = (
     "glTF has no subsurface scattering and no displacement: set them in the program that opens it.",
-    "The specular map is not linked in it; it lies beside the file.",
+    "Roughness is one value in it, and the specular map is not linked: both maps lie beside the file.",
 )
 FORMATS = {
     "glb": Format("glTF, one file", ".glb", _GLTF, unit="m", normals="opengl", pictures=("png8", "png16")),
     "gltf": Format("glTF with files", ".gltf", _GLTF, unit="m", normals="opengl", pictures=("png8", "png16")),
-    "usd": Format("USD", ".usdc", ("USD's preview material has no subsurface scattering; displacement and specular map lie beside the file.",),
+    "usd": Format("USD", ".usdc", ("USD's preview material has no subsurface scattering; displacement and the specular map lie beside the file.",),
                   unit="m", normals="opengl"),
     "fbx": Format("FBX", ".fbx", ("FBX's material has no subsurface scattering, so no scale of it either, and no displacement.",
                                   "What does not read FBX's roughness and specular links needs those maps set by hand."), unit="cm"),

@@ -5,6 +5,8 @@
 import errno
 import hashlib
 import json
+import os
+import shutil
 from pathlib import Path
 
 import cv2
@@ -14,7 +16,7 @@ import pytest
 import trimesh
 from scipy.spatial import cKDTree
 
-from core import deliver, delivery_plan, delivery_presets, images, meshes
+from core import deliver, delivery_plan, delivery_presets, images, meshes, skin_regions, template
 from core.__main__ import main
 from core.capture import Capture
 from core.messages import Cancelled, Done, Failed, Problem
@@ -106,6 +108,16 @@ def test_exr_is_linear_half_float_and_numbered_by_tile(capture):
     assert np.allclose(images.read_data(made / "Zoe_et_moi_displacement.1001.exr"), -0.2, atol=1e-4), "centimetres, as the mesh"
 
 
+def test_roughness_follows_the_regions_of_the_built_in_head_alone(capture):
+    paths = {"albedo": capture.maps / "diffuse_albedo.png"}
+    plain, head = (deliver.maps.Sources(paths, 256, 0.5, 0.3, regions=regions) for regions in (False, True))
+    plain.size = head.size = 256
+    lips, scalp = (template.mask(name, 256) > 0.99 for name in ("lips", "scalp"))
+    assert np.allclose(plain.channel("roughness"), 0.5) and lips.any() and scalp.any()
+    assert np.allclose(head.channel("roughness")[lips], 0.5 * (1 + skin_regions.ROUGHNESS["lips"]), atol=2e-3)
+    assert np.allclose(head.channel("smoothness")[scalp], 1 - 0.5 * (1 + skin_regions.ROUGHNESS["scalp"]), atol=2e-3)
+
+
 def test_maps_are_made_smaller_but_never_larger(capture):
     plan = delivery_plan.plan(capture, DeliverSettings(format="obj"))
     paths = {"albedo": capture.maps / "diffuse_albedo.png", "normal": capture.maps / "normal.png"}
@@ -118,6 +130,20 @@ def test_maps_are_made_smaller_but_never_larger(capture):
     assert np.allclose(np.linalg.norm(normals, axis=2), 1, atol=1e-4)
     light = images.read_linear(capture.maps / "diffuse_albedo.exr").reshape(4, 4, 4, 4, 3).mean((1, 3))
     assert np.allclose(images.read_linear(capture.root / "colour.png"), light, atol=3e-4), "averaged as light"
+
+
+def test_the_enlarged_maps_are_delivered_unless_the_solved_ones_are_newer(capture):
+    shutil.copytree(capture.maps, capture.maps_4k)
+    images.write_srgb(capture.maps_4k / "diffuse_albedo.png", np.full((SIDE, SIDE, 3), 0.5), 16)
+    for path in capture.maps_4k.iterdir():
+        os.utime(path, (2e9, 2e9))
+    delivered.deliver(capture, **OBJ)
+    made = folder(capture) / "textures" / "Zoe_et_moi_albedo.png"
+    assert made.read_bytes() == (capture.maps_4k / "diffuse_albedo.png").read_bytes()
+    for path in capture.maps.iterdir():
+        os.utime(path, (3e9, 3e9))
+    delivered.deliver(capture, **OBJ)
+    assert made.read_bytes() == (capture.maps / "diffuse_albedo.png").read_bytes()
 
 
 def test_hair_masks_and_clean_skin_go_along_where_there_are_some(capture):

@@ -30,13 +30,15 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         raise Problem(f"{plan.format.title} is written by Blender.", "Choose OBJ here, or deliver from the add-on's panel.")
     tiles = _tiles(capture, plan, settings)
     several = len(tiles) > 1
+    built_in = template.is_built_in(meshes.read_obj(capture.head))
+    mean, regions = _mean_specular(capture, built_in), built_in and plan.what == "head"
     pictures = _pictures(plan, settings)
     delivery_plan.discard(plan)
     with replacing_folder(plan.staged) as folder:
         (folder / TEXTURES).mkdir()
         made, size = [], 0
         for i, (tile, paths) in enumerate(tiles.items()):
-            sources = maps.Sources(paths, int(settings.deliver.size), settings.deliver.roughness / 100, _mean_specular(capture), METRES[plan.unit])
+            sources = maps.Sources(paths, int(settings.deliver.size), settings.deliver.roughness / 100, mean, METRES[plan.unit], regions)
             wanted = [picture for picture in pictures if sources.has(picture)]
             for j, picture in enumerate(wanted):
                 number = f".{tile}" if plan.numbered or several else ""
@@ -80,9 +82,9 @@ def _tiles(capture: Capture, plan: Plan, settings: Settings) -> dict[int, dict[s
         found = {number or HEAD_TILE: {name: delivery / f"own_{file}{f'.{number}' if number else ''}.png" for name, file in
                                        (("albedo", "diffuse_albedo"), ("normal", "normal"), ("specular", "specular_albedo"))} for number in numbers or [0]}
     else:
-        folder = capture.maps_4k if all((capture.maps_4k / name).is_file() for name in stages.MAPS) else capture.maps
+        folder = _newest(capture)
         found = {HEAD_TILE: {"albedo": folder / "diffuse_albedo.png", "normal": folder / "normal.png", "specular": folder / "specular_albedo.png",
-                             "roughness": folder / "roughness.png", "displacement": delivery / "displacement.exr",
+                             "displacement": delivery / "displacement.exr",
                              **{name: folder / f"{name}.png" for name in ("brows", "lashes", "beard")}, "clean": folder / "clean_albedo.png"}}
     found = {tile: {name: path for name, path in paths.items() if path.is_file()} for tile, paths in found.items()}
     if not all("albedo" in paths for paths in found.values()):
@@ -92,11 +94,22 @@ def _tiles(capture: Capture, plan: Plan, settings: Settings) -> dict[int, dict[s
     return found
 
 
-def _mean_specular(capture: Capture) -> float:
-    """The specular map's mean on facial skin, by which its values are told against skin's reflectance. Without our UVs, the mean where it is sure."""
+def _newest(capture: Capture) -> Path:
+    """The 4K maps where they are complete and not older than the solved ones, else those."""
+    solved, enlarged = ([folder / name for name in stages.MAPS if name.endswith(".png")] for folder in (capture.maps, capture.maps_4k))
+    fresh = all(path.is_file() for path in enlarged) and min(path.stat().st_mtime for path in enlarged) >= max(path.stat().st_mtime for path in solved)
+    return capture.maps_4k if fresh else capture.maps
+
+
+def _mean_specular(capture: Capture, built_in: bool) -> float:
+    """The specular map's mean on cheeks and forehead, by which its values are told against skin's reflectance: as the stage upscale found it, else the mean
+    over the face, or, without our UVs, where the maps are sure."""
+    told = capture.read()["stages"].get("upscale", {}).get("figures", {}).get("specular_mean")
+    if told:
+        return float(told)
     specular = images.read_mask(capture.maps / "specular_albedo.png")
     size = len(specular)
-    if template.is_built_in(meshes.read_obj(capture.head)):
+    if built_in:
         weight = template.mask("skin", size) * template.mask("face", size)
     else:
         weight = images.resize(images.read_mask(capture.maps / "confidence.png"), size, size)

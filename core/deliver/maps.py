@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import images
+from .. import images, skin_regions, template
 from ..delivery_plan import Plan
 from ..delivery_presets import COLOUR, NORMAL, Picture
 
@@ -26,10 +26,11 @@ STRIP = 256
 
 class Sources:
     """The maps of one UV tile, read when they are asked for, at one size. `paths`: albedo, normal, specular, clean, lit ... -> file;
-    `mean` is the specular map's mean on facial skin, `roughness` what holds where there is no map of it, `unit` the metres that 1 is."""
+    `mean` is the specular map's mean on facial skin, `roughness` that of the cheeks, `regions` whether the UVs are those of the built-in head, whose other
+    regions are known; `unit` the metres that 1 is."""
 
-    def __init__(self, paths: dict[str, Path], size: int, roughness: float, mean: float, unit: float = 1.0):
-        self.paths, self.roughness, self.mean, self.unit = paths, roughness, mean, unit
+    def __init__(self, paths: dict[str, Path], size: int, roughness: float, mean: float, unit: float = 1.0, regions: bool = False):
+        self.paths, self.roughness, self.mean, self.unit, self.regions = paths, roughness, mean, unit, regions
         stored = [images.size(path)[0] for name, path in paths.items() if name in ("albedo", "normal")]
         self.size = min([size, *stored])
         self._read: dict[str, np.ndarray] = {}
@@ -46,7 +47,8 @@ class Sources:
         if term in ("0", "1"):
             return np.full((self.size, self.size), float(term), np.float32)
         if term in ("roughness", "smoothness"):
-            rough = self._file("roughness") if "roughness" in self.paths else np.full((self.size, self.size), self.roughness, np.float32)
+            rough = np.full((self.size, self.size), self.roughness, np.float32)
+            rough = np.clip(rough * (1 + _shares(self.size)), 0, 1) if self.regions else rough  # as the node group WildCap Skin has it
             return rough if term == "roughness" else 1 - rough
         if term in ("level", "weight", "f0", "unreal_specular"):
             level = np.clip(0.5 * self._file("specular") / max(self.mean, 1e-6), 0, 1)  # as the node group WildCap Skin has it
@@ -83,6 +85,17 @@ def write(picture: Picture, sources: Sources, path: Path, plan: Plan) -> None:
         images.write_linear(path, pixels) if plan.colour == "linear" else images.write_srgb(path, pixels, bits)
     else:
         images.write_data(path, pixels[..., 0] if pixels.shape[2] == 1 else pixels, bits)
+
+
+def _shares(size: int) -> np.ndarray:
+    """How much rougher than the cheeks each texel of the built-in head is, as a share, float32 [size, size]."""
+    brows = np.flatnonzero(template.mask("brows", size).max(1) > 0.5).min()
+    above = np.clip((brows - np.arange(size)) / (skin_regions.FOREHEAD_FADE * size), 0, 1).astype(np.float32)
+    result = np.zeros((size, size), np.float32)
+    for name, share in skin_regions.ROUGHNESS.items():
+        mask = template.mask("face", size) * above[:, None] if name == "forehead" else template.mask(name, size)
+        result += mask * (share - result)
+    return result
 
 
 def _file_of(term: str) -> str:

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How rough each region of the head is against the cheeks, as a vertex attribute: no map, and it stays with the mesh.
-
-Forehead and nose are oilier than cheeks, lips moister than both; the amounts are chosen by eye, nobody measured this face's.
-"""
+"""How rough each region of the head is against the cheeks, as a vertex attribute: no map, and it stays with the mesh."""
 
 from functools import cache
 from pathlib import Path
@@ -11,11 +8,13 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...core import skin_regions
+
 ATTRIBUTE = "wildcap_roughness"
 MASKS = Path(__file__).resolve().parents[2] / "core" / "assets" / "masks"
 STEP = 4
 """Every fourth texel of the masks' 1024 is finer than the mesh"""
-SHARES = {"neck": 0.1, "ears": 0.05, "scalp": 0.15, "forehead": -0.1, "nose": -0.16, "eyes": -0.1, "lips": -0.25}
+SHARES = skin_regions.ROUGHNESS
 """Region -> how much rougher than the cheeks, as a share; later ones win where they meet"""
 
 
@@ -42,7 +41,7 @@ def _shares() -> np.ndarray:
     """[S, S], rows from the bottom as v goes."""
     masks = {name: _mask(name) for name in ("face", "brows", "neck", "ears", "scalp", "nose", "eyes", "lips")}
     rows = np.arange(len(masks["face"]))
-    above = np.clip((rows - np.flatnonzero(masks["brows"].max(1) > 0.5).max()) / (0.03 * len(rows)), 0, 1)
+    above = np.clip((rows - np.flatnonzero(masks["brows"].max(1) > 0.5).max()) / (skin_regions.FOREHEAD_FADE * len(rows)), 0, 1)
     masks["forehead"] = masks["face"] * above[:, None]
     result = np.zeros_like(masks["face"])
     for name, share in SHARES.items():
