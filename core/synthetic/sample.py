@@ -100,7 +100,7 @@ def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> N
         name = f"{frame:04d}.png"
         for folder in ("albedo", "face", "shadow"):
             (out / folder).mkdir(exist_ok=True)
-        images.write_srgb(out / "albedo" / name, np.concatenate([images.linear_to_srgb(albedo), alpha[..., None]], -1))
+        images.write_srgb(out / "albedo" / name, np.concatenate([images.linear_to_srgb(albedo), alpha[..., None]], -1), small=True)
         images.write_data(out / "face" / name, face.astype(np.float32))
         images.write_data(out / "shadow" / name, shadow.astype(np.float32))
         total, count = total + albedo[face].sum(0, dtype=np.float64), count + int(face.sum())
