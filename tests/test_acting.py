@@ -59,6 +59,9 @@ def test_at_rest_it_is_the_head_that_was_solved_and_each_unit_of_the_eye_opens_t
     assert np.abs(rest[skin].reshape(-1, 3, 3) - solved[_triangles()]).max() < 1e-6  # the cut moved no triangle
     assert head.data.materials[0].get("wildcap_skin") and [m.name.split()[-1] for m in head.data.materials[1:]] == ["Eyes", "Mouth", "Teeth"]
     _uvs_apart(head)
+    rough = np.empty(len(head.data.vertices), np.float32)
+    head.data.attributes["wildcap_roughness"].data.foreach_get("value", rough)
+    assert np.ptp(rough[:HEAD]) > 0.05 and np.ptp(rough[HEAD:HEAD + COPIES]) > 0.01 and not rough[HEAD + COPIES:].any()
 
     keys, lids = head.data.shape_keys, np.unique(skin[skin >= HEAD])
     blocks = keys.key_blocks
@@ -125,6 +128,15 @@ def test_what_cannot_act_is_told_why(addon, capture):
     bpy.context.view_layer.objects.active.shape_key_add(name="Basis")
     with pytest.raises(RuntimeError, match="shape keys of its own"):
         bpy.ops.wildcap.add_face_units()
+
+
+def test_lids_that_were_filmed_open_are_warned_of(addon, tmp_path):
+    from types import SimpleNamespace
+
+    for seen, word in ((0.31, "open while filming"), (0.12, ""), (None, "")):
+        record = {"stages": {"registration": {"figures": {"eye_opening": seen}}}}
+        told = addon("acting.operators").filmed_open(SimpleNamespace(read=lambda record=record: record))
+        assert word in told and bool(told) == bool(word)
 
 
 def _triangles() -> np.ndarray:

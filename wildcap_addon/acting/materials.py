@@ -8,7 +8,7 @@ import numpy as np
 SIZE = 512
 IRIS_ANGLE = 0.42  # radians from the pupil's middle to the iris' rim, seen from the eye's centre
 PUPIL_ANGLE = 0.15
-IRISES = {"brown": (0.20, 0.085, 0.03), "hazel": (0.25, 0.16, 0.06), "green": (0.14, 0.20, 0.10), "blue": (0.12, 0.22, 0.36), "grey": (0.24, 0.27, 0.29)}
+IRISES = {"brown": (0.13, 0.055, 0.02), "hazel": (0.25, 0.16, 0.06), "green": (0.14, 0.20, 0.10), "blue": (0.12, 0.22, 0.36), "grey": (0.24, 0.27, 0.29)}
 """Linear colours."""
 KEY = "wildcap_inside"
 
@@ -71,7 +71,7 @@ def picture(iris: tuple[float, float, float]) -> np.ndarray:
     fibres = sum(np.sin(k * turn + p + 3 * np.sin(9 * angle + p)) / (1 + i) for i, (k, p) in enumerate(((23, 0.3), (41, 1.7), (67, 4.1), (97, 2.2))))
     rim, pupil = _step(angle, IRIS_ANGLE, 0.03), _step(angle, PUPIL_ANGLE, 0.012)
     across = np.clip((angle - PUPIL_ANGLE) / (IRIS_ANGLE - PUPIL_ANGLE), 0, 1)
-    brightness = (1 + 0.16 * fibres) * (1.25 - 0.4 * across) * (1 - 0.65 * np.clip((across - 0.8) / 0.2, 0, 1))  # a dark ring at the limbus
+    brightness = (1 + 0.22 * fibres) * (1.25 - 0.4 * across) * (1 - 0.65 * np.clip((across - 0.8) / 0.2, 0, 1))  # a dark ring at the limbus
     coloured = np.array(iris) * brightness[..., None] * (1 - pupil[..., None]) + 0.003
     veins = np.clip(angle - 0.7, 0, 0.9)[..., None]
     white = np.array([0.62, 0.56, 0.52]) * (1 - veins * [0.15, 0.42, 0.45])

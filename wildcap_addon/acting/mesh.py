@@ -17,6 +17,8 @@ from .asset import GAZE, SIDES, FaceUnits, load
 MARK = "wildcap_face_units"
 OPEN = "eyesOpen"
 """Custom property of the shape keys: how far the lids are open, 0 to 1."""
+LAYOUT = {'FLOAT': ("value", 1), 'FLOAT_VECTOR': ("vector", 3), 'FLOAT_COLOR': ("color", 4)}
+"""Kinds of attributes that are carried over: field, and how many numbers it has."""
 
 
 def has(obj) -> bool:
@@ -121,8 +123,20 @@ def _built(old, asset: FaceUnits, rest: np.ndarray):
     layer.data.foreach_set("uv", np.concatenate([uv, extra.astype(np.float32).ravel()]))
     mesh.polygons.foreach_set("material_index", np.concatenate([np.zeros(len(triangles), np.int32), asset.slots.astype(np.int32)]))
     mesh.shade_smooth()
+    _attributes(old, mesh, asset)
     mesh.update()
     return mesh
+
+
+def _attributes(old, new, asset: FaceUnits) -> None:
+    """What is kept for each vertex of the head (its roughness, an artist's mask), on the copies as on what they double; zero inside."""
+    for attribute in old.attributes:
+        if attribute.domain == 'POINT' and attribute.data_type in LAYOUT and not attribute.is_internal and not attribute.is_required:
+            field, width = LAYOUT[attribute.data_type]
+            values = np.empty((len(old.vertices), width), np.float32)
+            attribute.data.foreach_get(field, values.ravel())
+            every = np.concatenate([values, values[asset.copies], np.zeros((len(asset.parts), width), np.float32)])
+            new.attributes.new(attribute.name, attribute.data_type, 'POINT').data.foreach_set(field, every.ravel())
 
 
 def _vertices(mesh) -> np.ndarray:

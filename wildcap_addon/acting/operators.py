@@ -9,6 +9,9 @@ from .. import captures
 from ..base_operator import BaseOperator
 from . import materials, mesh
 
+OPEN = 0.22
+"""Height over width of an eye from which the registration takes it for open (core/registration/eyes.py)."""
+
 
 class _OnHead(BaseOperator):
     @classmethod
@@ -31,6 +34,7 @@ class WILDCAP_OT_add_face_units(_OnHead, bpy.types.Operator):
         if mesh.has(obj):
             raise Problem("This head has its face units already.", "Move their sliders, here or under Shape Keys in the mesh's properties.")
         mesh.add(obj, self.iris)
+        self.warn(filmed_open(captures.folder(item)))
 
 
 class WILDCAP_OT_iris(_OnHead, bpy.types.Operator):
@@ -55,6 +59,12 @@ class WILDCAP_OT_rest_face(_OnHead, bpy.types.Operator):
 
     def work(self, context):
         mesh.rest(_acting(context))
+
+
+def filmed_open(capture) -> str:
+    """What there is to say of the lids of a face that was filmed with open eyes, '' for closed ones."""
+    seen = capture.read()["stages"].get("registration", {}).get("figures", {}).get("eye_opening")
+    return "The eyes were open while filming: the lids carry a picture of them, which shows when they move" if seen is not None and seen > OPEN else ""
 
 
 def _acting(context):
