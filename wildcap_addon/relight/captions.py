@@ -1,71 +1,52 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lines of text as pictures, in Blender's own font, by a small render of text objects: that works without a window, in every Blender."""
-
-from pathlib import Path
+"""Lines of text as pictures, in Blender's own font: its text objects become triangles, which are filled here. No window, no scene and no render is needed."""
 
 import bpy
 import numpy as np
 
 FONT = 0.52
 """Size of the letters as a share of a line's height"""
+FINE = 4
+"""Subpixels to a side"""
 
 
-def draw(lines: list[list[str]], width: int, height: int, folder: Path) -> list[np.ndarray]:
-    """Each line's words, each in the middle of its share of the width: how white [height, width, 1] is, rows from the bottom. `folder` is for a picture
-    on the way, which goes again."""
-    scene = bpy.data.scenes.new("WildCap Captions")
-    made = []
+def draw(lines: list[list[str]], width: int, height: int) -> list[np.ndarray]:
+    """Each line's words, each in the middle of its share of the width: how white [height, width, 1] is, float32 in [0, 1], rows from the bottom."""
+    strips = []
+    for words in lines:
+        fine = np.zeros((height * FINE, width * FINE), bool)
+        for i, word in enumerate(words):
+            shift = np.array([(i + 0.5) / len(words) * width, height / 2])
+            for triangle in (_triangles(word) * FONT * height + shift) * FINE:
+                _fill(fine, triangle)
+        strips.append(fine.reshape(height, FINE, width, FINE).mean((1, 3), dtype=np.float32)[..., None])
+    return strips
+
+
+def _triangles(word: str) -> np.ndarray:
+    """The letters [N, 3, 2] at size 1 around the origin."""
+    text = bpy.data.curves.new("WildCap Caption", 'FONT')
+    text.body, text.align_x, text.align_y, text.resolution_u = word, 'CENTER', 'CENTER', 4
+    obj = bpy.data.objects.new(text.name, text)
+    mesh = bpy.data.meshes.new_from_object(obj)
     try:
-        material = _white()
-        made.append((bpy.data.materials, material))
-        for row, words in enumerate(lines):
-            for i, word in enumerate(words):
-                text = bpy.data.curves.new("WildCap Caption", 'FONT')
-                made.append((bpy.data.curves, text))
-                text.body, text.size, text.align_x, text.align_y = word, FONT, 'CENTER', 'CENTER'
-                text.materials.append(material)
-                obj = bpy.data.objects.new(text.name, text)
-                obj.location = ((i + 0.5) / len(words) * width / height, len(lines) - row - 0.5, 0.0)
-                scene.collection.objects.link(obj)
-        camera = bpy.data.cameras.new("WildCap Captions")
-        made.append((bpy.data.cameras, camera))
-        camera.type, camera.ortho_scale = 'ORTHO', max(width / height, len(lines))
-        scene.camera = bpy.data.objects.new(camera.name, camera)
-        scene.camera.location = (width / height / 2, len(lines) / 2, 1.0)
-        scene.collection.objects.link(scene.camera)
-        shown = _render(scene, width, height * len(lines), folder / ".captions.png")
+        mesh.calc_loop_triangles()
+        points, corners = np.empty(3 * len(mesh.vertices), np.float32), np.empty(3 * len(mesh.loop_triangles), np.int32)
+        mesh.vertices.foreach_get("co", points)
+        mesh.loop_triangles.foreach_get("vertices", corners)
+        return points.reshape(-1, 3)[corners.reshape(-1, 3), :2]
     finally:
-        for kind, thing in made:
-            kind.remove(thing)
-        bpy.data.scenes.remove(scene)
-    return list(shown.reshape(len(lines), height, width, 1)[::-1])
+        bpy.data.meshes.remove(mesh)
+        bpy.data.curves.remove(text)  # takes its object along
 
 
-def _white() -> bpy.types.Material:
-    material = bpy.data.materials.new("WildCap Caption")
-    material.use_nodes = True
-    nodes = material.node_tree.nodes
-    nodes.clear()
-    light, output = nodes.new('ShaderNodeEmission'), nodes.new('ShaderNodeOutputMaterial')
-    light.inputs["Color"].default_value = (1, 1, 1, 1)
-    material.node_tree.links.new(light.outputs["Emission"], output.inputs["Surface"])
-    return material
-
-
-def _render(scene, width: int, height: int, path: Path) -> np.ndarray:
-    """How much of each pixel letters cover, [height, width], rows from the bottom."""
-    scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.max_bounces = 'CYCLES', 24, False, 0
-    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = width, height, 100
-    scene.render.film_transparent, scene.render.use_file_extension = True, False
-    scene.render.image_settings.file_format, scene.render.image_settings.color_mode = 'PNG', 'RGBA'
-    scene.render.filepath = str(path)
-    try:
-        bpy.ops.render.render(write_still=True, scene=scene.name)
-        image = bpy.data.images.load(str(path))
-        pixels = np.empty(4 * width * height, np.float32)
-        image.pixels.foreach_get(pixels)
-        bpy.data.images.remove(image)
-    finally:
-        path.unlink(missing_ok=True)
-    return pixels.reshape(height, width, 4)[..., 3]
+def _fill(picture: np.ndarray, triangle: np.ndarray) -> None:
+    """Sets the pixels whose middle lies in a triangle [3, 2], in place."""
+    low = np.maximum(np.floor(triangle.min(0)).astype(int), 0)
+    high = np.minimum(np.ceil(triangle.max(0)).astype(int) + 1, picture.shape[::-1])
+    if (high <= low).any():
+        return
+    x, y = np.meshgrid(np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1]) + 0.5)
+    sides = [(b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]) for a, b in zip(triangle, np.roll(triangle, -1, 0), strict=True)]
+    picture[low[1]:high[1], low[0]:high[0]] |= (np.min(sides, 0) >= 0) | (np.max(sides, 0) <= 0)

@@ -34,6 +34,7 @@ def set_up(obj: bpy.types.Object, light: str | Hdri | None, resolution: int, sam
     render.engine = 'CYCLES'
     render.resolution_x = render.resolution_y = resolution
     render.resolution_percentage = 100
+    render.use_lock_interface = True  # the views wait, so that no thread draws what another changes
     as_picture(scene)
     scene.cycles.samples = samples
     scene.cycles.use_denoising = has_denoiser()
