@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sample head delivered to Unreal: the preset chosen, Deliver clicked, its question answered, and the folder is there as a whole; then again, over it."""
+
+import json
+import sys
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import addon  # noqa: E402
+import driver as d  # noqa: E402
+
+LIMIT_S = 600
+"""For the worker to write four maps, on a loaded machine."""
+
+
+def flow():
+    addon.unfold("WILDCAP_PT_deliver")
+    root = yield from addon.open_sample_head()
+    addon.use_solver()
+    addon.settings().deliver.preset = "unreal"
+    addon.settings().deliver.size = "1024"
+    yield 1.0
+    d.screenshot("deliver_1_panel")
+    target = root / "exports" / f"{root.stem}_head_unreal_fbx"
+    yield from click_deliver(root)
+    yield from d.until(lambda: target.is_dir() or addon.problem(root), "the delivery", LIMIT_S)
+    assert target.is_dir(), addon.problem(root)
+    told = json.loads((target / "provenance.json").read_text(encoding="utf-8"))
+    assert told["versions"]["Blender"] and {f"{root.stem}.fbx", f"textures/T_{root.stem}_N.png"} <= set(told["files"]), told["files"]
+    assert not [path for path in target.parent.iterdir() if path.name.startswith(".")]
+    yield from d.park()
+    d.screenshot("deliver_3_done")
+    assert addon.module("deliver.waiting").last(str(root)) == target
+    d.say("delivered", *sorted(told["files"]))
+    yield from again_and_cancelled(root, target)
+
+
+def again_and_cancelled(root: Path, target: Path):
+    """A second delivery over the first, stopped on its way: the first one stays."""
+    before = {path: path.stat().st_mtime_ns for path in target.rglob("*")}
+    yield from click_deliver(root)
+    yield from d.until(lambda: addon.job(root) is not None and addon.job(root).progress is not None, "the worker's start", 120, every_s=0.02)
+    bpy.ops.wildcap.cancel()
+    yield from d.until(lambda: addon.job(root) is None, "the cancel", 5)
+    assert {path: path.stat().st_mtime_ns for path in target.rglob("*")} == before
+    d.say("cancelled; what was delivered before is as it was")
+
+
+def click_deliver(root: Path):
+    """The button and, in its dialog, Deliver."""
+    yield from d.press("wildcap.deliver")
+    yield 1.0
+    d.screenshot("deliver_2_question")
+    yield from d.key('RET')
+    yield from d.until(lambda: addon.job(root) is not None or addon.problem(root) or (root / "exports").is_dir(), "the delivery's start", 20)
+
+
+d.play(flow(), limit_s=900)
