@@ -20,7 +20,7 @@ from ..meshes import Mesh, vertex_normals
 
 STRIP = 128
 """Rows whose triangles are found between two looks at a cancel."""
-FAR = 60.0
+FAR = 25.0
 """mm over which a field falls back to its mean where nothing is known: one odd texel on the border must not colour the back of the head."""
 
 

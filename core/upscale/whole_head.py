@@ -50,7 +50,7 @@ def complete(maps: Maps, surface: HeadSurface, report: Reporter, seed: int = 0) 
     if not holes.any() or seen.max() < 1:
         return maps
     channels, slopes = apart(maps)
-    tone = _tone(channels, seen, surface, seed)
+    tone = _tone(channels, seen * maps.confidence**2, surface, seed)
     report.check()
     skin = template.mask("skin", size) * seen
     learnt = grain.measure(channels, slopes, (skin >= 0.99).astype(np.float32), surface, seed)
@@ -99,16 +99,16 @@ def _features(size: int) -> np.ndarray:
     return np.minimum(1, 2 * np.maximum.reduce([template.mask(name, size) for name in FEATURES]))
 
 
-def _tone(channels: np.ndarray, seen: np.ndarray, surface: HeadSurface, seed: int) -> np.ndarray:
+def _tone(channels: np.ndarray, trust: np.ndarray, surface: HeadSurface, seed: int) -> np.ndarray:
     """Log albedo and specular [S, S, 4] without detail, everywhere: what is usual there, and a smooth field of how this person differs from it.
 
     Bare skin goes on over the scalp too, unless enough of the scalp was seen: then it has a field of its own.
     """
     scalp, usual = template.mask("scalp", surface.size), usual_skin(surface.size)
-    bare = seen * (1 - _features(surface.size))
+    bare = trust * (1 - _features(surface.size))
     bald = surface.smooth(usual, (1 - _features(surface.size)) * (1 - scalp) ** 4, REACH)
     of_skin = bald + surface.smooth(channels - bald, bare * (1 - scalp), REACH, ODD)
-    if float((bare * scalp * surface.texel**2).sum()) < LEAST_SCALP:
+    if float(((bare > 0) * scalp * surface.texel**2).sum()) < LEAST_SCALP:
         return of_skin
     of_scalp = usual + surface.smooth(channels - usual, bare * scalp, REACH, ODD)
     uneven = noise(surface.position.reshape(-1, 3), 3.0, np.random.default_rng([seed, 3])).reshape(scalp.shape)
