@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
+Vector = pytest.importorskip("mathutils").Vector
 
 TEMPLATE = Path(__file__).resolve().parent.parent / "core" / "assets" / "head.obj"
 HEAD = 12225  # its vertices
@@ -48,7 +49,7 @@ def shown(head) -> np.ndarray:
     return coordinates(head.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices)
 
 
-def test_at_rest_it_is_the_head_that_was_solved_and_each_unit_of_the_eye_opens_the_lids(head, capture):
+def test_at_rest_it_is_the_head_that_was_solved_and_each_unit_of_the_eye_opens_the_lids(head, capture, addon):
     solved = write_head(capture, 0.95)
     rest = shown(head)
     assert np.abs(rest[:HEAD] - solved).max() < 1e-6
@@ -80,6 +81,18 @@ def test_at_rest_it_is_the_head_that_was_solved_and_each_unit_of_the_eye_opens_t
     assert np.abs(shown(head) - rest)[:HEAD, 2].max() > 0.005  # to look somewhere is to open the eye
     with pytest.raises(RuntimeError, match="has its face units already"):
         bpy.ops.wildcap.add_face_units()
+
+    keys["eyesOpen"] = 1.0
+    blocks["jawOpen"].value = 1
+    pick = addon("solve.eyedropper").uv_on
+    eye = head.matrix_world @ Vector(rest[_kind(addon) == 1].mean(0))
+    assert pick(head, eye + Vector((0, -1, 0)), Vector((0, 1, 0))) is None  # the eye is no skin
+    assert bpy.ops.wildcap.paint_mask() == {'FINISHED'}
+    assert np.abs(shown(head) - rest).max() < 1e-6  # one paints on the head as it was solved
+    bpy.ops.wildcap.finish_mask()
+    assert np.abs(shown(head) - rest).max() > 0.01 and not head.show_only_shape_key
+    bpy.ops.wildcap.rest_face()
+    assert pick(head, eye + Vector((0, -1, 0)), Vector((0, 1, 0))) is not None
 
     image = head.data.materials[1].node_tree.nodes["WildCap Eye"].image
     before = np.array(image.pixels[:]).reshape(512, 512, 4)
@@ -141,6 +154,12 @@ def test_lids_that_were_filmed_open_are_warned_of(addon, tmp_path):
 
 def _triangles() -> np.ndarray:
     return np.array([[int(corner.split("/")[0]) - 1 for corner in line.split()[1:]] for line in TEMPLATE.read_text().splitlines() if line.startswith("f ")])
+
+
+def _kind(addon) -> np.ndarray:
+    """What each vertex moves with, -1 for the head's own and the copies: 1 is the left eye."""
+    kind = addon("acting.asset").load().kind
+    return np.concatenate([np.full(HEAD + COPIES, -1), kind])
 
 
 def _uvs_apart(head) -> None:

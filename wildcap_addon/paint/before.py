@@ -26,8 +26,14 @@ def remember(context, head: bpy.types.Object) -> dict:
         "views": view.remember(context.screen) if context.screen is not None else [],
         "mode": context.mode, "active": active.name if active else "",
         "selected": [o.name for o in context.view_layer.objects if o.select_get()],
-        "head": head.name, "mirrored": head.data.use_mirror_x,
+        "head": head.name, "mirrored": head.data.use_mirror_x, "pose": [head.show_only_shape_key, head.active_shape_key_index],
     }
+
+
+def at_rest(head: bpy.types.Object) -> None:
+    """The head is painted as it was solved, whatever face it makes: a stroke must not land on eyes or teeth."""
+    if head.data.shape_keys is not None:
+        head.active_shape_key_index, head.show_only_shape_key = 0, True
 
 
 def put_back(context, before: dict) -> None:
@@ -39,6 +45,7 @@ def put_back(context, before: dict) -> None:
     head = bpy.data.objects.get(before.get("head", ""))
     if head is not None:
         head.data.use_mirror_x = before["mirrored"]
+        head.show_only_shape_key, head.active_shape_key_index = before.get("pose", (False, 0))
     objects = context.view_layer.objects
     for thing in list(objects):
         thing.select_set(thing.name in before["selected"])

@@ -106,6 +106,7 @@ def begin(context, item, use_sheet: bool, which: str = 'SHADOW') -> None:
         raise Problem("This capture has no texture to paint over.", "Click Reconstruct first.")
     image = mask_image.load(capture, which)
     _session = Session(str(capture.root), context.scene.name, obj.name, image.name, which, before=before.remember(context, obj))
+    before.at_rest(obj)
     props, paint = context.scene.wildcap, context.scene.tool_settings.image_paint
     view.set_up(_session.before["views"], props.tint_strength)
     paint.mode = 'IMAGE'

@@ -69,12 +69,12 @@ def uv_under(window, event, head) -> tuple[float, float] | None:
 
 
 def uv_on(head, origin: Vector, direction: Vector) -> tuple[float, float] | None:
-    """UV where a ray, in the world, first meets the head."""
+    """UV where a ray, in the world, first meets the head's skin; None beside it, or on eyes, mouth and teeth, whose UVs lie in other tiles."""
     inverse = head.matrix_world.inverted()
     hit, point, _, face = head.ray_cast(inverse @ origin, inverse.to_3x3() @ direction)
     if not hit:
         return None
-    mesh = head.data
+    mesh = head.evaluated_get(bpy.context.evaluated_depsgraph_get()).data  # as it is shown: a face may be made
     mesh.calc_loop_triangles()
     found = []
     for triangle in (t for t in mesh.loop_triangles if t.polygon_index == face):
@@ -82,7 +82,8 @@ def uv_on(head, origin: Vector, direction: Vector) -> tuple[float, float] | None
         weights = barycentric_transform(point, *corners, Vector((1, 0, 0)), Vector((0, 1, 0)), Vector((0, 0, 1)))
         uv = sum((w * mesh.uv_layers[0].data[loop].uv for w, loop in zip(weights, triangle.loops, strict=True)), Vector((0, 0)))
         found.append((min(weights), tuple(uv)))
-    return max(found)[1]  # the one triangle of the polygon that the point is inside of
+    u, v = max(found)[1]  # the one triangle of the polygon that the point is inside of
+    return (u, v) if 0 <= u <= 1 and 0 <= v <= 1 else None
 
 
 def shown_image(head) -> bpy.types.Image:

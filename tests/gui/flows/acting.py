@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Face units by clicks: added in the panel, lids and jaw opened, back by Rest."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import addon  # noqa: E402
+import driver as d  # noqa: E402
+
+
+def flow():
+    addon.unfold("WILDCAP_PT_acting")
+    yield from addon.open_sample_head()
+    d.screenshot("acting_before")
+    yield from d.press("wildcap.add_face_units")
+    yield from d.until(lambda: keys() is not None and len(keys().key_blocks) == 55, "the face units", 60)
+    d.screenshot("acting_closed")
+    keys()["eyesOpen"], keys().key_blocks["jawOpen"].value = 1.0, 0.6
+    keys().update_tag()
+    yield 2.0
+    assert keys().key_blocks["eyesOpenLeft"].value > 0.99, "the slider does not open the lids"
+    d.screenshot("acting_open")
+    yield from d.press("wildcap.rest_face")
+    yield from d.until(lambda: keys().key_blocks["jawOpen"].value == 0 and keys()["eyesOpen"] == 0, "the face at rest", 20)
+    d.say(f"{len(keys().key_blocks) - 1} units")
+
+
+def keys():
+    return addon.head().data.shape_keys
+
+
+d.play(flow(), limit_s=300)
