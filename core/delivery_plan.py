@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .capture import Capture, storage_problem
-from .delivery_presets import FORMATS, PICTURES, PRESETS, WHAT, Format, Preset
+from .delivery_presets import FORMATS, PICTURES, PRESETS, Format, Preset
 from .messages import Problem
 from .settings import DeliverSettings
 
@@ -95,7 +95,8 @@ def needs(capture: Capture, what: str) -> Path:
     if not mesh.is_file():
         remedy = {"head": "Click Reconstruct first.", "own_mesh": "Choose your mesh under Reconstruction, Head Mesh, and run the stages to the end.",
                   "scan": "Run the stage Delivery with its scan switched on."}[what]
-        raise Problem(f"This capture has no {WHAT[what][0].lower()} to deliver.", remedy)
+        words = {"head": "head", "own_mesh": "fitted mesh of yours", "scan": "scan with textures"}[what]
+        raise Problem(f"This capture has no {words} to deliver.", remedy)
     return mesh
 
 

@@ -3,7 +3,7 @@
 """One frozen dataclass per stage. Default, range, unit and tooltip of every setting are written here and nowhere else.
 
 Ground floor: standard library only. The docstring under a field is its tooltip in Blender and its line in the
-command line's help; `metadata` holds `min`, `max`, `choices` and `unit`, and `deciding` False where no result depends on it.
+command line's help; `metadata` holds `min`, `max`, `choices`, `unit` and `label`, and `deciding` False where no result depends on it.
 """
 
 from __future__ import annotations
@@ -153,9 +153,9 @@ class DeliverSettings:
 
     preset: str = setting("blender", choices=tuple(delivery_presets.PRESETS))
     """The program it is for: its names of the maps, its units, its normals"""
-    what: str = setting("head", choices=tuple(delivery_presets.WHAT))
+    what: str = setting("head", choices=tuple(delivery_presets.WHAT), label="Mesh")
     """Which mesh is delivered"""
-    format: str = setting("preset", choices=("preset", *delivery_presets.FORMATS))
+    format: str = setting("preset", choices=("preset", *delivery_presets.FORMATS), label="File")
     """File of the mesh; preset: what that program likes best"""
     size: str = setting("4096", choices=("4096", "2048", "1024"), unit="px")
     """Side of the maps; maps that are smaller are not enlarged"""
@@ -163,13 +163,13 @@ class DeliverSettings:
     """File of the maps"""
     colour: str = setting("preset", choices=("preset", "srgb", "linear"))
     """Colour space of the albedo; preset: sRGB in PNG, linear in EXR"""
-    udim: str = setting("preset", choices=("preset", "numbered", "plain"))
+    udim: str = setting("preset", choices=("preset", "numbered", "plain"), label="UDIM")
     """Whether the maps' names carry the number of their UV tile (1001); maps of several tiles always do"""
-    hair: bool = setting(True)
+    hair: bool = setting(True, label="Hair Masks")
     """Masks of brows, lashes and beard and the skin below them go along, where the capture has them"""
-    clean: bool = setting(False)
+    clean: bool = setting(False, label="Clean Skin")
     """The albedo without brows, lashes and beard, to groom hair over it, in place of the one with them"""
-    folder: str = setting("")
+    folder: str = setting("", label="Deliver To")
     """Folder to deliver to; empty: exports in the capture's folder"""
     roughness: int = setting(45, min=0, max=100, unit="percent")
     """Roughness of the cheeks, in the maps and materials that hold it; Blender puts in what the head's material has"""

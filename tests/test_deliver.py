@@ -161,6 +161,14 @@ def test_usd_with_blend_shapes_and_colour_spaces(capture):
     assert all(not Path(name).is_absolute() and (folder / name).is_file() for name in read["textures"])
 
 
+def test_fbx_for_arnold_refers_to_linear_exr_numbered_by_tile(capture):
+    pytest.importorskip("ufbx")
+    folder = deliver(capture, preset="arnold")
+    read = by_another_reader(folder / "face.fbx")
+    linked = {"base_color", "normal_camera", "specular", "specular_roughness"}
+    assert set(read["textures"]) == {f"textures/face_{name}.1001.exr" for name in linked} and all((folder / name).is_file() for name in read["textures"])
+
+
 def test_obj_for_character_creator(capture):
     trimesh = pytest.importorskip("trimesh")
     folder = deliver(capture, preset="character_creator")

@@ -238,7 +238,7 @@ def test_a_folder_that_cannot_be_written_and_one_that_is_not_ours_are_refused(ca
 @pytest.mark.parametrize(("settings", "words"), [
     ({"format": "glb", "pictures": "exr"}, "cannot hold EXR"), ({"format": "glb", "colour": "linear"}, "sRGB only"),
     ({"pictures": "exr", "colour": "srgb", "format": "obj"}, "hold linear light"), ({"pictures": "png8", "colour": "linear", "format": "obj"}, "too few"),
-    ({"format": "fbx", "whole": True}, "written by Blender"), ({"what": "scan"}, "no scan"), ({"what": "own_mesh"}, "no my mesh")])
+    ({"format": "fbx", "whole": True}, "written by Blender"), ({"what": "scan"}, "no scan"), ({"what": "own_mesh"}, "no fitted mesh of yours")])
 def test_choices_that_do_not_go_together_are_refused_with_a_remedy(capture, settings, words):
     ended = delivered.deliver(capture, **settings)
     assert isinstance(ended, Failed) and words in ended.problem and ended.remedy.endswith(".")
