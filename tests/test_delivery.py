@@ -253,6 +253,15 @@ def test_every_preset_has_an_albedo_that_is_linked_and_names_of_its_own():
     assert delivery_plan.safe_name("山田") == "head" and delivery_plan.safe_name("Zoë & moi") == "Zoe_moi"
 
 
+def test_the_terminal_delivers_without_blender(capture, capsys):
+    assert main(["deliver", str(capture.root.with_name("none.wildcap")), "--preset", "unreal"]) == 2
+    assert "There is no capture" in capsys.readouterr().err
+    assert main(["deliver", str(capture.root), "--preset", "unreal", "--pictures", "png16"]) == 0
+    target = folder(capture, preset="unreal")
+    assert capsys.readouterr().out.splitlines()[-1] == str(target)
+    assert {"Zoe_et_moi.obj", "Zoe_et_moi.mtl", "provenance.json", "textures"} == {path.name for path in target.iterdir()}
+
+
 def test_the_guide_has_the_tables_as_they_are(capsys):
     assert main(["presets"]) == 0
     assert capsys.readouterr().out.strip() in (ROOT / "docs" / "guide.md").read_text(encoding="utf-8")
