@@ -16,7 +16,7 @@ def pixels(path):
 
 
 def test_the_contact_sheet_shows_each_preset_as_it_is_alone(addon, capture):
-    headless, sheet = addon("relight.headless"), addon("relight.contact_sheet")
+    headless = addon("relight.headless")
     path = headless.render_contact_sheet(capture, resolution=32, samples=2)
     found = pixels(path)
     assert path == capture / "renders" / "contact_sheet.png" and found.shape == (2 * 32 + 3 * 8, 3 * 32, 3)
@@ -32,7 +32,7 @@ def test_the_contact_sheet_shows_each_preset_as_it_is_alone(addon, capture):
     for name, before in shown.items():
         assert np.abs(pixels(capture / "renders" / f"{name}.exr") - before).mean() < 0.1 * before.mean(), "the same light as in a render of its own"
     assert not [p for p in (capture / "renders").iterdir() if p.name.startswith(".")]
-    assert not [d for d in (*bpy.data.curves, *bpy.data.actions) if d.users == 0] and sheet.captions.FONT < 1
+    assert not [d for d in (*bpy.data.curves, *bpy.data.actions) if d.users == 0]
 
 
 @pytest.mark.parametrize("turns", ['LIGHT', 'HEAD'])
@@ -61,10 +61,9 @@ def test_a_film_replaces_the_frames_and_one_that_is_stopped_leaves_the_last(addo
     headless, output = addon("relight.headless"), addon("relight.output")
     folder = headless.render_turntable(capture, "sun", frames=2, film=True, resolution=32, samples=1)
     assert [p.name for p in folder.iterdir()] == ["turntable.mp4"] and b"ftyp" in (folder / "turntable.mp4").read_bytes()[:12]
-    scene = bpy.data.scenes["WildCap Relight"]
     output._running = output.Running(folder=folder)
     (folder.parent / ".turntable").mkdir()
-    output.cancelled(scene)
+    output.drop()
     assert not (folder.parent / ".turntable").exists() and (folder / "turntable.mp4").is_file()
     monkeypatch.setattr(addon("relight.reel"), "can_film", lambda: False)
     with pytest.raises(headless.Problem, match="without FFmpeg"):

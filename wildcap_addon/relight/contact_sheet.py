@@ -13,7 +13,7 @@ import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 
 from ..properties import LIGHTS
-from . import captions, lights, output, picture, reel
+from . import captions, lights, output, reel
 
 NAME = "contact_sheet.png"
 COLUMNS = 3
@@ -29,7 +29,7 @@ def render(obj: bpy.types.Object, folder: Path, wait: bool, **look) -> Path:
     size = look["resolution"]
     names = {name: iface_(label) for name, label, *_ in LIGHTS}
     rows = [[names[p] for p in presets[i:i + COLUMNS]] for i in range(0, len(presets), COLUMNS)]
-    about = [iface_("{} · {} · Cycles, {} samples").format(obj.name, picture.view_label(scene), look["samples"])]
+    about = [iface_("{} · {} · Cycles, {} samples").format(obj.name, output.view_label(scene), look["samples"])]
     paths, sheet = [folder / f"{name}.png" for name in presets], folder / NAME
     output.make_room(sheet)
     strips = captions.draw([*rows, about], COLUMNS * size, max(size // 14, 8))

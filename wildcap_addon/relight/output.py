@@ -1,13 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a render leaves. A file or folder that bears its name is complete; each still has its linear EXR (scene referred, half float) beside it, from which
-figures are taken: no view transform has touched it.
+"""What a render leaves. A file or folder that bears its name is complete. A still is rendered as linear EXR (scene referred, half float), from which figures
+are taken, and its PNG is made of that, through the scene's view transform.
 
-Blender renders in a thread of its own: what makes data-blocks waits for the window's next moment.
+Blender renders in a thread of its own, in which nothing of Blender may be touched: what is left to do waits for the window's next moment.
 """
 
 import os
 import shutil
+import struct
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,9 +23,9 @@ SCENE = "WildCap Relight"
 
 @dataclass
 class Running:
-    """A render on its way: `stills` by frame, or a `folder` of all frames; `then` is called when all is complete."""
+    """A render on its way: `stills`, each by the hidden EXR it is rendered to, or a `folder` of all frames; `then` is called when all is complete."""
 
-    stills: dict[int, Path] = field(default_factory=dict)
+    stills: dict[Path, Path] = field(default_factory=dict)
     folder: Path | None = None
     then: Callable[[], None] | None = None
 
@@ -40,9 +42,11 @@ def still(scene: bpy.types.Scene, path: Path, wait: bool) -> None:
     """Renders `path`, a PNG, and its EXR. wait=False returns at once and shows Blender's render window. Raises Problem when the folder cannot be written."""
     global _running
     make_room(path)
-    _running = Running(stills={scene.frame_current: path})
-    scene.render.filepath = str(_hidden(path))
-    bpy.ops.render.render('EXEC_DEFAULT' if wait else 'INVOKE_DEFAULT', write_still=True, scene=scene.name)
+    source = _hidden(path.with_suffix(".exr"))
+    _running = Running(stills={source: path})
+    as_linear(scene)
+    scene.render.filepath = str(source)
+    _render(scene, wait, write_still=True)
 
 
 def stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: Callable[[], None]) -> None:
@@ -50,8 +54,11 @@ def stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: Callable
     global _running
     make_room(paths[0])
     scene.frame_start, scene.frame_end = 1, len(paths)
-    _running = Running(stills=dict(enumerate(paths, 1)), then=then)
-    _animate(scene, _hidden(paths[0]).with_name(".frame_####.png"), wait)
+    as_linear(scene)
+    scene.render.filepath = str(paths[0].with_name(".frame_####.exr"))
+    _running = Running(stills={paths[0].with_name(f".frame_{i:04d}.exr"): path for i, path in enumerate(paths, 1)}, then=then)
+    scene.render.use_persistent_data = True  # the head and its maps are the same in all frames
+    _render(scene, wait, animation=True)
 
 
 def frames(scene: bpy.types.Scene, folder: Path, name: str, count: int, wait: bool) -> None:
@@ -61,14 +68,37 @@ def frames(scene: bpy.types.Scene, folder: Path, name: str, count: int, wait: bo
     hidden = _hidden(folder)
     shutil.rmtree(hidden, ignore_errors=True)
     scene.frame_start, scene.frame_end = 1, count
+    scene.render.filepath = str(hidden / name)
     _running = Running(folder=folder)
-    _animate(scene, hidden / name, wait)
+    if "#" in name:
+        as_picture(scene)
+    scene.render.use_persistent_data = True
+    _render(scene, wait, animation=True)
 
 
-def _animate(scene, path: Path, wait: bool) -> None:
-    scene.render.filepath = str(path)
-    scene.render.use_persistent_data = True  # the head and its maps are the same in all frames
-    bpy.ops.render.render('EXEC_DEFAULT' if wait else 'INVOKE_DEFAULT', animation=True, scene=scene.name)
+def as_picture(scene: bpy.types.Scene) -> None:
+    """Renders are written as PNG."""
+    _write_as(scene, 'PNG', '8')
+
+
+def as_linear(scene: bpy.types.Scene) -> None:
+    """Renders are written as EXR."""
+    _write_as(scene, 'OPEN_EXR', '16')
+    scene.render.image_settings.exr_codec = 'ZIP'
+
+
+def _write_as(scene, kind: str, bits: str) -> None:
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):  # Blender 5
+        settings.media_type = 'IMAGE'
+    settings.file_format, settings.color_mode, settings.color_depth = kind, 'RGB', bits
+    scene.render.use_file_extension = False
+
+
+def _render(scene, wait: bool, **what) -> None:
+    bpy.ops.render.render('EXEC_DEFAULT' if wait else 'INVOKE_DEFAULT', scene=scene.name, **what)
+    if wait:
+        _finish()
 
 
 def make_room(path: Path) -> None:
@@ -87,65 +117,76 @@ def _hidden(path: Path) -> Path:
 
 
 @bpy.app.handlers.persistent
-def written(scene, *_):
-    """Gives a finished picture its name, its EXR first."""
-    path = _running.stills.get(scene.frame_current)
-    if scene.name != SCENE or path is None:
-        return
-    source = Path(scene.render.frame_path(frame=scene.frame_current)) if "#" in scene.render.filepath else Path(scene.render.filepath)
-    if source.is_file():
-        exr = path.with_suffix(".exr")
-        _save_linear(scene, _hidden(exr))
-        os.replace(_hidden(exr), exr)
-        os.replace(source, path)
-
-
-@bpy.app.handlers.persistent
 def completed(scene, *_):
-    """The whole render is there."""
-    if scene.name == SCENE:
-        if bpy.app.background:
-            _finish()
-        else:
-            bpy.app.timers.register(_finish, first_interval=0.0)
+    """The whole render is there. Without a window, who asked for it waits for it."""
+    if scene.name == SCENE and not bpy.app.background:
+        bpy.app.timers.register(_finish, first_interval=0.0)
 
 
 @bpy.app.handlers.persistent
 def cancelled(scene, *_):
-    """The artist stopped it: pictures that are complete stay, a folder that is not goes."""
+    """The artist stopped it: what was there before stays."""
+    if scene.name == SCENE and not bpy.app.background:
+        bpy.app.timers.register(drop, first_interval=0.0)
+
+
+def drop() -> None:
+    """Forgets the render on its way and what it has written."""
     global _running
-    if scene.name == SCENE:
-        if _running.folder is not None:
-            shutil.rmtree(_hidden(_running.folder), ignore_errors=True)
-        _running = Running()
+    running, _running = _running, Running()
+    for source in running.stills:
+        source.unlink(missing_ok=True)
+    if running.folder is not None:
+        shutil.rmtree(_hidden(running.folder), ignore_errors=True)
+    _free()
 
 
 def _finish() -> None:
+    """Gives what is complete its name."""
     global _running
+    if busy():  # its last moments
+        bpy.app.timers.register(_finish, first_interval=0.1)
+        return
     running, _running = _running, Running()
-    scene = bpy.data.scenes.get(SCENE)
-    if scene is not None:
-        scene.render.use_persistent_data = False  # which frees what was kept
+    for source, path in running.stills.items():
+        os.replace(source, path.with_suffix(".exr"))
+        _picture(path)
     if running.folder is not None:
         shutil.rmtree(running.folder, ignore_errors=True)
         os.replace(_hidden(running.folder), running.folder)
+    _free()
     if running.then is not None:
         running.then()
 
 
-def _save_linear(scene, path: Path) -> None:
-    """The render's scene referred values, RGB half float."""
-    settings = scene.render.image_settings
-    before = settings.file_format, settings.color_mode, settings.color_depth
-    settings.file_format, settings.color_mode, settings.color_depth = 'OPEN_EXR', 'RGB', '16'
-    settings.exr_codec = 'ZIP'
+def _free() -> None:
+    scene = bpy.data.scenes.get(SCENE)
+    if scene is not None and scene.render.use_persistent_data:
+        scene.render.use_persistent_data = False  # which frees what was kept
+
+
+def _picture(path: Path) -> None:
+    """The PNG of an EXR, as the relight scene shows it; its metadata say by which view transform."""
+    scene = bpy.data.scenes[SCENE]
+    image = bpy.data.images.load(str(path.with_suffix(".exr")))
     try:
-        bpy.data.images["Render Result"].save_render(str(path), scene=scene)
+        as_picture(scene)
+        image.save_render(str(_hidden(path)), scene=scene)
     finally:
-        settings.file_format, settings.color_mode, settings.color_depth = before
+        bpy.data.images.remove(image)
+    data = _hidden(path).read_bytes()
+    note = b"tEXtNote\0" + view_label(scene).encode("latin-1", "replace")
+    header = 8 + 25  # the signature and IHDR, which comes first
+    _hidden(path).write_bytes(data[:header] + struct.pack(">I", len(note) - 4) + note + struct.pack(">I", zlib.crc32(note)) + data[header:])
+    os.replace(_hidden(path), path)
 
 
-HANDLERS = {"render_write": written, "render_complete": completed, "render_cancel": cancelled}
+def view_label(scene: bpy.types.Scene) -> str:
+    """What pictures of this scene say of their colours."""
+    return f"View transform: {scene.view_settings.view_transform}"
+
+
+HANDLERS = {"render_complete": completed, "render_cancel": cancelled}
 
 
 def register():

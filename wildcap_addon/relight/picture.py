@@ -13,7 +13,7 @@ from mathutils import Matrix, Vector
 from .. import colours
 from ..hdri import Hdri
 from . import lights
-from .output import SCENE
+from .output import SCENE, view_label
 
 CAMERA_DIRECTION = (-0.28, -1.0, 0.05)
 FOCAL_LENGTH_MM = 85.0
@@ -35,7 +35,6 @@ def set_up(obj: bpy.types.Object, light: str | Hdri | None, resolution: int, sam
     render.resolution_x = render.resolution_y = resolution
     render.resolution_percentage = 100
     render.use_lock_interface = True  # the views wait, so that no thread draws what another changes
-    as_picture(scene)
     scene.cycles.samples = samples
     scene.cycles.use_denoising = has_denoiser()
     colours.show_by(scene, view)
@@ -43,22 +42,8 @@ def set_up(obj: bpy.types.Object, light: str | Hdri | None, resolution: int, sam
     return scene
 
 
-def as_picture(scene: bpy.types.Scene) -> None:
-    """Renders are written as PNG."""
-    settings = scene.render.image_settings
-    if hasattr(settings, "media_type"):  # Blender 5
-        settings.media_type = 'IMAGE'
-    settings.file_format, settings.color_mode, settings.color_depth = 'PNG', 'RGB', '8'
-    scene.render.use_file_extension = False
-
-
-def view_label(scene: bpy.types.Scene) -> str:
-    """What pictures of this scene say of their colours."""
-    return f"View transform: {scene.view_settings.view_transform}"
-
-
 def _label(scene) -> None:
-    """The files' metadata name the view transform, and neither places nor persons."""
+    """Frames' metadata name the view transform, and neither places nor persons."""
     render = scene.render
     for name in (p.identifier for p in render.bl_rna.properties if p.identifier.startswith("use_stamp_")):
         setattr(render, name, name == "use_stamp_note")
