@@ -136,7 +136,7 @@ def _split(base: Base, builder: HeadBuilder) -> tuple[list, list, np.ndarray, sp
 
     cavities = torch.load(base.folder / "template_mesh_internal_cavities.pth", weights_only=True)
     inner = [base.faces[int(i)] for i in cavities["face_indices"]]
-    near = {i for chain in (UPPER for lids in builder._lids.values() for UPPER in lids) for i in chain.tolist()}
+    near = {i for lids in builder._lids.values() for rim in lids for i in rim.tolist()}
     socket = [f for f in inner if base.vertices[list(f), 1].min() > 7.05]
     kept = [f for f in inner if base.vertices[list(f), 1].min() <= 7.05]
     for _ in range(SOCKET_RINGS):
