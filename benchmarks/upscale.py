@@ -18,6 +18,7 @@ import json
 import resource
 import tempfile
 import time
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
@@ -68,8 +69,8 @@ def main() -> None:
     if "frames" in arguments.rows:
         found["frames"] = from_frames(arguments.work)
     if "cost" in arguments.rows:
-        with get_context("spawn").Pool(1, maxtasksperchild=1) as pool:  # each in a fresh process, whose peak is its own
-            found["cost"] = {method: pool.apply(cost, (method,)) for method in METHODS}
+        with ProcessPoolExecutor(1, mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:  # each in a fresh process, whose peak is its own
+            found["cost"] = dict(zip(METHODS, pool.map(cost, METHODS), strict=True))
     print("\n\n".join(_table(name, rows) for name, rows in found.items()))
     if arguments.json:
         arguments.json.write_text(json.dumps(found, indent=1), encoding="utf-8")
@@ -93,7 +94,7 @@ def enlarging(work: Path, sheet: Path | None = None) -> dict[str, dict[str, floa
                     shots.append(_closeup(small, results, true))
         found |= {f"{kind}, {method}": {name: round(float(np.mean([s[name] for s in rows])), 4) for name in rows[0]} for method, rows in scores.items()}
     if sheet:
-        images.write_srgb(sheet, np.vstack(shots[:4]), quality=88)
+        images.write_srgb(sheet, np.vstack([np.hstack(shots[:2]), np.hstack(shots[2:4])]), quality=86)
     return found
 
 
@@ -137,7 +138,8 @@ def _closeup(small: np.ndarray, results: dict[str, np.ndarray], true: np.ndarray
     row, column = (int(at) + side // 2 for at in np.unravel_index(log.argmax(), log.shape))
     nearest = np.repeat(np.repeat(np.moveaxis(small, 0, -1), FACTOR, 0), FACTOR, 1)
     parts = [maps[row:row + side, column:column + side] for maps in (nearest, *results.values(), true)]
-    return np.vstack([np.hstack([part[..., :3] for part in parts]), np.hstack([part[..., 3:6] * 0.5 + 0.5 for part in parts])])
+    both = np.vstack([np.hstack([part[..., :3] for part in parts]), np.hstack([part[..., 3:6] * 0.5 + 0.5 for part in parts])])
+    return np.pad(both, ((0, 8), (0, 8), (0, 0)), constant_values=1)
 
 
 def from_frames(work: Path) -> dict[str, dict[str, float]]:
