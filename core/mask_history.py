@@ -24,11 +24,16 @@ def keep(capture: Capture, mask: Path, content: bytes | None = None) -> Path | N
     """
     if content is None and not mask.is_file():
         return None
-    seconds, milliseconds = divmod(time.time_ns() // 1_000_000, 1000)  # read once: two readings may fall on both sides of a second
-    stamp = f"{time.strftime('%Y%m%d_%H%M%S', time.localtime(seconds))}_{milliseconds:03d}"
-    copy = capture.mask_history / f"{mask.stem}_{stamp}{mask.suffix}"
+    now = time.time_ns() // 1_000_000
+    while (copy := _place(capture, mask, now)).exists():  # a fast disk takes several within a millisecond, and none may be lost
+        now += 1
     with replacing(copy) as temporary:
         shutil.copyfile(mask, temporary) if content is None else temporary.write_bytes(content)
     for old in sorted(capture.mask_history.glob(f"{mask.stem}_*{mask.suffix}"))[:-KEPT]:
         old.unlink(missing_ok=True)
     return copy
+
+
+def _place(capture: Capture, mask: Path, milliseconds: int) -> Path:
+    seconds, rest = divmod(milliseconds, 1000)
+    return capture.mask_history / f"{mask.stem}_{time.strftime('%Y%m%d_%H%M%S', time.localtime(seconds))}_{rest:03d}{mask.suffix}"

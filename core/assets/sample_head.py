@@ -17,8 +17,9 @@ from ..capture import Capture, replacing_folder
 from ..messages import Problem
 from ..template import ASSETS
 
-PICTURES = ("texture.png", "texture_filmed.png", "comparison/delit.png", "comparison/filmed.png", "maps/diffuse_albedo.png")
-DATA = ("shadow_mask_auto.png", "maps/specular_albedo.png", "maps/normal.png")
+PICTURES = ("texture.png", "texture_filmed.png", "comparison/delit.png", "comparison/filmed.png")
+SIZE = 1024
+"""Side of the maps: the delivered ones, whose neck, ears and scalp are completed, made smaller again."""
 SURE = 256
 """Side of the confidence, which is only looked at."""
 
@@ -31,8 +32,12 @@ def main() -> None:
         (folder / "head_vertices.obj").write_text(_vertices(capture.head), encoding="ascii")
         for name in PICTURES:
             images.write_srgb(folder / name, images.read_srgb(capture.root / name), small=True)
-        for name in DATA:
-            images.write_data(folder / name, images.read_data(capture.root / name), small=True)
+        images.write_data(folder / "shadow_mask_auto.png", images.read_data(capture.shadow_mask_auto), small=True)
+        (folder / "maps").mkdir()
+        albedo = images.resize(images.read_linear(capture.maps_4k / "diffuse_albedo.exr"), SIZE, SIZE)
+        images.write_srgb(folder / "maps/diffuse_albedo.png", images.linear_to_srgb(albedo), small=True)
+        for name in ("specular_albedo.png", "normal.png"):
+            images.write_data(folder / "maps" / name, images.resize(images.read_data(capture.maps_4k / name), SIZE, SIZE), small=True)
         images.write_linear(folder / "texture.exr", images.read_linear(capture.texture), small=True)
         images.write_data(folder / "texture_confidence.exr", images.read_data(capture.texture_confidence), small=True)
         images.write_data(folder / "maps/confidence.png", images.resize(images.read_mask(capture.maps / "confidence.png"), SURE, SURE), small=True)
