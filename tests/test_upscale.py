@@ -194,8 +194,8 @@ def test_a_training_goes_on_where_it_stopped(windows, tmp_path, monkeypatch):
             "training": {"patch": 8, "batch": 4, "rate": 5e-3, "minutes": 1, "skins": 2, "views": 1, "held_out": 1, "seed": 0, "workers": 0}}
     monkeypatch.setitem(upscaler.CONFIGS, "cpu", tiny)
     out = tmp_path / "upscaler.safetensors"
-    first = upscaler.train_upscaler("cpu", out, Reporter("train"), minutes=0.02, work=windows)
-    second = upscaler.train_upscaler("cpu", out, Reporter("train"), minutes=0.05, work=windows)
+    first = upscaler.train_upscaler("cpu", out, Reporter("train"), minutes=0.01, work=windows)
+    second = upscaler.train_upscaler("cpu", out, Reporter("train"), minutes=0.02, work=windows)
     assert second["steps"] > first["steps"] > 0 and second["parameters"] == sum(p.numel() for p in network.Rcan(**tiny["model"]).parameters())
     assert load_network(out).tail.weight.abs().max() > 0 and out.with_suffix(".json").is_file()
     monkeypatch.setitem(upscaler.CONFIGS, "gpu", tiny)
