@@ -9,7 +9,6 @@ import os
 import shutil
 from pathlib import Path
 
-import cv2
 import numpy as np
 import OpenImageIO as oiio
 import pytest
@@ -50,7 +49,9 @@ def part_of(path: Path):
 
 def four_channels(path: Path) -> np.ndarray:
     """R, G, B, A as stored, by a reader that does not multiply by alpha."""
-    return cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., [2, 1, 0, 3]] / 255
+    as_stored = oiio.ImageSpec()
+    as_stored.attribute("oiio:UnassociatedAlpha", 1)
+    return oiio.ImageInput.open(str(path), as_stored).read_image("uint8") / 255
 
 
 def test_directx_flips_the_green_of_every_texel_and_nothing_else(capture):
