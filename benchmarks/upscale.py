@@ -42,9 +42,9 @@ from tests.painted_head import camera
 
 from .ablation_measures import feature_distance
 from .detail import moles
-from .shadow_captures import picture, registered, write_views
+from .shadow_captures import picture, write_views
 
-SEEDS, FILMED = (900001, 900003, 900004, 900005, 900007, 900008), (900003, 900007)
+SEEDS, FILMED = (900001, 900003, 900004, 900005, 900007, 900008), (900003,)
 """Reserved subjects: nothing is trained on them."""
 VIEWS = 2
 """Windows of each subject."""
@@ -168,7 +168,7 @@ def filmed(seed: int, folder: Path) -> tuple[Capture, np.ndarray]:
         views = [camera(azimuth, 0.0, scale=CLOSE) for azimuth in (-45, -25, -8, 8, 25, 45)]
         caster = raster.RayCaster(mesh)
         write_views(capture, views, (picture(caster, view, 0.8 * true, rng, rays=1) for view in views))
-        meshes.write_obj(capture.head, registered(mesh, seed))
+        meshes.write_obj(capture.head, mesh)  # the true head: an error of its place would be measured, not the detail
         with replacing_folder(capture.delit) as delit:
             for path in sorted(capture.frames.glob("*.jpg")):
                 images.write_srgb(delit / f"{path.stem}.png", images.read_srgb(path))
