@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The record that a benchmark leaves behind: {"benchmark", "command", "commit", "figures"}, one JSON file each.
+
+Benchmarks write it where their --json says; what is published lies in docs/figures/NAME.json, and docs/results.md and the README's figures
+come from there (benchmarks/results.py). Figures are nested dicts of plain numbers; null is one that was not measured. Rows of a table are
+printed in the order in which they were written.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+from core.capture import write_json
+from core.messages import Problem
+
+ROOT = Path(__file__).resolve().parent.parent
+PUBLISHED = ROOT / "docs" / "figures"
+
+
+def write(path: Path, benchmark: str, command: str, figures: dict) -> None:
+    """Writes a record; `benchmark` is the module's name, `command` as the docs have it (folders as CAPITALS).
+
+    Raises ValueError for a figure that is no finite number, string, bool or None. The commit is HEAD's, None outside of git.
+    """
+    write_json(Path(path), {"benchmark": benchmark, "command": command, "commit": commit(), "figures": plain(figures)})
+
+
+def read(name: str, folder: Path = PUBLISHED) -> dict:
+    """The record `name` of a folder. Raises Problem where it is missing or is no record."""
+    path = Path(folder) / f"{name}.json"
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except OSError:
+        raise Problem(f"{path} is missing.", f"Run the benchmark with `--json {path}`.") from None
+    except ValueError as error:
+        raise Problem(f"{path} is not JSON ({error}).", "Run the benchmark again.") from None
+    if not isinstance(record, dict) or set(record) != {"benchmark", "command", "commit", "figures"} or not isinstance(record["figures"], dict):
+        raise Problem(f"{path} is not a benchmark's record.", 'It holds "benchmark", "command", "commit" and "figures"; benchmarks/figures.py writes it.')
+    return record
+
+
+def markdown(head: list[str], rows: list[list]) -> str:
+    """A Markdown table, without a newline at its end; None is a dash."""
+    return "\n".join("| " + " | ".join("-" if cell is None else str(cell) for cell in row) + " |" for row in (head, ["---"] * len(head), *rows))
+
+
+def plain(figures, name: str = "figures"):
+    """The same with NumPy's numbers as Python's. Raises ValueError that names the figure JSON cannot hold."""
+    if isinstance(figures, dict):
+        return {str(key): plain(value, f"{name}.{key}") for key, value in figures.items()}
+    if isinstance(figures, np.generic):
+        figures = figures.item()
+    if figures is None or isinstance(figures, str | bool | int) or isinstance(figures, float) and math.isfinite(figures):
+        return figures
+    raise ValueError(f"{name} is {figures!r}: a figure is a finite number, a string, or None where it was not measured")
+
+
+def commit() -> str | None:
+    """HEAD's short hash; None where this is no checkout or git is not installed."""
+    try:
+        found = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return found.stdout.strip()

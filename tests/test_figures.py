@@ -1,0 +1,36 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A benchmark's record: what is written is read again, and what no table could print is refused."""
+
+import numpy as np
+import pytest
+
+from benchmarks import figures
+from core.messages import Problem
+
+
+def test_a_record_is_read_as_it_was_written(tmp_path):
+    figures.write(tmp_path / "one.json", "demo", "make demo", {"rows": {"b": {"psnr": np.float32(0.5)}, "a": {"views": np.int64(14), "none": None}}})
+    record = figures.read("one", tmp_path)
+    assert record["benchmark"] == "demo" and record["command"] == "make demo" and "commit" in record
+    assert record["figures"] == {"rows": {"b": {"psnr": 0.5}, "a": {"views": 14, "none": None}}}
+    assert list(record["figures"]["rows"]) == ["b", "a"]
+
+
+@pytest.mark.parametrize("value", [float("nan"), np.float64("inf"), [1, 2], np.zeros(2)])
+def test_what_is_no_figure_is_refused_by_name(tmp_path, value):
+    with pytest.raises(ValueError, match=r"figures\.rows\.psnr"):
+        figures.write(tmp_path / "one.json", "demo", "make demo", {"rows": {"psnr": value}})
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("text", [None, "no json", "[]", '{"figures": {}}'])
+def test_a_file_that_is_no_record_is_a_problem(tmp_path, text):
+    if text is not None:
+        (tmp_path / "one.json").write_text(text, encoding="utf-8")
+    with pytest.raises(Problem):
+        figures.read("one", tmp_path)
+
+
+def test_a_table_has_a_dash_where_nothing_was_measured():
+    assert figures.markdown(["row", "PSNR"], [["ours", "30.1 dB"], ["theirs", None]]) == "| row | PSNR |\n| --- | --- |\n| ours | 30.1 dB |\n| theirs | - |"
