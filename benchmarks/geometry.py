@@ -16,8 +16,6 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
-import subprocess
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +25,7 @@ from core.capture import Capture, write_json
 from core.messages import Problem
 from core.settings import Settings
 
+from . import stage_cost
 from .geometry_table import markdown, write_section
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -87,12 +86,7 @@ def run_stages(capture: Capture, source: Path) -> tuple[dict, dict | None]:
         if stage in costs and capture.state(stages.by_name(stage), Settings()) == "done":
             continue
         print(f"{capture.root.stem}: stage {stage}", flush=True)
-        child = subprocess.run([sys.executable, "-m", "benchmarks.geometry_stage", str(source.absolute()), str(capture.root), stage], cwd=ROOT,
-                               stdout=subprocess.PIPE, text=True, encoding="utf-8")
-        lines = child.stdout.strip().splitlines()
-        if child.returncode or not lines:
-            return costs, {"stage": stage, "problem": f"The stage's process ended with code {child.returncode}.", "remedy": f"See {capture.logs}."}
-        cost = json.loads(lines[-1])
+        cost = stage_cost.measure(capture.root, stage, source.absolute())
         if "problem" in cost:
             return costs, {"stage": stage, **cost}
         costs[stage] = cost

@@ -5,8 +5,8 @@
 import numpy as np
 import pytest
 
-from benchmarks.geometry_stage import peak_mb
 from benchmarks.geometry_table import markdown, write_section
+from benchmarks.stage_cost import peak_mb
 from core import images
 
 RESULTS = {

@@ -1,0 +1,222 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Time and memory of the whole chain on the sample video, stage by stage, and how they grow with resolution, grid, views and frames.
+
+    python -m benchmarks.costs WORK --json OUT.json [--rows standard draft solve-2048 ...] [--capture CAPTURE] [--limit-s 600]
+
+Every stage runs in a process of its own (benchmarks/stage_cost.py). "standard" goes from the video to the delivery; the other rows start from a copy of what
+it made in WORK, or of --capture. OUT.json is written after each stage: the same command goes on where it was stopped. A stage that takes longer than --limit-s
+is ended and told as "over"; one beside which other processes took more than 0.2 processors is told with that. 30 frames are taken from the sample's 60; 120 and
+300 are the sample's played to and fro, with new noise in every frame: more pictures to work on, not more to see.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import av
+import numpy as np
+
+from core import stages
+from core.capture import Capture, replacing_folder, write_json
+from core.messages import Problem
+
+from . import figures, stage_cost
+
+VIDEO = Path(__file__).resolve().parent.parent / "core" / "synthetic" / "sample" / "capture.mp4"
+NOISE = 1.5
+"""Deviation of a repeated frame's noise, in steps of 255."""
+DISTURBED = 0.2
+"""Processors that others took during a measurement, from which on the table says so."""
+LEFT_OUT = shutil.ignore_patterns("maps*", "checkpoints", "comparison", "delivery", "exports", "renders", "report*", "logs", "lock", "job.json")
+"""What a copy of a finished capture does without: each row solves before it needs maps."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """What is run: these stages in order, with the settings {stage: {name: value}} over the preset `quality`. frames: of a video of so many frames, from
+    nothing; views: so many of the frames are selected (V)."""
+
+    stages: tuple[str, ...]
+    settings: dict = field(default_factory=dict)
+    quality: str = "standard"
+    frames: int = 0
+    views: int = 0
+
+
+ROWS = {
+    "standard": Row(stages.NAMES),
+    "draft": Row(stages.NAMES[stages.NAMES.index("scan"):], quality="draft"),  # frames and cameras have the same settings in both
+    **{f"solve-{size}": Row(("solve",), {"solve": {"size": size}}) for size in (512, 2048)},
+    **{f"grid-{cells}": Row(("solve",), {"solve": {"grid_cells": cells}}) for cells in (1, 24, 384)},
+    **{f"texture-{size}": Row(("texture",), {"texture": {"size": size}}) for size in (512, 2048)},
+    **{f"views-{count}": Row(("delight", "texture"), views=count) for count in (8, 32)},
+    **{f"frames-{count}": Row(("frames", "cameras", "scan"), {"frames": {"max_frames": count}}, frames=count) for count in (30, 120, 300)},
+}
+"""In the order of what matters most."""
+GROWTH = (
+    ("side of the map", (512, 1024, 2048), {"texture": ("texture-512", "standard", "texture-2048"), "solve": ("solve-512", "standard", "solve-2048"),
+                                            "upscale": ("draft", "standard", "")}),
+    ("cells of the light grid", (1, 24, 96, 384), {"solve": ("grid-1", "grid-24", "standard", "grid-384")}),
+    ("views", (8, 16, 32), dict.fromkeys(("delight", "texture"), ("views-8", "standard", "views-32"))),
+    ("frames", (30, 60, 120, 300), dict.fromkeys(("frames", "cameras", "scan"), ("frames-30", "standard", "frames-120", "frames-300"))),
+)
+"""What the tables of growth show: a setting, its values, and for each stage the rows that measured it there."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("work", type=Path)
+    parser.add_argument("--json", type=Path, required=True)
+    parser.add_argument("--rows", nargs="+", choices=tuple(ROWS), default=list(ROWS))
+    parser.add_argument("--capture", type=Path, help="a finished capture of the sample to copy, for rows without the row standard")
+    parser.add_argument("--limit-s", type=float, default=600, help="seconds that a stage may take")
+    options = parser.parse_args()
+    try:
+        failed = [name for name in options.rows if not measured(name, options)]
+    except Problem as problem:
+        parser.error(f"{problem.problem} {problem.remedy}")
+    print(table(figures.read(options.json.stem, options.json.parent)["figures"]))
+    if failed:
+        sys.exit(f"Not measured to the end: {', '.join(failed)}.")
+
+
+def measured(name: str, options: argparse.Namespace) -> bool:
+    """Measures a row's stages that the JSON does not have yet; False where one failed, which is printed. Raises Problem where it has nothing to
+    start from."""
+    row, found = ROWS[name], figures.read(options.json.stem, options.json.parent)["figures"] if options.json.exists() else {"machine": machine()}
+    costs = found.setdefault(name, {})
+    left = [stage for stage in row.stages if stage not in costs]
+    if not left or any("over_s" in cost for cost in costs.values()):  # what comes after a stage without end cannot be measured
+        return True
+    capture = options.work / f"{name}.wildcap"
+    source = prepare(row, capture, options)
+    for stage in left:
+        print(f"{name}: {stage} ...", end=" ", flush=True)
+        cost = stage_cost.measure(capture, stage, source, row.quality, row.settings, options.limit_s)
+        if "problem" in cost:
+            print(cost["problem"], cost["remedy"])
+            return False
+        costs[stage] = cost
+        print(cell(cost), flush=True)
+        found["together"] = {quality: whole for quality in ("standard", "draft") if (whole := together(found, quality))}
+        figures.write(options.json, "costs", "python -m benchmarks.costs WORK --json OUT.json", found)
+        if "over_s" in cost:
+            break
+    if name != "standard":
+        shutil.rmtree(capture)
+    return True
+
+
+def prepare(row: Row, capture: Path, options: argparse.Namespace) -> Path:
+    """Makes the row's capture where it is not there yet, and returns its video. Raises Problem where it begins with what nobody made."""
+    base = options.work / "standard.wildcap"
+    if options.capture and not base.exists():
+        with replacing_folder(base) as folder:
+            shutil.copytree(options.capture, folder, ignore=LEFT_OUT, dirs_exist_ok=True)
+    reads = stages.by_name(row.stages[0]).reads
+    missing = [name for name in reads if not Capture(base).has(name)]
+    if missing:
+        raise Problem(f"There is no {missing[0]} of the sample to start from in {base}.", "Measure the row standard first, or name a finished --capture.")
+    if reads and not capture.exists():
+        with replacing_folder(capture) as folder:
+            shutil.copytree(base, folder, ignore=LEFT_OUT, dirs_exist_ok=True)
+            if row.views:
+                select(Capture(folder), row.views)
+    if row.frames <= length(VIDEO):
+        return VIDEO
+    video = options.work / f"frames-{row.frames}.mp4"
+    if not video.exists():
+        from core.synthetic.sample import write_video
+
+        write_video(video, to_and_fro(decoded(VIDEO), row.frames))
+    return video
+
+
+def select(capture: Capture, count: int) -> None:
+    """Has the frames stage's own choice of so many views written to frames.json."""
+    from core.frames.select import select_views, turns
+
+    told = json.loads(capture.frames_json.read_text(encoding="utf-8"))
+    frames = told["frames"]
+    chosen = select_views(np.array([frame["sharpness"] for frame in frames]), turns(frames), count)
+    for index, frame in enumerate(frames):
+        frame["selected"] = index in chosen
+    write_json(capture.frames_json, told)
+
+
+def length(video: Path) -> int:
+    with av.open(str(video)) as container:
+        return container.streams.video[0].frames
+
+
+def decoded(video: Path) -> list[np.ndarray]:
+    """All frames, uint8 [H, W, 3]."""
+    with av.open(str(video)) as container:
+        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+
+
+def to_and_fro(frames: list[np.ndarray], count: int) -> Iterator[np.ndarray]:
+    """`count` frames, sRGB float32 [H, W, 3]: those given (uint8), then back to the first, forth again and so on, each with noise of its own."""
+    random = np.random.default_rng(0)
+    for number in range(count):
+        at = number % (2 * len(frames) - 2)
+        frame = frames[min(at, 2 * len(frames) - 2 - at)].astype(np.float32)
+        yield np.clip(frame + NOISE * random.standard_normal(frame.shape, np.float32), 0, 255) / 255
+
+
+def machine() -> dict:
+    """What the figures were measured on."""
+    try:
+        told = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+        name = next(line.partition(":")[2].strip() for line in told.splitlines() if line.startswith("model name"))
+    except (OSError, StopIteration):
+        name = None
+    return {"processor": name, "cores": os.cpu_count(), "memory_gb": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9)}
+
+
+def together(found: dict, quality: str) -> dict | None:
+    """Minutes, peak memory and the most that others took, over all stages of a quality; None where one was not measured."""
+    costs = [stage_of(found, quality, stage) for stage in stages.NAMES]
+    if any(cost is None or "over_s" in cost for cost in costs):
+        return None
+    others = [cost["others"] for cost in costs if cost["others"] is not None]
+    return {"minutes": round(sum(cost["seconds"] for cost in costs) / 60, 1), "peak_mb": max(cost["peak_mb"] for cost in costs),
+            "others": max(others) if others else None}
+
+
+def stage_of(found: dict, quality: str, stage: str) -> dict | None:
+    """A stage's cost in a quality; the standard one's where the draft does the same."""
+    given = "standard" if stage not in ROWS[quality].stages else quality
+    return found.get(given, {}).get(stage)
+
+
+def table(found: dict) -> str:
+    """The Markdown tables: the chain stage by stage, then what grows with what."""
+    chain = [[stage, *(cell(stage_of(found, quality, stage)) for quality in ("standard", "draft"))] for stage in stages.NAMES]
+    wholes = [found.get("together", {}).get(quality) for quality in ("standard", "draft")]
+    chain.append(["**together**", *(whole and f"**{whole['minutes']:.1f} min, {whole['peak_mb'] / 1000:.1f} GB**" for whole in wholes)])
+    return "\n\n".join([figures.markdown(["stage: seconds, peak memory", "standard", "draft"], chain),
+                        *(figures.markdown([title, *map(str, values)], [[stage, *(cell(found.get(row, {}).get(stage)) for row in rows)]
+                                                                       for stage, rows in grown.items()]) for title, values, grown in GROWTH)])
+
+
+def cell(cost: dict | None) -> str | None:
+    """What a table says of a stage: seconds, peak memory, and what disturbed the measurement."""
+    if cost is None:
+        return None
+    if "over_s" in cost:
+        return f"over {cost['over_s']:.0f} s"
+    disturbed = f" (others took {cost['others']:.1f} processors)" if (cost["others"] or 0) > DISTURBED else ""
+    return f"{cost['seconds']:.0f} s, {cost['peak_mb'] / 1000:.1f} GB{disturbed}"
+
+
+if __name__ == "__main__":
+    main()

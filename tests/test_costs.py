@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the chain costs: a table says what was measured, what was not and what was disturbed; the processor's time is counted as it was spent."""
+
+import json
+import os
+import time
+
+import numpy as np
+import pytest
+
+from benchmarks import costs, figures, stage_cost
+from core import stages
+from core.capture import Capture, write_json
+
+DONE = {"seconds": 12.4, "processor_s": 20.0, "peak_mb": 1640, "load": 0.1, "others": 0.05}
+TICKS = os.sysconf("SC_CLK_TCK")
+
+
+def lines(text):
+    """First cell of each row -> its other cells, of the last table that has it."""
+    return {cells[0].strip(" *"): [cell.strip() for cell in cells[1:]] for line in text.splitlines() if (cells := line.strip("|").split("|"))}
+
+
+def test_table_says_what_was_measured_what_not_and_what_was_disturbed():
+    found = {"machine": {}, "standard": {**dict.fromkeys(stages.NAMES, DONE), "solve": {**DONE, "others": 0.74}}, "draft": {"solve": {**DONE, "seconds": 3.6}},
+             "solve-2048": {"solve": {"over_s": 600.0, "load": 0.0}}, "frames-30": {"frames": {**DONE, "others": None}}}
+    found["together"] = {"standard": costs.together(found, "standard")}
+    assert costs.together(found, "draft") is None, "a stage of it was not measured"
+    assert found["together"]["standard"] == {"minutes": 2.1, "peak_mb": 1640, "others": 0.74}
+    text = costs.table(found)
+    chain, sides, cells, views, frames = map(lines, text.split("\n\n"))
+    assert chain["frames"] == ["12 s, 1.6 GB", "12 s, 1.6 GB"], "the draft's frames are the standard's"
+    assert chain["upscale"] == ["12 s, 1.6 GB", "-"] and chain["together"] == ["**2.1 min, 1.6 GB**", "-"]
+    assert chain["solve"] == ["12 s, 1.6 GB (others took 0.7 processors)", "4 s, 1.6 GB"]
+    assert sides["solve"] == ["-", chain["solve"][0], "over 600 s"] and sides["upscale"] == ["-", "12 s, 1.6 GB", "-"]
+    assert cells["solve"][2] == chain["solve"][0] and views["delight"] == ["-", "12 s, 1.6 GB", "-"] and frames["frames"][:2] == ["12 s, 1.6 GB"] * 2
+
+
+def test_every_row_is_in_a_table():
+    shown = {(row, stage) for _, _, grown in costs.GROWTH for stage, rows in grown.items() for row in rows}
+    assert {(name, stage) for name, row in costs.ROWS.items() if name not in ("standard", "draft") for stage in row.stages} <= shown
+    assert all(len(rows) == len(values) and set(rows) <= {*costs.ROWS, ""} for _, values, grown in costs.GROWTH for rows in grown.values())
+
+
+def test_idle_and_waiting_processors_are_not_busy():
+    first = " ".join(str(seconds * TICKS) for seconds in (2, 3, 5, 100, 50, 7, 11, 13, 1, 0))
+    assert stage_cost.busy_of(f"cpu  {first}\ncpu0 1 1 1 1 1 1 1 1 1 1\nintr 12\n") == 2 + 3 + 5 + 7 + 11 + 13
+
+
+def test_own_seconds_are_those_of_the_processor():
+    before = stage_cost.own_s()[0]
+    time.sleep(0.1)
+    asleep = stage_cost.own_s()[0]
+    until = time.process_time() + 0.1
+    while time.process_time() < until:
+        pass
+    assert asleep - before < 0.05 and stage_cost.own_s()[0] - asleep == pytest.approx(0.1, abs=0.05)
+
+
+def test_settings_may_lie_beyond_their_range_but_must_exist():
+    beyond = stage_cost.over(stage_cost.preset("draft"), {"solve": {"size": 2048}})
+    assert beyond.solve.size == 2048 and beyond.solve.guidance == "proximal"
+    with pytest.raises(TypeError):
+        stage_cost.over(beyond, {"solve": {"sise": 2048}})
+
+
+def test_stage_that_fails_and_stage_that_takes_too_long_are_told(tmp_path):
+    cost = stage_cost.measure(tmp_path / "a.wildcap", "shadow_mask")
+    assert set(cost) == {"problem", "remedy"} and "delit/" in cost["problem"]
+    began = time.monotonic()
+    assert stage_cost.measure(tmp_path / "a.wildcap", "solve", limit_s=0.05)["over_s"] == 0.05
+    assert time.monotonic() - began < 2
+
+
+def test_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
+    asked, options = [], costs.argparse.Namespace(work=tmp_path, json=tmp_path / "costs.json", capture=None, limit_s=600)
+
+    def measure(capture, stage, *given):
+        asked.append(stage)
+        capture.mkdir(exist_ok=True)
+        return {"problem": "The disk is full.", "remedy": "Free some space."} if stage == "scan" and asked.count("scan") == 1 else DONE
+
+    monkeypatch.setattr(stage_cost, "measure", measure)
+    assert not costs.measured("frames-30", options), "the scan failed"
+    assert costs.measured("frames-30", options) and asked == ["frames", "cameras", "scan", "scan"]
+    assert costs.measured("frames-30", options) and len(asked) == 4, "all is there"
+    assert figures.read("costs", tmp_path)["figures"]["frames-30"] == dict.fromkeys(("frames", "cameras", "scan"), DONE)
+    with pytest.raises(costs.Problem, match="row standard first"):
+        costs.measured("solve-512", options)
+
+
+def test_video_is_played_to_and_fro_with_new_noise():
+    steps = [np.full((24, 32, 3), 40 * i + 20, np.uint8) for i in range(5)]
+    frames = list(costs.to_and_fro(steps, 11))
+    assert [round((255 * float(frame.mean()) - 20) / 40) for frame in frames] == [0, 1, 2, 3, 4, 3, 2, 1, 0, 1, 2]
+    assert 255 * np.std(frames[3] - frames[5]) == pytest.approx(costs.NOISE * 2**0.5, rel=0.05), "the same picture, but for the noise"
+    assert frames[0].dtype == np.float32 and max(frame.max() for frame in frames) <= 1
+    assert costs.length(costs.VIDEO) == 60
+
+
+def test_views_are_chosen_anew(tmp_path):
+    capture = Capture(tmp_path)
+    frames = [{"sharpness": 0.5 + 0.01 * (i % 3), "yaw_deg": float(3 * i - 45), "selected": True} for i in range(30)]
+    write_json(capture.frames_json, {"kind": "video", "frames": frames})
+    costs.select(capture, 8)
+    chosen = [i for i, frame in enumerate(json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]) if frame["selected"]]
+    assert len(chosen) == 8 and max(np.diff(chosen)) <= 6, "spread over the turn"
