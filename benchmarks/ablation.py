@@ -3,7 +3,7 @@
 """What each part of the solver is worth, on UV-space problems with known truth (benchmarks/uv_problems.py): subjects that no training saw.
 
     python -m benchmarks.ablation OUT.json [--rows NAME ...] [--skins FOLDER] [--kind raw|delit] [--size 256] [--steps 20] [--jobs 2]
-    python -m benchmarks.ablation OUT.json --table
+    python -m benchmarks.ablation OUT.json --table [--json docs/figures/ablation.json]
     python -m benchmarks.ablation OUT.json --pictures FOLDER
 
 Six subjects x three shadows for the rows that carry the method (KEY), the full method with two seeds, whose spread says what a tie is; the other rows run on
@@ -39,7 +39,8 @@ from core.solve.problem import State, photometric
 from core.solve.recipes import OURS, RECIPES, Recipe
 from core.solve.sampler import sample, seeded
 
-from .ablation_measures import measure, table
+from . import figures
+from .ablation_measures import measure, summary, table
 from .uv_problems import LEE_PERRY_SMITH, SHADOWS, UvProblem, problem
 
 SUBJECTS = ("9000", "9002", "9004", "9007", "9008", LEE_PERRY_SMITH.name if LEE_PERRY_SMITH.is_dir() else "9001")
@@ -89,7 +90,8 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--steps", type=int, default=20, help="of every row that does not say otherwise")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--table", action="store_true")
+    parser.add_argument("--table", action="store_true", help="solve nothing, print what is there")
+    parser.add_argument("--json", type=Path, help="where the table's figures go, such as docs/figures/ablation.json")
     parser.add_argument("--pictures", type=Path)
     options = parser.parse_args()
     done = json.loads(options.out.read_text(encoding="utf-8")) if options.out.is_file() else {}
@@ -98,11 +100,14 @@ def main() -> None:
         return
     if not options.table:
         solve_all(options, done)
-    print(table({k: r for k, r in done.items() if "tone" not in r}, list(ROWS), FULL))
+    found = summary({k: r for k, r in done.items() if "tone" not in r}, list(ROWS), FULL)
+    print(table(found) + "\n\nSpread over the solver's seeds, dB:", found["spread"])
     differences = [r["tone"] for r in done.values() if "tone" in r]
     if differences:
-        print(f"\nSkin tone, CIEDE2000 of the solved mean to the request, six tones: largest {max(a for a, _ in differences):.2f} as delivered, "
-              f"{max(b for _, b in differences):.2f} by the sampling alone.")
+        found["tone"] = {"delivered": max(a for a, _ in differences), "sampled": max(b for _, b in differences)}
+        print("Skin tone, largest CIEDE2000 of the solved mean to the request over six tones, as delivered and by the sampling alone:", found["tone"])
+    if options.json:
+        figures.write(options.json, "ablation", "python -m benchmarks.ablation OUT.json", found)
 
 
 def solve_all(options: argparse.Namespace, done: dict) -> None:

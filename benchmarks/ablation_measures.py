@@ -16,6 +16,8 @@ from core import images
 from core.messages import Problem
 from core.texture.features import load_features
 
+from .figures import markdown
+
 REGIONS = ("shadow", "band", "outside")
 FIGURES = ("psnr", "ssim", "flip", "features")
 
@@ -53,45 +55,49 @@ def _network():
         return None
 
 
-def table(done: dict[str, dict], rows: list[str], first: str) -> str:
-    """Markdown: per region a line per row over the problems that it was solved on, with its PSNR's distance to row `first` on just these problems and seeds.
-
-    The spread is half the difference between two seeds of the solver; a distance smaller than the first row's is a tie.
-    """
+def summary(done: dict[str, dict], rows: list[str], first: str) -> dict[str, dict]:
+    """Region -> row -> the means of FIGURES and seconds over the problems that the row was solved on, problems, seeds, and `to_first`: its PSNR's distance
+    to row `first` on just these problems and seeds, in dB (None for itself); and under "spread" half the difference between two seeds of that row, in dB."""
     by_row = {row: {_problem(r): r for r in done.values() if r["row"] == row} for row in rows}
-    by_row = {row: results for row, results in by_row.items() if results}
-    if first not in by_row:
+    full = by_row.get(first, {})
+    found: dict[str, dict] = {region: {} for region in REGIONS}
+    for row, results in by_row.items():
+        shared = [p for p in results if p in full]
+        for region in REGIONS if shared else ():
+            mine, best = ([of[p][region] for p in shared] for of in (results, full))
+            means = {figure: float(np.mean([r[figure] for r in mine])) if figure in mine[0] else None for figure in FIGURES}
+            distance = float(np.mean([a["psnr"] - b["psnr"] for a, b in zip(mine, best, strict=True)]))
+            problems, seeds = len({p[:-1] for p in shared}), len({p[-1] for p in shared})
+            found[region][row] = {"problems": problems, "seeds": seeds, "to_first": None if row == first else distance,
+                                  **means, "seconds": float(np.mean([results[p]["seconds"] for p in shared]))}
+    return {**found, "spread": {region: seed_spread(list(full.values()), region) for region in REGIONS}}
+
+
+def table(figures: dict[str, dict]) -> str:
+    """Markdown of `summary`: per region a line per row. A distance to the first row that is smaller than the spread over its seeds is a tie."""
+    if not figures[REGIONS[0]]:
         return "The first row was not solved yet."
-    lines = []
+    tables = []
     for region in REGIONS:
-        lines += ["", f"| {region} | problems x seeds | PSNR | to {first} | SSIM | FLIP | features | seconds |", "|" + " --- |" * 8]
-        spread = seed_spread(list(by_row[first].values()), region)
-        for row, results in by_row.items():
-            shared = [p for p in results if p in by_row[first]]
-            mine, best = [results[p] for p in shared], [by_row[first][p] for p in shared]
-            if not mine:
-                continue
-            cells = [f"{np.mean([r[region]['psnr'] for r in mine]):.2f}", "" if row == first else _compared(mine, best, region, spread),
-                     *(f"{np.mean([r[region][figure] for r in mine]):.3f}" if figure in mine[0][region] else "-" for figure in FIGURES[1:])]
-            lines.append(f"| {row} | {len({p[:-1] for p in shared})} x {len({p[-1] for p in shared})} | " + " | ".join(cells)
-                         + f" | {np.mean([r['seconds'] for r in mine]):.0f} |")
-    spread = ", ".join(f"{region} {seed_spread(list(by_row[first].values()), region):.2f} dB" for region in REGIONS)
-    return "\n".join([*lines[1:], "", f"Spread of {first} over the solver's seeds: {spread}."])
+        spread, first = figures["spread"][region], next(iter(figures[region]))
+        tables.append(markdown([region, "problems x seeds", "PSNR", f"to {first}", "SSIM", "FLIP", "features", "seconds"], [
+            [row, f"{r['problems']} x {r['seeds']}", f"{r['psnr']:.2f}", "" if row == first else _compared(r["to_first"], spread),
+             *(None if r[figure] is None else f"{r[figure]:.3f}" for figure in FIGURES[1:]), f"{r['seconds']:.0f}"] for row, r in figures[region].items()]))
+    return "\n\n".join(tables)
 
 
-def _compared(mine: list[dict], best: list[dict], region: str, spread: float) -> str:
-    """How far a row is from the first on the same problems, in dB, and whether that is within the spread."""
-    distance = float(np.mean([a[region]["psnr"] - b[region]["psnr"] for a, b in zip(mine, best, strict=True)]))
-    return f"{distance:+.2f}" + (" (tie)" if abs(distance) < spread else "")
+def _compared(distance: float, spread: float | None) -> str:
+    """How far a row is from the first, in dB, and whether that is within the spread."""
+    return f"{distance:+.2f}" + (" (tie)" if spread is not None and abs(distance) < spread else "")
 
 
-def seed_spread(results: list[dict], region: str) -> float:
-    """Half the difference between the best and the worst seed, as a mean over problems; nan for one seed."""
+def seed_spread(results: list[dict], region: str) -> float | None:
+    """Half the difference between the best and the worst seed, as a mean over problems; None for one seed."""
     by_problem: dict = {}
     for r in results:
         by_problem.setdefault(_problem(r)[:-1], []).append(r[region]["psnr"])
     ranges = [(max(values) - min(values)) / 2 for values in by_problem.values() if len(values) > 1]
-    return float(np.mean(ranges)) if ranges else float("nan")
+    return float(np.mean(ranges)) if ranges else None
 
 
 def _problem(result: dict) -> tuple:

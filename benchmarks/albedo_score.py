@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Solved albedo against true albedo, in image space, on facial skin (the paper's protocol for Digital Emily).
 
-    python -m benchmarks.albedo_score CAPTURE TRUTH
+    python -m benchmarks.albedo_score CAPTURE TRUTH [--json OUT.json]
 
 TRUTH holds capture.mp4, albedo/NNNN.png (sRGB with alpha), face/NNNN.png and, under hard light, shadow/NNNN.png, numbered
 by video frame. Figures per capture, each the mean over the frames with truth that were registered:
@@ -31,6 +31,10 @@ from core import images, meshes, raster
 from core.capture import Capture
 from core.messages import Problem
 from core.views import View, read_views
+
+from .figures import markdown, write
+
+LABELS = {"WildCap": "**WildCap**", "raw video": "the raw video", "flat true tone": "the true tone everywhere"}
 
 
 @dataclass(frozen=True)
@@ -175,15 +179,33 @@ def mean_scores(results: list[dict]) -> dict:
     return figures
 
 
+def rows(scores: dict[str, dict]) -> dict[str, dict]:
+    """Row -> PSNR in dB as it is and after the gain, SSIM, FLIP, detail and shadow step, of what `score_capture` and `score_floors` give."""
+    return {name: {"psnr": score["raw"]["psnr"], "psnr_after_gain": score["gain"]["psnr"], "ssim": score["raw"]["ssim"], "flip": score["raw"]["flip"],
+                   "detail": score["detail"], "shadow_step": score["shadow_step"]} for name, score in scores.items()}
+
+
+def table(figures: dict) -> str:
+    """Markdown of figures["rows"], as `rows` gives them."""
+    return markdown(["taken for albedo", "PSNR", "after one gain", "SSIM", "FLIP", "detail", "shadow step"], [
+        [LABELS.get(name, name), f"{r['psnr']:.2f} dB", f"{r['psnr_after_gain']:.2f} dB", f"{r['ssim']:.3f}", f"{r['flip']:.3f}", f"{r['detail']:.2f}",
+         None if r["shadow_step"] is None else f"{r['shadow_step']:.2f}"] for name, r in figures["rows"].items()])
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("capture", type=Path)
     parser.add_argument("truth", type=Path)
     parser.add_argument("--texture", type=Path, help="score this picture in the head's UVs instead of the solved albedo")
     parser.add_argument("--pictures", type=Path, help="folder for truth and result side by side")
+    parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/scan_albedo.json")
     arguments = parser.parse_args()
-    result = {"capture": score_capture(Capture(arguments.capture), arguments.truth, arguments.pictures, arguments.texture)}
-    print(json.dumps({**result, **score_floors(arguments.truth)}, indent=1))
+    scores = {"WildCap": score_capture(Capture(arguments.capture), arguments.truth, arguments.pictures, arguments.texture), **score_floors(arguments.truth)}
+    print(json.dumps(scores, indent=1))
+    if arguments.json:
+        ours = scores["WildCap"]
+        write(arguments.json, "albedo_score", "python -m benchmarks.albedo_score CAPTURE TRUTH",
+              {"views": ours["views"], "face_coverage": ours["face_coverage"], "rows": rows(scores)})
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The whole chain on the sample video, from nothing to a relit head, and its score against the known truth.
 
-    python -m benchmarks.demo FOLDER [--quality draft|standard|film]
+    python -m benchmarks.demo FOLDER [--quality draft|standard|film] [--json docs/figures/demo.json]
 
 Exit code 1 when the result does not beat both the raw video and the flat true tone. What is finished is not done twice.
 """
@@ -19,17 +19,19 @@ from core import report
 from core.capture import Capture, write_json
 from core.settings import QUALITIES, from_json, preset
 
-from .albedo_score import score_capture, score_floors
+from . import albedo_score, figures
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLE = ROOT / "core" / "synthetic" / "sample"
 LIGHTS = ("three_point", "sun", "window")
+table = albedo_score.table
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--quality", choices=QUALITIES, default="standard")
+    parser.add_argument("--json", type=Path, help="where the figures of README and docs/results.md go")
     arguments = parser.parse_args()
     capture = Capture(arguments.folder.resolve() / "sample.wildcap")
     started = time.monotonic()
@@ -42,7 +44,7 @@ def main() -> int:
     code = subprocess.call([sys.executable, "-m", "benchmarks.render_capture", str(capture.root), *LIGHTS], cwd=ROOT, stdout=subprocess.DEVNULL)
     if code:  # Cycles fills standard output with its progress; what went wrong is on standard error
         return code
-    rows = {"WildCap": score_capture(capture, SAMPLE), **score_floors(SAMPLE)}
+    rows = {"WildCap": albedo_score.score_capture(capture, SAMPLE), **albedo_score.score_floors(SAMPLE)}
     write_json(capture.root / "score.json", rows)
     report.write(capture, from_json({"solve": {"skin_tone": tone}}, preset(arguments.quality)))  # once more, with the renders
     print(f"\n{'':16}{'PSNR':>9}{'SSIM':>8}{'FLIP':>8}{'detail':>8}{'shadow_step':>13}")
@@ -50,6 +52,9 @@ def main() -> int:
         raw = row["raw"]
         print(f"{name:16}{raw['psnr']:6.2f} dB{raw['ssim']:8.3f}{raw['flip']:8.3f}{row['detail']:8.2f}{row['shadow_step']:13.2f}")
     print(f"\nFinished after {(time.monotonic() - started) / 60:.1f} minutes.\nThe report: {capture.report}")
+    if arguments.json:
+        size = sum(path.stat().st_size for path in capture.root.rglob("*") if path.is_file())
+        figures.write(arguments.json, "demo", "make demo", {"views": rows["WildCap"]["views"], "rows": albedo_score.rows(rows), "capture_gb": size / 1e9})
     beaten = all(rows["WildCap"]["raw"]["psnr"] > rows[name]["raw"]["psnr"] for name in ("raw video", "flat true tone"))
     if not beaten:
         print("The result does not beat both floors.", file=sys.stderr)

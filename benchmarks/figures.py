@@ -51,13 +51,15 @@ def markdown(head: list[str], rows: list[list]) -> str:
 
 
 def plain(figures, name: str = "figures"):
-    """The same with NumPy's numbers as Python's. Raises ValueError that names the figure JSON cannot hold."""
+    """The same with NumPy's numbers as Python's, rounded to six decimals. Raises ValueError that names the figure JSON cannot hold."""
     if isinstance(figures, dict):
         return {str(key): plain(value, f"{name}.{key}") for key, value in figures.items()}
     if isinstance(figures, np.generic):
         figures = figures.item()
-    if figures is None or isinstance(figures, str | bool | int) or isinstance(figures, float) and math.isfinite(figures):
+    if figures is None or isinstance(figures, str | bool | int):
         return figures
+    if isinstance(figures, float) and math.isfinite(figures):
+        return round(figures, 6)
     raise ValueError(f"{name} is {figures!r}: a figure is a finite number, a string, or None where it was not measured")
 
 

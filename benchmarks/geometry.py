@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From the video to the textured head, measured: cameras, scan, head and texture of several captures, with what each stage cost.
 
-    python -m benchmarks.geometry FOLDER [--captures NAME ...] [--data FOLDER] [--fresh] [--results docs/results.md]
+    python -m benchmarks.geometry FOLDER [--captures NAME ...] [--data FOLDER] [--fresh] [--json docs/figures/geometry.json]
 
 Captures: `sample` (part of this repository), `lps_sun` and `bust` (in --data). FOLDER gets NAME.wildcap, NAME.json, pictures/NAME.jpg (scan, wireframe and
-texture beside the frame), geometry.json and geometry.md. What is finished is not done again without --fresh: stages that are fresh, captures that came through.
+texture beside the frame) and geometry.json. What is finished is not done again without --fresh: stages that are fresh, captures that came through.
 The perceptual row needs `pip install --no-deps -r requirements/perceptual.txt`; without it the table says so. Every stage
 runs in a process of its own, so its peak memory (of the largest of its processes, as getrusage tells) is its own.
---results replaces this command's section of that file, and its picture of the synthetic sample: pictures of people never go into the documentation.
+docs/pictures/geometry.jpg is FOLDER/pictures/sample.jpg: pictures of people never go into the documentation.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from core.messages import Problem
 from core.settings import Settings
 
 from . import stage_cost
-from .geometry_table import markdown, write_section
+from .figures import write
+from .geometry_table import published, table
 
 ROOT = Path(__file__).resolve().parent.parent
 LAST = "texture"
@@ -130,7 +131,7 @@ def main() -> None:
     parser.add_argument("--captures", nargs="+", metavar="NAME", help="of sample, lps_sun, bust; all that are there by default")
     parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data")
     parser.add_argument("--fresh", action="store_true", help="do everything again")
-    parser.add_argument("--results", type=Path, help="a Markdown file whose section between the geometry markers is replaced")
+    parser.add_argument("--json", type=Path, help="where the tables' figures go")
     options = parser.parse_args()
     known = subjects(options.data)
     missing = set(options.captures or ()) - set(known)
@@ -146,11 +147,9 @@ def main() -> None:
         write_json(result, {**figures, "minutes": round((time.monotonic() - started) / 60, 1)})
     everything = {name: json.loads((folder / f"{name}.json").read_text(encoding="utf-8")) for name in known if (folder / f"{name}.json").is_file()}
     write_json(folder / "geometry.json", everything)
-    text = markdown(everything)
-    (folder / "geometry.md").write_text(text, encoding="utf-8")
-    if options.results:
-        write_section(options.results, text, folder / "pictures" / "sample.jpg")
-    print(text)
+    if options.json:
+        write(options.json, "geometry", "python -m benchmarks.geometry FOLDER", published(everything))
+    print(table(everything))
 
 
 if __name__ == "__main__":

@@ -1,46 +1,36 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What benchmarks.geometry found, as Markdown; and that text's own section of docs/results.md."""
+"""What benchmarks.geometry found, as Markdown."""
 
 from __future__ import annotations
 
-import shutil
-from pathlib import Path
+from .figures import markdown
 
-BEGIN, END = "<!-- begin: python -m benchmarks.geometry -->", "<!-- end: python -m benchmarks.geometry -->"
 ROWS = {"average": "plain average (L2)", "blend": "blend", "aligned": "aligned blend", "perceptual": "with perceptual step",
         "delit": "aligned, own delit frames, after one gain"}
-PICTURE = "geometry.jpg"
 
 
-def markdown(results: dict[str, dict]) -> str:
-    """The section's text for {capture: figures of geometry.measure}; what was not measured is a dash or is said."""
-    lines = ["## Geometry and texture: `python -m benchmarks.geometry FOLDER`", "", *_cameras(results), "", *_surfaces(results), "", *_textures(results), "",
-             *_costs(results)]
+def table(figures: dict[str, dict]) -> str:
+    """The tables of {capture: figures of geometry.measure}; what was not measured is a dash or is said."""
+    results = figures
+    tables = [_cameras(results), _surfaces(results), _textures(results), _costs(results)]
     stopped = [f"- **{name}** stopped at {s['stage']}: {s['problem']} {s['remedy']}" for name, figures in results.items() if (s := figures.get("stopped"))]
     failed = [f"- **{name}**, {part}: not measured ({figures[part]['not_measured']})" for name, figures in results.items()
               for part in ("cameras", "scan", "head", "texture") if "not_measured" in figures.get(part, {})]
-    return "\n".join([*lines, *(["", *stopped, *failed] if stopped or failed else [])]) + "\n"
+    return "\n\n".join([*tables, *(["\n".join([*stopped, *failed])] if stopped or failed else [])])
 
 
-def write_section(path: Path, text: str, picture: Path) -> None:
-    """Puts the text between the markers of a Markdown file (at its end where there are none), with the sample's picture beside it."""
-    if picture.is_file():
-        (path.parent / "pictures").mkdir(exist_ok=True)
-        shutil.copy(picture, path.parent / "pictures" / PICTURE)
-        title, _, rest = text.partition("\n")
-        text = f"{title}\n\n![frame, scan, wireframe and texture of the synthetic sample](pictures/{PICTURE})\n{rest}"
-    old = path.read_text(encoding="utf-8") if path.is_file() else ""
-    section = f"{BEGIN}\n{text}{END}\n"
-    before, found, after = old.partition(BEGIN)
-    if found:
-        after = after.partition(END)[2].lstrip("\n")
-        path.write_text(before + section + ("\n" + after if after else ""), encoding="utf-8")
-    else:
-        path.write_text(old.rstrip("\n") + ("\n\n" if old.strip() else "") + section, encoding="utf-8")
+def published(results: dict[str, dict]) -> dict[str, dict]:
+    """What of the results goes into the record: all but the stages' own figures that no table shows, and pictures."""
+    return {name: {part: {**of, "own": _millimetres(of["own"])} if isinstance(of, dict) and "own" in of else of
+                   for part, of in figures.items() if part != "picture"} for name, figures in results.items()}
 
 
-def _cameras(results: dict) -> list[str]:
+def _millimetres(own: dict) -> dict:
+    return {key: value for key, value in own.items() if isinstance(value, int | float) and "mm" in key}
+
+
+def _cameras(results: dict) -> str:
     rows = []
     for name, figures in results.items():
         c = figures.get("cameras", {})
@@ -48,10 +38,10 @@ def _cameras(results: dict) -> list[str]:
         rows.append([name, c.get("frames", "-"), _percent(c.get("registered_percent"), 0), _number(c.get("reprojection_px"), 2, " px"),
                      _percent(t.get("centre_error_median_percent"), 3), _number(t.get("rotation_error_median_deg"), 2, "°"),
                      _number(t.get("focal_px"), 0, f" px of {t['true_focal_px']:.0f}" if "true_focal_px" in t else "")])
-    return _table(["cameras", "frames", "registered", "reprojection", "centres (median, of the distance)", "rotations (median)", "focal length"], rows)
+    return markdown(["cameras", "frames", "registered", "reprojection", "centres (median, of the distance)", "rotations (median)", "focal length"], rows)
 
 
-def _surfaces(results: dict) -> list[str]:
+def _surfaces(results: dict) -> str:
     rows = []
     for name, figures in results.items():
         for part in ("scan", "head"):
@@ -60,13 +50,13 @@ def _surfaces(results: dict) -> list[str]:
                 rows.append([f"{name}: {part}", *(_number(t.get(kind, {}).get(f"{share}_mm"), 2, " mm") for kind in ("by_cameras", "after_icp")
                                                   for share in ("median", "p90", "p95"))])
             else:
-                own = figures.get(part, {}).get("own", {})
-                shown = "; ".join(f"{key.replace('_', ' ')} {value:.3g}" for key, value in own.items() if isinstance(value, int | float) and "mm" in key)
+                own = _millimetres(figures.get(part, {}).get("own", {}))
+                shown = "; ".join(f"{key.replace('_', ' ')} {value:.3g}" for key, value in own.items())
                 rows.append([f"{name}: {part}", shown or "-", *["no truth" if shown else "-"] * 5])
-    return _table(["to the true surface, in the face", "median", "90 %", "95 %", "median after ICP", "90 %", "95 %"], rows)
+    return markdown(["to the true surface, in the face", "median", "90 %", "95 %", "median after ICP", "90 %", "95 %"], rows)
 
 
-def _textures(results: dict) -> list[str]:
+def _textures(results: dict) -> str:
     rows = []
     for name, figures in results.items():
         alone = figures.get("texture", {}).get("alone", {})
@@ -77,18 +67,15 @@ def _textures(results: dict) -> list[str]:
             elif f:
                 rows.append([f"{name}: {label}", _number(f.get("psnr_after_gain" if row == "delit" else "psnr"), 2, " dB"), *(_number(f.get(k), 3) for k in (
                     "ssim", "detail", "mole_contrast", "pore_contrast", "pore_correlation")), _number(f.get("seconds"), 0, " s")])
-    return _table(["texture of the true albedo frames", "PSNR", "SSIM", "detail", "moles: contrast", "pores: contrast", "pores: correlation", "seconds"], rows)
+    return markdown(["texture of the true albedo frames", "PSNR", "SSIM", "detail", "moles: contrast", "pores: contrast", "pores: correlation",
+                     "seconds"], rows)
 
 
-def _costs(results: dict) -> list[str]:
+def _costs(results: dict) -> str:
     names = list(dict.fromkeys(stage for figures in results.values() for stage in figures.get("stages", {})))
     rows = [[stage, *(f"{c['seconds']:.0f} s, {c['peak_mb'] / 1000:.1f} GB" if (c := figures.get("stages", {}).get(stage)) else "-"
                       for figures in results.values())] for stage in names]
-    return _table(["stage: seconds, peak memory", *results], rows)
-
-
-def _table(head: list[str], rows: list[list]) -> list[str]:
-    return ["| " + " | ".join(str(cell) for cell in row) + " |" for row in (head, ["---"] * len(head), *rows)]
+    return markdown(["stage: seconds, peak memory", *results], rows)
 
 
 def _number(value, digits: int, unit: str = "") -> str:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Solved heads under new light beside the true subjects under the same light: the number that artists feel.
 
-    python -m benchmarks.relit WORK [--sample CAPTURE] [--people FOLDER [--only NAME ...]] [--picture OUT.jpg]
+    python -m benchmarks.relit WORK [--sample CAPTURE] [--people FOLDER [--only NAME ...]] [--picture OUT.jpg] [--json OUT.json]
 
 CAPTURE was solved from core/synthetic/sample, FOLDER was made by benchmarks/people.py. Rendered by Cycles with the add-on's own material and lights, of which
 none lit a capture, as linear EXR; both heads are the registered one. A picture is exposed so that the true subject's face has the mean luminance MIDDLE (one
@@ -32,6 +32,7 @@ from core.synthetic.parameters import sample_parameters
 from core.synthetic.pigment import LUMINANCE
 from core.synthetic.skin import make_skin
 
+from . import figures
 from .albedo_score import differences, face_box
 from .people import PEOPLE, write_maps
 from .relit_maps import face_mask, read_rows, read_worn, write_row
@@ -40,6 +41,10 @@ from .relit_renders import MARGIN
 ROOT = Path(__file__).resolve().parent.parent
 LIGHTS = ("three_point", "window", "sun", "coloured", "city.exr", "interior.exr")
 ROWS = ("raw", "delit", "solved", "plain", "true_albedo", "true_normal", "true_specular", "floor")
+LABELS = {"raw": "filmed texture as albedo", "delit": "delit texture as albedo", "solved": "**solved**", "plain": "solved albedo, no relief, even gloss",
+          "true_albedo": "solved, with the true albedo", "true_normal": "solved, with the true normals",
+          "true_specular": "solved, with the true specular albedo",
+          "floor": "the truth, other random numbers"}
 SHOWN = ("truth", "solved", "delit", "raw")
 RESOLUTION, SAMPLES = 320, 16
 MIDDLE = 0.18
@@ -53,6 +58,7 @@ def main() -> int:
     parser.add_argument("--people", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
     parser.add_argument("--picture", type=Path, help="a JPEG of the first subject under all lights: truth, solved, delit, raw")
+    parser.add_argument("--json", type=Path, help="where the table's figures go, such as docs/figures/relit.json")
     parser.add_argument("--lights", nargs="+", default=LIGHTS)
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS)
     arguments = parser.parse_args()
@@ -65,7 +71,10 @@ def main() -> int:
     if arguments.picture and results:
         images.write_srgb(arguments.picture, side_by_side([images.read_srgb(work / next(iter(results)) / f"{Path(light).stem}.png")
                                                            for light in arguments.lights]), quality=86)
-    print(table({name: mean_over_lights(found) for name, found in results.items()}))
+    means = {name: mean_over_lights(found) for name, found in results.items()}
+    print(table(means))
+    if arguments.json:
+        figures.write(arguments.json, "relit", "python -m benchmarks.relit WORK --sample .demo/sample.wildcap [--people FOLDER]", means)
     return 0
 
 
@@ -151,12 +160,11 @@ def table(results: dict[str, dict[str, dict[str, float]]]) -> str:
     people = [name for name in results if name != "sample"]
     columns = dict(results)
     if len(people) > 1:
-        columns[f"mean of {len(people)}"] = mean_over_lights({name: results[name] for name in people})
-    lines = ["| row | " + " | ".join(name.replace("_", " ") for name in columns) + " |", "|" + " --- |" * (len(columns) + 1)]
-    for row in (row for row in ROWS if all(row in column for column in columns.values())):
-        cells = (f"{c[row]['psnr']:.2f} dB, {c[row]['ssim']:.3f}, {c[row]['flip']:.3f}" for c in columns.values())
-        lines.append(f"| {row.replace('_', ' ')} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+        common = [row for row in ROWS if all(row in results[name] for name in people)]
+        columns[f"mean of {len(people)}"] = mean_over_lights({name: {row: results[name][row] for row in common} for name in people})
+    return figures.markdown(["row", *(name.replace("_", " ") for name in columns)], [
+        [LABELS[row], *(f"{c[row]['psnr']:.2f} dB, {c[row]['ssim']:.3f}, {c[row]['flip']:.3f}" for c in columns.values())]
+        for row in ROWS if all(row in column for column in columns.values())])
 
 
 if __name__ == "__main__":

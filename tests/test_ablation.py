@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import ablation, uv_problems
-from benchmarks.ablation_measures import measure, table
+from benchmarks.ablation_measures import measure, summary, table
 from core import images, template
 from core.synthetic.light import bake
 
@@ -59,7 +59,7 @@ def test_the_table_compares_on_shared_problems_and_names_ties():
                 for i, value in enumerate(values) for seed in (0, 1)}
 
     done = results("full", [30, 40]) | results("close", [40.1], 1) | results("far", [38], 1)
-    lines = {line.split(" | ")[0].strip("| "): line for line in table(done, ["full", "close", "far"], "full").splitlines() if line.startswith("|")}
+    lines = {line.split(" | ")[0].strip("| "): line for line in table(summary(done, ["full", "close", "far"], "full")).splitlines() if line.startswith("|")}
     assert "+0.10 (tie)" in lines["close"] and "-2.00 |" in lines["far"] and "| 1 x 2 |" in lines["far"] and "35.00" in lines["full"]
 
 
