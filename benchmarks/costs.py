@@ -6,7 +6,7 @@
 
 Every stage runs in a process of its own (benchmarks/stage_cost.py). "standard" goes from the video to the delivery; the other rows start from a copy of what
 it made in WORK, or of --capture. OUT.json is written after each stage: the same command goes on where it was stopped. A stage that takes longer than --limit-s
-is ended and told as "over"; one beside which other processes took more than 0.2 processors is told with that. 30 frames are taken from the sample's 60; 120 and
+is ended and told as "over"; one beside which other processes took more than 0.2 cores is told with that. 30 frames are taken from the sample's 60; 120 and
 300 are the sample's played to and fro, with new noise in every frame: more pictures to work on, not more to see.
 """
 
@@ -34,7 +34,7 @@ VIDEO = Path(__file__).resolve().parent.parent / "core" / "synthetic" / "sample"
 NOISE = 1.5
 """Deviation of a repeated frame's noise, in steps of 255."""
 DISTURBED = 0.2
-"""Processors that others took during a measurement, from which on the table says so."""
+"""Cores that others took during a measurement, from which on the table says so."""
 LEFT_OUT = shutil.ignore_patterns("maps*", "checkpoints", "comparison", "delivery", "exports", "renders", "report*", "logs", "lock", "job.json")
 """What a copy of a finished capture does without: each row solves before it needs maps."""
 
@@ -55,10 +55,11 @@ ROWS = {
     "standard": Row(stages.NAMES),
     "draft": Row(stages.NAMES[stages.NAMES.index("scan"):], quality="draft"),  # frames and cameras have the same settings in both
     **{f"solve-{size}": Row(("solve",), {"solve": {"size": size}}) for size in (512, 2048)},
-    **{f"grid-{cells}": Row(("solve",), {"solve": {"grid_cells": cells}}) for cells in (1, 24, 384)},
     **{f"texture-{size}": Row(("texture",), {"texture": {"size": size}}) for size in (512, 2048)},
+    **{f"grid-{cells}": Row(("solve",), {"solve": {"grid_cells": cells}}) for cells in (384, 1, 24)},
+    "frames-30": Row(("frames", "cameras", "scan"), {"frames": {"max_frames": 30}}, frames=30),
     **{f"views-{count}": Row(("delight", "texture"), views=count) for count in (8, 32)},
-    **{f"frames-{count}": Row(("frames", "cameras", "scan"), {"frames": {"max_frames": count}}, frames=count) for count in (30, 120, 300)},
+    **{f"frames-{count}": Row(("frames", "cameras", "scan"), {"frames": {"max_frames": count}}, frames=count) for count in (120, 300)},
 }
 """In the order of what matters most."""
 GROWTH = (
@@ -214,7 +215,7 @@ def cell(cost: dict | None) -> str | None:
         return None
     if "over_s" in cost:
         return f"over {cost['over_s']:.0f} s"
-    disturbed = f" (others took {cost['others']:.1f} processors)" if (cost["others"] or 0) > DISTURBED else ""
+    disturbed = f" ({cost['processor_s']:.0f} s of processor; others took {cost['others']:.1f} cores)" if (cost["others"] or 0) > DISTURBED else ""
     return f"{cost['seconds']:.0f} s, {cost['peak_mb'] / 1000:.1f} GB{disturbed}"
 
 

@@ -35,7 +35,7 @@ def measure(capture: Path, stage: str, source: Path | str = "", quality: str = "
     where it was ended after `limit_s` seconds.
 
     seconds: of the stage, the import of its libraries included; processor_s: summed over the threads of its processes; peak_mb: of the largest of them;
-    load: the machine's load average (one minute) before; others: processors that all other processes took meanwhile (the hypervisor's share included),
+    load: the machine's load average (one minute) before; others: cores that all other processes took meanwhile (the hypervisor's share included),
     None where the system does not count them. `settings` ({stage: {name: value}}) lie over the preset `quality`, and may lie out of their ranges.
     """
     job = json.dumps({"source": str(source), "quality": quality, "settings": settings or {}})
