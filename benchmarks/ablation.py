@@ -19,6 +19,7 @@ import json
 import os
 import tempfile
 import time
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from functools import lru_cache
@@ -33,9 +34,9 @@ from core import images, meshes, template
 from core.capture import Capture
 from core.solve import DELIT, initial, maps
 from core.solve.evidence import read_evidence
-from core.solve.light_fit import update_lights
+from core.solve.light_fit import update_lights, variation
 from core.solve.prior import WEIGHTS, load
-from core.solve.problem import State, photometric
+from core.solve.problem import State, albedo, photometric
 from core.solve.recipes import OURS, RECIPES, Recipe
 from core.solve.sampler import sample, seeded
 
@@ -186,9 +187,11 @@ def solved(given: UvProblem, recipe: Recipe, tone: np.ndarray, seed: int = 0, ce
     return maps.finished(state, evidence, start, recipe).diffuse
 
 
-def texels_alone(start: initial.Start, recipe: Recipe, updates: int = 600) -> State:
-    """No prior: the albedo's texels and the lights follow the photometric loss alone, under Adam (the paper's ablation)."""
-    o, state, recipe = start.observations[1], start.state, replace(recipe, phases=(("both", 0.0, 1.0),), refit=0.0, updates=updates)
+def texels_alone(start: initial.Start, recipe: Recipe, updates: int = 600, fit: Callable[..., None] = update_lights, smooth: float = 0.0) -> State:
+    """No prior: the albedo's texels and the lights follow the photometric loss alone, under Adam (the paper's ablation); `smooth`: weight of the albedo's L1
+    variation."""
+    recipe = replace(recipe, phases=tuple((which, 0.0, 1.0) for which, _, _ in recipe.phases), refit=0.0, updates=updates)
+    o, state = start.observations[1], start.state
     x = state.denoised.clone().requires_grad_(True)
     adam = torch.optim.Adam([x], lr=0.01)
     scheduler = torch.optim.lr_scheduler.ExponentialLR(adam, 0.995)
@@ -196,10 +199,11 @@ def texels_alone(start: initial.Start, recipe: Recipe, updates: int = 600) -> St
         with torch.no_grad():
             shading = o.shader.total(state.lights)
         adam.zero_grad()
-        photometric(x, shading, o, o.weight, recipe.blur).backward()
+        loss = photometric(x, shading, o, o.weight, recipe.blur)
+        (loss + smooth * variation(albedo(x), o.weight) if smooth else loss).backward()
         adam.step()
         scheduler.step()
-        update_lights(state, x.detach(), o, recipe, step, updates)
+        fit(state, x.detach(), o, recipe, step, updates)
     state.denoised = x.detach()
     return state
 

@@ -30,7 +30,7 @@ from skimage.metrics import structural_similarity
 from core import images, meshes, raster
 from core.capture import Capture
 from core.messages import Problem
-from core.views import View, read_views
+from core.views import read_views
 
 from .figures import markdown, write
 
@@ -59,27 +59,56 @@ def read_truth(folder: Path) -> list[Truth]:
     return frames
 
 
+@dataclass(frozen=True)
+class Look:
+    """What a view with truth sees of a head: hit bool [H, W], and for each pixel that hits where on the map it lies, [N, 2], u and v."""
+
+    true: Truth
+    hit: np.ndarray
+    uv: np.ndarray
+
+    def picture(self, albedo: np.ndarray) -> np.ndarray:
+        """A map [S, S, 3] in the head's UVs as this view sees it, [H, W, 3]; black beside the head."""
+        picture = np.zeros((*self.hit.shape, 3), np.float32)
+        picture[self.hit] = raster.sample(albedo, np.stack([self.uv[:, 0], 1 - self.uv[:, 1]], 1) * len(albedo))
+        return picture
+
+
 def score_capture(capture: Capture, truth: Path, pictures: Path | None = None, texture: Path | None = None) -> dict:
     """The figures of a solved capture; `texture` replaces its albedo map (any picture in the head's UVs)."""
+    albedo = images.read_srgb(texture or next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists()))
+    seen, missing = looks(capture, truth)
+    if pictures:
+        for look in seen:
+            mask = (look.true.face & look.hit)[..., None]
+            images.write_srgb(pictures / f"{look.true.frame:04d}.jpg", np.hstack([look.true.albedo * mask, look.picture(albedo) * mask]))
+    return {"frames_not_registered": missing, **score_map(albedo, seen)}
+
+
+def looks(capture: Capture, truth: Path) -> tuple[list[Look], list[int]]:
+    """The registered frames with truth as they see the capture's head, and the numbers of those that were not registered. Raises Problem where none was."""
     head = meshes.read_obj(capture.head)
     caster = raster.RayCaster(head)
-    albedo = images.read_srgb(texture or next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists()))
     numbers = {f["name"]: f["video_frame"] for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
     views = {numbers[view.name]: view for view in read_views(capture)}
-    results, coverage, missing = [], [], []
+    seen, missing = [], []
     for true in read_truth(truth):
         if true.frame not in views:
             missing.append(true.frame)
             continue
-        predicted, hit = _render(caster, albedo, views[true.frame], true.face.shape)
-        coverage.append((hit & true.face).sum() / true.face.sum())
-        results.append(compare(predicted, true, true.face & hit))
-        if pictures:
-            mask = (true.face & hit)[..., None]
-            images.write_srgb(pictures / f"{true.frame:04d}.jpg", np.hstack([true.albedo * mask, predicted * mask]))
-    if not results:
+        face, bary, _ = raster.render_view(caster, views[true.frame], true.face.shape[1] / views[true.frame].width)
+        hit = face >= 0
+        seen.append(Look(true, hit, raster.interpolate(head.uvs, head.face_uvs, face[hit], bary[hit])))
+    if not seen:
         raise Problem("None of the frames with a known albedo was registered.", "Look at the cameras stage in the report.")
-    return {"views": len(results), "frames_not_registered": missing, "face_coverage": float(np.mean(coverage)), **mean_scores(results)}
+    return seen, missing
+
+
+def score_map(albedo: np.ndarray, seen: list[Look]) -> dict:
+    """The figures of an albedo map, sRGB [S, S, 3], in the UVs of the head that `seen` sees."""
+    results = [compare(look.picture(albedo), look.true, look.true.face & look.hit) for look in seen]
+    coverage = [(look.hit & look.true.face).sum() / look.true.face.sum() for look in seen]
+    return {"views": len(results), "face_coverage": float(np.mean(coverage)), **mean_scores(results)}
 
 
 def score_floors(truth: Path) -> dict:
@@ -98,17 +127,6 @@ def _video(path: Path) -> Iterator[np.ndarray]:
     with av.open(str(path)) as video:
         for frame in video.decode(video=0):
             yield frame.to_ndarray(format="rgb24").astype(np.float32) / 255
-
-
-def _render(caster: raster.RayCaster, texture: np.ndarray, view: View, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """The head's texture seen by a camera: sRGB [h, w, 3] and the pixels that hit it."""
-    face, bary, _ = raster.render_view(caster, view, shape[1] / view.width)
-    hit = face >= 0
-    mesh, side = caster.mesh, texture.shape[0]
-    uv = raster.interpolate(mesh.uvs, mesh.face_uvs, face[hit], bary[hit])
-    picture = np.zeros((*shape, 3), np.float32)
-    picture[hit] = raster.sample(texture, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * side)
-    return picture, hit
 
 
 def compare(predicted: np.ndarray, true: Truth, mask: np.ndarray) -> dict:

@@ -1,13 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Six synthetic people of six skin tones, none known to any training, each photographed in another light, with their truth; and their solve.
+"""Six synthetic people of six skin tones, none known to any training, each filmed in another light, with their truth; and their solve.
 
-    python -m benchmarks.people FOLDER [--only NAME ...] [--until STAGE] [--quality NAME] [--no-solve]
+    python -m benchmarks.people FOLDER [--only NAME ...] [--places wild flash studio] [--until STAGE] [--quality NAME] [--no-solve]
 
 FOLDER/NAME.wildcap is the capture, FOLDER/NAME its truth in the layout that benchmarks/albedo_score.py says, with maps/ (the true maps, 2048) and head.obj
 besides. Path-traced by Cycles (shadows, two bounces, highlights; no scattering under the skin, so that albedo is what the truth says), then exposed,
 balanced, blurred, made noisy and compressed. The cameras are the true ones and the head is half a millimetre off, so the chain begins at delight, with the
-true skin tone. What is there is not made again.
+true skin tone. Two more captures of each, NAME_flash and NAME_studio: in a dark room with a lamp at the camera, and by sixteen fixed cameras in even light.
+Those are made only, not solved (benchmarks/controlled.py does). What is there is not made again.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ import numpy as np
 from core import images, meshes
 from core.capture import Capture, replacing, write_json
 from core.messages import Done, StageDone
-from core.settings import QUALITIES, from_json, preset
+from core.settings import QUALITIES, Settings, from_json, preset
 from core.stages import STAGES
 from core.synthetic import sample, scene
 from core.synthetic.identities import subject_mesh
@@ -55,8 +56,10 @@ PEOPLE = (
     Person("dark", 900102, "noon sun behind leaves"),
 )
 """The first seed from 900101 on in each group: nothing was chosen by eye. reserved.json keeps them from training."""
-VIEWS, EVERY, SCALE, SAMPLES = 12, 5, 5 / 6, 7  # frames, how many of a video lie between two, their size (600 x 800), rays per pixel before denoising
-TRUTH_EVERY = 2  # frames
+PLACES = ("wild", "flash", "studio")
+FRAMES, SCALE, SAMPLES = 40, 5 / 6, 7  # of the video, their size (600 x 800), rays per pixel before denoising
+FLASH_EVERY, FLASH_W = 3, 10.0  # of the video's cameras so many are taken again with the lamp; only its place matters, as frames are exposed
+TRUTHS = 14  # frames whose truth is written
 BALANCED = 0.75  # share of the light's colour that the white balance takes out
 WHITE_AT, TO = 99.0, 0.8  # percentile of the brightest channel on the face that the exposure brings to this linear level
 BLUR_PX, NOISE = 0.6, 0.006  # deviations; of the noise in sRGB at mid grey
@@ -66,43 +69,57 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
+    parser.add_argument("--places", nargs="+", choices=PLACES, default=PLACES[:1])
     parser.add_argument("--until", choices=[s.name for s in STAGES[4:]], default="upscale")
     parser.add_argument("--quality", choices=QUALITIES, default="standard")
     parser.add_argument("--no-solve", action="store_true", help="make the captures and their truth only")
     arguments = parser.parse_args()
     for person in (p for p in PEOPLE if p.name in arguments.only):
-        capture = make(person, arguments.folder.resolve())
-        if not arguments.no_solve:
-            solve(capture, arguments.folder / person.name, arguments.until, arguments.quality)
+        for place in arguments.places:
+            capture = make(person, arguments.folder.resolve(), place)
+            if place == "wild" and not arguments.no_solve:
+                solve(capture, arguments.folder / person.name, arguments.until, arguments.quality)
 
 
-def make(person: Person, folder: Path) -> Capture:
+def make(person: Person, folder: Path, place: str = "wild") -> Capture:
     """The person's capture and truth, made if they are not there."""
-    capture, truth = Capture(folder / f"{person.name}.wildcap"), folder / person.name
+    name = person.name if place == "wild" else f"{person.name}_{place}"
+    capture, truth = Capture(folder / f"{name}.wildcap"), folder / name
     if (truth / "skin_tone.txt").exists():  # written last
         return capture
     skin = make_skin(sample_parameters(person.seed), sample.MAPS)
-    light, cameras = KINDS[person.light](person.seed), scene.camera_path(person.seed, VIEWS * EVERY)[EVERY // 2::EVERY]
-    work = folder / "rendered" / person.name
-    sample.render_frames(work, person.seed, skin, cameras, list(range(VIEWS)), SAMPLES, SCALE, room=False, light=light, suffix=".exr")
+    light, cameras = _set(person, place)
+    work = folder / "rendered" / name
+    sample.render_frames(work, person.seed, skin, cameras, list(range(len(cameras))), SAMPLES, SCALE, room=False, light=light, suffix=".exr")
     head = subject_mesh(person.seed)
     meshes.write_obj(truth / "head.obj", head)
-    write_maps(truth / "maps", skin)
-    write_json(truth / "cameras.json", {"name": person.name, "light": person.light, "focal_px": scene.FOCAL * SCALE, "width": round(scene.WIDTH * SCALE),
-                                        "height": round(scene.HEIGHT * SCALE),
+    if place == "wild":
+        write_maps(truth / "maps", skin)
+    write_json(truth / "cameras.json", {"name": name, "light": person.light if place == "wild" else place, "focal_px": scene.FOCAL * SCALE,
+                                        "width": round(scene.WIDTH * SCALE), "height": round(scene.HEIGHT * SCALE),
                                         "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
     faces, total, count = {}, np.zeros(3), 0
     opaque = sample.together(head, light.blockers) if light.blockers else head
-    for frame in range(0, VIEWS, TRUTH_EVERY):
+    for frame in np.unique(np.linspace(1, len(cameras) - 2, TRUTHS).round().astype(int)).tolist():
         albedo, alpha, face, shadow = sample.frame_truth(head, opaque, skin, sample.view_of(cameras[frame], SCALE), light.sun.direction if light.sun else None)
         faces[frame] = albedo, face
         _write_truth(truth, frame, albedo, alpha, face, shadow if light.sun else None)
         total, count = total + albedo[face].sum(0, dtype=np.float64), count + int(face.sum())
-    write_views(capture, [sample.view_of(matrix, SCALE) for matrix in cameras], _developed(work, faces, person.seed))
+    views = [sample.view_of(matrix, SCALE) for matrix in cameras]
+    write_views(capture, views, _developed(work, len(cameras), faces, person.seed), min(Settings().frames.views, len(views)))
+    sample.write_video(truth / "capture.mp4", _developed(work, len(cameras), faces, person.seed))
     meshes.write_obj(capture.head, registered(head, person.seed))
     with replacing(truth / "skin_tone.txt") as temporary:
         temporary.write_text(",".join(f"{c:.4f}" for c in images.linear_to_srgb(total / count)) + "\n", encoding="ascii")
     return capture
+
+
+def _set(person: Person, place: str) -> tuple[scene.Light, np.ndarray]:
+    """The light at a place, and its cameras, camera-to-world [N, 4, 4]."""
+    if place == "studio":
+        return scene.Light((1.0, 1.0, 1.0)), scene.rig()
+    path = scene.camera_path(person.seed, FRAMES)
+    return (scene.Light((0.0, 0.0, 0.0), flash=FLASH_W), path[1::FLASH_EVERY]) if place == "flash" else (KINDS[person.light](person.seed), path)
 
 
 def write_maps(folder: Path, skin: Skin) -> None:
@@ -142,10 +159,10 @@ def _write_truth(truth: Path, frame: int, albedo: np.ndarray, alpha: np.ndarray,
         images.write_data(truth / "shadow" / name, shadow.astype(np.float32))
 
 
-def _developed(work: Path, faces: dict[int, tuple[np.ndarray, np.ndarray]], seed: int) -> Iterator[np.ndarray]:
+def _developed(work: Path, count: int, faces: dict[int, tuple[np.ndarray, np.ndarray]], seed: int) -> Iterator[np.ndarray]:
     """The rendered frames as a phone would show them, sRGB [H, W, 3]; `faces`: per frame with truth its albedo [H, W, 3] and facial skin [H, W]."""
     gain = exposure({frame: images.read_linear(work / f"{frame:05d}.exr") for frame in faces}, faces)
-    for frame in range(VIEWS):
+    for frame in range(count):
         rng = np.random.default_rng([seed, 51, frame])
         linear = cv2.GaussianBlur(images.read_linear(work / f"{frame:05d}.exr") * gain, (0, 0), BLUR_PX)
         srgb = images.linear_to_srgb(linear)

@@ -99,8 +99,10 @@ def _photograph(capture: Capture, mesh: Mesh, texture: np.ndarray, rng: np.rando
     write_views(capture, views, (picture(caster, view, texture, rng) for view in views))
 
 
-def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarray]) -> None:
-    """frames/ with frames.json, and cameras/: sRGB pictures [H, W, 3] with the known cameras that took them, which share one lens."""
+def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarray], selected: int | None = None) -> None:
+    """frames/ with frames.json, and cameras/: sRGB pictures [H, W, 3] with the known cameras that took them, which share one lens; so many of them, evenly
+    spread, are selected for the texture, or all."""
+    taken = np.linspace(0, len(views) - 1, selected or len(views)).round().astype(int)
     model = pycolmap.Reconstruction()
     model.add_camera_with_trivial_rig(views[0].camera)
     frames = []
@@ -111,7 +113,7 @@ def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarr
             image = pycolmap.Image(name=name, camera_id=1, image_id=i + 1)
             pose = pycolmap.Rigid3d(pycolmap.Rotation3d(view.rotation), view.translation)
             model.add_image_with_trivial_frame(image, pose)
-            frames.append({"name": name, "video_frame": i, "time_s": float(i), "sharpness": 1.0, "selected": True})
+            frames.append({"name": name, "video_frame": i, "time_s": float(i), "sharpness": 1.0, "selected": i in taken})
         write_json(folder / "frames.json", {"frames": frames})
     capture.cameras.mkdir(parents=True, exist_ok=True)
     model.write_binary(str(capture.cameras))

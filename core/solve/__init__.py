@@ -53,7 +53,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     prior = load(Path(options.prior).expanduser() if options.prior else WEIGHTS, settings.device)
     if options.low_memory:
         spare_memory(prior)
-    recipe = _recipe(settings, prior)
+    recipe = recipe_of(settings, prior)
     report.progress(0, recipe.steps, "reading the texture, the head and the masks")
     size = layout.whole_size(options.size, prior.multiple) if options.prior else max(options.size // 32, 4) * 32  # the network halves the map several times
     known = evidence = read_evidence(capture, size)
@@ -108,7 +108,7 @@ def _finished(prior: Prior, state: State, evidence: Evidence, start: initial.Sta
     return result, Solution(state.denoised, state.lights, evidence.alpha, start.alpha, varied, start.tone, result.gain, start.exposure)
 
 
-def _recipe(settings: Settings, prior: Prior) -> Recipe:
+def recipe_of(settings: Settings, prior: Prior) -> Recipe:
     """The chosen recipe on the noise levels that the prior knows. Ours takes the number of steps and the guidance from the settings; the others come with
     their own."""
     recipe = RECIPES[settings.solve.recipe]

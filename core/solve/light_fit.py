@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import torch
 
 from .lighting import BANDS, Lights, fit_around_constant
@@ -16,8 +18,9 @@ MOVING = {"both": (0, 1, 2), "main": (0,), "grid": (1, 2), "cells": (1,)}
 """Which of Lights.parameters() a phase moves."""
 
 
-def update_lights(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe, step: int, steps: int) -> None:
-    """The light updates that belong to one sampling step, in place: none, one or several of the phase that this step is in.
+def update_lights(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe, step: int, steps: int, loss: Callable | None = None) -> None:
+    """The light updates that belong to one sampling step, in place: none, one or several of the phase that this step is in; by `loss` instead of
+    `light_loss` where given.
 
     How many there were before follows from the step's number, so a stored state continues exactly.
     """
@@ -28,7 +31,7 @@ def update_lights(state: State, denoised: torch.Tensor, o: Observation, recipe: 
         if first <= step < last:
             per_step = max(1, round(recipe.updates / (last - first)))
             for k in range(per_step):
-                _adam(state, denoised, o, recipe, MOVING[phase], (step - first) * per_step + k)
+                _adam(state, denoised, o, recipe, MOVING[phase], (step - first) * per_step + k, loss or light_loss)
 
 
 def _refit(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> None:
@@ -69,11 +72,11 @@ def variation(image: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
     return (image.diff(dim=1).abs() * weight[1:]).sum() + (image.diff(dim=2).abs() * weight[:, 1:]).sum()
 
 
-def _adam(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe, moving: tuple[int, ...], before: int) -> None:
+def _adam(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe, moving: tuple[int, ...], before: int, loss: Callable) -> None:
     """One step of Adam on the parameters `moving`, the `before`+1st of its phase, with an exponentially decaying rate."""
     lights = state.lights.requires_grad_(True)
     parameters = lights.parameters()
-    gradients = torch.autograd.grad(light_loss(lights, denoised, o, recipe), [parameters[k] for k in moving], allow_unused=True)
+    gradients = torch.autograd.grad(loss(lights, denoised, o, recipe), [parameters[k] for k in moving], allow_unused=True)
     lights.requires_grad_(False)
     if not state.moments:
         state.moments = [torch.zeros_like(p) for p in parameters for _ in range(2)]

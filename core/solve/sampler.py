@@ -30,11 +30,11 @@ def seeded(seed: int) -> Callable[[int], Callable]:
 
 def sample(prior: Callable, observations: dict[int, Observation], state: State, recipe: Recipe, noise: Callable[[int], Callable],
            on_step: Callable[[State, int], None] = lambda state, steps: None,
-           known: Callable[[torch.Tensor, float, Callable], torch.Tensor] = lambda x, sigma, draw: x) -> State:
+           known: Callable[[torch.Tensor, float, Callable], torch.Tensor] = lambda x, sigma, draw: x, fit: Callable[..., None] = update_lights) -> State:
     """Runs the sampler from `state` to its end and returns the final state; `denoised` is the solved map, `lights` theta.
 
     prior(x, sigma, coords) is the denoiser; `observations` maps a coarsening factor to what is known at that size; `noise` is `seeded`'s;
-    `known` puts what is known of the map for sure into x_t (window.py).
+    `known` puts what is known of the map for sure into x_t (window.py); `fit` moves theta after each step (light_fit.update_lights, or another light model's).
     Raises Problem when the numbers leave all bounds.
     """
     sigmas = schedule(recipe)
@@ -58,7 +58,7 @@ def sample(prior: Callable, observations: dict[int, Observation], state: State, 
             gradient = clipped(torch.autograd.grad(loss, x)[0] * o.weight * scale, recipe)
         else:
             guided = proximal(guided, shading, o, s, recipe.residual)
-        update_lights(state, denoised.detach(), o, recipe, i, steps)  # equation 9
+        fit(state, denoised.detach(), o, recipe, i, steps)  # equation 9
 
         with torch.no_grad():
             s_down, s_up = ancestral(s, s_next)

@@ -42,6 +42,12 @@ def main() -> None:
     camera.data.sensor_height = 24
     camera.data.lens = job["focal_px"] * 24 / job["height"]
     camera.data.clip_start = 0.05
+    if job["flash"]:
+        lamp = bpy.data.lights.new("flash", 'POINT')
+        lamp.energy, lamp.shadow_soft_size = job["flash"], 0.004
+        flash = bpy.data.objects.new("flash", lamp)
+        flash.parent = camera
+        scene.collection.objects.link(flash)
     for number in job["frames"]:
         path = Path(job["out"]) / f"{number:05d}{job['suffix']}"
         if path.exists():

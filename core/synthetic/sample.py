@@ -16,6 +16,7 @@ import json
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterable
 from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
@@ -80,7 +81,7 @@ def render_frames(work: Path, seed: int, skin: Skin, cameras: np.ndarray, frames
         "suffix": suffix, "out": str(work), "frames": frames, "samples": samples,
         "maps": {name: str(work / f"{name}.png") for name in ("diffuse", "specular", "normal")}, "cameras": cameras.tolist(),
         "sun": asdict(light.sun) | {"direction": light.sun.direction.tolist()} if light.sun else None, "sky": sky,
-        "lamps": [asdict(lamp) for lamp in light.lamps],
+        "lamps": [asdict(lamp) for lamp in light.lamps], "flash": light.flash,
         "width": round(scene.WIDTH * scale), "height": round(scene.HEIGHT * scale), "focal_px": scene.FOCAL * scale})
     subprocess.run([sys.executable, "-m", "core.synthetic.render", str(work / "job.json")], cwd=Path(__file__).parents[2], check=True)
 
@@ -91,7 +92,7 @@ def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> N
     cameras = scene.camera_path(seed, frames)
     write_json(out / "cameras.json", {"name": "sample", "light": "sun", "focal_px": scene.FOCAL, "width": scene.WIDTH, "height": scene.HEIGHT,
                                       "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
-    write_video(out / "capture.mp4", [work / f"{k:05d}.png" for k in range(frames)])
+    write_video(out / "capture.mp4", (images.read_srgb(work / f"{k:05d}.png") for k in range(frames)))
     head, sun = subject_mesh(seed), scene.sun_of(seed)
     opaque = together(head, scene.leaves(seed, sun))
     total, count = np.zeros(3), 0
@@ -147,14 +148,14 @@ def frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarra
     return albedo, cover, (_shrunk(in_face, over) > 0.5) & (cover > 0.99), _shrunk(dark, over) > 0.5
 
 
-def write_video(path: Path, frames: list[Path]) -> None:
-    """H.264 at scene.RATE from PNG files, atomically."""
+def write_video(path: Path, pictures: Iterable[np.ndarray]) -> None:
+    """H.264 at scene.RATE from sRGB pictures [H, W, 3] of one size, atomically."""
     with replacing(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(scene.RATE), options={"crf": "18", "preset": "slow"})
-        stream.width, stream.height, stream.pix_fmt = scene.WIDTH, scene.HEIGHT, "yuv420p"
-        for frame in frames:
-            pixels = np.round(images.read_srgb(frame) * 255).astype(np.uint8)
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
+        stream.pix_fmt = "yuv420p"
+        for picture in pictures:
+            stream.height, stream.width = picture.shape[:2]
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(np.round(picture * 255).astype(np.uint8), format="rgb24")))
         container.mux(stream.encode())
 
 

@@ -44,12 +44,13 @@ class Lamp:
 @dataclass(frozen=True)
 class Light:
     """All that lights a subject. sky: its radiance everywhere, [3], or an equirectangular panorama [H, W, 3] as Blender reads one (its middle column is +X);
-    blockers: what stands between the lights and the head, unseen by the camera."""
+    blockers: what stands between the lights and the head, unseen by the camera; flash: watts of a small lamp in the camera's own place, that goes with it."""
 
     sky: tuple[float, float, float] | np.ndarray = SKY
     sun: Sun | None = None
     blockers: Mesh | None = None
     lamps: tuple[Lamp, ...] = ()
+    flash: float = 0.0
 
 
 def sun_of(seed: int) -> Sun:
@@ -91,14 +92,25 @@ def camera_path(seed: int, frames: int) -> np.ndarray:
     position = distance[:, None] * np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)
     position += _drift(rng, frames, 0.008, 9) + _drift(rng, frames, 0.0015, 2)
     target = np.array([0, -0.01, -0.035]) + _drift(rng, frames, 0.010, 9) + _drift(rng, frames, 0.0015, 2)
-    roll = _drift(rng, frames, np.radians(1.5), 9)[:, 0]
+    return looking(position, target, _drift(rng, frames, np.radians(1.5), 9)[:, 0])
+
+
+def rig() -> np.ndarray:
+    """Camera-to-world matrices [16, 4, 4] of a studio: two fixed rows of eight cameras, over 100 degrees from side to side, as in multi-view face datasets."""
+    height, azimuth = (np.radians(a).ravel() for a in np.meshgrid([-6.0, 22.0], np.linspace(-50, 50, 8), indexing="ij"))
+    position = DISTANCE * np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)
+    return looking(position, np.broadcast_to([0, -0.01, -0.035], position.shape), np.zeros(len(position)))
+
+
+def looking(position: np.ndarray, target: np.ndarray, roll: np.ndarray) -> np.ndarray:
+    """Camera-to-world matrices [N, 4, 4] of cameras at `position` [N, 3] that look at `target` [N, 3], turned about their axis by `roll` [N] radians."""
     back = position - target
     back /= np.linalg.norm(back, axis=1, keepdims=True)
     right = np.cross([0, 0, 1.0], back)
     right /= np.linalg.norm(right, axis=1, keepdims=True)
     up = np.cross(back, right)
     c, s = np.cos(roll)[:, None], np.sin(roll)[:, None]
-    matrices = np.tile(np.eye(4), (frames, 1, 1))
+    matrices = np.tile(np.eye(4), (len(position), 1, 1))
     matrices[:, :3, 0], matrices[:, :3, 1] = c * right + s * up, c * up - s * right
     matrices[:, :3, 2], matrices[:, :3, 3] = back, position
     return matrices

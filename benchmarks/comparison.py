@@ -1,0 +1,230 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Albedo against truth, the paper's protocol for Digital Emily: our light beside other methods' light models, on delit and on raw frames.
+
+    python -m benchmarks.comparison FOLDER [--only NAME ...] [--scan CAPTURE TRUTH] [--size 512] [--jobs 2] [--json OUT.json]
+
+FOLDER was made and solved by benchmarks/people.py; CAPTURE is a solved one of another subject, TRUTH its folder. Rows of INPUT: METHOD over one texture each:
+  wildcap                  the texel grid of local light in the shadow mask, with two seeds, whose spread says what a tie is
+  regions 5, regions 10    soft regions with a light each (light_models.py)      environment    one environment cubemap
+  environment, no prior    the same, and texels that follow the frames alone, smoothly
+  over its blur            the texture divided by its own blur, what one does by hand in Blender
+  texture                  taken for albedo as it is
+All but the last three sample the same prior with the same guidance; all are told the true skin tone. Raw rows get the mask that the chain proposes for
+raw frames. Maps are kept in FOLDER/comparison (benchmarks/rerender.py reads them), so that a second run goes on where the first stopped.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
+from functools import cache, partial
+from importlib import import_module
+from multiprocessing import get_context
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+
+from core import images
+from core.capture import Capture, replacing_folder, write_json
+from core.messages import Reporter
+from core.settings import Settings, from_json, preset
+from core.solve import FACE_CROP, initial, maps, recipe_of
+from core.solve.evidence import REFERENCE, Evidence, read_evidence
+from core.solve.prior import load
+from core.solve.sampler import sample, seeded
+from core.solve.witnesses import confirmed
+
+from . import figures, light_models
+from .ablation import texels_alone
+from .albedo_score import looks, score_map
+from .people import PEOPLE, skin_tone
+
+INPUTS = ("delit", "raw")
+OURS = "wildcap"
+SEEDS = {OURS: (0, 1)}
+LIGHTS: dict[str, Callable] = {
+    "regions 5": partial(light_models.regions, count=5),
+    "regions 10": partial(light_models.regions, count=10),
+    "environment": light_models.environment,
+    "environment, no prior": light_models.environment,
+}
+METHODS = (OURS, *LIGHTS, "over its blur", "texture")
+FREE = "environment, no prior"
+FREE_UPDATES, FREE_SMOOTH = 200, 0.01
+BLUR = 0.03  # deviation as a share of the map's side: keeps moles, takes a cheek's shading
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--only", nargs="*", default=[p.name for p in PEOPLE])
+    parser.add_argument("--scan", nargs=2, type=Path, metavar=("CAPTURE", "TRUTH"))
+    parser.add_argument("--size", type=int, default=512)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--json", type=Path)
+    asked = parser.parse_args()
+    folder = asked.folder.resolve()
+    subjects = {name: (folder / f"{name}.wildcap", folder / name) for name in asked.only}
+    if asked.scan:
+        subjects["scan"] = tuple(path.resolve() for path in asked.scan)
+    found = {}
+    with ProcessPoolExecutor(asked.jobs, get_context("spawn")) as pool:
+        running = {pool.submit(compare_methods, *paths, folder / "comparison" / name, asked.size): name for name, paths in subjects.items()}
+        for future in as_completed(running):
+            found[running[future]] = future.result()
+            print(f"{running[future]} compared", flush=True)
+    found = {"size": asked.size, "subjects": {name: found[name] for name in subjects}}
+    if asked.json:
+        figures.write(asked.json, "comparison", "python -m benchmarks.comparison FOLDER --scan CAPTURE TRUTH", found)
+    print(table(found))
+
+
+def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[str, dict]:
+    """'INPUT: METHOD' -> seed -> figures of one subject; each row's maps lie in work/INPUT_METHOD_SEED."""
+    torch.set_num_threads(1)
+    found: dict[str, dict] = {}
+    for given in INPUTS:
+        settings = from_json({"solve": {"skin_tone": skin_tone(truth), "size": size}, "delight": {"delighter": "none"} if given == "raw" else {}},
+                             preset("standard"))
+        capture = Capture(source) if given == "delit" else _raw(Capture(source), work / "raw.wildcap", settings)
+        seen = None
+        for method in METHODS:
+            for seed in SEEDS.get(method, (0,)) if given == "delit" else (0,):
+                row = row_folder(work, given, method, seed)
+                if not (row / "score.json").is_file():
+                    seen = seen or looks(capture, truth)[0]
+                    _keep(row, *solved(capture, settings, method, seed), seen)
+                found.setdefault(f"{given}: {method}", {})[str(seed)] = json.loads((row / "score.json").read_text(encoding="utf-8"))
+    return found
+
+
+def row_folder(work: Path, given: str, method: str, seed: int = 0) -> Path:
+    """Where a row's diffuse_albedo.exr, shading.exr and score.json lie."""
+    return work / f"{given}_{method.replace(', ', '_').replace(' ', '_')}_{seed}"
+
+
+def solved(capture: Capture, settings: Settings, method: str, seed: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """Diffuse albedo and shading, linear [S, S, 3], of one method under one input, and the seconds that it took."""
+    began = time.monotonic()
+    evidence = read_evidence(capture, settings.solve.size)
+    if method in ("texture", "over its blur"):
+        return *_by_hand(capture, evidence, settings, method), time.monotonic() - began
+    prior = _prior()
+    recipe = recipe_of(settings, prior)
+    cell = FACE_CROP / settings.solve.grid_cells * REFERENCE / evidence.extent.side
+    start = initial.start(prior, evidence, settings.solve.skin_tone, cell, recipe, lambda marks: confirmed(capture, marks, evidence.size))
+    fit = {}
+    if method in LIGHTS:
+        start, recipe, move = LIGHTS[method](start, recipe)
+        fit = {"fit": move}
+    if method == FREE:
+        state = texels_alone(start, replace(recipe, decay=0.995), FREE_UPDATES, smooth=FREE_SMOOTH, **fit)
+    else:
+        state = sample(prior, start.observations, start.state, recipe, seeded(seed), **fit)
+    result = maps.finished(state, evidence, start, recipe)
+    return result.diffuse, result.shading, time.monotonic() - began
+
+
+def _by_hand(capture: Capture, evidence: Evidence, settings: Settings, method: str) -> tuple[np.ndarray, np.ndarray]:
+    """The texture, or the texture over its own blur, brought to the skin tone; and what it was divided by."""
+    size, weight = evidence.size, evidence.weight.numpy()[..., None]
+    texture = np.maximum(images.resize(images.read_linear(capture.texture), size, size), 0)
+    shading = np.ones_like(texture)
+    if method != "texture":
+        blurred, share = (cv2.GaussianBlur(a, (0, 0), BLUR * len(texture)) for a in (texture * weight, np.repeat(weight, 3, 2)))
+        shading = np.maximum(blurred / np.maximum(share, 1e-3), 1e-3)
+    skin = weight * evidence.skin.numpy()[..., None]
+    tone = images.srgb_to_linear(np.array([float(v) for v in settings.solve.skin_tone.split(",")], np.float32))
+    gain = tone * skin.sum() / np.maximum((texture / shading * skin).sum((0, 1)), 1e-6)
+    return (texture / shading * gain).astype(np.float32), (shading / gain).astype(np.float32)
+
+
+def _keep(row: Path, diffuse: np.ndarray, shading: np.ndarray, seconds: float, seen: list) -> None:
+    score = {**score_map(images.linear_to_srgb(np.clip(diffuse, 0, 1)), seen), "seconds": round(seconds, 1)}
+    with replacing_folder(row) as folder:
+        images.write_linear(folder / "diffuse_albedo.exr", diffuse)
+        images.write_linear(folder / "shading.exr", shading)
+        write_json(folder / "score.json", score)
+
+
+def _raw(source: Capture, folder: Path, settings: Settings) -> Capture:
+    """A copy of a capture whose texture is the frames' as filmed, with the mask that the chain proposes for it; made once."""
+    copy = Capture(folder)
+    if not copy.shadow_mask_auto.is_file():
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(source.root, folder, ignore=shutil.ignore_patterns("maps*", "preview", "checkpoints", "renders", "delivery", "delit", "lock",
+                                                                          "shadow_mask*", "mask_history", "texture*"))
+        for stage in ("delight", "texture", "shadow_mask"):
+            import_module(f"core.{stage}").run(copy, settings, Reporter(stage))
+    return copy
+
+
+@cache
+def _prior():
+    return load()
+
+
+COLUMNS = {"PSNR": lambda s: s["raw"]["psnr"], "after one gain": lambda s: s["gain"]["psnr"], "SSIM": lambda s: s["gain"]["ssim"],
+           "FLIP": lambda s: s["gain"]["flip"], "detail": lambda s: s["detail"], "shadow step": lambda s: s["shadow_step"]}
+FORMATS = {"PSNR": "{:.2f}", "after one gain": "{:.2f}", "SSIM": "{:.3f}", "FLIP": "{:.3f}", "detail": "{:.2f}", "shadow step": "{:.2f}"}
+
+
+def means(found: dict, people: bool = True) -> dict[str, dict[str, float]]:
+    """'INPUT: METHOD' -> column -> mean over the people (or the scan's figures), the first seed; and 'spread': half of what two seeds of ours differ by."""
+    subjects = [rows for name, rows in found["subjects"].items() if (name != "scan") == people]
+    if not subjects:
+        return {}
+    out = {row: {column: _mean([value(rows[row]["0"]) for rows in subjects]) for column, value in COLUMNS.items()} for row in subjects[0]}
+    two = [rows[f"delit: {OURS}"] for rows in subjects]
+    out["spread"] = {column: _mean([abs(value(s["0"]) - value(s["1"])) / 2 for s in two if value(s["0"]) is not None]) for column, value in COLUMNS.items()}
+    return out
+
+
+def table(found: dict) -> str:
+    """Markdown: a line per row with the means over the people, the best of each column and what ties with it in bold; then the same for the scan."""
+    parts = []
+    for people, title in ((True, "mean of the people"), (False, "head scan")):
+        rows = means(found, people)
+        if not rows:
+            continue
+        spread = rows.pop("spread")
+        lines = [f"| {title} | " + " | ".join(COLUMNS) + " |", "| --- |" + " --- |" * len(COLUMNS)]
+        for name, cells in rows.items():
+            line = [_cell(column, cells[column], [r[column] for r in rows.values()], spread[column]) for column in COLUMNS]
+            lines.append(f"| {name} | " + " | ".join(line) + " |")
+        lines.append("| *spread over seeds* | " + " | ".join(_text(column, spread[column]) for column in COLUMNS) + " |")
+        parts.append("\n".join(lines))
+    return "\n\n".join(parts)
+
+
+def _cell(column: str, value: float | None, column_values: list[float | None], spread: float | None) -> str:
+    known = [_badness(column, v) for v in column_values if v is not None]
+    text = _text(column, value)
+    return f"**{text}**" if value is not None and _badness(column, value) <= min(known) + (spread or 0) else text
+
+
+def _badness(column: str, value: float) -> float:
+    return abs(value) if column == "shadow step" else value if column == "FLIP" else -value
+
+
+def _text(column: str, value: float | None) -> str:
+    return "-" if value is None else FORMATS[column].format(value)
+
+
+def _mean(values: list[float | None]) -> float | None:
+    known = [v for v in values if v is not None]
+    return float(np.mean(known)) if known else None
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    main()

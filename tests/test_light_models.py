@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The other methods' light models explain light of their own kind, and hold the solver's contract; the comparison's table names what is best."""
+
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from benchmarks import comparison, light_models, rerender
+from benchmarks.albedo_score import Look, Truth
+from core.solve.initial import Start
+from core.solve.lighting import Lights, Shader, constant_light
+from core.solve.problem import Observation, State
+from core.solve.recipes import OURS
+
+SIZE = 32
+
+
+def begun(shading) -> Start:
+    """A half ball of even albedo 0.4 under `shading`(normal) [3, S, S], as the solver begins it: with the even light of the texture's mean."""
+    y, x = (torch.meshgrid(*[torch.linspace(-0.95, 0.95, SIZE)] * 2, indexing="ij"))
+    inside = (x**2 + y**2 < 0.9).float()
+    normal = torch.stack([x, -(1 - x**2 - y**2).clamp_min(0.05).sqrt(), -y])
+    normal = normal / normal.norm(dim=0)
+    reference = torch.cat([torch.full((1, 3, SIZE, SIZE), 2 * 0.4 - 1), torch.zeros(1, 4, SIZE, SIZE)], 1)
+    texture = 0.4 * shading(normal, x)
+    shader = Shader(normal, torch.zeros(SIZE, SIZE), (4, 4))
+    o = Observation(texture, inside, torch.ones(SIZE, SIZE), torch.zeros(1, 2, SIZE, SIZE), shader, torch.zeros(SIZE, SIZE))
+    mean = (texture * inside).sum((1, 2)) / inside.sum() / 0.4
+    state = State(0, None, reference, Lights(constant_light(mean), torch.zeros(1, 9, 4, 4), torch.ones(3)))
+    return Start(torch.full((3,), 0.4), reference, 1.0, torch.zeros(SIZE, SIZE), {1: o}, state)
+
+
+def fitted(start, recipe, move, steps=10) -> tuple[float, float]:
+    """Share of the shading's variance that is left, before and after the light moved under the true albedo."""
+    o, state = start.observations[1], start.state
+
+    def left():
+        error = (0.4 * o.shader.total(state.lights) - o.texture) * o.weight
+        spread = (o.texture - (o.texture * o.weight).sum((1, 2), keepdim=True) / o.weight.sum()) * o.weight
+        return float((error**2).sum() / (spread**2).sum())
+
+    before = left()
+    for step in range(steps):
+        move(state, state.denoised, o, recipe, step, steps)
+    return before, left()
+
+
+def lamp(normal, x):
+    return (0.4 + 0.8 * (normal * torch.tensor([0.5, -0.7, 0.5])[:, None, None]).sum(0).clamp_min(0)).repeat(3, 1, 1)
+
+
+def bars(normal, x):
+    """Shadows of bars, finer than a cosine lobe."""
+    return torch.where((8 * x).sin() > 0, 1.0, 0.45).repeat(3, 1, 1)
+
+
+FREE = replace(OURS, phases=(("both", 0.0, 1.0),), updates=80)
+
+
+def test_an_environment_explains_a_lamp_and_no_shadow():
+    before, after = fitted(*light_models.environment(begun(lamp), FREE))
+    assert before > 0.9 and after < 0.05
+    assert fitted(*light_models.environment(begun(bars), FREE))[1] > 0.5
+
+
+def test_regions_explain_a_shadow_that_they_were_laid_on():
+    assert fitted(*light_models.regions(begun(bars), FREE, 5))[1] < 0.15
+    assert fitted(*light_models.regions(begun(lamp), FREE, 5))[1] < 0.1
+
+
+def test_an_even_sky_is_an_even_irradiance_and_a_point_is_a_cosine():
+    directions, lobe, pairs = light_models.cubemap()
+    assert torch.allclose(lobe.sum(1), torch.ones(len(lobe)), atol=1e-5)
+    k = 700
+    assert np.allclose(lobe[:, k] / lobe[k, k], np.maximum(directions @ directions[k], 0), atol=0.03)
+    assert np.degrees(np.arccos((directions[pairs[:, 0]] * directions[pairs[:, 1]]).sum(1).clip(-1, 1))).max() < 9
+    assert len(np.unique(pairs)) == len(directions)  # nobody is without neighbours, at the cube's corners either
+
+
+def test_the_table_marks_the_best_and_its_ties():
+    def score(psnr, step):
+        return {"raw": {"psnr": psnr}, "gain": {"psnr": psnr, "ssim": 0.9, "flip": 0.1}, "detail": 0.5, "shadow_step": step}
+
+    rows = {"delit: wildcap": {"0": score(30.0, -0.1), "1": score(30.4, -0.1)}, "delit: regions 5": {"0": score(29.9, 0.2)},
+            "raw: texture": {"0": score(20.0, None)}}
+    text = comparison.table({"size": 8, "subjects": {"a": rows}})
+    lines = {line.split("|")[1].strip(): line for line in text.splitlines()}
+    assert "**30.00**" in lines["delit: wildcap"] and "**-0.10**" in lines["delit: wildcap"]
+    assert "**29.90**" in lines["delit: regions 5"]  # within half of what two seeds differ by
+    assert "**0.20**" not in lines["delit: regions 5"] and "20.00" in lines["raw: texture"] and "**20" not in lines["raw: texture"]
+
+
+def test_a_rendering_that_is_the_frame_scores_and_a_wrong_one_does_not():
+    rng = np.random.default_rng(0)
+    flat = rng.uniform(0.3, 0.6, (64, 64, 3)).astype(np.float32)
+    linear = np.where(flat <= 0.04045, flat / 12.92, ((flat + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    y, x = np.mgrid[:64, :64]
+    uv = np.stack([(x + 0.5) / 64, 1 - (y + 0.5) / 64], -1).reshape(-1, 2)
+    look = Look(Truth(0, flat, np.ones((64, 64), bool), None), np.ones((64, 64), bool), uv)
+    same = rerender.score(0.5 * linear, [rerender.Delit(flat, look)])  # a view's exposure does not count
+    assert same["psnr"] > 60 and same["ssim"] > 0.999
+    assert rerender.score(linear[::-1], [rerender.Delit(flat, look)])["psnr"] < 25
