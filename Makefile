@@ -1,4 +1,4 @@
-# The two commands of the README (demo, test), the add-on in other Blenders and in a real window, and the extension's zip.
+# The two commands of the README (demo, test), the figures of the documentation, the add-on in other Blenders and in a real window, and the extension's zip.
 PYTHON ?= python3.11
 BIN := .venv/bin
 DEMO ?= .demo
@@ -10,7 +10,7 @@ BLENDERS ?= 4.2.0 5.0.1
 # What of the tests needs Blender.
 IN_BLENDER = addon captures setup evidence choices eyedropper white_card paint paint_session operators job_life relight skin_material skin_kept reel next_step refusals draw translations sending acting
 
-.PHONY: demo test test-blenders test-gui zip clean
+.PHONY: demo test results test-blenders test-gui zip clean
 
 demo: .venv/installed
 	$(BIN)/python -m benchmarks.demo $(DEMO)
@@ -18,6 +18,10 @@ demo: .venv/installed
 test: .venv/installed
 	$(BIN)/ruff check core wildcap_addon tests benchmarks
 	$(BIN)/python -m pytest tests --ignore=tests/gui
+
+# docs/results.md and the README's figures, out of the records that the benchmarks left in docs/figures.
+results: .venv/installed
+	$(BIN)/python -m benchmarks.results
 
 test-blenders: $(BLENDERS:%=.blenders/%/installed)
 	for version in $(BLENDERS); do \
