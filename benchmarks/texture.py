@@ -21,6 +21,7 @@ import json
 import shutil
 import tempfile
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -46,7 +47,7 @@ def measure(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: 
     if not capture.head.is_file():
         raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
     head, report, results = meshes.read_obj(capture.head), Reporter("texture"), {}
-    looks = _looks(capture, head, truth)
+    looks = looks_of(capture, head, truth)
     if "delit" in rows and any(capture.delit.glob("*.png")):
         results["delit"] = _row("aligned", *texture.observe_all(capture, head, size, report), looks, steps, pictures and pictures / "delit.jpg")
     with tempfile.TemporaryDirectory() as folder:
@@ -67,7 +68,7 @@ def measure(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: 
     return results
 
 
-def _looks(capture: Capture, head: meshes.Mesh, truth: Path) -> dict[str, Look]:
+def looks_of(capture: Capture, head: meshes.Mesh, truth: Path) -> dict[str, Look]:
     """Frame name -> what its rays meet, of the registered frames with a true albedo."""
     numbers = {f["name"]: f["video_frame"] for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
     known, caster = {true.frame: true for true in read_truth(truth)}, raster.RayCaster(head)
@@ -83,7 +84,7 @@ def _row(row: str, observations: list, surface, looks: dict[str, Look], steps: i
     seconds = time.monotonic() - started
     if picture:
         images.write_srgb(picture, map_)
-    return {**_score(map_, looks.values()), "seconds": round(seconds, 1)}
+    return {**score(map_, looks.values()), "seconds": round(seconds, 1)}
 
 
 def _texture(row: str, observations: list, surface, steps: int) -> np.ndarray:
@@ -98,23 +99,23 @@ def _texture(row: str, observations: list, surface, steps: int) -> np.ndarray:
     return images.linear_to_srgb(texture.fill(linear, confidence, surface.covered))
 
 
-def _score(map_: np.ndarray, looks) -> dict:
-    """albedo_score's figures and those of benchmarks/detail.py, means over the frames."""
+def score(map_: np.ndarray, frames: Iterable[Look]) -> dict:
+    """albedo_score's figures of a map, sRGB [S, S, 3], and those of benchmarks/detail.py, means over the frames."""
     scores, found = [], []
-    for seen in looks:
+    for seen in frames:
         predicted, hit = centre_rays(seen, map_)
         scores.append(compare(predicted, seen.true, seen.true.face & hit))
         found.append(marks(seen, map_))
     mean = mean_scores(scores)
-    return {**mean["raw"], "psnr_after_gain": mean["gain"]["psnr"], "detail": mean["detail"], "shadow_step": mean["shadow_step"], "frames": len(scores),
-            **mean_of(found)}
+    return {**mean["raw"], **{f"{name}_after_gain": value for name, value in mean["gain"].items()}, "detail": mean["detail"],
+            "shadow_step": mean["shadow_step"], "frames": len(scores), **mean_of(found)}
 
 
 def _leave_one_out(observations: list, surface, looks: dict[str, Look], count: int) -> dict:
     """The aligned texture without one view, scored in that view alone; `count` views in turn, evenly spread."""
     names = [o.name for o in observations if o.name in looks]
     chosen = [names[i] for i in np.unique(np.linspace(1, max(len(names) - 2, 1), count).round().astype(int))]
-    frames = {name: _score(_texture("aligned", [replace(o) for o in observations if o.name != name], surface, 0), [looks[name]]) for name in chosen}
+    frames = {name: score(_texture("aligned", [replace(o) for o in observations if o.name != name], surface, 0), [looks[name]]) for name in chosen}
     figures = ("psnr", "ssim", "detail", "mole_contrast", "pore_contrast", "pore_correlation")
     return {**{f: float(np.mean(values)) for f in figures if (values := [v[f] for v in frames.values() if v.get(f) is not None])}, "frames": frames}
 

@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The captures of benchmarks/controlled.py and their solves: a flash in the dark, a studio's even light, and the true albedo for frames.
+
+Each begins from frames, cameras and head of a capture of benchmarks/people.py, works in a copy that is made once, and leaves an albedo map in the same UVs.
+"""
+
+from __future__ import annotations
+
+import importlib
+import shutil
+import time
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from core import images, template
+from core.capture import Capture
+from core.messages import Reporter
+from core.settings import Settings, from_json
+from core.solve import FACE_CROP, initial, maps, recipe_of
+from core.solve.evidence import read_evidence
+from core.solve.prior import load
+from core.solve.sampler import sample, seeded
+
+from .flash_light import write_delit
+from .relit_maps import toned
+
+EMPTY = np.zeros((64, 64), np.float32)
+
+
+def flash(source: Capture, work: Capture, settings: Settings) -> Capture:
+    """The dark room's capture up to its texture, with an empty mask; made once."""
+    if not work.texture_confidence.is_file():
+        _copy(source, work)
+        write_delit(work, work.root / "without_lamp")
+        _run(work, from_json({"delight": {"delighter": "folder", "folder": str(work.root / "without_lamp")}}, settings), "delight", "texture")
+    images.write_data(work.shadow_mask_auto, EMPTY)
+    return work
+
+
+def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict]:
+    """The solver's albedo, sRGB [S, S, 3], where the light is known and gone: even, one colour, held throughout; and the seconds."""
+    began, prior = time.monotonic(), _prior()
+    recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0)
+    evidence = read_evidence(capture, settings.solve.size)
+    start = initial.start(prior, evidence, settings.solve.skin_tone, FACE_CROP / settings.solve.grid_cells, recipe)
+    state = sample(prior, start.observations, start.state, recipe, seeded(settings.seed))
+    return images.linear_to_srgb(maps.finished(state, evidence, start, recipe).diffuse), {"seconds": round(time.monotonic() - began, 1)}
+
+
+def studio(source: Capture, work: Capture, settings: Settings) -> Capture:
+    """The studio's capture up to the proposed mask; the mask that counts is empty. Made once."""
+    if not work.shadow_mask.is_file():
+        _copy(source, work)
+        _run(work, from_json({"delight": {"delighter": "none"}}, settings), "delight", "texture", "shadow_mask")
+        images.write_data(work.shadow_mask, EMPTY)
+    return work
+
+
+def by_the_stage(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict]:
+    """The solve stage's albedo, sRGB [S, S, 3]; its seconds, and the share of the seen face that the proposed mask would have covered, in percent."""
+    began = time.monotonic()
+    _run(capture, from_json({"delight": {"delighter": "none"}}, settings), "solve")
+    seconds, proposed = time.monotonic() - began, images.read_mask(capture.shadow_mask_auto)
+    face = template.mask("face", len(proposed)) * images.read_data(capture.texture_confidence)[..., 0]
+    share = {"proposed_mask_percent": round(100 * float((proposed * face).sum() / face.sum()), 2)}
+    return images.read_srgb(capture.maps / "diffuse_albedo.png"), {"seconds": round(seconds, 1), **share}
+
+
+def true_frames(source: Capture, truth: Path, work: Capture, settings: Settings) -> Capture:
+    """The wild capture with its true albedo frames for delit ones, up to the texture; made once."""
+    if not work.texture_confidence.is_file():
+        _copy(source, work)
+        _run(work, from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings), "delight", "texture")
+    return work
+
+
+def as_albedo(capture: Capture, settings: Settings) -> np.ndarray:
+    """The texture whose confident facial skin has been brought to the skin tone, sRGB [S, S, 3]."""
+    texture, tone = images.read_linear(capture.texture), np.array([float(v) for v in settings.solve.skin_tone.split(",")])
+    skin = images.read_data(capture.texture_confidence)[..., 0] * template.mask("skin", len(texture))
+    return images.linear_to_srgb(toned(texture, images.srgb_to_linear(tone), skin))
+
+
+def _copy(source: Capture, work: Capture) -> None:
+    """What a chain that begins at delight needs of a capture."""
+    shutil.rmtree(work.root, ignore_errors=True)
+    for part in (source.frames, source.cameras):
+        shutil.copytree(part, work.root / part.name)
+    shutil.copyfile(source.head, work.head)
+
+
+def _run(capture: Capture, settings: Settings, *stages: str) -> None:
+    for stage in stages:
+        importlib.import_module(f"core.{stage}").run(capture, settings, Reporter(stage))
+
+
+@cache
+def _prior():
+    return load()
