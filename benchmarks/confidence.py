@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether the confidence map knows where the solved albedo is wrong, on UV-space problems of held-out synthetic subjects.
 
-    python -m benchmarks.confidence [--subjects 9000 ... 9005] [--size 256] [--steps 20] [--picture PATH]
+    python -m benchmarks.confidence [--subjects 9000 ... 9005] [--size 256] [--steps 20] [--picture PATH] [--json OUT.json]
 
 Prints, per subject, Spearman's correlation of 1 - confidence with the true error over the texels of the face (absolute difference in sRGB, mean of the
 channels, after the gain per channel that is best for the whole face), and the error of the more confident half over that of the rest. All of the texture
@@ -24,6 +24,7 @@ from core.messages import Reporter
 from core.settings import from_json
 from core.solve.recipes import OURS
 
+from .figures import write
 from .solve_uv import problem
 
 SHADOWS = ("leaves", "self", "blinds")
@@ -35,6 +36,7 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--steps", type=int, default=OURS.steps)
     parser.add_argument("--picture", type=Path)
+    parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/confidence.json")
     options = parser.parse_args()
     rows, shown = [], []
     print("subject shadows  Spearman  error: confident half  the rest  ratio")
@@ -47,6 +49,9 @@ def main() -> None:
         print(f"{subject:7} {shadows:8} {rho:8.3f} {sure:21.4f} {rest:9.4f} {sure / rest:6.2f}", flush=True)
     rho, ratio = np.mean(rows, 0)
     print(f"mean             {rho:8.3f} {'':31} {ratio:6.2f}")
+    if options.json:
+        write(options.json, "confidence", "python -m benchmarks.confidence",
+              {"subjects": len(rows), "correlation": {"mean": rho, "best": max(each for each, _ in rows)}, "error_of_confident_half": ratio})
     if options.picture:
         images.write_srgb(options.picture, np.repeat(np.vstack(shown)[..., None], 3, 2))
 

@@ -29,10 +29,11 @@ from pathlib import Path
 import numpy as np
 
 from core import delight, images
-from core.capture import Capture, write_json
+from core.capture import Capture
 from core.messages import Problem, Reporter
 from core.settings import Settings
 
+from . import figures
 from .albedo_score import with_gain
 from .delight_measures import flat_tone, mean_of, score, sheet, shortfalls, square, table, tone_group
 from .delight_portraits import portraits
@@ -67,7 +68,7 @@ def main() -> None:
     if options.weights:
         importlib.import_module("core.delight.network").WEIGHTS = options.weights
     captures = dict(pair.split("=", 1) for pair in options.capture)
-    results = json.loads(options.json.read_text(encoding="utf-8")) if options.json and options.json.is_file() else {}
+    results = figures.read(options.json.stem, options.json.parent)["figures"] if options.json and options.json.is_file() else {}
     for name in options.sets:
         title = Path(name).name
         with tempfile.TemporaryDirectory() as folder:
@@ -78,7 +79,7 @@ def main() -> None:
                 found = {"-": {"not_run": f"{problem.problem} {problem.remedy}"}}
         results[title] = {**results.get(title, {}), **found}
         if options.json:
-            write_json(options.json, results)
+            figures.write(options.json, "delight", "python -m benchmarks.delight [--data DIR]", results)
     print(table(results))
     if any(row.startswith("network") and "figures" in found for rows_ in results.values() for row, found in rows_.items()):
         print("", "Where the network is no better than no delighting or the delighter shading:", *(shortfalls(results) or ["nowhere."]), sep="\n")

@@ -23,12 +23,16 @@ ROOT = Path(__file__).resolve().parent.parent
 PUBLISHED = ROOT / "docs" / "figures"
 
 
-def write(path: Path, benchmark: str, command: str, figures: dict) -> None:
+def write(path: Path, benchmark: str, command: str, figures: dict, keep: bool = False) -> None:
     """Writes a record; `benchmark` is the module's name, `command` as the docs have it (folders as CAPITALS).
 
-    Raises ValueError for a figure that is no finite number, string, bool or None. The commit is HEAD's, None outside of git.
+    `keep`: figures of a record that is there stay where they were not measured anew, as of other captures or rows. Raises ValueError for a figure that is
+    no finite number, string, bool or None, Problem where `keep` finds another file than a record. The commit is HEAD's, None outside of git.
     """
-    write_json(Path(path), {"benchmark": benchmark, "command": command, "commit": commit(), "figures": plain(figures)})
+    path, figures = Path(path), plain(figures)
+    if keep and path.is_file():
+        figures = _merged(read(path.stem, path.parent)["figures"], figures)
+    write_json(path, {"benchmark": benchmark, "command": command, "commit": commit(), "figures": figures})
 
 
 def read(name: str, folder: Path = PUBLISHED) -> dict:
@@ -48,6 +52,10 @@ def read(name: str, folder: Path = PUBLISHED) -> dict:
 def markdown(head: list[str], rows: list[list]) -> str:
     """A Markdown table, without a newline at its end; None is a dash."""
     return "\n".join("| " + " | ".join("-" if cell is None else str(cell) for cell in row) + " |" for row in (head, ["---"] * len(head), *rows))
+
+
+def _merged(old: dict, new: dict) -> dict:
+    return {**old, **{key: _merged(old[key], value) if isinstance(value, dict) and isinstance(old.get(key), dict) else value for key, value in new.items()}}
 
 
 def plain(figures, name: str = "figures"):

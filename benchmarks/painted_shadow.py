@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of a shadow that is masked exactly stays in the albedo: python -m benchmarks.painted_shadow [--size N]
+"""How much of a shadow that is masked exactly stays in the albedo: python -m benchmarks.painted_shadow [--size N] [--json OUT.json]
 
 A disc on the sample head's cheek is darkened in its texture and solved, once with the disc as the proposal, once as what the artist added to an empty
 one. Printed is the share of the darkening (logarithm of inside over around, less that of the untouched texture's solve) that is left in the albedo.
@@ -22,6 +22,8 @@ from core.messages import Reporter
 from core.settings import from_json
 from core.template import ASSETS
 
+from .figures import write
+
 CENTRE, RADIUS, EDGE = (690, 600), 70, 2.0  # texels of a 1024 map: column and row, the disc, the blur of its edge
 LEFT = (0.4, 0.6, 0.8)
 """Of the light, inside of the shadow."""
@@ -30,7 +32,9 @@ LEFT = (0.4, 0.6, 0.8)
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.painted_shadow", description=__doc__.splitlines()[0])
     parser.add_argument("--size", type=int, default=512)
-    size = parser.parse_args().size
+    parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/painted_shadow.json")
+    arguments = parser.parse_args()
+    size, found = arguments.size, {}
     y, x = np.mgrid[:1024, :1024].astype(np.float32)
     distance = np.hypot(x - CENTRE[0], y - CENTRE[1])
     disc = (distance < RADIUS).astype(np.float32)
@@ -42,8 +46,11 @@ def main() -> None:
             albedo = solved(1 - (1 - left) * cv2.GaussianBlur(disc, (0, 0), EDGE), disc, added, size).mean(-1)
             steps[left] = np.log(albedo[inside].mean() / albedo[around].mean())
         for left in LEFT:
-            share = (steps[left] - steps[1.0]) / np.log(left)
-            print(f"| {left} | {'added by the artist' if added else 'proposed'} | {100 * share:.0f} % |", flush=True)
+            share, mask = (steps[left] - steps[1.0]) / np.log(left), "added by the artist" if added else "proposed"
+            found[f"{mask}, {left}"] = {"light": left, "mask": mask, "left": share}
+            print(f"| {left} | {mask} | {100 * share:.0f} % |", flush=True)
+    if arguments.json:
+        write(arguments.json, "painted_shadow", "python -m benchmarks.painted_shadow", {"rows": found})
 
 
 def solved(darkening: np.ndarray, mask: np.ndarray, added: bool, size: int) -> np.ndarray:

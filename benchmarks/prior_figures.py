@@ -34,6 +34,9 @@ from core.synthetic.skin import make_skin
 from core.training.patches import mean_map
 from core.training.skins import SCALES, carried_names, carried_skins, synthetic_skins
 
+from .figures import write
+
+COMMAND = "python -m benchmarks.prior_figures"
 PATCH = 64
 COARSE = SCALES[-1]
 NAMES = "sampled", "expected", "draft", "draft, not restored", "mean face", "another subject"
@@ -57,6 +60,7 @@ def main() -> None:
     response.set_defaults(command=measure_response)
     for command in (samples, response):
         command.add_argument("--weights", type=Path, default=WEIGHTS)
+        command.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/prior.json; those of the other command stay")
     options = parser.parse_args()
     options.command(options)
 
@@ -93,6 +97,8 @@ def show_samples(options: argparse.Namespace) -> None:
     images.write_srgb(options.out, images.linear_to_srgb(images.resize(sheet, 2 * sheet.shape[1], 2 * sheet.shape[0])))
     print(f"{options.count} samples; distance to the nearest training patch over that patch's own distance to its nearest: "
           f"median {np.median(ratios):.2f}, least {min(ratios):.2f}. Left of each pair the sample, right the training patch.")
+    if options.json:
+        write(options.json, "prior_figures", COMMAND, {"samples": {"count": options.count, "median": np.median(ratios), "least": min(ratios)}}, keep=True)
 
 
 def card_of(weights: Path) -> dict:
@@ -132,6 +138,10 @@ def measure_response(options: argparse.Namespace) -> None:
         rows.append([errors(maps, truth, face) for maps in (solved, expected, again, draft, mean, other)])
         print(f"{seed}: " + "; ".join(f"{name} {angle:.2f} deg, {gloss:.4f}" for name, (angle, gloss) in zip(NAMES, rows[-1], strict=True)), flush=True)
     means = np.mean(rows, 0)
+    if options.json:
+        write(options.json, "prior_figures", COMMAND, keep=True, figures={"response": {name: {
+            f"{what}_of_{whose}": means[k][part] / means[of][part] for of, whose in ((-2, "mean_face"), (-1, "another"))
+            for part, what in enumerate(("normals", "specular"))} for k, name in enumerate(NAMES[:-2])}})
     for k, name in enumerate(NAMES[:-2]):
         print(f"{name}: " + ", ".join(f"normals {means[k][0] / means[j][0]:.2f} and specular {means[k][1] / means[j][1]:.2f} of {NAMES[j]}'s error"
                                       for j in (-2, -1)))

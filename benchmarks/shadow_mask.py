@@ -26,6 +26,7 @@ from core.capture import Capture
 from core.messages import Reporter
 from core.settings import from_json
 
+from .figures import write
 from .shadow_captures import KINDS, SIZE, lifted_truth, synthetic_capture
 
 HELD_OUT = (200, 201, 202, 203, 204, 205)
@@ -40,14 +41,22 @@ def main() -> None:
     parser.add_argument("--delighters", nargs="+", default=["shading", "none"])
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_shadow_masks")
     parser.add_argument("--pictures", action="store_true", help="leave the filmed texture, the true mask and the proposal side by side in the work folder")
+    parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/shadow_mask.json; those of other rows stay")
     asked = parser.parse_args()
+    found: dict[str, dict] = {}
     print("| capture | delighter | " + " | ".join(COLUMNS) + " |\n| --- | --- |" + " --- |" * len(COLUMNS))
     for delighter in asked.delighters:
-        rows = [_row(*_synthetic(seed, delighter, asked.work), f"synthetic {seed}, {KINDS[seed % len(KINDS)]}", delighter, asked) for seed in asked.seeds]
+        names = [f"synthetic {seed}, {KINDS[seed % len(KINDS)]}" for seed in asked.seeds]
+        rows = [_row(*_synthetic(seed, delighter, asked.work), name, delighter, asked) for seed, name in zip(asked.seeds, names, strict=True)]
+        found |= {f"{name}, {delighter}": _figures(name, delighter, row) for name, row in zip(names, rows, strict=True)}
         if len(rows) > 1:
             _print("mean of the synthetic", delighter, np.mean(rows, 0))
     for capture, truth in asked.capture:
-        _row(*_filmed(capture, truth, asked.work), capture.stem, _delighter_of(Capture(capture)), asked)
+        delighter = _delighter_of(Capture(capture))
+        row = _row(*_filmed(capture, truth, asked.work), capture.stem, delighter, asked)
+        found[f"{capture.stem}, {delighter}"] = _figures(capture.stem, delighter, row)
+    if asked.json:
+        write(asked.json, "shadow_mask", "python -m benchmarks.shadow_mask", {"rows": found}, keep=True)
 
 
 def scores(found: np.ndarray, true: np.ndarray, judged: np.ndarray) -> tuple[float, ...]:
@@ -75,6 +84,10 @@ def _row(capture: Capture, true: np.ndarray, name: str, delighter: str, asked: a
         grey = [np.repeat(m.astype(np.float32)[..., None], 3, -1) for m in (true, mask)]
         images.write_srgb(asked.work / f"{capture.root.stem}_{delighter}.png", np.hstack([filmed, *grey]))
     return found
+
+
+def _figures(name: str, delighter: str, values: tuple[float, ...]) -> dict:
+    return {"capture": name, "delighter": delighter, **{column.lower().replace(" ", "_"): value for column, value in zip(COLUMNS, values, strict=True)}}
 
 
 def _print(name: str, delighter: str, values) -> None:

@@ -36,6 +36,8 @@ from core.synthetic.pigment import reflectance
 from core.training.prior import HELD_OUT_SEED
 from core.training.tones import PHONES, photographed, scenes_of
 
+from .figures import write
+
 BRIGHTEST = 0.85  # a delit picture's tone has no brighter channel: more than skin reflects
 MOST = 400  # subjects looked at until each group has enough
 
@@ -44,6 +46,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--each", type=int, default=6, help="subjects of each group, at least")
     parser.add_argument("--capture", nargs=2, action="append", default=[], metavar=("CAPTURE", "TONE"))
+    parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/skin_tone.json; those of other captures stay")
     asked = parser.parse_args()
     known = json.loads(WEIGHTS.with_suffix(".json").read_text(encoding="utf-8"))["tones"]
     rows: dict[str, list] = {"before": [], "scene": [], "measured": []}
@@ -61,9 +64,14 @@ def main() -> None:
                 look, card = photographed(scene, np.random.default_rng([seed, light, phone, 33]))
                 for row, tone in (("before", before(look, known)), ("scene", estimate(look)), ("measured", estimate(look, card))):
                     rows[row].append((name, *errors(tone, scene.tone)))
-    table(rows, subjects)
+    print_table(rows, subjects)
+    captures = {}
     for folder, truth in asked.capture:
-        of_capture(Capture(folder), np.array([float(v) for v in Path(truth).read_text(encoding="ascii").split("#")[0].split(",")]), known)
+        tone = np.array([float(v) for v in Path(truth).read_text(encoding="ascii").split("#")[0].split(",")])
+        captures[Path(folder).stem] = of_capture(Capture(folder), tone, known)
+    if asked.json:
+        write(asked.json, "skin_tone", "python -m benchmarks.skin_tone --each 14 [--capture CAPTURE TONE.txt]",
+              {"groups": summary(rows, subjects), "captures": captures}, keep=True)
 
 
 def expected(seed: int) -> str:
@@ -85,26 +93,45 @@ def errors(tone: Tone, truth: np.ndarray) -> tuple[float, float, float]:
     return float(found[0] - true[0]), float(deltaE_ciede2000(true, found)), tone.deviation
 
 
-def table(rows: dict[str, list], subjects: dict[str, int]) -> None:
-    print(f"{'row':9} {'group':13} {'subjects':>8} {'L* mean':>8} {'L* rms':>7} {'delta E':>8} {'stated':>7} {'in two':>7}")
-    for row, found in rows.items():
-        for name in (*subjects, "all"):
-            chosen = np.array([values for group_name, *values in found if name in (group_name, "all")])
+def summary(rows: dict[str, list], subjects: dict[str, int]) -> dict[str, dict]:
+    """Group (and "all") -> subjects, and row -> mean signed and root mean square error of L*, mean delta E 2000, mean stated deviation of L* and the share
+    within two of those (both None where none is stated)."""
+    found: dict[str, dict] = {}
+    for name in (*subjects, "all"):
+        of_group = {"subjects": subjects.get(name, sum(subjects.values()))}
+        for row, errors_of_row in rows.items():
+            chosen = np.array([values for group_name, *values in errors_of_row if name in (group_name, "all")])
             if len(chosen):
                 signed, colour, stated = chosen.T
-                print(f"{row:9} {name:13} {subjects.get(name, sum(subjects.values())):8} {signed.mean():+8.2f} {np.sqrt((signed**2).mean()):7.2f} "
-                      f"{colour.mean():8.2f} {stated.mean():7.2f} {np.mean(np.abs(signed) <= 2 * stated):7.2f}")
+                known = bool(np.isfinite(stated).all())
+                of_group[row] = {"lightness": signed.mean(), "rms": np.sqrt((signed**2).mean()), "delta_e": colour.mean(),
+                                 "stated": stated.mean() if known else None, "within_two": np.mean(np.abs(signed) <= 2 * stated) if known else None}
+        found[name] = of_group
+    return found
 
 
-def of_capture(capture: Capture, srgb: np.ndarray, known: list) -> None:
-    """One finished capture: its name, then the estimate's and the earlier auto's error of L* and delta E."""
+def print_table(rows: dict[str, list], subjects: dict[str, int]) -> None:
+    print(f"{'row':9} {'group':13} {'subjects':>8} {'L* mean':>8} {'L* rms':>7} {'delta E':>8} {'stated':>7} {'in two':>7}")
+    groups = summary(rows, subjects)
+    for row in rows:
+        for name, of_group in groups.items():
+            if of := of_group.get(row):
+                stated = "".join(f" {'-':>7}" if value is None else f" {value:7.2f}" for value in (of["stated"], of["within_two"]))
+                print(f"{row:9} {name:13} {of_group['subjects']:8} {of['lightness']:+8.2f} {of['rms']:7.2f} {of['delta_e']:8.2f}{stated}")
+
+
+def of_capture(capture: Capture, srgb: np.ndarray, known: list) -> dict:
+    """One finished capture: prints its name, then the earlier auto's and the estimate's error of L* and delta E, and returns them with its true L*."""
     truth = images.srgb_to_linear(srgb)
     evidence, settings = read_evidence(capture, SIZE), from_json({}, Settings())
     lit = evidence.skin * evidence.weight * (1 - evidence.alpha)
     linear = skin_tone("auto", evidence.texture, lit, known).numpy()
+    found: dict = {"lightness": lab(truth)[0]}
     for row, tone in (("before", Tone(linear, np.nan, np.nan, group(linear))), ("scene", automatic(capture, settings, evidence, Reporter("skin_tone")))):
         signed, colour, stated = errors(tone, truth)
         print(f"{row:9} {capture.root.name:20} {group(truth):13} L* {lab(truth)[0]:.1f} error {signed:+.2f} delta E {colour:.2f} stated {stated:.2f}")
+        found[row] = {"lightness": signed, "delta_e": colour, "stated": stated if np.isfinite(stated) else None}
+    return found
 
 
 if __name__ == "__main__":

@@ -24,6 +24,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from .figures import write
+
 ROOT = Path(__file__).resolve().parent.parent
 AUTHORS = {"model": {"type": "image_v1", "input_channels": 7, "patch_size": 1, "mapping_out": 256, "depths": [2, 2, 4, 4], "channels": [128, 256, 256, 512],
                      "augment_wrapper": True, "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80}, "cond": {"type": "coord"}}
@@ -68,7 +70,7 @@ def main() -> None:
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--compile", action="store_true")
     parser.add_argument("--capture", type=Path, help="a capture whose chain came as far as the texture")
-    parser.add_argument("--json", type=Path)
+    parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/solver_speed.json")
     parser.add_argument("--child", nargs=2, metavar=("ROW", "FOLDER"), help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.child:
@@ -83,8 +85,12 @@ def main() -> None:
             rows[name] = json.loads(child.stdout.splitlines()[-1])
             print(line(name, rows[name], rows.get("plain")), flush=True)
     if options.json:
-        options.json.write_text(json.dumps({"network": options.network, "device": options.device, "size": options.size, "rows": rows}, indent=1),
-                                encoding="utf-8")
+        plain = rows.get("plain", {}).get("seconds_per_step")
+        write(options.json, "solver_speed", "python -m benchmarks.solver_speed", {
+            "network": options.network, "device": options.device, "size": options.size,
+            "python_gib": next(row["peak_gib"] - row["added_gib"] for row in rows.values()),
+            "steps": {name: {**row, "to_plain": plain and row["seconds_per_step"] / plain} for name, row in rows.items() if not ROWS[name].stage},
+            "stage": {name: {**row, "allowed": ROWS[name].target} for name, row in rows.items() if ROWS[name].stage}})
 
 
 def line(name: str, row: dict, plain: dict | None) -> str:

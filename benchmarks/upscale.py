@@ -14,7 +14,6 @@ cost: 1024 to 4096 in a process of its own, seconds and peak memory.
 from __future__ import annotations
 
 import argparse
-import json
 import resource
 import tempfile
 import time
@@ -42,6 +41,7 @@ from tests.painted_head import camera
 
 from .ablation_measures import feature_distance
 from .detail import moles
+from .figures import write
 from .shadow_captures import picture, write_views
 
 SEEDS, FILMED = (900001, 900003, 900004, 900005, 900007, 900008), (900003,)
@@ -59,7 +59,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rows", nargs="+", choices=("enlarging", "frames", "cost"), default=("enlarging", "frames", "cost"))
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_upscale_benchmark")
-    parser.add_argument("--json", type=Path)
+    parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/upscale.json; those of other rows stay")
     parser.add_argument("--picture", type=Path, help="close-ups of small map, Lanczos, network and truth side by side")
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
@@ -73,7 +73,9 @@ def main() -> None:
             found["cost"] = dict(zip(METHODS, pool.map(cost, METHODS), strict=True))
     print("\n\n".join(_table(name, rows) for name, rows in found.items()))
     if arguments.json:
-        arguments.json.write_text(json.dumps(found, indent=1), encoding="utf-8")
+        keyed = {part: {row.replace("lanczos", "Lanczos"): {figure.lower().replace(" ", "_"): value for figure, value in values.items()}
+                        for row, values in rows.items()} for part, rows in found.items()}
+        write(arguments.json, "upscale", "python -m benchmarks.upscale", keyed, keep=True)
 
 
 def enlarging(work: Path, sheet: Path | None = None) -> dict[str, dict[str, float]]:

@@ -32,6 +32,7 @@ from core.messages import Reporter
 from core.settings import Settings, from_json
 
 from .albedo_score import score_capture
+from .figures import write
 from .shadow_captures import lifted_truth
 
 ROWS = ("chain", "solve_off", "raw_texture", "true_frames", "true_mask", "mask", "delighters")
@@ -44,6 +45,7 @@ def main() -> None:
     parser.add_argument("truth", type=Path)
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS)
     parser.add_argument("--delighters", nargs="+", default=DELIGHTERS, help="of the row delighters")
+    parser.add_argument("--json", type=Path, help="where the table's figures go, such as docs/figures/whole_chain.json; those of other captures stay")
     arguments = parser.parse_args()
     capture = Capture(arguments.capture.resolve())
     tone = (arguments.truth / "skin_tone.txt").read_text(encoding="ascii").split("#")[0].replace(" ", "").strip()
@@ -53,6 +55,23 @@ def main() -> None:
         chosen = {name: from_json({"delight": {"delighter": name}}, settings) for name in arguments.delighters}
         rows["delighters"] = {name: _row("delighter", capture, arguments.truth, of) for name, of in chosen.items()}
     print(json.dumps(rows, indent=1))
+    if arguments.json:
+        write(arguments.json, "whole_chain", "python -m benchmarks.whole_chain CAPTURE TRUTH --rows chain solve_off true_mask mask delighters",
+              _figures(capture, rows), keep=True)
+
+
+def _figures(capture: Capture, rows: dict) -> dict:
+    """PSNR and SSIM per "CAPTURE, DELIGHTER" of the texture at the true tone, the solve and the solve with the true mask, and the mask's intersection over
+    union; None is what was not run."""
+    name, own = capture.root.stem, capture.read()["stages"]["delight"]["figures"]["delighter"]
+    chains = {own: (rows.get("solve_off"), rows.get("chain"), rows.get("true_mask"))}
+    chains |= {delighter: (row["solve_off"], row, chains.get(delighter, (None,))[-1]) for delighter, row in rows.get("delighters", {}).items()}
+    found = {}
+    for delighter, scores in chains.items():
+        cells = {column: {figure: score and score["raw"][figure] for figure in ("psnr", "ssim")}
+                 for column, score in zip(("solve_off", "solved", "true_mask"), scores, strict=True)}
+        found[f"{name}, {delighter}"] = {"capture": name, "delighter": delighter, **cells}
+    return {"rows": found, **({"mask_iou": {name: rows["mask"]["iou"]}} if "mask" in rows else {})}
 
 
 def _row(row: str, capture: Capture, truth: Path, settings: Settings) -> dict:

@@ -39,6 +39,8 @@ from core.upscale.maps import Maps, read_maps
 from core.upscale.surface import HeadSurface, lay_out
 from core.upscale.whole_head import UNSEEN, complete
 
+from .figures import write
+
 SEEDS = [9101, 9102, 9103, 9104, 9105, 9106]
 RINGS = (8.0, 11.0), (-6.0, -3.0), (22.0, 25.0)
 """mm inside the border: the seen side, the unseen side, and farther in."""
@@ -50,6 +52,7 @@ def main() -> None:
     parser.add_argument("--seeds", nargs="*", type=int, default=SEEDS)
     parser.add_argument("--subject", type=int)
     parser.add_argument("--size", type=int, default=512)
+    parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/whole_head.json; those of other captures stay")
     asked = parser.parse_args()
     found = {}
     if asked.seeds:
@@ -57,8 +60,10 @@ def main() -> None:
         rows = [{**whole(seed, surface), **hairs(seed, surface)} for seed in asked.seeds]
         found["synthetic"] = {name: _mean([row[name] for row in rows]) for name in rows[0]}
     for path in asked.captures:
-        found[path.name] = of_capture(Capture(path), asked.subject)
+        found[path.stem] = of_capture(Capture(path), asked.subject)
     print(json.dumps(found, indent=1))
+    if asked.json:
+        write(asked.json, "whole_head", "python -m benchmarks.whole_head [--subject SEED] [CAPTURE]", found, keep=True)
 
 
 def whole(seed: int, surface: HeadSurface) -> dict:

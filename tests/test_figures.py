@@ -17,6 +17,15 @@ def test_a_record_is_read_as_it_was_written(tmp_path):
     assert list(record["figures"]["rows"]) == ["b", "a"]
 
 
+def test_figures_of_other_captures_are_kept_where_asked(tmp_path):
+    path = tmp_path / "one.json"
+    figures.write(path, "relit", "one", {"rows": {"a": {"psnr": 1.0, "ssim": 0.5}, "b": {"psnr": 2.0}}})
+    figures.write(path, "relit", "two", {"rows": {"a": {"psnr": 3.0}}}, keep=True)
+    assert figures.read("one", tmp_path)["figures"] == {"rows": {"a": {"psnr": 3.0, "ssim": 0.5}, "b": {"psnr": 2.0}}}
+    figures.write(path, "relit", "two", {"rows": {"a": {"psnr": 3.0}}})
+    assert figures.read("one", tmp_path)["figures"] == {"rows": {"a": {"psnr": 3.0}}}
+
+
 @pytest.mark.parametrize("value", [float("nan"), np.float64("inf"), [1, 2], np.zeros(2)])
 def test_what_is_no_figure_is_refused_by_name(tmp_path, value):
     with pytest.raises(ValueError, match=r"figures\.rows\.psnr"):
