@@ -4,7 +4,7 @@
 
     python -m benchmarks.comparison FOLDER [--only NAME ...] [--scan CAPTURE TRUTH] [--size 512] [--jobs 2] [--json OUT.json]
 
-FOLDER was made and solved by benchmarks/people.py; CAPTURE is a solved one of another subject, TRUTH its folder. Rows of INPUT: METHOD over one texture each:
+FOLDER was made and solved by benchmarks/people.py; CAPTURE is a solved one of another subject, TRUTH its folder. Rows of INPUT: METHOD over one texture:
   wildcap                  the texel grid of local light in the shadow mask, with two seeds, whose spread says what a tie is
   regions 5, regions 10    soft regions with a light each (light_models.py)      environment    one environment cubemap
   environment, no prior    the same, and texels that follow the frames alone, smoothly
@@ -83,15 +83,17 @@ def main() -> None:
             found[running[future]] = future.result()
             print(f"{running[future]} compared", flush=True)
     found = {"size": asked.size, "subjects": {name: found[name] for name in subjects}}
+    found |= {"people": means([rows for name, rows in found["subjects"].items() if name != "scan"])} if set(found["subjects"]) - {"scan"} else {}
+    found |= {"scan": means([found["subjects"]["scan"]])} if "scan" in subjects else {}
     if asked.json:
         figures.write(asked.json, "comparison", "python -m benchmarks.comparison FOLDER --scan CAPTURE TRUTH", found)
     print(table(found))
 
 
 def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[str, dict]:
-    """'INPUT: METHOD' -> seed -> figures of one subject; each row's maps lie in work/INPUT_METHOD_SEED."""
+    """Input -> method -> seed -> figures of one subject; each row's maps lie in work/INPUT_METHOD_SEED."""
     torch.set_num_threads(1)
-    found: dict[str, dict] = {}
+    found: dict[str, dict] = {given: {} for given in INPUTS}
     for given in INPUTS:
         settings = from_json({"solve": {"skin_tone": skin_tone(truth), "size": size}, "delight": {"delighter": "none"} if given == "raw" else {}},
                              preset("standard"))
@@ -103,7 +105,7 @@ def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[st
                 if not (row / "score.json").is_file():
                     seen = seen or looks(capture, truth)[0]
                     _keep(row, *solved(capture, settings, method, seed), seen)
-                found.setdefault(f"{given}: {method}", {})[str(seed)] = json.loads((row / "score.json").read_text(encoding="utf-8"))
+                found[given].setdefault(method, {})[str(seed)] = json.loads((row / "score.json").read_text(encoding="utf-8"))
     return found
 
 
@@ -178,31 +180,29 @@ COLUMNS = {"PSNR": lambda s: s["raw"]["psnr"], "after one gain": lambda s: s["ga
 FORMATS = {"PSNR": "{:.2f}", "after one gain": "{:.2f}", "SSIM": "{:.3f}", "FLIP": "{:.3f}", "detail": "{:.2f}", "shadow step": "{:.2f}"}
 
 
-def means(found: dict, people: bool = True) -> dict[str, dict[str, float]]:
-    """'INPUT: METHOD' -> column -> mean over the people (or the scan's figures), the first seed; and 'spread': half of what two seeds of ours differ by."""
-    subjects = [rows for name, rows in found["subjects"].items() if (name != "scan") == people]
-    if not subjects:
-        return {}
-    out = {row: {column: _mean([value(rows[row]["0"]) for rows in subjects]) for column, value in COLUMNS.items()} for row in subjects[0]}
-    two = [rows[f"delit: {OURS}"] for rows in subjects]
-    out["spread"] = {column: _mean([abs(value(s["0"]) - value(s["1"])) / 2 for s in two if value(s["0"]) is not None]) for column, value in COLUMNS.items()}
-    return out
+def means(subjects: list[dict]) -> dict:
+    """Of several subjects' figures: input -> method -> column -> mean of the first seed; and 'spread': half of what two seeds of ours differ by."""
+    out: dict = {given: {method: {column: _mean([value(one[given][method]["0"]) for one in subjects]) for column, value in COLUMNS.items()}
+                         for method in subjects[0][given]} for given in subjects[0]}
+    two = [one["delit"][OURS] for one in subjects]
+    return out | {"spread": {column: _mean([abs(value(s["0"]) - value(s["1"])) / 2 for s in two if value(s["0"]) is not None])
+                             for column, value in COLUMNS.items()}}
 
 
 def table(found: dict) -> str:
-    """Markdown: a line per row with the means over the people, the best of each column and what ties with it in bold; then the same for the scan."""
+    """Markdown: a line per row with the means over the people, of each input's rows the best of each column and what ties with it in bold; then the scan's."""
     parts = []
-    for people, title in ((True, "mean of the people"), (False, "head scan")):
-        rows = means(found, people)
-        if not rows:
+    for key, title in (("people", "mean of the people"), ("scan", "head scan")):
+        if key not in found:
             continue
-        spread = rows.pop("spread")
-        lines = [f"| {title} | " + " | ".join(COLUMNS) + " |", "| --- |" + " --- |" * len(COLUMNS)]
-        for name, cells in rows.items():
-            line = [_cell(column, cells[column], [r[column] for r in rows.values()], spread[column]) for column in COLUMNS]
-            lines.append(f"| {name} | " + " | ".join(line) + " |")
-        lines.append("| *spread over seeds* | " + " | ".join(_text(column, spread[column]) for column in COLUMNS) + " |")
-        parts.append("\n".join(lines))
+        lines, spread = [], found[key]["spread"]
+        for given in INPUTS:
+            rows = found[key].get(given, {})
+            for method, cells in rows.items():
+                line = [_cell(column, cells[column], [r[column] for r in rows.values()], spread[column]) for column in COLUMNS]
+                lines.append([f"{given}: {method}", *line])
+        lines.append(["*spread over seeds*", *(_text(column, spread[column]) for column in COLUMNS)])
+        parts.append(figures.markdown([title, *COLUMNS], lines))
     return "\n\n".join(parts)
 
 
