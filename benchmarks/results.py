@@ -85,7 +85,7 @@ def missing_pictures(text: str, docs: Path) -> list[str]:
 def pictures(captures: Path) -> Iterator[list[str]]:
     """Module and arguments of the commands that draw the page's pictures of the solved captures in a folder."""
     target = DOCS / "pictures"
-    for capture in sorted(captures.glob("*.wildcap")):
+    for capture in sorted(path for path in captures.glob("*.wildcap") if (path / "maps" / "normal.png").is_file()):
         name, truth = capture.stem, captures / capture.stem / "maps"
         if name == "sample":
             yield ["benchmarks.teaser", str(capture), str(target / "teaser.jpg")]

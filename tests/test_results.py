@@ -82,6 +82,18 @@ def test_a_mark_that_cannot_be_filled_names_its_line(records, mark):
         fill(f"words\n{mark}\n", "page", records)
 
 
+def test_pictures_are_made_of_solved_captures_that_the_page_shows(tmp_path):
+    for name in ("sample", "dark", "stranger"):
+        (tmp_path / f"{name}.wildcap" / "maps").mkdir(parents=True)
+        (tmp_path / f"{name}.wildcap" / "maps" / "normal.png").touch()
+    (tmp_path / "tan.wildcap").mkdir()
+    (tmp_path / "dark" / "maps").mkdir(parents=True)
+    made = {(command[0], *(part for part in command if part.endswith(("jpg", "maps")))) for command in results.pictures(tmp_path)}
+    shown = results.DOCS / "pictures"
+    assert made == {("benchmarks.teaser", str(shown / "teaser.jpg")), ("benchmarks.gallery", str(shown / "gallery_sample.jpg")),
+                    ("benchmarks.gallery", str(shown / "gallery_dark.jpg"), str(tmp_path / "dark" / "maps"))}
+
+
 def test_the_command_writes_the_page_and_the_readme_and_then_finds_nothing(records, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(results, "ROOT", tmp_path)
     monkeypatch.setattr(results, "DOCS", tmp_path)
