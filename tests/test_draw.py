@@ -78,6 +78,12 @@ def test_no_panel_works_while_it_is_drawn(addon, tmp_path, state):
     assert count >= (2 if state == "nothing" else 8)
 
 
+def test_a_sidebar_is_narrow_below_a_width_in_the_users_own_units(addon):
+    base = addon("base_panel")
+    widths = [type("Drawn", (), {"region": region and type("Region", (), {"width": region})}) for region in (201, 291, None)]
+    assert [base.narrow(context) for context in widths] == [True, False, False]
+
+
 def test_search_finds_every_operator(addon):
     """Blender lists what is registered and not internal."""
     assert addon

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Turntable and contact sheet: one render of several frames, judged by where the light and the head are in each."""
 
+import shutil
+
 import numpy as np
 import pytest
 
@@ -65,6 +67,11 @@ def test_a_film_replaces_the_frames_and_one_that_is_stopped_leaves_the_last(addo
     (folder.parent / ".turntable").mkdir()
     output.drop()
     assert not (folder.parent / ".turntable").exists() and (folder / "turntable.mp4").is_file()
+    shutil.rmtree(folder)
+    monkeypatch.setattr(output, "_render", lambda scene, wait, **what: None)  # one that Esc stops before its first frame
+    output.frames(bpy.data.scenes[output.SCENE], folder, "####.png", 2, False)
+    output.drop()
+    assert not folder.exists()
     monkeypatch.setattr(addon("relight.reel"), "can_film", lambda: False)
     with pytest.raises(headless.Problem, match="without FFmpeg"):
         headless.render_turntable(capture, frames=2, film=True)

@@ -1,12 +1,17 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all panels share: where they are, and how a stage's settings are listed."""
+"""What all panels share: where they are, how wide, and how a stage's settings are listed."""
 
 from dataclasses import fields
+
+import bpy
 
 from ..core.stages import Stage
 from . import captures
 from .properties import STAGE_KINDS
+
+NARROW_PX = 260
+"""Below this width, at a user interface scale of one, two buttons in a row or a name beside its value are cut"""
 
 
 class WildcapPanel:
@@ -30,6 +35,16 @@ class CapturePanel(FoldedPanel):
     @classmethod
     def poll(cls, context):
         return captures.active(context) is not None
+
+
+def region_width(context) -> int:
+    """Width of what is drawn into, in pixels; a sidebar's usual one outside of a window."""
+    return context.region.width if context.region else 300
+
+
+def narrow(context) -> bool:
+    """Whether what would stand side by side has to stand one below the other."""
+    return region_width(context) < NARROW_PX * (bpy.context.preferences.system.ui_scale or 1.0)  # 0 without a window
 
 
 def draw_settings(layout, item, stage: Stage, without: tuple[str, ...] = ()) -> None:

@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ..core import stages
 from . import captures, jobs, next_step, preferences, problems, status
-from .base_panel import WildcapPanel
+from .base_panel import WildcapPanel, region_width
 from .paint import session
 
 STATE_ICONS = {"done": 'CHECKMARK', "absent": 'CHECKMARK', "stale": 'FILE_REFRESH', "to do": 'RADIOBUT_OFF', "not needed": 'BLANK1', "running": 'PLAY'}
@@ -25,7 +25,7 @@ class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
         step = next_step.next_step(gather(context, item), iface_)
         if item is not None:
             layout.label(text=item.name, icon='USER')
-        width = context.region.width if context.region else 300
+        width = region_width(context)
         problems.draw_text(layout, step.state, width)
         job = jobs.of(root) or jobs.of("")
         if job is not None:
@@ -101,7 +101,7 @@ class WILDCAP_PT_doctor(WildcapPanel, bpy.types.Panel):
 
     def draw(self, context):
         layout = self.layout
-        width = context.region.width if context.region else 300
+        width = region_width(context)
         for finding in status.of(captures.active(context)).findings:
             problems.draw_text(layout.column(), finding["problem"], width, 'CANCEL' if finding["stopped"] else 'ERROR')
             problems.draw_text(layout.column(), finding["remedy"], width, 'INFO')

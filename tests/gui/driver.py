@@ -45,12 +45,13 @@ def play(flow, limit_s: float = 600) -> None:
 
 
 def survive_lost_contexts() -> None:
-    """Lets an X error pass instead of ending Blender, as Xlib does by default.
-
-    While Cycles shows a render in a window, its thread and the main one change OpenGL contexts at once, and with Mesa's software
-    renderer the X server now and then answers GLXBadContext: a race of theirs, seen in one render of three on some machines.
-    The handler is a C function that takes no notice of its arguments: one in Python would need the interpreter's lock.
+    """Has Cycles make no OpenGL contexts of its own, and lets an X error pass, which ends Blender by default. To show a render
+    Cycles changes contexts in its thread while the main one draws: with Mesa's software renderer the X server then answers GLXBadContext now and then, or
+    the main thread crashes for want of one. The error handler is in C: one in Python would need the interpreter's lock.
     """
+    import _cycles
+    import cycles
+    _cycles.init(os.path.dirname(cycles.__file__), bpy.utils.resource_path('USER'), True)
     passing = ctypes.cast(ctypes.CDLL(None).sched_yield, ctypes.c_void_p)
     xlib = ctypes.CDLL("libX11.so.6")
     xlib.XSetErrorHandler.argtypes, xlib.XSetErrorHandler.restype = [ctypes.c_void_p], ctypes.c_void_p
@@ -141,6 +142,19 @@ def park():
     yield from move((x - 200, y))
     yield from move((x - 202, y))
     yield 0.3
+
+
+def scroll(steps: int):
+    """Turns the wheel over the sidebar, and has it drawn."""
+    sidebar = region('UI')
+    position = sidebar.x + sidebar.width // 3, sidebar.y + sidebar.height // 2
+    yield from move(position)
+    for _ in range(steps):
+        event('WHEELDOWNMOUSE', 'PRESS', position)
+        yield 0.05
+    sidebar.tag_redraw()
+    yield from park()
+    yield 0.5
 
 
 def open_tab(name: str):

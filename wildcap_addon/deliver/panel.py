@@ -8,7 +8,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from ...core import stages
 from ...core.delivery_presets import FORMATS, PICTURES, PRESETS
 from .. import captures, problems
-from ..base_panel import CapturePanel, draw_settings
+from ..base_panel import CapturePanel, draw_settings, region_width
 from . import waiting
 
 
@@ -25,7 +25,7 @@ class WILDCAP_PT_deliver(CapturePanel, bpy.types.Panel):
             layout.prop(settings, name)
         preset = PRESETS[settings.preset]
         format_name = preset.format if settings.format == "preset" else settings.format
-        width = context.region.width if context.region else 300
+        width = region_width(context)
         chosen = FORMATS[format_name]
         unit = chosen.unit or preset.unit
         pictures = preset.pictures if settings.pictures == "preset" else settings.pictures

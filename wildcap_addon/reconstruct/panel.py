@@ -7,7 +7,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ...core import stages
 from .. import captures, problems
-from ..base_panel import CapturePanel, draw_settings
+from ..base_panel import CapturePanel, draw_settings, region_width
 from . import card, delighters, landmarks
 
 
@@ -41,7 +41,7 @@ class WILDCAP_PT_head_mesh(CapturePanel, bpy.types.Panel):
         layout = self.layout
         item = captures.active(context)
         own = item.registration.template
-        width = context.region.width if context.region else 300
+        width = region_width(context)
         beside = iface_("The built-in head, and {} beside it.").format(bpy.path.basename(own.rstrip('/')))
         problems.draw_text(layout, beside if own else "The built-in head.", width)
         column = layout.column(align=True)
@@ -59,7 +59,7 @@ class WILDCAP_PT_delighter(CapturePanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         item = captures.active(context)
-        width = context.region.width if context.region else 300
+        width = region_width(context)
         card.draw(layout, item, width)
         capture = captures.folder(item)
         layout.operator("wildcap.compare_delit", icon='IMAGE_DATA')

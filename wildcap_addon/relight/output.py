@@ -64,9 +64,9 @@ def stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: Callable
 def frames(scene: bpy.types.Scene, folder: Path, name: str, count: int, wait: bool) -> None:
     """Renders the frames 1 to `count` to folder/name, which holds #### or is a film's; the folder replaces the one before when all are there."""
     global _running
-    make_room(folder / name)
     hidden = _hidden(folder)
     shutil.rmtree(hidden, ignore_errors=True)
+    make_room(folder)
     scene.frame_start, scene.frame_end = 1, count
     scene.render.filepath = str(hidden / name)
     _running = Running(folder=folder)
@@ -133,6 +133,9 @@ def cancelled(scene, *_):
 def drop() -> None:
     """Forgets the render on its way and what it has written."""
     global _running
+    if busy():  # its last moments
+        bpy.app.timers.register(drop, first_interval=0.1)
+        return
     running, _running = _running, Running()
     for source in running.stills:
         source.unlink(missing_ok=True)

@@ -4,7 +4,7 @@
 
 import bpy
 
-from ..base_panel import CapturePanel
+from ..base_panel import CapturePanel, narrow
 from . import compare
 
 
@@ -14,26 +14,28 @@ class WILDCAP_PT_relight(CapturePanel, bpy.types.Panel):
 
     def draw(self, context):
         layout = self.layout
-        layout.use_property_split = True
+        tight = narrow(context)
+        layout.use_property_split = not tight
         layout.use_property_decorate = False
         props = context.scene.wildcap
         layout.operator("wildcap.assemble_material")
-        row = layout.row(align=True)
+        buttons = side_by_side(layout, tight)
         now = compare.shown(context)
         for kind, (label, _, _) in compare.SHOWN.items():
-            row.operator("wildcap.compare", text=label, depress=kind == now).show = kind
-        layout.prop(props, "light")
+            buttons.operator("wildcap.compare", text=label, depress=kind == now).show = kind
+        layout.prop(props, "light", text="" if tight else None)
         if props.light == 'hdri':
-            for name in ("hdri", "hdri_file", "hdri_strength"):
-                layout.prop(props, name)
+            layout.prop(props, "hdri", text="" if tight else None)
+            layout.prop(props, "hdri_file", text="" if tight else None, placeholder="Own File" if tight else None)
+            layout.prop(props, "hdri_strength")
         layout.prop(props, "hdri_rotation")
         column = layout.column(align=True)
         column.prop(props, "resolution")
         column.prop(props, "samples")
         layout.row().prop(props, "view", expand=True)
-        row = layout.row(align=True)
-        row.operator("wildcap.render")
-        row.operator("wildcap.contact_sheet")
+        buttons = side_by_side(layout, tight)
+        buttons.operator("wildcap.render")
+        buttons.operator("wildcap.contact_sheet")
         header, body = layout.panel("wildcap_turntable", default_closed=True)
         header.label(text="Turntable")
         if body:
@@ -41,6 +43,11 @@ class WILDCAP_PT_relight(CapturePanel, bpy.types.Panel):
             body.prop(props, "turn_frames")
             body.row().prop(props, "turn_file", expand=True)
             body.operator("wildcap.turntable", text="Render Turntable")
+
+
+def side_by_side(layout, tight: bool):
+    """Where buttons go that belong together: into a row, one below the other where it is too tight for that."""
+    return layout.column(align=True) if tight else layout.row(align=True)
 
 
 CLASSES = (WILDCAP_PT_relight,)

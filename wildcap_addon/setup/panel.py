@@ -5,7 +5,7 @@
 import bpy
 
 from .. import preferences, problems
-from ..base_panel import FoldedPanel
+from ..base_panel import FoldedPanel, region_width
 
 
 class WILDCAP_PT_setup(FoldedPanel, bpy.types.Panel):
@@ -18,7 +18,7 @@ class WILDCAP_PT_setup(FoldedPanel, bpy.types.Panel):
 
     def draw(self, context):
         preferences.draw_solver(self.layout, preferences.get())
-        problems.draw_text(self.layout, "Masks, materials and renders work without it.", context.region.width if context.region else 300)
+        problems.draw_text(self.layout, "Masks, materials and renders work without it.", region_width(context))
 
 
 CLASSES = (WILDCAP_PT_setup,)

@@ -38,7 +38,7 @@ def flow():
     shots = []
     for i in range(TURNS):
         shots.append((yield from shot(f"panels_{i}")))
-        yield from scroll(STEPS)
+        yield from d.scroll(STEPS)
     subprocess.run(["convert", *map(str, shots), "+append", str(d.OUT / "panels.png")], check=True, timeout=60)
 
 
@@ -64,16 +64,6 @@ def shot(name: str):
     inside = f"{sidebar.width - TABS_PX}x{sidebar.height}+{sidebar.x}+{top}"
     subprocess.run(["convert", str(path), "-crop", inside, "+repage", str(path)], check=True, timeout=60)
     return path
-
-
-def scroll(steps: int):
-    """Turns the wheel over the sidebar."""
-    sidebar = d.region('UI')
-    position = sidebar.x + sidebar.width // 2, sidebar.y + sidebar.height // 2
-    yield from d.move(position)
-    for _ in range(steps):
-        d.event('WHEELDOWNMOUSE', 'PRESS', position)
-        yield 0.02
 
 
 d.play(flow(), limit_s=300)

@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Relight panel, wide and narrow; contact sheet and turntable by their buttons, from a terminal, and a render stopped by Esc."""
+
+import ctypes
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import addon  # noqa: E402
+import driver as d  # noqa: E402
+
+OUTLINE_PX = 8
+"""How far inside of its region the sidebar's outline lies, which the mouse drags"""
+NARROWER_PX = 90
+ESCAPE = 0xFF1B
+"""X11's symbol of the key"""
+
+
+def flow():
+    addon.unfold("WILDCAP_PT_relight")
+    root = yield from addon.open_sample_head()
+    yield from panel()
+    yield from contact_sheet(root)
+    yield from turntable(root)
+    from_a_terminal(root)
+    yield from stopped(root)
+
+
+def panel():
+    yield 0.5
+    d.screenshot("relight_wide")
+    props = bpy.context.scene.wildcap
+    x, y = yield from d.find("wildcap.render")
+    yield from d.click((x - 20, y - 24))
+    props.light = 'hdri'
+    yield from d.scroll(8)
+    d.screenshot("relight_turntable_hdri")
+    sidebar = d.region('UI')
+    width, (x, y) = sidebar.width, (sidebar.x + OUTLINE_PX, sidebar.y + sidebar.height / 2)
+    yield from d.stroke([(x + NARROWER_PX * i / 15, y) for i in range(16)])
+    assert d.region('UI').width < width - NARROWER_PX / 2, "the sidebar is narrower"
+    yield from d.scroll(8)
+    d.screenshot("relight_narrow")
+    yield from d.stroke([(x + NARROWER_PX * (1 - i / 15), y) for i in range(16)])
+    props.light, props.resolution, props.samples = 'three_point', 64, 2
+
+
+def contact_sheet(root: Path):
+    sheet = root / "renders" / "contact_sheet.png"
+    yield from d.press("wildcap.contact_sheet")
+    yield from d.until(sheet.is_file, "the contact sheet", 180)
+    image = bpy.data.images.load(str(sheet))
+    assert tuple(image.size) == (192, 2 * 64 + 3 * 8), tuple(image.size)
+    assert all((root / "renders" / f"{name}.{kind}").is_file() for name in ("three_point", "coloured") for kind in ("png", "exr"))
+    d.say("contact sheet")
+
+
+def turntable(root: Path):
+    props, folder = bpy.context.scene.wildcap, root / "renders" / "turntable"
+    props.turn_file, props.turn_frames, props.turns = 'PNG', 3, 'LIGHT'
+    yield from d.scroll(8)
+    yield from d.press("wildcap.turntable")
+    yield from d.until(folder.is_dir, "the turntable", 180)
+    assert sorted(p.name for p in folder.iterdir()) == ["0001.png", "0002.png", "0003.png"]
+    d.say("turntable")
+
+
+def from_a_terminal(root: Path) -> None:
+    (root / "renders" / "window.png").unlink()
+    command = ["blender", "--command", "wildcap", "relight", str(root), "window", "--resolution", "32", "--samples", "1"]
+    done = subprocess.run(command, env=os.environ, capture_output=True, text=True, timeout=180)
+    assert done.returncode == 0 and (root / "renders" / "window.png").is_file(), done.stdout[-2000:] + done.stderr[-2000:]
+    d.say("blender --command wildcap relight")
+
+
+def stopped(root: Path):
+    """Esc in a turntable leaves the one before as it was. From then on there are no more clicks: see `escape`."""
+    folder = root / "renders" / "turntable"
+    before, hidden = folder.stat().st_mtime_ns, folder.with_name(".turntable")
+    bpy.context.scene.wildcap.turn_frames = 1000
+    yield 0.5
+    yield from d.press("wildcap.turntable")
+    yield from d.until(lambda: hidden.is_dir() and len(list(hidden.iterdir())) > 1, "two frames", 180)
+    escape()
+    yield from d.until(lambda: not hidden.exists(), "the end after Esc", 30)
+    assert not bpy.app.is_job_running('RENDER'), "the render goes on"
+    assert folder.is_dir() and folder.stat().st_mtime_ns == before, "the turntable before"
+    d.say("stopped by Esc")
+
+
+def escape() -> None:
+    """The key from the X server, over the render's window: Blender looks for it where keys come in, past which simulated ones are made."""
+    bpy.app.use_event_simulate = False  # it heeds no other keys while that is on
+    x11, test = ctypes.CDLL("libX11.so.6"), ctypes.CDLL("libXtst.so.6")
+    x11.XOpenDisplay.restype = ctypes.c_void_p
+    x11.XKeysymToKeycode.argtypes, x11.XKeysymToKeycode.restype = [ctypes.c_void_p, ctypes.c_ulong], ctypes.c_ubyte
+    display = ctypes.c_void_p(x11.XOpenDisplay(None))
+    test.XTestFakeMotionEvent(display, 0, *(side // 2 for side in (d.window().width, d.window().height)), ctypes.c_ulong(0))
+    for pressed in (1, 0):
+        test.XTestFakeKeyEvent(display, x11.XKeysymToKeycode(display, ESCAPE), pressed, ctypes.c_ulong(0))
+    x11.XCloseDisplay(display)
+
+
+d.play(flow(), limit_s=600)
