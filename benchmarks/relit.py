@@ -11,7 +11,8 @@ gain per light, the same for all rows), encoded by the sRGB curve and clipped: n
   solved         all three maps as delivered         plain          the solved albedo, with no relief and an even gloss
   true_albedo, true_normal, true_specular            solved, with one map swapped for the true one: what that map costs
   floor          the truth with other random numbers: what the rendering's noise costs
-All albedos share the true skin tone as mean, and all rows but plain the solved relief and gloss. WORK keeps the renders; what is there is not made again.
+All albedos share the true skin tone as mean, and all rows but plain the solved relief and gloss.
+WORK keeps the renders; those that are newer than the maps and textures are taken as they are.
 """
 
 from __future__ import annotations
@@ -74,7 +75,8 @@ def main() -> int:
     means = {name: mean_over_lights(found) for name, found in results.items()}
     print(table(means))
     if arguments.json:
-        figures.write(arguments.json, "relit", "python -m benchmarks.relit WORK --sample .demo/sample.wildcap [--people FOLDER]", means)
+        source = "--sample .demo/sample.wildcap" if arguments.sample else f"--people FOLDER --rows {' '.join(arguments.rows)}"
+        figures.write(arguments.json, "relit", f"python -m benchmarks.relit WORK {source}", with_mean(means))
     return 0
 
 
@@ -97,8 +99,12 @@ def render(capture: Capture, truth: Path, work: Path, lights: list[str], wanted:
     """work/renders/ROW_LIGHT.exr of all rows, and face.exr."""
     renders, mask = work / "renders", work / "mask.png"
     renders.mkdir(parents=True, exist_ok=True)
-    if all((renders / f"{row}_{Path(light).stem}.exr").exists() for row in ("truth", *wanted) for light in lights) and (renders / "face.exr").exists():
+    pictures = [renders / name for name in (*(f"{row}_{Path(light).stem}.exr" for row in ("truth", *wanted) for light in lights), "face.exr")]
+    old = [picture for picture in pictures if not is_newer(picture, capture, truth)]
+    if not old:
         return
+    for picture in old:  # what is there would be kept
+        picture.unlink(missing_ok=True)
     face_mask(mask)
     rows = []
     for name, worn in read_rows(capture, read_worn(truth)).items():
@@ -109,6 +115,13 @@ def render(capture: Capture, truth: Path, work: Path, lights: list[str], wanted:
         rows.append({"name": name, "capture": str(folder), "seed": int(name == "floor")})
     write_json(work / "job.json", {"rows": rows, "lights": list(lights), "out": str(renders), "mask": str(mask), "resolution": RESOLUTION, "samples": SAMPLES})
     subprocess.run([sys.executable, "-m", "benchmarks.relit_renders", str(work / "job.json")], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+
+
+def is_newer(picture: Path, capture: Capture, truth: Path) -> bool:
+    """Whether a render is there and was made after all that it shows: the capture's maps, its textures and head, and the true maps."""
+    shown = [path for folder in (capture.maps, capture.maps_4k, truth) if folder.is_dir() for path in folder.glob("*.png")]
+    shown += [path for path in (capture.head, capture.texture, capture.texture_filmed) if path.is_file()]
+    return picture.is_file() and picture.stat().st_mtime >= max((path.stat().st_mtime for path in shown), default=0.0)
 
 
 def score(work: Path, lights: list[str], rows: list[str] = ROWS) -> dict[str, dict[str, dict]]:
@@ -155,13 +168,18 @@ def shortfall(rows: dict[str, dict[str, float]]) -> str:
                      for row, asked in (("raw", OVER_RAW), ("delit", OVER_DELIT)) if gains[row] < asked)
 
 
+def with_mean(results: dict[str, dict[str, dict[str, float]]]) -> dict[str, dict[str, dict[str, float]]]:
+    """The same and, where there are several people of benchmarks/people.py, their mean."""
+    people = [results[person.name] for person in PEOPLE if person.name in results]
+    if len(people) < 2:
+        return dict(results)
+    common = [row for row in ROWS if all(row in found for found in people)]
+    return {**results, "mean": mean_over_lights({str(k): {row: found[row] for row in common} for k, found in enumerate(people)})}
+
+
 def table(results: dict[str, dict[str, dict[str, float]]]) -> str:
     """Markdown: a line per row, and for each subject PSNR, SSIM and FLIP; last the mean over the people of benchmarks/people.py."""
-    people = [name for name in results if name != "sample"]
-    columns = dict(results)
-    if len(people) > 1:
-        common = [row for row in ROWS if all(row in results[name] for name in people)]
-        columns[f"mean of {len(people)}"] = mean_over_lights({name: {row: results[name][row] for row in common} for name in people})
+    columns = with_mean(results)
     return figures.markdown(["row", *(name.replace("_", " ") for name in columns)], [
         [LABELS[row], *(f"{c[row]['psnr']:.2f} dB, {c[row]['ssim']:.3f}, {c[row]['flip']:.3f}" for c in columns.values())]
         for row in ROWS if all(row in column for column in columns.values())])

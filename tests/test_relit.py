@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The people that benchmarks photograph, and the measure of relit heads: answers known beforehand."""
 
+import os
+
 import numpy as np
 import pytest
 
@@ -117,6 +119,22 @@ def test_the_same_head_scores_infinite_one_and_nought_and_a_known_gain_its_decib
     assert (tmp_path / "window.png").is_file()
     missing = relit.shortfall(relit.mean_over_lights({"window": found}))
     assert "over delit" in missing and "over raw" not in missing
+
+
+def test_a_render_is_made_again_once_a_map_is_newer(tmp_path):
+    capture, truth, picture = Capture(tmp_path / "a.wildcap"), tmp_path / "truth", tmp_path / "solved_sun.exr"
+    assert not relit.is_newer(picture, capture, truth)
+    for second, path in enumerate((capture.head, capture.maps / "normal.png", truth / "normal.png", picture)):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+        os.utime(path, (1000 + second,) * 2)
+    assert relit.is_newer(picture, capture, truth)
+    for path in (capture.maps_4k / "normal.png", truth / "normal.png", capture.head):
+        path.parent.mkdir(exist_ok=True)
+        path.touch()
+        assert not relit.is_newer(picture, capture, truth), path
+        os.utime(path, (1000, 1000))
+    assert relit.is_newer(picture, capture, truth)
 
 
 def test_the_table_gives_the_mean_over_people_and_leaves_the_sample_out():
