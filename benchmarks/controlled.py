@@ -74,11 +74,11 @@ def measure(folder: Path, name: str) -> dict[str, dict]:
     makers: dict[str, tuple[str, Callable[[], tuple[np.ndarray, dict]]]] = {
         "wild_texture": ("solved", lambda: (as_albedo(wild, settings), {})),
         "wild": ("solved", lambda: (images.read_srgb(wild.maps / "diffuse_albedo.png"), {})),
-        "limit": ("wild", lambda: (as_albedo(true_frames(wild, truth, sets["wild"], settings), settings), {})),
         "flash_texture": ("flash", lambda: (as_albedo(flash(_set(folder, name, "flash"), sets["flash"], settings), settings), {})),
         "flash": ("flash", lambda: under_even_light(flash(_set(folder, name, "flash"), sets["flash"], settings), settings)),
         "studio_texture": ("studio", lambda: (as_albedo(studio(_set(folder, name, "studio"), sets["studio"], settings), settings), {})),
         "studio": ("studio", lambda: by_the_stage(studio(_set(folder, name, "studio"), sets["studio"], settings), settings)),
+        "limit": ("wild", lambda: (as_albedo(true_frames(wild, truth, sets["wild"], settings), settings), {})),
     }
     there = {"wild": True, "solved": (wild.maps / "diffuse_albedo.png").is_file(),
              **{place: (folder / f"{name}_{place}" / "skin_tone.txt").is_file() for place in ("flash", "studio")}}
