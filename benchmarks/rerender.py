@@ -33,6 +33,8 @@ CEILING = "the texture itself"
 GRAZING = 0.3  # least cosine between surface and view: beyond it a registered head and a frame do not agree on what is where
 PAPER = {OURS: (28.79, 0.9520), "regions": (22.20, 0.9279), "environment": (27.81, 0.9411)}
 """PSNR and SSIM of the paper's table 1 (its six real captures): ours, DeFace*, FLARE*."""
+TITLES = {"psnr": "PSNR", "ssim": "SSIM", "flip": "FLIP", "features": "features"}
+FORMATS = {"psnr": "{:.2f} dB", "ssim": "{:.4f}", "flip": "{:.4f}", "features": "{:.3f}"}
 
 
 @dataclass(frozen=True)
@@ -49,11 +51,13 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
-    found = {}
+    people = {}
     for name in asked.only:
         views = delit_views(Capture(asked.folder / f"{name}.wildcap"))
-        found[name] = {"views": len(views), "rows": {row: score(rendering(asked.folder / "comparison" / name, row), views) for row in (*ROWS, CEILING)}}
-        print(name, json.dumps(found[name]["rows"]), flush=True)
+        people[name] = {row: score(rendering(asked.folder / "comparison" / name, row), views) for row in (*ROWS, CEILING)}
+        print(name, json.dumps(people[name]), flush=True)
+    found = {"people": people, "mean": {row: {figure: float(np.mean([rows[row][figure] for rows in people.values()])) for figure in cells}
+                                        for row, cells in next(iter(people.values())).items()}}
     if asked.json:
         figures.write(asked.json, "rerender", "python -m benchmarks.rerender FOLDER", found)
     print(table(found))
@@ -103,17 +107,13 @@ def score(rendered: np.ndarray, views: list[Delit]) -> dict[str, float]:
 
 def table(found: dict) -> str:
     """Markdown: a line per row with the mean over the people, beside the paper's figures for its own captures."""
-    people = list(found.values())
-    known = [f for f in ("psnr", "ssim", "flip", "features") if f in people[0]["rows"][OURS]]
-    titles = {"psnr": "PSNR", "ssim": "SSIM", "flip": "FLIP", "features": "features"}
-    formats = {"psnr": "{:.2f} dB", "ssim": "{:.4f}", "flip": "{:.4f}", "features": "{:.3f}"}
-    lines = ["| mean of the people | " + " | ".join(titles[f] for f in known) + " | the paper's, on its own captures |",
-             "| --- |" + " --- |" * (len(known) + 1)]
-    for row in people[0]["rows"]:
-        cells = [formats[f].format(np.mean([p["rows"][row][f] for p in people])) for f in known]
+    known = [figure for figure in FORMATS if figure in found["mean"][OURS]]
+    lines = []
+    for row, cells in found["mean"].items():
         paper = PAPER.get(row if row in PAPER else row.rsplit(" ", 1)[0])
-        lines.append(f"| {'**' + row + '**' if row == OURS else row} | " + " | ".join(cells) + f" | {'{:.2f} dB, {:.4f}'.format(*paper) if paper else '-'} |")
-    return "\n".join(lines)
+        lines.append([f"**{row}**" if row == OURS else row, *(FORMATS[figure].format(cells[figure]) for figure in known),
+                      "{:.2f} dB, {:.4f}".format(*paper) if paper else None])
+    return figures.markdown(["mean of the people", *(TITLES[figure] for figure in known), "the paper's, on its own captures"], lines)
 
 
 if __name__ == "__main__":
