@@ -84,6 +84,8 @@ def main() -> None:
         failed = [name for name in options.rows if not measured(name, options)]
     except Problem as problem:
         parser.error(f"{problem.problem} {problem.remedy}")
+    except KeyboardInterrupt:
+        sys.exit("\nStopped; the same command goes on from here.")
     print(table(figures.read(options.json.stem, options.json.parent)["figures"]))
     if failed:
         sys.exit(f"Not measured to the end: {', '.join(failed)}.")
