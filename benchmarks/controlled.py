@@ -107,11 +107,18 @@ def side_by_side(folder: Path, name: str, size: int = 512) -> np.ndarray:
 
 
 def means(found: dict[str, dict]) -> dict[str, dict]:
-    """Row -> figure -> mean over the people, for the rows that all of them have."""
-    people = list(found.values())
-    return {row: {figure: round(float(np.mean([rows[row][figure] for rows in people])), 4) for figure in people[0][row]
-                  if all(rows[row].get(figure) is not None for rows in people)}
-            for row in (*GAP, *STUDIO) if all(row in rows for rows in people)}
+    """Row -> figure -> mean over the people that have all rows of the same table."""
+    out = {}
+    for table_rows in (GAP, STUDIO):
+        people = whole(found, table_rows)
+        out |= {row: {figure: round(float(np.mean([rows[row][figure] for rows in people])), 4) for figure in people[0][row]
+                      if all(rows[row].get(figure) is not None for rows in people)} for row in table_rows if people}
+    return out
+
+
+def whole(found: dict[str, dict], table_rows: dict) -> list[dict]:
+    """The people whose rows of one table are all there."""
+    return [rows for rows in found.values() if {*table_rows} <= {*rows}]
 
 
 def table(found: dict) -> str:
@@ -119,7 +126,7 @@ def table(found: dict) -> str:
     mean, everyone = found["mean"], {**found["people"], "mean": found["mean"]}
     parts = []
     for rows in (GAP, STUDIO):
-        head = [f"mean of {len(found['people'])} people", *(label for label, _ in COLUMNS.values())]
+        head = [f"mean of {len(whole(found['people'], rows))} people", *(label for label, _ in COLUMNS.values())]
         parts.append((head, [[label, *(_text(mean[row].get(figure), digits) for figure, (_, digits) in COLUMNS.items())]
                              for row, label in rows.items() if row in mean]))
     three = ("wild", "flash", "limit")
