@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Time and memory of the whole chain on the sample video, stage by stage, and how they grow with resolution, grid, views and frames.
 
-    python -m benchmarks.costs WORK --json OUT.json [--rows standard draft solve-2048 ...] [--capture CAPTURE] [--limit-s 600]
+    python -m benchmarks.costs WORK --json OUT.json [--rows standard draft solve-2048 ...] [--capture CAPTURE] [--limit-s 600] [--again]
 
 Every stage runs in a process of its own (benchmarks/stage_cost.py). "standard" goes from the video to the delivery; the other rows start from a copy of what
 it made in WORK, or of --capture. OUT.json is written after each stage: the same command goes on where it was stopped. A stage that takes longer than --limit-s
-is ended and told as "over"; one beside which other processes took more than 0.2 cores is told with that. 30 frames are taken from the sample's 60; 120 and
-300 are the sample's played to and fro, with new noise in every frame: more pictures to work on, not more to see.
+is ended and told as "over"; one beside which other processes took more than 0.2 cores is told with that, and is measured once more with --again. 30 frames are
+taken from the sample's 60; 120 and 300 are the sample's played to and fro, with new noise in every frame: more pictures to work on, not more to see.
 """
 
 from __future__ import annotations
@@ -79,6 +79,7 @@ def main() -> None:
     parser.add_argument("--rows", nargs="+", choices=tuple(ROWS), default=list(ROWS))
     parser.add_argument("--capture", type=Path, help="a finished capture of the sample to copy, for rows without the row standard")
     parser.add_argument("--limit-s", type=float, default=600, help="seconds that a stage may take")
+    parser.add_argument("--again", action="store_true", help="measure once more what other processes disturbed")
     options = parser.parse_args()
     try:
         failed = [name for name in options.rows if not measured(name, options)]
@@ -92,22 +93,25 @@ def main() -> None:
 
 
 def measured(name: str, options: argparse.Namespace) -> bool:
-    """Measures a row's stages that the JSON does not have yet; False where one failed, which is printed. Raises Problem where it has nothing to
-    start from."""
+    """Measures a row's stages that the JSON does not have yet (or has disturbed, with options.again: the less disturbed one stays); False where one failed,
+    which is printed. Raises Problem where it has nothing to start from."""
     row, found = ROWS[name], figures.read(options.json.stem, options.json.parent)["figures"] if options.json.exists() else {"machine": machine()}
     costs = found.setdefault(name, {})
-    left = [stage for stage in row.stages if stage not in costs]
+    capture = options.work / f"{name}.wildcap"
+    left = [stage for stage in row.stages if stage not in costs or (options.again and disturbed(costs[stage]))]
     if not left or any("over_s" in cost for cost in costs.values()):  # what comes after a stage without end cannot be measured
         return True
-    capture = options.work / f"{name}.wildcap"
+    begun = capture.exists()
     source = prepare(row, capture, options)
-    for stage in left:
+    for stage in left if begun else row.stages:
         print(f"{name}: {stage} ...", end=" ", flush=True)
         cost = stage_cost.measure(capture, stage, source, row.quality, row.settings, options.limit_s)
         if "problem" in cost:
             print(cost["problem"], cost["remedy"])
             return False
-        costs[stage] = cost
+        known = costs.get(stage)
+        if known is None or "over_s" not in cost and (cost["others"] or 0) <= (known["others"] or 0):
+            costs[stage] = cost
         print(cell(cost), flush=True)
         found["together"] = {quality: whole for quality in ("standard", "draft") if (whole := together(found, quality))}
         figures.write(options.json, "costs", "python -m benchmarks.costs WORK --json OUT.json", found)
@@ -217,8 +221,12 @@ def cell(cost: dict | None) -> str | None:
         return None
     if "over_s" in cost:
         return f"over {cost['over_s']:.0f} s"
-    disturbed = f" ({cost['processor_s']:.0f} s of processor; others took {cost['others']:.1f} cores)" if (cost["others"] or 0) > DISTURBED else ""
-    return f"{cost['seconds']:.0f} s, {cost['peak_mb'] / 1000:.1f} GB{disturbed}"
+    beside = f" ({cost['processor_s']:.0f} s of processor; others took {cost['others']:.1f} cores)" if disturbed(cost) else ""
+    return f"{cost['seconds']:.0f} s, {cost['peak_mb'] / 1000:.1f} GB{beside}"
+
+
+def disturbed(cost: dict) -> bool:
+    return (cost.get("others") or 0) > DISTURBED
 
 
 if __name__ == "__main__":

@@ -74,7 +74,7 @@ def test_stage_that_fails_and_stage_that_takes_too_long_are_told(tmp_path):
 
 
 def test_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
-    asked, options = [], costs.argparse.Namespace(work=tmp_path, json=tmp_path / "costs.json", capture=None, limit_s=600)
+    asked, options = [], costs.argparse.Namespace(work=tmp_path, json=tmp_path / "costs.json", capture=None, limit_s=600, again=False)
 
     def measure(capture, stage, *given):
         asked.append(stage)
@@ -86,8 +86,23 @@ def test_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
     assert costs.measured("frames-30", options) and asked == ["frames", "cameras", "scan", "scan"]
     assert costs.measured("frames-30", options) and len(asked) == 4, "all is there"
     assert figures.read("costs", tmp_path)["figures"]["frames-30"] == dict.fromkeys(("frames", "cameras", "scan"), DONE)
+    options.again = True
+    assert costs.measured("frames-30", options) and len(asked) == 4, "nothing disturbed it"
     with pytest.raises(costs.Problem, match="row standard first"):
         costs.measured("solve-512", options)
+
+
+def test_what_was_disturbed_is_measured_once_more_and_the_better_one_kept(tmp_path, monkeypatch):
+    options = costs.argparse.Namespace(work=tmp_path, json=tmp_path / "costs.json", capture=None, limit_s=600, again=True)
+    busy = {"frames": [0.1], "cameras": [0.9, 1.5, 0.3, 0.0], "scan": [0.0]}
+    capture = tmp_path / "standard.wildcap"
+    monkeypatch.setitem(costs.ROWS, "standard", costs.Row(("frames", "cameras", "scan")))
+    monkeypatch.setattr(stage_cost, "measure", lambda capture, stage, *given: capture.mkdir(exist_ok=True) or {**DONE, "others": busy[stage].pop(0)})
+    kept = []
+    for _ in range(5):
+        assert costs.measured("standard", options)
+        kept.append(figures.read("costs", tmp_path)["figures"]["standard"]["cameras"]["others"])
+    assert kept == [0.9, 0.9, 0.3, 0.0, 0.0] and capture.is_dir()
 
 
 def test_video_is_played_to_and_fro_with_new_noise():
