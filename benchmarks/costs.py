@@ -210,9 +210,12 @@ def table(found: dict) -> str:
     chain = [[stage, *(cell(stage_of(found, quality, stage)) for quality in ("standard", "draft"))] for stage in stages.NAMES]
     wholes = [found.get("together", {}).get(quality) for quality in ("standard", "draft")]
     chain.append(["**together**", *(whole and f"**{whole['minutes']:.1f} min, {whole['peak_mb'] / 1000:.1f} GB**" for whole in wholes)])
-    return "\n\n".join([figures.markdown(["stage: seconds, peak memory", "standard", "draft"], chain),
-                        *(figures.markdown([title, *map(str, values)], [[stage, *(cell(found.get(row, {}).get(stage)) for row in rows)]
-                                                                       for stage, rows in grown.items()]) for title, values, grown in GROWTH)])
+    tables = [figures.markdown(["stage: seconds, peak memory", "standard", "draft"], chain)]
+    for title, values, grown in GROWTH:
+        known = {stage: [cell(found.get(row, {}).get(stage)) for row in rows] for stage, rows in grown.items()}
+        if any(sum(text is not None for text in cells) > 1 for cells in known.values()):  # one value alone tells of no growth
+            tables.append(figures.markdown([title, *map(str, values)], [[stage, *cells] for stage, cells in known.items()]))
+    return "\n\n".join(tables)
 
 
 def cell(cost: dict | None) -> str | None:
