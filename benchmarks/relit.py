@@ -179,8 +179,8 @@ def with_mean(results: dict[str, dict[str, dict[str, float]]]) -> dict[str, dict
 
 def table(results: dict[str, dict[str, dict[str, float]]]) -> str:
     """Markdown: a line per row, and for each subject PSNR, SSIM and FLIP; last the mean over the people of benchmarks/people.py."""
-    columns = with_mean(results)
-    return figures.markdown(["row", *(name.replace("_", " ") for name in columns)], [
+    columns, people = with_mean(results), sum(person.name in results for person in PEOPLE)
+    return figures.markdown(["row", *(f"mean of {people}" if name == "mean" else name.replace("_", " ") for name in columns)], [
         [LABELS[row], *(f"{c[row]['psnr']:.2f} dB, {c[row]['ssim']:.3f}, {c[row]['flip']:.3f}" for c in columns.values())]
         for row in ROWS if all(row in column for column in columns.values())])
 
