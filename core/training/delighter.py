@@ -11,25 +11,22 @@ that `train carry` brought into our UVs; without them all light and skin is proc
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import tempfile
 from pathlib import Path
 
 import numpy as np
 import torch
-from safetensors.torch import save_file
 from torch.nn import functional
 from torch.utils.data import Dataset
 
-from ..capture import replacing
 from ..delight.unet import DelightNet
 from ..messages import Reporter
 from ..solve.prior import fast_dtype
-from . import descent
+from . import command_line, descent
 from .portraits import Batch, Portraits, mirrored, prepare
 from .prior import named_data
+from .release import again, release
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "delighter.safetensors"
 _MODEL = {"widths": [64, 128, 192, 224], "depths": [2, 2, 2, 2]}
@@ -130,22 +127,15 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from."""
     state = descent.read_state(work)
     data = state["data"]
-    with replacing(out) as temporary:
-        save_file({name: value.half().contiguous() for name, value in state["average"].items()}, temporary)
     told = "Synthetic portraits of core/synthetic on the built-in head, which derives from the MakeHuman base mesh (CC0)"
     if data["skins"]:
         told += f"; some wear one of {len(data['skins'])} skins of {data['from']}, carried into the built-in UVs"
     if data["panoramas"]:
         told += f"; light from procedural environments, lamps and {len(data['panoramas'])} panoramas (CC0)"
-    card = {**CONFIGS[state["config"]], "data": told, "licence": "GPL-3.0-or-later", "notices": data["notices"], "command": _command(state),
-            "steps": state["step"], "minutes": round(state["seconds"] / 60, 1), "parameters": sum(v.numel() for v in state["average"].values()),
-            "seeds": data["seeds"], "held_out_seeds": data["held_out_seeds"], "skins": data["skins"], "held_out_skins": data["held_out_skins"],
-            "panoramas": data["panoramas"],
-            "held_out": {**state["history"][-1][2], "what": "portraits of held-out subjects: mean error of the log-albedo about its own mean over the skin "
-                         "(natural log units), told the geometry or the picture only, beside the picture as it is; intersection over union of the shadows"}}
-    with replacing(Path(out).with_suffix(".json")) as temporary:
-        temporary.write_text(json.dumps(card, indent=1), encoding="utf-8")
-    return card
+    what = ("portraits of held-out subjects: mean error of the log-albedo about its own mean over the skin (natural log units), told the geometry or the "
+            "picture only, beside the picture as it is; intersection over union of the shadows")
+    command = again("delighter", state) + (" --hdri hdri" if data["panoramas"] else "")
+    return release(out, state, CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what}, panoramas=data["panoramas"])
 
 
 class _Steps(Dataset):
@@ -165,30 +155,11 @@ class _Steps(Dataset):
         return mirrored(self.drawn[1]) if turned else self.drawn[1]
 
 
-def _command(state: dict) -> str:
-    data = state["data"]
-    skins = f" --skins {data['from']}_carried --held-out {' '.join(data['held_out_skins'])}" if data["skins"] else ""
-    return (f"python -m core train delighter --config {state['config']} --minutes {round(state['seconds'] / 60)}"
-            f"{' --hdri hdri' if data['panoramas'] else ''}{skins}")
-
-
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser("python -m core train delighter", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--config", default="cpu", choices=tuple(CONFIGS))
-    parser.add_argument("--minutes", type=float, help="in all, those of earlier runs included; the configuration's by default")
-    parser.add_argument("--hdri", type=Path, metavar="FOLDER", help="panoramas whose licence lets weights trained with them be shipped")
-    parser.add_argument("--skins", type=Path, metavar="FOLDER", help="skins that `train carry` brought into our UVs")
-    parser.add_argument("--held-out", nargs="+", default=[], metavar="NAME", help="skins of FOLDER that are kept from training, each with its cluster")
-    parser.add_argument("--export", action="store_true", help="write the weights of the work folder's last checkpoint and stop")
-    parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_delighter")
-    parser.add_argument("--out", type=Path, default=WEIGHTS)
-    options = parser.parse_args(arguments)
-    if options.export:
-        export(options.work, options.out)
-        return 0
-    report = Reporter("train", emit=lambda message: print(message.text, flush=True) if type(message).__name__ == "Log" else None)
-    train_delighter(options.config, options.out, report, options.minutes, options.hdri, options.skins, options.held_out, options.work)
-    return 0
+    options = command_line.parser("delighter", __doc__, CONFIGS, WEIGHTS)
+    command_line.add_skins(options)
+    options.add_argument("--hdri", type=Path, metavar="FOLDER", help="panoramas whose licence lets weights trained with them be shipped")
+    return command_line.carry_out(options, arguments, train_delighter, export)
 
 
 if __name__ == "__main__":

@@ -11,23 +11,21 @@ Needs neither Blender nor the internet. A second run goes on where the first was
 
 from __future__ import annotations
 
-import argparse
 import json
 import tempfile
 from pathlib import Path
 
 import numpy as np
 import torch
-from safetensors.torch import save_file
 from torch.utils.data import Dataset
 
-from ..capture import replacing
 from ..messages import Problem, Reporter
 from ..solve.network import UNet, denoise
 from ..solve.prior import BLIND, WEIGHTS, build, condition, fast_dtype, packed
 from ..synthetic.identities import reserved_seeds
-from . import descent
+from . import command_line, descent
 from .patches import Batch, Windows, mean_map, reference_skins, spread_about
+from .release import again, release
 from .skins import SCALES, Skins, carried_names, carried_skins, clusters, synthetic_skins
 
 OCTAVES = 6
@@ -88,24 +86,14 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     state = descent.read_state(work)
     data = state["data"]
     levels, limits = packed(state["references"])
-    tensors = {name: value.half().contiguous() for name, value in {**state["average"], **state["statistics"]}.items()}
-    with replacing(out) as temporary:
-        save_file({**tensors, "references": levels, "references_range": limits}, temporary)
+    statistics = {name: value.half().contiguous() for name, value in state["statistics"].items()}
     told = "Procedural skins of core/synthetic on the built-in head, which derives from the MakeHuman base mesh (CC0)"
     if data["skins"]:
         told += f"; {len(data['skins'])} skins of {data['from']}, carried into the built-in UVs, diffuse only"
-    card = {
-        **CONFIGS[state["config"]], "scales": list(SCALES), "data": told, "licence": "GPL-3.0-or-later", "notices": data["notices"],
-        "command": _command(state), "steps": state["step"], "minutes": round(state["seconds"] / 60, 1),
-        "parameters": sum(v.numel() for v in state["average"].values()),
-        "seeds": data["seeds"], "held_out_seeds": data["held_out_seeds"], "skins": data["skins"], "held_out_skins": data["held_out_skins"],
-        "held_out": {"loss": {kind: dict(zip((f"scale_{scale}" for scale in SCALES), losses, strict=True)) for kind, losses in state["history"][-1][2].items()},
-                     "what": "mean squared error of the network's output on fixed patches and noise of held-out skins; 1 is that of the mean face"},
-        "tones": [[round(v, 4) for v in tone] for tone in state["tones"]],
-    }
-    with replacing(Path(out).with_suffix(".json")) as temporary:
-        temporary.write_text(json.dumps(card, indent=1), encoding="utf-8")
-    return card
+    losses = {kind: dict(zip((f"scale_{scale}" for scale in SCALES), of, strict=True)) for kind, of in state["history"][-1][2].items()}
+    what = "mean squared error of the network's output on fixed patches and noise of held-out skins; 1 is that of the mean face"
+    return release(out, state, {**CONFIGS[state["config"]], "scales": list(SCALES)}, told, again("prior", state), {"loss": losses, "what": what},
+                   {**statistics, "references": levels, "references_range": limits}, tones=[[round(v, 4) for v in tone] for tone in state["tones"]])
 
 
 def named_data(t: dict, skins: Path | None, held_out: list[str]) -> dict:
@@ -185,27 +173,10 @@ def _held_out_loss(average: dict, statistics: dict, config: str, batch: Batch, d
     return [round(losses[batch.scale == scale].mean().item(), 4) for scale in SCALES]
 
 
-def _command(state: dict) -> str:
-    skins = f" --skins {state['data']['from']}_carried --held-out {' '.join(state['data']['held_out_skins'])}" if state["data"]["skins"] else ""
-    return f"python -m core train prior --config {state['config']} --minutes {round(state['seconds'] / 60)}{skins}"
-
-
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser("python -m core train prior", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--config", default="cpu", choices=tuple(CONFIGS))
-    parser.add_argument("--minutes", type=float, help="in all, those of earlier runs included; the configuration's by default")
-    parser.add_argument("--skins", type=Path, metavar="FOLDER", help="skins that `train carry` brought into our UVs")
-    parser.add_argument("--held-out", nargs="+", default=[], metavar="NAME", help="skins of FOLDER that are kept from training, each with its cluster")
-    parser.add_argument("--export", action="store_true", help="write the weights of the work folder's last checkpoint and stop")
-    parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_prior")
-    parser.add_argument("--out", type=Path, default=WEIGHTS)
-    options = parser.parse_args(arguments)
-    if options.export:
-        export(options.work, options.out)
-        return 0
-    report = Reporter("train", emit=lambda message: print(message.text, flush=True) if type(message).__name__ == "Log" else None)
-    train_prior(options.config, options.out, report, options.minutes, options.skins, options.held_out, options.work)
-    return 0
+    options = command_line.parser("prior", __doc__, CONFIGS, WEIGHTS)
+    command_line.add_skins(options)
+    return command_line.carry_out(options, arguments, train_prior, export)
 
 
 if __name__ == "__main__":

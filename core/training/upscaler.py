@@ -10,25 +10,22 @@ Needs neither Blender nor the internet. A second run goes on where the first was
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import tempfile
 from pathlib import Path
 
 import numpy as np
 import torch
-from safetensors.torch import save_file
 from torch.utils.data import Dataset
 
-from ..capture import replacing
 from ..messages import Reporter
 from ..solve.prior import fast_dtype
 from ..upscale.enlarge import WEIGHTS
 from ..upscale.network import MISSED, Rcan, bicubic
-from . import descent
+from . import command_line, descent
 from .fine_windows import FineWindows, prepare
 from .prior import named_data
+from .release import again, release
 
 _MODEL = {"groups": 5, "blocks": 10, "width": 64}
 CONFIGS = {
@@ -96,18 +93,9 @@ def figures(average: dict, config: str, pairs: tuple[torch.Tensor, torch.Tensor]
 def export(work: Path, out: Path = WEIGHTS) -> dict:
     """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from."""
     state = descent.read_state(work)
-    data = state["data"]
-    with replacing(out) as temporary:
-        save_file({name: value.half().contiguous() for name, value in state["average"].items()}, temporary)
-    card = {**CONFIGS[state["config"]], "growth": GROWTH, "licence": "GPL-3.0-or-later", "notices": data["notices"],
-            "data": "Windows of procedural skins of core/synthetic at 4096 on the built-in head, which derives from the MakeHuman base mesh (CC0)",
-            "command": f"python -m core train upscaler --config {state['config']} --minutes {round(state['seconds'] / 60)}",
-            "steps": state["step"], "minutes": round(state["seconds"] / 60, 1), "parameters": sum(v.numel() for v in state["average"].values()),
-            "seeds": data["seeds"], "held_out_seeds": data["held_out_seeds"],
-            "held_out": {**state["history"][-1][2], "what": "mean absolute error on degraded patches of held-out skins, as a share of bicubic resampling's"}}
-    with replacing(Path(out).with_suffix(".json")) as temporary:
-        temporary.write_text(json.dumps(card, indent=1), encoding="utf-8")
-    return card
+    told = "Windows of procedural skins of core/synthetic at 4096 on the built-in head, which derives from the MakeHuman base mesh (CC0)"
+    what = "mean absolute error on degraded patches of held-out skins, as a share of bicubic resampling's"
+    return release(out, state, CONFIGS[state["config"]], told, again("upscaler", state), {**state["history"][-1][2], "what": what}, growth=GROWTH)
 
 
 class _Steps(Dataset):
@@ -121,16 +109,5 @@ class _Steps(Dataset):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser("python -m core train upscaler", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--config", default="cpu", choices=tuple(CONFIGS))
-    parser.add_argument("--minutes", type=float, help="in all, those of earlier runs included; the configuration's by default")
-    parser.add_argument("--export", action="store_true", help="write the weights of the work folder's last checkpoint and stop")
-    parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_upscaler")
-    parser.add_argument("--out", type=Path, default=WEIGHTS)
-    options = parser.parse_args(arguments)
-    if options.export:
-        export(options.work, options.out)
-        return 0
-    report = Reporter("train", emit=lambda message: print(message.text, flush=True) if type(message).__name__ == "Log" else None)
-    train_upscaler(options.config, options.out, report, options.minutes, options.work)
-    return 0
+    options = command_line.parser("upscaler", __doc__, CONFIGS, WEIGHTS)
+    return command_line.carry_out(options, arguments, train_upscaler, export)

@@ -1,0 +1,39 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line of the trainings: the options that all of them have, and what is done with them."""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from ..messages import Log, Reporter
+
+
+def parser(training: str, description: str, configs: dict, out: Path) -> argparse.ArgumentParser:
+    """The options of every training; `training` is its name in `python -m core train NAME`, `out` where its weights go by default."""
+    options = argparse.ArgumentParser(f"python -m core train {training}", description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--config", default="cpu", choices=tuple(configs))
+    options.add_argument("--minutes", type=float, help="in all, those of earlier runs included; the configuration's by default")
+    options.add_argument("--export", action="store_true", help="write the weights of the work folder's last checkpoint and stop")
+    options.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / f"wildcap_{training}")
+    options.add_argument("--out", type=Path, default=out)
+    return options
+
+
+def add_skins(options: argparse.ArgumentParser) -> None:
+    """The options of a training that can learn from skins of other heads."""
+    options.add_argument("--skins", type=Path, metavar="FOLDER", help="skins that `train carry` brought into our UVs")
+    options.add_argument("--held-out", nargs="+", default=[], metavar="NAME", help="skins of FOLDER that are kept from training, each with its cluster")
+
+
+def carry_out(options: argparse.ArgumentParser, arguments: list[str] | None, train: Callable[..., dict], export: Callable[[Path, Path], dict]) -> int:
+    """Trains, or exports an earlier training: the options are `train`'s keyword arguments. Returns the exit code."""
+    asked = vars(options.parse_args(arguments))
+    if asked.pop("export"):
+        export(asked["work"], asked["out"])
+    else:
+        train(report=Reporter("train", emit=lambda message: print(message.text, flush=True) if isinstance(message, Log) else None), **asked)
+    return 0
