@@ -10,7 +10,7 @@ FOLDER was made by benchmarks/people.py (--places wild flash studio) and its wil
   flash_texture    the same, before the solve                  limit           the true albedo frames as a texture: what geometry and texture leave
   studio           sixteen cameras in even light, no delighter, empty mask, solved by the stage      studio_texture    its texture taken for the albedo
 All are scored in the wild capture's frames that have a truth; all share head, prior, quality and true skin tone. FOLDER/controlled keeps maps and figures,
-so that a second run goes on where the first stopped. A set that has not been made is left out.
+so that a second run goes on where the first stopped. A set that has not been made is left out; people that OUT.json has and FOLDER has not stay in it.
 """
 
 from __future__ import annotations
@@ -57,7 +57,10 @@ def main() -> int:
         parser.error(f"{folder} holds no capture of benchmarks/people.py.")
     for name in found if asked.pictures else ():
         images.write_srgb(asked.pictures / f"{name}.jpg", side_by_side(folder, name))
-    summary = {"people": found, "mean": means(found)}
+    known = figures.read(asked.json.stem, asked.json.parent)["figures"]["people"] if asked.json and asked.json.exists() else {}
+    everyone = {**known, **found}
+    people = {p.name: everyone[p.name] for p in PEOPLE if p.name in everyone}
+    summary = {"people": people, "mean": means(people)}
     if asked.json:
         figures.write(asked.json, "controlled", COMMAND, summary)
     print(table(summary))

@@ -104,3 +104,23 @@ def test_the_table_says_the_gap_and_leaves_out_what_was_not_measured():
     assert "| tan | 30.00 | 33.50 | 40.00 | +3.50 | - | - | - |" in text and "| mean | 31.00 | 34.00 | 41.00 | +3.00 |" in text
     assert "mean of 2 people" in text and "mean of 1 people" in text and "light" not in text
     assert "| dark | 31.00 | 31.50 | +0.50 | 0.80 | 0.80 | 0.40 | 80 |" in text and "| tan | 31" not in text
+
+
+def test_people_of_a_record_stay_where_others_are_measured(tmp_path, monkeypatch, capsys):
+    def row(psnr):
+        return {"psnr": psnr, "psnr_after_gain": psnr, "ssim_after_gain": 0.9, "flip_after_gain": 0.1, "detail": 0.8, "mole_contrast": None}
+
+    def rows(psnr):
+        return {name: row(psnr + i) for i, name in enumerate(("wild_texture", "wild", "flash_texture", "flash", "limit"))}
+
+    def run(name, psnr):
+        monkeypatch.setattr(controlled, "measure", lambda folder, person: rows(psnr))
+        monkeypatch.setattr("sys.argv", ["controlled", str(tmp_path), "--only", name, "--json", str(tmp_path / "out.json")])
+        assert controlled.main() == 0
+        return json.loads((tmp_path / "out.json").read_text())["figures"]
+
+    run("tan", 30.0)
+    found = run("light", 32.0)
+    assert list(found["people"]) == ["light", "tan"] and found["people"]["tan"]["wild"]["psnr"] == 31.0
+    assert found["mean"]["flash"]["psnr_after_gain"] == 34.0 and "mean of 2 people" in capsys.readouterr().out
+    assert run("tan", 40.0)["mean"]["flash"]["psnr_after_gain"] == 39.0
