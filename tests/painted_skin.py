@@ -5,16 +5,26 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 import torch
 
 from core import images, meshes, template
 from core.capture import Capture
 from core.settings import Settings, from_json
-from core.solve import initial
+from core.solve import confidence, initial
 from core.solve.prior import load
 
 SIZE = 128
 TONE = np.array([0.42, 0.26, 0.18], np.float32)  # linear
+
+
+@pytest.fixture(scope="module", autouse=True)
+def brief_confidence():
+    """In a module that imports this the short runs behind the confidence map are shorter still: at this size they would take longer than the solve."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(confidence, "RUNS", 2)
+        patched.setattr(confidence, "STEPS", 2)
+        yield
 
 
 def make(root: Path) -> Capture:

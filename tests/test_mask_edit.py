@@ -15,7 +15,7 @@ from core.messages import CancelledError, Reporter
 from core.solve.window import window
 from core.stages import MAPS
 
-from .painted_skin import make, settings
+from .painted_skin import brief_confidence, make, settings  # noqa: F401
 
 EDIT = (slice(60, 68), slice(40, 50))
 

@@ -18,7 +18,7 @@ from core.solve.recipes import Recipe
 from core.solve.sampler import sample, seeded
 from core.stages import MAPS, by_name
 
-from .painted_skin import make, settings
+from .painted_skin import brief_confidence, make, settings  # noqa: F401
 from .test_sampler import SmoothPrior, observation, shadow_problem, start
 
 REFUSALS = [MemoryError(), torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB"),

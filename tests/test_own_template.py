@@ -14,19 +14,12 @@ from core.messages import Problem, Reporter
 from core.registration import alignment, carried, own_mesh, own_template, render_landmarks
 from core.settings import from_json
 
+from .own_heads import lay_over, person
 from .painted_egg import egg
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 TO_Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 EYES = np.array([[-0.0315, -0.004, 0.0], [0.0315, -0.004, 0.0]])
-
-
-@pytest.fixture(scope="module")
-def head():
-    """The registered built-in head of one person, and its model."""
-    model = registration.load_model()
-    vertices = model.shape(np.random.default_rng(5).normal(0, 0.7, len(model.identity))) * 1.03 + [0.01, 0.02, -0.03]
-    return model.mesh.moved(vertices), own_template.BuiltIn(model, *registration.weights_of(model))
 
 
 def coarse(folder: Path) -> tuple[Path, np.ndarray]:
@@ -70,13 +63,10 @@ def coarse(folder: Path) -> tuple[Path, np.ndarray]:
     return folder / "coarse head.obj", chosen
 
 
-def test_a_made_mesh_goes_where_its_vertices_belong(head, tmp_path, monkeypatch):
-    monkeypatch.setattr(own_template, "ITERATIONS", 8)
-    monkeypatch.setattr(render_landmarks, "SIDES", render_landmarks.SIDES[:5])
-    truth, ours = head
+def test_a_made_mesh_goes_where_its_vertices_belong(tmp_path):
+    truth, ours = person()
     path, chosen = coarse(tmp_path)
-    capture, report = Capture(tmp_path / "face.wildcap"), Reporter("registration")
-    own_template.run(capture, from_json({"registration": {"template": str(path), "new_atlas": True}}), truth, ours, report)
+    capture, report = lay_over(path, tmp_path / "face.wildcap", (8, own_template.COVER_ITERATIONS), new_atlas=True)
     mesh, neutral = meshes.read_obj(capture.own_head), template.load().vertices
     error = np.linalg.norm(mesh.vertices[:len(chosen)] - truth.vertices[chosen], axis=1)
     face = registration.weights_of(registration.load_model())[0][chosen] > 0.5
@@ -94,16 +84,19 @@ def test_a_made_mesh_goes_where_its_vertices_belong(head, tmp_path, monkeypatch)
     assert not capture.own_head.exists() and not capture.own_head_skin.exists()
 
 
-@pytest.mark.parametrize(("name", "shapes", "median", "p95"), [("ict_facekit", 11, 0.15, 1.2), ("valid_skins/White_M_1_head.obj", 0, 0.2, 1.8)])
-def test_heads_of_others_are_laid_over_ours(head, tmp_path, monkeypatch, name, shapes, median, p95):
-    if not (SHARED / name).exists():
-        pytest.skip(f"needs {name} in ../shared/data")
-    monkeypatch.setattr(own_template, "ITERATIONS", 6)
-    monkeypatch.setattr(own_template, "COVER_ITERATIONS", 3)
-    monkeypatch.setattr(render_landmarks, "SIDES", render_landmarks.SIDES[:5])
-    capture, report = Capture(tmp_path), Reporter("registration")
-    own_template.run(capture, from_json({"registration": {"template": str(SHARED / name)}}), *head, report)
-    own = own_mesh.read(str(SHARED / name), report)
+def test_ict_facekit_is_laid_over_ours(ict_fitted):
+    check_head_of_others(SHARED / "ict_facekit", *ict_fitted, shapes=11, median=0.15, p95=1.2)
+
+
+def test_the_head_of_the_valid_avatars_is_laid_over_ours(tmp_path):
+    path = SHARED / "valid_skins" / "White_M_1_head.obj"
+    if not path.exists():
+        pytest.skip(f"needs {path.name} in ../shared/data")
+    check_head_of_others(path, *lay_over(path, tmp_path), shapes=0, median=0.2, p95=1.8)
+
+
+def check_head_of_others(path: Path, capture: Capture, report: Reporter, shapes: int, median: float, p95: float) -> None:
+    own = own_mesh.read(str(path), report)
     assert report.figures["own_shapes"] == shapes == len(own.shapes) and report.figures["own_uvs"] == "the artist's"
     assert report.figures["own_to_head_median_mm"] < median and report.figures["own_to_head_p95_mm"] < p95
     assert report.figures["own_flipped_triangles"] == 0
@@ -115,7 +108,7 @@ def test_heads_of_others_are_laid_over_ours(head, tmp_path, monkeypatch, name, s
     corners = [[corner.split("/")[:2] for corner in face] for face in lines(own.path, "f ")]
     assert [[corner.split("/") for corner in face] for face in lines(capture.own_head, "f ")] == corners, "and polygons"
     fitted = meshes.read_obj(capture.own_head).vertices
-    middle = own_template._at_landmarks(head[0]).mean(0)
+    middle = own_template._at_landmarks(person()[0]).mean(0)
     assert fitted.shape == own.mesh.vertices.shape and np.linalg.norm(fitted - middle, axis=1).min() < 0.02
 
 

@@ -8,7 +8,7 @@ from core import images, solve
 from core.messages import Preview, Reporter
 from core.solve import drawing
 
-from .painted_skin import make, settings
+from .painted_skin import brief_confidence, make, settings  # noqa: F401
 
 
 def test_a_solve_shows_pictures_that_change_and_how_its_loss_falls(tmp_path, monkeypatch):

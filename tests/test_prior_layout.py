@@ -6,6 +6,7 @@ The head with other UVs is the built-in one with its chart turned and moved to w
 """
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,10 +14,9 @@ import numpy as np
 import pytest
 import torch
 
-from core import images, meshes, raster, registration, solve, stages, template
+from core import images, meshes, raster, solve, stages, template
 from core.capture import Capture
 from core.messages import Problem, Reporter
-from core.registration import own_mesh, own_template, render_landmarks
 from core.settings import from_json
 from core.solve import initial, layout
 from core.solve.lighting import Lights
@@ -24,6 +24,8 @@ from core.solve.maps import Maps
 from core.solve.prior import WEIGHTS, load
 from core.stages import MAPS
 
+from .own_heads import person
+from .painted_skin import brief_confidence  # noqa: F401
 from .test_released_prior import weights_of, write
 
 SIZE = 128
@@ -198,19 +200,13 @@ def test_another_checkpoint_or_head_makes_the_stage_stale_but_only_with_that_pri
     assert capture.stage_key(stage, settings("")) == ours and capture.stage_key(stage, settings(authors)) != theirs
 
 
-def test_on_ict_facekit_with_random_weights_of_the_released_shape(capture, monkeypatch):
-    ict, weights = SHARED / "data" / "ict_facekit" / "FaceXModel", SHARED / "vectors" / "prior_v1_coord"
-    for path in (ict, weights):
-        if not path.is_dir():
-            pytest.skip(f"{path} is missing")
-    monkeypatch.setattr(own_template, "ITERATIONS", 3)
-    monkeypatch.setattr(own_template, "COVER_ITERATIONS", 2)
-    monkeypatch.setattr(render_landmarks, "SIDES", render_landmarks.SIDES[:5])
-    model = registration.load_model()
-    built_in = own_template.BuiltIn(model, *registration.weights_of(model))
-    own = own_mesh.read(str(ict / "generic_neutral_mesh.obj"), Reporter("registration"))
-    fitted = own_template.fit(own, template.load(), built_in, Reporter("registration"))
-    put_own_head(capture, own.mesh.moved(fitted.vertices), fitted.skin)
+def test_on_ict_facekit_with_random_weights_of_the_released_shape(capture, ict_fitted, monkeypatch):
+    weights = SHARED / "vectors" / "prior_v1_coord"
+    if not weights.is_dir():
+        pytest.skip(f"{weights} is missing")
+    meshes.write_obj(capture.head, person()[0])
+    for theirs, ours in ((ict_fitted[0].own_head, capture.own_head), (ict_fitted[0].own_head_skin, capture.own_head_skin)):
+        shutil.copyfile(theirs, ours)
     kept = seen_layouts(monkeypatch)
     solve.run(capture, settings(weights, steps=6), Reporter("solve"))
     there = kept[0]

@@ -18,7 +18,7 @@ from core.solve.problem import albedo
 from core.stages import MAPS
 from core.synthetic.identities import reserved_seeds
 
-from .painted_skin import SIZE, TONE, as_setting, make, settings
+from .painted_skin import SIZE, TONE, as_setting, brief_confidence, make, settings  # noqa: F401
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from core.stages import MAPS
 from core.worker.client import Worker
 from core.worker.job import write_job
 
-from .painted_skin import SHORT, SIZE, TONE, make, settings
+from .painted_skin import SHORT, SIZE, TONE, brief_confidence, make, settings  # noqa: F401
 from .tiny_chain import follow
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -1,0 +1,36 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A head of another topology laid over the registered built-in head of one person, in fewer steps than the stage takes."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from core import registration
+from core.capture import Capture
+from core.meshes import Mesh
+from core.messages import Reporter
+from core.registration import own_template, render_landmarks
+from core.settings import from_json
+
+
+@cache
+def person() -> tuple[Mesh, own_template.BuiltIn]:
+    """The registered built-in head, and its model."""
+    model = registration.load_model()
+    vertices = model.shape(np.random.default_rng(5).normal(0, 0.7, len(model.identity))) * 1.03 + [0.01, 0.02, -0.03]
+    return model.mesh.moved(vertices), own_template.BuiltIn(model, *registration.weights_of(model))
+
+
+def lay_over(template: Path, folder: Path, steps: tuple[int, int] = (6, 3), **options) -> tuple[Capture, Reporter]:
+    """The capture in `folder` with the fitted head, and what the stage reported. `steps`: of the fit, and of laying the built-in head over the template;
+    `options` of the registration."""
+    capture, report = Capture(folder), Reporter("registration")
+    with pytest.MonkeyPatch.context() as patched:
+        for name, value in zip(("ITERATIONS", "COVER_ITERATIONS"), steps, strict=True):
+            patched.setattr(own_template, name, value)
+        patched.setattr(render_landmarks, "SIDES", render_landmarks.SIDES[:5])
+        own_template.run(capture, from_json({"registration": {"template": str(template), **options}}), *person(), report)
+    return capture, report
