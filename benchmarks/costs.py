@@ -27,6 +27,7 @@ import numpy as np
 from core import stages
 from core.capture import Capture, replacing_folder, write_json
 from core.messages import Problem
+from core.solve.prior import fast_dtype
 
 from . import figures, stage_cost
 
@@ -95,8 +96,12 @@ def main() -> None:
 def measured(name: str, options: argparse.Namespace) -> bool:
     """Measures a row's stages that the JSON does not have yet (or has disturbed, with options.again: the less disturbed one stays); False where one failed,
     which is printed. Raises Problem where it has nothing to start from."""
-    row, found = ROWS[name], figures.read(options.json.stem, options.json.parent)["figures"] if options.json.exists() else {"machine": machine()}
+    row, found = ROWS[name], figures.read(options.json.stem, options.json.parent)["figures"] if options.json.exists() else {}
+    here = machine()
+    if other := [what for what, value in found.get("machine", {}).items() if value != here[what]]:
+        raise Problem(f"{options.json} was measured on another machine ({', '.join(other)}).", "Name a new --json: one table holds one machine's costs.")
     costs = found.setdefault(name, {})
+    found = {"machine": here, **{key: value for key, value in found.items() if key != "machine"}}
     capture = options.work / f"{name}.wildcap"
     left = [stage for stage in row.stages if stage not in costs or (options.again and disturbed(costs[stage]))]
     if not left or any("over_s" in cost for cost in costs.values()):  # what comes after a stage without end cannot be measured
@@ -180,13 +185,14 @@ def to_and_fro(frames: list[np.ndarray], count: int) -> Iterator[np.ndarray]:
 
 
 def machine() -> dict:
-    """What the figures were measured on."""
+    """What the figures were measured on; networks: the precision in which the processor runs them."""
     try:
         told = Path("/proc/cpuinfo").read_text(encoding="utf-8")
         name = next(line.partition(":")[2].strip() for line in told.splitlines() if line.startswith("model name"))
     except (OSError, StopIteration):
         name = None
-    return {"processor": name, "cores": os.cpu_count(), "memory_gb": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9)}
+    return {"processor": name, "cores": os.cpu_count(), "memory_gb": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9),
+            "networks": str(fast_dtype("cpu")).removeprefix("torch.")}
 
 
 def together(found: dict, quality: str) -> dict | None:

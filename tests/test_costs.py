@@ -75,6 +75,7 @@ def test_stage_that_fails_and_stage_that_takes_too_long_are_told(tmp_path):
 
 def test_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
     asked, options = [], costs.argparse.Namespace(work=tmp_path, json=tmp_path / "costs.json", capture=None, limit_s=600, again=False)
+    found_on = costs.machine()
 
     def measure(capture, stage, *given):
         asked.append(stage)
@@ -89,6 +90,9 @@ def test_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
     options.again = True
     assert costs.measured("frames-30", options) and len(asked) == 4, "nothing disturbed it"
     with pytest.raises(costs.Problem, match="row standard first"):
+        costs.measured("solve-512", options)
+    monkeypatch.setattr(costs, "machine", lambda: {**found_on, "cores": 1000})
+    with pytest.raises(costs.Problem, match=r"another machine \(cores\)"):
         costs.measured("solve-512", options)
 
 
