@@ -58,11 +58,11 @@ def place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: flo
 
 
 def _place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: float) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    depth = _signed_distance(painted > 0.5) * texel  # negative inside
+    depth = signed_distance(painted > 0.5) * texel  # negative inside
     dark = _segmented(light.mean(-1), painted > 0.5, depth, weight, texel)
     if not dark.any() or dark.all():
         return None
-    distance = cv2.GaussianBlur(_signed_distance(dark), (0, 0), max(1.5 / texel, 0.5)) * texel
+    distance = cv2.GaussianBlur(signed_distance(dark), (0, 0), max(1.5 / texel, 0.5)) * texel
     near = weight * (np.abs(distance) < 2.5 * BAND)
     shift, width, step = _profile(light, distance, near, texel)
     sure, colour = _sureness(step, near * (np.abs(distance) < BAND))
@@ -144,7 +144,7 @@ def _ramp(values: np.ndarray, low: float, high: float) -> np.ndarray:
     return np.clip((values - low) / (high - low), 0, 1)
 
 
-def _signed_distance(inside: np.ndarray) -> np.ndarray:
+def signed_distance(inside: np.ndarray) -> np.ndarray:
     """Texels to the border of a region, negative inside it; the border runs between texels."""
     outside = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, 5)
     return np.where(inside, 0.5 - cv2.distanceTransform(inside.astype(np.uint8), cv2.DIST_L2, 5), outside - 0.5).astype(np.float32)

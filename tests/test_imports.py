@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent
 GROUND = {"capture", "hashes", "settings", "stages", "messages", "mask_history", "artist_landmarks", "report", "worker", "mask_edit", "consent",
           "switchlight_api", "delighter_cards", "delivery_presets", "delivery_plan", "provenance", "skin_regions"}
 """Standard library only: what Blender may import."""
-SHARED = {"images", "meshes", "raster", "surfaces", "atlas", "baking", "views", "template", "faces", "mask_import", "skylight", "shadow_edges",
+SHARED = {"images", "meshes", "raster", "surfaces", "atlas", "baking", "views", "template", "faces", "mask_import", "skylight", "shadow_edges", "beard",
           "frame_pictures", "sunlight", "noise"}
 """What the rooms of the upper floor may import beside the ground floor."""
 LATE = {"core/__main__.py", "core/worker/runner.py"}

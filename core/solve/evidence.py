@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import torch
 
-from .. import images, meshes, raster, template
+from .. import beard, images, meshes, raster, template
 from ..capture import Capture
 from ..messages import Problem
 from .lighting import Shader
@@ -21,6 +21,7 @@ from .recipes import Recipe
 REFERENCE = 1024  # lengths in texels are given for maps of this size
 TRUSTED = 0.2  # confidence from which a texel counts in full: below, it was seen at a glancing angle only
 FEATURE_TRUST = 0.2  # of brows, lips, lids and hair: they vary between people more than skin does, and light must not explain them away
+BEARD_TRUST = 0.1  # of skin under a beard: the shade of a shaven one is as soft as a light's
 MASK_FADE = 2.0  # deviation in texels over which a hard mask's border fades
 
 
@@ -42,7 +43,8 @@ class Evidence:
     space, N_c; covered bool [S, S]: texels of the head; skin [S, S]: facial skin without lips, brows and eyes; trust [S, S]: 1, less where a texel's
     colour says little of the light; protected [S, S]: what the artist keeps out of M; edge [S, S]: how far M's border lies on a shadow's edge that is
     seen; taken [3]: the colour of what shadows take of the light, over its mean, zeros where that is not known; asked [S, S]: how far the
-    artist added to the proposal for M, None where the maps are in other UVs."""
+    artist added to the proposal for M, None where the maps are in other UVs; missing [S, S]: the share of the light that M's border says is missing, None
+    where nobody asked it."""
 
     texture: torch.Tensor
     weight: torch.Tensor
@@ -56,6 +58,7 @@ class Evidence:
     taken: tuple[float, float, float] = (0.0, 0.0, 0.0)
     extent: Extent = Extent()
     asked: torch.Tensor | None = None
+    missing: torch.Tensor | None = None
 
     @property
     def size(self) -> int:
@@ -78,7 +81,7 @@ def read_evidence(capture: Capture, size: int) -> Evidence:
     texture = np.where(known[..., None], np.clip(texture, 0, None), 0)
     if confidence.max() < 1e-3:
         raise Problem("No texel of the texture was seen by any frame.", "Run the chain again from the cameras, and look at its report.")
-    seen = _sized(confidence, size)
+    seen, bearded = _sized(confidence, size), _sized(beard.seen_in(texture, confidence), size)
     texture = _sized(texture * confidence[..., None], size) / np.maximum(seen, 1e-4)[..., None]  # what nobody saw must not darken its neighbours
     head = meshes.read_obj(capture.head)
     if head.uvs is None:
@@ -97,8 +100,8 @@ def read_evidence(capture: Capture, size: int) -> Evidence:
     weight = np.where(covered, np.clip(seen / TRUSTED, 0, 1), 0)
     tensors = [np.ascontiguousarray(a, np.float32) for a in (texture.transpose(2, 0, 1), weight, np.where(covered, alpha, 0), normal.transpose(2, 0, 1))]
     unlike_skin = np.maximum.reduce([template.mask(name, size) for name in ("brows", "lips", "eyes", "nostrils", "scalp")])
-    parts = [torch.from_numpy(np.ascontiguousarray(a, np.float32))
-             for a in (skin, 1 - (1 - FEATURE_TRUST) * unlike_skin, protected, np.zeros_like(alpha))]
+    trust = np.minimum(1 - (1 - FEATURE_TRUST) * unlike_skin, 1 - (1 - BEARD_TRUST) * bearded)
+    parts = [torch.from_numpy(np.ascontiguousarray(a, np.float32)) for a in (skin, trust, protected, np.zeros_like(alpha))]
     return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts, asked=torch.from_numpy(asked))
 
 
@@ -144,7 +147,8 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
         coords = coordinates(whole, slice(top, top + size), slice(left, left + size), extent.centred)
         shader = Shader(normal, modulation, cells, recipe.bilinear)
         held = 1.0 if evidence.asked is None else 1 - torch.from_numpy(_sized(evidence.asked.numpy(), size))
-        found[factor] = Observation(texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size, held)
+        missing = 0.0 if evidence.missing is None else torch.from_numpy(_sized(evidence.missing.numpy(), size))
+        found[factor] = Observation(texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size, held, missing)
     return found
 
 

@@ -12,6 +12,7 @@ import torch
 
 from .. import images
 from ..messages import Problem
+from .border import missing
 from .checkpoint import Solution
 from .edges import with_edges
 from .evidence import Evidence, grid_cells, observations
@@ -75,11 +76,13 @@ def again(prior: Prior, evidence: Evidence, earlier: Solution, cell: float, reci
 def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float, recipe: Recipe,
               mask: Callable[[torch.Tensor], torch.Tensor] = lambda alpha: alpha, witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
     """`begun` with M as it is used, the marks that light must not explain, and the observations under both."""
+    lit = torch.einsum("ck,khw->chw", begun.state.lights.glob, sh_basis(evidence.normal)) * albedo_of(begun.reference).clamp_min(1e-3)
+    light = evidence.texture * begun.exposure / lit.clamp_min(1e-3)
     if recipe.sharp_edges:
-        lit = torch.einsum("ck,khw->chw", begun.state.lights.glob, sh_basis(evidence.normal)) * albedo_of(begun.reference).clamp_min(1e-3)
-        trusted = evidence.weight * (1 if recipe.trusting else evidence.trust)
-        evidence = with_edges(evidence, evidence.texture * begun.exposure / lit.clamp_min(1e-3), trusted)
+        evidence = with_edges(evidence, light, evidence.weight * (1 if recipe.trusting else evidence.trust))
     evidence = replace(evidence, alpha=mask(evidence.alpha))
+    if recipe.faint:
+        evidence = replace(evidence, missing=missing(light, evidence.alpha, evidence.weight * evidence.trust * evidence.skin, evidence.texel))
     marks: list[Mark] = []
     if recipe.protect_marks:
         evidence, marks = with_marks(evidence, witness)

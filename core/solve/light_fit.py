@@ -59,8 +59,8 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
     elif recipe.tv:
         loss = loss + recipe.tv * variation(shading[(slice(None), *o.shader.box)], o.ring[o.shader.box])
     if recipe.faint:
-        held = o.held[o.shader.box] if isinstance(o.held, torch.Tensor) else o.held
-        loss = loss + recipe.faint * brightness * (held * local**2).sum()
+        held, missing = (value[o.shader.box] if isinstance(value, torch.Tensor) else value for value in (o.held, o.missing))
+        loss = loss + recipe.faint * brightness * (held * (local + missing * o.shader.box_alpha) ** 2).sum()
     if recipe.smooth:
         free = o.shader.unmodulated(lights) if recipe.sharp_edges else local  # a shadow's own edge is in M and costs nothing
         loss = loss + recipe.smooth * brightness / o.texel * variation(free, o.shader.box_alpha)

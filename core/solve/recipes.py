@@ -51,7 +51,7 @@ class Recipe:
     neg: float = 1.0
     smooth: float = 1.4  # L1 variation of s^V inside M, per texel of a 1024 map and mean squared albedo: a brow is not worth its outline, a shadow is
     even: float = 0.0  # pull of gamma^g towards an even light, per texel and mean squared albedo
-    faint: float = 0.0  # pull of s^V towards zero, likewise; not where the artist added to the proposal for M
+    faint: float = 0.0  # pull of s^V towards what M's border says is missing, likewise; not where the artist added to the proposal for M
 
     # the end
     released_boxes: bool = False  # with the authors' prior the tone is that of their box, and texture and M count within the bounds of their masks alone

@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How much light is missing inside of M, as its border tells: a shadow's edge crosses the skin at random, so what differs on its two sides is light.
+
+Inside a shadow a darker skin and a lesser light look the same; at its edge they do not. What the steps along the border say holds for some way inwards,
+less the farther in and the shorter the border is that says it.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import torch
+
+from ..shadow_edges import signed_distance
+
+# in texels of a 1024 map
+AWAY, BAND = 9.0, 8.0  # the two sides are compared over bands about this distance from the border: a penumbra lies between; half width of a band
+REACH = 14.0  # how far from the border a step is read
+WINDOW = 8.0  # deviation of the windows over which a side is averaged
+INWARDS = 40.0  # deviation over which a step holds for what is around it
+LITTLE = 0.05  # share of a window of INWARDS that border must fill, for its step to hold by half
+DARKEST = 0.9  # more of the light than this never goes
+
+
+def missing(light: torch.Tensor, alpha: torch.Tensor, weight: torch.Tensor, texel: float) -> torch.Tensor:
+    """The share [S, S] in [0, DARKEST] of the light that is missing under M = 1, by the steps along M's border; 0 where no border is near.
+
+    light [3, S, S]: texture over (reference albedo x global shading), linear, about 1 where lit; alpha [S, S]: M; weight [S, S]: how far a texel tells of
+    light, 0 off the facial skin, so that the outline of the face is no border; `texel` is the side of one in texels of a 1024 map.
+    """
+    inside = alpha.numpy() > 0.5
+    if not inside.any() or inside.all():
+        return torch.zeros_like(alpha)
+    depth = signed_distance(inside) * texel  # negative inside
+    value = np.log(np.clip(light.numpy(), 0.05, 4)).mean(0).astype(np.float32)
+    near = weight.numpy() * np.clip(1.5 - np.abs(np.abs(depth) - AWAY) / BAND, 0, 1) * (np.abs(depth) > 2)
+    sides, known = [], []
+    for side in (depth < 0, depth > 0):
+        share = _blurred(near * side, WINDOW / texel)
+        sides.append(_blurred(near * side * value, WINDOW / texel) / np.maximum(share, 1e-4))
+        known.append(share)
+    sure = np.minimum(*known) * (np.abs(depth) < REACH)
+    sure = np.where(sure > 0.02, sure / max(float(sure.max()), 1e-6), 0)
+    step = _blurred(sure * (sides[1] - sides[0]), INWARDS / texel) / (_blurred(sure, INWARDS / texel) + LITTLE)
+    return torch.from_numpy((1 - np.exp(-np.maximum(step, 0))).clip(0, DARKEST).astype(np.float32))
+
+
+def _blurred(image: np.ndarray, sigma: float) -> np.ndarray:
+    return cv2.GaussianBlur(image.astype(np.float32), (0, 0), sigma, borderType=cv2.BORDER_REPLICATE)

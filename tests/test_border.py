@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a mask's border tells of the light inside: a known step comes back, blotches and the outline of what was seen are none."""
+
+import numpy as np
+import pytest
+import torch
+
+from core import beard, images, template
+from core.solve import border
+from core.solve.evidence import BEARD_TRUST, read_evidence
+
+from .painted_skin import make
+
+SIZE = 256
+TEXEL = 1024 / SIZE
+Y, X = np.mgrid[:SIZE, :SIZE] * TEXEL
+
+
+def light_and_mask(taken: float) -> tuple[torch.Tensor, torch.Tensor]:
+    """Skin with blotches of 8 % under a shadow, a bar of 180 texels of a 1024 map with a penumbra of 6; the mask lies on it."""
+    blotches = 1 + 0.08 * np.sin(X / 37 + 1) * np.sin(Y / 29) + 0.01 * np.random.default_rng(0).standard_normal(X.shape)
+    inside = np.abs(X - 500) < 90
+    shadow = 1 / (1 + np.exp((np.abs(X - 500) - 90) / 1.5))
+    return torch.from_numpy(np.repeat((blotches * (1 - taken * shadow))[None], 3, 0).astype(np.float32)), torch.from_numpy(inside.astype(np.float32))
+
+
+@pytest.mark.parametrize("taken", [0.05, 0.2, 0.5])
+def test_a_known_step_is_told_at_the_border_with_caution_and_less_inwards(taken):
+    light, mask = light_and_mask(taken)
+    found = border.missing(light, mask, torch.ones(SIZE, SIZE), TEXEL).numpy()[40:-40]
+    within = 90 - np.abs(X - 500)[40:-40]
+    at_border = (within > 0) & (within < 25)
+    assert found[at_border].min() > 0.65 * taken - 0.01 and found.max() < taken + 0.01
+    middle = found[within > 80].mean()
+    assert 0.2 * taken - 0.01 < middle < 0.6 * found[at_border].mean()
+
+
+def test_where_the_light_is_even_nothing_is_missing():
+    light, mask = light_and_mask(0.0)
+    assert border.missing(light, mask, torch.ones(SIZE, SIZE), TEXEL).max() < 0.02
+    assert border.missing(1 / light, 0 * mask, torch.ones(SIZE, SIZE), TEXEL).max() == 0, "and no mask has no border"
+
+
+def test_the_outline_of_what_was_seen_is_no_border_and_far_from_one_nothing_is_known():
+    light, _ = light_and_mask(0.0)
+    seen = torch.from_numpy((X < 600).astype(np.float32))
+    assert border.missing(light * (0.5 + 0.5 * seen), seen, seen, TEXEL).max() == 0
+    light, _ = light_and_mask(0.3)
+    half = torch.from_numpy((X < 500).astype(np.float32))  # its other edge is the shadow's own
+    wide = border.missing(light, (half + (light[0] < 0.8)).clamp(0, 1), torch.ones(SIZE, SIZE), TEXEL).numpy()
+    assert wide[128, int(570 / TEXEL)] > 0.18 and wide[128, int(400 / TEXEL)] < 0.01
+
+
+def test_a_beard_says_little_of_the_light(tmp_path):
+    """Dark strokes on jaw and chin of a texture that is large enough to show them; without them, or on a small one, there is no beard."""
+    size = beard.SIZE
+    tone = np.array([0.42, 0.26, 0.18], np.float32) * (1 + 0.01 * np.random.default_rng(1).standard_normal((size, size, 1)).astype(np.float32))
+    grows = beard._on_template()[0] > 0.9
+    strokes = (np.random.default_rng(2).random((size, size)) < 0.04) & grows
+    stubbly = np.where(strokes[..., None], 0.5 * tone, tone)
+    seen = np.ones((size, size), np.float32)
+    found = beard.seen_in(stubbly, seen)
+    assert found[grows].mean() > 0.8 and found[template.mask("nose", size) > 0.99].max() < 0.02
+    assert beard.seen_in(tone, seen).max() == 0 and beard.seen_in(stubbly[::2, ::2], seen[::2, ::2]).max() == 0
+    capture = make(tmp_path / "a.wildcap")
+    images.write_linear(capture.texture, stubbly)
+    images.write_data(capture.texture_confidence, seen)
+    trust = read_evidence(capture, 256).trust.numpy()
+    inner = images.resize((found > 0.99).astype(np.float32), 256, 256) > 0.99
+    assert inner.sum() > 200 and trust[inner] == pytest.approx(BEARD_TRUST, abs=0.02)
+    cheek = (template.mask("skin", 256) > 0.99) & (images.resize(found, 256, 256) == 0)
+    assert np.percentile(trust[cheek], 5) > 0.98
