@@ -10,7 +10,7 @@ FOLDER was made by benchmarks/people.py (--places wild flash studio) and its wil
   flash_texture    the same, before the solve                  limit           the true albedo frames as a texture: what geometry and texture leave
   studio           sixteen cameras in even light, no delighter, empty mask, solved by the stage      studio_texture    its texture taken for the albedo
 All are scored in the wild capture's frames that have a truth; all share head, prior, quality and true skin tone. FOLDER/controlled keeps maps and figures,
-so that a second run goes on where the first stopped. A set that has not been made is left out; people that OUT.json has and FOLDER has not stay in it.
+so that a second run goes on where the first stopped. A set that has not been made is left out; what OUT.json has and FOLDER has not stays in it.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def main() -> int:
     for name in found if asked.pictures else ():
         images.write_srgb(asked.pictures / f"{name}.jpg", side_by_side(folder, name))
     known = figures.read(asked.json.stem, asked.json.parent)["figures"]["people"] if asked.json and asked.json.exists() else {}
-    everyone = {**known, **found}
+    everyone = {name: {**known.get(name, {}), **found.get(name, {})} for name in (*known, *found)}
     people = {p.name: everyone[p.name] for p in PEOPLE if p.name in everyone}
     summary = {"people": people, "mean": means(people)}
     if asked.json:

@@ -124,3 +124,7 @@ def test_people_of_a_record_stay_where_others_are_measured(tmp_path, monkeypatch
     assert list(found["people"]) == ["light", "tan"] and found["people"]["tan"]["wild"]["psnr"] == 31.0
     assert found["mean"]["flash"]["psnr_after_gain"] == 34.0 and "mean of 2 people" in capsys.readouterr().out
     assert run("tan", 40.0)["mean"]["flash"]["psnr_after_gain"] == 39.0
+    monkeypatch.setattr(controlled, "measure", lambda folder, person: {"wild": row(50.0)})
+    controlled.main()
+    people = json.loads((tmp_path / "out.json").read_text())["figures"]["people"]
+    assert people["tan"]["wild"]["psnr"] == 50.0 and people["tan"]["flash"]["psnr"] == 43.0, "a set that was not made again keeps its figures"
