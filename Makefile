@@ -17,7 +17,9 @@ demo: .venv/installed
 
 test: .venv/installed
 	$(BIN)/ruff check core wildcap_addon tests benchmarks
-	$(BIN)/python -m pytest tests --ignore=tests/gui
+	rm -rf .reached
+	$(BIN)/python -m pytest tests --ignore=tests/gui --ignore=tests/test_messages_reached.py --numprocesses auto --maxprocesses 4 --dist loadfile --reached .reached
+	$(BIN)/python -m pytest tests/test_messages_reached.py --messages --reached .reached
 
 # docs/results.md and the README's figures, out of the records that the benchmarks left in docs/figures.
 results: .venv/installed
@@ -49,4 +51,4 @@ zip: .venv/installed
 	touch $@
 
 clean:
-	rm -rf .demo .blenders dist
+	rm -rf .demo .blenders .reached dist

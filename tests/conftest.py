@@ -45,10 +45,13 @@ WHOLE = pytest.StashKey()
 
 def pytest_addoption(parser):
     parser.addoption("--messages", action="store_true", help="judge which messages were reached even where not all tests ran")
+    parser.addoption("--reached", type=Path, metavar="FOLDER", help="where the processes of a run keep which messages they reached; what is there counts")
 
 
 def pytest_configure(config):
     message_sites.watch_problems(core.messages.Problem)
+    if config.option.reached:
+        message_sites.take_in(config.option.reached)
 
 
 @pytest.hookimpl(trylast=True)
@@ -81,6 +84,8 @@ def pytest_unconfigure(config):
 
 def pytest_sessionfinish(session, exitstatus):
     session.config.stash[STATUS] = exitstatus
+    if session.config.option.reached:
+        message_sites.keep(session.config.option.reached)
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every error message of the add-on, the worker, the capture and the settings, and every reason for a greyed-out button, was said in some test.
 
-Judged after all other tests, and only where all of them ran; `pytest --messages FILES` judges after any.
+Judged after all other tests, and only where all of them ran; `pytest --messages FILES` judges after any. `make test` runs them in several processes,
+which keep what they reached in a folder (`--reached`).
 """
 
 import ast
@@ -31,6 +32,16 @@ def test_reasons_reach_blender_in_one_place_alone():
     for file in message_sites.sources():
         used = "poll_message_set" in (message_sites.ROOT / file).read_text(encoding="utf-8")
         assert used == (file == message_sites.REASONS), f"{file}: use `allowed`"
+
+
+def test_what_other_processes_reached_counts(tmp_path, monkeypatch):
+    everything = message_sites._reached | {("core/settings.py", line) for line in range(1, 1000)}
+    monkeypatch.setattr(message_sites, "_reached", set(everything))
+    message_sites.keep(tmp_path / "reached")
+    monkeypatch.setattr(message_sites, "_reached", set())
+    assert len(message_sites.unreached()) > 80
+    message_sites.take_in(tmp_path / "reached")
+    assert message_sites._reached == everything and not any(sentence.startswith("core/settings.py") for sentence in message_sites.unreached())
 
 
 def test_a_sentence_is_noted_at_its_own_line():
