@@ -58,7 +58,7 @@ def main() -> int:
     for name in found if asked.pictures else ():
         images.write_srgb(asked.pictures / f"{name}.jpg", side_by_side(folder, name))
     known = figures.read(asked.json.stem, asked.json.parent)["figures"]["people"] if asked.json and asked.json.exists() else {}
-    everyone = {name: {**known.get(name, {}), **found.get(name, {})} for name in (*known, *found)}
+    everyone = figures.merged(known, found)
     people = {p.name: everyone[p.name] for p in PEOPLE if p.name in everyone}
     summary = {"people": people, "mean": means(people)}
     if asked.json:

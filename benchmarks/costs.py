@@ -101,7 +101,7 @@ def measured(name: str, options: argparse.Namespace) -> bool:
     if other := [what for what, value in found.get("machine", {}).items() if value != here[what]]:
         raise Problem(f"{options.json} was measured on another machine ({', '.join(other)}).", "Name a new --json: one table holds one machine's costs.")
     costs = found.setdefault(name, {})
-    found = {"machine": here, **{key: value for key, value in found.items() if key != "machine"}}
+    found["machine"] = here
     capture = options.work / f"{name}.wildcap"
     left = [stage for stage in row.stages if stage not in costs or (options.again and disturbed(costs[stage]))]
     if not left or any("over_s" in cost for cost in costs.values()):  # what comes after a stage without end cannot be measured

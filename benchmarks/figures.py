@@ -31,7 +31,7 @@ def write(path: Path, benchmark: str, command: str, figures: dict, keep: bool = 
     """
     path, figures = Path(path), plain(figures)
     if keep and path.is_file():
-        figures = _merged(read(path.stem, path.parent)["figures"], figures)
+        figures = merged(read(path.stem, path.parent)["figures"], figures)
     write_json(path, {"benchmark": benchmark, "command": command, "commit": commit(), "figures": figures})
 
 
@@ -54,8 +54,9 @@ def markdown(head: list[str], rows: list[list]) -> str:
     return "\n".join("| " + " | ".join("-" if cell is None else str(cell) for cell in row) + " |" for row in (head, ["---"] * len(head), *rows))
 
 
-def _merged(old: dict, new: dict) -> dict:
-    return {**old, **{key: _merged(old[key], value) if isinstance(value, dict) and isinstance(old.get(key), dict) else value for key, value in new.items()}}
+def merged(old: dict, new: dict) -> dict:
+    """Nested figures: `new` over `old`."""
+    return {**old, **{key: merged(old[key], value) if isinstance(value, dict) and isinstance(old.get(key), dict) else value for key, value in new.items()}}
 
 
 def plain(figures, name: str = "figures"):

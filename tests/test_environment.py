@@ -105,6 +105,10 @@ def test_what_an_installation_brings_is_known_before_it_begins(local, tmp_path):
         index.check_space(huge, tmp_path)
     with pytest.raises(Problem, match=r"did not answer as expected \(No matching distribution\)"):
         index.plan(installation.base_python(), steps, lambda command: (1, "ERROR: No matching distribution."))
+    (local / "worker.txt").write_text("tinytorch==2.0\n")
+    task = Task("index", lambda task: index.plan(installation.base_python(), steps, task.run))
+    task.start()
+    assert "did not answer as expected" in follow(task)[-1].problem
 
 
 def test_sizes_come_from_a_wheels_own_directory_wherever_it_lies(tmp_path):
