@@ -14,6 +14,7 @@ from .recipes import Recipe
 
 BETAS = 0.9, 0.999
 BAND_OF = torch.tensor([BANDS[0]] + [BANDS[1]] * 3 + [BANDS[2]] * 5)
+SIDEWAYS = torch.tensor([0.0, 0, 0, 1, 1, 0, 0, 1, 0])  # coefficients whose shading changes its sign from the head's left to its right (x, xy and xz)
 MOVING = {"both": (0, 1, 2), "main": (0,), "grid": (1, 2), "cells": (1,)}
 """Which of Lights.parameters() a phase moves."""
 
@@ -48,7 +49,7 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
     loss = photometric(denoised, shading, o, o.weight if recipe.trusting else o.weight * o.trust, recipe.blur)
     brightness = (o.weight * albedo(denoised) ** 2).mean()  # L_pho is larger on light skin
     if recipe.even:
-        loss = loss + recipe.even * brightness * o.weight.sum() * ((lights.glob * BAND_OF)[:, 1:] ** 2).sum()
+        loss = loss + recipe.even * brightness * o.weight.sum() * uneven(lights.glob, recipe)
     if o.shader.empty:
         return loss
     local = o.shader.local(lights)
@@ -65,6 +66,13 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
         free = o.shader.unmodulated(lights) if recipe.sharp_edges else local  # a shadow's own edge is in M and costs nothing
         loss = loss + recipe.smooth * brightness / o.texel * variation(free, o.shader.box_alpha)
     return loss
+
+
+def uneven(glob: torch.Tensor, recipe: Recipe) -> torch.Tensor:
+    """How far gamma^g [3, 9] is from an even light: the sum of squares of its directed parts, `recipe.sides` of those that tell left from right. The world is
+    the head's own, x across it."""
+    cost = 1 + (recipe.sides - 1) * SIDEWAYS[1:]
+    return (cost * (glob * BAND_OF)[:, 1:] ** 2).sum()
 
 
 def variation(image: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
