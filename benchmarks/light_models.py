@@ -68,7 +68,7 @@ def _region_loss(lights: RegionLights, denoised: torch.Tensor, o: Observation, r
     own = o.shader.own(lights)
     loss = photometric(denoised, o.shader.main(lights) + own, o, o.weight * o.trust)
     brightness = (o.weight * albedo(denoised) ** 2).mean()
-    return loss + brightness * (recipe.even * o.weight.sum() * uneven(lights.glob, recipe) + recipe.faint * (o.weight * own**2).sum())
+    return loss + brightness * (recipe.even * o.weight.sum() * uneven(lights.glob, o, recipe) + recipe.faint * (o.weight * own**2).sum())
 
 
 def _clusters(start: Start, count: int, seed: int) -> torch.Tensor:

@@ -105,9 +105,12 @@ def test_what_tells_left_from_right_is_held_to_an_even_light_by_its_share_alone(
     for k in range(1, 9):
         gamma = constant_light(torch.ones(3))
         gamma[:, k] += 0.2
-        assert uneven(gamma, recipe) == pytest.approx(3 * (0.2 * float(BAND_OF[k])) ** 2 * (0.05 if SIDEWAYS[k] else 1), rel=1e-5)
         texture = 0.4 * torch.einsum("ck,khw->chw", gamma, basis)
         o = Observation(texture, weight, torch.ones_like(weight), torch.zeros(1, 2, *weight.shape), Shader(directions.float(), 0 * weight, (2, 2)), 0 * weight)
+        coloured = gamma * torch.tensor([0.7, 1.0, 1.3])[:, None]
+        parts = [float(uneven(coloured, replace(o, even=even), recipe)) for even in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0))]
+        assert parts[0] == pytest.approx(parts[1] + parts[2], rel=1e-5) and parts[2] == pytest.approx(parts[1] * 0.06, rel=1e-4)  # (0.3^2 + 0.3^2) / 3
+        assert uneven(gamma, o, recipe) == pytest.approx(3 * (0.2 * float(BAND_OF[k])) ** 2 * (0.05 if SIDEWAYS[k] else 1), rel=1e-5)
         state = State(0, None, torch.full((1, 7, *weight.shape), 2 * 0.4 - 1), Lights(constant_light(torch.ones(3)), torch.zeros(1, 9, 2, 2), torch.ones(3)))
         update_lights(state, state.denoised, o, replace(recipe, phases=(("main", 0.0, 1.0),), updates=400), 0, 1)
         seen = float((weight**2 * basis[k] ** 2).sum())

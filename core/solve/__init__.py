@@ -38,9 +38,9 @@ FACE_CROP = 768
 """Texels at 1024 over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels."""
 
 
-DELIT = {"even": 0.2, "sides": 0.05, "faint": 2.0}
+DELIT = {"even": 0.3, "sides": 0.05, "faint": 2.0}
 """After a delighter little light is left, global or local, and the lights would rather explain how this face (its cheeks, its blotches) differs from the
-mean one; on raw light every pull costs. Chosen on a head scan and six synthetic heads (docs/results.md)."""
+mean one, unless what is left is plainly light (traits.py); on raw light every pull costs. Chosen on a head scan and six synthetic heads (docs/results.md)."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:

@@ -22,6 +22,7 @@ from .prior import Prior, coordinates, mean_at
 from .problem import Observation, State
 from .problem import albedo as albedo_of
 from .recipes import OURS, Recipe
+from .traits import held
 
 HUMAN_GREEN = 0.02, 0.45
 """Range of linear green a skin's mean albedo can have; red and blue follow from the colour."""
@@ -81,6 +82,9 @@ def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float, recip
     if recipe.sharp_edges:
         evidence = with_edges(evidence, light, evidence.weight * (1 if recipe.trusting else evidence.trust))
     evidence = replace(evidence, alpha=mask(evidence.alpha))
+    if recipe.even:
+        seen = evidence.weight * evidence.trust * evidence.skin * (1 - evidence.alpha)
+        evidence = replace(evidence, even=held(evidence.texture * begun.exposure, albedo_of(begun.reference), evidence.normal, seen, evidence.texel))
     if recipe.faint:
         evidence = replace(evidence, missing=missing(light, evidence.alpha, evidence.weight * evidence.trust * evidence.skin, evidence.texel))
     marks: list[Mark] = []

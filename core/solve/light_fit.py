@@ -49,7 +49,7 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
     loss = photometric(denoised, shading, o, o.weight if recipe.trusting else o.weight * o.trust, recipe.blur)
     brightness = (o.weight * albedo(denoised) ** 2).mean()  # L_pho is larger on light skin
     if recipe.even:
-        loss = loss + recipe.even * brightness * o.weight.sum() * uneven(lights.glob, recipe)
+        loss = loss + recipe.even * brightness * o.weight.sum() * uneven(lights.glob, o, recipe)
     if o.shader.empty:
         return loss
     local = o.shader.local(lights)
@@ -68,11 +68,12 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
     return loss
 
 
-def uneven(glob: torch.Tensor, recipe: Recipe) -> torch.Tensor:
-    """How far gamma^g [3, 9] is from an even light: the sum of squares of its directed parts, `recipe.sides` of those that tell left from right. The world is
-    the head's own, x across it."""
-    cost = 1 + (recipe.sides - 1) * SIDEWAYS[1:]
-    return (cost * (glob * BAND_OF)[:, 1:] ** 2).sum()
+def uneven(glob: torch.Tensor, o: Observation, recipe: Recipe) -> torch.Tensor:
+    """How far gamma^g [3, 9] is from an even light: the sum of squares of its directed parts, `o.even` of their brightness and of their colours, `recipe.sides`
+    of those that tell left from right. The world is the head's own, x across it."""
+    cost, directed = 1 + (recipe.sides - 1) * SIDEWAYS[1:], (glob * BAND_OF)[:, 1:]
+    mean = directed.mean(0)
+    return (cost * (o.even[0] * len(glob) * mean**2 + o.even[1] * ((directed - mean) ** 2).sum(0))).sum()
 
 
 def variation(image: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:

@@ -50,7 +50,7 @@ class Recipe:
     tv_of_gamma: bool = False  # L_TV is the squared variation of the SH coefficients; else the L1 variation of the shading on M's ring
     neg: float = 1.0
     smooth: float = 1.4  # L1 variation of s^V inside M, per texel of a 1024 map and mean squared albedo: a brow is not worth its outline, a shadow is
-    even: float = 0.0  # pull of gamma^g towards an even light, per texel and mean squared albedo
+    even: float = 0.0  # pull of gamma^g towards an even light, per texel and mean squared albedo, the less the surer what it explains is light (traits.py)
     sides: float = 1.0  # share of that pull on what gives the head's two sides different light: cheeks and beards are alike on both, so it is light
     faint: float = 0.0  # pull of s^V towards what M's border says is missing, likewise; not where the artist added to the proposal for M
 
