@@ -16,7 +16,7 @@ import torch
 from .lighting import fit_global, sh_basis
 
 LARGE = 40.0  # deviation of the blur that leaves the large shapes, in texels of a 1024 map
-TRAITS = 0.6  # variance that a light seems to explain, beside what it leaves, where all of it are traits: two people and a head scan hardly lit have 0.2 to 0.7
+TRAITS = 0.6  # variance that a light seems to explain, beside what it leaves, where all of it are traits; chosen as DELIT was
 FINEST = 0.003  # deviation that every face leaves at least
 LEAST = 0.2  # share of a blur's window that must be known
 
