@@ -11,12 +11,13 @@ from __future__ import annotations
 import argparse
 import shutil
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from core import images, solve
+from core import images, meshes, solve
 from core.capture import Capture
 from core.messages import Reporter
 from core.settings import from_json
@@ -58,14 +59,20 @@ def solved(darkening: np.ndarray, mask: np.ndarray, added: bool, size: int) -> n
     with tempfile.TemporaryDirectory() as folder:
         capture = Capture(Path(folder) / "head.wildcap")
         capture.root.mkdir()
-        for name in ("head.obj", "texture_confidence.exr"):
-            shutil.copyfile(ASSETS / "sample_head" / name, capture.root / name)
+        shutil.copyfile(ASSETS / "sample_head" / "texture_confidence.exr", capture.texture_confidence)
+        meshes.write_obj(capture.head, sample_head())
         images.write_linear(capture.texture, images.read_linear(ASSETS / "sample_head" / "texture.exr") * darkening[..., None])
         images.write_data(capture.shadow_mask_auto, 0 * mask if added else mask)
         if added:
             images.write_data(capture.shadow_mask, mask)
         solve.run(capture, from_json({"solve": {"size": size}}), Reporter("solve"))
         return images.read_linear(capture.maps / "diffuse_albedo.exr")
+
+
+def sample_head() -> meshes.Mesh:
+    """The sample's head: the built-in one's faces and UVs over the vertices that are stored of it."""
+    vertices = np.loadtxt(ASSETS / "sample_head" / "head_vertices.obj", usecols=(1, 2, 3))
+    return replace(meshes.read_obj(ASSETS / "head.obj"), vertices=vertices)
 
 
 if __name__ == "__main__":
