@@ -30,8 +30,10 @@ import numpy as np
 import torch
 from skimage.color import deltaE_ciede2000, rgb2lab
 
-from core import images, meshes, template
-from core.capture import Capture
+from core.contract.capture import Capture
+from core.face import template
+from core.geometry import meshes
+from core.imaging import images
 from core.solve import DELIT, initial, maps
 from core.solve.evidence import read_evidence
 from core.solve.light_fit import update_lights, variation

@@ -12,8 +12,8 @@ from flip_evaluator import evaluate as flip_evaluate
 from skimage.metrics import structural_similarity
 from torch.nn import functional
 
-from core import images
-from core.messages import Problem
+from core.contract.messages import Problem
+from core.imaging import images
 from core.texture.features import load_features
 
 from .figures import markdown

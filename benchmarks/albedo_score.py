@@ -27,10 +27,11 @@ import numpy as np
 from flip_evaluator import evaluate as flip_evaluate
 from skimage.metrics import structural_similarity
 
-from core import images, meshes, raster
-from core.capture import Capture
-from core.messages import Problem
-from core.views import read_views
+from core.contract.capture import Capture
+from core.contract.messages import Problem
+from core.geometry import meshes, raster
+from core.geometry.views import read_views
+from core.imaging import images
 
 from .figures import markdown, write
 

@@ -75,7 +75,7 @@ def save_a_mask(folder: Path) -> None:
 
     keeping = import_module(f"{MODULE}.wildcap_addon.paint.keeping")
     image = bpy.data.images.new("mask", MASK, MASK)
-    capture = import_module(f"{MODULE}.core.capture").Capture(folder)
+    capture = import_module(f"{MODULE}.core.contract.capture").Capture(folder)
     keeping.prepare(image)
     time.sleep(3)
     held = []

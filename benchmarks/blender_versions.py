@@ -20,8 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images
-from core.capture import Capture
+from core.contract.capture import Capture
+from core.imaging import images
 
 ROOT = Path(__file__).resolve().parent.parent
 USED = ("capture.json", "head.obj", "maps", "maps_4k", "delivery/displacement.exr")

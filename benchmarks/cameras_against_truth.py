@@ -16,8 +16,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from core.capture import Capture  # noqa: E402
-from core.views import View, read_views  # noqa: E402
+from core.contract.capture import Capture  # noqa: E402
+from core.geometry.views import View, read_views  # noqa: E402
 
 BLENDER_TO_COLMAP = np.diag([1.0, -1.0, -1.0])
 

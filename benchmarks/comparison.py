@@ -33,10 +33,10 @@ import cv2
 import numpy as np
 import torch
 
-from core import images
-from core.capture import Capture, replacing_folder, write_json
-from core.messages import Reporter
-from core.settings import Settings, from_json, preset
+from core.contract.capture import Capture, replacing_folder, write_json
+from core.contract.messages import Reporter
+from core.contract.settings import Settings, from_json, preset
+from core.imaging import images
 from core.solve import FACE_CROP, initial, maps, recipe_of
 from core.solve.evidence import REFERENCE, Evidence, read_evidence
 from core.solve.prior import load

@@ -24,10 +24,12 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images, meshes, template
-from core.capture import Capture, write_json
-from core.messages import Problem
-from core.settings import from_json, preset
+from core.contract.capture import Capture, write_json
+from core.contract.messages import Problem
+from core.contract.settings import from_json, preset
+from core.face import template
+from core.geometry import meshes
+from core.imaging import images
 
 from . import figures
 from .controlled_captures import as_albedo, by_the_stage, flash, studio, true_frames, under_even_light

@@ -16,10 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images, template
-from core.capture import Capture
-from core.messages import Reporter
-from core.settings import Settings, from_json
+from core.contract.capture import Capture
+from core.contract.messages import Reporter
+from core.contract.settings import Settings, from_json
+from core.face import template
+from core.imaging import images
 from core.solve import FACE_CROP, initial, maps, recipe_of
 from core.solve.evidence import read_evidence
 from core.solve.prior import load

@@ -24,9 +24,9 @@ from pathlib import Path
 import av
 import numpy as np
 
-from core import stages
-from core.capture import Capture, replacing_folder, write_json
-from core.messages import Problem
+from core.contract import stages
+from core.contract.capture import Capture, replacing_folder, write_json
+from core.contract.messages import Problem
 from core.solve.prior import fast_dtype
 
 from . import figures, stage_cost

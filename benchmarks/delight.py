@@ -28,10 +28,11 @@ from pathlib import Path
 
 import numpy as np
 
-from core import delight, images
-from core.capture import Capture
-from core.messages import Problem, Reporter
-from core.settings import Settings
+from core import delight
+from core.contract.capture import Capture
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import Settings
+from core.imaging import images
 
 from . import figures
 from .albedo_score import with_gain

@@ -12,7 +12,7 @@ import math
 import cv2
 import numpy as np
 
-from core import images
+from core.imaging import images
 from core.synthetic import pigment
 
 from .ablation_measures import feature_distance

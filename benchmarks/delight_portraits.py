@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images
-from core.capture import replacing
+from core.contract.capture import replacing
+from core.imaging import images
 from core.synthetic import pigment
 from core.synthetic.identities import subject_mesh
 from core.synthetic.olat import light_stage

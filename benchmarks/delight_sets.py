@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images
-from core.capture import Capture, write_json
-from core.messages import Problem
-from core.views import read_views
+from core.contract.capture import Capture, write_json
+from core.contract.messages import Problem
+from core.geometry.views import read_views
+from core.imaging import images
 
 from .albedo_score import Truth, read_truth
 

@@ -15,9 +15,9 @@ import sys
 import time
 from pathlib import Path
 
-from core import report
-from core.capture import Capture, write_json
-from core.settings import QUALITIES, from_json, preset
+from core.contract import report
+from core.contract.capture import Capture, write_json
+from core.contract.settings import QUALITIES, from_json, preset
 
 from . import albedo_score, figures
 

@@ -13,8 +13,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from core import images, raster, template
-from core.views import View
+from core.face import template
+from core.geometry import raster
+from core.geometry.views import View
+from core.imaging import images
 
 from .albedo_score import Truth
 

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from core.capture import write_json
-from core.messages import Problem
+from core.contract.capture import write_json
+from core.contract.messages import Problem
 
 ROOT = Path(__file__).resolve().parent.parent
 PUBLISHED = ROOT / "docs" / "figures"

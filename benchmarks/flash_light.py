@@ -15,10 +15,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from core import images, meshes, raster
-from core.capture import Capture
+from core.contract.capture import Capture
+from core.geometry import meshes, raster
+from core.geometry.views import View, read_views
+from core.imaging import images
 from core.texture.projection import Surface, observe
-from core.views import View, read_views
 
 LEAST = 0.2  # cosine at which the division stops: beyond, pixels stay dark, and the texture hardly trusts them
 ROUGHNESSES = (0.3, 0.4, 0.5, 0.6, 0.7)  # in Principled's terms (alpha is the square)

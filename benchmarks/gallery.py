@@ -20,9 +20,11 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images, meshes, raster, template
-from core.capture import Capture
-from core.views import View, read_views
+from core.contract.capture import Capture
+from core.face import template
+from core.geometry import meshes, raster
+from core.geometry.views import View, read_views
+from core.imaging import images
 
 ROOT = Path(__file__).resolve().parent.parent
 LIGHTS = ("three_point", "window", "sun", "city.exr")

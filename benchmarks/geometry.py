@@ -20,10 +20,11 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from core import images, stages
-from core.capture import Capture, write_json
-from core.messages import Problem
-from core.settings import Settings
+from core.contract import stages
+from core.contract.capture import Capture, write_json
+from core.contract.messages import Problem
+from core.contract.settings import Settings
+from core.imaging import images
 
 from . import stage_cost
 from .figures import write
@@ -98,7 +99,7 @@ def run_stages(capture: Capture, source: Path) -> tuple[dict, dict | None]:
 def _cameras(capture: Capture, subject: Subject, part: str) -> dict:
     import pycolmap
 
-    from core.views import read_views
+    from core.geometry.views import read_views
 
     from .cameras_against_truth import compare
 

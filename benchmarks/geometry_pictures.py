@@ -7,9 +7,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from core import images, meshes, raster
-from core.capture import Capture
-from core.views import View, read_views
+from core.contract.capture import Capture
+from core.geometry import meshes, raster
+from core.geometry.views import View, read_views
+from core.imaging import images
 
 HEIGHT = 480
 

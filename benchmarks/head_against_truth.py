@@ -18,12 +18,13 @@ import trimesh
 from scipy.spatial import cKDTree
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from core import images, meshes, raster  # noqa: E402
-from core.capture import Capture  # noqa: E402
+from core.contract.capture import Capture  # noqa: E402
+from core.geometry import meshes, raster
+from core.geometry.views import read_views  # noqa: E402
+from core.imaging import images  # noqa: E402
 from core.registration.alignment import similarity  # noqa: E402
 from core.synthetic.identities import subject_mesh  # noqa: E402
 from core.synthetic.sample import RESERVED  # noqa: E402
-from core.views import read_views  # noqa: E402
 
 
 def compare(capture: Capture, truth: Path, mesh: Path | None, surface: str = "head.obj") -> dict:

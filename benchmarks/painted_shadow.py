@@ -17,11 +17,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from core import images, meshes, solve
-from core.capture import Capture
-from core.messages import Reporter
-from core.settings import from_json
-from core.template import ASSETS
+from core import solve
+from core.contract.capture import Capture
+from core.contract.messages import Reporter
+from core.contract.settings import from_json
+from core.face.template import ASSETS
+from core.geometry import meshes
+from core.imaging import images
 
 from .figures import write
 

@@ -22,11 +22,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from core import images, meshes
-from core.capture import Capture, replacing, write_json
-from core.messages import Done, StageDone
-from core.settings import QUALITIES, Settings, from_json, preset
-from core.stages import STAGES
+from core.contract.capture import Capture, replacing, write_json
+from core.contract.messages import Done, StageDone
+from core.contract.settings import QUALITIES, Settings, from_json, preset
+from core.contract.stages import STAGES
+from core.geometry import meshes
+from core.imaging import images
 from core.synthetic import sample, scene
 from core.synthetic.identities import subject_mesh
 from core.synthetic.parameters import sample_parameters

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.meshes import Mesh
+from core.geometry.meshes import Mesh
 from core.synthetic.scene import SKY, Lamp, Light, Sun, leaves
 
 HEIGHT = 64  # rows of a panorama

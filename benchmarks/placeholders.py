@@ -20,7 +20,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-from core.messages import Problem
+from core.contract.messages import Problem
 
 from . import figures
 

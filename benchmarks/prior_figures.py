@@ -21,8 +21,9 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from core import images, template
-from core.messages import Reporter
+from core.contract.messages import Reporter
+from core.face import template
+from core.imaging import images
 from core.solve.draft import restored
 from core.solve.lighting import Lights, Shader, constant_light
 from core.solve.network import denoise

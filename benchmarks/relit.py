@@ -26,8 +26,8 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images
-from core.capture import Capture, write_json
+from core.contract.capture import Capture, write_json
+from core.imaging import images
 from core.synthetic import sample
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.pigment import LUMINANCE

@@ -14,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images, template
-from core.capture import Capture, write_json
+from core.contract.capture import Capture, write_json
+from core.face import template
+from core.imaging import images
 from core.upscale.gloss import on_cheeks_and_forehead
 
 SIZE = 1024

@@ -18,9 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images, meshes, raster, template
-from core.capture import Capture
-from core.views import read_views
+from core.contract.capture import Capture
+from core.face import template
+from core.geometry import meshes, raster
+from core.geometry.views import read_views
+from core.imaging import images
 
 from . import figures
 from .ablation_measures import feature_distance

@@ -22,8 +22,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from core.capture import replacing
-from core.messages import Problem
+from core.contract.capture import replacing
+from core.contract.messages import Problem
 
 from . import figures, tied_figures
 from .placeholders import fill, unmarked

@@ -16,18 +16,20 @@ import cv2
 import numpy as np
 import pycolmap
 
-from core import images, meshes, raster, template
-from core.capture import Capture, replacing_folder, write_json
-from core.meshes import Mesh
-from core.messages import Reporter
-from core.noise import noise
+from core.contract.capture import Capture, replacing_folder, write_json
+from core.contract.messages import Reporter
+from core.face import template
+from core.geometry import meshes, raster
+from core.geometry.meshes import Mesh
+from core.geometry.noise import noise
+from core.geometry.views import View, read_views
+from core.imaging import images
 from core.shadow_mask.lift import Unfolded, lift_shadows
 from core.synthetic.identities import subject_mesh
 from core.synthetic.light import bake, random_light
+from core.synthetic.painted_head import camera
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
-from core.views import View, read_views
-from tests.painted_head import camera
 
 SIZE = 512
 """Texels of the truth, and of the texture."""

@@ -21,10 +21,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from core import images, template
-from core.capture import Capture
-from core.messages import Reporter
-from core.settings import from_json
+from core.contract.capture import Capture
+from core.contract.messages import Reporter
+from core.contract.settings import from_json
+from core.face import template
+from core.imaging import images
 
 from .figures import write
 from .shadow_captures import KINDS, SIZE, lifted_truth, synthetic_capture

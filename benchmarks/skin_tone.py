@@ -20,10 +20,10 @@ import numpy as np
 import torch
 from skimage.color import deltaE_ciede2000
 
-from core import images
-from core.capture import Capture
-from core.messages import Reporter
-from core.settings import Settings, from_json
+from core.contract.capture import Capture
+from core.contract.messages import Reporter
+from core.contract.settings import Settings, from_json
+from core.imaging import images
 from core.solve.evidence import read_evidence
 from core.solve.initial import skin_tone
 from core.solve.look import Look

@@ -18,10 +18,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from core import images, meshes, solve, template
-from core.capture import Capture
-from core.messages import Reporter
-from core.settings import from_json
+from core import solve
+from core.contract.capture import Capture
+from core.contract.messages import Reporter
+from core.contract.settings import from_json
+from core.face import template
+from core.geometry import meshes
+from core.imaging import images
 from core.solve.recipes import OURS, RECIPES
 from core.synthetic.light import uv_problem
 

@@ -120,8 +120,10 @@ def make(folder: str, source: str | None) -> None:
     import numpy as np
 
     from benchmarks.solve_uv import problem
-    from core import images, meshes, template
-    from core.capture import Capture
+    from core.contract.capture import Capture
+    from core.face import template
+    from core.geometry import meshes
+    from core.imaging import images
 
     capture = Capture(Path(folder) / "a.wildcap")
     if source:
@@ -139,7 +141,7 @@ def measured(row: Row, folder: Path, options: argparse.Namespace) -> dict:
     import torch
 
     from core import solve  # noqa: F401 - all that the stage imports counts as loaded
-    from core.capture import Capture
+    from core.contract.capture import Capture
 
     before = peak_gib()
     capture = Capture(folder / "a.wildcap")
@@ -156,7 +158,7 @@ def single_steps(row: Row, capture, options: argparse.Namespace) -> dict:
 
     import torch
 
-    from core.messages import Reporter
+    from core.contract.messages import Reporter
     from core.solve import FACE_CROP, initial
     from core.solve.evidence import read_evidence
     from core.solve.memory import sample_within_memory
@@ -187,8 +189,8 @@ def whole_stage(row: Row, capture, options: argparse.Namespace) -> dict:
     import torch
 
     from core import shadow_mask, solve
-    from core.messages import Reporter
-    from core.settings import from_json
+    from core.contract.messages import Reporter
+    from core.contract.settings import from_json
     from core.solve import prior
 
     dtype = torch.float32 if row.float32 else prior.fast_dtype(options.device)

@@ -18,10 +18,10 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from core.capture import Capture
-from core.messages import Problem, StageDone
-from core.settings import Settings, preset
-from core.stages import by_name
+from core.contract.capture import Capture
+from core.contract.messages import Problem, StageDone
+from core.contract.settings import Settings, preset
+from core.contract.stages import by_name
 from core.worker.job import Job
 from core.worker.runner import explained, run_stage
 

@@ -19,12 +19,13 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.cameras_against_truth import similarity  # noqa: E402
-from core import images, meshes  # noqa: E402
-from core.capture import Capture  # noqa: E402
-from core.messages import Reporter  # noqa: E402
-from core.settings import from_json  # noqa: E402
-from core.views import read_views  # noqa: E402
-from tests import painted_head  # noqa: E402
+from core.contract.capture import Capture  # noqa: E402
+from core.contract.messages import Reporter  # noqa: E402
+from core.contract.settings import from_json  # noqa: E402
+from core.geometry import meshes
+from core.geometry.views import read_views  # noqa: E402
+from core.imaging import images  # noqa: E402
+from core.synthetic import painted_head  # noqa: E402
 
 STAGES = ("frames", "cameras", "scan", "registration", "delight", "texture", "shadow_mask")
 

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images
-from core.capture import Capture
-from core.views import read_views
+from core.contract.capture import Capture
+from core.geometry.views import read_views
+from core.imaging import images
 
 SIDE = 360
 

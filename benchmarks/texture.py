@@ -27,12 +27,14 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images, meshes, raster, texture
-from core.capture import Capture
-from core.messages import Problem, Reporter
-from core.settings import from_json
+from core import texture
+from core.contract.capture import Capture
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import from_json
+from core.geometry import meshes, raster
+from core.geometry.views import read_views
+from core.imaging import images
 from core.texture.blend import weighted_mean
-from core.views import read_views
 
 from .albedo_score import compare, mean_scores, read_truth
 from .detail import Look, centre_rays, look, marks, mean_of

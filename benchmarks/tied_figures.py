@@ -13,7 +13,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from core.messages import Problem
+from core.contract.messages import Problem
 
 from . import figures
 from .placeholders import NUMBER, fill, measures, plain_prose

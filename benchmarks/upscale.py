@@ -27,17 +27,20 @@ import numpy as np
 from flip_evaluator import evaluate as flip_evaluate
 from skimage.metrics import structural_similarity
 
-from core import images, meshes, raster, template, texture
-from core.capture import Capture, replacing_folder
-from core.messages import Reporter
-from core.settings import Settings
+from core import texture
+from core.contract.capture import Capture, replacing_folder
+from core.contract.messages import Reporter
+from core.contract.settings import Settings
+from core.face import template
+from core.geometry import meshes, raster
+from core.imaging import images
 from core.synthetic.identities import subject_mesh
+from core.synthetic.painted_head import camera
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
 from core.training.fine_windows import CHANNELS, FACTOR, Degradation, degraded, prepare
 from core.upscale import detail, enlarged
 from core.upscale.maps import Maps
-from tests.painted_head import camera
 
 from .ablation_measures import feature_distance
 from .detail import moles

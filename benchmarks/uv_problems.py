@@ -19,9 +19,11 @@ import numpy as np
 import torch
 import trimesh
 
-from core import images, meshes, template
-from core.capture import replacing
-from core.messages import Reporter
+from core.contract.capture import replacing
+from core.contract.messages import Reporter
+from core.face import template
+from core.geometry import meshes
+from core.imaging import images
 from core.solve.lighting import fit_global, sh_basis
 from core.synthetic import light
 from core.synthetic.light import bake, random_light

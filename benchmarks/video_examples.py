@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images
+from core.imaging import images
 from core.synthetic import scene
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.sample import MAPS, RESERVED, render_frames

@@ -26,10 +26,11 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images, template
-from core.capture import Capture
-from core.messages import Reporter
-from core.settings import Settings, from_json
+from core.contract.capture import Capture
+from core.contract.messages import Reporter
+from core.contract.settings import Settings, from_json
+from core.face import template
+from core.imaging import images
 
 from .albedo_score import score_capture
 from .figures import write

@@ -27,9 +27,11 @@ import numpy as np
 import torch
 from scipy.spatial import cKDTree
 
-from core import images, meshes, template
-from core.capture import Capture
-from core.messages import Reporter
+from core.contract.capture import Capture
+from core.contract.messages import Reporter
+from core.face import template
+from core.geometry import meshes
+from core.imaging import images
 from core.solve.initial import face_of_tone
 from core.solve.prior import load
 from core.synthetic.parameters import sample_parameters

@@ -14,9 +14,10 @@ import signal
 import sys
 from pathlib import Path
 
-from . import __version__, artist_landmarks, consent, delighter_cards, delivery_plan, delivery_presets, report, settings, stages
-from .capture import Capture
-from .messages import Problem
+from . import __version__
+from .contract import artist_landmarks, consent, delighter_cards, delivery_plan, delivery_presets, report, settings, stages
+from .contract.capture import Capture
+from .contract.messages import Problem
 from .worker import terminal
 from .worker.job import read_job, write_job
 
@@ -205,7 +206,7 @@ def _status(options: argparse.Namespace) -> int:
 
 
 def _mask_import(options: argparse.Namespace) -> int:
-    from .mask_import import import_mask  # needs OpenImageIO
+    from .imaging.mask_import import import_mask  # needs OpenImageIO
 
     print(f"{import_mask(Capture(options.capture), options.picture)} is now the shadow mask; solve comes next.")
     return 0
@@ -221,8 +222,8 @@ def _landmarks(options: argparse.Namespace) -> int:
 
 
 def _white(options: argparse.Namespace) -> int:
-    from .images import read_srgb  # these need OpenImageIO, OpenCV and torch
-    from .messages import Reporter
+    from .contract.messages import Reporter
+    from .imaging.images import read_srgb  # these need OpenImageIO, OpenCV and torch
     from .solve import white_point
 
     capture = Capture(options.capture)

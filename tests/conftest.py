@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-import core.messages
+import core.contract.messages
 from core.worker.client import SPINS
 
 from . import message_sites
@@ -49,7 +49,7 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
-    message_sites.watch_problems(core.messages.Problem)
+    message_sites.watch_problems(core.contract.messages.Problem)
     if config.option.reached:
         message_sites.take_in(config.option.reached)
 
@@ -98,7 +98,7 @@ def enabled_extension():
     repository.mkdir(parents=True, exist_ok=True)
     (repository / "wildcap").symlink_to(ROOT, target_is_directory=True)
     assert addon_utils.enable(MODULE, default_set=True) is not None, "Blender could not enable the extension"
-    message_sites.watch_problems(import_module(f"{MODULE}.core.messages").Problem)
+    message_sites.watch_problems(import_module(f"{MODULE}.core.contract.messages").Problem)
     message_sites.watch_reasons(import_module(f"{MODULE}.wildcap_addon.base_operator").BaseOperator)
     yield MODULE
     addon_utils.disable(MODULE, default_set=True)

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from core import images, meshes
-from core.capture import Capture
-from core.messages import Message
+from core.contract.capture import Capture
+from core.contract.messages import Message
+from core.geometry import meshes
+from core.imaging import images
 from core.worker.job import write_job
 from core.worker.runner import run_job
 

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from core import template
+from core.face import template
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
 from core.upscale.maps import Maps

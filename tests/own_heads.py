@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from core import registration
-from core.capture import Capture
-from core.meshes import Mesh
-from core.messages import Reporter
+from core.contract.capture import Capture
+from core.contract.messages import Reporter
+from core.contract.settings import from_json
+from core.geometry.meshes import Mesh
 from core.registration import own_template, render_landmarks
-from core.settings import from_json
 
 
 @cache

@@ -10,10 +10,11 @@ import json
 import numpy as np
 import pycolmap
 
-from core import images, meshes, raster
-from core.capture import Capture
-from core.meshes import Mesh
-from core.views import read_views
+from core.contract.capture import Capture
+from core.geometry import meshes, raster
+from core.geometry.meshes import Mesh
+from core.geometry.views import read_views
+from core.imaging import images
 
 RADII = np.array([0.075, 0.095, 0.120])
 WIDTH, HEIGHT, FOCAL = 300, 400, 520.0

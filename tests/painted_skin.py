@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 import torch
 
-from core import images, meshes, template
-from core.capture import Capture
-from core.settings import Settings, from_json
+from core.contract.capture import Capture
+from core.contract.settings import Settings, from_json
+from core.face import template
+from core.geometry import meshes
+from core.imaging import images
 from core.solve import confidence, initial
 from core.solve.prior import load
 

@@ -7,7 +7,8 @@ import pytest
 
 from benchmarks import ablation, uv_problems
 from benchmarks.ablation_measures import measure, summary, table
-from core import images, template
+from core.face import template
+from core.imaging import images
 from core.synthetic.light import bake
 
 

@@ -163,8 +163,8 @@ def drawn(panel) -> list[tuple]:
 
 
 def test_what_is_wrong_with_a_video_stands_in_the_tab(addon, capture):
-    from core.capture import Capture
-    from core.messages import Problem
+    from core.contract.capture import Capture
+    from core.contract.messages import Problem
 
     doctor, status = addon("panel").WILDCAP_PT_doctor, addon("status")
     status.refresh(bpy.context)
@@ -179,7 +179,7 @@ def test_what_is_wrong_with_a_video_stands_in_the_tab(addon, capture):
 
 
 def test_a_finished_stage_can_be_done_again_from_its_row(addon, capture, monkeypatch):
-    from core.capture import Capture
+    from core.contract.capture import Capture
 
     with pytest.raises(RuntimeError, match="no video"):
         bpy.ops.wildcap.reconstruct(first="scan")
@@ -203,7 +203,7 @@ def test_a_finished_stage_can_be_done_again_from_its_row(addon, capture, monkeyp
 
 
 def test_moved_landmarks_are_kept_and_the_head_is_fitted_to_them_again(addon, capture, monkeypatch):
-    from core.capture import Capture
+    from core.contract.capture import Capture
 
     Capture(capture).set_source(capture.parent / "face.mp4")
     bpy.ops.wildcap.bring_in_head()

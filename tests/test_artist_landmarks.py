@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from core import __main__ as cli
-from core import artist_landmarks, meshes, registration, stages
-from core.capture import Capture, write_json
-from core.messages import Problem, Reporter
-from core.settings import Settings, from_json
+from core import registration
+from core.contract import artist_landmarks, stages
+from core.contract.capture import Capture, write_json
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import Settings, from_json
+from core.geometry import meshes
 
 from .test_registration import _capture, known  # noqa: F401
 

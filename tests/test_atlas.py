@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core import atlas, meshes, surfaces
-from core.meshes import Mesh
+from core.geometry import atlas, meshes, surfaces
+from core.geometry.meshes import Mesh
 
 from .painted_egg import egg
 

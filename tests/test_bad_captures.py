@@ -7,16 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core import cameras, faces, frames, images
+from core import cameras, frames
 from core.cameras import coverage
 from core.cameras.mirrored import find_mirrored
 from core.cameras.motion import expression_changes
-from core.capture import Capture
-from core.messages import Problem, Reporter
-from core.settings import from_json
-
-from . import painted_head
-from .painted_head import camera
+from core.contract.capture import Capture
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import from_json
+from core.face import faces
+from core.imaging import images
+from core.synthetic import painted_head
+from core.synthetic.painted_head import camera
 
 
 def place(azimuth_deg, elevation_deg=0.0) -> np.ndarray:

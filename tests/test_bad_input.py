@@ -20,8 +20,8 @@ import numpy as np
 import pytest
 from skimage.data import astronaut
 
-from core.capture import Capture
-from core.messages import Cancelled, Failed, Progress, StageDone
+from core.contract.capture import Capture
+from core.contract.messages import Cancelled, Failed, Progress, StageDone
 from core.worker.client import Worker
 from core.worker.job import write_job
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks import figures, shadow_mask, skin_tone, whole_chain
-from core.capture import Capture
+from core.contract.capture import Capture
 
 
 def test_tones_are_summed_up_by_group():

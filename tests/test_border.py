@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from core import beard, images, template
+from core.face import beard, template
+from core.imaging import images
 from core.solve import border
 from core.solve.evidence import BEARD_TRUST, read_evidence
 

@@ -8,12 +8,11 @@ import numpy as np
 import pycolmap
 import pytest
 
-from core import images
 from core.cameras.calibration import import_cameras, read_cameras
-from core.cameras.realityscan import turned
-from core.messages import Problem, Reporter
-
-from . import painted_head
+from core.cameras.importers.realityscan import turned
+from core.contract.messages import Problem, Reporter
+from core.imaging import images
+from core.synthetic import painted_head
 
 WIDTH, HEIGHT = 1200, 1600  # of the pictures the cameras were solved from; the frames are smaller
 FRAME_WIDTH, FRAME_HEIGHT = 360, 480

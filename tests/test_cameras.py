@@ -14,13 +14,15 @@ import pytest
 from skimage.data import astronaut
 
 from benchmarks.cameras_against_truth import similarity
-from core import cameras, faces, frames, images
+from core import cameras, frames
 from core.cameras.landmarks import find_landmarks
 from core.cameras.world import find_head, intersect_rays
-from core.capture import Capture
-from core.messages import CancelledError, Problem, Reporter
-from core.settings import from_json
-from core.views import read_views
+from core.contract.capture import Capture
+from core.contract.messages import CancelledError, Problem, Reporter
+from core.contract.settings import from_json
+from core.face import faces
+from core.geometry.views import read_views
+from core.imaging import images
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 WIDTH, HEIGHT, FOCAL = 360, 480, 420.0

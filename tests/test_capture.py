@@ -11,11 +11,11 @@ from dataclasses import replace
 
 import pytest
 
-from core import stages
-from core.capture import FORMAT, Capture, replacing, replacing_folder, write_json
-from core.hashes import code_hash
-from core.messages import Problem
-from core.settings import Settings, from_json
+from core.contract import stages
+from core.contract.capture import FORMAT, Capture, replacing, replacing_folder, write_json
+from core.contract.hashes import code_hash
+from core.contract.messages import Problem
+from core.contract.settings import Settings, from_json
 
 CAMERAS, FRAMES, UPSCALE = stages.by_name("cameras"), stages.by_name("frames"), stages.by_name("upscale")
 
@@ -59,7 +59,7 @@ def test_a_shared_setting_matters_where_it_is_named(capture):
 
 
 def test_changed_code_makes_stale(capture, monkeypatch):
-    monkeypatch.setattr("core.capture.code_hash", lambda module: "other" if module == CAMERAS.module else code_hash(module))
+    monkeypatch.setattr("core.contract.capture.code_hash", lambda module: "other" if module == CAMERAS.module else code_hash(module))
     assert states(capture) == ["done", "stale"]
 
 

@@ -7,8 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from core import images, meshes, raster, template
-from core.messages import Problem, Reporter
+from core.contract.messages import Problem, Reporter
+from core.face import template
+from core.geometry import meshes, raster
+from core.imaging import images
 from core.registration import own_template
 from core.training import carry
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from core.capture import Capture
+from core.contract.capture import Capture
 
 from . import standin
 

@@ -12,11 +12,12 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
-from core import images, stages
-from core.capture import Capture
-from core.mask_import import import_mask
-from core.messages import Problem
-from core.settings import preset
+from core.contract import stages
+from core.contract.capture import Capture
+from core.contract.messages import Problem
+from core.contract.settings import preset
+from core.imaging import images
+from core.imaging.mask_import import import_mask
 
 from . import tiny_chain
 

@@ -10,10 +10,11 @@ import pytest
 pytest.importorskip("flip_evaluator")
 
 from benchmarks import controlled, flash_light  # noqa: E402
-from core import images, meshes, raster  # noqa: E402
-from core.capture import Capture  # noqa: E402
+from core.contract.capture import Capture  # noqa: E402
+from core.geometry import meshes, raster
+from core.geometry.views import read_views  # noqa: E402
+from core.imaging import images  # noqa: E402
 from core.texture.projection import Surface  # noqa: E402
-from core.views import read_views  # noqa: E402
 
 from . import painted_egg  # noqa: E402
 

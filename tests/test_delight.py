@@ -10,14 +10,16 @@ import numpy as np
 import pycolmap
 import pytest
 
-from core import images, meshes, raster, template
-from core.capture import Capture, write_json
+from core.contract.capture import Capture, write_json
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import from_json
 from core.delight import run
-from core.messages import Problem, Reporter
-from core.settings import from_json
-from core.skylight import fibonacci_sphere, radiance_transfer, sh_basis
-from core.sunlight import fit_light
-from core.views import read_views
+from core.face import template
+from core.geometry import meshes, raster
+from core.geometry.views import read_views
+from core.imaging import images
+from core.light.skylight import fibonacci_sphere, radiance_transfer, sh_basis
+from core.light.sunlight import fit_light
 
 SKIN = np.array([0.45, 0.28, 0.20])
 SKY = np.zeros((9, 3))

@@ -14,9 +14,9 @@ from benchmarks import albedo_score, delight, delight_portraits  # noqa: E402
 from benchmarks.albedo_score import Truth  # noqa: E402
 from benchmarks.delight_measures import FIGURES, flat_tone, mean_of, score, shortfalls, table, tone_group  # noqa: E402
 from benchmarks.delight_sets import Photograph, Photographs, light_stage  # noqa: E402
-from core import images  # noqa: E402
-from core.messages import Problem  # noqa: E402
-from core.settings import Settings  # noqa: E402
+from core.contract.messages import Problem  # noqa: E402
+from core.contract.settings import Settings  # noqa: E402
+from core.imaging import images  # noqa: E402
 
 FACEOLAT = Path(__file__).resolve().parents[2] / "shared" / "data" / "faceolat"
 

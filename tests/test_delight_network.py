@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from core import images, template
+from core.contract.messages import Problem, Reporter
 from core.delight.casts import without_casts
 from core.delight.evening import Look, even_out
 from core.delight.lift import lift, lift_share
@@ -18,9 +18,10 @@ from core.delight.lit_head import LitHead
 from core.delight.network import WEIGHTS, crop, face_box, load
 from core.delight.second_opinion import FITTED, beyond, of_both
 from core.delight.unet import CHANNELS, DelightNet, network_input
-from core.meshes import vertex_normals
-from core.messages import Problem, Reporter
-from core.raster import RayCaster, render_view
+from core.face import template
+from core.geometry.meshes import vertex_normals
+from core.geometry.raster import RayCaster, render_view
+from core.imaging import images
 from core.synthetic.identities import reserved_seeds
 from core.synthetic.sight import random_camera
 from core.training import delighter

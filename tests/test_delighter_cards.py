@@ -6,9 +6,9 @@ import subprocess
 import sys
 from dataclasses import fields
 
-from core import delighter_cards
-from core import switchlight_api as service
-from core.settings import DelightSettings
+from core.contract import delighter_cards
+from core.contract import switchlight_api as service
+from core.contract.settings import DelightSettings
 
 from .conftest import ROOT
 

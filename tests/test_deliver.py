@@ -17,7 +17,7 @@ bpy = pytest.importorskip("bpy")
 Vector = pytest.importorskip("mathutils").Vector
 pytest.importorskip("OpenImageIO", reason="the worker's part needs its packages")
 
-from core.messages import Done  # noqa: E402
+from core.contract.messages import Done  # noqa: E402
 
 from . import delivered  # noqa: E402
 from .delivered import SIDE  # noqa: E402
@@ -187,7 +187,7 @@ def test_the_artists_own_mesh_has_a_material_per_tile(capture):
 
 
 def test_what_comes_before_the_files_is_told_in_panel_and_dialog(addon, capture):
-    presets = import_module(f"{addon('deliver').__name__.rsplit('.', 2)[0]}.core.delivery_presets")
+    presets = import_module(f"{addon('deliver').__name__.rsplit('.', 2)[0]}.core.contract.delivery_presets")
     said = " ".join(text for text, _ in drawn(bpy.types.WILDCAP_PT_deliver))
     assert "glTF, one file, m, PNG, 16 bit" in said and "no subsurface scattering" in said
     deliver(capture)
@@ -225,7 +225,7 @@ def test_a_delivery_waits_for_the_artist_to_leave_a_mode_and_a_failure_keeps_the
 
 def test_a_blender_without_an_exporter_says_so(addon, capture, monkeypatch, tmp_path):
     files = addon("deliver.files")
-    problem = import_module(f"{files.__name__.split('.wildcap_addon')[0]}.core.messages").Problem
+    problem = import_module(f"{files.__name__.split('.wildcap_addon')[0]}.core.contract.messages").Problem
     monkeypatch.setitem(files.ADDONS, ".glb", "none of these")
     with pytest.raises(problem, match="switched off"):
         files.check(".glb")

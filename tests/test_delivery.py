@@ -15,11 +15,15 @@ import pytest
 import trimesh
 from scipy.spatial import cKDTree
 
-from core import deliver, delivery_plan, delivery_presets, images, meshes, skin_regions, template
+from core import deliver
 from core.__main__ import main
-from core.capture import Capture
-from core.messages import Cancelled, Done, Failed, Problem
-from core.settings import DeliverSettings
+from core.contract import delivery_plan, delivery_presets, skin_regions
+from core.contract.capture import Capture
+from core.contract.messages import Cancelled, Done, Failed, Problem
+from core.contract.settings import DeliverSettings
+from core.face import template
+from core.geometry import meshes
+from core.imaging import images
 
 from . import delivered
 from .conftest import ROOT

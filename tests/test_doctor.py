@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from skimage.data import astronaut
 
-from core import faces, frames, images
-from core.capture import Capture
+from core import frames
+from core.contract.capture import Capture
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import from_json
+from core.face import faces
 from core.frames.doctor import blurred, diagnose, examine
 from core.frames.eyes import blinks
-from core.messages import Problem, Reporter
-from core.settings import from_json
+from core.imaging import images
 
 FACE = astronaut().astype(np.float32)[:300, 60:400] / 255
 

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from benchmarks.prior_figures import errors, given_diffuse, reflectance
-from core import template
+from core.face import template
 from core.solve.draft import restored
 from core.solve.prior import coordinates, load
 from core.solve.recipes import Recipe

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from skimage.data import astronaut
 
-from core import faces, images
+from core.face import faces
 from core.frames import drift
 from core.frames.drift import content_of, gains_of
+from core.imaging import images
 
 HEIGHT, WIDTH = 300, 400
 

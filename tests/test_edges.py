@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from core.shadow_edges import BAND, INWARD, penumbra, place
+from core.light.shadow_edges import BAND, INWARD, penumbra, place
 from core.solve.evidence import softened
 
 SIZE = 512

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from core.messages import Cancelled, Done, Failed, Problem, Progress
+from core.contract.messages import Cancelled, Done, Failed, Problem, Progress
 from core.worker import environment, index, installation
 from core.worker.background import Task
 from core.worker.environment import judge, python_of, remove, required, survey, verify

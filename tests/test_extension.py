@@ -22,14 +22,14 @@ TAGS = SCRIPTS / "modules" / "_bpy_internal" / "extensions" / "tags.py"
 WANTED = (
     r"__init__\.py", r"blender_manifest\.toml", r"LICENSE", r"README\.md", r"requirements/(worker|nets|perceptual|cuda)\.txt",
     r"wildcap_addon/([a-z_]+/)?[a-z_]+\.py",
-    r"core/README\.md", r"core/[a-z_]+\.py",
-    r"core/(worker|frames|cameras|scan|registration|delight|texture|shadow_mask|solve|transfer|upscale|deliver)/[a-z0-9_]+\.py",
+    r"core/README\.md", r"core/[a-z_]+\.py", r"core/(contract|worker|imaging|geometry|face|light)/[a-z0-9_]+\.py",
+    r"core/(frames|cameras|scan|registration|delight|texture|shadow_mask|solve|transfer|upscale|deliver)/(importers/)?[a-z0-9_]+\.py",
     r"core/weights/[a-z0-9_]+\.(safetensors|json)", r"core/assets/([A-Z]+\.md|head\.obj|head\.json|identity\.npz|masks/[a-z_]+\.png)",
     r"core/assets/[a-z_]+\.(png|json|npz|md)", r"core/assets/sample_head/.+\.(obj|png|exr|json)",
     r"core/[a-z_]+/(README\.md|[a-z0-9_]+\.(npz|json))",
 )
 NEEDED = ("__init__.py", "blender_manifest.toml", "LICENSE", "requirements/worker.txt", "requirements/nets.txt", "wildcap_addon/__init__.py",
-          "wildcap_addon/relight/headless.py", "core/settings.py", "core/worker/__main__.py", "core/worker/client.py", "core/solve/__init__.py",
+          "wildcap_addon/relight/headless.py", "core/contract/settings.py", "core/worker/__main__.py", "core/worker/client.py", "core/solve/__init__.py",
           "core/assets/head.obj")
 
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from skimage.data import astronaut
 
-from core import faces, images
-from core.messages import Problem
+from core.contract.messages import Problem
+from core.face import faces
+from core.imaging import images
 
 PORTRAITS = Path(__file__).resolve().parents[2] / "shared" / "data" / "portraits"
 

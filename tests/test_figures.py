@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import figures
-from core.messages import Problem
+from core.contract.messages import Problem
 
 
 def test_a_record_is_read_as_it_was_written(tmp_path):

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from core import images
-from core.messages import Reporter
+from core.contract.messages import Reporter
+from core.imaging import images
 from core.texture.detail import fine_detail, finer
 from core.texture.projection import Observation, log_colours
 from core.upscale.detail import guide

@@ -13,12 +13,13 @@ import OpenImageIO as oiio
 import pytest
 from skimage.data import astronaut
 
-from core import frames, images
-from core.capture import Capture
+from core import frames
+from core.contract.capture import Capture
+from core.contract.messages import CancelledError, Problem, Reporter
+from core.contract.settings import from_json
 from core.frames.colour import HLG, to_srgb
 from core.frames.select import select_views, sharpness, turns
-from core.messages import CancelledError, Problem, Reporter
-from core.settings import from_json
+from core.imaging import images
 
 SIZE = 240
 

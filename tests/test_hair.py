@@ -5,10 +5,14 @@
 import numpy as np
 import pytest
 
-from core import images, meshes, stages, template, upscale
-from core.capture import Capture
-from core.messages import Reporter
-from core.settings import from_json
+from core import upscale
+from core.contract import stages
+from core.contract.capture import Capture
+from core.contract.messages import Reporter
+from core.contract.settings import from_json
+from core.face import template
+from core.geometry import meshes
+from core.imaging import images
 from core.upscale import hair
 from core.upscale.maps import Maps
 

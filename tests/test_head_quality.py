@@ -5,11 +5,13 @@
 import numpy as np
 import pytest
 
-from core import meshes, registration, template
-from core.messages import Problem, Reporter
+from core import registration
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import from_json
+from core.face import template
+from core.geometry import meshes
 from core.registration import alignment, eyes, intersections, landmarks, quality
 from core.registration.correspondence import Scan
-from core.settings import from_json
 from core.synthetic.identities import subject_mesh
 
 from .test_registration import _capture, known, scan_of  # noqa: F401

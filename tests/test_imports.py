@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who may import whom, read from the sources: the rules of the house without running any of it."""
+"""Who may import whom, read from the sources: where a file lies says it, and no module is named here."""
 
 import ast
 import sys
@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
+from core.contract import stages
+
 ROOT = Path(__file__).resolve().parent.parent
-GROUND = {"capture", "hashes", "settings", "stages", "messages", "mask_history", "artist_landmarks", "report", "worker", "mask_edit", "consent",
-          "switchlight_api", "delighter_cards", "delivery_presets", "delivery_plan", "provenance", "skin_regions"}
-"""Standard library only: what Blender may import."""
-SHARED = {"images", "meshes", "raster", "surfaces", "atlas", "baking", "views", "template", "faces", "mask_import", "skylight", "shadow_edges", "beard",
-          "frame_pictures", "sunlight", "noise"}
-"""What the rooms of the upper floor may import beside the ground floor."""
-LATE = {"core/__main__.py", "core/worker/runner.py"}
-"""Ground floor files that import heavy things inside a function, once there is something for them to do."""
+GROUND = ("contract", "worker")
+"""Rooms that stand on the standard library: what Blender imports of core."""
+FLOORS = (("contract",), ("imaging",), ("geometry",), ("face", "light"))
+"""Rooms that the stages share, from the bottom up: each imports the floors below its own, and itself."""
+SHARED = tuple(room for floor in FLOORS for room in floor)
+STAGES = {step.module.split(".")[1] for step in (*stages.STAGES, *stages.TOOLS)}
 BPY = {"core/synthetic/render.py"}
 
 
@@ -35,9 +35,10 @@ class Import:
         return f"{self.file}:{self.line} imports {self.target}"
 
 
-def imports(folder: str) -> list[Import]:
+def imports(*paths: str) -> list[Import]:
+    """What the files of these folders, and these files, import."""
     found = []
-    for path in sorted((ROOT / folder).rglob("*.py")):
+    for path in [file for name in paths for file in (sorted((ROOT / name).rglob("*.py")) or [ROOT / name])]:
         tree = ast.parse(path.read_text(encoding="utf-8"))
         late = {id(node) for function in ast.walk(tree) if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef) for node in ast.walk(function)}
         file = path.relative_to(ROOT).as_posix()
@@ -52,28 +53,34 @@ def imports(folder: str) -> list[Import]:
 def _targets(file: str, node: ast.ImportFrom) -> list[str]:
     """The modules that `from x import a, b` means: x.a where that is a module, else x."""
     if not node.level:
-        return [node.module]
+        names = [f"{node.module}.{alias.name}" for alias in node.names]
+        return list(dict.fromkeys(name if _is_module(name.split(".")) else node.module for name in names))
     package = file.split("/")[:-1]
     assert node.level <= len(package) + 1, f"{file}:{node.lineno} climbs out of the repository"
     base = package[:len(package) - node.level + 1] + (node.module.split(".") if node.module else [])  # [] is the extension itself
-    names = []
-    for alias in node.names:
-        inner = ROOT.joinpath(*base, alias.name)
-        names.append(".".join([*base, alias.name] if inner.is_dir() or inner.with_suffix(".py").is_file() else base))
-    return list(dict.fromkeys(names))
+    return list(dict.fromkeys(".".join([*base, alias.name] if _is_module([*base, alias.name]) else base) for alias in node.names))
+
+
+def _is_module(parts: list[str]) -> bool:
+    inner = ROOT.joinpath(*parts)
+    return inner.is_dir() or inner.with_suffix(".py").is_file()
 
 
 def room(target: str) -> str:
-    """Second part of a dotted name: the room, or the module of a floor."""
-    return (target.split(".") + [""])[1]
+    """Second part of a dotted name: the room; '' for core itself and for its command line."""
+    second = (target.split(".") + [""])[1]
+    return second if (ROOT / target.split(".")[0] / second).is_dir() else ""
 
 
 def own_room(file: str) -> str:
-    return Path(file).parts[1].removesuffix(".py")
+    return Path(file).parts[1] if len(Path(file).parts) > 2 else ""
 
 
 CORE = imports("core")
 ADDON = imports("wildcap_addon")
+BENCHMARKS = imports("benchmarks")
+INSIDE = [i for i in CORE if i.level and room(i.target)]
+"""Imports of core that lead into one of its rooms."""
 
 
 def _none(offending):
@@ -89,25 +96,43 @@ def test_core_knows_nothing_of_blender():
 
 
 def test_the_ground_floor_stands_on_the_standard_library():
-    ground = [i for i in CORE if own_room(i.file) in GROUND | {"__init__", "__main__"} and not (i.late and i.file in LATE)]
+    """Inside a function of the worker or the command line a heavy module may be imported, once there is something for it to do."""
+    ground = [i for i in CORE if own_room(i.file) in (*GROUND, "") and not (i.late and own_room(i.file) != "contract")]
     assert len(ground) > 50
     _none(i for i in ground if not i.level and i.target.split(".")[0] not in sys.stdlib_module_names)
-    _none(i for i in ground if i.level and i.target != "core" and room(i.target) not in GROUND)
+    _none(i for i in ground if i in INSIDE and room(i.target) not in GROUND)
 
 
-def test_the_shared_floor_imports_no_room():
-    _none(i for i in CORE if own_room(i.file) in SHARED and i.level and i.target != "core" and room(i.target) not in GROUND | SHARED)
+def test_a_shared_room_imports_only_what_lies_below_it():
+    for height, floor in enumerate(FLOORS):
+        below = {each for lower in FLOORS[:height] for each in lower}
+        _none(i for i in INSIDE if own_room(i.file) in floor and room(i.target) not in below | {own_room(i.file)})
 
 
-def test_a_room_imports_the_floors_and_itself():
-    above = [i for i in CORE if own_room(i.file) not in GROUND | SHARED | {"__init__", "__main__", "training"} and i.level]
-    assert len({own_room(i.file) for i in above}) >= 9
-    _none(i for i in above if i.target != "core" and room(i.target) not in GROUND | SHARED | {own_room(i.file)})
+def test_a_stage_imports_shared_rooms_and_itself():
+    inside = [i for i in INSIDE if own_room(i.file) in STAGES]
+    assert len({own_room(i.file) for i in inside}) == len(STAGES)
+    _none(i for i in inside if room(i.target) not in (*SHARED, own_room(i.file)))
 
 
-def test_a_stage_does_not_know_its_worker():
-    """The rooms see the capture, the settings and the reporter, not who runs them."""
-    _none(i for i in CORE if own_room(i.file) not in GROUND | {"__main__"} and i.level and room(i.target) == "worker")
+def test_other_rooms_import_no_stage():
+    """Assets and synthetic subjects; what trains a stage's network knows that stage."""
+    _none(i for i in INSIDE if own_room(i.file) not in (*STAGES, "training", "") and room(i.target) in STAGES)
+
+
+def test_only_the_worker_and_its_hosts_know_it():
+    _none(i for i in INSIDE if own_room(i.file) not in ("worker", "") and room(i.target) == "worker")
+
+
+def test_no_module_imports_itself_in_a_circle():
+    found = imports("__init__.py", "core", "wildcap_addon", "benchmarks")
+    edges: dict[str, set[str]] = {}
+    for i in found:
+        edges.setdefault(i.file.removesuffix(".py").replace("/", ".").removesuffix("__init__").removesuffix("."), set()).add(i.target)
+    assert len(edges) > 300 and "" in edges, "the extension's root is one of them"
+    while leaves := {name for name, targets in edges.items() if not targets & edges.keys()}:
+        edges = {name: targets for name, targets in edges.items() if name not in leaves}
+    assert not edges, "each of these imports another of these"
 
 
 def test_the_add_on_imports_of_core_the_ground_floor_only():
@@ -121,8 +146,13 @@ def test_the_add_on_imports_itself_relatively():
 
 def test_rooms_of_the_add_on_do_not_import_each_other():
     rooms = {path.name for path in (ROOT / "wildcap_addon").iterdir() if path.is_dir() and (path / "__init__.py").is_file()}
-    inside = [i for i in ADDON if Path(i.file).parts[1] in rooms and i.level and i.target.startswith("wildcap_addon.")]
+    inside = [i for i in ADDON if own_room(i.file) in rooms and i.level and i.target.startswith("wildcap_addon.")]
     _none(i for i in inside if room(i.target) in rooms - {own_room(i.file)})
+
+
+def test_benchmarks_import_no_tests():
+    assert any(i.target.startswith("core.") for i in BENCHMARKS)
+    _none(i for i in BENCHMARKS if i.target.split(".")[0] == "tests")
 
 
 @pytest.mark.parametrize("folder", ["core", "wildcap_addon", "benchmarks"])
@@ -136,12 +166,14 @@ def test_pictures_and_weights_go_through_one_door(folder):
                 assert "weights_only=True" in ast.unparse(node), f"{path}:{node.lineno}"
 
 
-def test_relative_import_targets_are_read_right():
+def test_import_targets_are_read_right():
     """The reading itself: a module, a name in a module, and a package."""
     def targets(file, source):
         return _targets(file, ast.parse(source).body[0])
 
-    assert targets("core/frames/video.py", "from .. import images, stages") == ["core.images", "core.stages"]
-    assert targets("core/frames/video.py", "from ..messages import Problem, Reporter") == ["core.messages"]
-    assert targets("core/report.py", "from . import __version__") == ["core"]
-    assert targets("wildcap_addon/paint/panel.py", "from ...core import stages") == ["core.stages"]
+    assert targets("core/frames/video.py", "from ..imaging import images") == ["core.imaging.images"]
+    assert targets("core/frames/video.py", "from ..contract.messages import Problem, Reporter") == ["core.contract.messages"]
+    assert targets("core/contract/report.py", "from .. import __version__") == ["core"]
+    assert targets("wildcap_addon/paint/panel.py", "from ...core.contract import stages") == ["core.contract.stages"]
+    assert targets("benchmarks/demo.py", "from core.contract import report") == ["core.contract.report"]
+    assert room("core.contract.stages") == "contract" and room("core.__main__") == room("core") == ""

@@ -5,8 +5,8 @@
 import numpy as np
 import trimesh
 
-from core.meshes import Mesh
-from core.raster import RayCaster
+from core.geometry.meshes import Mesh
+from core.geometry.raster import RayCaster
 from core.synthetic import light
 
 WHITE_SKY = np.zeros((9, 3))

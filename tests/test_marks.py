@@ -10,16 +10,18 @@ import pycolmap
 import pytest
 import torch
 
-from core import images, meshes, raster, template
-from core.capture import Capture
-from core.shadow_edges import penumbra
+from core.contract.capture import Capture
+from core.face import template
+from core.geometry import meshes, raster
+from core.geometry.views import View
+from core.imaging import images
+from core.light.shadow_edges import penumbra
 from core.solve import initial, maps, witnesses
 from core.solve.evidence import read_evidence
 from core.solve.marks import Mark, find, unlike_shadow
 from core.solve.prior import load
 from core.solve.recipes import OURS
 from core.solve.sampler import sample, seeded
-from core.views import View
 
 SIZE = 512
 TEXEL = 1024 / SIZE

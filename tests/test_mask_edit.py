@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 import torch
 
-from core import images, mask_edit, solve
-from core.capture import Capture
-from core.messages import CancelledError, Reporter
+from core import solve
+from core.contract import mask_edit
+from core.contract.capture import Capture
+from core.contract.messages import CancelledError, Reporter
+from core.contract.stages import MAPS
+from core.imaging import images
 from core.solve.window import window
-from core.stages import MAPS
 
 from .painted_skin import brief_confidence, make, settings  # noqa: F401
 

@@ -5,9 +5,10 @@
 import numpy as np
 import pytest
 
-from core import images, stages
-from core.capture import Capture
-from core.messages import Failed, Reporter, StageDone
+from core.contract import stages
+from core.contract.capture import Capture
+from core.contract.messages import Failed, Reporter, StageDone
+from core.imaging import images
 from core.worker.job import write_job
 from core.worker.runner import run_job
 

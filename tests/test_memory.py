@@ -9,14 +9,14 @@ import pytest
 import torch
 
 from core import solve
-from core.capture import Capture
-from core.messages import Problem, Reporter
-from core.settings import Settings, from_json
+from core.contract.capture import Capture
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import Settings, from_json
+from core.contract.stages import MAPS, by_name
 from core.solve.memory import sample_within_memory
 from core.solve.network import UNet
 from core.solve.recipes import Recipe
 from core.solve.sampler import sample, seeded
-from core.stages import MAPS, by_name
 
 from .painted_skin import brief_confidence, make, settings  # noqa: F401
 from .test_sampler import SmoothPrior, observation, shadow_problem, start

@@ -4,7 +4,7 @@
 
 import pytest
 
-from core.messages import KINDS, Cancelled, CancelledError, Done, Failed, Log, Preview, Progress, Reporter, StageDone, from_line, to_line
+from core.contract.messages import KINDS, Cancelled, CancelledError, Done, Failed, Log, Preview, Progress, Reporter, StageDone, from_line, to_line
 
 EVERY = (Progress("scan", 3.0, 24.0, "Paar 3 é 顔\n", 12.5), Log("line\u2028 \0"), Preview("solve", "preview/albedo.png"),
          StageDone("frames", 4.2, False, {"share": 0.9, "names": ["a", None]}), Done(3.5), Cancelled("solve"), Failed("frames", "No video.", "Choose one."))

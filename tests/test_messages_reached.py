@@ -10,8 +10,8 @@ import ast
 
 import pytest
 
-from core.messages import Problem
-from core.settings import preset
+from core.contract.messages import Problem
+from core.contract.settings import preset
 
 from . import message_sites
 
@@ -35,18 +35,18 @@ def test_reasons_reach_blender_in_one_place_alone():
 
 
 def test_what_other_processes_reached_counts(tmp_path, monkeypatch):
-    everything = message_sites._reached | {("core/settings.py", line) for line in range(1, 1000)}
+    everything = message_sites._reached | {("core/contract/settings.py", line) for line in range(1, 1000)}
     monkeypatch.setattr(message_sites, "_reached", set(everything))
     message_sites.keep(tmp_path / "reached")
     monkeypatch.setattr(message_sites, "_reached", set())
     assert len(message_sites.unreached()) > 80
     message_sites.take_in(tmp_path / "reached")
-    assert message_sites._reached == everything and not any(sentence.startswith("core/settings.py") for sentence in message_sites.unreached())
+    assert message_sites._reached == everything and not any(sentence.startswith("core/contract/settings.py") for sentence in message_sites.unreached())
 
 
 def test_a_sentence_is_noted_at_its_own_line():
-    call = next(call for call in message_sites.sentences("core/settings.py") if "no quality" in ast.unparse(call))
-    message_sites._reached -= {("core/settings.py", line) for line in range(call.lineno, call.end_lineno + 1)}
+    call = next(call for call in message_sites.sentences("core/contract/settings.py") if "no quality" in ast.unparse(call))
+    message_sites._reached -= {("core/contract/settings.py", line) for line in range(call.lineno, call.end_lineno + 1)}
     assert any("no quality" in sentence for sentence in message_sites.unreached())
     with pytest.raises(Problem):
         preset("none")

@@ -16,16 +16,16 @@ from torch import nn
 
 from benchmarks.opendelight_cost import base, enhancer, write_random
 from core import __main__ as terminal
-from core import images
-from core.capture import Capture
+from core.contract.capture import Capture
+from core.contract.messages import CancelledError, Problem, Reporter
+from core.contract.settings import DelightSettings, from_json
 from core.delight.face_crop import alignment, cut, face_mask, put_back
 from core.delight.opendelight_checkpoint import BASE, ENHANCER, load
 from core.delight.opendelight_network import base_shapes, delit, enhancer_shapes
-from core.faces import Face
-from core.messages import CancelledError, Problem, Reporter
-from core.settings import DelightSettings, from_json
+from core.face.faces import Face
+from core.imaging import images
+from core.synthetic.painted_head import camera, photograph
 from core.worker.job import read_job
-from tests.painted_head import camera, photograph
 
 room = importlib.import_module("core.delight.opendelight")  # the package names its function alike
 SMALL = {"width": 64, "depth": 2, "channels": 12, "unet": 4}

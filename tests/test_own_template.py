@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from core import atlas, meshes, registration, template
-from core.capture import Capture
-from core.messages import Problem, Reporter
+from core import registration
+from core.contract.capture import Capture
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import from_json
+from core.face import template
+from core.geometry import atlas, meshes
 from core.registration import alignment, carried, own_mesh, own_template, render_landmarks
-from core.settings import from_json
 
 from .own_heads import lay_over, person
 from .painted_egg import egg

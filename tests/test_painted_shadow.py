@@ -5,8 +5,8 @@
 import numpy as np
 
 from benchmarks.painted_shadow import sample_head
-from core import meshes
-from core.template import ASSETS
+from core.face.template import ASSETS
+from core.geometry import meshes
 
 
 def test_the_head_has_the_stored_vertices_under_the_built_in_faces(tmp_path):

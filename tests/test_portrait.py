@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from core import images
-from core.meshes import Mesh
-from core.raster import RayCaster
+from core.geometry.meshes import Mesh
+from core.geometry.raster import RayCaster
+from core.imaging import images
 from core.synthetic import environments, olat, portrait, sight
 from core.synthetic.identities import subject_mesh
 from core.synthetic.skin import make_skin

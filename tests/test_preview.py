@@ -4,8 +4,9 @@
 
 import numpy as np
 
-from core import images, solve
-from core.messages import Preview, Reporter
+from core import solve
+from core.contract.messages import Preview, Reporter
+from core.imaging import images
 from core.solve import drawing
 
 from .painted_skin import brief_confidence, make, settings  # noqa: F401

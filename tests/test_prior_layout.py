@@ -14,15 +14,19 @@ import numpy as np
 import pytest
 import torch
 
-from core import images, meshes, raster, solve, stages, template
-from core.capture import Capture
-from core.messages import Problem, Reporter
-from core.settings import from_json
+from core import solve
+from core.contract import stages
+from core.contract.capture import Capture
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import from_json
+from core.contract.stages import MAPS
+from core.face import template
+from core.geometry import meshes, raster
+from core.imaging import images
 from core.solve import initial, layout
 from core.solve.lighting import Lights
 from core.solve.maps import Maps
 from core.solve.prior import WEIGHTS, load
-from core.stages import MAPS
 
 from .own_heads import person
 from .painted_skin import brief_confidence  # noqa: F401

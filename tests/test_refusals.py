@@ -4,7 +4,7 @@
 
 import pytest
 
-from core.messages import Problem
+from core.contract.messages import Problem
 
 from . import standin
 

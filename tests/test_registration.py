@@ -8,14 +8,17 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from core import images, meshes, registration, template
-from core.capture import Capture
-from core.meshes import Mesh
-from core.messages import Problem, Reporter
+from core import registration
+from core.contract.capture import Capture
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import from_json
+from core.face import template
+from core.geometry import meshes
+from core.geometry.meshes import Mesh
+from core.geometry.views import read_views
+from core.imaging import images
 from core.registration import alignment, landmarks, nonrigid
 from core.registration.correspondence import Scan
-from core.settings import from_json
-from core.views import read_views
 
 from .painted_egg import HEIGHT, WIDTH, write_cameras
 

@@ -11,7 +11,7 @@ import pytest
 import torch
 from torch.nn import functional
 
-from core.messages import Problem
+from core.contract.messages import Problem
 from core.solve import prior, released
 from core.solve.network import denoise
 

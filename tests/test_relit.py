@@ -12,8 +12,9 @@ pytest.importorskip("flip_evaluator")
 from benchmarks import gallery, people, people_lights, relit  # noqa: E402
 from benchmarks.delight_measures import TONES, tone_group  # noqa: E402
 from benchmarks.relit_maps import Worn, read_worn, rows_of, write_row  # noqa: E402
-from core import images, template  # noqa: E402
-from core.capture import Capture  # noqa: E402
+from core.contract.capture import Capture  # noqa: E402
+from core.face import template
+from core.imaging import images  # noqa: E402
 from core.synthetic import pigment  # noqa: E402
 from core.synthetic.identities import reserved_seeds  # noqa: E402
 from core.synthetic.parameters import sample_parameters  # noqa: E402
@@ -54,7 +55,7 @@ def test_bars_stand_in_the_light_and_let_most_of_it_through():
     direction = np.array([0.5, -0.8, 0.33]) / np.linalg.norm([0.5, -0.8, 0.33])
     mesh = people_lights.bars(direction)
     np.testing.assert_allclose(mesh.vertices @ direction, 0.6, atol=1e-9)  # a plane across it
-    from core.raster import RayCaster
+    from core.geometry.raster import RayCaster
 
     starts = np.random.default_rng(0).uniform(-0.08, 0.08, (2000, 3))
     assert 0.3 < RayCaster(mesh).blocked(starts, np.repeat(direction[None], len(starts), 0)).mean() < 0.55

@@ -7,10 +7,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from core import images, report, stages
-from core.capture import Capture
-from core.messages import Problem, Reporter
-from core.settings import Settings, from_json
+from core.contract import report, stages
+from core.contract.capture import Capture
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import Settings, from_json
+from core.imaging import images
 
 
 class Page(HTMLParser):

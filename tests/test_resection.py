@@ -9,10 +9,9 @@ from benchmarks.cameras_against_truth import similarity
 from core.cameras.landmarks import fit_rays, pupils, template_landmarks
 from core.cameras.matches import Matches, tracks
 from core.cameras.resection import resect
-from core.faces import Face
-from core.messages import Reporter
-
-from .painted_head import FOCAL, HEIGHT, WIDTH, camera
+from core.contract.messages import Reporter
+from core.face.faces import Face
+from core.synthetic.painted_head import FOCAL, HEIGHT, WIDTH, camera
 
 AZIMUTHS = (-45, -20, 0, 25, 50)
 IDENTITY = np.random.default_rng(3).normal(0, 0.8, len(template_landmarks().basis))

@@ -10,7 +10,7 @@ import pytest
 from benchmarks import figures, results
 from benchmarks.placeholders import fill, measures, plain_prose, unmarked
 from benchmarks.tied_figures import Tied, differences, read_tied, refreshed
-from core.messages import Problem
+from core.contract.messages import Problem
 
 from .conftest import ROOT
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from core.messages import Problem
+from core.contract.messages import Problem
 from core.solve import checkpoint
 from core.solve.lighting import Lights, Shader, constant_light
 from core.solve.prior import coordinates

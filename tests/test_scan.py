@@ -10,15 +10,17 @@ import pycolmap
 import pytest
 import trimesh
 
-from core import images, meshes, raster, scan
-from core.capture import Capture
-from core.meshes import Mesh
-from core.messages import CancelledError, Problem, Reporter
+from core import scan
+from core.contract.capture import Capture
+from core.contract.messages import CancelledError, Problem, Reporter
+from core.contract.settings import from_json
+from core.geometry import meshes, raster
+from core.geometry.meshes import Mesh
+from core.geometry.views import read_views
+from core.imaging import images
 from core.scan.fusion import fuse
 from core.scan.pairs import choose_pairs
 from core.scan.stereo import DepthMap
-from core.settings import from_json
-from core.views import read_views
 
 WIDTH, HEIGHT, FOCAL = 360, 480, 460.0
 CENTRE, RADII = np.array([0.0, 0.06, -0.02]), np.array([0.075, 0.09, 0.11])

@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("flip_evaluator")
 
 from benchmarks.albedo_score import Truth, compare  # noqa: E402
-from core import images  # noqa: E402
+from core.imaging import images  # noqa: E402
 
 
 @pytest.fixture

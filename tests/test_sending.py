@@ -7,8 +7,8 @@ import os
 
 import pytest
 
-from core import delighter_cards
-from core import switchlight_api as service
+from core.contract import delighter_cards
+from core.contract import switchlight_api as service
 
 from . import standin
 from .drawn import Layout, drawn

@@ -7,9 +7,9 @@ from dataclasses import fields
 
 import pytest
 
-from core import stages
-from core.messages import Problem
-from core.settings import QUALITIES, Settings, from_json, preset, to_json, tooltips
+from core.contract import stages
+from core.contract.messages import Problem
+from core.contract.settings import QUALITIES, Settings, from_json, preset, to_json, tooltips
 
 EVERY = [(stage, field) for stage in stages.NAMES for field in fields(getattr(Settings(), stage))]
 

@@ -12,21 +12,23 @@ import numpy as np
 import pycolmap
 import pytest
 
-from core import images, meshes, raster, template
 from core.__main__ import main
-from core.capture import Capture, write_json
-from core.messages import Problem, Reporter
-from core.settings import from_json
+from core.contract.capture import Capture, write_json
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import from_json
+from core.face import template
+from core.geometry import meshes, raster
+from core.geometry.views import View
+from core.imaging import images
+from core.light.skylight import ambient_occlusion, radiance_transfer, sh_basis
 from core.shadow_mask import run, sunless
 from core.shadow_mask.frames import filtered, softening
 from core.shadow_mask.lift import Unfolded, lift_shadows
 from core.shadow_mask.occlusion import GENTLE, baked_occlusion
 from core.shadow_mask.tidy import over_brows
-from core.skylight import ambient_occlusion, radiance_transfer, sh_basis
-from core.views import View
+from core.synthetic.painted_head import camera
 from core.worker.job import read_job
 
-from .painted_head import camera
 from .test_shadow_mask import SHADOW, SKIN, cheek, painted_blob
 
 SIZE = 256  # of test_shadow_mask's pictures

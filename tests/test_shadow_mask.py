@@ -12,10 +12,12 @@ import pycolmap
 import pytest
 
 from benchmarks.shadow_mask import scores
-from core import images, meshes, raster, template
-from core.capture import Capture, write_json
-from core.messages import Reporter
-from core.settings import from_json
+from core.contract.capture import Capture, write_json
+from core.contract.messages import Reporter
+from core.contract.settings import from_json
+from core.face import template
+from core.geometry import meshes, raster
+from core.imaging import images
 from core.shadow_mask import run
 from core.shadow_mask.tidy import tidy
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core import template
-from core.meshes import Mesh
+from core.face import template
+from core.geometry.meshes import Mesh
 from core.synthetic import pigment
 from core.synthetic.canvas import canvas, make_canvas
 from core.synthetic.regions import regions

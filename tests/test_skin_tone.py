@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 pytest.importorskip("torch")
-from core.messages import Reporter
-from core.settings import from_json
+from core.contract.messages import Reporter
+from core.contract.settings import from_json
 from core.solve import look, population, tone
 from core.training import tones
 

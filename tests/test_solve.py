@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 import torch
 
-from core import images, solve, template
-from core.messages import CancelledError, Problem, Reporter
+from core import solve
+from core.contract.messages import CancelledError, Problem, Reporter
+from core.contract.stages import MAPS
+from core.face import template
+from core.imaging import images
 from core.solve import initial
 from core.solve.evidence import read_evidence, softened
 from core.solve.prior import WEIGHTS, load
 from core.solve.problem import albedo
-from core.stages import MAPS
 from core.synthetic.identities import reserved_seeds
 
 from .painted_skin import SIZE, TONE, as_setting, brief_confidence, make, settings  # noqa: F401

@@ -13,10 +13,12 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
-from core import images, solve, template
-from core.capture import Capture
-from core.messages import Done, Failed, Log, Progress, Reporter
-from core.stages import MAPS
+from core import solve
+from core.contract.capture import Capture
+from core.contract.messages import Done, Failed, Log, Progress, Reporter
+from core.contract.stages import MAPS
+from core.face import template
+from core.imaging import images
 from core.worker.client import Worker
 from core.worker.job import write_job
 

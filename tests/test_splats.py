@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from core.meshes import Mesh
-from core.messages import Problem
-from core.raster import RayCaster, interpolate
+from core.contract.messages import Problem
+from core.geometry.meshes import Mesh
+from core.geometry.raster import RayCaster, interpolate
 from core.scan import splats
 from core.scan.fusion import fuse
 

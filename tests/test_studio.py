@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from benchmarks.cameras_against_truth import similarity
-from core import cameras, delight, frames, images, meshes, shadow_mask, texture
-from core.capture import Capture
-from core.messages import Problem, Reporter
-from core.settings import from_json
-from core.views import read_views
-
-from . import painted_head
+from core import cameras, delight, frames, shadow_mask, texture
+from core.contract.capture import Capture
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import from_json
+from core.geometry import meshes
+from core.geometry.views import read_views
+from core.imaging import images
+from core.synthetic import painted_head
 
 
 def calibration(views: list) -> str:

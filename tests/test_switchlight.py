@@ -12,13 +12,13 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from core import consent, images
-from core import switchlight_api as service
-from core.capture import Capture, write_json
+from core.contract import consent, switchlight_api
+from core.contract.capture import Capture, write_json
+from core.contract.messages import CancelledError, Problem, Reporter
+from core.contract.settings import from_json
 from core.delight import run, switchlight_calls
 from core.delight.switchlight_line import Patience
-from core.messages import CancelledError, Problem, Reporter
-from core.settings import from_json
+from core.imaging import images
 
 from . import standin
 from .switchlight_server import KEY, Service
@@ -35,9 +35,9 @@ HURRIED = Patience(tries=4, first_s=0.02, most_s=0.1)
 def capture(tmp_path, monkeypatch) -> Capture:
     """Three selected frames of four, a key, and an impatient client."""
     capture = make(tmp_path / "Zoë.wildcap")
-    monkeypatch.setenv(service.KEY_VARIABLE, KEY)
+    monkeypatch.setenv(switchlight_api.KEY_VARIABLE, KEY)
     monkeypatch.setattr(switchlight, "PATIENCE", HURRIED)
-    for name in (service.OFFLINE_VARIABLE, consent.GIVEN_VARIABLE):
+    for name in (switchlight_api.OFFLINE_VARIABLE, consent.GIVEN_VARIABLE):
         monkeypatch.delenv(name, raising=False)
     return capture
 
@@ -49,7 +49,7 @@ def serve(monkeypatch):
 
     def start(*plan, **options) -> Service:
         running.append(Service(plan, **options))
-        monkeypatch.setenv(service.BASE_VARIABLE, running[-1].url)
+        monkeypatch.setenv(switchlight_api.BASE_VARIABLE, running[-1].url)
         return running[-1]
 
     yield start
@@ -118,12 +118,12 @@ def test_nothing_is_sent_without_consent_a_key_or_a_network(capture, serve, monk
         with pytest.raises(Problem, match=r"waits for your consent: 3 frames .* 3 credits.* Nothing was sent.*--send-frames"):
             delight(capture)
         agree(capture)
-        monkeypatch.setenv(service.OFFLINE_VARIABLE, "1")
+        monkeypatch.setenv(switchlight_api.OFFLINE_VARIABLE, "1")
         with pytest.raises(Problem, match="work offline"):
             delight(capture)
-        monkeypatch.delenv(service.OFFLINE_VARIABLE)
+        monkeypatch.delenv(switchlight_api.OFFLINE_VARIABLE)
         for bad in ("", f"{KEY}\r\nX: y", f"{KEY} {KEY}", f"{KEY}…"):
-            monkeypatch.setenv(service.KEY_VARIABLE, bad)
+            monkeypatch.setenv(switchlight_api.KEY_VARIABLE, bad)
             with pytest.raises(Problem, match="key") as caught:
                 delight(capture)
             assert KEY not in str(caught.value)
@@ -148,9 +148,9 @@ def test_consent_holds_for_these_pictures_here_and_nothing_else(capture, serve, 
     assert not consent.given(capture, consent.sending(capture, True)), "other answers"
     serve()
     assert consent.given(capture, consent.sending(capture, False)), "the same machine"
-    monkeypatch.setenv(service.BASE_VARIABLE, "https://elsewhere.example/v1")
+    monkeypatch.setenv(switchlight_api.BASE_VARIABLE, "https://elsewhere.example/v1")
     assert not consent.given(capture, consent.sending(capture, False)), "another machine"
-    monkeypatch.setenv(service.BASE_VARIABLE, first.url)
+    monkeypatch.setenv(switchlight_api.BASE_VARIABLE, first.url)
     capture.consent.write_text('{"frames": 3}')
     assert not consent.given(capture, consent.sending(capture, False)), "damaged"
     monkeypatch.setenv(consent.GIVEN_VARIABLE, consent.by_flag(other)[consent.GIVEN_VARIABLE])
@@ -163,7 +163,7 @@ def test_consent_holds_for_these_pictures_here_and_nothing_else(capture, serve, 
 
 
 def test_the_key_goes_to_safe_addresses_only(capture, serve, monkeypatch):
-    monkeypatch.setenv(service.BASE_VARIABLE, "http://sdk.example/v1")
+    monkeypatch.setenv(switchlight_api.BASE_VARIABLE, "http://sdk.example/v1")
     with pytest.raises(Problem, match="not a safe one"):
         delight(capture)
     elsewhere = serve()
@@ -182,7 +182,7 @@ def test_a_busy_service_gets_time_and_each_frame_is_charged_once(tmp_path, captu
         found = delight(capture)
         assert len(found) == 9 and all(each.shadow is None for each in found)
         assert len(server.calls) == 9 + len(busy) and set(server.charged.values()) == {1} and len(server.charged) == 9
-        assert server.most_at_once == service.MOST_AT_ONCE == 3
+        assert server.most_at_once == switchlight_api.MOST_AT_ONCE == 3
         assert max(b - a for a, b in zip(server.times, server.times[1:], strict=False)) > 0.9, "the service asked for a second"
 
 
@@ -250,7 +250,7 @@ def test_a_service_that_is_not_there_or_does_not_know_the_key_gets_no_picture(ca
     with pytest.raises(Problem, match=r"cannot be used now: it cannot be reached \(Connection refused\)\. Nothing was sent"):
         delight(capture)
     with serve() as server:
-        monkeypatch.setenv(service.KEY_VARIABLE, "another")
+        monkeypatch.setenv(switchlight_api.KEY_VARIABLE, "another")
         with pytest.raises(Problem, match="does not accept the key"):
             delight(capture)
         assert server.calls == []

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from core import consent
-from core import switchlight_api as service
 from core.__main__ import main
+from core.contract import consent
+from core.contract import switchlight_api as service
 from core.worker.job import write_job
 
 from .switchlight_server import KEY, Service

@@ -13,8 +13,10 @@ pytest.importorskip("pycolmap")
 
 import av  # noqa: E402
 
-from core import faces, images, raster, template  # noqa: E402
-from core.meshes import vertex_normals  # noqa: E402
+from core.face import faces, template  # noqa: E402
+from core.geometry import raster
+from core.geometry.meshes import vertex_normals  # noqa: E402
+from core.imaging import images
 from core.synthetic import sample, scene  # noqa: E402
 from core.synthetic.identities import reserved_seeds, subject_mesh  # noqa: E402
 

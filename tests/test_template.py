@@ -7,7 +7,8 @@ import pytest
 
 pytest.importorskip("OpenImageIO")
 
-from core import raster, template  # noqa: E402
+from core.face import template
+from core.geometry import raster  # noqa: E402
 
 FROZEN = "d77cc1f89fd306ed5b300c0877415150"  # every shipped weight depends on this topology and these UVs: never change it
 

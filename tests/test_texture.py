@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from core import images, texture
-from core.messages import CancelledError, Problem, Reporter
-from core.settings import from_json
+from core import texture
+from core.contract.messages import CancelledError, Problem, Reporter
+from core.contract.settings import from_json
+from core.imaging import images
 
 from .painted_egg import capture_of, skin
 

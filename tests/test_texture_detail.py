@@ -11,9 +11,11 @@ import pytest
 import torch
 
 from benchmarks.detail import moles
-from core import meshes, template, texture
-from core.messages import Problem, Reporter
-from core.settings import from_json
+from core import texture
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import from_json
+from core.face import template
+from core.geometry import meshes
 from core.texture import features, foreign
 from core.texture.perceptual import refine
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import torch
 
-from core import images, template
-from core.messages import Problem, Reporter
+from core.contract.messages import Problem, Reporter
+from core.face import template
+from core.imaging import images
 from core.solve.prior import build, load
 from core.synthetic import pigment
 from core.training import prior, skins

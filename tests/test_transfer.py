@@ -10,11 +10,14 @@ import cv2
 import numpy as np
 import pytest
 
-from core import atlas, baking, images, meshes, raster, stages, surfaces, transfer
-from core.capture import Capture
-from core.meshes import Mesh, vertex_normals
-from core.messages import CancelledError, Problem, Reporter
-from core.settings import from_json
+from core import transfer
+from core.contract import stages
+from core.contract.capture import Capture
+from core.contract.messages import CancelledError, Problem, Reporter
+from core.contract.settings import from_json
+from core.geometry import atlas, baking, meshes, raster, surfaces
+from core.geometry.meshes import Mesh, vertex_normals
+from core.imaging import images
 from core.transfer import scan
 
 from .painted_egg import capture_of, egg, skin

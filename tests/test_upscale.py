@@ -7,10 +7,13 @@ import OpenImageIO as oiio
 import pytest
 import torch
 
-from core import images, stages, template, upscale
-from core.capture import Capture
-from core.messages import CancelledError, Problem, Reporter
-from core.settings import from_json
+from core import upscale
+from core.contract import stages
+from core.contract.capture import Capture
+from core.contract.messages import CancelledError, Problem, Reporter
+from core.contract.settings import from_json
+from core.face import template
+from core.imaging import images
 from core.training import fine_windows, upscaler
 from core.upscale import gloss, network
 from core.upscale.enlarge import enlarge, load_network

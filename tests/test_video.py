@@ -10,11 +10,11 @@ import av
 import numpy as np
 import pytest
 
-from core import images
+from core.contract.messages import Reporter
 from core.frames import video
 from core.frames.colour import HLG, P3, PQ, REC709, REC2020, to_srgb
 from core.frames.source import evenly_in_time
-from core.messages import Reporter
+from core.imaging import images
 
 WEIGHTS = {1: (0.2126, 0.0722), 9: (0.2627, 0.0593)}  # Kr and Kb of the matrices Rec. 709 and Rec. 2020
 

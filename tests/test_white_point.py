@@ -6,11 +6,12 @@ import cv2
 import numpy as np
 import pytest
 
-from core import images, stages
 from core.__main__ import main
-from core.capture import Capture
-from core.messages import Problem, Reporter
-from core.settings import Settings, from_json
+from core.contract import stages
+from core.contract.capture import Capture
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import Settings, from_json
+from core.imaging import images
 
 white_point = pytest.importorskip("core.solve.white_point")
 LIGHT = np.array([0.9, 0.8, 0.6])

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core import template
-from core.messages import Reporter
+from core.contract.messages import Reporter
+from core.face import template
 from core.upscale import grain
 from core.upscale.maps import Maps
 from core.upscale.whole_head import complete, seen_well

@@ -16,10 +16,10 @@ from pathlib import Path
 
 import pytest
 
-from core import stages
-from core.capture import Capture
-from core.messages import Cancelled, Done, Failed, Log, Problem, Progress, StageDone
-from core.report import findings
+from core.contract import stages
+from core.contract.capture import Capture
+from core.contract.messages import Cancelled, Done, Failed, Log, Problem, Progress, StageDone
+from core.contract.report import findings
 from core.worker.client import GRACE_S, Worker
 
 from . import tiny_chain

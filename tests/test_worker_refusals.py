@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from core.capture import Capture, storage_problem
-from core.messages import Done, Failed, Problem
+from core.contract.capture import Capture, storage_problem
+from core.contract.messages import Done, Failed, Problem
 from core.worker import installation
 from core.worker.job import read_job, write_job
 from core.worker.runner import explained, run_job

@@ -12,21 +12,20 @@ import sys
 import time
 from pathlib import Path
 
-from core import stages
-from core.capture import Capture
-from core.messages import Message
+from core.contract import stages
+from core.contract.capture import Capture
+from core.contract.messages import Message
 from core.worker.client import Worker
 from core.worker.job import write_job
 
 ROOT = Path(__file__).resolve().parent.parent
-GROUND = ("__init__.py", "__main__.py", "capture.py", "hashes.py", "settings.py", "stages.py", "messages.py", "mask_history.py", "artist_landmarks.py",
-          "report.py", "consent.py", "switchlight_api.py", "delighter_cards.py", "delivery_presets.py", "delivery_plan.py")
+GROUND = ("__init__.py", "__main__.py", "contract", "worker")
 
 ROOM = '''
 import errno, hashlib, json, os, sys, time
-from .. import stages
-from ..capture import replacing, replacing_folder
-from ..messages import Problem
+from ..contract import stages
+from ..contract.capture import replacing, replacing_folder
+from ..contract.messages import Problem
 
 def run(capture, settings, report):
     stage = stages.by_name(__name__.rsplit(".", 1)[1])
@@ -82,8 +81,11 @@ def build(folder: Path) -> Path:
     core = folder / "core"
     core.mkdir(parents=True)
     for name in GROUND:
-        shutil.copyfile(ROOT / "core" / name, core / name)
-    shutil.copytree(ROOT / "core" / "worker", core / "worker", ignore=shutil.ignore_patterns("__pycache__"))
+        path = ROOT / "core" / name
+        if path.is_dir():
+            shutil.copytree(path, core / name, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copyfile(path, core / name)
     for stage in stages.STAGES:
         (core / stage.name).mkdir()
         (core / stage.name / "__init__.py").write_text(ROOM, encoding="utf-8")

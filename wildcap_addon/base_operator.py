@@ -7,7 +7,7 @@ import traceback
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..core.messages import Problem
+from ..core.contract.messages import Problem
 from . import captures, problems, status
 
 WIDTH = 460

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import bpy
 
-from ..core.capture import Capture
-from ..core.messages import Problem
+from ..core.contract.capture import Capture
+from ..core.contract.messages import Problem
 
 HEAD_KEY = "wildcap_capture"
 """Custom property of a head object: its capture's folder."""

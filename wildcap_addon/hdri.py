@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 
-from ..core.messages import Problem
+from ..core.contract.messages import Problem
 
 _items: list[tuple[str, str, str]] = []  # Blender keeps no reference to the strings of a dynamic enum
 

@@ -14,9 +14,9 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ..core import messages, stages
-from ..core.messages import Problem
-from ..core.settings import Settings
+from ..core.contract import messages, stages
+from ..core.contract.messages import Problem
+from ..core.contract.settings import Settings
 from ..core.worker.background import Task
 from ..core.worker.client import Worker
 from ..core.worker.job import read_job, write_job
@@ -67,7 +67,7 @@ def can_start(operator, context) -> bool:
 
 def start(item, goal: str, *, first: str | None = None, last: str | None = None, tool: str = "", then: Callable[[], None] | None = None,
           on_preview: Callable[[str], None] | None = None, **shared) -> Job:
-    """Starts the stages from `first` (or from what is not fresh) to `last`, or one of core.stages.TOOLS, with `shared` settings for this once.
+    """Starts the stages from `first` (or from what is not fresh) to `last`, or one of core.contract.stages.TOOLS, with `shared` settings for this once.
     Raises Problem when it cannot."""
     capture, root = captures.folder(item), captures.root(item)
     if root in _jobs:

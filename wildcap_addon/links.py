@@ -11,7 +11,7 @@ from pathlib import Path
 
 import bpy
 
-from ..core.capture import Capture
+from ..core.contract.capture import Capture
 from . import captures, preferences
 
 

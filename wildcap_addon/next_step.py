@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..core import stages
+from ..core.contract import stages
 
 if TYPE_CHECKING:
     from .status import Status

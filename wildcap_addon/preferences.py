@@ -9,9 +9,9 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from .. import __package__ as base_package
-from ..core import switchlight_api
-from ..core.messages import Problem
+from ..core.contract import switchlight_api
+from ..core.contract.messages import Problem
+from . import extension
 
 COMPUTES = [('auto', "Automatic", "For the GPU where there is an NVIDIA one or an Apple one, else for the CPU"),
             *([('apple', "Apple", "For Apple GPUs, by Metal; the CPU can be chosen as well")] if sys.platform == "darwin" else
@@ -25,7 +25,7 @@ _aside: set[str] = set()  # Pythons that were found not to answer, in this sessi
 
 
 class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
-    bl_idname = base_package
+    bl_idname = extension.NAME
 
     python: bpy.props.StringProperty(
         name="Solver Python", subtype='FILE_PATH',
@@ -86,7 +86,7 @@ def draw_key(layout, label: str) -> None:
 
 
 def get() -> WILDCAP_AP_preferences:
-    return bpy.context.preferences.addons[base_package].preferences
+    return bpy.context.preferences.addons[extension.NAME].preferences
 
 
 def has_switchlight_key() -> bool:
@@ -128,7 +128,7 @@ def set_python(path: Path | None, device: str = "") -> None:
 def environment_folder() -> Path:
     """Where Install Solver makes its environment: kept across updates, outside the extension's own files."""
     chosen = get().environment
-    return Path(bpy.path.abspath(chosen) if chosen else bpy.utils.extension_path_user(base_package, path="solver"))
+    return Path(bpy.path.abspath(chosen) if chosen else bpy.utils.extension_path_user(extension.NAME, path="solver"))
 
 
 def captures_folder(saved: bool = True) -> Path:

@@ -7,7 +7,7 @@ import textwrap
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ..core.messages import Problem
+from ..core.contract.messages import Problem
 
 
 class Notice(Problem):

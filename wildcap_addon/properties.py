@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the .blend keeps: the list of captures and each one's settings. Groups are built from core.settings.
+"""What the .blend keeps: the list of captures and each one's settings. Groups are built from core.contract.settings.
 
 Default, range, unit and tooltip of every setting are written there; run-time state lives in `jobs` and `status`.
 """
@@ -10,8 +10,8 @@ from pathlib import Path
 
 import bpy
 
-from ..core import delighter_cards, delivery_presets, stages
-from ..core import settings as core_settings
+from ..core.contract import delighter_cards, delivery_presets, stages
+from ..core.contract import settings as core_settings
 from . import captures, preferences
 from . import hdri as worlds
 

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import bpy
 
-from ..core import consent, mask_edit, report, stages
-from ..core.capture import Capture
-from ..core.messages import Problem
+from ..core.contract import consent, mask_edit, report, stages
+from ..core.contract.capture import Capture
+from ..core.contract.messages import Problem
 from . import captures, properties
 
 INTERVAL_S = 1.0
@@ -35,7 +35,7 @@ class Status:
     render: str = ""
     whole_solve: str = ""  # why an edited part of the mask cannot be solved alone; '' where it can
     interrupted: bool = False  # a solve was stopped on its way, and can go on from its checkpoint
-    findings: tuple[dict, ...] = ()  # what is wrong with the capture, as core.report.findings tells it
+    findings: tuple[dict, ...] = ()  # what is wrong with the capture, as core.contract.report.findings tells it
     problem: Problem | None = None
     missing: bool = False  # the folder is not there
     sending: consent.Sending | None = None  # what SwitchLight, where it is chosen, would get of the frames; None before there are any

@@ -12,10 +12,10 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from .. import __package__ as base_package
-from ..core.capture import write_json
-from ..core.messages import Problem
-from ..core.settings import QUALITIES, Settings, preset
+from ..core.contract.capture import write_json
+from ..core.contract.messages import Problem
+from ..core.contract.settings import QUALITIES, Settings, preset
+from . import extension
 
 _rates: dict[str, float] = {}  # device -> seconds per million texels and step
 
@@ -50,7 +50,7 @@ def _spoken(value: float) -> str:
 
 
 def _file() -> Path:
-    return Path(bpy.utils.extension_path_user(base_package, create=True)) / "timings.json"
+    return Path(bpy.utils.extension_path_user(extension.NAME, create=True)) / "timings.json"
 
 
 def register():

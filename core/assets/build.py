@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import images, meshes
-from ..capture import replacing, write_json
-from ..meshes import Mesh
-from ..template import ASSETS, template_hash
+from ..contract.capture import replacing, write_json
+from ..face.template import ASSETS, template_hash
+from ..geometry import meshes
+from ..geometry.meshes import Mesh
+from ..imaging import images
 from .identities import identity_space
 from .makehuman import HeadBuilder, read_base
 from .marks import find_landmarks

@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..capture import replacing
-from ..template import ASSETS, load
+from ..contract.capture import replacing
+from ..face.template import ASSETS, load
 from .acting import LEFT_EYE, RIGHT_EYE, OpenHead, open_head
 from .identities import SAMPLES, bodies
 from .makehuman import PUPIL_DISTANCE, Base, HeadBuilder, read_base

@@ -8,9 +8,10 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from .. import faces, images
-from ..meshes import Mesh, vertex_normals
-from ..raster import RayCaster
+from ..face import faces
+from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.raster import RayCaster
+from ..imaging import images
 
 OVAL = (10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377, 152, 148, 176, 149, 150, 136, 172, 58, 132, 93, 234,
         127, 162, 21, 54, 103, 67, 109)

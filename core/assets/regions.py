@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import trimesh
 
-from ..meshes import Mesh
-from ..raster import bleed, interpolate, rasterize_uv
+from ..geometry.meshes import Mesh
+from ..geometry.raster import bleed, interpolate, rasterize_uv
 from .marks import BROWS, EYES, LIPS, OVAL
 
 MASK_SIZE = 1024
@@ -122,8 +122,8 @@ def _connected(mask: np.ndarray, size: int) -> np.ndarray:
 
 def _nostrils(mesh: Mesh, position: np.ndarray, nose: np.ndarray) -> np.ndarray:
     """Texels inside the nose's outline from which less than a third of the frontal directions see out."""
-    from ..meshes import vertex_normals
-    from ..raster import RayCaster
+    from ..geometry.meshes import vertex_normals
+    from ..geometry.raster import RayCaster
 
     rng = np.random.default_rng(0)
     near = np.linalg.norm(mesh.vertices - position[nose > 0.9].mean(0), axis=1) < 0.04

@@ -12,10 +12,10 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from .. import images
-from ..capture import Capture, replacing_folder
-from ..messages import Problem
-from ..template import ASSETS
+from ..contract.capture import Capture, replacing_folder
+from ..contract.messages import Problem
+from ..face.template import ASSETS
+from ..imaging import images
 
 PICTURES = ("texture.png", "texture_filmed.png", "comparison/delit.png", "comparison/filmed.png")
 SIZE = 1024

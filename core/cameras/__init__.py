@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import images
-from ..capture import Capture, replacing_folder
-from ..messages import Problem, Reporter
-from ..settings import Settings
+from ..contract.capture import Capture, replacing_folder
+from ..contract.messages import Problem, Reporter
+from ..contract.settings import Settings
+from ..imaging import images
 from . import coverage
 from .calibration import import_cameras
 from .drawing import draw_cameras

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pycolmap
 
-from .. import images
+from ..imaging import images
 
 AXES = (((1.0, 0.2, 0.2), (0.1, 0, 0)), ((0.2, 0.9, 0.2), (0, -0.1, 0)), ((0.3, 0.5, 1.0), (0, 0, 0.1)))  # colour, tip [m]: left, forward, up
 

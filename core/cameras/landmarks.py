@@ -15,8 +15,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from .. import faces, images, meshes, template
-from ..messages import Reporter
+from ..contract.messages import Reporter
+from ..face import faces, template
+from ..geometry import meshes
+from ..imaging import images
 
 RIGHT_LIDS = (33, 7, 163, 144, 145, 153, 154, 155, 133, 173, 157, 158, 159, 160, 161, 246)
 LEFT_LIDS = (263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 387, 388, 466)

@@ -11,8 +11,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from .. import images
-from ..messages import Reporter
+from ..contract.messages import Reporter
+from ..imaging import images
 
 SIDE = 640
 FEATURES = 1500

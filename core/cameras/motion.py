@@ -12,8 +12,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from .. import faces, images
-from ..messages import Reporter
+from ..contract.messages import Reporter
+from ..face import faces
+from ..imaging import images
 from .matches import Matches
 
 TURNED_DEG = 12.0

@@ -15,8 +15,8 @@ import cv2
 import numpy as np
 import pycolmap
 
-from .. import faces
-from ..messages import Reporter
+from ..contract.messages import Reporter
+from ..face import faces
 from .bundle import Bundle, Observations, adjust
 from .landmarks import template_landmarks
 from .matches import Matches, tracks

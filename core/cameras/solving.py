@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 
-from .. import faces
-from ..capture import Capture
-from ..messages import Problem, Reporter
-from ..settings import Settings
+from ..contract.capture import Capture
+from ..contract.messages import Problem, Reporter
+from ..contract.settings import Settings
+from ..face import faces
 from .landmarks import find_landmarks
 from .matches import Matches
 from .mirrored import find_mirrored

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pycolmap
 
-from .. import images
-from ..messages import Problem, Reporter
+from ..contract.messages import Problem, Reporter
+from ..imaging import images
 from .matches import Matches, read_matches
 
 ALL_PAIRS = 40

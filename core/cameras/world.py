@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import pycolmap
 
-from .. import faces
-from ..messages import Problem
+from ..contract.messages import Problem
+from ..face import faces
 from .landmarks import fit_rays, pupils, template_landmarks
 
 FRONTAL_DEG = 45.0

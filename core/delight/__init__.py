@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import images
-from ..capture import Capture, replacing_folder
-from ..messages import Reporter
-from ..settings import Settings
+from ..contract.capture import Capture, replacing_folder
+from ..contract.messages import Reporter
+from ..contract.settings import Settings
+from ..imaging import images
 from .contract import Delighter, Photographer
 from .folder import folder
 from .network import delight_photograph as delight_with_network

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..capture import Capture
-from ..messages import Reporter
-from ..settings import DelightSettings, Settings
-from ..views import View
+from ..contract.capture import Capture
+from ..contract.messages import Reporter
+from ..contract.settings import DelightSettings, Settings
+from ..geometry.views import View
 
 
 @dataclass(frozen=True)

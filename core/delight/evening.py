@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ..meshes import vertex_normals
-from ..raster import interpolate, rasterize_uv, sample, visible_from
-from ..views import View
+from ..geometry.meshes import vertex_normals
+from ..geometry.raster import interpolate, rasterize_uv, sample, visible_from
+from ..geometry.views import View
 from .lit_head import LitHead
 
 UV_SIDE = 256

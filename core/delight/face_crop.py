@@ -10,8 +10,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from .. import images
-from ..faces import Face
+from ..face.faces import Face
+from ..imaging import images
 
 EYES = ((33, 160, 158, 133, 153, 144), (362, 385, 387, 263, 373, 380))
 """Landmarks round the person's right and left eye: the places of 36 to 47 of the 68 points that FFHQ's alignment is written for."""

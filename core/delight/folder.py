@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighter that takes pictures made elsewhere, by any tool; core/frame_pictures.py says which belongs to which frame."""
+"""The delighter that takes pictures made elsewhere, by any tool; core/geometry/frame_pictures.py says which belongs to which frame."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..capture import Capture
-from ..frame_pictures import pictures_of, read_picture
-from ..messages import Reporter
-from ..settings import Settings
+from ..contract.capture import Capture
+from ..contract.messages import Reporter
+from ..contract.settings import Settings
+from ..geometry.frame_pictures import pictures_of, read_picture
 from .contract import Delit
 
 

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import meshes
-from ..capture import Capture
-from ..meshes import Mesh
-from ..messages import Reporter
-from ..raster import RayCaster, interpolate
-from ..skylight import radiance_transfer
-from ..sunlight import Light, fit_light
-from ..views import View
+from ..contract.capture import Capture
+from ..contract.messages import Reporter
+from ..geometry import meshes
+from ..geometry.meshes import Mesh
+from ..geometry.raster import RayCaster, interpolate
+from ..geometry.views import View
+from ..light.skylight import radiance_transfer
+from ..light.sunlight import Light, fit_light
 from .surface import skin_weights, smooth_normals, vertex_colours
 
 BRIGHTEST = 0.85  # a tone's largest channel: more than skin reflects, so a brighter picture was over-exposed

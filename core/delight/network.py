@@ -20,12 +20,13 @@ import numpy as np
 import torch
 from safetensors.torch import load_file
 
-from .. import faces, images, template
-from ..capture import Capture
-from ..messages import Problem, Reporter
-from ..raster import interpolate, sample
-from ..settings import DelightSettings, Settings
-from ..views import View, read_views
+from ..contract.capture import Capture
+from ..contract.messages import Problem, Reporter
+from ..contract.settings import DelightSettings, Settings
+from ..face import faces, template
+from ..geometry.raster import interpolate, sample
+from ..geometry.views import View, read_views
+from ..imaging import images
 from .casts import without_casts
 from .contract import Delit
 from .evening import Look, even_out

@@ -8,11 +8,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .. import images
-from ..capture import Capture
-from ..messages import Reporter
-from ..settings import DelightSettings, Settings
-from ..views import read_views
+from ..contract.capture import Capture
+from ..contract.messages import Reporter
+from ..contract.settings import DelightSettings, Settings
+from ..geometry.views import read_views
+from ..imaging import images
 from .contract import Delit
 
 

@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from .. import images
-from ..capture import Capture
-from ..faces import Face, detect, segment_person
-from ..messages import Problem, Reporter
-from ..settings import DelightSettings, Settings
-from ..views import read_views
+from ..contract.capture import Capture
+from ..contract.messages import Problem, Reporter
+from ..contract.settings import DelightSettings, Settings
+from ..face.faces import Face, detect, segment_person
+from ..geometry.views import read_views
+from ..imaging import images
 from .contract import Delit
 from .face_crop import alignment, cut, face_mask, put_back
 from .opendelight_checkpoint import Checkpoint, load

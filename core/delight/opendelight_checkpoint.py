@@ -11,7 +11,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from ..messages import Problem
+from ..contract.messages import Problem
 from .opendelight_network import HEAD, base_shapes, enhancer_shapes
 
 BASE, ENHANCER = "base_delight_network.pth", "unet_enhancer.pth"

@@ -12,12 +12,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .. import images
-from ..capture import Capture
-from ..messages import Reporter
-from ..raster import bleed, interpolate, render_view
-from ..settings import Settings
-from ..views import View, read_views
+from ..contract.capture import Capture
+from ..contract.messages import Reporter
+from ..contract.settings import Settings
+from ..geometry.raster import bleed, interpolate, render_view
+from ..geometry.views import View, read_views
+from ..imaging import images
 from .contract import Delit
 from .lit_head import LitHead, lit_head
 from .occlusion import seamless, sun_share

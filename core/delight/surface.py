@@ -7,11 +7,12 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sparse
 
-from .. import images, template
-from ..meshes import Mesh, vertex_normals
-from ..messages import Problem, Reporter
-from ..raster import RayCaster, sample, visible_from
-from ..views import View
+from ..contract.messages import Problem, Reporter
+from ..face import template
+from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.raster import RayCaster, sample, visible_from
+from ..geometry.views import View
+from ..imaging import images
 
 GRAZING = 0.35  # cosine of the view angle under which a vertex's colour is not trusted
 NOT_SKIN = ("lips", "brows", "eyes")

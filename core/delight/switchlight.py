@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The delighter that the paper uses: SwitchLight, a paid service of Beeble (Kim et al., CVPR 2024). The selected frames leave the machine.
 
-Nothing is sent without the artist's consent (core/consent.py), nothing twice: answers are kept in the capture by the hash of what was sent. They say
-nothing about shadows. What is known of the service, and how well, is in core/switchlight_api.py.
+Nothing is sent without the artist's consent (core/contract/consent.py), nothing twice: answers are kept in the capture by the hash of what was sent. They say
+nothing about shadows. What is known of the service, and how well, is in core/contract/switchlight_api.py.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ from concurrent.futures import Future, wait
 
 import numpy as np
 
-from .. import consent, images
-from .. import switchlight_api as service
-from ..capture import Capture
-from ..hashes import hash_file
-from ..messages import Problem, Reporter
-from ..settings import Settings
-from ..views import View, read_views
+from ..contract import consent
+from ..contract import switchlight_api as service
+from ..contract.capture import Capture
+from ..contract.hashes import hash_file
+from ..contract.messages import Problem, Reporter
+from ..contract.settings import Settings
+from ..geometry.views import View, read_views
+from ..imaging import images
 from .contract import Delit
 from .switchlight_calls import KINDS, Account, balance
 from .switchlight_line import Parcel, Patience, send

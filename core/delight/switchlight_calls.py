@@ -21,8 +21,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .. import __version__
-from .. import switchlight_api as service
-from ..messages import Problem
+from ..contract import switchlight_api as service
+from ..contract.messages import Problem
 
 KINDS = {".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".png": "image/png", ".webp": "image/webp"}
 BUSY = (408, 425, 429, 500, 502, 503, 504)

@@ -13,10 +13,10 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from .. import images
-from .. import switchlight_api as service
-from ..capture import replacing
-from ..messages import Problem, Reporter
+from ..contract import switchlight_api as service
+from ..contract.capture import replacing
+from ..contract.messages import Problem, Reporter
+from ..imaging import images
 from .switchlight_calls import Account, AgainError, albedo
 
 

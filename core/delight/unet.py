@@ -12,7 +12,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from .. import images
+from ..imaging import images
 
 SIDE = 256  # of the picture it looks at
 CHANNELS = 16

@@ -10,12 +10,15 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from .. import delivery_plan, images, meshes, provenance, stages, template
-from ..capture import Capture, replacing_folder, write_json
-from ..delivery_plan import PACKING, TEXTURES, Plan
-from ..delivery_presets import HAIR, SCAN_MAPS, Picture
-from ..messages import Problem, Reporter
-from ..settings import Settings
+from ..contract import delivery_plan, provenance, stages
+from ..contract.capture import Capture, replacing_folder, write_json
+from ..contract.delivery_plan import PACKING, TEXTURES, Plan
+from ..contract.delivery_presets import HAIR, SCAN_MAPS, Picture
+from ..contract.messages import Problem, Reporter
+from ..contract.settings import Settings
+from ..face import template
+from ..geometry import meshes
+from ..imaging import images
 from . import maps, wavefront
 
 HEAD_TILE = 1001

@@ -12,9 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import images, skin_regions, template
-from ..delivery_plan import Plan
-from ..delivery_presets import COLOUR, NORMAL, Picture
+from ..contract import skin_regions
+from ..contract.delivery_plan import Plan
+from ..contract.delivery_presets import COLOUR, NORMAL, Picture
+from ..face import template
+from ..imaging import images
 
 F0 = 0.0278
 """What skin of an IOR of 1.4 reflects at normal incidence, ((1.4 - 1) / (1.4 + 1))^2, where the specular map is at its mean of facial skin."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import floor
 from pathlib import Path
 
-from ..delivery_plan import Plan
+from ..contract.delivery_plan import Plan
 
 HEAD_TILE = 1001
 LINKS = {"base_color": "map_Kd", "normal": "norm", "roughness": "map_Pr", "specular": "map_Ks"}

@@ -15,10 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import faces, images
-from ..capture import Capture, replacing_folder, write_json
-from ..messages import Problem, Reporter
-from ..settings import Settings
+from ..contract.capture import Capture, replacing_folder, write_json
+from ..contract.messages import Problem, Reporter
+from ..contract.settings import Settings
+from ..face import faces
+from ..imaging import images
 from .doctor import FEW, blurred, diagnose, examine
 from .drift import content_of, gains_of
 from .eyes import blinks

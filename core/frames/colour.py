@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import images
+from ..imaging import images
 
 SDR, HLG, PQ = 1, 18, 16
 """Transfer characteristics as ITU-T H.273 numbers them; all that is neither HLG nor PQ is shown as it is."""

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from skimage.measure import blur_effect
 
-from ..messages import Problem, Reporter
+from ..contract.messages import Problem, Reporter
 from .select import turns
 
 FEW = 12

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from .. import faces, images
+from ..face import faces
+from ..imaging import images
 
 WIDTH = 480
 """Longer side at which colours are compared, in pixels: fine detail and noise are gone, motion blur hardly matters."""

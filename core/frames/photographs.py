@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from .. import images
-from ..messages import Problem, Reporter
+from ..contract.messages import Problem, Reporter
+from ..imaging import images
 from .colour import P3, SDR, to_srgb
 from .source import Picture, evenly, fit
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import images
+from ..imaging import images
 
 
 @dataclass(frozen=True)

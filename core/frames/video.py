@@ -15,7 +15,7 @@ from pathlib import Path
 import av
 import numpy as np
 
-from ..messages import Problem, Reporter
+from ..contract.messages import Problem, Reporter
 from .colour import HLG, PQ, REC709, to_srgb
 from .source import Picture, evenly_in_time, fitted
 

@@ -12,11 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from .. import artist_landmarks, images, meshes, raster, template
-from ..capture import Capture, write_json
-from ..messages import Reporter
-from ..settings import Settings
-from ..views import read_views
+from ..contract import artist_landmarks
+from ..contract.capture import Capture, write_json
+from ..contract.messages import Reporter
+from ..contract.settings import Settings
+from ..face import template
+from ..geometry import meshes, raster
+from ..geometry.views import read_views
+from ..imaging import images
 from . import alignment, drawing, eyes, intersections, landmarks, nonrigid, own_template, quality
 from .correspondence import Scan
 

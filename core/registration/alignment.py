@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..meshes import Mesh, vertex_normals
+from ..geometry.meshes import Mesh, vertex_normals
 from .correspondence import Scan, trimmed
 
 LANDMARK_SIGMA_M = 0.002

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
-from ..messages import Reporter
+from ..contract.messages import Reporter
 from .alignment import similarity
 
 MOST_CENTRES = 2000

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..meshes import Mesh, vertex_normals
+from ..geometry.meshes import Mesh, vertex_normals
 
 NEIGHBOURS = 8
 MOST_ANGLE_DEG = 45.0

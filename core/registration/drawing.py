@@ -7,9 +7,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from .. import images, raster
-from ..meshes import Mesh, vertex_normals
-from ..views import View
+from ..geometry import raster
+from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.views import View
+from ..imaging import images
 from .landmarks import Landmarks
 
 

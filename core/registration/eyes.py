@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..faces import LEFT_EYE, RIGHT_EYE
+from ..face.faces import LEFT_EYE, RIGHT_EYE
 
 FRONTAL_DEG = 25.0
 OPEN = 0.22

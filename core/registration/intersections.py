@@ -12,7 +12,7 @@ import scipy.sparse as sparse
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
-from ..meshes import Mesh, face_normals
+from ..geometry.meshes import Mesh, face_normals
 
 ROUNDS = 8
 """Each round smooths one ring of neighbours more."""

@@ -9,11 +9,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .. import faces, images
-from ..meshes import Mesh
-from ..messages import Problem, Reporter
-from ..raster import RayCaster
-from ..views import View
+from ..contract.messages import Problem, Reporter
+from ..face import faces
+from ..geometry.meshes import Mesh
+from ..geometry.raster import RayCaster
+from ..geometry.views import View
+from ..imaging import images
 from . import eyes
 
 MOST_VIEWS = 32

@@ -13,8 +13,8 @@ import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
-from ..meshes import Mesh, vertex_normals
-from ..messages import Reporter
+from ..contract.messages import Reporter
+from ..geometry.meshes import Mesh, vertex_normals
 from .alignment import Model
 from .correspondence import Scan, trimmed
 from .intersections import flipped

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import atlas, meshes
-from ..capture import replacing
-from ..meshes import Mesh
-from ..messages import Problem, Reporter
+from ..contract.capture import replacing
+from ..contract.messages import Problem, Reporter
+from ..geometry import atlas, meshes
+from ..geometry.meshes import Mesh
 
 LEAST_VERTICES = 300
 MOST_VERTICES = 400_000

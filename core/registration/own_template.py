@@ -15,11 +15,13 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from .. import images, raster, surfaces, template
-from ..capture import Capture, write_json
-from ..meshes import Mesh, vertex_normals
-from ..messages import Problem, Reporter
-from ..settings import Settings
+from ..contract.capture import Capture, write_json
+from ..contract.messages import Problem, Reporter
+from ..contract.settings import Settings
+from ..face import template
+from ..geometry import raster, surfaces
+from ..geometry.meshes import Mesh, vertex_normals
+from ..imaging import images
 from . import alignment, carried, nonrigid, own_mesh, render_landmarks
 from .correspondence import Scan
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from .. import atlas
-from ..meshes import Mesh, vertex_normals
-from ..messages import Problem, Reporter
+from ..contract.messages import Problem, Reporter
+from ..geometry import atlas
+from ..geometry.meshes import Mesh, vertex_normals
 from .alignment import Model
 from .correspondence import Scan
 from .intersections import flipped, intersecting

@@ -15,10 +15,12 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 
-from .. import faces, images, raster
-from ..meshes import Mesh, vertex_normals
-from ..messages import Problem, Reporter
-from ..views import View
+from ..contract.messages import Problem, Reporter
+from ..face import faces
+from ..geometry import raster
+from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.views import View
+from ..imaging import images
 from .landmarks import Landmarks, onto_surface, triangulate
 
 FIRST_SIZE, SIZE = 192, 460

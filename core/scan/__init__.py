@@ -13,11 +13,12 @@ import time
 
 import numpy as np
 
-from .. import images, meshes, raster
-from ..capture import Capture
-from ..messages import Problem, Reporter
-from ..settings import Settings
-from ..views import View, read_views
+from ..contract.capture import Capture
+from ..contract.messages import Problem, Reporter
+from ..contract.settings import Settings
+from ..geometry import meshes, raster
+from ..geometry.views import View, read_views
+from ..imaging import images
 from . import rounds, splats
 
 HEAD_BOX = np.array([[-0.13, -0.08, -0.21], [0.13, 0.21, 0.19]])

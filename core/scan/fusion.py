@@ -16,7 +16,7 @@ import trimesh
 from scipy.ndimage import binary_dilation
 from skimage.measure import marching_cubes
 
-from ..meshes import Mesh
+from ..geometry.meshes import Mesh
 from .stereo import DepthMap
 
 SIDE = 8

@@ -13,9 +13,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from .. import faces, images, raster
-from ..messages import Reporter
-from ..views import View
+from ..contract.messages import Reporter
+from ..face import faces
+from ..geometry import raster
+from ..geometry.views import View
+from ..imaging import images
 from .fusion import Fused, fuse
 from .pairs import BASELINES_DEG, choose_pairs
 from .stereo import DepthMap, match_pair

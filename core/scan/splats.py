@@ -17,10 +17,11 @@ import torch
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-from .. import faces, images
-from ..meshes import Mesh, vertex_normals
-from ..messages import Problem, Reporter
-from ..views import View
+from ..contract.messages import Problem, Reporter
+from ..face import faces
+from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.views import View
+from ..imaging import images
 from .fusion import Fused, fuse
 from .stereo import DepthMap, warp
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ..raster import RayCaster, bleed
-from ..views import View
+from ..geometry.raster import RayCaster, bleed
+from ..geometry.views import View
 
 BLOCK = 5
 EASY_DEG = 8.0

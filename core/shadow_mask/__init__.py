@@ -11,12 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import images, meshes, template
-from ..capture import Capture
-from ..messages import Reporter
-from ..raster import bleed, interpolate
-from ..settings import Settings
-from ..skylight import ambient_occlusion, radiance_transfer
+from ..contract.capture import Capture
+from ..contract.messages import Reporter
+from ..contract.settings import Settings
+from ..face import template
+from ..geometry import meshes
+from ..geometry.raster import bleed, interpolate
+from ..imaging import images
+from ..light.skylight import ambient_occlusion, radiance_transfer
 from .frames import shadow_frames, source_of
 from .lift import Unfolded, lift_shadows
 from .occlusion import baked_occlusion

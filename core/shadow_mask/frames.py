@@ -14,11 +14,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from .. import images
-from ..capture import Capture
-from ..frame_pictures import pictures_of, read_picture
-from ..settings import Settings
-from ..views import View, read_views
+from ..contract.capture import Capture
+from ..contract.settings import Settings
+from ..geometry.frame_pictures import pictures_of, read_picture
+from ..geometry.views import View, read_views
+from ..imaging import images
 from .tidy import without_small
 
 THRESHOLDS = {"shading": 0.5, "network": 0.5, "softened": 0.5}

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ..meshes import Mesh, vertex_normals
-from ..messages import Reporter
-from ..raster import RayCaster, interpolate, rasterize_uv, render_view, sample, visible_from
-from ..views import View
+from ..contract.messages import Reporter
+from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.raster import RayCaster, interpolate, rasterize_uv, render_view, sample, visible_from
+from ..geometry.views import View
 
 GRAZING = 0.2  # cosine of the steepest angle under which a texel is judged
 EDGE_PX = 0.012  # of the frame's longer side: so near a silhouette a small error of the head shows what lies behind

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..shadow_edges import place
+from ..light.shadow_edges import place
 from .residual import smooth_basis
 
 

@@ -2,16 +2,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the sun does not reach, told by the texture as it was filmed: for delighters that do not say where they saw a shadow.
 
-The light of core/sunlight.py, a sky and a sun, is fitted to the skin; each texel is then lit by both or by the sky alone.
+The light of core/light/sunlight.py, a sky and a sun, is fitted to the skin; each texel is then lit by both or by the sky alone.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..messages import Reporter
-from ..raster import interpolate
-from ..sunlight import fit_light, log_likelihood
+from ..contract.messages import Reporter
+from ..geometry.raster import interpolate
+from ..light.sunlight import fit_light, log_likelihood
 from .lift import Unfolded
 from .tidy import cohere
 

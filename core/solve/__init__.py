@@ -15,11 +15,12 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from .. import images, mask_edit
-from ..capture import Capture
-from ..hashes import hash_tree
-from ..messages import Reporter
-from ..settings import Settings, deciding
+from ..contract import mask_edit
+from ..contract.capture import Capture
+from ..contract.hashes import hash_tree
+from ..contract.messages import Reporter
+from ..contract.settings import Settings, deciding
+from ..imaging import images
 from . import checkpoint, comparison, drawing, initial, layout, maps, tone
 from .checkpoint import Solution
 from .confidence import spread

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import torch
 
-from ..shadow_edges import signed_distance
+from ..light.shadow_edges import signed_distance
 
 # in texels of a 1024 map
 AWAY, BAND = 9.0, 8.0  # the two sides are compared over bands about this distance from the border: a penumbra lies between; half width of a band

@@ -15,8 +15,8 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 
-from ..capture import replacing
-from ..mask_edit import FIELD
+from ..contract.capture import replacing
+from ..contract.mask_edit import FIELD
 from .lighting import Lights
 from .problem import State
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import images
-from ..capture import Capture, replacing_folder
+from ..contract.capture import Capture, replacing_folder
+from ..imaging import images
 from .evidence import Evidence
 
 LUMINANCE = np.float32([0.2126, 0.7152, 0.0722])

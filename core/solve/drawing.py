@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import torch
 
-from .. import images
+from ..imaging import images
 from .evidence import REFERENCE, Evidence
 from .marks import Mark
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""M laid on the shadow's edges before the first step (core/shadow_edges.py says how): a sharp edge of the shadow can live in M alone."""
+"""M laid on the shadow's edges before the first step (core/light/shadow_edges.py says how): a sharp edge of the shadow can live in M alone."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import torch
 
-from ..shadow_edges import place
+from ..light.shadow_edges import place
 from .evidence import Evidence
 
 

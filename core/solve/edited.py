@@ -8,10 +8,10 @@ import time
 
 import torch
 
-from .. import mask_edit
-from ..capture import Capture
-from ..messages import Reporter
-from ..settings import Settings
+from ..contract import mask_edit
+from ..contract.capture import Capture
+from ..contract.messages import Reporter
+from ..contract.settings import Settings
 from . import checkpoint, initial, maps
 from .checkpoint import Solution
 from .confidence import spread

@@ -10,9 +10,11 @@ import cv2
 import numpy as np
 import torch
 
-from .. import beard, images, meshes, raster, template
-from ..capture import Capture
-from ..messages import Problem
+from ..contract.capture import Capture
+from ..contract.messages import Problem
+from ..face import beard, template
+from ..geometry import meshes, raster
+from ..imaging import images
 from .lighting import Shader
 from .prior import coordinates
 from .problem import Observation, blurred

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 
-from .. import images
-from ..messages import Problem
+from ..contract.messages import Problem
+from ..imaging import images
 from .border import missing
 from .checkpoint import Solution
 from .edges import with_edges

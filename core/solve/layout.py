@@ -17,9 +17,9 @@ import cv2
 import numpy as np
 import torch
 
-from .. import atlas, baking, meshes
-from ..capture import Capture
-from ..messages import Problem, Reporter
+from ..contract.capture import Capture
+from ..contract.messages import Problem, Reporter
+from ..geometry import atlas, baking, meshes
 from .evidence import REFERENCE, Evidence, Extent
 from .lighting import Lights, sh_basis
 from .maps import DARKEST, Maps

@@ -13,10 +13,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from .. import faces, images, meshes, raster, template
-from ..capture import Capture
-from ..messages import Problem, Reporter
-from ..views import View, read_views
+from ..contract.capture import Capture
+from ..contract.messages import Problem, Reporter
+from ..face import faces, template
+from ..geometry import meshes, raster
+from ..geometry.views import View, read_views
+from ..imaging import images
 from .witnesses import visible
 
 FRONT = np.array([0.0, -1.0, 0.0])

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from .. import images
-from ..capture import Capture, replacing_folder
-from ..messages import Reporter
+from ..contract.capture import Capture, replacing_folder
+from ..contract.messages import Reporter
+from ..imaging import images
 from .checkpoint import Solution, write_solution
 from .confidence import confidence
 from .evidence import Evidence

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import torch
 
-from .. import raster
+from ..geometry import raster
 from .evidence import Evidence
 
 RADII = tuple(np.geomspace(2.0, 8.0, 6))

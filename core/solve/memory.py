@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import torch
 
-from ..messages import Problem, out_of_memory
+from ..contract.messages import Problem, out_of_memory
 from .lighting import Lights
 from .prior import Prior
 from .problem import Observation, State

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from skimage import color
 
-from .. import images
+from ..imaging import images
 from .look import LUMINANCE, Look
 
 FILE = Path(__file__).parents[1] / "weights" / "tones.json"

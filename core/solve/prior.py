@@ -14,7 +14,7 @@ from pathlib import Path
 import torch
 from safetensors import safe_open
 
-from ..messages import Problem
+from ..contract.messages import Problem
 from . import released
 from .network import UNet, denoise, from_state
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from ..messages import Problem
+from ..contract.messages import Problem
 
 DATA_CHANNELS = 7
 COND_KINDS = ("coord", "posenc", "noise")

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import torch
 
-from ..messages import Problem
+from ..contract.messages import Problem
 from .light_fit import update_lights
 from .lighting import interpolation
 from .problem import Observation, State, albedo, blurred, photometric

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import images
-from ..capture import Capture
-from ..messages import Reporter
-from ..settings import Settings
+from ..contract.capture import Capture
+from ..contract.messages import Reporter
+from ..contract.settings import Settings
+from ..imaging import images
 from . import initial
 from .evidence import read_evidence
 from .prior import WEIGHTS, load

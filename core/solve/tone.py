@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import images
-from ..capture import Capture
-from ..messages import Problem, Reporter
-from ..settings import Settings
+from ..contract.capture import Capture
+from ..contract.messages import Problem, Reporter
+from ..contract.settings import Settings
+from ..imaging import images
 from .evidence import Evidence, read_evidence
 from .initial import skin_tone
 from .look import capture_look

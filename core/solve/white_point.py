@@ -11,10 +11,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from .. import images
-from ..capture import Capture
-from ..messages import Problem, Reporter
-from ..settings import CARDS, Settings
+from ..contract.capture import Capture
+from ..contract.messages import Problem, Reporter
+from ..contract.settings import CARDS, Settings
+from ..imaging import images
 
 GREYS = np.array([0.914, 0.589, 0.363, 0.191, 0.088])
 """Reflectance of a ColorChecker's neutral patches, white to neutral 3.5 (L* 96.5, 81.3, 66.8, 50.9, 35.7: the mean of measured charts)."""

@@ -8,9 +8,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from .. import images, meshes, raster
-from ..capture import Capture
-from ..views import View, read_views
+from ..contract.capture import Capture
+from ..geometry import meshes, raster
+from ..geometry.views import View, read_views
+from ..imaging import images
 from .marks import Mark
 
 FACING = 0.35  # least cosine between the surface and the way to the camera

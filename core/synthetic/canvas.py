@@ -16,8 +16,10 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .. import images, raster, template
-from ..meshes import Mesh, vertex_normals
+from ..face import template
+from ..geometry import raster
+from ..geometry.meshes import Mesh, vertex_normals
+from ..imaging import images
 
 MASK_SIZE = 1024  # of the template's masks; they are soft, so a window takes its part of them enlarged
 

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .. import images
+from ..imaging import images
 from .olat import DIRECTIONS
 
 WIDTH = 128  # of a panorama kept for backgrounds

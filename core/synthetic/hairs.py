@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..noise import octaves
+from ..geometry.noise import octaves
 from .canvas import Canvas
 from .spots import strew
 

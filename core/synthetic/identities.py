@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import template
-from ..meshes import Mesh
+from ..face import template
+from ..geometry.meshes import Mesh
 
 STRENGTH = 0.75  # of N(0, 1): the tails of MakeHuman's combinations are caricatures
 

@@ -13,10 +13,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from .. import raster, template
-from ..meshes import Mesh, vertex_normals
-from ..noise import noise
-from ..skylight import radiance_transfer, sh_basis
+from ..face import template
+from ..geometry import raster
+from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.noise import noise
+from ..light.skylight import radiance_transfer, sh_basis
 from .parameters import sample_parameters
 from .skin import make_skin
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..meshes import Mesh, vertex_normals
-from ..raster import RayCaster
-from ..skylight import fibonacci_sphere, sh_basis
+from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.raster import RayCaster
+from ..light.skylight import fibonacci_sphere, sh_basis
 
 LIGHTS = 256
 LIFT = 1e-3  # metres off the surface from which a ray starts

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from .. import images
+from ..imaging import images
 from .environments import Environment, made_environment, panorama_environment, seen
 from .identities import subject_mesh
 from .light import in_the_way, sh_basis
@@ -218,7 +218,7 @@ def _shadow(sight: Sight, lamps: list, colours: list, reach: list, ambient: np.n
 
 def _fitted(sight: Sight, carried: np.ndarray, environment: Environment, lamps: list, colours: list, albedo: np.ndarray, gains: np.ndarray,
             rng: np.random.Generator) -> Fitted:
-    """What core/sunlight.py would find, without its search: the second-order sky and the strongest lamp, each a little off."""
+    """What core/light/sunlight.py would find, without its search: the second-order sky and the strongest lamp, each a little off."""
     transfer = carried @ BASIS.astype(np.float32)  # [N, 9]
     main = int(np.argmax([c.mean() for c in colours])) if lamps else -1
     sky = BASIS.T @ environment.radiance * (4 * np.pi / LIGHTS)

@@ -20,7 +20,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ..meshes import Mesh, read_obj
+from ..geometry.meshes import Mesh, read_obj
 
 
 def main() -> None:

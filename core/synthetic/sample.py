@@ -25,10 +25,12 @@ import av
 import numpy as np
 import pycolmap
 
-from .. import images, meshes, raster, template
-from ..capture import replacing, write_json
-from ..meshes import Mesh, vertex_normals
-from ..views import View
+from ..contract.capture import replacing, write_json
+from ..face import template
+from ..geometry import meshes, raster
+from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.views import View
+from ..imaging import images
 from . import scene
 from .identities import subject_mesh
 from .parameters import sample_parameters

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..meshes import Mesh
+from ..geometry.meshes import Mesh
 
 WIDTH, HEIGHT, FOCAL, RATE = 720, 960, 933.0, 24  # pixels, pixels, pixels, frames per second
 DISTANCE = 0.46  # metres from the camera to the head's middle

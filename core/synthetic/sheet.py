@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import images
+from ..imaging import images
 from . import scene
 from .parameters import sample_parameters
 from .sample import render_frames

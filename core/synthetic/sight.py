@@ -16,9 +16,10 @@ import numpy as np
 import pycolmap
 from scipy.sparse import csr_matrix
 
-from .. import raster, template
-from ..capture import replacing
-from ..views import View
+from ..contract.capture import replacing
+from ..face import template
+from ..geometry import raster
+from ..geometry.views import View
 from .olat import LightStage, sun_visibility
 
 LAMPS, RAYS = 4, 8

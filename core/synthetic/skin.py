@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..noise import noise, octaves
+from ..geometry.noise import noise, octaves
 from . import adornment, hairs, pigment
 from .canvas import Canvas, canvas
 from .parameters import SkinParameters, sample_parameters

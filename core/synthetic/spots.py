@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..noise import noise
+from ..geometry.noise import noise
 from .canvas import Canvas
 
 

@@ -14,11 +14,13 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from .. import images, meshes, template
-from ..capture import Capture
-from ..messages import Problem, Reporter
-from ..settings import Settings
-from ..views import read_views
+from ..contract.capture import Capture
+from ..contract.messages import Problem, Reporter
+from ..contract.settings import Settings
+from ..face import template
+from ..geometry import meshes
+from ..geometry.views import read_views
+from ..imaging import images
 from .align import align
 from .blend import bands_of, blend, equalise, robust_weights
 from .detail import fine_detail

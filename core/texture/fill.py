@@ -7,7 +7,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from .. import raster
+from ..geometry import raster
 
 TRUSTED = 0.1
 """Confidence from which a texel is kept as it was seen."""

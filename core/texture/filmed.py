@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import images
-from ..messages import Reporter
+from ..contract.messages import Reporter
+from ..imaging import images
 from .blend import blend
 from .projection import Observation, log_colours
 

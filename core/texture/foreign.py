@@ -11,8 +11,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from .. import faces, images, raster, template
-from ..messages import Problem, Reporter
+from ..contract.messages import Problem, Reporter
+from ..face import faces, template
+from ..geometry import raster
+from ..imaging import images
 from .projection import Observation, Surface
 
 COLOUR = 0.35

@@ -16,8 +16,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from .. import images, raster
-from ..messages import Reporter
+from ..contract.messages import Reporter
+from ..geometry import raster
+from ..imaging import images
 from .blend import blurred
 from .features import Features
 from .projection import DARKEST, Observation, Surface

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from .. import raster
-from ..meshes import Mesh, vertex_normals
-from ..views import View
+from ..geometry import raster
+from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.views import View
 
 DARKEST = 2e-3
 """Linear values below this are noise to a logarithm."""

@@ -19,9 +19,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from .. import baking, images, registration, template
-from ..capture import replacing_folder
-from ..messages import Problem, Reporter
+from .. import registration
+from ..contract.capture import replacing_folder
+from ..contract.messages import Problem, Reporter
+from ..face import template
+from ..geometry import baking
+from ..imaging import images
 from ..registration import own_mesh, own_template, render_landmarks
 
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".exr")

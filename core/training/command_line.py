@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from ..messages import Log, Reporter
+from ..contract.messages import Log, Reporter
 
 
 def parser(training: str, description: str, configs: dict, out: Path) -> argparse.ArgumentParser:

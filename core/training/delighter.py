@@ -20,8 +20,8 @@ import torch
 from torch.nn import functional
 from torch.utils.data import Dataset
 
+from ..contract.messages import Reporter
 from ..delight.unet import DelightNet
-from ..messages import Reporter
 from ..solve.prior import fast_dtype
 from . import command_line, descent
 from .portraits import Batch, Portraits, mirrored, prepare

@@ -16,8 +16,8 @@ from pathlib import Path
 import torch
 from torch.utils.data import DataLoader, Dataset
 
-from ..capture import replacing
-from ..messages import Problem, Reporter
+from ..contract.capture import replacing
+from ..contract.messages import Problem, Reporter
 
 STATE = "state.pt"
 

@@ -17,9 +17,11 @@ import cv2
 import numpy as np
 import torch
 
-from .. import images, raster, template
-from ..capture import replacing
-from ..messages import Reporter
+from ..contract.capture import replacing
+from ..contract.messages import Reporter
+from ..face import template
+from ..geometry import raster
+from ..imaging import images
 from ..synthetic.canvas import canvas, window_canvas
 from ..synthetic.parameters import adorned, sample_parameters
 from ..synthetic.skin import GROUND, paint_skin

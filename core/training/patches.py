@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from .. import template
+from ..face import template
 from ..solve.prior import coordinates, mean_at
 from ..synthetic import pigment
 from .skins import SCALES, SIZE, Skins, shrink

@@ -17,10 +17,10 @@ import numpy as np
 import torch
 from safetensors.torch import load_file
 
-from ..capture import replacing
+from ..contract.capture import replacing
+from ..contract.messages import Reporter
 from ..delight.unet import SIDE, network_input
-from ..meshes import vertex_normals
-from ..messages import Reporter
+from ..geometry.meshes import vertex_normals
 from ..solve.prior import WEIGHTS
 from ..synthetic import sight
 from ..synthetic.environments import read_panoramas

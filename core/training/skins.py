@@ -19,9 +19,11 @@ import torch
 from scipy.ndimage import map_coordinates
 from scipy.spatial import cKDTree
 
-from .. import images, raster, template
-from ..capture import replacing
-from ..messages import Problem, Reporter
+from ..contract.capture import replacing
+from ..contract.messages import Problem, Reporter
+from ..face import template
+from ..geometry import raster
+from ..imaging import images
 from ..synthetic import light, pigment
 from ..synthetic.parameters import adorned, sample_parameters
 from ..synthetic.skin import make_skin

@@ -16,9 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import meshes, raster, template
-from ..capture import write_json
-from ..messages import Problem, Reporter
+from ..contract.capture import write_json
+from ..contract.messages import Problem, Reporter
+from ..face import template
+from ..geometry import meshes, raster
 from ..solve.look import FRONT, Look, look, skin_weight
 from ..solve.population import FILE, SHEEN, coordinates
 from ..synthetic import light, pigment

@@ -18,7 +18,7 @@ import numpy as np
 import torch
 from torch.utils.data import Dataset
 
-from ..messages import Reporter
+from ..contract.messages import Reporter
 from ..solve.prior import fast_dtype
 from ..upscale.enlarge import WEIGHTS
 from ..upscale.network import MISSED, Rcan, bicubic

@@ -13,12 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import atlas, baking, images, meshes, stages
-from ..capture import Capture, replacing_folder
-from ..meshes import Mesh
-from ..messages import Reporter
-from ..settings import Settings
-from ..views import read_views
+from ..contract import stages
+from ..contract.capture import Capture, replacing_folder
+from ..contract.messages import Reporter
+from ..contract.settings import Settings
+from ..geometry import atlas, baking, meshes
+from ..geometry.meshes import Mesh
+from ..geometry.views import read_views
+from ..imaging import images
 from . import drawing, scan
 
 OWN_FAR_M = 0.012

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import images, raster
-from ..capture import Capture
-from ..meshes import Mesh
-from ..views import View
+from ..contract.capture import Capture
+from ..geometry import raster
+from ..geometry.meshes import Mesh
+from ..geometry.views import View
+from ..imaging import images
 
 
 def own_map(capture: Capture, number: int, srgb: np.ndarray, side: int = 512) -> None:

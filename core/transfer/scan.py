@@ -13,10 +13,11 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 
-from .. import atlas, images, raster, surfaces
-from ..baking import STRIP, Places
-from ..meshes import Mesh, vertex_normals
-from ..views import View
+from ..geometry import atlas, raster, surfaces
+from ..geometry.baking import STRIP, Places
+from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.views import View
+from ..imaging import images
 
 LEAST_PART = 0.02
 """Share of all triangles under which a loose part is dropped as a floater."""

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import images, meshes
-from ..capture import Capture, replacing_folder
-from ..messages import Reporter
-from ..settings import Settings
+from ..contract.capture import Capture, replacing_folder
+from ..contract.messages import Reporter
+from ..contract.settings import Settings
+from ..geometry import meshes
+from ..imaging import images
 from . import detail, drawing, gloss, hair
 from .maps import Maps, read_maps
 from .surface import lay_out

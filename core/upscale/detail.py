@@ -9,7 +9,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from .. import images
+from ..imaging import images
 
 STRIP = 256
 COARSE = 1.0

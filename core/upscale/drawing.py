@@ -6,8 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import images, raster, surfaces
-from ..meshes import vertex_normals
+from ..geometry import raster, surfaces
+from ..geometry.meshes import vertex_normals
+from ..imaging import images
 from .hair import Hair
 from .maps import Maps
 from .surface import HeadSurface

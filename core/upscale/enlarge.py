@@ -14,8 +14,8 @@ import numpy as np
 import torch
 from safetensors.torch import load_file
 
-from .. import images
-from ..messages import Problem
+from ..contract.messages import Problem
+from ..imaging import images
 from .maps import Maps
 from .network import CHANNELS, FACTOR, HALO, Rcan, bicubic
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import template
+from ..face import template
 
 WITHOUT = ("nose", "eyes", "brows", "lips", "nostrils")
 

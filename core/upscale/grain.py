@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from scipy.optimize import nnls
 
-from ..noise import noise
+from ..geometry.noise import noise
 from .surface import HeadSurface
 
 SIGMAS = (0.24, 0.48, 0.96, 1.92)

@@ -14,7 +14,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from .. import beard, images, template
+from ..face import beard, template
+from ..imaging import images
 from . import grain
 from .maps import Maps
 from .surface import HeadSurface

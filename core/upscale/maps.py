@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import images
+from ..imaging import images
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
-from .. import raster, surfaces
-from ..meshes import Mesh, vertex_normals
+from ..geometry import raster, surfaces
+from ..geometry.meshes import Mesh, vertex_normals
 
 STRIP = 128
 """Rows whose triangles are found between two looks at a cancel."""

@@ -15,9 +15,9 @@ import cv2
 import numpy as np
 from safetensors import safe_open
 
-from .. import template
-from ..messages import Reporter
-from ..noise import noise
+from ..contract.messages import Reporter
+from ..face import template
+from ..geometry.noise import noise
 from . import grain
 from .maps import Maps
 from .surface import HeadSurface

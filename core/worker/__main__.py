@@ -16,7 +16,7 @@ import sys
 import threading
 from pathlib import Path
 
-from ..messages import Message, to_line
+from ..contract.messages import Message, to_line
 from .runner import run_job
 
 PRIORITY = 15

@@ -16,7 +16,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from ..messages import FINAL, Cancelled, CancelledError, Done, Failed, Message, Problem, Progress
+from ..contract.messages import FINAL, Cancelled, CancelledError, Done, Failed, Message, Problem, Progress
 
 GRACE_S = 1.0
 """How long a cancelled task's thread may take to end before it is waited for no longer."""

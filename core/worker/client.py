@@ -15,8 +15,8 @@ import threading
 import time
 from pathlib import Path
 
-from ..capture import storage_problem
-from ..messages import FINAL, Cancelled, Failed, Log, Message, Problem, from_line
+from ..contract.capture import storage_problem
+from ..contract.messages import FINAL, Cancelled, Failed, Log, Message, Problem, from_line
 
 GRACE_S = 0.7
 """How long a cancelled worker may take to reach its next report before it is stopped."""

@@ -13,8 +13,8 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from ..capture import storage_problem
-from ..messages import Problem
+from ..contract.capture import storage_problem
+from ..contract.messages import Problem
 from .background import Task
 
 PYTHONS = ((3, 11), (3, 12))

@@ -20,7 +20,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..messages import Problem
+from ..contract.messages import Problem
 
 UNPACKED = 3.5
 """Bytes on disk for each that is downloaded, where a wheel's directory cannot be read: 0.46 GB became 1.6 GB on Linux with torch for the CPU."""

@@ -12,8 +12,8 @@ import shutil
 import sys
 from pathlib import Path
 
-from ..capture import storage_problem
-from ..messages import Problem
+from ..contract.capture import storage_problem
+from ..contract.messages import Problem
 from .background import Task
 from .environment import PYTHONS, answer, python_of, required, verify
 

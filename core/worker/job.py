@@ -12,10 +12,10 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from .. import stages
-from ..capture import Capture, write_json
-from ..messages import Problem
-from ..settings import Settings, from_json, preset
+from ..contract import stages
+from ..contract.capture import Capture, write_json
+from ..contract.messages import Problem
+from ..contract.settings import Settings, from_json, preset
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,11 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
-from .. import __version__, report
-from ..capture import Capture, storage_problem
-from ..messages import Cancelled, CancelledError, Done, Failed, Log, Message, Problem, Progress, Reporter, StageDone, out_of_memory
-from ..stages import Stage
+from .. import __version__
+from ..contract import report
+from ..contract.capture import Capture, storage_problem
+from ..contract.messages import Cancelled, CancelledError, Done, Failed, Log, Message, Problem, Progress, Reporter, StageDone, out_of_memory
+from ..contract.stages import Stage
 from .job import Job, read_job
 
 

@@ -9,9 +9,9 @@ import sys
 import time
 from pathlib import Path
 
-from .. import stages
-from ..capture import Capture
-from ..messages import Cancelled, Done, Failed, Log, Message, Progress, StageDone
+from ..contract import stages
+from ..contract.capture import Capture
+from ..contract.messages import Cancelled, Done, Failed, Log, Message, Progress, StageDone
 from .client import Worker
 
 POLL_S = 0.1

@@ -10,7 +10,7 @@ The custom property `MARK` of the mesh says that it has them.
 import bpy
 import numpy as np
 
-from ...core.messages import Problem
+from ...core.contract.messages import Problem
 from . import carrying, materials
 from .asset import GAZE, SIDES, FaceUnits, load
 

@@ -4,7 +4,7 @@
 
 import bpy
 
-from ...core.messages import Problem
+from ...core.contract.messages import Problem
 from .. import captures
 from ..base_operator import BaseOperator
 from . import materials, mesh

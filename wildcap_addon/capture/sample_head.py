@@ -7,8 +7,8 @@ from pathlib import Path
 
 import bpy
 
-from ...core.capture import Capture, replacing_folder, storage_problem
-from ...core.messages import Problem
+from ...core.contract.capture import Capture, replacing_folder, storage_problem
+from ...core.contract.messages import Problem
 from .. import captures, preferences, status
 from ..base_operator import BaseOperator
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import bpy
 
-from ...core.capture import Capture
-from ...core.messages import Problem
+from ...core.contract.capture import Capture
+from ...core.contract.messages import Problem
 from .. import captures, preferences
 from ..base_operator import BaseOperator
 from ..base_panel import WildcapPanel

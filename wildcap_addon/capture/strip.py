@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import bpy
 import bpy.utils.previews
 
-from ...core.capture import Capture
+from ...core.contract.capture import Capture
 from .. import captures, status
 
 INTERVAL_S = 0.5

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import bpy
 
-from ...core.delivery_plan import Plan
-from ...core.messages import Problem
+from ...core.contract.delivery_plan import Plan
+from ...core.contract.messages import Problem
 
 ADDONS = {".glb": "gltf", ".gltf": "gltf", ".fbx": "fbx"}
 """Exporters that are add-ons of Blender, which may be switched off: the operator of bpy.ops.export_scene."""

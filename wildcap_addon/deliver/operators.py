@@ -5,9 +5,9 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core import delivery_plan
-from ...core.delivery_plan import Plan
-from ...core.messages import Problem
+from ...core.contract import delivery_plan
+from ...core.contract.delivery_plan import Plan
+from ...core.contract.messages import Problem
 from .. import captures, jobs, properties
 from ..base_operator import BaseOperator, Dialog
 from . import files, waiting

@@ -5,8 +5,8 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core import stages
-from ...core.delivery_presets import FORMATS, PICTURES, PRESETS
+from ...core.contract import stages
+from ...core.contract.delivery_presets import FORMATS, PICTURES, PRESETS
 from .. import captures, problems
 from ..base_panel import CapturePanel, draw_settings, region_width
 from . import waiting

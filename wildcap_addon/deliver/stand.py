@@ -14,7 +14,7 @@ from pathlib import Path
 import bpy
 from mathutils import Matrix
 
-from ...core.delivery_plan import PACKING, Plan
+from ...core.contract.delivery_plan import PACKING, Plan
 from .. import colours, head
 
 SCENE = "WildCap Delivery"

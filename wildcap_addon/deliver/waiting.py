@@ -9,9 +9,9 @@ from pathlib import Path
 
 import bpy
 
-from ...core import delivery_plan, provenance
-from ...core.delivery_plan import PACKING, Plan
-from ...core.messages import Problem
+from ...core.contract import delivery_plan, provenance
+from ...core.contract.delivery_plan import PACKING, Plan
+from ...core.contract.messages import Problem
 from .. import captures, problems
 from . import files, stand
 

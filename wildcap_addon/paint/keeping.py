@@ -13,8 +13,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.capture import Capture
-from ...core.messages import Problem
+from ...core.contract.capture import Capture
+from ...core.contract.messages import Problem
 from . import mask_image
 
 

@@ -12,9 +12,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core import mask_history
-from ...core.capture import Capture, replacing
-from ...core.messages import Problem
+from ...core.contract import mask_history
+from ...core.contract.capture import Capture, replacing
+from ...core.contract.messages import Problem
 from .. import colours
 
 

@@ -4,9 +4,9 @@
 
 import bpy
 
-from ...core import stages
-from ...core.capture import Capture
-from ...core.messages import Problem
+from ...core.contract import stages
+from ...core.contract.capture import Capture
+from ...core.contract.messages import Problem
 from .. import captures, jobs
 from ..base_operator import BaseOperator
 from . import edits, mask_image, session

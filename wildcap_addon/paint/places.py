@@ -5,7 +5,7 @@ for an undo may take the sheet away or bring it back."""
 
 import bpy
 
-from ...core.messages import Problem
+from ...core.contract.messages import Problem
 from . import sheet, view
 
 

@@ -13,8 +13,8 @@ from dataclasses import asdict, dataclass, field
 
 import bpy
 
-from ...core.capture import Capture
-from ...core.messages import Problem
+from ...core.contract.capture import Capture
+from ...core.contract.messages import Problem
 from .. import captures, head, problems
 from . import before, brush, keeping, mask_image, places, sheet, view
 

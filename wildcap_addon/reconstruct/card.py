@@ -5,8 +5,8 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core import delighter_cards
-from ...core import switchlight_api as service
+from ...core.contract import delighter_cards
+from ...core.contract import switchlight_api as service
 from .. import preferences, problems, status
 
 COLUMNS = 3

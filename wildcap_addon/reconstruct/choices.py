@@ -6,8 +6,8 @@ from pathlib import Path
 
 import bpy
 
-from ...core.capture import storage_problem
-from ...core.messages import Problem
+from ...core.contract.capture import storage_problem
+from ...core.contract.messages import Problem
 from .. import captures
 from ..base_operator import BaseOperator
 from . import delighters

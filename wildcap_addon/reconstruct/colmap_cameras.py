@@ -11,7 +11,7 @@ from pathlib import Path
 
 from mathutils import Matrix, Quaternion
 
-from ...core.messages import Problem
+from ...core.contract.messages import Problem
 
 PARAMETERS = {0: 3, 1: 4, 2: 4, 3: 5, 4: 8, 5: 8, 6: 12, 7: 5, 8: 4, 9: 5, 10: 12}
 """Number of parameters of each camera model, by COLMAP's number for it"""

@@ -11,8 +11,8 @@ import bpy
 import bpy.utils.previews
 import numpy as np
 
-from ...core.capture import Capture
-from ...core.messages import Problem
+from ...core.contract.capture import Capture
+from ...core.contract.messages import Problem
 from .. import colours
 
 SIDE = 256

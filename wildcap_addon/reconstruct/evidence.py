@@ -10,8 +10,8 @@ import json
 
 import bpy
 
-from ...core.capture import Capture
-from ...core.messages import Problem
+from ...core.contract.capture import Capture
+from ...core.contract.messages import Problem
 from .. import captures, local_view
 from . import colmap_cameras
 

@@ -10,9 +10,9 @@ import json
 import bpy
 from mathutils import Vector
 
-from ...core import artist_landmarks
-from ...core.capture import Capture
-from ...core.messages import Problem
+from ...core.contract import artist_landmarks
+from ...core.contract.capture import Capture
+from ...core.contract.messages import Problem
 from .. import captures, local_view
 
 COLLECTION = "WildCap Landmarks"

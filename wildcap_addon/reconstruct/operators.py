@@ -4,8 +4,8 @@
 
 import bpy
 
-from ...core import stages
-from ...core.messages import Problem
+from ...core.contract import stages
+from ...core.contract.messages import Problem
 from .. import captures, head, jobs
 from ..base_operator import BaseOperator
 from . import evidence, landmarks

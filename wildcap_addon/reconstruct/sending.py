@@ -5,8 +5,8 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core import consent
-from ...core.messages import Problem
+from ...core.contract import consent
+from ...core.contract.messages import Problem
 from .. import captures, preferences, properties
 from ..base_operator import BaseOperator, Dialog
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.messages import Problem
+from ...core.contract.messages import Problem
 from . import headless
 
 NAME = "wildcap"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.messages import Problem
+from ...core.contract.messages import Problem
 from .. import captures, colours, hdri, head
 from ..hdri import Hdri
 from . import contact_sheet, lights, material, output, picture, reel

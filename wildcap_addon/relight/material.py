@@ -10,8 +10,8 @@ from math import isclose
 
 import bpy
 
-from ...core.capture import Capture
-from ...core.messages import Problem
+from ...core.contract.capture import Capture
+from ...core.contract.messages import Problem
 from .. import captures, head, status
 from . import asset, node_group, regions
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.capture import storage_problem
+from ...core.contract.capture import storage_problem
 
 SCENE = "WildCap Relight"
 

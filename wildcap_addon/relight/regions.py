@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core import skin_regions
+from ...core.contract import skin_regions
 
 ATTRIBUTE = "wildcap_roughness"
 MASKS = Path(__file__).resolve().parents[2] / "core" / "assets" / "masks"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.messages import Problem
+from ...core.contract.messages import Problem
 from ...core.worker import environment
 from ...core.worker.background import Task
 from .. import jobs, preferences

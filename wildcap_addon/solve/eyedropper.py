@@ -9,7 +9,7 @@ from bpy_extras import view3d_utils
 from mathutils import Vector
 from mathutils.geometry import barycentric_transform
 
-from ...core.messages import Problem
+from ...core.contract.messages import Problem
 from .. import captures
 from ..base_operator import BaseOperator
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.capture import Capture
+from ...core.contract.capture import Capture
 from .. import captures, head, jobs
 
 

@@ -5,7 +5,7 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core import stages
+from ...core.contract import stages
 from .. import captures, jobs, properties, timings
 from ..base_panel import CapturePanel, WildcapPanel, draw_settings
 from . import preview

@@ -5,7 +5,7 @@
 import bpy
 import bpy.utils.previews
 
-from ...core.capture import Capture
+from ...core.contract.capture import Capture
 
 NAMES = ("albedo", "shading", "loss")
 ROW_SCALE = 11.5

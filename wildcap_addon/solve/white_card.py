@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.messages import Problem
-from ...core.settings import CARDS
+from ...core.contract.messages import Problem
+from ...core.contract.settings import CARDS
 from .. import captures, jobs
 from ..base_operator import BaseOperator
 from .eyedropper import colour_at

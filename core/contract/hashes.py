@@ -39,7 +39,7 @@ def source_stamp(source: str) -> list:
 
 def code_hash(module: str) -> str:
     """Hash of the stage's own room, without importing it."""
-    room = Path(__file__).parent / module.split(".", 1)[1]
+    room = Path(__file__).parents[1] / module.split(".", 1)[1]
     digest = hashlib.blake2b(digest_size=8)
     for path in sorted(room.glob("*.py")):
         digest.update(path.read_bytes())

@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from . import images, meshes
-from .meshes import Mesh
+from ..geometry import meshes
+from ..geometry.meshes import Mesh
+from ..imaging import images
 
-ASSETS = Path(__file__).parent / "assets"
+ASSETS = Path(__file__).parents[1] / "assets"
 MASKS = ("face", "skin", "lips", "brows", "eyes", "nose", "nostrils", "ears", "neck", "scalp")
 
 

@@ -14,8 +14,8 @@ import io
 
 import numpy as np
 
-from ..messages import Problem
-from .calibration import Calibrated, rigid, trailing_number
+from ...contract.messages import Problem
+from ..calibrated import Calibrated, rigid, trailing_number
 
 ALIASES = {"yaw": "heading", "f_35mm": "f", "px_norm": "px", "py_norm": "py"}
 NEEDED = ("name", "x", "y", "alt", "heading", "pitch", "roll", "f")

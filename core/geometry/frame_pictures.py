@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from . import images
-from .capture import Capture
-from .messages import Problem
+from ..contract.capture import Capture
+from ..contract.messages import Problem
+from ..imaging import images
 from .views import View, read_views
 
 KINDS = (".png", ".jpg", ".jpeg", ".exr", ".tif", ".tiff", ".webp")

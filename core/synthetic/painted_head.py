@@ -12,11 +12,12 @@ import cv2
 import numpy as np
 import pycolmap
 
-from core import images, meshes, raster
-from core.synthetic.identities import subject_mesh
-from core.synthetic.parameters import sample_parameters
-from core.synthetic.skin import make_skin
-from core.views import View
+from ..geometry import meshes, raster
+from ..geometry.views import View
+from ..imaging import images
+from .identities import subject_mesh
+from .parameters import sample_parameters
+from .skin import make_skin
 
 WIDTH, HEIGHT, FOCAL = 300, 400, 467.0
 WALL_M, WALL_AT = 6.0, 1.2

@@ -15,8 +15,8 @@ import json
 
 import numpy as np
 
-from ..messages import Problem
-from .calibration import Calibrated, rigid, trailing_number
+from ...contract.messages import Problem
+from ..calibrated import Calibrated, rigid, trailing_number
 
 
 def read(text: str, name: str) -> list[Calibrated]:

@@ -12,7 +12,9 @@ from functools import cache
 import cv2
 import numpy as np
 
-from . import images, raster, template
+from ..geometry import raster
+from ..imaging import images
+from . import template
 
 PLACES = (((132, 58, 172, 136, 150, 149, 176, 148, 152, 377, 400, 378, 379, 365, 397, 288, 361), 16.0), ((92, 165, 167, 164, 393, 391, 322), 6.5),
           ((18, 200, 199, 201, 421, 204, 424, 202, 422, 212, 432, 57, 287), 9.0), ((127, 234, 93, 356, 454, 323), 8.0),

@@ -16,7 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from .messages import Problem
+from ..contract.messages import Problem
 
 RIGHT_EYE, LEFT_EYE = (33, 133), (362, 263)
 """Landmarks at the outer and inner corner of the person's right eye, and at the inner and outer of the left: they stay put when the lids close."""

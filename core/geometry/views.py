@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 
-from .capture import Capture
-from .messages import Problem
+from ..contract.capture import Capture
+from ..contract.messages import Problem
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from ..messages import Problem
-from .calibration import Calibrated, rigid, trailing_number
+from ...contract.messages import Problem
+from ..calibrated import Calibrated, rigid, trailing_number
 
 MOST_SKEW_PX = 1.0
 

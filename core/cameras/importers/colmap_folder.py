@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 
-from ..messages import Problem
-from .calibration import PIXELS, Calibrated, trailing_number
+from ...contract.messages import Problem
+from ..calibrated import PIXELS, Calibrated, trailing_number
 
 
 def read(folder: Path) -> list[Calibrated]:

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from . import images, mask_history
-from .capture import Capture
-from .messages import Problem
-from .settings import Settings
+from ..contract import mask_history
+from ..contract.capture import Capture
+from ..contract.messages import Problem
+from ..contract.settings import Settings
+from . import images
 
 
 def import_mask(capture: Capture, picture: Path) -> Path:

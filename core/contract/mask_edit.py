@@ -37,7 +37,7 @@ def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
     stage = stages.by_name("solve")
     chosen = [deciding(settings.solve), settings.seed, settings.device, settings.delight.delighter]
     files = {name: hash_tree(capture.root / name) for name in (*stage.reads, *stage.wishes) if "mask" not in name}
-    shipped = {name: hash_tree(Path(__file__).parent / name) for name in stage.data}
+    shipped = {name: hash_tree(Path(__file__).parents[1] / name) for name in stage.data}
     found = {**files, "the solver's settings": chosen, "the prior": shipped, "the solver's code": code_hash(stage.module)}
     return {name: hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=8).hexdigest() for name, value in found.items()}
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .raster import RayCaster
+from ..geometry.raster import RayCaster
 
 EVEN = 1 / 0.282095  # the coefficient of radiance 1 from everywhere
 

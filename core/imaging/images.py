@@ -16,8 +16,8 @@ import cv2
 import numpy as np
 import OpenImageIO as oiio
 
-from .capture import replacing
-from .messages import Problem
+from ..contract.capture import replacing
+from ..contract.messages import Problem
 
 
 def srgb_to_linear(srgb: np.ndarray) -> np.ndarray:

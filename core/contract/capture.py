@@ -203,7 +203,7 @@ class Capture:
         if stage.name == "solve" and settings.solve.prior:  # it works in the UVs of the artist's own mesh
             parts += [[path.name, hash_tree(path)] for path in (self.own_head, self.own_head_skin)]
         parts += [[name, hash_tree(self.root / name)] for name in (*stage.reads, *stage.wishes)]
-        parts += [hash_tree(Path(__file__).parent / name) for name in stage.data]
+        parts += [hash_tree(Path(__file__).parents[1] / name) for name in stage.data]
         return hashlib.blake2b(json.dumps(parts, sort_keys=True).encode(), digest_size=16).hexdigest()
 
     def state(self, stage: stages.Stage, settings: Settings) -> str:

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from . import atlas, images, raster, surfaces
+from ..imaging import images
+from . import atlas, raster, surfaces
 from .meshes import Mesh, vertex_normals
 
 STRIP = 128

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from .capture import replacing
-from .messages import Problem
+from ..contract.capture import replacing
+from ..contract.messages import Problem
 
 
 @dataclass(frozen=True)

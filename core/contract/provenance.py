@@ -16,12 +16,13 @@ from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 
-from . import __version__, stages
+from .. import __version__
+from . import stages
 from .capture import Capture, write_json
 from .delivery_plan import MADE_BY, PROVENANCE, Plan
 from .settings import Settings
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 CHUNK = 1 << 22
 
 

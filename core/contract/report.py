@@ -12,7 +12,8 @@ import html
 from dataclasses import asdict
 from pathlib import Path
 
-from . import __version__, stages
+from .. import __version__
+from . import stages
 from .capture import Capture, replacing
 from .settings import Settings, tooltips
 
