@@ -194,10 +194,11 @@ def _status(options: argparse.Namespace) -> int:
         raise Problem(f"There is no capture at {capture.root}.", "Check the name; `python -m core run SOURCE CAPTURE` makes one.")
     record = capture.read()
     chosen = read_job(capture.job).settings if capture.job.is_file() else settings.Settings()
-    print(f"source        {record.get('source') or 'none yet'}")
+    print(f"source        {capture.source or 'none yet'}")
     for stage in stages.STAGES:
-        finished = record["stages"].get(stage.name)
-        print(f"{stage.name:13} {capture.state(stage, chosen):6}" + (f" {finished['seconds']:8.1f} s  {finished['finished']}" if finished else ""))
+        finished, verdict = record["stages"].get(stage.name), capture.verdict(stage, chosen)
+        print(f"{stage.name:13} {verdict.state:6}" + (f" {finished['seconds']:8.1f} s  {finished['finished']}" if finished else "")
+              + (f"  {verdict.reason()}" if verdict.reason() else ""))
     if capture.shadow_mask.is_file():
         print("shadow mask   painted")
     for finding in report.findings(record):

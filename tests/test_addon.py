@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from core.contract.capture import Capture
+
 from . import standin
 
 bpy = pytest.importorskip("bpy")
@@ -77,7 +79,7 @@ def test_choosing_a_video_makes_a_capture_and_the_same_video_finds_it_again(addo
     bpy.ops.wildcap.choose_video(filepath=str(video))
     bpy.ops.wildcap.choose_video(filepath=str(video))
     root = tmp_path / "captures" / "Mon visage é.wildcap"
-    assert json.loads((root / "capture.json").read_text(encoding="utf-8"))["source"] == str(video)
+    assert Capture(root).source == video
     assert [item.path for item in bpy.context.scene.wildcap.captures] == [str(root)]
 
 
@@ -179,14 +181,13 @@ def test_what_is_wrong_with_a_video_stands_in_the_tab(addon, capture):
 
 
 def test_a_finished_stage_can_be_done_again_from_its_row(addon, capture, monkeypatch):
-    from core.contract.capture import Capture
-
     with pytest.raises(RuntimeError, match="no video"):
         bpy.ops.wildcap.reconstruct(first="scan")
     video = capture.parent / "face.mp4"
     video.write_bytes(b"0")
     Capture(capture).set_source(video)
-    monkeypatch.setattr(addon("status").Capture, "state", lambda *_: "stale")
+    status = addon("status")
+    monkeypatch.setattr(status.Capture, "verdict", lambda *_: status.freshness.Verdict("stale"))
     record = Capture(capture).read()
     record["stages"]["scan"] = {"seconds": 12.0, "findings": []}
     addon("status")._known.clear()
@@ -203,8 +204,6 @@ def test_a_finished_stage_can_be_done_again_from_its_row(addon, capture, monkeyp
 
 
 def test_moved_landmarks_are_kept_and_the_head_is_fitted_to_them_again(addon, capture, monkeypatch):
-    from core.contract.capture import Capture
-
     Capture(capture).set_source(capture.parent / "face.mp4")
     bpy.ops.wildcap.bring_in_head()
     head = bpy.context.view_layer.objects.active

@@ -114,7 +114,7 @@ def test_accents_and_spaces_in_every_path(face, tmp_path):
     command = [sys.executable, "-B", "-m", "core", "run", str(face), str(capture.root), "--until", "frames"]
     result = subprocess.run(command, cwd=root, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
     assert result.returncode == 0, result.stderr
-    assert capture.has("frames/") and capture.read()["source"] == str(face)
+    assert capture.has("frames/") and capture.source == face
 
 
 # -- disks

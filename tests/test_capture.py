@@ -1,23 +1,20 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The capture folder: what makes a stage stale, who may work in it, and that no file is ever half written."""
+"""The capture folder: what it records, who may work in it, and that no file is ever half written."""
 
 import json
 import os
-import shutil
 import subprocess
 import sys
-from dataclasses import replace
 
 import pytest
 
 from core.contract import stages
 from core.contract.capture import FORMAT, Capture, replacing, replacing_folder, write_json
-from core.contract.hashes import code_hash
 from core.contract.messages import Problem
-from core.contract.settings import Settings, from_json
+from core.contract.settings import Settings
 
-CAMERAS, FRAMES, UPSCALE = stages.by_name("cameras"), stages.by_name("frames"), stages.by_name("upscale")
+CAMERAS, FRAMES = stages.by_name("cameras"), stages.by_name("frames")
 
 
 @pytest.fixture
@@ -31,54 +28,12 @@ def capture(tmp_path) -> Capture:
         folder.mkdir()
         (folder / "a.bin").write_bytes(b"1")
     for stage in (FRAMES, CAMERAS):
-        capture.finish(stage, capture.stage_key(stage, Settings()), 1.5, Settings(), {"count": 3}, "0.1.0")
+        capture.finish(stage, capture.conditions(stage, Settings()), 1.5, Settings(), {"count": 3}, "0.1.0")
     return capture
 
 
-def states(capture: Capture, settings: Settings | None = None) -> list[str]:
-    return [capture.state(stage, settings or Settings()) for stage in (FRAMES, CAMERAS)]
-
-
-def test_what_was_made_from_the_same_things_is_fresh(capture):
-    assert states(capture) == ["done", "done"]
-    assert states(Capture(capture.root)) == ["done", "done"]
-
-
-def test_a_changed_input_makes_stale(capture):
-    (capture.frames / "a.bin").write_bytes(b"2")
-    assert states(capture) == ["done", "stale"]
-
-
-def test_a_changed_setting_makes_its_own_stage_stale(capture):
-    assert states(capture, from_json({"cameras": {"matching": "exhaustive"}})) == ["done", "stale"]
-    assert states(capture, from_json({"scan": {"pairs": 7}})) == ["done", "done"]
-
-
-def test_a_shared_setting_matters_where_it_is_named(capture):
-    assert states(capture, replace(Settings(), seed=7)) == ["done", "stale"]  # frames draws no random numbers
-
-
-def test_changed_code_makes_stale(capture, monkeypatch):
-    monkeypatch.setattr("core.contract.capture.code_hash", lambda module: "other" if module == CAMERAS.module else code_hash(module))
-    assert states(capture) == ["done", "stale"]
-
-
-def test_another_video_makes_the_frames_stale_and_one_that_was_moved_does_not(capture, tmp_path):
-    moved = tmp_path / "archive" / "film.mp4"
-    moved.parent.mkdir()
-    shutil.move(tmp_path / "film.mp4", moved)
-    assert states(capture) == ["done", "done"], "gone: the frames are what is left of it"
-    capture.set_source(moved)
-    assert states(capture) == ["done", "done"]
-    moved.write_bytes(b"another film")
-    assert states(capture)[0] == "stale" and not capture.made_from(moved)
-
-
-def test_a_painted_mask_is_a_wish_of_the_solver(capture):
-    solve = stages.by_name("solve")
-    before = capture.stage_key(solve, Settings())
-    capture.shadow_mask.write_bytes(b"painted")
-    assert capture.stage_key(solve, Settings()) != before
+def states(capture: Capture) -> list[str]:
+    return [capture.state(stage, Settings()) for stage in (FRAMES, CAMERAS)]
 
 
 def test_a_missing_output_is_to_do_and_a_forgotten_stage_too(capture):

@@ -10,6 +10,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from core.contract.capture import Capture
+
 from . import standin
 
 bpy = pytest.importorskip("bpy")
@@ -20,7 +22,7 @@ def items():
 
 
 def chosen_source(item) -> str:
-    return json.loads((Path(item.path) / "capture.json").read_text(encoding="utf-8"))["source"]
+    return str(Capture(item.path).source)
 
 
 @pytest.fixture

@@ -59,6 +59,16 @@ def test_the_manifest_asks_for_files_and_network_with_a_reason_each():
     assert manifest["version"] == version[1]
 
 
+def test_the_stages_have_the_same_code_keys_from_the_zip_as_from_a_checkout(archive, tmp_path):
+    with zipfile.ZipFile(archive) as file:
+        file.extractall(tmp_path)
+    from core.contract import code_key, stages
+
+    assert not (tmp_path / "core" / "synthetic").exists()
+    for stage in stages.STAGES:
+        assert code_key.code_key(stage.module, tmp_path / "core") == code_key.code_key(stage.module), stage.name
+
+
 def test_the_zip_holds_what_it_should_and_nothing_else(archive):
     with zipfile.ZipFile(archive) as file:
         names = [info.filename for info in file.infolist() if not info.is_dir()]

@@ -26,7 +26,7 @@ EDIT = (slice(60, 68), slice(40, 50))
 def same_code():
     """The sources may be edited while the tests run."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mask_edit, "code_hash", lambda module: "now")
+        patch.setattr(mask_edit, "code_key", lambda module: "now")
         yield
 
 
@@ -130,7 +130,7 @@ def test_the_add_on_can_tell_without_torch(capture):
     assert mask_edit.obstacle(capture, settings()) == ""
     assert "settings" in mask_edit.obstacle(capture, settings(steps=7))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mask_edit, "code_hash", lambda module: "a later version's")
+        patch.setattr(mask_edit, "code_key", lambda module: "a later version's")
         assert "code changed" in mask_edit.obstacle(capture, settings())
     assert "No solve" in mask_edit.obstacle(Capture(Path("/no/such/capture")), settings())
 

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where memory does not suffice the solve goes on in the low-memory mode, says so, and gives the same bytes."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -19,6 +18,7 @@ from core.solve.recipes import Recipe
 from core.solve.sampler import sample, seeded
 
 from .painted_skin import brief_confidence, make, settings  # noqa: F401
+from .recorded import changed, record
 from .test_sampler import SmoothPrior, observation, shadow_problem, start
 
 REFUSALS = [MemoryError(), torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB"),
@@ -140,6 +140,6 @@ def solved(capture, **options):
 
 def test_how_much_memory_is_used_decides_nothing(tmp_path):
     capture, stage = Capture(tmp_path), by_name("solve")
-    plain, low, other = (from_json({"solve": values}) for values in ({}, {"low_memory": True}, {"steps": 9}))
-    assert capture.stage_key(stage, plain) == capture.stage_key(stage, low) == capture.stage_key(stage, replace(Settings()))
-    assert capture.stage_key(stage, plain) != capture.stage_key(stage, other)
+    record(capture, stage, Settings())
+    assert changed(capture, stage, from_json({"solve": {"low_memory": True}})) == ()
+    assert changed(capture, stage, from_json({"solve": {"steps": 9}})) == ("solve.steps",)

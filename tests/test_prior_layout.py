@@ -30,6 +30,7 @@ from core.solve.prior import WEIGHTS, load
 
 from .own_heads import person
 from .painted_skin import brief_confidence  # noqa: F401
+from .recorded import changed, record
 from .test_released_prior import weights_of, write
 
 SIZE = 128
@@ -196,12 +197,17 @@ def test_without_the_other_head_or_with_other_uvs_it_says_what_to_do(capture, au
 
 def test_another_checkpoint_or_head_makes_the_stage_stale_but_only_with_that_prior(capture, authors):
     stage = stages.by_name("solve")
-    ours, theirs = (capture.stage_key(stage, settings(prior)) for prior in ("", authors))
-    put_own_head(capture, other_head(5.0))
-    assert capture.stage_key(stage, settings("")) == ours and capture.stage_key(stage, settings(authors)) != theirs
-    theirs = capture.stage_key(stage, settings(authors))
-    (authors / "config.json").write_text((authors / "config.json").read_text() + "\n")
-    assert capture.stage_key(stage, settings("")) == ours and capture.stage_key(stage, settings(authors)) != theirs
+    def change(prior, edit) -> tuple[str, ...]:
+        record(capture, stage, settings(prior))
+        edit()
+        return changed(capture, stage, settings(prior))
+
+    def edit_config():
+        (authors / "config.json").write_text((authors / "config.json").read_text() + "\n")
+
+    assert change("", lambda: put_own_head(capture, other_head(5.0))) == change("", edit_config) == ()
+    assert change(authors, lambda: put_own_head(capture, other_head(6.0))) == ("own_head.obj",)
+    assert change(authors, edit_config) == ("solve.prior",)
 
 
 def test_on_ict_facekit_with_random_weights_of_the_released_shape(capture, ict_fitted, monkeypatch):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..core.contract import stages
+from ..core.contract.freshness import FINISHED
 
 if TYPE_CHECKING:
     from .status import Status
@@ -77,7 +78,7 @@ def _step_of(facts: Facts, status: Status, translated: Callable[[str], str]) -> 
         return Step(state, "Continue Reconstruction" if begun else "Reconstruct", "wildcap.reconstruct", 'MESH_MONKEY') if facts.has_python else SET_UP
     if facts.head_time < status.head_time:
         return Step("The head is ready.", "Bring In Head", "wildcap.bring_in_head", 'IMPORT')
-    solved = status.has_maps and status.stages["solve"] in ("done", "absent")
+    solved = status.has_maps and status.stages["solve"] in (*FINISHED, "absent")
     if not solved and status.interrupted:
         words = "A solve was interrupted. It goes on from its last checkpoint, unless the settings changed."
         step = Step(words, "Continue Solving", "wildcap.solve", 'LIGHT')

@@ -12,7 +12,8 @@ from . import captures, jobs, next_step, preferences, problems, status
 from .base_panel import WildcapPanel, region_width
 from .paint import session
 
-STATE_ICONS = {"done": 'CHECKMARK', "absent": 'CHECKMARK', "stale": 'FILE_REFRESH', "to do": 'RADIOBUT_OFF', "not needed": 'BLANK1', "running": 'PLAY'}
+STATE_ICONS = {"done": 'CHECKMARK', "absent": 'CHECKMARK', "stale": 'FILE_REFRESH', "older": 'TIME', "to do": 'RADIOBUT_OFF', "not needed": 'BLANK1',
+               "running": 'PLAY'}
 
 
 class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
@@ -70,10 +71,10 @@ class WILDCAP_PT_stages(WildcapPanel, bpy.types.Panel):
             split = column.split(factor=0.47)
             split.label(text=stage.label, icon=STATE_ICONS[state])
             row = split.row()
-            row.label(text=_words(state, found.seconds.get(stage.name) if found else None))
+            row.label(text=_words(state, found, stage.name))
             if state == "running" and job.progress and job.progress.of > 0:
                 row.label(text=f"{min(1.0, job.progress.done / job.progress.of):.0%}")
-            if job is None and (state in ("done", "stale") or state == "to do" and ready):
+            if job is None and (state in ("done", "stale", "older") or state == "to do" and ready):
                 icon = 'PLAY' if state == "to do" else 'FILE_REFRESH'
                 if stage.name == "solve":
                     row.operator("wildcap.solve", text="", icon=icon, emboss=False)
@@ -136,7 +137,10 @@ def draw_job(layout, job: jobs.Job, cancel: str = "") -> None:
             column.label(text=line[:1].upper() + line[1:], translate=False)
 
 
-def _words(state: str, seconds: float | None) -> str:
+def _words(state: str, found: status.Status | None, stage: str) -> str:
+    if state == "older":
+        return iface_("made by {}").format(found.versions[stage])
+    seconds = found.seconds.get(stage) if found else None
     if state in ("done", "stale") and seconds is not None:
         time = f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
         return (iface_("done, {}") if state == "done" else iface_("out of date, {}")).format(time)

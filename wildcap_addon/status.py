@@ -12,7 +12,7 @@ from pathlib import Path
 
 import bpy
 
-from ..core.contract import consent, mask_edit, report, stages
+from ..core.contract import consent, freshness, mask_edit, report, stages
 from ..core.contract.capture import Capture
 from ..core.contract.messages import Problem
 from . import captures, properties
@@ -22,11 +22,13 @@ INTERVAL_S = 1.0
 
 @dataclass(frozen=True)
 class Status:
-    """What a capture's folder says. `stages`: name -> 'to do', 'done', 'stale' or 'absent' (outputs came from elsewhere, without a record)."""
+    """What a capture's folder says. `stages`: name -> 'to do', 'done', 'stale', 'older' (made by older code, kept) or 'absent' (outputs came from elsewhere,
+    without a record); `versions`: name -> the WildCap that made what is older."""
 
     source: str = ""
     stages: dict = field(default_factory=dict)
     seconds: dict = field(default_factory=dict)
+    versions: dict = field(default_factory=dict)
     has_head: bool = False
     head_time: float = 0.0
     has_mask: bool = False
@@ -71,7 +73,7 @@ def look(capture: Capture, settings) -> Status:
                                                     "Connect its disk, or click Locate Capture and show where it is now."))
     try:
         record = capture.read()
-        states = {stage.name: _state(capture, stage, record, settings) for stage in stages.STAGES}
+        verdicts = {stage.name: _verdict(capture, stage, record, settings) for stage in stages.STAGES}
     except Problem as problem:
         return Status(problem=problem)
     except OSError as error:
@@ -79,8 +81,10 @@ def look(capture: Capture, settings) -> Status:
                                       "Check the disk, or open the capture from where it is now."))
     maps_time = max(map(_time, delivered(capture)))
     render = max(capture.renders.glob("[!.]*.png"), key=_time, default=Path())
+    states = {name: verdict.state for name, verdict in verdicts.items()}
     return Status(
-        source=record.get("source", ""), stages=states, whole_solve=_whole_solve(capture, states["solve"], settings),
+        source=str(capture.source or ""), stages=states, versions={name: verdict.version for name, verdict in verdicts.items()},
+        whole_solve=_whole_solve(capture, states["solve"], settings),
         seconds={name: done["seconds"] for name, done in record["stages"].items()},
         has_head=capture.head.is_file(), head_time=_time(capture.head), has_mask=capture.shadow_mask.is_file(),
         findings=tuple(report.findings(record)), interrupted=_interrupted(capture),
@@ -97,11 +101,11 @@ def delivered(capture: Capture) -> list[Path]:
     return enlarged if newer else solved
 
 
-def _state(capture: Capture, stage: stages.Stage, record: dict, settings) -> str:
+def _verdict(capture: Capture, stage: stages.Stage, record: dict, settings) -> freshness.Verdict:
     if stage.name not in record["stages"]:
         begun = (capture.logs / f"{stage.name}.log").is_file()  # and did not end: what is there is of another run, or half new
-        return "absent" if all(capture.has(name) for name in stage.writes) and not begun else "to do"
-    return capture.state(stage, settings)
+        return freshness.Verdict("absent" if all(capture.has(name) for name in stage.writes) and not begun else freshness.TO_DO)
+    return capture.verdict(stage, settings)
 
 
 def _sending(capture: Capture, settings) -> dict:
@@ -115,7 +119,7 @@ def _sending(capture: Capture, settings) -> dict:
 
 
 def _whole_solve(capture: Capture, state: str, settings) -> str:
-    return "The mask is as it was at the last solve." if state == "done" else mask_edit.obstacle(capture, settings)
+    return "The mask is as it was at the last solve." if state in freshness.FINISHED else mask_edit.obstacle(capture, settings)
 
 
 def _interrupted(capture: Capture) -> bool:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import hashlib
 import json
 import os
 import re
@@ -20,13 +19,15 @@ from collections.abc import Collection
 from dataclasses import asdict
 from pathlib import Path
 
-from . import stages
-from .hashes import code_hash, hash_tree, source_stamp
+from . import format_1, freshness, stages
+from .freshness import Verdict
+from .hashes import hash_source, same_source
 from .messages import Problem
-from .settings import Settings, deciding
+from .portable_paths import convert_settings, write_portable
+from .settings import Settings
 
-FORMAT = 1
-"""Version of the capture folder's layout; a capture of a newer format is refused."""
+FORMAT = 2
+"""Version of the capture folder's layout; a capture of a newer format is refused. Format 1 is that of WildCap 0.1.0 (format_1.py)."""
 
 
 @contextlib.contextmanager
@@ -151,29 +152,42 @@ class Capture:
             raise Problem("This capture was made by a newer version of WildCap.", "Update the extension to open it; nothing was changed.")
         return record
 
+    @property
+    def source(self) -> Path | None:
+        """The video, or the folder of photographs, that the capture is made from; it may be gone. None where none was chosen."""
+        return freshness.source_of(self.root, self.read())
+
     def set_source(self, source: str | Path) -> None:
-        """Records where the pictures come from, with a stamp that outlives them: a video may be put away once its frames are taken."""
+        """Records where the pictures come from, and what they hold: a video may be put away once its frames are taken."""
         record = self.read()
-        changed = {**record, "source": str(source), "source_stamp": source_stamp(str(source)) or record.get("source_stamp", [])}
+        stamp, path = record.get("source_stamp", []), Path(source) if str(source) else None
+        changed = {**record, **format_1.keep_stamp(stamp), "format": FORMAT, "source": self._portable(path) if path else "",
+                   "source_stamp": hash_source(path) or stamp}
         if changed != record:
             write_json(self.json, changed)
 
     def made_from(self, source: str | Path) -> bool:
-        """Whether `source` is what this capture's frames were taken from, or there are none yet."""
+        """Whether `source` holds what this capture's frames were taken from, or there are none yet, or it is not there to be asked."""
         record = self.read()
         first = next(stage.name for stage in stages.STAGES if not stage.reads)
-        return first not in record["stages"] or source_stamp(str(source)) in ([], record.get("source_stamp"))
+        present = hash_source(Path(source))
+        return first not in record["stages"] or not present or same_source(record.get("source_stamp", []), present)
 
-    def finish(self, stage: stages.Stage, key: str, seconds: float, settings: Settings, figures: dict, version: str,
+    def finish(self, stage: stages.Stage, conditions: dict, seconds: float, settings: Settings, figures: dict, version: str,
                findings: Collection[dict] = ()) -> None:
-        """Records that a stage ended well; `key` is what `stage_key` gave before it began, `findings` are the Reporter's."""
+        """Records that a stage ended well; `conditions` is what `conditions` gave before it began, `findings` are the Reporter's."""
         record = self.read()
+        chosen = convert_settings({stage.name: asdict(getattr(settings, stage.name))}, self._portable)[stage.name]
+        record["format"] = FORMAT
         record["stages"][stage.name] = {
-            "key": key, "seconds": round(seconds, 2), "finished": time.strftime("%Y-%m-%dT%H:%M:%S"), "version": version,
-            "settings": asdict(getattr(settings, stage.name)), "seed": settings.seed, "device": settings.device, "figures": figures,
+            **conditions, "seconds": round(seconds, 2), "finished": time.strftime("%Y-%m-%dT%H:%M:%S"), "version": version,
+            "settings": chosen, "seed": settings.seed, "device": settings.device, "figures": figures,
             "findings": list(findings),
         }
         write_json(self.json, record)
+
+    def _portable(self, path: str | Path) -> str:
+        return write_portable(path, self.root)
 
     def stop(self, stage: str, problem: Problem, findings: Collection[dict] = ()) -> None:
         """Records why a stage could not end, for the report; gone as soon as that stage is begun again."""
@@ -191,27 +205,19 @@ class Capture:
 
     # -- freshness
 
-    def stage_key(self, stage: stages.Stage, settings: Settings) -> str:
-        """Hash of all a stage's result depends on: its inputs' contents, its settings, the shared ones it names, its code."""
-        record = self.read()
-        parts = [deciding(getattr(settings, stage.name)), {name: getattr(settings, name) for name in stage.shared}, code_hash(stage.module)]
-        if not stage.reads:
-            parts.append(source_stamp(record.get("source", "")) or record.get("source_stamp", []))
-        named = {"delight": settings.delight.folder, "cameras": settings.cameras.import_from, "registration": settings.registration.template,
-                 "shadow_mask": settings.shadow_mask.softened, "solve": settings.solve.prior}.get(stage.name)
-        parts += [hash_tree(Path(named).expanduser())] if named else []  # what the artist keeps elsewhere
-        if stage.name == "solve" and settings.solve.prior:  # it works in the UVs of the artist's own mesh
-            parts += [[path.name, hash_tree(path)] for path in (self.own_head, self.own_head_skin)]
-        parts += [[name, hash_tree(self.root / name)] for name in (*stage.reads, *stage.wishes)]
-        parts += [hash_tree(Path(__file__).parents[1] / name) for name in stage.data]
-        return hashlib.blake2b(json.dumps(parts, sort_keys=True).encode(), digest_size=16).hexdigest()
+    def conditions(self, stage: stages.Stage, settings: Settings) -> dict:
+        """What the result of a stage that begins now will depend on, for `finish`."""
+        return freshness.describe_conditions(self.root, self.read(), stage, settings)
+
+    def verdict(self, stage: stages.Stage, settings: Settings) -> Verdict:
+        """Whether a stage is to do, done, stale or made by older code, and why (freshness.py)."""
+        if not all(self.has(name) for name in stage.writes):
+            return Verdict(freshness.TO_DO)
+        return freshness.judge(self.root, self.read(), stage, settings)
 
     def state(self, stage: stages.Stage, settings: Settings) -> str:
-        """'to do', 'done' (fresh) or 'stale' (its inputs, settings or code have changed since)."""
-        finished = self.read()["stages"].get(stage.name)
-        if finished is None or not all(self.has(name) for name in stage.writes):
-            return "to do"
-        return "done" if finished["key"] == self.stage_key(stage, settings) else "stale"
+        """The `verdict`'s state alone."""
+        return self.verdict(stage, settings).state
 
     def has(self, name: str) -> bool:
         path = self.root / name

@@ -1,26 +1,27 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What tells whether a stage's inputs have changed: hashes of files, folders and code, and stamps of sources too long to be read.
+"""Content hashes of files and folders, and what identifies the pictures that a capture is made from.
 
-Ground floor: standard library only.
+Standard library only.
 """
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
+WHOLE_BYTES = 64 << 20
+"""Size up to which a source's file is read whole: every photograph, and a phone's video of half a minute."""
+BLOCKS, BLOCK_BYTES = 64, 1 << 20
+"""What is read of a longer one, spread evenly from its first byte to its last."""
 _hashes: dict[tuple, str] = {}
 
 
 def hash_file(path: Path) -> str:
-    """The content hash of a file; one that has kept its size and time is not read again."""
-    info = path.stat()
-    key = (str(path), info.st_size, info.st_mtime_ns)
-    if key not in _hashes:
-        with open(path, "rb") as file:
-            _hashes[key] = hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
-    return _hashes[key]
+    """The content hash of a file; one that has kept its size and time is not read again by this process."""
+    return _remember(path, _hash_whole)
 
 
 def hash_tree(path: Path) -> str | dict:
@@ -30,17 +31,50 @@ def hash_tree(path: Path) -> str | dict:
     return hash_file(path) if path.is_file() else ""
 
 
-def source_stamp(source: str) -> list:
-    """Name, size and time of a source's files ([] when it is gone): a long video is not read to see that it is the same, nor its folder's name."""
-    path = Path(source)
-    files = [] if not source else sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path] if path.is_file() else []
-    return [[p.name, p.stat().st_size, p.stat().st_mtime_ns] for p in files]
+def hash_source(source: Path | None) -> list:
+    """[name, size, content hash] of each file of a source, which is a video or a folder of photographs; [] where it is gone.
+
+    A file of more than WHOLE_BYTES is known by its size and by BLOCKS blocks of it.
+    """
+    inside = sorted(source.iterdir()) if source is not None and source.is_dir() else [source] if source is not None else []
+    files = [p for p in inside if p.is_file() and not p.name.startswith(".")]
+    return [[p.name, p.stat().st_size, _remember(p, _hash_sampled)] for p in files]
 
 
-def code_hash(module: str) -> str:
-    """Hash of the stage's own room, without importing it."""
-    room = Path(__file__).parents[1] / module.split(".", 1)[1]
-    digest = hashlib.blake2b(digest_size=8)
-    for path in sorted(room.glob("*.py")):
-        digest.update(path.read_bytes())
+def same_source(recorded: list, present: list) -> bool:
+    """Whether two answers of `hash_source` mean the same pictures. A video may be renamed; the names of photographs count, for they tell their order.
+
+    Captures of WildCap 0.1.0 recorded a time in place of the hash: of those, size and name must do.
+    """
+    def told(stamp: list) -> list:
+        return [[name if len(stamp) > 1 or not hashed else "", size, digest if hashed else ""] for name, size, digest in stamp if not name.startswith(".")]
+
+    hashed = all(isinstance(digest, str) for _, _, digest in (*recorded, *present))
+    return told(recorded) == told(present)
+
+
+def _remember(path: Path, digest: Callable[[BinaryIO, int], str]) -> str:
+    info = path.stat()
+    key = (digest.__name__, str(path), info.st_size, info.st_mtime_ns)
+    if key not in _hashes:
+        with open(path, "rb") as file:
+            _hashes[key] = digest(file, info.st_size)
+    return _hashes[key]
+
+
+def _hash_whole(file: BinaryIO, size: int) -> str:
+    return hashlib.file_digest(file, _hasher).hexdigest()
+
+
+def _hash_sampled(file: BinaryIO, size: int) -> str:
+    if size <= WHOLE_BYTES:
+        return _hash_whole(file, size)
+    digest = _hasher()
+    for block in range(BLOCKS):
+        file.seek(block * (size - BLOCK_BYTES) // (BLOCKS - 1))
+        digest.update(file.read(BLOCK_BYTES))
     return digest.hexdigest()
+
+
+def _hasher():
+    return hashlib.blake2b(digest_size=16)

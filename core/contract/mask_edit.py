@@ -14,7 +14,8 @@ from pathlib import Path
 
 from . import stages
 from .capture import Capture
-from .hashes import code_hash, hash_tree
+from .code_key import code_key
+from .hashes import hash_tree
 from .settings import Settings, deciding
 
 FIELD = "conditions"  # of the file's metadata
@@ -37,8 +38,7 @@ def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
     stage = stages.by_name("solve")
     chosen = [deciding(settings.solve), settings.seed, settings.device, settings.delight.delighter]
     files = {name: hash_tree(capture.root / name) for name in (*stage.reads, *stage.wishes) if "mask" not in name}
-    shipped = {name: hash_tree(Path(__file__).parents[1] / name) for name in stage.data}
-    found = {**files, "the solver's settings": chosen, "the prior": shipped, "the solver's code": code_hash(stage.module)}
+    found = {**files, "the solver's settings": chosen, "the solver's code": code_key(stage.module)}
     return {name: hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=8).hexdigest() for name, value in found.items()}
 
 

@@ -19,7 +19,9 @@ from pathlib import Path
 from .. import __version__
 from . import stages
 from .capture import Capture, write_json
+from .code_key import data_files
 from .delivery_plan import MADE_BY, PROVENANCE, Plan
+from .hashes import hash_source, same_source
 from .settings import Settings
 
 HERE = Path(__file__).parents[1]
@@ -34,7 +36,7 @@ def collect(capture: Capture, plan: Plan, settings: Settings, tick: Callable[[],
         "delivery": {"what": plan.what, "preset": plan.preset.title, "format": plan.format.title, "pictures": plan.pictures, "colour": plan.colour,
                      "normals": plan.normals, "unit": plan.unit, "drops": list(plan.format.drops)},
         "versions": {"WildCap": __version__, "Python": platform.python_version(), "packages": packages()},
-        "capture": {"name": capture.root.name, "sources": _sources(record, tick)},
+        "capture": {"name": capture.root.name, "sources": _sources(capture.source, record, tick)},
         "stages": {name: _stage(done) for name, done in record["stages"].items()},
         "weights": _weights(record, settings, tick),
         "data": {"built-in head": "MakeHuman base mesh and targets, CC0", "landmark and face nets": "MediaPipe, Apache-2.0"},
@@ -73,13 +75,12 @@ def sha256(path: Path, tick: Callable[[], None]) -> str:
     return digest.hexdigest()
 
 
-def _sources(record: dict, tick: Callable[[], None]) -> list[dict]:
+def _sources(source: Path | None, record: dict, tick: Callable[[], None]) -> list[dict]:
     """The video or the photographs: name, size and hash; without the hash where they are not there any more, or have changed since."""
-    path = Path(record.get("source") or "")
     found = []
-    for name, size, time_ns in record.get("source_stamp", []):
-        file = path / name if path.is_dir() else path
-        there = file.is_file() and (file.stat().st_size, file.stat().st_mtime_ns) == (size, time_ns)
+    for name, size, known in record.get("source_stamp", []):
+        file = source / name if source is not None and source.is_dir() else source
+        there = file is not None and same_source([[name, size, known]], hash_source(file))
         found.append({"name": name, "bytes": size, "sha256": sha256(file, tick) if there else "not there any more"})
     return found
 
@@ -92,7 +93,8 @@ def _stage(done: dict) -> dict:
 
 def _weights(record: dict, settings: Settings, tick: Callable[[], None]) -> list[dict]:
     """The shipped networks that the finished stages may have used: hash, licence, data and the command that trained them, from their cards."""
-    names = dict.fromkeys(name for stage in stages.STAGES if stage.name in record["stages"] for name in stage.data if name.endswith(".safetensors"))
+    read = [name for stage in stages.STAGES if stage.name in record["stages"] for name in data_files(stage.module)]
+    names = dict.fromkeys(name for name in read if name.endswith(".safetensors"))
     found = []
     for name in names:
         file, card = HERE / name, (HERE / name).with_suffix(".json")

@@ -15,9 +15,8 @@ from pathlib import Path
 from .. import __version__
 from . import stages
 from .capture import Capture, replacing
+from .freshness import STALE
 from .settings import Settings, tooltips
-
-STATES = {"done": "done", "stale": "out of date", "to do": "to do"}
 
 
 def write(capture: Capture, settings: Settings) -> None:
@@ -25,7 +24,7 @@ def write(capture: Capture, settings: Settings) -> None:
     record = capture.read()
     sections = "\n".join(_section(capture, stage, record["stages"].get(stage.name), settings) for stage in stages.STAGES)
     renders = _pictures(sorted(p for p in capture.renders.glob("*") if p.suffix.lower() in (".jpg", ".jpeg", ".png")), "Render")
-    page = PAGE.format(title=html.escape(capture.root.stem), source=html.escape(record.get("source", "")), summary=_summary(record), style=STYLE,
+    page = PAGE.format(title=html.escape(capture.root.stem), source=html.escape(str(capture.source or "")), summary=_summary(record), style=STYLE,
                        doctor=_doctor(record), sections=sections,
                        renders=f"<section><h2>Renders</h2>{renders}</section>" if renders else "", version=__version__)
     with replacing(capture.report) as temporary:
@@ -73,8 +72,9 @@ def _summary(record: dict) -> str:
 
 
 def _section(capture: Capture, stage: stages.Stage, finished: dict | None, settings: Settings) -> str:
-    state = capture.state(stage, settings)
-    head = f'<h2>{html.escape(stage.label)} <small class="{state.replace(" ", "-")}">{STATES[state]}</small></h2>'
+    verdict = capture.verdict(stage, settings)
+    words = f"out of date: {verdict.reason()}" if verdict.state == STALE else verdict.reason() or verdict.state
+    head = f'<h2>{html.escape(stage.label)} <small class="{verdict.state.replace(" ", "-")}">{html.escape(words)}</small></h2>'
     if finished is None:
         return f'<section id="{stage.name}">{head}</section>'
     pictures = _pictures(sorted(capture.pictures.glob(f"{stage.name}_*.jpg")), stage.label, len(stage.name) + 1)
@@ -131,7 +131,8 @@ body { margin: 0 auto; padding: 2.5rem 1.5rem 4rem; max-width: 62rem; background
 h1 { font-size: 1.9rem; margin: 0; } h2 { font-size: 1.25rem; margin: 0 0 .3rem; } h3 { font-size: .85rem; color: var(--faint); margin: 1rem 0 .3rem; }
 header p, .when, figcaption, footer { color: var(--faint); margin: .2rem 0; font-size: .88rem; overflow-wrap: anywhere; }
 section { border-top: 1px solid var(--line); padding: 1.3rem 0; margin-top: 1.3rem; }
-small { font-size: .78rem; font-weight: 500; color: var(--faint); margin-left: .5rem; } small.done { color: var(--good); } small.stale { color: var(--stale); }
+small { font-size: .78rem; font-weight: 500; color: var(--faint); margin-left: .5rem; } small.done { color: var(--good); }
+small.stale, small.older { color: var(--stale); }
 figure { display: inline-block; margin: .7rem .8rem 0 0; max-width: 100%; vertical-align: top; }
 img { max-width: 100%; max-height: 34rem; border-radius: 4px; display: block; }
 table { border-collapse: collapse; font-size: .92rem; }

@@ -16,8 +16,8 @@ from .messages import Problem
 class Stage:
     """One step of the chain: `module`'s `run(capture, settings, report)` turns `reads` into `writes`.
 
-    `wishes` are read when they are there. `shared` names the shared settings (seed, device) the result depends on,
-    `data` the shipped files (relative to core/).
+    `wishes` are read when they are there. `shared` names the shared settings (seed, device) the result depends on; which code and which shipped
+    files it depends on is read from the sources (code_key.py).
     """
 
     name: str
@@ -27,7 +27,6 @@ class Stage:
     module: str
     wishes: tuple[str, ...] = field(default=())
     shared: tuple[str, ...] = field(default=())
-    data: tuple[str, ...] = field(default=())
 
 
 MAPS = ("diffuse_albedo.png", "diffuse_albedo.exr", "specular_albedo.png", "normal.png", "shading.exr", "confidence.png")
@@ -36,18 +35,16 @@ STAGES = (
     Stage("frames", "Frames", (), ("frames/",), "core.frames"),
     Stage("cameras", "Cameras", ("frames/",), ("cameras/",), "core.cameras", shared=("seed",)),
     Stage("scan", "Scan", ("frames/", "cameras/"), ("scan.ply",), "core.scan", shared=("device",)),
-    Stage("registration", "Head", ("frames/", "cameras/", "scan.ply"), ("head.obj", "landmarks.json"), "core.registration", wishes=("landmarks_artist.json",),
-          data=("assets/head.obj", "assets/head.json", "assets/identity.npz", "assets/masks")),
-    Stage("delight", "Delight", ("frames/", "cameras/", "head.obj"), ("delit/",), "core.delight", shared=("device",),
-          data=("weights/delighter.safetensors", "weights/delighter.json")),
+    Stage("registration", "Head", ("frames/", "cameras/", "scan.ply"), ("head.obj", "landmarks.json"), "core.registration", wishes=("landmarks_artist.json",)),
+    Stage("delight", "Delight", ("frames/", "cameras/", "head.obj"), ("delit/",), "core.delight", shared=("device",)),
     Stage("texture", "Texture", ("frames/", "delit/", "cameras/", "head.obj"), ("texture.exr", "texture.png", "texture_confidence.exr"), "core.texture"),
     Stage("shadow_mask", "Shadow Mask", ("delit/", "cameras/", "head.obj", "texture.exr", "texture_confidence.exr"), ("shadow_mask_auto.png",),
           "core.shadow_mask", wishes=("texture_filmed.png", "frames/")),
     Stage("solve", "Solve", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
-          tuple(f"maps/{name}" for name in MAPS), "core.solve", shared=("seed",), data=("weights/prior.safetensors", "weights/tones.json"),
+          tuple(f"maps/{name}" for name in MAPS), "core.solve", shared=("seed",),
           wishes=("shadow_mask.png", "protect_mask.png", "texture_filmed.png", "frames/", "cameras/", "delit/")),
     Stage("upscale", "4K Maps", ("head.obj", *(f"maps/{name}" for name in MAPS)), tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale",
-          shared=("seed", "device"), data=("weights/prior.safetensors", "weights/upscaler.safetensors", "weights/upscaler.json"),
+          shared=("seed", "device"),
           wishes=("texture_detail.exr",)),
     Stage("transfer", "Delivery", ("head.obj", *(f"maps/{name}" for name in MAPS)), ("delivery/",), "core.transfer",
           wishes=(*(f"maps_4k/{name}" for name in MAPS), "own_head.obj", "own_head.json", "scan.ply", "frames/", "cameras/")),

@@ -37,7 +37,8 @@ from .shading import light_in_frame, light_seen
 from .surface import skin_weights
 from .unet import DARKEST, SIDE, DelightNet, network_input
 
-WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "delighter.safetensors"
+DATA_FILES = ("weights/delighter.safetensors", "weights/delighter.json")
+WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
 MARGIN = 1.35  # side of the square, in sides of the face's landmarks; training shows 1.25 to 2
 FADE = 0.06  # of the square's side: along its border it gives way to the fitted light
 

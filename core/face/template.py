@@ -16,6 +16,7 @@ from ..geometry.meshes import Mesh
 from ..imaging import images
 
 ASSETS = Path(__file__).parents[1] / "assets"
+DATA_FILES = ("assets/head.obj", "assets/head.json", "assets/identity.npz", "assets/masks")
 MASKS = ("face", "skin", "lips", "brows", "eyes", "nose", "nostrils", "ears", "neck", "scalp")
 
 

@@ -39,10 +39,9 @@ READING = 0.9
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """Writes capture.frames. Raises Problem where there are fewer than three readable frames, no face, two equal ones, or no motion."""
-    source = capture.read()["source"]
-    path = Path(source)
-    if not source or not path.exists():
-        raise Problem(f"There is no video or folder of photographs at {source!r}." if source else "No video was chosen.",
+    path = capture.source
+    if path is None or not path.exists():
+        raise Problem(f"There is no video or folder of photographs at {str(path)!r}." if path else "No video was chosen.",
                       "Choose a video of the face, or a folder of photographs.")
     photographs = path.is_dir()
     read = read_photographs if photographs else read_video

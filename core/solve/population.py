@@ -21,7 +21,8 @@ from skimage import color
 from ..imaging import images
 from .look import LUMINANCE, Look
 
-FILE = Path(__file__).parents[1] / "weights" / "tones.json"
+DATA_FILES = ("weights/tones.json",)
+FILE = Path(__file__).parents[1] / DATA_FILES[0]
 SHEEN = 0.015  # of a white surface's brightness: what skin of any tone reflects without taking colour, and no view is free of
 SHINE = 0.5  # deviation of the sheen in log units: oily and dry skin
 STRETCH = 2.0  # at most

@@ -20,7 +20,8 @@ from .network import UNet, denoise, from_state
 
 BLIND = 80.0  # noise level of a channel of which nothing is seen
 CLEAR = 0.01  # ... and of one that is known
-WEIGHTS = Path(__file__).parent.parent / "weights" / "prior.safetensors"
+DATA_FILES = ("weights/prior.safetensors", "weights/prior.json")
+WEIGHTS = Path(__file__).parent.parent / DATA_FILES[0]
 
 
 class Prior:

@@ -19,7 +19,8 @@ from ..imaging import images
 from .maps import Maps
 from .network import CHANNELS, FACTOR, HALO, Rcan, bicubic
 
-WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "upscaler.safetensors"
+DATA_FILES = ("weights/upscaler.safetensors", "weights/upscaler.json")
+WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
 STRIP = 64
 """Rows of the small map whose tail is worked out at once."""
 

@@ -34,7 +34,8 @@ ODD = 0.20
 """Difference of log albedo from its surroundings at which the fringe of the seen part loses half of its say: stray light, clothes, hair in front."""
 LEAST_SCALP = 1500.0
 """mm^2 of scalp that must have been seen for it to have a tone of its own."""
-MEAN_FACE = Path(__file__).resolve().parent.parent / "weights" / "prior.safetensors"
+DATA_FILES = ("weights/prior.safetensors",)
+MEAN_FACE = Path(__file__).resolve().parent.parent / DATA_FILES[0]
 FEATURES = ("brows", "lips", "eyes", "nostrils")
 DARKEST = 0.004
 

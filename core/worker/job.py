@@ -8,13 +8,13 @@ Ground floor: standard library only.
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..contract import stages
 from ..contract.capture import Capture, write_json
 from ..contract.messages import Problem
+from ..contract.portable_paths import convert_settings, read_portable, write_portable
 from ..contract.settings import Settings, from_json, preset
 
 
@@ -40,10 +40,10 @@ def write_job(capture: Capture, *, source: str | Path = "", first: str | None = 
     over the preset `quality`. `tool` names one of stages.TOOLS that runs in place of the chain. Raises Problem for an unknown name or value, when the
     folder cannot be written, and while another worker is at the capture: job.json is the record of what that one was asked.
     """
-    source = os.path.abspath(source) if str(source) else ""
-    values = {"capture": str(capture.root.absolute()), "source": source, "from": first, "until": last, "settings": settings or {}, "quality": quality,
-              **({"tool": tool} if tool else {})}
-    _job(values)
+    chosen = convert_settings(settings or {}, lambda path: write_portable(path, capture.root))
+    values = {"capture": ".", "source": write_portable(source, capture.root) if str(source) else "", "from": first, "until": last, "settings": chosen,
+              "quality": quality, **({"tool": tool} if tool else {})}
+    _job(values, capture.root)
     capture.check_free()
     write_json(capture.job, values)
     return capture.job
@@ -52,18 +52,21 @@ def write_job(capture: Capture, *, source: str | Path = "", first: str | None = 
 def read_job(path: Path) -> Job:
     """The job of a file. Raises Problem when it is damaged or asks for what there is not."""
     try:
-        return _job(json.loads(Path(path).read_text(encoding="utf-8")))
+        return _job(json.loads(Path(path).read_text(encoding="utf-8")), Path(path).parent)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise Problem(f"The job file {path} cannot be read ({error}).", "Start the job again from Blender or with `python -m core run`.") from error
 
 
-def _job(values: dict) -> Job:
+def _job(values: dict, folder: Path) -> Job:
+    """`folder` is where the job file lies; its paths are relative to that where they can be."""
     first, last = (stages.NAMES.index(stages.by_name(name).name) if name else default
                    for name, default in ((values.get("from"), 0), (values.get("until"), len(stages.NAMES) - 1)))
     if first > last:
         raise Problem(f"The stage {stages.NAMES[first]} comes after {stages.NAMES[last]}.", "Name the first stage to run before the last one.")
-    settings = from_json(values.get("settings") or {}, preset(values.get("quality") or "standard"))
+    chosen = convert_settings(values.get("settings") or {}, lambda path: str(read_portable(path, folder)))
+    settings = from_json(chosen, preset(values.get("quality") or "standard"))
     tool = next((each for each in stages.TOOLS if each.name == values.get("tool")), None)
     if values.get("tool") and tool is None:
         raise Problem(f"There is no tool named {values['tool']!r}.", f"The tools are {', '.join(each.name for each in stages.TOOLS)}.")
-    return Job(Capture(values["capture"]), values.get("source") or "", stages.STAGES[first:last + 1], bool(values.get("from")), settings, tool)
+    source = str(read_portable(values["source"], folder)) if values.get("source") else ""
+    return Job(Capture(read_portable(values["capture"], folder)), source, stages.STAGES[first:last + 1], bool(values.get("from")), settings, tool)

@@ -19,6 +19,7 @@ from pathlib import Path
 from .. import __version__
 from ..contract import report
 from ..contract.capture import Capture, storage_problem
+from ..contract.freshness import FINISHED, OLDER
 from ..contract.messages import Cancelled, CancelledError, Done, Failed, Log, Message, Problem, Progress, Reporter, StageDone, out_of_memory
 from ..contract.stages import Stage
 from .job import Job, read_job
@@ -62,7 +63,10 @@ def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None, 
 def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
     """Runs one stage unless it is fresh, records it, and rebuilds the report. Raises whatever the stage raises."""
     capture, settings = job.capture, job.settings
-    if capture.state(stage, settings) == "done":
+    verdict = capture.verdict(stage, settings)
+    if verdict.state in FINISHED:
+        if verdict.state == OLDER:
+            emit(Log(f"{stage.label} was made by older code (WildCap {verdict.version}) and is kept; run the stage again to have it made by this one."))
         finished = capture.read()["stages"][stage.name]
         emit(StageDone(stage.name, finished["seconds"], True, finished["figures"]))
         return
@@ -70,14 +74,14 @@ def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled
         try:
             # Outputs may be half new from here on: until the end, nobody may take them for the recorded result.
             capture.forget([stage.name])
-            key = capture.stage_key(stage, settings)
+            conditions = capture.conditions(stage, settings)
             started = time.monotonic()
             _room(stage).run(capture, settings, reporter)
             seconds = time.monotonic() - started
             lost = [name for name in stage.writes if not capture.has(name)]
             if lost:
                 raise RuntimeError(f"the stage {stage.name} ended without writing {lost[0]}")
-            capture.finish(stage, key, seconds, settings, reporter.figures, __version__, reporter.findings)
+            capture.finish(stage, conditions, seconds, settings, reporter.figures, __version__, reporter.findings)
             report.write(capture, settings)
         except Problem as problem:
             with contextlib.suppress(OSError, Problem):
@@ -117,16 +121,17 @@ def _take_source(job: Job, emit: Callable[[Message], None]) -> None:
     if job.chain[0].reads:
         return
     capture, first = job.capture, job.chain[0]
-    source = job.source or capture.read().get("source", "")
-    if not source:
+    known = capture.source
+    source = Path(job.source) if job.source else known
+    if source is None:
         raise Problem("This capture has no video yet.", "Choose a video or a folder of photographs.")
-    if not Path(source).exists():
+    if not source.exists():
         if job.force or not capture.has(first.writes[0]) or first.name not in capture.read()["stages"]:
             raise Problem(f"There is no video or folder at {source}.", "Check its name and whether the disk it is on is connected.")
         emit(Log(f"{source} is not there any more; the frames taken from it are used."))
         return
     if not job.force and not capture.made_from(source):
-        raise Problem(f"This capture was made from {Path(capture.read()['source']).name}, not from this {Path(source).name}.",
+        raise Problem(f"This capture was made from {known.name}, not from this {source.name}.",
                       f"Choose another capture folder for another video, or run again from the stage {first.name} to replace everything but the painted masks.")
     capture.set_source(source)
 

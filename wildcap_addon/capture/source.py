@@ -82,7 +82,7 @@ def new_folder(parent: Path, source: Path) -> Path:
     name = re.sub(r'[<>:"/\\|?*\x00-\x1f]', "_", source.stem if source.is_file() else source.name).strip(" .") or "face"
     for number in range(1, 1000):
         folder = parent / (f"{name}.wildcap" if number == 1 else f"{name}_{number}.wildcap")
-        if not folder.exists() or (Capture(folder).json.is_file() and Capture(folder).read().get("source") == str(source)):
+        if not folder.exists() or (Capture(folder).json.is_file() and Capture(folder).source == source):
             return folder
     raise Problem(f"{parent} holds a thousand captures named {name}.", "Choose another captures folder in the preferences.")
 

@@ -34,7 +34,7 @@ class WILDCAP_OT_reconstruct(BaseOperator, bpy.types.Operator):
     def work(self, context):
         item = captures.require(context)
         after_mask = self.first and stages.NAMES.index(stages.by_name(self.first).name) > stages.NAMES.index(stages.MASK_STAGE)
-        if not after_mask and not captures.folder(item).read().get("source"):
+        if not after_mask and not captures.folder(item).source:
             raise Problem("This capture has no video: there is nothing to reconstruct it from.", "Choose the video of your own face.")
         jobs.start(item, "solve" if after_mask else "reconstruct", first=self.first or None, last=None if after_mask else stages.MASK_STAGE)
 

@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which code a stage's result depends on: a hash of everything its module imports, read from the sources without importing any of it.
+
+A module counts by its syntax tree, without docstrings, comments and layout, written in a form that no Python version changes (`ast.dump` and `ast.unparse`
+differ between versions). Data files count by content: a module that reads shipped ones names them in its constant DATA_FILES, relative to core/.
+Standard library only.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from .hashes import hash_tree
+
+CORE = Path(__file__).resolve().parents[1]
+DATA_CONSTANT = "DATA_FILES"
+IGNORED_FIELDS = {"ctx", "kind", "type_comment"}
+"""Fields of syntax tree nodes that follow from the others, or mean nothing when the code runs."""
+
+
+@dataclass(frozen=True)
+class Module:
+    """One source file: the hash of its syntax tree, the files (relative to core/) of the modules it imports, and the data files it names."""
+
+    tree: str
+    imports: tuple[str, ...]
+    data: tuple[str, ...]
+
+
+@cache
+def code_key(module: str, core: Path = CORE) -> str:
+    """Hash of all code and data that the module `core.NAME...` depends on. Computed once per process."""
+    return _digest([modules(module, core), {name: hash_tree(core / name) for name in data_files(module, core)}])
+
+
+def modules(module: str, core: Path = CORE) -> dict[str, str]:
+    """The import closure of a module: file relative to core/ -> hash of its syntax tree."""
+    return {file: read.tree for file, read in _closure(module, core).items()}
+
+
+def data_files(module: str, core: Path = CORE) -> list[str]:
+    """The data files, relative to core/, that the modules of its closure name."""
+    return sorted({name for read in _closure(module, core).values() for name in read.data})
+
+
+def write_canonically(node, text: list[str]) -> None:
+    """Appends a syntax tree, or a part of one, to `text`: the same pieces under every Python that can parse it. Statements that are only a string are
+    left out, and fields that are empty, for every version brings new ones."""
+    if isinstance(node, ast.AST):
+        text.append("(" + type(node).__name__)
+        for name in node._fields:
+            value = getattr(node, name, None)
+            if value is None or value == [] or name in IGNORED_FIELDS:
+                continue
+            text.append(" " + name + ":")
+            write_canonically(_merge_constants(value) if isinstance(node, ast.JoinedStr) else value, text)
+        text.append(")")
+    elif isinstance(node, list):
+        for item in node:
+            if not _is_text(item):
+                write_canonically(item, text)
+                text.append(",")
+    else:
+        text.append(ascii(node))
+
+
+@cache
+def _closure(module: str, core: Path) -> dict[str, Module]:
+    """File relative to core/ -> module, for the module itself and all it imports, in order of name."""
+    first = _file_of(core, module.split(".")[1:])
+    found, waiting = {}, [first]
+    while waiting:
+        file = waiting.pop()
+        if file not in found:
+            found[file] = _read_module(core, file, (core / file).stat().st_mtime_ns)
+            waiting += found[file].imports
+    return dict(sorted(found.items()))
+
+
+@cache
+def _read_module(core: Path, file: str, changed: int) -> Module:
+    """One source file as it was at the time `changed`."""
+    tree = ast.parse((core / file).read_bytes())
+    package = file.split("/")[:-1]
+    imports = [_file_of(core, package[:depth]) for depth in range(1, len(package) + 1)]  # importing a module runs its packages first
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            base = package[:len(package) - node.level + 1] + (node.module.split(".") if node.module else [])
+            imports += [_file_of(core, [*base, alias.name]) or _file_of(core, base) for alias in node.names]
+        elif isinstance(node, ast.JoinedStr):
+            imports.append(_run_module(core, package, node))
+    named = [node.value for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == DATA_CONSTANT]
+    data = ast.literal_eval(named[0]) if named else ()
+    text: list[str] = []
+    write_canonically(tree, text)
+    return Module(hashlib.blake2b("".join(text).encode(), digest_size=16).hexdigest(), tuple(dict.fromkeys(filter(None, imports))), data)
+
+
+def _run_module(core: Path, package: list[str], node: ast.JoinedStr) -> str:
+    """The file of a module that is run as a process of its own, by the name f"{__package__}.NAME"; '' for any other string."""
+    parts = _merge_constants(node.values)
+    if len(parts) != 2 or not isinstance(parts[0], ast.FormattedValue) or ast.unparse(parts[0].value) != "__package__":
+        return ""
+    return _file_of(core, [*package, *parts[1].value.removeprefix(".").split(".")])
+
+
+def _file_of(core: Path, parts: list[str]) -> str:
+    """The file of the module core.PARTS relative to core/, '' where there is none. core/__init__.py holds the version alone, on which no result depends."""
+    for name in ("/".join([*parts, "__init__.py"]), "/".join(parts) + ".py"):
+        if parts and (core / name).is_file():
+            return name
+    return ""
+
+
+def _merge_constants(values: list) -> list:
+    """The parts of an f-string with neighbouring pieces of text made one, as some Pythons do."""
+    merged: list = []
+    for value in values:
+        if isinstance(value, ast.Constant) and merged and isinstance(merged[-1], ast.Constant):
+            merged[-1] = ast.Constant(merged[-1].value + value.value)
+        else:
+            merged.append(value)
+    return [value for value in merged if not (isinstance(value, ast.Constant) and value.value == "")]
+
+
+def _is_text(node) -> bool:
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+
+
+def _digest(value) -> str:
+    return hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=16).hexdigest()

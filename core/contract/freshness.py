@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether a finished stage is still what its inputs, its settings and its code would give.
+
+When a stage begins, `describe_conditions` says what its result will depend on; capture.json keeps that, and `judge` compares it with what is there now.
+What differs is told apart: inputs and settings are the artist's doing, and such a stage is out of date; code that has changed is ours, and a stage that
+older code made stays as it is until the artist has it run again. Standard library only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from . import format_1
+from .code_key import code_key
+from .hashes import hash_source, hash_tree, same_source
+from .portable_paths import read_portable
+from .settings import Settings
+from .stages import Stage
+
+TO_DO, DONE, STALE, OLDER = "to do", "done", "stale", "older"
+FINISHED = (DONE, OLDER)
+"""States of a stage whose outputs are what its inputs and settings ask for: painted on, delivered and rendered alike."""
+SOURCE = "the video or photographs"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """`state`: 'to do', 'done', 'stale' (an input or a setting changed) or 'older' (neither did, but the code); `changed` names the inputs and settings that
+    did; `version` is that of the WildCap that made the outputs."""
+
+    state: str
+    changed: tuple[str, ...] = ()
+    version: str = ""
+
+    def reason(self) -> str:
+        """Why it is not simply done or to do: 'texture.exr changed'."""
+        if self.state == OLDER:
+            return f"made by older code (WildCap {self.version})"
+        return f"{', '.join(self.changed)} changed" if self.changed else ""
+
+
+def describe_conditions(root: Path, record: dict, stage: Stage, settings: Settings) -> dict:
+    """All that the result of a stage in the capture folder `root` depends on beside its settings, as capture.json's entry of the stage keeps it."""
+    return {"code": code_key(stage.module), "inputs": _hash_inputs(root, record, stage, settings)}
+
+
+def judge(root: Path, record: dict, stage: Stage, settings: Settings) -> Verdict:
+    """The state of a stage whose outputs are there. `record` is capture.json's content."""
+    finished = record["stages"].get(stage.name)
+    if finished is None:
+        return Verdict(TO_DO)
+    version = str(finished.get("version", ""))
+    if "inputs" not in finished:  # by WildCap 0.1.0, which kept one hash of everything
+        same = format_1.matches(root, record, stage, settings) and (bool(stage.reads) or not _other_source(record.get("source_stamp", []), root, record))
+        return Verdict(OLDER, version=version) if same else Verdict(STALE, ("an input or a setting",), version)
+    changed = [*_changed_inputs(finished["inputs"], root, record, stage, settings), *_changed_settings(finished, stage, settings)]
+    if changed:
+        return Verdict(STALE, tuple(changed), version)
+    return Verdict(DONE if finished["code"] == code_key(stage.module) else OLDER, version=version)
+
+
+def _hash_inputs(root: Path, record: dict, stage: Stage, settings: Settings) -> dict:
+    """Content hash by name: of the capture's files that the stage reads, of what its settings name elsewhere, and of the source for the first stage."""
+    names = (*stage.reads, *stage.wishes, *(("own_head.obj", "own_head.json") if stage.name == "solve" and settings.solve.prior else ()))
+    found = {name: _digest(hash_tree(root / name)) for name in names}
+    found |= {f"{stage.name}.{name}": _digest(hash_tree(Path(path).expanduser())) for name, path in _paths(stage, settings).items()}
+    if not stage.reads:
+        found[SOURCE] = record.get("source_stamp", [])
+    return found
+
+
+def _other_source(recorded: list, root: Path, record: dict) -> bool:
+    """Whether the source is there and holds something else than what was recorded of it."""
+    present = hash_source(source_of(root, record))
+    return bool(present) and not same_source(recorded, present)
+
+
+def source_of(root: Path, record: dict) -> Path | None:
+    """Where the video or the folder of photographs is, or was."""
+    return read_portable(record["source"], root) if record.get("source") else None
+
+
+def _changed_inputs(recorded: dict, root: Path, record: dict, stage: Stage, settings: Settings) -> list[str]:
+    present = _hash_inputs(root, record, stage, settings)
+    named = {name for name in {*present, *recorded} if name.startswith(f"{stage.name}.")}  # by settings, outside of the capture
+    gone = {f"{stage.name}.{name}" for name, path in _paths(stage, settings).items() if not Path(path).expanduser().exists()}
+    changed = [name for name in present.keys() & recorded.keys() - gone - {SOURCE} if present[name] != recorded[name]]
+    changed += [name for name in named if name not in present or name not in recorded]
+    if SOURCE in present and _other_source(recorded.get(SOURCE, []), root, record):
+        changed.append(SOURCE)
+    return sorted(changed)
+
+
+def _changed_settings(finished: dict, stage: Stage, settings: Settings) -> list[str]:
+    """A setting that the record does not know had its default; one that names a path is judged by what the path holds."""
+    chosen, then = getattr(settings, stage.name), finished["settings"]
+    names = [f.name for f in fields(chosen) if f.metadata.get("affects_result", True) and "path" not in f.metadata]
+    changed = [f"{stage.name}.{f.name}" for f in fields(chosen) if f.name in names and then.get(f.name, f.default) != getattr(chosen, f.name)]
+    return changed + [name for name in stage.shared if finished[name] != getattr(settings, name)]
+
+
+def _paths(stage: Stage, settings: Settings) -> dict[str, str]:
+    """The stage's settings that name something outside of the capture which its result depends on: name -> path, where one is given."""
+    chosen = getattr(settings, stage.name)
+    return {f.name: getattr(chosen, f.name) for f in fields(chosen)
+            if "path" in f.metadata and f.metadata.get("affects_result", True) and getattr(chosen, f.name)}
+
+
+def _digest(tree: str | dict) -> str:
+    """One hash for a folder's many; '' stays what it is: nothing there."""
+    return hashlib.blake2b(json.dumps(tree, sort_keys=True).encode(), digest_size=16).hexdigest() if isinstance(tree, dict) else tree
