@@ -23,7 +23,7 @@ from pathlib import Path
 from . import stages
 from .hashes import code_hash, hash_tree, source_stamp
 from .messages import Problem
-from .settings import Settings, deciding
+from .settings import Settings, result_paths, result_settings
 
 FORMAT = 1
 """Version of the capture folder's layout; a capture of a newer format is refused."""
@@ -194,12 +194,10 @@ class Capture:
     def stage_key(self, stage: stages.Stage, settings: Settings) -> str:
         """Hash of all a stage's result depends on: its inputs' contents, its settings, the shared ones it names, its code."""
         record = self.read()
-        parts = [deciding(getattr(settings, stage.name)), {name: getattr(settings, name) for name in stage.shared}, code_hash(stage.module)]
+        parts = [result_settings(getattr(settings, stage.name)), {name: getattr(settings, name) for name in stage.shared}, code_hash(stage.module)]
         if not stage.reads:
             parts.append(source_stamp(record.get("source", "")) or record.get("source_stamp", []))
-        named = {"delight": settings.delight.folder, "cameras": settings.cameras.import_from, "registration": settings.registration.template,
-                 "shadow_mask": settings.shadow_mask.softened, "solve": settings.solve.prior}.get(stage.name)
-        parts += [hash_tree(Path(named).expanduser())] if named else []  # what the artist keeps elsewhere
+        parts += [hash_tree(Path(named)) for named in result_paths(getattr(settings, stage.name))]  # what the artist keeps elsewhere
         if stage.name == "solve" and settings.solve.prior:  # it works in the UVs of the artist's own mesh
             parts += [[path.name, hash_tree(path)] for path in (self.own_head, self.own_head_skin)]
         parts += [[name, hash_tree(self.root / name)] for name in (*stage.reads, *stage.wishes)]

@@ -15,7 +15,7 @@ from pathlib import Path
 from . import stages
 from .capture import Capture
 from .hashes import code_hash, hash_tree
-from .settings import Settings, deciding
+from .settings import Settings, result_settings
 
 FIELD = "conditions"  # of the file's metadata
 
@@ -35,7 +35,7 @@ def obstacle(capture: Capture, settings: Settings) -> str:
 def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
     """All that a solve depends on beside its masks: name -> hash."""
     stage = stages.by_name("solve")
-    chosen = [deciding(settings.solve), settings.seed, settings.device, settings.delight.delighter]
+    chosen = [result_settings(settings.solve), settings.seed, settings.device, settings.delight.delighter]
     files = {name: hash_tree(capture.root / name) for name in (*stage.reads, *stage.wishes) if "mask" not in name}
     shipped = {name: hash_tree(Path(__file__).parents[1] / name) for name in stage.data}
     found = {**files, "the solver's settings": chosen, "the prior": shipped, "the solver's code": code_hash(stage.module)}
