@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m core: run, deliver, stages, delighters, presets, status, mask, landmarks, doctor, train.
+"""python -m core: run, deliver, settings, stages, delighters, presets, status, mask, landmarks, doctor, train.
 
 The command line is one more host of the worker: it writes a job, starts the worker with this same Python and prints
 what it says. Failures are two lines, a problem and its remedy, and exit code 2; Ctrl-C ends with 130.
@@ -18,7 +18,7 @@ from . import __version__
 from .contract import artist_landmarks, consent, delighter_cards, delivery_plan, delivery_presets, report, settings, stages
 from .contract.capture import Capture
 from .contract.messages import Problem
-from .worker import terminal
+from .worker import command_settings, terminal
 from .worker.job import read_job, write_job
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -50,35 +50,16 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--from", dest="first", metavar="STAGE", help="begin with this stage and run it even if nothing has changed")
     run.add_argument("--until", dest="last", metavar="STAGE", help="end with this stage")
     run.add_argument("--quality", choices=settings.QUALITIES, default="standard")
-    run.add_argument("--skin-tone", metavar="R,G,B", help="sRGB in 0..1, the linear mean over facial skin; or auto")
-    run.add_argument("--white-point", metavar="R,G,B", help="linear colour of a white surface in the face's light, as `white` prints it; or auto")
-    run.add_argument("--delighter", choices=delighter_cards.choices(), help="how the light is taken out of the frames")
-    run.add_argument("--folder", metavar="FOLDER", type=Path, help="delit pictures for the folder delighter, matched by name")
-    run.add_argument("--checkpoint", metavar="FOLDER", type=Path, help="the authors' two files, for the opendelight delighter")
-    run.add_argument("--preview", action="store_true", help="of SwitchLight, ask for small pictures at half the credits")
     run.add_argument("--send-frames", action="store_true",
                      help="you agree that SwitchLight gets the selected frames, a person's face, and charges you; without it, the run stops before")
-    run.add_argument("--softened", metavar="FOLDER", type=Path,
-                     help="the frames with their shadows softened by any tool, matched by name: what that lightens is the mask's proposal")
-    run.add_argument("--cameras", metavar="PATH", type=Path,
-                     help="cameras of another program: COLMAP's folder, Metashape's .xml, RealityScan's .csv, Blender's .json")
-    run.add_argument("--template", metavar="MESH", type=Path, help="your own head mesh, fitted too: an OBJ, or a folder with a neutral OBJ and its shapes")
-    run.add_argument("--new-atlas", action="store_true", help="give that mesh new UVs where its own are missing or overlap")
-    run.add_argument("--prior", metavar="FOLDER", type=Path, help="the authors' config.json and ckpt.pth; needs ICT-FaceKit as --template")
-    run.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
-    run.add_argument("--seed", type=int, default=0)
-    run.add_argument("--edited-part", action="store_true", help="solve only what a mask edit touched since the last solve, where that can be done")
+    command_settings.add_options(run, "run")
     run.set_defaults(command=_run)
 
     deliver = commands.add_parser("deliver", help="the maps as another program wants them, with the mesh as OBJ; other files and shape keys need the add-on")
     deliver.add_argument("capture", metavar="CAPTURE", type=Path)
-    for name in ("preset", "what", "size", "pictures", "colour", "udim"):
-        known = settings.DeliverSettings.__dataclass_fields__[name]
-        deliver.add_argument(f"--{name}", choices=known.metadata["choices"], default=known.default, help=settings.tooltips(settings.DeliverSettings)[name])
-    deliver.add_argument("--clean", action="store_true", help=settings.tooltips(settings.DeliverSettings)["clean"])
-    deliver.add_argument("--no-hair", action="store_true", help="leave the masks of brows, lashes and beard out")
-    deliver.add_argument("--to", metavar="FOLDER", type=Path, help="deliver to this folder; without it to exports in the capture's")
+    command_settings.add_options(deliver, "deliver")
     deliver.set_defaults(command=_deliver)
+    commands.add_parser("settings", help="list every setting: its default, what it may be, its flag, what it does").set_defaults(command=_settings)
     table = commands.add_parser("presets", help="say how each program gets its maps, and what each format drops: the tables of docs/guide.md")
     table.set_defaults(command=_presets)
     commands.add_parser("stages", help="list the stages of the chain").set_defaults(command=_stages)
@@ -120,32 +101,10 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _run(options: argparse.Namespace) -> int:
-    if options.folder and options.delighter != "folder":
-        raise Problem("--folder goes with --delighter folder only.", "Add --delighter folder, or leave --folder out.")
-    delight = {"delighter": options.delighter} if options.delighter else {}
-    if options.folder:
-        delight["folder"] = str(options.folder.absolute())
-    if options.checkpoint and options.delighter != "opendelight":
-        raise Problem("--checkpoint goes with --delighter opendelight only.", "Add --delighter opendelight, or leave --checkpoint out.")
-    if options.checkpoint:
-        delight["checkpoint"] = str(options.checkpoint.absolute())
-    if (options.preview or options.send_frames) and options.delighter != "switchlight":
-        raise Problem("--preview and --send-frames go with --delighter switchlight only.", "Add --delighter switchlight, or leave them out.")
-    if options.preview:
-        delight["switchlight_preview"] = True
+    values = command_settings.read_options(options, "run")
+    command_settings.refuse_lone_flags(options, values)
     # A shell that starts a job in the background has it ignore Ctrl-C's signal; here the signal means cancel, whoever sends it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    values = {"seed": options.seed, "device": options.device, "delight": delight, "edited_part": options.edited_part}
-    if options.softened:
-        values["shadow_mask"] = {"softened": str(options.softened.absolute())}
-    if options.cameras:
-        values["cameras"] = {"import_from": str(options.cameras.absolute())}
-    if options.new_atlas and not options.template:
-        raise Problem("--new-atlas goes with --template only.", "Name your head mesh with --template, or leave --new-atlas out.")
-    if options.template:
-        values["registration"] = {"template": str(options.template.absolute()), "new_atlas": options.new_atlas}
-    values["solve"] = {**({"skin_tone": options.skin_tone} if options.skin_tone else {}), **({"prior": str(options.prior.absolute())} if options.prior else {}),
-                       **({"white_point": options.white_point} if options.white_point else {})}
     capture = Capture(options.capture)
     strangers = [path.name for path in capture.root.iterdir() if path not in vars(capture).values()] if capture.root.is_dir() else []
     if strangers and not capture.json.is_file():
@@ -160,8 +119,9 @@ def _deliver(options: argparse.Namespace) -> int:
     capture = Capture(options.capture)
     if not capture.json.is_file():
         raise Problem(f"There is no capture at {capture.root}.", "Check the name; `python -m core run SOURCE CAPTURE` makes one.")
-    wanted = {name: getattr(options, name) for name in ("preset", "what", "size", "pictures", "colour", "udim", "clean")}
-    wanted |= {"hair": not options.no_hair, "folder": str(options.to.absolute()) if options.to else "", "format": "obj", "whole": True}
+    wanted = {"format": "obj", "whole": True, **command_settings.read_options(options, "deliver").get("deliver", {})}
+    if not wanted["whole"]:
+        raise Problem("A delivery without its mesh (deliver.whole off) is ended by Blender.", "Leave deliver.whole on, or deliver from the add-on's panel.")
     before = read_job(capture.job).settings if capture.job.is_file() else settings.Settings()  # job.json is also what `status` judges the stages by
     chosen = {**settings.to_json(before), "deliver": wanted}
     plan = delivery_plan.plan(capture, settings.from_json(chosen).deliver)
@@ -169,6 +129,11 @@ def _deliver(options: argparse.Namespace) -> int:
     if code == 0:
         print(plan.target)
     return code
+
+
+def _settings(options: argparse.Namespace) -> int:
+    print(command_settings.list_settings())
+    return 0
 
 
 def _presets(options: argparse.Namespace) -> int:

@@ -147,8 +147,8 @@ def test_docstrings_comments_and_layout_do_not_count_and_code_does():
     assert written("\n".join(WORDS)) == written("\n".join(BARE))
     assert written("f'a' f'b{x}' 'c'") == written("f'ab{x}c'")
     for one, other in (("a = 1", "a = 2"), ("a = 1", "a = True"), ("a = 1", "a = 1.0"), ("a = 'x'", "a = b'x'"), ("f(a, *b)", "f(*a, b)"),
-                       ("a < b", "a <= b"), ("def f(a, /): ...", "def f(a): ..."), ("x = None", "x = ..."), ("f'{a!r}'", "f'{a}'"), ("{**a, b: c}", "{b: c, **a}"), ("f('x')", "f()"),
-                       ("return_ = [1, [2]]", "return_ = [[1], 2]")):
+                       ("a < b", "a <= b"), ("def f(a, /): ...", "def f(a): ..."), ("x = None", "x = ..."), ("f'{a!r}'", "f'{a}'"),
+                       ("{**a, b: c}", "{b: c, **a}"), ("f('x')", "f()"), ("return_ = [1, [2]]", "return_ = [[1], 2]")):
         assert written(one) != written(other), one
 
 

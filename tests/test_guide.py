@@ -8,6 +8,8 @@ from functools import cache
 
 import pytest
 
+from core.contract.settings import known_settings
+
 from .conftest import ROOT
 
 GUIDE = (ROOT / "docs" / "guide.md").read_text(encoding="utf-8")
@@ -42,7 +44,7 @@ def test_a_message_of_the_guide_is_one_that_is_said(message):
 @pytest.mark.parametrize("button", BUTTONS)
 def test_a_button_of_the_guide_is_there(button):
     name = " ".join(button.split())
-    said = {sentence.replace("_", " ").casefold() for sentence in sentences()}
+    said = {each.replace("_", " ").casefold() for each in (*sentences(), *(setting.rpartition(".")[2] for setting in known_settings()))}
     assert name in NOT_BUTTONS or name.casefold() in said, name
 
 

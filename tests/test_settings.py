@@ -8,14 +8,79 @@ from dataclasses import fields
 import pytest
 
 from core.contract import stages
+from core.contract.capture import Capture
 from core.contract.messages import Problem
-from core.contract.settings import QUALITIES, Settings, from_json, preset, to_json, tooltips
+from core.contract.settings import (
+    QUALITIES,
+    STAGE_KINDS,
+    Settings,
+    find_setting,
+    from_json,
+    known_settings,
+    preset,
+    quality_settings,
+    result_paths,
+    result_settings,
+    to_json,
+    tooltips,
+)
 
-EVERY = [(stage, field) for stage in stages.NAMES for field in fields(getattr(Settings(), stage))]
+from .recorded import changed, record
+
+EVERY = [(stage, field) for stage, kind in STAGE_KINDS.items() for field in fields(kind)]
+PATHS = [name for name, field in known_settings().items() if "path" in field.metadata]
+METADATA = {"min", "max", "unit", "choices", "path", "form", "label", "flag", "per_face", "affects_result"}
 
 
 def test_every_stage_has_settings():
-    assert all(hasattr(getattr(Settings(), stage), "__dataclass_fields__") for stage in stages.NAMES)
+    assert list(STAGE_KINDS) == [*stages.NAMES, "deliver"]
+    assert [name for name in known_settings() if "." not in name] == ["seed", "device", "edited_part"]
+    assert all(tooltips(Settings)[name] for name in ("seed", "device", "edited_part"))
+
+
+@pytest.mark.parametrize("name", known_settings())
+def test_metadata_says_what_a_setting_may_be(name):
+    field = known_settings()[name]
+    assert field.metadata.keys() <= METADATA
+    kinds = field.metadata.keys() & {"path", "choices", "form", "min"}
+    assert len(kinds) == (0 if isinstance(field.default, bool) else 1), "one of them, and a switch needs none"
+    assert field.metadata.get("path") in (None, "file", "folder", "file_or_folder")
+    assert ("path" in field.metadata) <= (field.default == ""), "a place is never chosen beforehand"
+
+
+def test_no_two_settings_of_a_command_have_one_flag():
+    flags = [(name.startswith("deliver."), field.metadata["flag"]) for name, field in known_settings().items() if "flag" in field.metadata]
+    assert len(flags) > 20 and len(set(flags)) == len(flags) and all(flag.startswith("--") for _, flag in flags)
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_the_content_of_a_place_counts_where_the_result_depends_on_it(name, tmp_path):
+    stage, own = name.split(".")
+    settings = from_json({stage: {own: str(tmp_path / "mine")}})
+    if own not in result_settings(getattr(settings, stage)):
+        assert name == "deliver.folder" and not result_paths(settings.deliver)
+        return
+    assert result_paths(getattr(settings, stage)) == {own: str(tmp_path / "mine")} and not result_paths(getattr(Settings(), stage))
+    capture, step = Capture(tmp_path / "a.wildcap"), stages.by_name(stage)
+    record(capture, step, Settings())
+    assert changed(capture, step, settings) == (name,), "named since"
+    for content in ("one", "two two"):
+        (tmp_path / "mine").write_text(content)
+        assert changed(capture, step, settings) == (name,)
+        record(capture, step, settings)
+        assert changed(capture, step, settings) == ()
+    assert changed(capture, step, Settings()) == (name,), "emptied since"
+
+
+def test_a_place_in_the_home_folder_is_found(monkeypatch, tmp_path):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert result_paths(from_json({"solve": {"prior": "~/authors"}}).solve) == {"prior": str(tmp_path / "authors")}
+
+
+def test_a_quality_leaves_alone_what_is_about_the_face():
+    left = {f"{stage}.{field.name}" for stage, field in EVERY if field.name not in quality_settings(STAGE_KINDS[stage])}
+    assert left == {*PATHS, "frames.mirrored", "cameras.interpupillary_mm", "registration.new_atlas", "delight.delighter", "delight.switchlight_preview",
+                    "solve.skin_tone", "solve.white_point"}
 
 
 @pytest.mark.parametrize("quality", QUALITIES)
@@ -50,10 +115,31 @@ def test_every_setting_has_a_tooltip_a_valid_default_and_limits_that_hold(stage,
         from_json({stage: {field.name: [1]}})
 
 
-@pytest.mark.parametrize("values", [{"moon": {}}, {"solve": {"moon": 1}}, {"solve": {"steps": True}}, {"solve": {"steps": "5"}}, {"seed": "5"}, {"device": 0}])
-def test_what_is_no_setting_is_refused(values):
-    with pytest.raises(Problem):
+@pytest.mark.parametrize(("values", "words"), [
+    ({"moon": {}}, "no setting named 'moon'"), ({"solve": {"moon": 1}}, "no setting named 'solve.moon'"),
+    ({"solve": {"steps": True}}, "True, which is not a int"),
+    ({"solve": {"steps": "5"}}, "'5', which is not a int"), ({"seed": "5"}, "not a int"), ({"seed": -1}, "0 to 2147483647"), ({"device": 0}, "not a str"),
+    ({"device": "abacus"}, "cpu, cuda, mps"), ({"__doc__": "x"}, "no setting"), ({"solve.steps": 5}, "has no 'solve.steps'"), ([1], "no object but \\[1\\]"),
+    ("seed", "no object but 'seed'"), ({"solve": 5}, "settings of the stage solve are no object but 5"), ({"solve": None}, "no object but None"),
+    ({"scan": {"voxel_mm": float("nan")}}, "0.3 to 5 mm"), ({"scan": {"voxel_mm": float("inf")}}, "0.3 to 5 mm"),
+    ({"scan": {"voxel_mm": 10**400}}, "0.3 to 5 mm")])
+def test_what_is_no_setting_is_refused(values, words):
+    with pytest.raises(Problem, match=words) as refusal:
         from_json(values)
+    assert refusal.value.remedy.endswith(".")
+
+
+@pytest.mark.parametrize(("wrong", "right"), [
+    ("slove", "solve"), ("solve.step", "solve.steps"), ("slove.steps", "solve.steps"), ("skin_tone", "solve.skin_tone"), ("sede", "seed"),
+    ("delight.delight", "delight.delighter")])
+def test_the_nearest_setting_is_named(wrong, right):
+    with pytest.raises(Problem, match=f"Did you mean {right}\\?"):
+        find_setting(wrong)
+
+
+def test_a_whole_number_does_for_a_fraction():
+    value = from_json({"scan": {"voxel_mm": 2}}).scan.voxel_mm
+    assert value == 2.0 and isinstance(value, float)
 
 
 def test_an_unknown_quality_is_refused():

@@ -6,25 +6,19 @@ Default, range, unit and tooltip of every setting are written there; run-time st
 """
 
 from dataclasses import fields
-from pathlib import Path
 
 import bpy
 
 from ..core.contract import delighter_cards, delivery_presets, stages
 from ..core.contract import settings as core_settings
+from ..core.contract.setting_values import absolute_path
+from ..core.contract.settings import STAGE_KINDS
 from . import captures, preferences
 from . import hdri as worlds
 
-STAGE_KINDS = {name: type(getattr(core_settings.Settings(), name)) for name in (*stages.NAMES, "deliver")}
-
-
-PATHS = {"folder": {"subtype": 'DIR_PATH'}, "checkpoint": {"subtype": 'DIR_PATH'},
-         "prior": {"subtype": 'DIR_PATH'}, "template": {"subtype": 'FILE_PATH'}, "import_from": {"subtype": 'FILE_PATH'},
-         "softened": {"subtype": 'DIR_PATH'}}
-"""Settings that name a place on the disk, and how they are chosen."""
-ABOUT_THE_FACE = ("skin_tone", "white_point", "folder", "switchlight_preview", "checkpoint", "delighter", "template", "new_atlas",
-                  "import_from", "mirrored", "softened", "prior")
-"""Settings that a quality leaves as they are."""
+SUBTYPES = {"file": 'FILE_PATH', "file_or_folder": 'FILE_PATH', "folder": 'DIR_PATH'}
+"""How what names a place on the disk is chosen; in a file browser a folder can be named where a file is asked for."""
+SHARED_TOOLTIPS = core_settings.tooltips(core_settings.Settings)
 
 
 def settings_group(stage: str, kind: type) -> type:
@@ -46,7 +40,7 @@ def _property(field, tooltip: str):
         return bpy.props.IntProperty(**common, **limits)
     if isinstance(field.default, float):
         return bpy.props.FloatProperty(**common, **limits)
-    return bpy.props.StringProperty(**common, **PATHS.get(field.name, {}))
+    return bpy.props.StringProperty(**common, subtype=SUBTYPES.get(field.metadata.get("path"), 'NONE'))
 
 
 def _choice(setting: str, value: str) -> tuple[str, str, str]:
@@ -68,9 +62,8 @@ GROUPS = {stage: settings_group(stage, kind) for stage, kind in STAGE_KINDS.item
 def _apply_quality(self, context):
     preset = core_settings.preset(self.quality)
     for stage in stages.NAMES:
-        for f in fields(STAGE_KINDS[stage]):
-            if f.name not in ABOUT_THE_FACE:
-                setattr(getattr(self, stage), f.name, getattr(getattr(preset, stage), f.name))
+        for name in core_settings.quality_settings(STAGE_KINDS[stage]):
+            setattr(getattr(self, stage), name, getattr(getattr(preset, stage), name))
 
 
 class WILDCAP_PG_capture(bpy.types.PropertyGroup):
@@ -86,11 +79,11 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
         description="A set of settings: draft to look, standard to work, film to deliver",
     )
     device: bpy.props.EnumProperty(
-        name="Device", default="auto", description="Where the solver computes",
+        name="Device", default="auto", description=SHARED_TOOLTIPS["device"],
         items=[("auto", "Automatic", "What the solver's Python was found to compute on when it was set up"), ("cpu", "CPU", ""), ("cuda", "CUDA", ""),
                ("mps", "Metal", "")],
     )
-    seed: bpy.props.IntProperty(name="Seed", min=0, default=0, description="The same seed gives the same maps")
+    seed: bpy.props.IntProperty(name="Seed", min=0, default=0, description=SHARED_TOOLTIPS["seed"])
     use_skin_tone: bpy.props.BoolProperty(
         name="Set Skin Tone", default=False, description="Use the colour below as the mean skin colour; off: it is estimated from the video",
     )
@@ -162,14 +155,15 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
 
 
 def values(item: WILDCAP_PG_capture) -> dict:
-    """The settings of a capture as a job file holds them: stage -> {name: value}, seed, device."""
-    found = {stage: {f.name: getattr(getattr(item, stage), f.name) for f in fields(kind)} for stage, kind in STAGE_KINDS.items()}
+    """The settings of a capture as a job file holds them: stage -> {name: value}, seed, device. Paths are absolute."""
+    found = {stage: {f.name: _value(getattr(item, stage), f) for f in fields(kind)} for stage, kind in STAGE_KINDS.items()}
     found["solve"]["skin_tone"] = ",".join(f"{c:.4f}" for c in item.skin_tone) if item.use_skin_tone else "auto"
-    for stage, name in (("cameras", "import_from"), ("delight", "folder"), ("delight", "checkpoint"), ("shadow_mask", "softened"),
-                        ("registration", "template"), ("solve", "prior"), ("deliver", "folder")):
-        if found[stage][name]:
-            found[stage][name] = str(Path(bpy.path.abspath(found[stage][name])))
     return {**found, "seed": item.seed, "device": device(item)}
+
+
+def _value(group, field):
+    value = getattr(group, field.name)
+    return absolute_path(bpy.path.abspath(value)) if "path" in field.metadata else value
 
 
 def device(item: WILDCAP_PG_capture) -> str:

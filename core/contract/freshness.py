@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 from . import format_1
 from .code_key import code_key
-from .hashes import hash_source, hash_tree, same_source
+from .hashes import hash_source, hash_tree, same_source, sample_file
 from .portable_paths import read_portable
-from .settings import Settings
+from .settings import Settings, result_paths, result_settings
 from .stages import Stage
 
 TO_DO, DONE, STALE, OLDER = "to do", "done", "stale", "older"
@@ -67,7 +67,7 @@ def _hash_inputs(root: Path, record: dict, stage: Stage, settings: Settings) -> 
     """Content hash by name: of the capture's files that the stage reads, of what its settings name elsewhere, and of the source for the first stage."""
     names = (*stage.reads, *stage.wishes, *(("own_head.obj", "own_head.json") if stage.name == "solve" and settings.solve.prior else ()))
     found = {name: _digest(hash_tree(root / name)) for name in names}
-    found |= {f"{stage.name}.{name}": _digest(hash_tree(Path(path).expanduser())) for name, path in _paths(stage, settings).items()}
+    found |= {f"{stage.name}.{name}": _digest(hash_tree(Path(path), sample_file)) for name, path in result_paths(getattr(settings, stage.name)).items()}
     if not stage.reads:
         found[SOURCE] = record.get("source_stamp", [])
     return found
@@ -87,7 +87,7 @@ def source_of(root: Path, record: dict) -> Path | None:
 def _changed_inputs(recorded: dict, root: Path, record: dict, stage: Stage, settings: Settings) -> list[str]:
     present = _hash_inputs(root, record, stage, settings)
     named = {name for name in {*present, *recorded} if name.startswith(f"{stage.name}.")}  # by settings, outside of the capture
-    gone = {f"{stage.name}.{name}" for name, path in _paths(stage, settings).items() if not Path(path).expanduser().exists()}
+    gone = {f"{stage.name}.{name}" for name, path in result_paths(getattr(settings, stage.name)).items() if not Path(path).exists()}
     changed = [name for name in present.keys() & recorded.keys() - gone - {SOURCE} if present[name] != recorded[name]]
     changed += [name for name in named if name not in present or name not in recorded]
     if SOURCE in present and _other_source(recorded.get(SOURCE, []), root, record):
@@ -97,17 +97,10 @@ def _changed_inputs(recorded: dict, root: Path, record: dict, stage: Stage, sett
 
 def _changed_settings(finished: dict, stage: Stage, settings: Settings) -> list[str]:
     """A setting that the record does not know had its default; one that names a path is judged by what the path holds."""
-    chosen, then = getattr(settings, stage.name), finished["settings"]
-    names = [f.name for f in fields(chosen) if f.metadata.get("affects_result", True) and "path" not in f.metadata]
-    changed = [f"{stage.name}.{f.name}" for f in fields(chosen) if f.name in names and then.get(f.name, f.default) != getattr(chosen, f.name)]
+    chosen, then = getattr(settings, stage.name), {**asdict(type(getattr(settings, stage.name))()), **finished["settings"]}
+    paths = {f.name for f in fields(chosen) if "path" in f.metadata}
+    changed = [f"{stage.name}.{name}" for name, value in result_settings(chosen).items() if name not in paths and then[name] != value]
     return changed + [name for name in stage.shared if finished[name] != getattr(settings, name)]
-
-
-def _paths(stage: Stage, settings: Settings) -> dict[str, str]:
-    """The stage's settings that name something outside of the capture which its result depends on: name -> path, where one is given."""
-    chosen = getattr(settings, stage.name)
-    return {f.name: getattr(chosen, f.name) for f in fields(chosen)
-            if "path" in f.metadata and f.metadata.get("affects_result", True) and getattr(chosen, f.name)}
 
 
 def _digest(tree: str | dict) -> str:

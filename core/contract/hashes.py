@@ -24,21 +24,23 @@ def hash_file(path: Path) -> str:
     return _remember(path, _hash_whole)
 
 
-def hash_tree(path: Path) -> str | dict:
+def sample_file(path: Path) -> str:
+    """As `hash_file`, but a file of more than WHOLE_BYTES is known by its size and BLOCKS blocks of it: a film, or another program's network."""
+    return _remember(path, _hash_sampled)
+
+
+def hash_tree(path: Path, hash_one: Callable[[Path], str] = hash_file) -> str | dict:
     """The content hash of a file, {relative name: hash} of a folder, or '' for what is not there."""
     if path.is_dir():
-        return {p.relative_to(path).as_posix(): hash_file(p) for p in sorted(path.rglob("*")) if p.is_file() and not p.name.startswith(".")}
-    return hash_file(path) if path.is_file() else ""
+        return {p.relative_to(path).as_posix(): hash_one(p) for p in sorted(path.rglob("*")) if p.is_file() and not p.name.startswith(".")}
+    return hash_one(path) if path.is_file() else ""
 
 
 def hash_source(source: Path | None) -> list:
-    """[name, size, content hash] of each file of a source, which is a video or a folder of photographs; [] where it is gone.
-
-    A file of more than WHOLE_BYTES is known by its size and by BLOCKS blocks of it.
-    """
+    """[name, size, content hash by `sample_file`] of each file of a source, which is a video or a folder of photographs; [] where it is gone."""
     inside = sorted(source.iterdir()) if source is not None and source.is_dir() else [source] if source is not None else []
     files = [p for p in inside if p.is_file() and not p.name.startswith(".")]
-    return [[p.name, p.stat().st_size, _remember(p, _hash_sampled)] for p in files]
+    return [[p.name, p.stat().st_size, sample_file(p)] for p in files]
 
 
 def same_source(recorded: list, present: list) -> bool:
@@ -70,6 +72,7 @@ def _hash_sampled(file: BinaryIO, size: int) -> str:
     if size <= WHOLE_BYTES:
         return _hash_whole(file, size)
     digest = _hasher()
+    digest.update(str(size).encode())
     for block in range(BLOCKS):
         file.seek(block * (size - BLOCK_BYTES) // (BLOCKS - 1))
         digest.update(file.read(BLOCK_BYTES))

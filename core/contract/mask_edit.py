@@ -16,7 +16,7 @@ from . import stages
 from .capture import Capture
 from .code_key import code_key
 from .hashes import hash_tree
-from .settings import Settings, deciding
+from .settings import Settings, result_settings
 
 FIELD = "conditions"  # of the file's metadata
 
@@ -36,7 +36,7 @@ def obstacle(capture: Capture, settings: Settings) -> str:
 def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
     """All that a solve depends on beside its masks: name -> hash."""
     stage = stages.by_name("solve")
-    chosen = [deciding(settings.solve), settings.seed, settings.device, settings.delight.delighter]
+    chosen = [result_settings(settings.solve), settings.seed, settings.device, settings.delight.delighter]
     files = {name: hash_tree(capture.root / name) for name in (*stage.reads, *stage.wishes) if "mask" not in name}
     found = {**files, "the solver's settings": chosen, "the solver's code": code_key(stage.module)}
     return {name: hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=8).hexdigest() for name, value in found.items()}

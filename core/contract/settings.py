@@ -1,24 +1,23 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One frozen dataclass per stage. Default, range, unit and tooltip of every setting are written here and nowhere else.
+"""One frozen dataclass per stage. All that is said of a setting is written here and nowhere else: Blender's panels, the command line, what a
+stage's result depends on and what is read as a path follow from it.
 
-Ground floor: standard library only. The docstring under a field is its tooltip in Blender and its line in the
-command line's help; `metadata` holds `min`, `max`, `choices`, `unit` and `label`, and `deciding` False where no result depends on it.
+Ground floor: standard library only. The docstring under a field is its tooltip in Blender and its line in the command line's help.
 """
 
 from __future__ import annotations
 
 import ast
+import difflib
 import inspect
-from dataclasses import asdict, dataclass, field, fields, replace
+import os
+from dataclasses import MISSING, Field, asdict, dataclass, field, fields, replace
 from functools import cache
 
 from . import delivery_presets
 from .messages import Problem
-
-
-def setting(default, **metadata):
-    return field(default=default, metadata=metadata)
+from .setting_values import check_value, setting
 
 
 @dataclass(frozen=True)
@@ -29,19 +28,19 @@ class FramesSettings:
     """Longer side of the extracted frames"""
     views: int = setting(16, min=3, max=64)
     """Sharp, evenly spread frames chosen for the texture (V in the paper)"""
-    mirrored: bool = setting(False)
+    mirrored: bool = setting(False, per_face=True)
     """The pictures are mirrored, as a front camera may save them: flip them back. A head alone cannot show which way round it was"""
 
 
 @dataclass(frozen=True)
 class CamerasSettings:
-    interpupillary_mm: float = setting(63.0, min=40.0, max=80.0, unit="mm")
+    interpupillary_mm: float = setting(63.0, min=40.0, max=80.0, unit="mm", per_face=True)
     """Distance between the pupils; sets the scale of the head"""
     matching: str = setting("auto", choices=("auto", "sequential", "exhaustive"))
     """Which frames are matched with each other; auto: neighbours in a video, all pairs in a few photographs"""
     features: str = setting("auto", choices=("auto", "plain", "skin", "face"))
     """What the cameras are found by; skin holds on low-contrast faces and costs ten times as much, face uses its landmarks alone; auto tries plain first"""
-    import_from: str = setting("")
+    import_from: str = setting("", path="file_or_folder", flag="--cameras")
     """Cameras of another program: COLMAP's folder, Metashape's .xml, RealityScan's .csv, Blender's .json; empty: solve them here"""
 
 
@@ -59,21 +58,21 @@ class ScanSettings:
 class RegistrationSettings:
     iterations: int = setting(30, min=1, max=200)
     """Steps of the non-rigid fit, stiff to soft"""
-    template: str = setting("")
+    template: str = setting("", path="file_or_folder", flag="--template")
     """A head mesh of your own, fitted beside the built-in one: an OBJ, or a folder with a neutral OBJ and its shapes (as ICT-FaceKit)"""
-    new_atlas: bool = setting(False)
+    new_atlas: bool = setting(False, flag="--new-atlas", per_face=True)
     """Make new UVs for your own head mesh where its own are missing or overlap"""
 
 
 @dataclass(frozen=True)
 class DelightSettings:
-    delighter: str = setting("network", choices=("network", "shading", "switchlight", "opendelight", "folder", "none"))
+    delighter: str = setting("network", choices=("network", "shading", "switchlight", "opendelight", "folder", "none"), flag="--delighter", per_face=True)
     """How the light is taken out of the frames before the texture is built"""
-    switchlight_preview: bool = setting(False)
+    switchlight_preview: bool = setting(False, label="Small Pictures at Half the Credits", flag="--preview", per_face=True)
     """Have SwitchLight answer with pictures of at most 512 px, at half the credits: to see whether it helps"""
-    folder: str = setting("")
+    folder: str = setting("", path="folder", flag="--folder")
     """Folder of delit pictures for the folder delighter, matched by name"""
-    checkpoint: str = setting("")
+    checkpoint: str = setting("", path="folder", flag="--checkpoint")
     """OpenDelight's checkpoint as its authors publish it: the folder with base_delight_network.pth and unet_enhancer.pth"""
 
 
@@ -81,9 +80,9 @@ class DelightSettings:
 class TextureSettings:
     size: int = setting(1024, min=256, max=4096, unit="px")
     """Side of the texture"""
-    perceptual: int = setting(0, min=0, max=2000)
+    perceptual: int = setting(0, min=0, max=2000, label="Perceptual Steps")
     """Steps that sharpen the texture until the head looks like the frames to a network, as the paper does; 0 is off"""
-    perceptual_network: str = setting("")
+    perceptual_network: str = setting("", path="file_or_folder")
     """VGG16 file, or folder with it and LPIPS's weights, for these steps; empty takes the small network of an installed package"""
 
 
@@ -93,7 +92,7 @@ class ShadowMaskSettings:
     """How readily a dark region is taken for a shadow"""
     dilate_px: int = setting(8, min=0, max=64, unit="px")
     """How far the proposal is grown, at a 1024 px texture; where the texture shows the shadow's edge it is laid on that"""
-    softened: str = setting("")
+    softened: str = setting("", path="folder", label="Frames With Softened Shadows", flag="--softened")
     """Folder of the frames with their shadows softened by any tool, matched by name: what that lightens is proposed. Empty: the delighter tells"""
 
 
@@ -109,15 +108,15 @@ class SolveSettings:
     """dps follows the paper through the network's gradient; proximal is a closed form, twice as fast, with smoother normals and specular"""
     grid_cells: int = setting(96, min=1, max=512)
     """Cells per side of the texel grid of lights over the whole map's face crop (96 cells of 8 texels at 1024)"""
-    skin_tone: str = setting("auto")
+    skin_tone: str = setting("auto", form="R,G,B or auto", flag="--skin-tone", per_face=True)
     """Skin tone as sRGB R,G,B in 0..1 (linear mean over facial skin), or auto"""
-    white_point: str = setting("auto")
+    white_point: str = setting("auto", form="R,G,B or auto", flag="--white-point", per_face=True)
     """What a white surface in the face's light is in the frames, linear R,G,B, from a ColorChecker, a grey card or white paper; auto: from the scene"""
-    prior: str = setting("")
+    prior: str = setting("", path="folder", flag="--prior")
     """The authors' prior: the folder with its config.json and ckpt.pth. It needs ICT-FaceKit fitted as template, in whose UVs it works; empty: ours"""
-    checkpoint_every: int = setting(5, min=1, max=600, deciding=False)
+    checkpoint_every: int = setting(5, min=1, max=600, affects_result=False)
     """Steps between two checkpoints"""
-    low_memory: bool = setting(False, deciding=False)
+    low_memory: bool = setting(False, affects_result=False)
     """Use a third less memory for the same maps, at two thirds more time. Without it this begins where the memory does not suffice"""
 
 
@@ -151,25 +150,25 @@ class TransferSettings:
 class DeliverSettings:
     """What a delivery is made for; names and packing of every preset stand in delivery_presets.py."""
 
-    preset: str = setting("blender", choices=tuple(delivery_presets.PRESETS))
+    preset: str = setting("blender", choices=tuple(delivery_presets.PRESETS), flag="--preset")
     """The program it is for: its names of the maps, its units, its normals"""
-    what: str = setting("head", choices=tuple(delivery_presets.WHAT), label="Mesh")
+    what: str = setting("head", choices=tuple(delivery_presets.WHAT), label="Mesh", flag="--what")
     """Which mesh is delivered"""
     format: str = setting("preset", choices=("preset", *delivery_presets.FORMATS), label="File")
     """File of the mesh; preset: what that program likes best"""
-    size: str = setting("4096", choices=("4096", "2048", "1024"), unit="px")
+    size: str = setting("4096", choices=("4096", "2048", "1024"), unit="px", flag="--size")
     """Side of the maps; maps that are smaller are not enlarged"""
-    pictures: str = setting("preset", choices=("preset", *delivery_presets.PICTURES))
+    pictures: str = setting("preset", choices=("preset", *delivery_presets.PICTURES), flag="--pictures")
     """File of the maps"""
-    colour: str = setting("preset", choices=("preset", "srgb", "linear"))
+    colour: str = setting("preset", choices=("preset", "srgb", "linear"), flag="--colour")
     """Colour space of the albedo; preset: sRGB in PNG, linear in EXR"""
-    udim: str = setting("preset", choices=("preset", "numbered", "plain"), label="UDIM")
+    udim: str = setting("preset", choices=("preset", "numbered", "plain"), label="UDIM", flag="--udim")
     """Whether the maps' names carry the number of their UV tile (1001); maps of several tiles always do"""
-    hair: bool = setting(True, label="Hair Masks")
+    hair: bool = setting(True, label="Hair Masks", flag="--no-hair")
     """Masks of brows, lashes and beard and the skin below them go along, where the capture has them"""
-    clean: bool = setting(False, label="Clean Skin")
+    clean: bool = setting(False, label="Clean Skin", flag="--clean")
     """The albedo without brows, lashes and beard, to groom hair over it, in place of the one with them"""
-    folder: str = setting("", label="Deliver To")
+    folder: str = setting("", path="folder", label="Deliver To", flag="--to", affects_result=False)
     """Folder to deliver to; empty: exports in the capture's folder"""
     roughness: int = setting(45, min=0, max=100, unit="percent")
     """Roughness of the cheeks, in the maps and materials that hold it; Blender puts in what the head's material has"""
@@ -181,9 +180,12 @@ class DeliverSettings:
 class Settings:
     """All stages' settings, with what they share."""
 
-    seed: int = 0
-    device: str = "cpu"
-    edited_part: bool = False  # solve only what a mask edit touched, where that can be done; how a result was reached is no condition of it
+    seed: int = setting(0, min=0, max=2**31 - 1, flag="--seed")
+    """The same seed gives the same maps"""
+    device: str = setting("cpu", choices=("cpu", "cuda", "mps"), flag="--device")
+    """Where the solver computes"""
+    edited_part: bool = setting(False, flag="--edited-part", affects_result=False)  # how a result was reached is no condition of it
+    """Solve only what a mask edit touched since the last solve, where that can be done"""
     frames: FramesSettings = field(default_factory=FramesSettings)
     cameras: CamerasSettings = field(default_factory=CamerasSettings)
     scan: ScanSettings = field(default_factory=ScanSettings)
@@ -197,6 +199,9 @@ class Settings:
     deliver: DeliverSettings = field(default_factory=DeliverSettings)
 
 
+STAGE_KINDS = {f.name: f.default_factory for f in fields(Settings) if f.default_factory is not MISSING}
+"""Stage -> the class of its settings; deliver, a button's tool, is among them."""
+WRITTEN = 'Settings are written as {"solve": {"steps": 30}, "seed": 1}.'
 CARDS = {"grey": 0.18, "white": 0.88}
 """Reflectance of what a white point may be measured on: a grey card, and white paper"""
 QUALITIES = ("draft", "standard", "film")
@@ -218,46 +223,57 @@ def to_json(settings: Settings) -> dict:
     return asdict(settings)
 
 
-def deciding(stage_settings) -> dict:
-    """The settings of one stage that its result depends on."""
-    without = [f.name for f in fields(stage_settings) if not f.metadata.get("deciding", True)]
-    return {name: value for name, value in asdict(stage_settings).items() if name not in without}
+@cache
+def known_settings() -> dict[str, Field]:
+    """Every setting there is: STAGE.NAME, or the name alone for the shared ones -> its field. The shared ones come first."""
+    shared = {f.name: f for f in fields(Settings) if f.name not in STAGE_KINDS}
+    return {**shared, **{f"{stage}.{f.name}": f for stage, kind in STAGE_KINDS.items() for f in fields(kind)}}
+
+
+def result_settings(stage_settings) -> dict:
+    """The settings of one stage that its result depends on: name -> value."""
+    return {f.name: getattr(stage_settings, f.name) for f in fields(stage_settings) if f.metadata.get("affects_result", True)}
+
+
+def result_paths(stage_settings) -> dict[str, str]:
+    """The files and folders whose content the result of one stage depends on: name -> path with ~ expanded, of the settings that are not empty."""
+    paths = [f.name for f in fields(stage_settings) if "path" in f.metadata]
+    return {name: os.path.expanduser(value) for name, value in result_settings(stage_settings).items() if name in paths and value}
+
+
+def quality_settings(kind: type) -> list[str]:
+    """The names of the settings of one stage's class that a quality sets; it leaves alone what is about the face, and every path."""
+    return [f.name for f in fields(kind) if not f.metadata.get("per_face") and "path" not in f.metadata]
 
 
 def from_json(values: dict, base: Settings | None = None) -> Settings:
     """Settings with `values` (stage -> {name: value}, and seed, device) laid over `base` or the defaults.
 
-    Raises Problem for an unknown name, a wrong type, or a value out of its range.
+    Raises Problem for what is no such object, an unknown name, a wrong type, or a value out of its range.
     """
     settings = base or Settings()
+    if not isinstance(values, dict):
+        raise Problem(f"The settings are no object but {values!r:.60}.", WRITTEN)
     for name, value in values.items():
-        current = getattr(settings, name, None)
-        if current is None:
-            raise Problem(f"There is no setting named {name!r}.", "Remove it from the job or update the add-on.")
-        if hasattr(current, "__dataclass_fields__"):
-            value = replace(current, **{k: _checked(type(current), name, k, v) for k, v in value.items()})
-        elif type(value) is not type(current):
-            raise Problem(f"{name} is {value!r}, which is not a {type(current).__name__}.", f"Its default is {current!r}.")
+        if "." in name:
+            raise Problem(f"A settings object has no {name!r}: a stage's settings are an object in it.", WRITTEN)
+        if name not in STAGE_KINDS:
+            value = check_value(name, find_setting(name), value)
+        elif not isinstance(value, dict):
+            raise Problem(f"The settings of the stage {name} are no object but {value!r:.60}.", WRITTEN)
+        else:
+            value = replace(getattr(settings, name), **{k: check_value(f"{name}.{k}", find_setting(f"{name}.{k}"), v) for k, v in value.items()})
         settings = replace(settings, **{name: value})
     return settings
 
 
-def _checked(kind: type, stage: str, name: str, value):
-    by_name = {f.name: f for f in fields(kind)}
-    if name not in by_name:
-        raise Problem(f"Stage {stage} has no setting named {name!r}.", "Remove it from the job or update the add-on.")
-    f = by_name[name]
-    expected = type(f.default)
-    if expected is float and isinstance(value, int) and not isinstance(value, bool):
-        value = float(value)
-    if type(value) is not expected:
-        raise Problem(f"{stage}.{name} is {value!r}, which is not a {expected.__name__}.", f"Its default is {f.default!r}.")
-    m = f.metadata
-    if "choices" in m and value not in m["choices"]:
-        raise Problem(f"{stage}.{name} is {value!r}.", f"Choose one of {', '.join(m['choices'])}.")
-    if ("min" in m and value < m["min"]) or ("max" in m and value > m["max"]):
-        raise Problem(f"{stage}.{name} is {value}.", f"It goes from {m['min']} to {m['max']}{' ' + m['unit'] if 'unit' in m else ''}.")
-    return value
+def find_setting(name: str) -> Field:
+    """The field of STAGE.NAME, or of a shared setting. Raises Problem for an unknown one and names the nearest."""
+    if name not in known_settings():
+        near = difflib.get_close_matches(name, [*known_settings(), *STAGE_KINDS], 1, 0.5)
+        raise Problem(f"There is no setting named {name!r}.",
+                      f"{f'Did you mean {near[0]}? ' if near else ''}`python -m core settings` lists all of this version; a newer one may have more.")
+    return known_settings()[name]
 
 
 @cache

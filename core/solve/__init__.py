@@ -19,7 +19,7 @@ from ..contract import mask_edit
 from ..contract.capture import Capture
 from ..contract.hashes import hash_tree
 from ..contract.messages import Reporter
-from ..contract.settings import Settings, deciding
+from ..contract.settings import Settings, result_settings
 from ..imaging import images
 from . import checkpoint, comparison, drawing, initial, layout, maps, tone
 from .checkpoint import Solution
@@ -139,7 +139,7 @@ def _key(evidence: Evidence, settings: Settings, tone: torch.Tensor) -> str:
     digest = hashlib.blake2b(digest_size=16)
     for tensor in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, tone):
         digest.update(tensor.numpy().tobytes())
-    digest.update(json.dumps([deciding(settings.solve), settings.seed, settings.device]).encode())
+    digest.update(json.dumps([result_settings(settings.solve), settings.seed, settings.device]).encode())
     digest.update(WEIGHTS.read_bytes())
     digest.update(json.dumps(hash_tree(Path(settings.solve.prior).expanduser()) if settings.solve.prior else "").encode())
     return digest.hexdigest()

@@ -49,7 +49,7 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
             item = captures.active(context)
             if item is not None:
                 column = layout.column(align=True)
-                column.label(text="Frames With Softened Shadows")
+                column.label(text=item.shadow_mask.bl_rna.properties["softened"].name)
                 column.prop(item.shadow_mask, "softened", text="")
             found = session.offered()
             if found == 'SNAPPED':

@@ -13,7 +13,6 @@ COLUMNS = 3
 LOOKS = {"best_for": 'CHECKMARK', "leaves": 'HIDE_OFF', "costs": 'DISC', "runs": 'MEMORY', "shadows": 'LIGHT_SUN', "weights": 'FILE_BLANK', "licence": 'TEXT'}
 FOLDED = ("runs", "shadows", "weights", "licence")
 """Facts of a card that are shown when it is unfolded."""
-LABELS = {"switchlight_preview": "Small Pictures at Half the Credits"}
 
 
 def draw(layout, item, width: int) -> None:
@@ -34,7 +33,7 @@ def draw(layout, item, width: int) -> None:
         _draw_facts(more, card, width, folded=True)
     column = layout.column()
     for name in card.settings:
-        column.prop(item.delight, name, **({"text": LABELS[name]} if name in LABELS else {}))
+        column.prop(item.delight, name)
     if chosen == "switchlight":
         preferences.draw_key(column, "Key")
         _draw_sending(column, item, width)

@@ -1,0 +1,179 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings on the command line: --set and --settings reach every one, flags are theirs, the order among them holds, and what cannot be is refused."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from core.__main__ import main
+from core.contract.capture import Capture
+from core.contract.settings import Settings, find_setting, known_settings, preset
+from core.worker import terminal
+from core.worker.job import read_job
+
+RUN = [name for name in known_settings() if not name.startswith("deliver.")]
+DELIVER = [name for name in known_settings() if name.startswith("deliver.")]
+FLAGGED = [name for name in known_settings() if "flag" in find_setting(name).metadata]
+
+
+@pytest.fixture
+def capture(tmp_path, monkeypatch) -> Capture:
+    """A capture whose jobs are written and not run; the working directory is beside it."""
+    monkeypatch.setattr(terminal, "follow", lambda *_: 0)
+    monkeypatch.chdir(tmp_path)
+    found = Capture(tmp_path / "Zoë.wildcap")
+    found.set_source("")
+    return found
+
+
+def job(capture: Capture, *words, command: str = "run") -> Settings:
+    """The settings of the job that a command line writes."""
+    source = ["-"] if command == "run" else []
+    assert main([command, *source, str(capture.root), *map(str, words)]) == 0
+    return read_job(capture.job).settings
+
+
+def value(settings: Settings, name: str):
+    stage, _, own = name.rpartition(".")
+    return getattr(getattr(settings, stage) if stage else settings, own)
+
+
+def other(name: str) -> tuple[str, object]:
+    """A valid value of a setting that is not its default: as text, and as it is kept but for a path."""
+    field = find_setting(name)
+    limits = field.metadata
+    if isinstance(field.default, bool):
+        return "off" if field.default else "on", not field.default
+    if "min" in limits:
+        found = limits["max"] if field.default != limits["max"] else limits["min"]
+        return str(found), found
+    found = next(choice for choice in limits.get("choices", ("0.6,0.5,0.4",)) if choice != field.default)
+    return ("mine/é", "mine/é") if "path" in limits else (found, found)
+
+
+@pytest.mark.parametrize("name", known_settings())
+def test_every_setting_can_be_set(capture, name, tmp_path, capsys):
+    text, kept = other(name)
+    command = "deliver" if name in DELIVER else "run"
+    if name == "deliver.whole":  # the command's own choice, and its only one
+        assert job(capture, "--set", "deliver.whole=yes", command=command).deliver.whole
+        assert main(["deliver", str(capture.root), "--set", "deliver.whole=no"]) == 2 and "ended by Blender" in capsys.readouterr().err
+        return
+    settings = job(capture, "--set", f"{name}={text}", command=command)
+    assert value(settings, name) == (str(tmp_path / "mine" / "é") if "path" in find_setting(name).metadata else kept)
+    assert type(value(settings, name)) is type(find_setting(name).default)
+    expected = read_job(capture.job)
+    unchanged = [each for each in RUN if each != name and value(settings, each) != value(Settings(), each)]
+    assert expected.settings == settings and not unchanged
+
+
+@pytest.mark.parametrize("name", FLAGGED)
+def test_a_flag_says_the_same_as_set(capture, name):
+    text, _ = other(name)
+    field = find_setting(name)
+    needed = {"delight.folder": ["--delighter", "folder"], "delight.checkpoint": ["--delighter", "opendelight"],
+              "delight.switchlight_preview": ["--delighter", "switchlight"], "registration.new_atlas": ["--template", "mine.obj"]}.get(name, [])
+    words = [field.metadata["flag"]] if isinstance(field.default, bool) else [field.metadata["flag"], text]
+    command = "deliver" if name in DELIVER else "run"
+    assert job(capture, *needed, *words, command=command) == job(capture, *needed, "--set", f"{name}={text}", command=command)
+
+
+@pytest.mark.parametrize("name", [name for name in known_settings() if isinstance(find_setting(name).default, bool) and name in RUN])
+def test_a_switch_has_many_words(capture, name):
+    for words, state in (("on true YES 1", True), ("off False no 0", False)):
+        assert {value(job(capture, "--set", f"{name}={word}"), name) for word in words.split()} == {state}
+
+
+def test_a_file_lies_over_the_quality_and_set_and_flags_over_the_file(capture, tmp_path):
+    (tmp_path / "mine.json").write_text('\ufeff{"seed": 3, "solve": {"steps": 7, "size": 256, "skin_tone": "0.5,0.4,0.3"}, "deliver": {"preset": "unreal"}}',
+                                        encoding="utf-8")
+    settings = job(capture, "--quality", "draft", "--settings", "mine.json", "--set", "solve.size=128", "--set", "solve.grid_cells=8", "--skin-tone", "auto")
+    assert (settings.seed, settings.solve.steps, settings.solve.size, settings.solve.grid_cells, settings.solve.skin_tone) == (3, 7, 128, 8, "auto")
+    assert settings.solve.guidance == preset("draft").solve.guidance
+    assert json.loads(capture.job.read_text(encoding="utf-8"))["quality"] == "draft"
+    assert job(capture, "--settings", "mine.json", command="deliver").deliver.preset == "unreal"
+    kept = job(capture, "--settings", "mine.json", "--pictures", "png8", command="deliver")
+    assert (kept.deliver.pictures, kept.deliver.whole, kept.deliver.format) == ("png8", True, "obj") and kept.seed == settings.seed, "the last run's stay"
+
+
+def test_paths_begin_where_they_are_written(capture, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    (tmp_path / "studio").mkdir()
+    places = {"delight": {"delighter": "folder", "folder": "delit"}, "solve": {"prior": "~/authors"}, "registration": {"template": ""},
+              "cameras": {"import_from": str(tmp_path / "rig.json")}}
+    (tmp_path / "studio" / "mine.json").write_text(json.dumps(places), encoding="utf-8")
+    settings = job(capture, "--settings", "studio/mine.json", "--set", "texture.perceptual_network=vgg", "--softened", "~/soft")
+    assert settings.delight.folder == str(tmp_path / "studio" / "delit") and settings.solve.prior == str(tmp_path / "home" / "authors")
+    assert settings.registration.template == "" and settings.cameras.import_from == str(tmp_path / "rig.json")
+    assert settings.texture.perceptual_network == str(tmp_path / "vgg") and settings.shadow_mask.softened == str(tmp_path / "home" / "soft")
+    assert job(capture, "--settings", "studio/mine.json", "--folder", "mine").delight.folder == str(tmp_path / "mine"), "the file says that it is for folder"
+    assert job(capture, "--settings", "studio/mine.json", "--set", "delight.folder=").delight.folder == ""
+
+
+@pytest.mark.parametrize(("words", "said"), [
+    (["--set", "solve.steps"], "--set solve.steps gives no value. Write --set solve.steps=VALUE, as solve.steps=20."),
+    (["--set", "solve.stps=5"], "no setting named 'solve.stps'. Did you mean solve.steps?"), (["--set", "slove.steps=5"], "Did you mean solve.steps?"),
+    (["--set", "solve.steps=many"], "solve.steps is 'many', which is no whole number. It goes from 4 to 600."),
+    (["--set", "solve.steps=5.5"], "no whole number"), (["--set", "solve.steps="], "'', which is no whole number"),
+    (["--set", "solve.steps=3"], "solve.steps is 3. It goes from 4 to 600."),
+    (["--set", "scan.voxel_mm=wide"], "which is no number. It goes from 0.3 to 5 mm."),
+    (["--set", "scan.voxel_mm=nan"], "It goes from 0.3 to 5 mm."), (["--set", "upscale.hair=perhaps"], "upscale.hair is 'perhaps'. It is on or off."),
+    (["--set", "scan.method=magic"], "Choose one of auto, stereo, splats."), (["--seed", "-1"], "seed is -1. It goes from 0 to 2147483647."),
+    (["--set", "seed=1", "--seed", "2"], "--seed and --set seed=1 ask for two values of seed. Leave one of them out."),
+    (["--set", "scan.pairs=5", "--set", "scan.pairs=6"], "ask for two values of scan.pairs."),
+    (["--set", "deliver.preset=unreal"], "`core run` has no use for deliver.preset. It is a setting of `core deliver`."),
+    (["--new-atlas"], "--new-atlas goes with --template only."), (["--folder", "x", "--delighter", "none"], "--folder goes with --delighter folder only."),
+    (["--checkpoint", "x"], "--checkpoint goes with --delighter opendelight only."),
+    (["--preview"], "--preview and --send-frames go with --delighter switchlight"),
+])
+def test_what_cannot_be_is_refused(capture, words, said, capsys):
+    assert main(["run", "-", str(capture.root), *words]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 2 and said in " ".join(lines) and not capture.job.exists()
+
+
+def test_a_delivery_takes_its_own_settings_only(capture, capsys):
+    assert main(["deliver", str(capture.root), "--set", "solve.steps=5"]) == 2
+    assert "`core deliver` has no use for solve.steps." in capsys.readouterr().err
+
+
+def test_two_words_for_one_value_are_no_contradiction(capture):
+    assert job(capture, "--seed", "2", "--set", "seed=2", "--set", "scan.pairs=5", "--set", " scan.pairs = 5").seed == 2
+    assert job(capture, "--skin-tone", "").solve.skin_tone == "auto", "an empty variable of a script says nothing"
+
+
+@pytest.mark.parametrize(("content", "said"), [
+    (None, "mine.json cannot be read"), (b"", "cannot be read"), (b"{", "cannot be read"), (b"\xff\xfe\x00", "cannot be read"), (b"[1]", "no object but [1]"),
+    (b'"solve"', "no object but 'solve'"), (b'{"solve": [5]}', "settings of the stage solve are no object"), (b'{"solve": {"prior": 5}}', "not a str"),
+    (b'{"slove": {}}', "Did you mean solve?"), (b'{"scan": {"voxel_mm": NaN}}', "0.3 to 5 mm"), (b"[" * 100_000, "cannot be read")])
+def test_a_settings_file_that_is_none_is_refused(capture, tmp_path, content, said, capsys):
+    if content is not None:
+        (tmp_path / "mine.json").write_bytes(content)
+    for words in (["run", "-"], ["deliver"]):
+        assert main([*words, str(capture.root), "--settings", str(tmp_path / "mine.json")]) == 2
+        assert said in capsys.readouterr().err and not capture.job.exists()
+
+
+def test_all_settings_are_listed(capsys):
+    assert main(["settings"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(" = ")[0] for line in lines if not line.startswith(" ")] == list(known_settings())
+    assert "scan.voxel_mm = 1.0; 0.3 to 5 mm" in lines and "upscale.hair = on; on or off" in lines
+    assert "solve.skin_tone = auto; R,G,B or auto  (run --skin-tone R,G,B)" in lines and "    Sampling steps" in lines
+    assert "deliver.size = 4096; 4096, 2048, 1024 px  (deliver --size VALUE)" in lines
+    assert all(len(line) < 160 for line in lines)
+
+
+def test_the_help_has_the_tooltips(capsys):
+    for command, said in (("run", "Make new UVs for your own head mesh"), ("deliver", "Which mesh is delivered")):
+        with pytest.raises(SystemExit):
+            main([command, "--help"])
+        assert said in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_settings_file_in_the_home_folder(capture, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    Path(tmp_path / "mine.json").write_text('{"edited_part": true}')
+    assert job(capture, "--settings", "~/mine.json").edited_part
