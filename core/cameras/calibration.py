@@ -25,7 +25,7 @@ def import_cameras(path: Path, frames: Frames, folder: Path, report: Reporter) -
     matched = _match(cameras, frames)
     if len(matched) < FEWEST:
         here = ", ".join(_known_as(record)[0] for record in frames.records[:3])
-        raise Problem(f"{path.name} has cameras for {len(matched)} of the {len(frames['frames'])} frames; three are the least. "
+        raise Problem(f"{path.name} has cameras for {len(matched)} of the {len(frames.records)} frames; three are the least. "
                       f"It names {', '.join(camera.name for camera in cameras[:3])}; the frames are {here}.",
                       "Solve the cameras from these very pictures, under the same file names; for a video, name each camera by its frame's number.")
     model = pycolmap.Reconstruction()
