@@ -32,6 +32,7 @@ from skimage.color import deltaE_ciede2000, rgb2lab
 
 from core.contract.capture import Capture
 from core.face import template
+from core.face.head import read_head
 from core.geometry import meshes
 from core.imaging import images
 from core.solve import DELIT, initial, maps
@@ -183,7 +184,7 @@ def solved(given: UvProblem, recipe: Recipe, tone: np.ndarray, seed: int = 0, ce
         images.write_data(capture.texture_confidence, np.ones((size, size), np.float32))
         images.write_data(capture.shadow_mask_auto, {"painted": given.mask, "empty": 0 * given.mask, "full": 0 * given.mask + 1}[mask])
         meshes.write_obj(capture.head, template.load())
-        evidence = read_evidence(capture, size)
+        evidence = read_evidence(capture, read_head(capture), size)
     start = initial.start(prior, evidence, ",".join(f"{v:.5f}" for v in tone), FACE_CROP / cells, recipe)
     state = sample(prior, start.observations, start.state, recipe, seeded(seed)) if with_prior else texels_alone(start, recipe)
     return maps.finished(state, evidence, start, recipe).diffuse

@@ -28,8 +28,10 @@ from flip_evaluator import evaluate as flip_evaluate
 from skimage.metrics import structural_similarity
 
 from core.contract.capture import Capture
+from core.contract.frame_records import read_frames
 from core.contract.messages import Problem
-from core.geometry import meshes, raster
+from core.face.head import read_head
+from core.geometry import raster
 from core.geometry.views import read_views
 from core.imaging import images
 
@@ -88,10 +90,10 @@ def score_capture(capture: Capture, truth: Path, pictures: Path | None = None, t
 
 def looks(capture: Capture, truth: Path) -> tuple[list[Look], list[int]]:
     """The registered frames with truth as they see the capture's head, and the numbers of those that were not registered. Raises Problem where none was."""
-    head = meshes.read_obj(capture.head)
-    caster = raster.RayCaster(head)
-    numbers = {f["name"]: f["video_frame"] for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
-    views = {numbers[view.name]: view for view in read_views(capture)}
+    whole = read_head(capture)
+    head, caster = whole.mesh, whole.caster
+    frames = read_frames(capture).by_name
+    views = {frames[view.name].video_frame: view for view in read_views(capture)}
     seen, missing = [], []
     for true in read_truth(truth):
         if true.frame not in views:

@@ -17,6 +17,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from core.contract.capture import Capture  # noqa: E402
+from core.contract.frame_records import read_frames  # noqa: E402
 from core.geometry.views import View, read_views  # noqa: E402
 
 BLENDER_TO_COLMAP = np.diag([1.0, -1.0, -1.0])
@@ -55,9 +56,9 @@ def similarity(source: np.ndarray, target: np.ndarray) -> tuple[float, np.ndarra
 
 
 def _paired(capture: Capture, true: dict) -> tuple[list[View], np.ndarray]:
-    index = {f["name"]: f["video_frame"] for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
-    views = [view for view in read_views(capture) if index[view.name] in true]
-    return views, np.array([true[index[view.name]] for view in views])
+    frames = read_frames(capture).by_name
+    views = [view for view in read_views(capture) if frames[view.name].video_frame in true]
+    return views, np.array([true[frames[view.name].video_frame] for view in views])
 
 
 def _looked_at(centres: np.ndarray, axes: np.ndarray) -> np.ndarray:

@@ -36,6 +36,7 @@ import torch
 from core.contract.capture import Capture, replacing_folder, write_json
 from core.contract.messages import Reporter
 from core.contract.settings import Settings, from_json, preset
+from core.face.head import read_head
 from core.imaging import images
 from core.solve import FACE_CROP, initial, maps, recipe_of
 from core.solve.evidence import REFERENCE, Evidence, read_evidence
@@ -117,13 +118,14 @@ def row_folder(work: Path, given: str, method: str, seed: int = 0) -> Path:
 def solved(capture: Capture, settings: Settings, method: str, seed: int) -> tuple[np.ndarray, np.ndarray, float]:
     """Diffuse albedo and shading, linear [S, S, 3], of one method under one input, and the seconds that it took."""
     began = time.monotonic()
-    evidence = read_evidence(capture, settings.solve.size)
+    head = read_head(capture)
+    evidence = read_evidence(capture, head, settings.solve.size)
     if method in ("texture", "over its blur"):
         return *_by_hand(capture, evidence, settings, method), time.monotonic() - began
     prior = _prior()
     recipe = recipe_of(settings, prior)
     cell = FACE_CROP / settings.solve.grid_cells * REFERENCE / evidence.extent.side
-    start = initial.start(prior, evidence, settings.solve.skin_tone, cell, recipe, lambda marks: confirmed(capture, marks, evidence.size))
+    start = initial.start(prior, evidence, settings.solve.skin_tone, cell, recipe, lambda marks: confirmed(capture, head, marks, evidence.size))
     fit = {}
     if method in LIGHTS:
         start, recipe, move = LIGHTS[method](start, recipe)

@@ -28,7 +28,7 @@ from core.contract.capture import Capture, write_json
 from core.contract.messages import Problem
 from core.contract.settings import from_json, preset
 from core.face import template
-from core.geometry import meshes
+from core.face.head import read_head
 from core.imaging import images
 
 from . import figures
@@ -157,7 +157,7 @@ def _set(folder: Path, name: str, place: str) -> Capture:
 
 @cache
 def _looks(capture: Path, truth: Path) -> list:
-    return list(looks_of(Capture(capture), meshes.read_obj(capture / "head.obj"), truth).values())
+    return list(looks_of(Capture(capture), read_head(Capture(capture)).caster, truth).values())
 
 
 def _rounded(scores: dict) -> dict:

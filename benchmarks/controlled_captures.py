@@ -20,6 +20,7 @@ from core.contract.capture import Capture
 from core.contract.messages import Reporter
 from core.contract.settings import Settings, from_json
 from core.face import template
+from core.face.head import read_head
 from core.imaging import images
 from core.solve import FACE_CROP, initial, maps, recipe_of
 from core.solve.evidence import read_evidence
@@ -46,7 +47,7 @@ def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, 
     """The solver's albedo, sRGB [S, S, 3], where the light is known and gone: even, one colour, held throughout; and the seconds."""
     began, prior = time.monotonic(), _prior()
     recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0)
-    evidence = read_evidence(capture, settings.solve.size)
+    evidence = read_evidence(capture, read_head(capture), settings.solve.size)
     start = initial.start(prior, evidence, settings.solve.skin_tone, FACE_CROP / settings.solve.grid_cells, recipe)
     state = sample(prior, start.observations, start.state, recipe, seeded(settings.seed))
     return images.linear_to_srgb(maps.finished(state, evidence, start, recipe).diffuse), {"seconds": round(time.monotonic() - began, 1)}

@@ -13,19 +13,19 @@ taken from the sample's 60; 120 and 300 are the sample's played to and fro, with
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import shutil
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import av
 import numpy as np
 
 from core.contract import stages
-from core.contract.capture import Capture, replacing_folder, write_json
+from core.contract.capture import Capture, replacing_folder
+from core.contract.frame_records import read_frames, write_frames
 from core.contract.messages import Problem
 from core.solve.prior import fast_dtype
 
@@ -156,12 +156,9 @@ def select(capture: Capture, count: int) -> None:
     """Has the frames stage's own choice of so many views written to frames.json."""
     from core.frames.select import select_views, turns
 
-    told = json.loads(capture.frames_json.read_text(encoding="utf-8"))
-    frames = told["frames"]
-    chosen = select_views(np.array([frame["sharpness"] for frame in frames]), turns(frames), count)
-    for index, frame in enumerate(frames):
-        frame["selected"] = index in chosen
-    write_json(capture.frames_json, told)
+    frames = read_frames(capture)
+    chosen = select_views(np.array([record.sharpness for record in frames.records]), turns(frames.records), count)
+    write_frames(capture.frames, replace(frames, records=tuple(replace(record, selected=i in chosen) for i, record in enumerate(frames.records))))
 
 
 def length(video: Path) -> int:

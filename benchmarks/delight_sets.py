@@ -4,16 +4,16 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from core.contract.capture import Capture, write_json
+from core.contract.capture import Capture
+from core.contract.frame_records import read_frames, write_frames
 from core.contract.messages import Problem
 from core.geometry.views import read_views
 from core.imaging import images
@@ -70,21 +70,20 @@ def frames(truth: Path, capture: Capture, work: Path, every: int = 1) -> Photogr
         shutil.copytree(part, copy.root / part.name)
     shutil.copy(capture.head, copy.head)
     known = {true.frame: true for true in read_truth(truth)}
-    listed = json.loads(copy.frames_json.read_text(encoding="utf-8"))
+    listed = read_frames(copy)
     registered = {view.name: view for view in read_views(copy)}
-    having = [frame for frame in listed["frames"] if frame["video_frame"] in known and frame["name"] in registered]
+    having = [frame for frame in listed.records if frame.video_frame in known and frame.name in registered]
     if not having:
         raise Problem(f"No registered frame of {capture.root} has a true albedo in {truth}.", "Check that the two belong together.")
-    for frame in listed["frames"]:
-        frame["selected"] = frame in having  # the light is fitted to all of them, also where only some are scored
-    write_json(copy.frames_json, listed)
+    chosen = tuple(replace(frame, selected=frame in having) for frame in listed.records)  # the light is fitted to all, also where only some are scored
+    write_frames(copy.frames, replace(listed, records=chosen))
     found = []
     for frame in having[::every]:
-        true = known[frame["video_frame"]]
-        srgb = images.read_srgb(registered[frame["name"]].path)
+        true = known[frame.video_frame]
+        srgb = images.read_srgb(registered[frame.name].path)
         if srgb.shape != true.albedo.shape:
             srgb = images.resize(srgb, true.albedo.shape[1], true.albedo.shape[0])
-        found.append(Photograph(f"{frame['video_frame']:04d}", srgb, true, truth.name, frame["name"]))
+        found.append(Photograph(f"{frame.video_frame:04d}", srgb, true, truth.name, frame.name))
     return Photographs(found, copy)
 
 

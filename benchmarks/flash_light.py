@@ -16,10 +16,11 @@ import cv2
 import numpy as np
 
 from core.contract.capture import Capture
-from core.geometry import meshes, raster
+from core.face.head import Head, Unfolded, read_head
+from core.geometry import raster
 from core.geometry.views import View, read_views
 from core.imaging import images
-from core.texture.projection import Surface, observe
+from core.texture.projection import observe
 
 LEAST = 0.2  # cosine at which the division stops: beyond, pixels stay dark, and the texture hardly trusts them
 ROUGHNESSES = (0.3, 0.4, 0.5, 0.6, 0.7)  # in Principled's terms (alpha is the square)
@@ -58,10 +59,9 @@ class Lit:
 
 def write_delit(capture: Capture, folder: Path) -> Highlight:
     """folder/NNNNN.png of every registered frame of a capture with a lamp at the camera: sRGB, 16 bit, without the known light, all in one exposure."""
-    head = meshes.read_obj(capture.head)
-    caster = raster.RayCaster(head)
-    frames = [lit(view, images.read_linear(view.path), caster) for view in read_views(capture)]
-    found = highlight(frames, Surface.of(head, SIZE))
+    head = read_head(capture)
+    frames = [lit(view, images.read_linear(view.path), head) for view in read_views(capture)]
+    found = highlight(frames, head.unfold(SIZE))
     pictures = [matte(frame, found) for frame in frames]
     gain = BRIGHT[1] / np.percentile(np.concatenate([picture[frame.hit].max(1) for picture, frame in zip(pictures, frames, strict=True)]), BRIGHT[0])
     for frame, picture in zip(frames, pictures, strict=True):
@@ -69,20 +69,20 @@ def write_delit(capture: Capture, folder: Path) -> Highlight:
     return found
 
 
-def lit(view: View, linear: np.ndarray, caster: raster.RayCaster) -> Lit:
-    """A frame, linear [H, W, 3], of the size of its view, with the light of a lamp at the camera on the caster's head."""
-    face, bary, distance = raster.render_view(caster, view)
-    head, hit = caster.mesh, face >= 0
-    normal = raster.interpolate(meshes.vertex_normals(head), head.faces, face, bary)
-    points = raster.interpolate(head.vertices, head.faces, face, bary)
+def lit(view: View, linear: np.ndarray, head: Head) -> Lit:
+    """A frame, linear [H, W, 3], of the size of its view, with the light of a lamp at the camera on the head."""
+    face, bary, distance = raster.render_view(head.caster, view)
+    mesh, hit = head.mesh, face >= 0
+    normal = raster.interpolate(head.normals, mesh.faces, face, bary)
+    points = raster.interpolate(mesh.vertices, mesh.faces, face, bary)
     towards = (view.centre - points) / np.where(hit, distance, 1)[..., None]
     cosine = (normal * towards).sum(-1) / np.maximum(np.linalg.norm(normal, axis=-1), 1e-9)
     shading = np.where(hit, np.maximum(cosine, LEAST) / np.where(hit, distance, 1) ** 2, 1)
-    uv = raster.interpolate(head.uvs, head.face_uvs, face, bary)
+    uv = raster.interpolate(mesh.uvs, mesh.face_uvs, face, bary)
     return Lit(view, linear, hit, np.clip(cosine, 0, 1), shading, uv)
 
 
-def highlight(frames: list[Lit], surface: Surface) -> Highlight:
+def highlight(frames: list[Lit], surface: Unfolded) -> Highlight:
     """Least squares over the frames at every texel: picture over shading = albedo + strength x lobe(n.l), neighbours sharing the strength; of all ROUGHNESSES
     the one that leaves least."""
     seen = [_observed(frame, surface) for frame in frames]
@@ -107,7 +107,7 @@ def lobe(cosine: np.ndarray, roughness: float) -> np.ndarray:
     return np.pi * distribution / (4 * c2 * smith)
 
 
-def _observed(frame: Lit, surface: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _observed(frame: Lit, surface: Unfolded) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What a frame shows of each texel: its unshaded colour [S, S, 3], n.l [S, S], and how far that counts [S, S]."""
     seen = observe(frame.view, frame.unshaded, surface, 1.0)
     burnt = cv2.dilate((images.linear_to_srgb(frame.linear).max(-1) > BURNT).astype(np.uint8), np.ones((5, 5))).astype(np.float32)

@@ -22,6 +22,7 @@ from pathlib import Path
 
 from core.contract import stages
 from core.contract.capture import Capture, write_json
+from core.contract.frame_records import read_frames
 from core.contract.messages import Problem
 from core.contract.settings import Settings
 from core.imaging import images
@@ -103,7 +104,7 @@ def _cameras(capture: Capture, subject: Subject, part: str) -> dict:
 
     from .cameras_against_truth import compare
 
-    frames = len(json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"])
+    frames = len(read_frames(capture).records)
     views = read_views(capture)
     figures = {"frames": frames, "registered_percent": 100 * len(views) / frames,
                "reprojection_px": pycolmap.Reconstruction(str(capture.cameras)).compute_mean_reprojection_error()}

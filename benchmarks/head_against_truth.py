@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from core.contract.capture import Capture  # noqa: E402
+from core.contract.frame_records import read_frames  # noqa: E402
 from core.geometry import meshes, raster
 from core.geometry.views import read_views  # noqa: E402
 from core.imaging import images  # noqa: E402
@@ -30,7 +31,7 @@ from core.synthetic.sample import RESERVED  # noqa: E402
 def compare(capture: Capture, truth: Path, mesh: Path | None, surface: str = "head.obj") -> dict:
     """Median, 90th and 95th percentile in mm over the face's pixels, as placed by the cameras and after ICP beside it."""
     views = read_views(capture)
-    frames = {f["name"]: f["video_frame"] for f in json.loads(capture.frames_json.read_text())["frames"]}
+    frames = {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()}
     cameras = {c["frame"]: np.array(c["matrix_world"])[:3, 3] for c in json.loads((truth / "cameras.json").read_text())["cameras"]}
     shared = [v for v in views if frames[v.name] in cameras]
     ours, theirs = np.stack([v.centre for v in shared]), np.stack([cameras[frames[v.name]] for v in shared])

@@ -8,7 +8,6 @@ is the true one, off by half a millimetre here and there, as a fit leaves it.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -16,15 +15,17 @@ import cv2
 import numpy as np
 import pycolmap
 
-from core.contract.capture import Capture, replacing_folder, write_json
+from core.contract.capture import Capture, replacing_folder
+from core.contract.frame_records import FrameRecord, Frames, read_frames, write_frames
 from core.contract.messages import Reporter
 from core.face import template
+from core.face.head import read_head
 from core.geometry import meshes, raster
 from core.geometry.meshes import Mesh
 from core.geometry.noise import noise
 from core.geometry.views import View, read_views
 from core.imaging import images
-from core.shadow_mask.lift import Unfolded, lift_shadows
+from core.shadow_mask.lift import lift_shadows
 from core.synthetic.identities import subject_mesh
 from core.synthetic.light import bake, random_light
 from core.synthetic.painted_head import camera
@@ -59,11 +60,11 @@ def synthetic_capture(seed: int, kind: str, folder: Path) -> tuple[Capture, np.n
 
 def lifted_truth(capture: Capture, truth: Path, size: int = SIZE) -> np.ndarray:
     """The true shadow of TRUTH/shadow/NNNN.png (NNNN: frame of the video) in the UVs of a capture's head, bool [size, size]."""
-    numbers = {f["name"]: f["video_frame"] for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
+    frames = read_frames(capture).by_name
     pictures = {int(path.stem): path for path in (truth / "shadow").glob("*.png")}
-    views = [(view, pictures[numbers[view.name]]) for view in read_views(capture) if numbers[view.name] in pictures]
+    views = [(view, pictures[frames[view.name].video_frame]) for view in read_views(capture) if frames[view.name].video_frame in pictures]
     masks = ((view, images.read_mask(path)) for view, path in views)
-    return lift_shadows(Unfolded.of(meshes.read_obj(capture.head), size), len(views), masks, Reporter("shadow_mask")) > 0.5
+    return lift_shadows(read_head(capture).unfold(size), len(views), masks, Reporter("shadow_mask")) > 0.5
 
 
 def _lit(mesh: Mesh, seed: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
@@ -115,8 +116,8 @@ def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarr
             image = pycolmap.Image(name=name, camera_id=1, image_id=i + 1)
             pose = pycolmap.Rigid3d(pycolmap.Rotation3d(view.rotation), view.translation)
             model.add_image_with_trivial_frame(image, pose)
-            frames.append({"name": name, "video_frame": i, "time_s": float(i), "sharpness": 1.0, "selected": i in taken})
-        write_json(folder / "frames.json", {"frames": frames})
+            frames.append(FrameRecord(name=name, video_frame=i, time_s=float(i), sharpness=1.0, selected=i in taken))
+        write_frames(folder, Frames(tuple(frames)))
     capture.cameras.mkdir(parents=True, exist_ok=True)
     model.write_binary(str(capture.cameras))
 

@@ -23,6 +23,7 @@ from skimage.color import deltaE_ciede2000
 from core.contract.capture import Capture
 from core.contract.messages import Reporter
 from core.contract.settings import Settings, from_json
+from core.face.head import read_head
 from core.imaging import images
 from core.solve.evidence import read_evidence
 from core.solve.initial import skin_tone
@@ -123,11 +124,12 @@ def print_table(rows: dict[str, list], subjects: dict[str, int]) -> None:
 def of_capture(capture: Capture, srgb: np.ndarray, known: list) -> dict:
     """One finished capture: prints its name, then the earlier auto's and the estimate's error of L* and delta E, and returns them with its true L*."""
     truth = images.srgb_to_linear(srgb)
-    evidence, settings = read_evidence(capture, SIZE), from_json({}, Settings())
+    head = read_head(capture)
+    evidence, settings = read_evidence(capture, head, SIZE), from_json({}, Settings())
     lit = evidence.skin * evidence.weight * (1 - evidence.alpha)
     linear = skin_tone("auto", evidence.texture, lit, known).numpy()
     found: dict = {"lightness": lab(truth)[0]}
-    for row, tone in (("before", Tone(linear, np.nan, np.nan, group(linear))), ("scene", automatic(capture, settings, evidence, Reporter("skin_tone")))):
+    for row, tone in (("before", Tone(linear, np.nan, np.nan, group(linear))), ("scene", automatic(capture, head, settings, evidence, Reporter("skin_tone")))):
         signed, colour, stated = errors(tone, truth)
         print(f"{row:9} {capture.root.name:20} {group(truth):13} L* {lab(truth)[0]:.1f} error {signed:+.2f} delta E {colour:.2f} stated {stated:.2f}")
         found[row] = {"lightness": signed, "delta_e": colour, "stated": stated if np.isfinite(stated) else None}

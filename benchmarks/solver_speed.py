@@ -159,6 +159,7 @@ def single_steps(row: Row, capture, options: argparse.Namespace) -> dict:
     import torch
 
     from core.contract.messages import Reporter
+    from core.face.head import read_head
     from core.solve import FACE_CROP, initial
     from core.solve.evidence import read_evidence
     from core.solve.memory import sample_within_memory
@@ -168,7 +169,7 @@ def single_steps(row: Row, capture, options: argparse.Namespace) -> dict:
     prior = prior_of(row, options)
     coarse = OURS.coarse if row.coarse and not prior.one_scale else ()
     recipe = replace(OURS, coarse=coarse, guidance=row.guidance, sharp_edges=False, protect_marks=False)
-    begun = initial.start(prior, read_evidence(capture, options.size), TONE, FACE_CROP / 96, recipe)
+    begun = initial.start(prior, read_evidence(capture, read_head(capture), options.size), TONE, FACE_CROP / 96, recipe)
     short = replace(recipe, steps=options.steps, updates=max(1, recipe.updates * options.steps // recipe.steps))
     if options.compile:
         prior.network = torch.compile(prior.network)

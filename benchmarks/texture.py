@@ -29,9 +29,11 @@ import numpy as np
 
 from core import texture
 from core.contract.capture import Capture
+from core.contract.frame_records import read_frames
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import from_json
-from core.geometry import meshes, raster
+from core.face.head import read_head
+from core.geometry import raster
 from core.geometry.views import read_views
 from core.imaging import images
 from core.texture.blend import weighted_mean
@@ -48,8 +50,8 @@ def measure(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: 
     """The figures of all rows. Raises Problem where the capture is not registered or no true frame belongs to it."""
     if not capture.head.is_file():
         raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
-    head, report, results = meshes.read_obj(capture.head), Reporter("texture"), {}
-    looks = looks_of(capture, head, truth)
+    head, report, results = read_head(capture), Reporter("texture"), {}
+    looks = looks_of(capture, head.caster, truth)
     if "delit" in rows and any(capture.delit.glob("*.png")):
         results["delit"] = _row("aligned", *texture.observe_all(capture, head, size, report), looks, steps, pictures and pictures / "delit.jpg")
     with tempfile.TemporaryDirectory() as folder:
@@ -70,11 +72,11 @@ def measure(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: 
     return results
 
 
-def looks_of(capture: Capture, head: meshes.Mesh, truth: Path) -> dict[str, Look]:
+def looks_of(capture: Capture, caster: raster.RayCaster, truth: Path) -> dict[str, Look]:
     """Frame name -> what its rays meet, of the registered frames with a true albedo."""
-    numbers = {f["name"]: f["video_frame"] for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
-    known, caster = {true.frame: true for true in read_truth(truth)}, raster.RayCaster(head)
-    found = {view.name: look(caster, view, known[numbers[view.name]]) for view in read_views(capture) if numbers[view.name] in known}
+    frames = read_frames(capture).by_name
+    known = {true.frame: true for true in read_truth(truth)}
+    found = {view.name: look(caster, view, known[frames[view.name].video_frame]) for view in read_views(capture) if frames[view.name].video_frame in known}
     if not found:
         raise Problem(f"No registered frame of {capture.root} has a true albedo in {truth}.", "Check that the two belong together.")
     return found

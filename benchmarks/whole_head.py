@@ -30,7 +30,7 @@ from scipy.spatial import cKDTree
 from core.contract.capture import Capture
 from core.contract.messages import Reporter
 from core.face import template
-from core.geometry import meshes
+from core.face.head import read_head
 from core.imaging import images
 from core.solve.initial import face_of_tone
 from core.solve.prior import load
@@ -102,7 +102,7 @@ def hairs(seed: int, surface: HeadSurface) -> dict:
 def of_capture(capture: Capture, subject: int | None = None) -> dict:
     """How far the border and the map's cut show, before and after, and how much hair there is."""
     maps = read_maps(capture.maps)
-    surface = lay_out(meshes.read_obj(capture.head), len(maps.diffuse))
+    surface = lay_out(read_head(capture).mesh, len(maps.diffuse))
     report = Reporter("upscale")
     done = complete(maps, surface, report)
     seen = cv2.morphologyEx((maps.confidence >= UNSEEN).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8))

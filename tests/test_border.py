@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from core.face import beard, template
+from core.face.head import read_head
 from core.imaging import images
 from core.solve import border
 from core.solve.evidence import BEARD_TRUST, read_evidence
@@ -67,7 +68,7 @@ def test_a_beard_says_little_of_the_light(tmp_path):
     capture = make(tmp_path / "a.wildcap")
     images.write_linear(capture.texture, stubbly)
     images.write_data(capture.texture_confidence, seen)
-    trust = read_evidence(capture, 256).trust.numpy()
+    trust = read_evidence(capture, read_head(capture), 256).trust.numpy()
     inner = images.resize((found > 0.99).astype(np.float32), 256, 256) > 0.99
     assert inner.sum() > 200 and trust[inner] == pytest.approx(BEARD_TRUST, abs=0.02)
     cheek = (template.mask("skin", 256) > 0.99) & (images.resize(found, 256, 256) == 0)

@@ -3,6 +3,7 @@
 """Imported cameras: known ones written as each program lays them out project known points where that program's own formula puts them."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pycolmap
@@ -10,6 +11,7 @@ import pytest
 
 from core.cameras.calibration import import_cameras, read_cameras
 from core.cameras.importers.realityscan import turned
+from core.contract.frame_records import PHOTOGRAPHS, VIDEO, FrameRecord, Frames
 from core.contract.messages import Problem, Reporter
 from core.imaging import images
 from core.synthetic import painted_head
@@ -97,13 +99,13 @@ def colmap_model() -> pycolmap.Reconstruction:
 
 @pytest.fixture(scope="module")
 def shot(tmp_path_factory):
-    """frames.json's content and folder, as made from photographs of those names."""
+    """The frames and their folder, as made from photographs of those names."""
     folder = tmp_path_factory.mktemp("frames")
     records = []
     for i, name in enumerate(NAMES):
         images.write_srgb(folder / f"{i:05d}.jpg", np.zeros((FRAME_HEIGHT, FRAME_WIDTH, 3), np.float32))
-        records.append({"name": f"{i:05d}.jpg", "source": f"{name}.jpeg", "video_frame": i})
-    return {"kind": "photographs", "frames": records}, folder
+        records.append(FrameRecord(name=f"{i:05d}.jpg", source=f"{name}.jpeg", video_frame=i, sharpness=1.0, selected=True))
+    return Frames(tuple(records), PHOTOGRAPHS), folder
 
 
 def written(tmp_path, kind: str):
@@ -148,7 +150,7 @@ def test_a_videos_frames_are_matched_by_number(tmp_path, shot):
         camera["frame"] = i
         del camera["name"]
     (tmp_path / "cameras.json").write_text(json.dumps(record))
-    model = import_cameras(tmp_path / "cameras.json", {**frames, "kind": "video"}, folder, Reporter("cameras"))
+    model = import_cameras(tmp_path / "cameras.json", replace(frames, kind=VIDEO), folder, Reporter("cameras"))
     assert model.num_reg_images() == 4
 
 
@@ -173,8 +175,8 @@ def test_cameras_of_other_pictures_are_refused(tmp_path, shot):
     with pytest.raises(Problem, match="0 of the 4 frames.*DSC_0007.*img_0007"):
         import_cameras(path, frames, folder, Reporter("cameras"))
     turned_folder = tmp_path / "turned"
-    for record in frames["frames"]:
-        images.write_srgb(turned_folder / record["name"], np.zeros((FRAME_WIDTH, FRAME_HEIGHT, 3), np.float32))
+    for record in frames.records:
+        images.write_srgb(turned_folder / record.name, np.zeros((FRAME_WIDTH, FRAME_HEIGHT, 3), np.float32))
     with pytest.raises(Problem, match="1200 x 1600.*480 x 360") as caught:
         import_cameras(written(tmp_path, "blender"), frames, turned_folder, Reporter("cameras"))
     assert "EXIF" in caught.value.remedy

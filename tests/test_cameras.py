@@ -18,6 +18,7 @@ from core import cameras, frames
 from core.cameras.landmarks import find_landmarks
 from core.cameras.world import find_head, intersect_rays
 from core.contract.capture import Capture
+from core.contract.frame_records import read_frames
 from core.contract.messages import CancelledError, Problem, Reporter
 from core.contract.settings import from_json
 from core.face import faces
@@ -158,12 +159,12 @@ def test_a_camera_that_hardly_moved_is_refused(tmp_path):
 def test_a_head_that_moves_before_a_still_background_is_refused(solved, tmp_path):
     """Cameras that hold for the background, but in every second picture the face has gone aside by a third of its width."""
     capture, _, _ = solved
-    records = json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]
+    records = read_frames(capture).records
     model = pycolmap.Reconstruction(str(capture.cameras))
     for i, record in enumerate(records):
-        picture = images.read_srgb(capture.frames / record["name"])
-        aside = round((record["face_box"][2] - record["face_box"][0]) / 3) if i % 2 else 0
-        images.write_srgb(tmp_path / record["name"], np.roll(picture, aside, 1))
+        picture = images.read_srgb(capture.frames / record.name)
+        aside = round((record.face_box[2] - record.face_box[0]) / 3) if i % 2 else 0
+        images.write_srgb(tmp_path / record.name, np.roll(picture, aside, 1))
     still, moved = (find_head(model, find_landmarks(records, folder, Reporter("cameras")), 0.063) for folder in (capture.frames, tmp_path))
     assert still.still and still.error_px < 5
     assert not moved.still

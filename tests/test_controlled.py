@@ -11,10 +11,10 @@ pytest.importorskip("flip_evaluator")
 
 from benchmarks import controlled, flash_light  # noqa: E402
 from core.contract.capture import Capture  # noqa: E402
+from core.face.head import read_head  # noqa: E402
 from core.geometry import meshes, raster
 from core.geometry.views import read_views  # noqa: E402
 from core.imaging import images  # noqa: E402
-from core.texture.projection import Surface  # noqa: E402
 
 from . import painted_egg  # noqa: E402
 
@@ -81,12 +81,11 @@ def test_a_known_flash_leaves_the_albedo(dark_room, tmp_path, monkeypatch):
 
 def test_without_a_highlight_none_is_found(dark_room):
     capture, true = dark_room
-    caster = raster.RayCaster(meshes.read_obj(capture.head))
-    frames = []
+    head, frames = read_head(capture), []
     for view, (albedo, _) in zip(read_views(capture), true, strict=True):
-        frame = flash_light.lit(view, albedo, caster)
-        frames.append(flash_light.lit(view, albedo * frame.shading[..., None], caster))
-    found = flash_light.highlight(frames, Surface.of(caster.mesh, 64))
+        frame = flash_light.lit(view, albedo, head)
+        frames.append(flash_light.lit(view, albedo * frame.shading[..., None], head))
+    found = flash_light.highlight(frames, head.unfold(64))
     assert np.median(found.strength[24:40, 24:40]) < 0.1 * F0
 
 

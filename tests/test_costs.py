@@ -120,7 +120,7 @@ def test_video_is_played_to_and_fro_with_new_noise():
 
 def test_views_are_chosen_anew(tmp_path):
     capture = Capture(tmp_path)
-    frames = [{"sharpness": 0.5 + 0.01 * (i % 3), "yaw_deg": float(3 * i - 45), "selected": True} for i in range(30)]
+    frames = [{"name": f"{i:05d}.jpg", "sharpness": 0.5 + 0.01 * (i % 3), "yaw_deg": float(3 * i - 45), "selected": True} for i in range(30)]
     write_json(capture.frames_json, {"kind": "video", "frames": frames})
     costs.select(capture, 8)
     chosen = [i for i, frame in enumerate(json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]) if frame["selected"]]

@@ -19,8 +19,9 @@ from core.delight.network import WEIGHTS, crop, face_box, load
 from core.delight.second_opinion import FITTED, beyond, of_both
 from core.delight.unet import CHANNELS, DelightNet, network_input
 from core.face import template
+from core.face.head import Head
 from core.geometry.meshes import vertex_normals
-from core.geometry.raster import RayCaster, render_view
+from core.geometry.raster import render_view
 from core.imaging import images
 from core.synthetic.identities import reserved_seeds
 from core.synthetic.sight import random_camera
@@ -95,7 +96,7 @@ def test_an_untrained_network_says_nothing_and_sees_any_size():
 def test_views_are_brought_to_one_albedo():
     """Three looks at one head whose shadings are off by a constant and by a slope: afterwards what they leave as albedo agrees."""
     mesh = template.load()
-    head = LitHead(mesh, RayCaster(mesh), vertex_normals(mesh), np.zeros((len(mesh.vertices), 9)), np.ones(len(mesh.vertices)), None, np.ones(3))
+    head = LitHead(Head(mesh), vertex_normals(mesh), np.zeros((len(mesh.vertices), 9)), np.ones(len(mesh.vertices)), None, np.ones(3))
     face, bary = template.landmarks()
     landmarks = (mesh.vertices[mesh.faces[face]] * bary[..., None]).sum(1)
     views, looks = [], []

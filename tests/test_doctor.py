@@ -3,6 +3,7 @@
 """The video doctor: bad captures end in the right diagnosis, blurred frames and blinks are left out, good ones hear nothing of it."""
 
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -11,6 +12,7 @@ from skimage.data import astronaut
 
 from core import frames
 from core.contract.capture import Capture
+from core.contract.frame_records import FrameRecord
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import from_json
 from core.face import faces
@@ -100,13 +102,13 @@ def test_two_equal_faces_are_a_problem_and_a_smaller_one_is_passed_over(tmp_path
     assert "second face is in 4 of 4" in problems(report)
 
 
-def record(**other) -> dict:
+def record(**other) -> FrameRecord:
     """A frame with nothing wrong."""
-    return {"name": "00000.jpg", "time_s": 0.0, "size": [720, 960], "face_box": [200, 300, 520, 720], "yaw_deg": 0.0, "blur": 0.5, "brightness": 0.6,
-            "clipped": 0.0, "noise": 0.002, "other_face": 0.0, "gain": [1.0] * 3, **other}
+    return FrameRecord(**{"name": "00000.jpg", "time_s": 0.0, "size": (720, 960), "sharpness": 0.2, "selected": False, "face_box": (200, 300, 520, 720),
+                          "yaw_deg": 0.0, "blur": 0.5, "brightness": 0.6, "noise": 0.002, **other})
 
 
-def around(low=-60, high=60, step=3, **other) -> list[dict]:
+def around(low=-60, high=60, step=3, **other) -> list[FrameRecord]:
     return [record(name=f"{i:05d}.jpg", yaw_deg=float(yaw), **other) for i, yaw in enumerate(range(low, high + 1, step))]
 
 
@@ -115,12 +117,12 @@ def around(low=-60, high=60, step=3, **other) -> list[dict]:
     (around(low=0), "left side of the face is not seen at all"),
     (around(high=12), "right side of the face is hardly seen: the camera came only 12 degrees"),
     (around(low=-12, high=9, step=1), "from in front only: the camera came 12 degrees around to its left and 9 to its right"),
-    ([r for r in around() if not 0 < r["yaw_deg"] < 40], "Between 0 and 42 degrees"),
+    ([r for r in around() if not 0 < r.yaw_deg < 40], "Between 0 and 42 degrees"),
     (around(brightness=0.12), "too dark"),
     (around(clipped=0.2), "overexposed: 20% of it"),
     (around(noise=0.04), "noisy"),
-    ([{**r, "gain": [1 + 0.4 * i / 40] * 3} for i, r in enumerate(around())], "exposure changed by 40%"),
-    ([{**r, "gain": [1 + 0.1 * i / 20 - 0.1, 1.0, 1.1 - 0.1 * i / 20]} for i, r in enumerate(around())], "white balance changed"),
+    ([replace(r, gain=(1 + 0.4 * i / 40,) * 3) for i, r in enumerate(around())], "exposure changed by 40%"),
+    ([replace(r, gain=(1 + 0.1 * i / 20 - 0.1, 1.0, 1.1 - 0.1 * i / 20)) for i, r in enumerate(around())], "white balance changed"),
     (around(face_box=[300, 400, 400, 540]), "small in the picture: 14%"),
     (around(face_box=[60, 60, 160, 190], size=[240, 320]), "only 100 pixels wide"),
     (around(blur=0.75), "blurred in most"),

@@ -15,6 +15,7 @@ from skimage.data import astronaut
 
 from core import frames
 from core.contract.capture import Capture
+from core.contract.frame_records import FrameRecord
 from core.contract.messages import CancelledError, Problem, Reporter
 from core.contract.settings import from_json
 from core.frames.colour import HLG, to_srgb
@@ -205,7 +206,7 @@ def test_sharp_frames_spread_over_the_turn_are_chosen():
 
 def test_turn_is_carried_into_profile_but_not_far_from_a_face():
     yaws = [None] * 3 + list(range(-60, 60, 4)) + [None] * 20
-    turn = turns([{"yaw_deg": yaw} for yaw in yaws])
+    turn = turns([FrameRecord(name="", sharpness=1.0, selected=False, yaw_deg=yaw) for yaw in yaws])
     assert turn[0] < turn[1] < turn[2] < -60
     assert np.isnan(turn[-1]) and np.isfinite(turn[33])
 

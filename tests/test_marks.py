@@ -12,6 +12,7 @@ import torch
 
 from core.contract.capture import Capture
 from core.face import template
+from core.face.head import read_head
 from core.geometry import meshes, raster
 from core.geometry.views import View
 from core.imaging import images
@@ -96,9 +97,9 @@ def test_views_confirm_what_they_all_show(tmp_path, monkeypatch):
         images.write_srgb((capture.delit / view.name).with_suffix(".png"), picture)
         views.append(view)
     monkeypatch.setattr(witnesses, "read_views", lambda capture: views)
-    assert witnesses.confirmed(capture, marks, 256) == marks[:1]
+    assert witnesses.confirmed(capture, read_head(capture), marks, 256) == marks[:1]
     monkeypatch.setattr(witnesses, "read_views", lambda capture: views[:1])
-    assert witnesses.confirmed(capture, marks, 256) == marks  # one view is too few to deny what the texture shows
+    assert witnesses.confirmed(capture, read_head(capture), marks, 256) == marks  # one view is too few to deny what the texture shows
 
 
 def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
@@ -114,7 +115,7 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     images.write_data(capture.texture_confidence, np.ones((SIZE, SIZE), np.float32))
     images.write_data(capture.shadow_mask, (distance_to(row - 1.5, column + 1.5) < 98).astype(np.float32))
     meshes.write_obj(capture.head, template.load())
-    evidence, recipe = read_evidence(capture, SIZE), replace(OURS, guidance="proximal", steps=16)
+    evidence, recipe = read_evidence(capture, read_head(capture), SIZE), replace(OURS, guidance="proximal", steps=16)
     start = initial.start(prior, evidence, ",".join(f"{v:.5f}" for v in images.linear_to_srgb(TONE)), 8.0, recipe)
     assert [(round(m.row / 4), round(m.column / 4)) for m in start.marks] == [(round(row / 4), round(column / 4))]
     solved = maps.finished(sample(prior, start.observations, start.state, recipe, seeded(0)), evidence, start, recipe).diffuse

@@ -17,13 +17,14 @@ from core.contract.capture import Capture, write_json
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import from_json
 from core.face import template
+from core.face.head import Head, Unfolded
 from core.geometry import meshes, raster
 from core.geometry.views import View
 from core.imaging import images
 from core.light.skylight import ambient_occlusion, radiance_transfer, sh_basis
 from core.shadow_mask import run, sunless
 from core.shadow_mask.frames import filtered, softening
-from core.shadow_mask.lift import Unfolded, lift_shadows
+from core.shadow_mask.lift import lift_shadows
 from core.shadow_mask.occlusion import GENTLE, baked_occlusion
 from core.shadow_mask.tidy import over_brows
 from core.synthetic.painted_head import camera
@@ -38,7 +39,7 @@ SHADOWED = painted_blob(cheek(1), 0.11)  # [SIZE, SIZE], on the person's left ch
 
 @cache
 def head() -> Unfolded:
-    return Unfolded.of(template.load(), SIZE)
+    return Head(template.load()).unfold(SIZE)
 
 
 @cache
@@ -159,8 +160,8 @@ def test_softening_alone_is_shadow_not_gain_nor_noise():
 
 def test_the_sun_s_shadow_is_told_by_the_filmed_texture_alone(monkeypatch):
     monkeypatch.setattr(sunless, "FIT_TEXELS", 400)
-    small = Unfolded.of(template.load(), SMALL)
-    transfer = radiance_transfer(small.caster, small.mesh.vertices, meshes.vertex_normals(small.mesh), 48)
+    small = Head(template.load()).unfold(SMALL)
+    transfer = radiance_transfer(small.caster, small.mesh.vertices, small.head.normals, 48)
     at = raster.interpolate(transfer, small.mesh.faces, small.face, small.bary)
     sun = np.array([0.45, -0.70, 0.55]) / np.linalg.norm([0.45, -0.70, 0.55])
     normals = small.spread(small.normals)
@@ -175,8 +176,8 @@ def test_the_sun_s_shadow_is_told_by_the_filmed_texture_alone(monkeypatch):
 
 
 def test_occlusion_is_masked_gently_where_shape_and_texture_agree():
-    small = Unfolded.of(template.load(), SMALL)
-    transfer = radiance_transfer(small.caster, small.mesh.vertices, meshes.vertex_normals(small.mesh), 48)
+    small = Head(template.load()).unfold(SMALL)
+    transfer = radiance_transfer(small.caster, small.mesh.vertices, small.head.normals, 48)
     visible = raster.bleed(raster.interpolate(ambient_occlusion(transfer)[:, None], small.mesh.faces, small.face, small.bary)[..., 0], small.covered)
     skin = template.mask("skin", SMALL) * template.mask("face", SMALL) * (1 - template.mask("lips", SMALL)) * (1 - template.mask("eyes", SMALL))
     pores = np.random.default_rng(0).normal(0, 0.03, visible.shape)

@@ -8,6 +8,7 @@ import pytest
 pytest.importorskip("torch")
 from core.contract.messages import Reporter
 from core.contract.settings import from_json
+from core.face.head import read_head
 from core.solve import look, population, tone
 from core.training import tones
 
@@ -80,8 +81,9 @@ def test_the_artists_tone_wins_and_a_capture_without_cameras_asks_its_texture(tm
     from .painted_skin import make, settings
 
     capture, report = make(tmp_path / "a.wildcap"), Reporter("solve")
-    evidence = tone.read_evidence(capture, 64)
-    assert tone.asked(capture, settings(skin_tone="0.5,0.4,0.3"), evidence, report) == "0.5,0.4,0.3"
-    assert tone.asked(capture, settings(skin_tone="auto"), evidence, report) == "auto" and not report.figures
+    head = read_head(capture)
+    evidence = tone.read_evidence(capture, head, 64)
+    assert tone.asked(capture, head, settings(skin_tone="0.5,0.4,0.3"), evidence, report) == "0.5,0.4,0.3"
+    assert tone.asked(capture, head, settings(skin_tone="auto"), evidence, report) == "auto" and not report.figures
     tone.run(capture, from_json({}), report)
     assert report.figures["skin_tone_source"] == "texture"

@@ -13,6 +13,7 @@ from core import solve
 from core.contract.messages import CancelledError, Problem, Reporter
 from core.contract.stages import MAPS
 from core.face import template
+from core.face.head import read_head
 from core.imaging import images
 from core.solve import initial
 from core.solve.evidence import read_evidence, softened
@@ -159,7 +160,7 @@ def test_the_card_names_its_seeds_and_they_are_not_the_sample_subjects():
 def test_the_nearest_skin_is_the_one_that_was_filmed(capture):
     """Under another light, another tone and a shadow that M covers."""
     prior, tone = load(), torch.from_numpy(TONE)
-    evidence = read_evidence(capture, SIZE)
+    evidence = read_evidence(capture, read_head(capture), SIZE)
     light = images.read_linear(capture.texture) / np.maximum(filmed(prior.mean_face, evidence), 1e-3)
     for skin in prior.references[[3, 7]]:
         evidence = replace(evidence, texture=torch.from_numpy((filmed(skin, evidence) * light).transpose(2, 0, 1)))

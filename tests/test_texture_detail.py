@@ -15,7 +15,7 @@ from core import texture
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import from_json
 from core.face import template
-from core.geometry import meshes
+from core.face.head import Head, read_head
 from core.texture import features, foreign
 from core.texture.perceptual import refine
 
@@ -37,8 +37,8 @@ def fine(log):
 
 def test_the_step_brings_back_detail_that_a_mean_has_lost(tmp_path):
     paint = skin(SIZE)
-    observations, surface = texture.observe_all(capture_of(tmp_path / "egg", paint, (-40, 0, 40)), meshes.read_obj(tmp_path / "egg" / "head.obj"), SIZE,
-                                                Reporter("texture"))
+    capture = capture_of(tmp_path / "egg", paint, (-40, 0, 40))
+    observations, surface = texture.observe_all(capture, read_head(capture), SIZE, Reporter("texture"))
     built = texture.build(observations, surface, from_json({}), Reporter("texture"))
     dull = cv2.GaussianBlur(built.log_texture, (0, 0), 1.5)
     wanted = built.confidence > 0.6
@@ -83,7 +83,7 @@ def test_a_pickle_that_runs_code_is_not_run(tmp_path):
 
 @pytest.fixture(scope="module")
 def head():
-    return texture.Surface.of(template.load(), SIZE)
+    return Head(template.load()).unfold(SIZE)
 
 
 def test_a_cloth_at_the_neck_is_found_and_skin_is_not(head):

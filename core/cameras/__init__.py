@@ -6,13 +6,14 @@ origin midway between the eyes. Solved from what matches between the frames and 
 
 from __future__ import annotations
 
-import json
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..contract.capture import Capture, replacing_folder
+from ..contract.frame_records import FrameRecord, Frames, read_frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..imaging import images
@@ -37,7 +38,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """Writes capture.cameras. Raises Problem where too few frames fit together, the camera hardly moved, or the head moved on its own; or where
     imported cameras cannot be read or do not fit the frames."""
     started = time.monotonic()
-    frames = json.loads(capture.frames_json.read_text(encoding="utf-8"))
+    frames = read_frames(capture)
     chosen = settings.cameras.import_from.strip()
     solved = _imported(Path(chosen).expanduser(), frames, capture, settings, report) if chosen else solve(frames, capture, settings, report)
     model = solved.model
@@ -50,10 +51,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     with replacing_folder(capture.cameras) as folder:
         model.write_binary(str(folder))
         report.check()
-    images.write_srgb(capture.picture("cameras", "world"), draw_cameras(model, frames["frames"], capture.frames))
-    _findings(solved, frames["frames"], centres, report)
+    images.write_srgb(capture.picture("cameras", "world"), draw_cameras(model, frames.records, capture.frames))
+    _findings(solved, frames.records, centres, report)
     registered, azimuth = model.num_reg_images(), coverage.angles(centres)[0]
-    for name, value in (("frames_registered", registered), ("share_registered", round(registered / len(frames["frames"]), 3)),
+    for name, value in (("frames_registered", registered), ("share_registered", round(registered / len(frames.records), 3)),
                         ("reprojection_error_px", round(model.compute_mean_reprojection_error(), 3) if model.num_points3D() else None),
                         ("sparse_points", model.num_points3D()), ("angular_coverage_deg", round(widest, 1)),
                         ("from_person_right_deg", round(float(-azimuth.min()), 1)), ("to_person_left_deg", round(float(azimuth.max()), 1)),
@@ -68,11 +69,11 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         report.figure("tracks", solved.tracks)
 
 
-def _imported(path: Path, frames: dict, capture: Capture, settings: Settings, report: Reporter) -> Solved:
+def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
     """Another program's cameras, checked by the face's landmarks."""
     model = import_cameras(path, frames, capture.frames, report)
     names = {image.name for image in model.images.values()}
-    records = [record for record in frames["frames"] if record["name"] in names and record["yaw_deg"] is not None]
+    records = [record for record in frames.records if record.name in names and record.yaw_deg is not None]
     records = [records[i] for i in np.unique(np.linspace(0, len(records) - 1, min(MOST_FACES, len(records))).round().astype(int))] if records else []
     found = find_landmarks(records, capture.frames, report)
     head = find_head(model, found, settings.cameras.interpupillary_mm / 1000)
@@ -84,9 +85,9 @@ def _imported(path: Path, frames: dict, capture: Capture, settings: Settings, re
     return Solved(model, "imported", head, found)
 
 
-def _findings(solved: Solved, records: list[dict], centres: np.ndarray, report: Reporter) -> None:
+def _findings(solved: Solved, records: Sequence[FrameRecord], centres: np.ndarray, report: Reporter) -> None:
     """What is wrong with a capture that can be used, and how to shoot it again."""
-    shown = {record["name"]: record.get("source") or record["name"] for record in records}
+    shown = {record.name: record.shown for record in records}
     if solved.way == "face":
         rough = "refined by what little matches" if solved.refined else "to ten degrees or so"
         report.finding(f"The frames do not overlap enough to be matched: the cameras come from the face's landmarks, {rough}. Expect a rough head.",
@@ -109,13 +110,13 @@ def _findings(solved: Solved, records: list[dict], centres: np.ndarray, report: 
         report.finding(problem, remedy)
 
 
-def _left_out(solved: Solved, records: list[dict], shown: dict[str, str], report: Reporter) -> None:
+def _left_out(solved: Solved, records: Sequence[FrameRecord], shown: dict[str, str], report: Reporter) -> None:
     fits = {image.name for image in solved.model.images.values() if image.has_pose}
-    rest = [record for record in records if record["name"] not in fits and record["name"] not in solved.mirrored]
+    rest = [record for record in records if record.name not in fits and record.name not in solved.mirrored]
     if not rest:
         return
-    sharp = np.median([record["sharpness"] for record in records if record["name"] in fits])
-    blurred = sum(record["sharpness"] < BLURRED * sharp for record in rest)
+    sharp = np.median([record.sharpness for record in records if record.name in fits])
+    blurred = sum(record.sharpness < BLURRED * sharp for record in rest)
     why, remedy = ((f"; {blurred} of them are blurred", "Move the camera slower, or add light, so that each frame is sharp.") if blurred > len(rest) / 2
                    else ("", "Move the camera slower past the places where frames were lost, and keep the whole head in the picture."))
-    report.finding(f"{len(rest)} of {len(records)} frames did not fit the others and were left out{why}.", remedy, [shown[record["name"]] for record in rest])
+    report.finding(f"{len(rest)} of {len(records)} frames did not fit the others and were left out{why}.", remedy, [shown[record.name] for record in rest])

@@ -9,6 +9,7 @@ from pathlib import Path, PurePath
 import numpy as np
 import pycolmap
 
+from ..contract.frame_records import VIDEO, FrameRecord, Frames
 from ..contract.messages import Problem, Reporter
 from ..imaging import images
 from .calibrated import Calibrated
@@ -17,23 +18,23 @@ from .importers import blender_cameras, colmap_folder, metashape, realityscan
 FEWEST = 3
 
 
-def import_cameras(path: Path, frames: dict, folder: Path, report: Reporter) -> pycolmap.Reconstruction:
-    """A model, in the program's own world, of those of frames.json's `frames` that `path` (file or folder) has a camera for.
+def import_cameras(path: Path, frames: Frames, folder: Path, report: Reporter) -> pycolmap.Reconstruction:
+    """A model, in the program's own world, of those of the `frames` that `path` (file or folder) has a camera for.
     Raises Problem for what cannot be read, is no such file, or names fewer than three of the frames."""
     cameras = read_cameras(path)
     matched = _match(cameras, frames)
     if len(matched) < FEWEST:
-        here = ", ".join(_known_as(record)[0] for record in frames["frames"][:3])
-        raise Problem(f"{path.name} has cameras for {len(matched)} of the {len(frames['frames'])} frames; three are the least. "
+        here = ", ".join(_known_as(record)[0] for record in frames.records[:3])
+        raise Problem(f"{path.name} has cameras for {len(matched)} of the {len(frames.records)} frames; three are the least. "
                       f"It names {', '.join(camera.name for camera in cameras[:3])}; the frames are {here}.",
                       "Solve the cameras from these very pictures, under the same file names; for a video, name each camera by its frame's number.")
     model = pycolmap.Reconstruction()
     for number, (record, calibrated) in enumerate(matched, 1):
-        width, height = images.size(folder / record["name"])
+        width, height = images.size(folder / record.name)
         model.add_camera_with_trivial_rig(calibrated.camera(number, width, height))
         pose = pycolmap.Rigid3d(np.concatenate([calibrated.rotation, calibrated.translation[:, None]], 1))
-        model.add_image_with_trivial_frame(pycolmap.Image(name=record["name"], camera_id=number, image_id=number), pose)
-    left_out = len(frames["frames"]) - len(matched)
+        model.add_image_with_trivial_frame(pycolmap.Image(name=record.name, camera_id=number, image_id=number), pose)
+    left_out = len(frames.records) - len(matched)
     if left_out:
         report.log(f"{left_out} frames have no camera in {path.name} and are left out.")
     return model
@@ -63,21 +64,21 @@ def read_cameras(path: Path) -> list[Calibrated]:
     return cameras
 
 
-def _match(cameras: list[Calibrated], frames: dict) -> list[tuple[dict, Calibrated]]:
+def _match(cameras: list[Calibrated], frames: Frames) -> list[tuple[FrameRecord, Calibrated]]:
     """Frames with their cameras: by file name without its ending, or by the number of the video's frame."""
     by_name = {PurePath(camera.name.replace("\\", "/")).stem.lower(): camera for camera in cameras}
     by_name |= {camera.name.lower(): camera for camera in cameras}
     by_frame = {camera.frame: camera for camera in cameras if camera.frame is not None}
     found = []
-    for record in frames["frames"]:
+    for record in frames.records:
         camera = next((by_name[known] for known in _known_as(record) if known in by_name), None)
-        if camera is None and frames.get("kind") == "video":
-            camera = by_frame.get(record.get("video_frame"))
+        if camera is None and frames.kind == VIDEO:
+            camera = by_frame.get(record.video_frame)
         if camera is not None:
             found.append((record, camera))
     return found
 
 
-def _known_as(record: dict) -> list[str]:
+def _known_as(record: FrameRecord) -> list[str]:
     """The names a frame may go by, lower case, without ending: its photograph's, its own."""
-    return [PurePath(name).stem.lower() for name in (record.get("source"), record["name"]) if name]
+    return [PurePath(name).stem.lower() for name in (record.source, record.name) if name]

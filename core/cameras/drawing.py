@@ -4,20 +4,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pycolmap
 
+from ..contract.frame_records import FrameRecord
 from ..imaging import images
 
 AXES = (((1.0, 0.2, 0.2), (0.1, 0, 0)), ((0.2, 0.9, 0.2), (0, -0.1, 0)), ((0.3, 0.5, 1.0), (0, 0, 0.1)))  # colour, tip [m]: left, forward, up
 
 
-def draw_cameras(model: pycolmap.Reconstruction, records: list[dict], folder: Path, height: int = 480) -> np.ndarray:
+def draw_cameras(model: pycolmap.Reconstruction, records: Sequence[FrameRecord], folder: Path, height: int = 480) -> np.ndarray:
     """sRGB [height, W, 3] in [0, 1]."""
-    yaw = {record["name"]: abs(record["yaw_deg"]) if record["yaw_deg"] is not None else 999 for record in records}
+    yaw = {record.name: abs(record.yaw_deg) if record.yaw_deg is not None else 999 for record in records}
     image = min((image for image in model.images.values() if image.has_pose), key=lambda image: yaw.get(image.name, 999))
     return np.concatenate([_axes(model, image, folder, height), _plan(model, height)], 1)
 

@@ -8,6 +8,7 @@ when lids are closed. Umeyama, Least-squares Estimation of Transformation Parame
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -15,6 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from ..contract.frame_records import FrameRecord
 from ..contract.messages import Reporter
 from ..face import faces, template
 from ..geometry import meshes
@@ -57,20 +59,20 @@ def template_landmarks() -> Landmarks:
                      template.landmark_weights())
 
 
-def find_landmarks(records: list[dict], folder: Path, report: Reporter, text: str = "finding the face") -> dict[str, faces.Face]:
-    """Name -> face of each of frames.json's `records` where one is found; a turned head is followed from the frame after it, too."""
+def find_landmarks(records: Sequence[FrameRecord], folder: Path, report: Reporter, text: str = "finding the face") -> dict[str, faces.Face]:
+    """Name -> face of each of `records` where one is found; a turned head is followed from the frame after it, too."""
     found: dict[str, faces.Face] = {}
     last = None
     for done, record in enumerate(records):
         report.progress(done, len(records), text)
-        last = faces.detect(images.read_srgb(folder / record["name"]), last)
+        last = faces.detect(images.read_srgb(folder / record.name), last)
         if last is not None:
-            found[record["name"]] = last
+            found[record.name] = last
     for record, following in zip(records[-2::-1], records[:0:-1], strict=True):
-        if record["name"] not in found and following["name"] in found:
-            face = faces.detect(images.read_srgb(folder / record["name"]), found[following["name"]])
+        if record.name not in found and following.name in found:
+            face = faces.detect(images.read_srgb(folder / record.name), found[following.name])
             if face is not None:
-                found[record["name"]] = face
+                found[record.name] = face
         report.check()
     return found
 

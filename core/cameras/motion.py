@@ -7,11 +7,13 @@ Matches are COLMAP's before it chose one motion, so both motions are in them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
 
+from ..contract.frame_records import FrameRecord
 from ..contract.messages import Reporter
 from ..face import faces
 from ..imaging import images
@@ -48,21 +50,21 @@ def in_background(pixels: np.ndarray, face: faces.Face) -> np.ndarray:
     return (aside & (pixels[:, 1] < y1)) | (pixels[:, 1] < y0 - 0.7 * (y1 - y0))
 
 
-def head_masks(found: dict[str, faces.Face], records: list[dict], folder: Path, out: Path, report: Reporter) -> None:
+def head_masks(found: dict[str, faces.Face], records: Sequence[FrameRecord], folder: Path, out: Path, report: Reporter) -> None:
     """out/NAME.png: white on the head, black elsewhere (all black without a face). A turning head leaves its shoulders behind."""
     for done, record in enumerate(records):
         report.progress(done, len(records), "masking the head")
-        width, height = images.size(folder / record["name"])
+        width, height = images.size(folder / record.name)
         mask = np.zeros((height, width), np.float32)
-        if record["name"] in found:
-            x0, y0, x1, y1 = found[record["name"]].box
+        if record.name in found:
+            x0, y0, x1, y1 = found[record.name].box
             w, h = x1 - x0, y1 - y0
             cv2.ellipse(mask, (round((x0 + x1) / 2), round((y0 + y1) / 2 - 0.2 * h)), (round(0.85 * w), round(0.8 * h)), 0, 0, 360, 1.0, -1)
             mask[round(max(y1 + 0.05 * h, 0)):] = 0
-            person = faces.segment_person(images.read_srgb(folder / record["name"])) > 0.5
+            person = faces.segment_person(images.read_srgb(folder / record.name)) > 0.5
             if person[round(max(y0, 0)):round(y1), round(max(x0, 0)):round(x1)].mean() > 0.7:
                 mask *= person
-        images.write_data(out / f"{record['name']}.png", mask)
+        images.write_data(out / f"{record.name}.png", mask)
 
 
 def expression_changes(found: dict[str, faces.Face]) -> list[str]:

@@ -7,6 +7,7 @@ and on the head alone where it did not keep still. The first model that passes t
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import numpy as np
 import pycolmap
 
 from ..contract.capture import Capture
+from ..contract.frame_records import VIDEO, FrameRecord, Frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import faces
@@ -55,9 +57,9 @@ class Solved:
     refined: bool = True
 
 
-def solve(frames: dict, capture: Capture, settings: Settings, report: Reporter) -> Solved:
+def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
     """Raises Problem with what is wrong, as precisely as can be told."""
-    records = frames["frames"]
+    records = frames.records
     few = len(records) <= FEW
     ways = {"auto": ("plain", "face", "skin", "face") if few else ("plain", "skin", "face")}.get(settings.cameras.features, (settings.cameras.features,))
     found = find_landmarks(records if few else _spread(records), capture.frames, report)
@@ -79,7 +81,7 @@ def solve(frames: dict, capture: Capture, settings: Settings, report: Reporter) 
                 matches = head_matches
                 solved, fault = alone, alone_fault
         if solved and not fault:
-            rest = sorted({record["name"] for record in records} - {image.name for image in solved.model.images.values() if image.has_pose})
+            rest = sorted({record.name for record in records} - {image.name for image in solved.model.images.values() if image.has_pose})
             mirrored = _mirrored(frames, rest, solved.model, capture, report) if way != "face" else ()
             return replace(solved, head_moved=moved, stood_still=stood, mirrored=tuple(mirrored) or solved.mirrored)
         faults.append(fault)
@@ -87,15 +89,15 @@ def solve(frames: dict, capture: Capture, settings: Settings, report: Reporter) 
     raise _explained(frames, faults, moved, stood, capture, report)
 
 
-def _by_features(skin: bool, frames: dict, capture: Capture, found: dict, settings: Settings, report: Reporter,
+def _by_features(skin: bool, frames: Frames, capture: Capture, found: dict, settings: Settings, report: Reporter,
                  alone: bool = False) -> tuple[Solved | None, Matches, str | None]:
     """The model of one kind of features, the matches, and its shortcoming; `alone`: on the head only. A model whose head moved is given, with that fault."""
     with tempfile.TemporaryDirectory(prefix="wildcap_") as temporary:
         if alone:
-            found = found if len(found) > len(frames["frames"]) / 2 else find_landmarks(frames["frames"], capture.frames, report)
-            head_masks(found, frames["frames"], capture.frames, Path(temporary), report)
+            found = found if len(found) > len(frames.records) / 2 else find_landmarks(frames.records, capture.frames, report)
+            head_masks(found, frames.records, capture.frames, Path(temporary), report)
         model, matches = solve_structure(frames, capture.frames, skin, settings.cameras.matching, settings.seed, report, Path(temporary) if alone else None)
-    fault = shortcoming(model, len(frames["frames"]))
+    fault = shortcoming(model, len(frames.records))
     if fault:
         return None, matches, fault
     try:
@@ -119,7 +121,8 @@ def shortcoming(model: pycolmap.Reconstruction | None, frames: int) -> str | Non
     return None
 
 
-def _by_face(records: list[dict], capture: Capture, found: dict, matches: Matches, settings: Settings, report: Reporter) -> tuple[Solved | None, str | None]:
+def _by_face(records: Sequence[FrameRecord], capture: Capture, found: dict, matches: Matches, settings: Settings,
+             report: Reporter) -> tuple[Solved | None, str | None]:
     mirrored = find_mirrored(sorted(found), [], capture.frames, report) if len(records) <= FEW else []
     result = resect(camera_groups(records, capture.frames), {name: face for name, face in found.items() if name not in mirrored}, matches, report)
     registered = result.model.num_reg_images() if result else 0
@@ -133,28 +136,28 @@ def _by_face(records: list[dict], capture: Capture, found: dict, matches: Matche
                   refined=result.refined), None
 
 
-def _mirrored(frames: dict, rest: list[str], model: pycolmap.Reconstruction, capture: Capture, report: Reporter) -> list[str]:
+def _mirrored(frames: Frames, rest: list[str], model: pycolmap.Reconstruction, capture: Capture, report: Reporter) -> list[str]:
     """Among photographs that did not fit, those that are mirrored."""
-    if not rest or frames.get("kind") == "video" or len(rest) > 2 * FEW:
+    if not rest or frames.kind == VIDEO or len(rest) > 2 * FEW:
         return []
     trusted = sorted(image.name for image in model.images.values() if image.has_pose)
     some = [trusted[i] for i in np.unique(np.linspace(0, len(trusted) - 1, min(8, len(trusted))).round().astype(int))]
     return find_mirrored(rest, some, capture.frames, report)
 
 
-def _spread(records: list[dict]) -> list[dict]:
+def _spread(records: Sequence[FrameRecord]) -> list[FrameRecord]:
     """At most MOST_FACES frames with a face, those that face the camera first, spread over the sequence."""
-    seen = [record for record in records if record["yaw_deg"] is not None]
-    frontal = [record for record in seen if abs(record["yaw_deg"]) < 45]
+    seen = [record for record in records if record.yaw_deg is not None]
+    frontal = [record for record in seen if abs(record.yaw_deg) < 45]
     seen = frontal if len(frontal) >= 4 else seen
     return [seen[i] for i in np.unique(np.linspace(0, len(seen) - 1, min(MOST_FACES, len(seen))).round().astype(int))] if seen else []
 
 
-def _explained(frames: dict, faults: list[str], moved: bool, stood: bool, capture: Capture, report: Reporter) -> Problem:
+def _explained(frames: Frames, faults: list[str], moved: bool, stood: bool, capture: Capture, report: Reporter) -> Problem:
     """The Problem that fits best what was tried."""
-    records = frames["frames"]
-    names = {record["name"]: record.get("source") or record["name"] for record in records}
-    mirrored = find_mirrored(sorted(names), [], capture.frames, report) if frames.get("kind") != "video" and len(names) <= FEW else []
+    records = frames.records
+    names = {record.name: record.shown for record in records}
+    mirrored = find_mirrored(sorted(names), [], capture.frames, report) if frames.kind != VIDEO and len(names) <= FEW else []
     if mirrored:
         they = "is mirrored: it fits" if len(mirrored) == 1 else "are mirrored: they fit"
         return Problem(f"{', '.join(names[name] for name in mirrored)} {they} the other pictures only when flipped left to right.",

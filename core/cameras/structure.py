@@ -10,10 +10,12 @@ import subprocess
 import sys
 import tempfile
 import threading
+from collections.abc import Sequence
 from pathlib import Path
 
 import pycolmap
 
+from ..contract.frame_records import VIDEO, FrameRecord, Frames
 from ..contract.messages import Problem, Reporter
 from ..imaging import images
 from .matches import Matches, read_matches
@@ -24,12 +26,12 @@ STEPS = {"finding features": (0.0, 0.4), "matching features": (0.4, 0.6), "placi
 NO_MODEL = 3
 
 
-def solve_structure(frames: dict, folder: Path, skin: bool, matching: str, seed: int, report: Reporter,
+def solve_structure(frames: Frames, folder: Path, skin: bool, matching: str, seed: int, report: Reporter,
                     masks: Path | None = None) -> tuple[pycolmap.Reconstruction | None, Matches]:
-    """The largest model of frames.json's `frames`, whose pictures lie in `folder`, in COLMAP's own world (None where nothing fits together),
+    """The largest model of `frames`, whose pictures lie in `folder`, in COLMAP's own world (None where nothing fits together),
     and all matches. `masks`: folder with NAME.png, where black hides what moves otherwise."""
-    records = frames["frames"]
-    sequential = matching == "sequential" or (matching == "auto" and frames.get("kind") == "video" and len(records) > ALL_PAIRS)
+    records = frames.records
+    sequential = matching == "sequential" or (matching == "auto" and frames.kind == VIDEO and len(records) > ALL_PAIRS)
     with tempfile.TemporaryDirectory(prefix="wildcap_") as temporary:
         job = {"images": str(folder.resolve()), "groups": camera_groups(records, folder), "skin": skin, "sequential": sequential,
                "masks": str(masks) if masks else None, "seed": seed, "database": str(Path(temporary) / "database.db"), "output": str(Path(temporary) / "model")}
@@ -39,13 +41,13 @@ def solve_structure(frames: dict, folder: Path, skin: bool, matching: str, seed:
         return model, read_matches(Path(job["database"]))
 
 
-def camera_groups(records: list[dict], folder: Path) -> list[dict]:
+def camera_groups(records: Sequence[FrameRecord], folder: Path) -> list[dict]:
     """Frames that share a camera, those of one size and one focal length: [{names, width, height, focal_px or None}]."""
     groups = {}
     for record in records:
-        width, height = images.size(folder / record["name"])
-        key = width, height, record.get("focal_px")
-        groups.setdefault(key, []).append(record["name"])
+        width, height = images.size(folder / record.name)
+        key = width, height, record.focal_px
+        groups.setdefault(key, []).append(record.name)
     return [{"names": names, "width": w, "height": h, "focal_px": f} for (w, h, f), names in groups.items()]
 
 

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from . import switchlight_api as service
 from .capture import Capture, storage_problem, write_json
+from .frame_records import read_frames
 from .hashes import hash_file
 from .messages import Problem
 
@@ -58,8 +59,8 @@ def sending(capture: Capture, preview: bool, names: Collection[str] | None = Non
 def selected(capture: Capture) -> list[str]:
     """The frames that the texture is made from. Raises Problem where there are none yet."""
     try:
-        names = [frame["name"] for frame in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"] if frame["selected"]]
-    except (OSError, ValueError, KeyError, TypeError):
+        names = [frame.name for frame in read_frames(capture).records if frame.selected]
+    except Problem:
         names = []
     if not names:
         raise Problem("This capture has no frames yet that could be agreed to.", "Reconstruct first: it stops before anything is sent.")

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ..geometry.meshes import vertex_normals
-from ..geometry.raster import interpolate, rasterize_uv, sample, visible_from
+from ..face.head import Unfolded
+from ..geometry.raster import interpolate, sample, visible_from
 from ..geometry.views import View
 from .lit_head import LitHead
 
@@ -38,14 +38,11 @@ class Look:
 
 def even_out(head: LitHead, views: list[View], looks: list[Look]) -> list[Look]:
     """The looks of these views with shadings that agree about the head's albedo."""
-    mesh = head.mesh
-    if mesh.uvs is None or len(looks) < 2:
+    if head.mesh.uvs is None or len(looks) < 2:
         return looks
-    raster_face, raster_bary = rasterize_uv(mesh, UV_SIDE)
-    texel = np.flatnonzero(raster_face.ravel() >= 0)
-    points, normals = (interpolate(values, mesh.faces, raster_face, raster_bary).reshape(-1, 3)[texel] for values in (mesh.vertices, vertex_normals(mesh)))
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-    found = [_opinion(head, view, look, points, normals) for view, look in zip(views, looks, strict=True)]
+    surface = head.head.unfold(UV_SIDE)
+    texel = np.flatnonzero(surface.covered)
+    found = [_opinion(surface, view, look) for view, look in zip(views, looks, strict=True)]
     opinions, weights = (np.stack(part) for part in zip(*found, strict=True))
     level = _levels(opinions, weights)
     mean = _robust_mean(opinions - level[:, None], weights)
@@ -57,8 +54,9 @@ def even_out(head: LitHead, views: list[View], looks: list[Look]) -> list[Look]:
     return [_agreeing(head, replace(look, shading=look.shading + off), albedo, known) for look, off in zip(looks, level, strict=True)]
 
 
-def _opinion(head: LitHead, view: View, look: Look, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Log-albedo [N, 3] that a look gives points of the surface, and how far it counts [N]."""
+def _opinion(surface: Unfolded, view: View, look: Look) -> tuple[np.ndarray, np.ndarray]:
+    """Log-albedo [N, 3] that a look gives the surface's points, and how far it counts [N]."""
+    points, normals = surface.points, surface.normals
     towards = view.centre - points
     cosine = (towards * normals).sum(1) / np.linalg.norm(towards, axis=1)
     pixels, _ = view.project(points)
@@ -66,7 +64,7 @@ def _opinion(head: LitHead, view: View, look: Look, points: np.ndarray, normals:
     at = (pixels - look.box[:2]) * side / look.box[2]
     inside = ((at > 1) & (at < side - 1)).all(1) & ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)  # nan is not
     seen = np.flatnonzero((cosine > 0.2) & inside)
-    seen = seen[visible_from(head.caster, points[seen], normals[seen], view.centre)]
+    seen = seen[visible_from(surface.caster, points[seen], normals[seen], view.centre)]
     values, weight = np.zeros((len(points), 3), np.float32), np.zeros(len(points), np.float32)
     values[seen] = sample(look.log - look.shading, at[seen])
     weight[seen] = cosine[seen] ** 2

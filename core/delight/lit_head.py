@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..contract.capture import Capture
 from ..contract.messages import Reporter
-from ..geometry import meshes
+from ..face.head import Head
 from ..geometry.meshes import Mesh
 from ..geometry.raster import RayCaster, interpolate
 from ..geometry.views import View
@@ -24,16 +23,23 @@ FIT_POINTS = 6000
 
 @dataclass(frozen=True)
 class LitHead:
-    """mesh with its ray caster; smoothed unit normals [V, 3]; transfer [V, 9] of the sky; not_brows [V]: 0 where dark hair is; the light; and
+    """The head; its smoothed unit normals [V, 3]; transfer [V, 9] of the sky; not_brows [V]: 0 where dark hair is; the light; and
     best_lit [3]: the linear colour of the best lit skin, taken for the colour of the skin itself."""
 
-    mesh: Mesh
-    caster: RayCaster
+    head: Head
     normals: np.ndarray
     transfer: np.ndarray
     not_brows: np.ndarray
     light: Light
     best_lit: np.ndarray
+
+    @property
+    def mesh(self) -> Mesh:
+        return self.head.mesh
+
+    @property
+    def caster(self) -> RayCaster:
+        return self.head.caster
 
     def at(self, face: np.ndarray, bary: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Where a raster (face [h, w], bary [h, w, 3]) shows the head: the linear colour of its skin under the sky [h, w, 3], what an unblocked sun adds
@@ -49,26 +55,25 @@ class LitHead:
         return ambient, self.light.direct(normal), free, normal
 
 
-def lit_head(capture: Capture, views: list[View], report: Reporter) -> LitHead:
+def lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
     """Fits the light of these views to the head; half of the stage's progress. Raises Problem where the views hardly see it."""
-    mesh = meshes.read_obj(capture.head)
-    caster, normals = RayCaster(mesh), smooth_normals(mesh)
-    colours, count = vertex_colours(mesh, normals, caster, views, report)
-    transfer = radiance_transfer(caster, mesh.vertices, normals, step=lambda done, of: report.progress(of + done, 4 * of, "Casting rays at the sky"))
-    skin, not_brows = skin_weights(mesh)
-    light, reached = _fit(mesh, normals, transfer, caster, colours, skin * (count >= min(2, len(views))), report)
-    return LitHead(mesh, caster, normals, transfer, not_brows, light, _best_lit(light, normals, transfer, reached, count))
+    normals = smooth_normals(head)
+    colours, count = vertex_colours(head, normals, views, report)
+    transfer = radiance_transfer(head.caster, head.mesh.vertices, normals, step=lambda done, of: report.progress(of + done, 4 * of, "Casting rays at the sky"))
+    skin, not_brows = skin_weights(head.mesh)
+    light, reached = _fit(head, normals, transfer, colours, skin * (count >= min(2, len(views))), report)
+    return LitHead(head, normals, transfer, not_brows, light, _best_lit(light, normals, transfer, reached, count))
 
 
-def _fit(mesh, normals, transfer, caster, colours, weights, report) -> tuple[Light, np.ndarray]:
+def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.ndarray]:
     """The light from an even draw of skin vertices; the draw's posterior on all vertices [V] (0 where not drawn) and the figures."""
     skin = np.flatnonzero((weights > 0.3) & (colours.min(1) > 1e-3))
     drawn = skin[:: max(1, len(skin) // FIT_POINTS)]
-    origins = mesh.vertices[drawn] + 1e-3 * normals[drawn]
+    origins = head.mesh.vertices[drawn] + 1e-3 * normals[drawn]
 
     def reaches(direction: np.ndarray) -> np.ndarray:
         free = normals[drawn] @ direction > 0
-        free[free] = ~caster.blocked(origins[free], np.repeat(direction[None], free.sum(), 0))
+        free[free] = ~head.caster.blocked(origins[free], np.repeat(direction[None], free.sum(), 0))
         return free.astype(float)
 
     light, lit, inlier = fit_light(colours[drawn], normals[drawn], transfer[drawn], reaches, weights[drawn],

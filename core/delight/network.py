@@ -24,6 +24,7 @@ from ..contract.capture import Capture
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import DelightSettings, Settings
 from ..face import faces, template
+from ..face.head import read_head
 from ..geometry.raster import interpolate, sample
 from ..geometry.views import View, read_views
 from ..imaging import images
@@ -46,7 +47,7 @@ FADE = 0.06  # of the square's side: along its border it gives way to the fitted
 def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
     """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see the head."""
     net, views = load(settings.device), read_views(capture, selected_only=True)
-    head = lit_head(capture, views, report)
+    head = lit_head(read_head(capture), views, report)
     looks, fitted = [], []
     for i, view in enumerate(views):
         report.progress(4 * len(views) + 3 * i, 8 * len(views), f"Looking at frame {i + 1} of {len(views)}")

@@ -15,6 +15,7 @@ import numpy as np
 from ..contract.capture import Capture
 from ..contract.messages import Reporter
 from ..contract.settings import Settings
+from ..face.head import read_head
 from ..geometry.raster import bleed, interpolate, render_view
 from ..geometry.views import View, read_views
 from ..imaging import images
@@ -26,7 +27,7 @@ from .occlusion import seamless, sun_share
 def shading(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
     """The selected frames divided by their shading, which is 1 where the skin is best lit."""
     views = read_views(capture, selected_only=True)
-    head = lit_head(capture, views, report)
+    head = lit_head(read_head(capture), views, report)
     for i, view in enumerate(views):
         report.progress(2 * len(views) + 2 * i, 4 * len(views), f"Delighting frame {i + 1} of {len(views)}")
         yield _delight(view, head)

@@ -9,8 +9,9 @@ import scipy.sparse as sparse
 
 from ..contract.messages import Problem, Reporter
 from ..face import template
-from ..geometry.meshes import Mesh, vertex_normals
-from ..geometry.raster import RayCaster, sample, visible_from
+from ..face.head import Head
+from ..geometry.meshes import Mesh
+from ..geometry.raster import sample, visible_from
 from ..geometry.views import View
 from ..imaging import images
 
@@ -18,9 +19,9 @@ GRAZING = 0.35  # cosine of the view angle under which a vertex's colour is not 
 NOT_SKIN = ("lips", "brows", "eyes")
 
 
-def smooth_normals(mesh: Mesh, rounds: int = 2) -> np.ndarray:
+def smooth_normals(head: Head, rounds: int = 2) -> np.ndarray:
     """Unit vertex normals [V, 3], averaged with their neighbours: a scan's noise would show as light."""
-    normals = vertex_normals(mesh)
+    mesh, normals = head.mesh, head.normals
     edges = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
     count = len(mesh.vertices)
     graph = sparse.coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), (count, count)).tocsr()
@@ -31,11 +32,12 @@ def smooth_normals(mesh: Mesh, rounds: int = 2) -> np.ndarray:
     return normals
 
 
-def vertex_colours(mesh: Mesh, normals: np.ndarray, caster: RayCaster, views: list[View], report: Reporter) -> tuple[np.ndarray, np.ndarray]:
+def vertex_colours(head: Head, normals: np.ndarray, views: list[View], report: Reporter) -> tuple[np.ndarray, np.ndarray]:
     """Linear colour [V, 3], the median over the views that see a vertex well (so that highlights, which move, drop out), and their number [V].
 
     Raises Problem when hardly any vertex is seen.
     """
+    mesh = head.mesh
     seen_colours = np.full((len(views), len(mesh.vertices), 3), np.nan, np.float32)
     for i, view in enumerate(views):
         report.progress(i, 4 * len(views), "Reading the skin's colour")
@@ -44,7 +46,7 @@ def vertex_colours(mesh: Mesh, normals: np.ndarray, caster: RayCaster, views: li
         pixels, _ = view.project(mesh.vertices)
         inside = ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)
         candidates = np.flatnonzero(inside & (cosine > GRAZING))
-        candidates = candidates[visible_from(caster, mesh.vertices[candidates], normals[candidates], view.centre)]
+        candidates = candidates[visible_from(head.caster, mesh.vertices[candidates], normals[candidates], view.centre)]
         srgb = sample(images.read_srgb(view.path), pixels[candidates])
         candidates, srgb = candidates[srgb.max(1) < 0.99], srgb[srgb.max(1) < 0.99]  # what is burnt out has lost its colour
         seen_colours[i, candidates] = images.srgb_to_linear(srgb)

@@ -17,7 +17,7 @@ from ..contract.delivery_presets import HAIR, SCAN_MAPS, Picture
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import template
-from ..geometry import meshes
+from ..face.head import read_head
 from ..imaging import images
 from . import maps, wavefront
 
@@ -33,7 +33,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         raise Problem(f"{plan.format.title} is written by Blender.", "Choose OBJ here, or deliver from the add-on's panel.")
     tiles = _tiles(capture, plan, settings)
     several = len(tiles) > 1
-    built_in = template.is_built_in(meshes.read_obj(capture.head))
+    built_in = read_head(capture).built_in
     mean, regions = _mean_specular(capture, built_in), built_in and plan.what == "head"
     pictures = _pictures(plan, settings)
     delivery_plan.discard(plan)

@@ -2,10 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stage frames: a video or a folder of photographs becomes frames/: sharp ones, in one exposure, with the turn of the head in each.
 
-frames.json: {"kind": "video" or "photographs", "frames": [{name, video_frame, time_s, source, size [w, h], sharpness, selected,
-face_box (px) or null, face_score, yaw_deg or null, focal_px or null, blur, brightness, clipped, noise, eyes_open [right, left] or null,
-blink, other_face, gain [3]}]}. Pixels are those of the written frame, to which the gains have been applied already: every stage, and any tool
-that is given the folder, sees one exposure. The mask of the person is not stored: faces.segment_person gives it in the time a file is read in.
+frames.json (contract/frame_records.py) tells of the written frames, to which the gains have been applied already: every stage, and any tool that is given
+the folder, sees one exposure. The mask of the person is not stored: faces.segment_person gives it in the time a file is read in.
 """
 
 from __future__ import annotations
@@ -15,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..contract.capture import Capture, replacing_folder, write_json
+from ..contract.capture import Capture, replacing_folder
+from ..contract.frame_records import PHOTOGRAPHS, VIDEO, FrameRecord, Frames, write_frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import faces
@@ -52,17 +51,17 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         records, thumbnails, contents = _write_frames(pictures, folder, report)
         _check(records, thumbnails, photographs)
         records, contents, dropped = _drop_blurred(records, contents, folder)
-        _even_out(records, contents, folder, report)
-        for record, blink in zip(records, blinks([r["eyes_open"] for r in records], [r["time_s"] for r in records]), strict=True):
-            record["blink"] = bool(blink)
+        records = _even_out(records, contents, folder, report)
+        shut = blinks([r.eyes_open for r in records], [r.time_s for r in records])
+        records = [replace(r, blink=bool(blink)) for r, blink in zip(records, shut, strict=True)]
         diagnose(records, dropped, photographs, report)
-        _select(records, settings.frames.views)
-        write_json(folder / "frames.json", {"kind": "photographs" if photographs else "video", "frames": records})
+        records = _select(records, settings.frames.views)
+        write_frames(folder, Frames(tuple(records), PHOTOGRAPHS if photographs else VIDEO))
         report.check()
     _report(capture, records, dropped, report)
 
 
-def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[dict], np.ndarray, list]:
+def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[FrameRecord], np.ndarray, list]:
     """Consumes the pictures; their records, thumbnails [N, 32, 32] and what the exposure is compared by."""
     records, thumbnails, contents, last = [], [], [], None
     for picture in pictures:
@@ -89,57 +88,55 @@ def _subject(srgb: np.ndarray, last: faces.Face | None) -> tuple[faces.Face | No
     return (rival, weight / second) if second > RIVAL * weight else (face, second / weight)
 
 
-def _record(picture: Picture, name: str, face: faces.Face | None, last: faces.Face | None, rival: float) -> dict:
+def _record(picture: Picture, name: str, face: faces.Face | None, last: faces.Face | None, rival: float) -> FrameRecord:
     """`last` tells where the head is, more or less, where no face is found."""
-    return {
-        "name": name, "video_frame": picture.index, "time_s": None if picture.time_s is None else round(picture.time_s, 4), "source": picture.source,
-        "size": [picture.srgb.shape[1], picture.srgb.shape[0]],
-        "sharpness": round(sharpness(picture.srgb, face.box if face else None), 5), "selected": False,
-        "face_box": [round(x, 1) for x in face.box] if face else None, "face_score": round(face.score, 4) if face else 0.0,
-        "yaw_deg": round(face.yaw_deg, 1) if face else None, "focal_px": picture.focal_px,
-        **examine(picture.srgb, last.box if last else None),
-        "eyes_open": [round(x, 3) for x in faces.eye_openness(picture.srgb, face)] if face else None, "blink": False,
-        "other_face": round(rival, 3), "gain": [1.0, 1.0, 1.0],
-    }
+    return FrameRecord(
+        name=name, video_frame=picture.index, time_s=None if picture.time_s is None else round(picture.time_s, 4), source=picture.source,
+        size=(picture.srgb.shape[1], picture.srgb.shape[0]), sharpness=round(sharpness(picture.srgb, face.box if face else None), 5), selected=False,
+        face_box=tuple(round(x, 1) for x in face.box) if face else None, face_score=round(face.score, 4) if face else 0.0,
+        yaw_deg=round(face.yaw_deg, 1) if face else None, focal_px=picture.focal_px, **examine(picture.srgb, last.box if last else None),
+        eyes_open=tuple(round(x, 3) for x in faces.eye_openness(picture.srgb, face)) if face else None, other_face=round(rival, 3))
 
 
-def _drop_blurred(records: list[dict], contents: list, folder: Path) -> tuple[list[dict], list, list[str]]:
+def _drop_blurred(records: list[FrameRecord], contents: list, folder: Path) -> tuple[list[FrameRecord], list, list[str]]:
     """Without the frames that are blurred by comparison, whose files go too; and their names."""
     bad = blurred(records)
-    dropped = [r["name"] for r, out in zip(records, bad, strict=True) if out]
+    dropped = [r.name for r, out in zip(records, bad, strict=True) if out]
     for name in dropped:
         (folder / name).unlink()
     return [r for r, out in zip(records, bad, strict=True) if not out], [c for c, out in zip(contents, bad, strict=True) if not out], dropped
 
 
-def _even_out(records: list[dict], contents: list, folder: Path, report: Reporter) -> None:
-    """Brings all frames to the exposure and white balance of the median frame; those that have it stay byte for byte."""
-    gains = gains_of(contents, report.check)
+def _even_out(records: list[FrameRecord], contents: list, folder: Path, report: Reporter) -> list[FrameRecord]:
+    """Brings all frames to the exposure and white balance of the median frame; those that have it stay byte for byte. The records with their gains."""
+    gains, evened = gains_of(contents, report.check), []
     for done, (record, gain) in enumerate(zip(records, gains, strict=True)):
         if np.abs(np.log(gain)).max() < 0.005:
+            evened.append(record)
             continue
         report.progress(READING * len(records) + (1 - READING) * done, len(records), "evening out the exposure")
-        record["gain"] = [round(float(g), 4) for g in gain]
-        path = folder / record["name"]
+        path = folder / record.name
         images.write_srgb(path, images.linear_to_srgb(images.read_linear(path) * gain.astype(np.float32)), quality=95)
+        evened.append(replace(record, gain=tuple(round(float(g), 4) for g in gain)))
+    return evened
 
 
-def _select(records: list[dict], count: int) -> None:
-    """Marks the V views. A blink is none of them as long as there are other frames to choose from."""
+def _select(records: list[FrameRecord], count: int) -> list[FrameRecord]:
+    """The same records with the V views marked. A blink is none of them as long as there are other frames to choose from."""
     turn = turns(records)
-    open_ = np.array([not r["blink"] for r in records])
+    open_ = np.array([not r.blink for r in records])
     if (np.isfinite(turn) & open_).sum() >= min(count, FEWEST):
         turn = np.where(open_, turn, np.nan)
-    for index in select_views(np.array([r["sharpness"] for r in records]), turn, count):
-        records[index]["selected"] = True
+    chosen = set(select_views(np.array([r.sharpness for r in records]), turn, count))
+    return [replace(r, selected=i in chosen) for i, r in enumerate(records)]
 
 
-def _check(records: list[dict], thumbnails: np.ndarray, photographs: bool) -> None:
+def _check(records: list[FrameRecord], thumbnails: np.ndarray, photographs: bool) -> None:
     if len(records) < FEWEST:
         what, remedy = ("photographs", "Take 30 or more photographs around the face.") if photographs else (
             "frames", "Film the face for 5 to 30 seconds while you walk half around it; a damaged file may be whole once copied again.")
         raise Problem(f"Only {len(records)} {what} could be read; three are the least a head can be built from.", remedy)
-    if not any(r["face_box"] for r in records):
+    if not any(r.face_box for r in records):
         raise Problem("No face was found in any frame.",
                       "Film one face, upright, filling a third of the picture or more, and lit well enough to see the eyes.")
     if np.abs(thumbnails - thumbnails[0]).mean((1, 2)).max() < STILL:
@@ -147,24 +144,24 @@ def _check(records: list[dict], thumbnails: np.ndarray, photographs: bool) -> No
                       "Let the person sit still and move the camera from one ear around the face to the other.")
 
 
-def _report(capture: Capture, records: list[dict], dropped: list[str], report: Reporter) -> None:
-    found = [r for r in records if r["face_box"]]
-    yaws = [r["yaw_deg"] for r in found]
-    gains = np.array([r["gain"] for r in records])
+def _report(capture: Capture, records: list[FrameRecord], dropped: list[str], report: Reporter) -> None:
+    found = [r for r in records if r.face_box]
+    yaws = [r.yaw_deg for r in found]
+    gains = np.array([r.gain for r in records])
     report.figure("frames", len(records))
     report.figure("frames_dropped_as_blurred", len(dropped))
-    report.figure("frames_with_a_blink", sum(r["blink"] for r in records))
-    report.figure("views_selected", sum(r["selected"] for r in records))
+    report.figure("frames_with_a_blink", sum(r.blink for r in records))
+    report.figure("views_selected", sum(r.selected for r in records))
     report.figure("share_with_face", round(len(found) / len(records), 3))
-    report.figure("median_sharpness", round(float(np.median([r["sharpness"] for r in found])), 4))
-    report.figure("median_blur", round(float(np.median([r["blur"] for r in found])), 3))
-    report.figure("face_width_px", round(float(np.median([r["face_box"][2] - r["face_box"][0] for r in found]))))
+    report.figure("median_sharpness", round(float(np.median([r.sharpness for r in found])), 4))
+    report.figure("median_blur", round(float(np.median([r.blur for r in found])), 3))
+    report.figure("face_width_px", round(float(np.median([r.face_box[2] - r.face_box[0] for r in found]))))
     report.figure("exposure_drift_percent", round(100 * float((gains.max(0) / gains.min(0)).max() - 1), 1))
     report.figure("yaw_from_deg", min(yaws))
     report.figure("yaw_to_deg", max(yaws))
     if len(records) < FEW:
         report.figure("expected_quality", "rough: few frames")
-    chosen = [images.read_srgb(capture.frames / r["name"]) for r in records if r["selected"]]
+    chosen = [images.read_srgb(capture.frames / r.name) for r in records if r.selected]
     images.write_srgb(capture.picture("frames", "selected"), _contact_sheet(chosen))
 
 

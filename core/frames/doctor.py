@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from skimage.measure import blur_effect
 
+from ..contract.frame_records import FrameRecord
 from ..contract.messages import Problem, Reporter
 from .select import turns
 
@@ -44,9 +45,9 @@ def examine(srgb: np.ndarray, box: tuple | None) -> dict:
             "clipped": round(float((inside[rows, columns].max(-1) > 0.99).mean()), 4), "noise": round(_noise(luma), 5)}
 
 
-def blurred(records: list[dict], around: int = 10) -> np.ndarray:
+def blurred(records: list[FrameRecord], around: int = 10) -> np.ndarray:
     """Which frames [N] are much more blurred than those around them; at most a third, and never so many that few are left."""
-    blur = np.array([r["blur"] for r in records])
+    blur = np.array([r.blur for r in records])
     usual = np.array([np.median(blur[max(0, i - around):i + around + 1]) for i in range(len(blur))])
     worse = np.where(blur > 0.55, blur - usual - 0.08, 0)
     most = max(0, min(len(blur) // 3, len(blur) - FEW))
@@ -55,16 +56,16 @@ def blurred(records: list[dict], around: int = 10) -> np.ndarray:
     return found & (worse > 0)
 
 
-def diagnose(records: list[dict], dropped: list[str], photographs: bool, report: Reporter) -> None:
+def diagnose(records: list[FrameRecord], dropped: list[str], photographs: bool, report: Reporter) -> None:
     """Reports a finding for each shortcoming of the kept frames; `dropped` names those left out as blurred. Raises Problem where it is
     not clear whose face is meant."""
-    found = [r for r in records if r["face_box"]]
+    found = [r for r in records if r.face_box]
     count, shots = len(records), "photographs" if photographs else "frames"
     _other_faces(found, report)
     if count < FEW:
         report.finding(f"There are only {count} {shots}: expect a rough head with holes at the sides and a texture from few directions.",
                        "Take 60 or more around the face for a full one.")
-    lost = [r["name"] for r in records if not r["face_box"]]
+    lost = [r.name for r in records if not r.face_box]
     if len(lost) > 0.4 * count:
         report.finding(f"No face was found in {len(lost)} of {count} {shots}.", "Keep the whole face in the picture all the time, upright and well lit.", lost)
     _angles(records, photographs, report)
@@ -73,9 +74,9 @@ def diagnose(records: list[dict], dropped: list[str], photographs: bool, report:
     _sharpness(found, dropped, count, shots, report)
 
 
-def _other_faces(found: list[dict], report: Reporter) -> None:
-    second = [r for r in found if r["other_face"] > 0]
-    if sum(r["other_face"] > EQUAL for r in found) > OFTEN * len(found):
+def _other_faces(found: list[FrameRecord], report: Reporter) -> None:
+    second = [r for r in found if r.other_face > 0]
+    if sum(r.other_face > EQUAL for r in found) > OFTEN * len(found):
         raise Problem("There are two faces in the picture, and it is not clear which one is meant.",
                       "Film one person alone, or crop the video so that one face fills the middle of the picture.")
     if len(second) > max(1, 0.05 * len(found)):
@@ -83,7 +84,7 @@ def _other_faces(found: list[dict], report: Reporter) -> None:
                        "Film one person alone, and away from pictures of faces.", _names(second))
 
 
-def _angles(records: list[dict], photographs: bool, report: Reporter) -> None:
+def _angles(records: list[FrameRecord], photographs: bool, report: Reporter) -> None:
     turn = turns(records)
     turn = np.sort(turn[np.isfinite(turn)])
     again = "Start at one ear and walk around the face to the other, at arm's length, while the person sits still."
@@ -102,48 +103,48 @@ def _angles(records: list[dict], photographs: bool, report: Reporter) -> None:
                        "Take photographs every 10 degrees or so." if photographs else "Walk slowly and evenly, and keep the face in the picture.")
 
 
-def _size(found: list[dict], report: Reporter) -> None:
-    width = np.array([r["face_box"][2] - r["face_box"][0] for r in found])
-    share = float(np.median(width / [min(r["size"]) for r in found]))
+def _size(found: list[FrameRecord], report: Reporter) -> None:
+    width = np.array([r.face_box[2] - r.face_box[0] for r in found])
+    share = float(np.median(width / [min(r.size) for r in found]))
     if share < FAR:
         report.finding(f"The face is small in the picture: {share:.0%} of its width.", "Go closer, or zoom in, until the head fills half of the picture.",
-                       _names([r for r, w in zip(found, width, strict=True) if w < FAR * min(r["size"])]))
+                       _names([r for r, w in zip(found, width, strict=True) if w < FAR * min(r.size)]))
     elif np.median(width) < SMALL_PX:
         report.finding(f"The face is only {np.median(width):.0f} pixels wide, too few for pores.",
                        "Go closer, shoot in the highest resolution, or raise the setting Long Side of the frames where the pictures are larger.")
 
 
-def _light(found: list[dict], report: Reporter) -> None:
-    bright, clipped, noise = (np.array([r[name] for r in found]) for name in ("brightness", "clipped", "noise"))
+def _light(found: list[FrameRecord], report: Reporter) -> None:
+    bright, clipped, noise = np.array([(r.brightness, r.clipped, r.noise) for r in found]).T
     if np.median(bright) < DARK:
         report.finding("The face is too dark: shadows hide its colour.", "Film in daylight or near a window, and tap on the face to set the exposure.",
-                       _names([r for r in found if r["brightness"] < DARK]))
+                       _names([r for r in found if r.brightness < DARK]))
     if np.median(clipped) > CLIPPED:
         report.finding(f"The face is overexposed: {np.median(clipped):.0%} of it has no colour left.",
-                       "Tap on the brightest part of the face and draw the exposure down before filming.", _names([r for r in found if r["clipped"] > CLIPPED]))
+                       "Tap on the brightest part of the face and draw the exposure down before filming.", _names([r for r in found if r.clipped > CLIPPED]))
     if np.median(noise) > NOISY:
         report.finding("The picture is noisy, which the maps would take for pores.", "Film in more light, and without digital zoom.")
-    gain = np.array([r["gain"] for r in found])
+    gain = np.array([r.gain for r in found])
     tone = gain / gain.mean(1, keepdims=True)
     ratio, tint = float(np.median(gain, 1).max() / np.median(gain, 1).min()), float((tone.max(0) / tone.min(0)).max())
     if ratio > DRIFT or tint > DRIFT:
         what = f"The exposure changed by {ratio - 1:.0%}" if ratio > DRIFT else "The white balance changed"
         report.finding(f"{what} while filming; it was evened out as far as possible.",
                        "Lock exposure and white balance: hold a finger on the face in the camera app until it says locked.",
-                       _names([r for r in found if abs(np.log(r["gain"])).max() > np.log(DRIFT) / 2]))
+                       _names([r for r in found if abs(np.log(r.gain)).max() > np.log(DRIFT) / 2]))
 
 
-def _sharpness(found: list[dict], dropped: list[str], count: int, shots: str, report: Reporter) -> None:
-    if np.median([r["blur"] for r in found]) > BLURRED:
+def _sharpness(found: list[FrameRecord], dropped: list[str], count: int, shots: str, report: Reporter) -> None:
+    if np.median([r.blur for r in found]) > BLURRED:
         report.finding("The face is blurred in most of the capture, by motion or out of focus: no pores and a rough shape.",
                        "Move slowly, film in more light so that each frame is short, wipe the lens, and hold a finger on the face to lock the focus.",
-                       _names([r for r in found if r["blur"] > BLURRED]))
+                       _names([r for r in found if r.blur > BLURRED]))
     elif len(dropped) > 0.1 * (count + len(dropped)):
         report.finding(f"{len(dropped)} of {count + len(dropped)} {shots} are blurred and were left out.", "Move more slowly, and film in more light.", dropped)
 
 
-def _names(records: list[dict]) -> list[str]:
-    return [r["name"] for r in records]
+def _names(records: list[FrameRecord]) -> list[str]:
+    return [r.name for r in records]
 
 
 def _noise(luma: np.ndarray) -> float:

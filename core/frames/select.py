@@ -7,6 +7,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from ..contract.frame_records import FrameRecord
+
 REACH = 0.1
 """A frame without a face may be chosen if one with a face is nearer than this share of the sequence: a profile, where detectors fail."""
 
@@ -26,11 +28,11 @@ def sharpness(srgb: np.ndarray, box: tuple | None) -> float:
     return float(np.sqrt(gradient.mean()) / max(luma.mean(), 0.02))
 
 
-def turns(records: list[dict]) -> np.ndarray:
+def turns(records: list[FrameRecord]) -> np.ndarray:
     """From where each frame sees the head [N]: its yaw in degrees, carried on along the sequence where no face is found; nan too far from any face."""
     order = np.arange(len(records))
-    known = np.array([r["yaw_deg"] is not None for r in records])
-    yaw = np.array([r["yaw_deg"] or 0.0 for r in records])
+    known = np.array([r.yaw_deg is not None for r in records])
+    yaw = np.array([r.yaw_deg or 0.0 for r in records])
     if not known.any():
         return order.astype(float)
     turn = np.interp(order, order[known], yaw[known])

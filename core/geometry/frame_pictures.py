@@ -8,12 +8,12 @@ with any number of leading zeros. Pictures of registered frames are all used, se
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 
 from ..contract.capture import Capture
+from ..contract.frame_records import read_frames
 from ..contract.messages import Problem
 from ..imaging import images
 from .views import View, read_views
@@ -26,7 +26,7 @@ def pictures_of(capture: Capture, folder: str, what: str) -> list[tuple[View, Pa
 
     Raises Problem where none belongs to a registered frame.
     """
-    return match(read_views(capture), _video_frames(capture), Path(folder), what, bool(folder))
+    return match(read_views(capture), {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()}, Path(folder), what, bool(folder))
 
 
 def read_picture(path: Path, view: View, what: str) -> np.ndarray:
@@ -54,8 +54,3 @@ def match(views: list[View], video_frames: dict[str, int], path: Path, what: str
         raise Problem(f"None of the {len(pictures)} pictures in {path} belongs to a registered frame.",
                       f"Name them like the frames (for example {Path(views[0].name).stem}.png)." if views else "Run the stage cameras again.")
     return pairs
-
-
-def _video_frames(capture: Capture) -> dict[str, int]:
-    frames = json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]
-    return {frame["name"]: frame["video_frame"] for frame in frames}

@@ -14,6 +14,7 @@ import numpy as np
 import pycolmap
 
 from ..contract.capture import Capture
+from ..contract.frame_records import read_frames
 from ..contract.messages import Problem
 
 
@@ -64,20 +65,18 @@ class View:
 
 
 def read_views(capture: Capture, selected_only: bool = False) -> list[View]:
-    """The registered frames in frame order. Raises Problem where the cameras are missing or damaged."""
-    import json
-
+    """The registered frames in frame order. Raises Problem where the frames or the cameras are missing or damaged."""
+    frames = read_frames(capture).by_name
     try:
-        frames = {f["name"]: f for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
         model = pycolmap.Reconstruction(str(capture.cameras))
     except (OSError, ValueError, KeyError, RuntimeError) as error:
         raise Problem(f"The cameras of this capture cannot be read ({error}).", "Run the stages frames and cameras again.") from error
     views = []
     for image in sorted(model.images.values(), key=lambda image: image.name):
         frame = frames.get(image.name)
-        if frame is None or (selected_only and not frame["selected"]):
+        if frame is None or (selected_only and not frame.selected):
             continue
         pose = image.cam_from_world() if callable(image.cam_from_world) else image.cam_from_world
         views.append(View(image.name, capture.frames / image.name, model.cameras[image.camera_id],
-                          pose.rotation.matrix(), np.array(pose.translation), frame["selected"]))
+                          pose.rotation.matrix(), np.array(pose.translation), frame.selected))
     return views

@@ -8,12 +8,12 @@ where there is an NVIDIA GPU and gsplat, Gaussian surfels trained on the frames 
 
 from __future__ import annotations
 
-import json
 import time
 
 import numpy as np
 
 from ..contract.capture import Capture
+from ..contract.frame_records import read_frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..geometry import meshes, raster
@@ -31,7 +31,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """Writes capture.scan. Raises Problem where no pair of frames gives a surface."""
     started = time.monotonic()
     views = read_views(capture)
-    sharpness = _sharpness(capture, views)
+    frames = read_frames(capture).by_name
+    sharpness = np.array([frames[view.name].sharpness for view in views])
     by_splats = splats.wanted(settings.scan.method, settings.device)
     fused, maps = rounds.measure(views, sharpness, settings.scan.pairs, settings.scan.voxel_mm / 1000, HEAD_BOX, report)
     if fused is not None and by_splats:
@@ -54,11 +55,6 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         report.finding(f"The frames disagree about {100 * fused.disagreeing:.0f} % of the surface; it was left out of the scan.",
                        "Film again with the head kept still, the hair tied back and nothing shiny on the skin.")
     images.write_srgb(capture.picture("scan", "surface"), _draw(mesh, views))
-
-
-def _sharpness(capture: Capture, views: list[View]) -> np.ndarray:
-    by_name = {f["name"]: f["sharpness"] for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
-    return np.array([by_name[view.name] for view in views])
 
 
 def _draw(mesh: meshes.Mesh, views: list[View], height: int = 480) -> np.ndarray:

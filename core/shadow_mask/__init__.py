@@ -15,12 +15,12 @@ from ..contract.capture import Capture
 from ..contract.messages import Reporter
 from ..contract.settings import Settings
 from ..face import template
-from ..geometry import meshes
+from ..face.head import Unfolded, read_head
 from ..geometry.raster import bleed, interpolate
 from ..imaging import images
 from ..light.skylight import ambient_occlusion, radiance_transfer
 from .frames import shadow_frames, source_of
-from .lift import Unfolded, lift_shadows
+from .lift import lift_shadows
 from .occlusion import baked_occlusion
 from .residual import find_shadow
 from .snap import snapped
@@ -51,10 +51,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """texture.exr, texture_confidence.exr, head.obj, and where they are there texture_filmed.png and the frames' shadows -> shadow_mask_auto.png at the
     texture's size. Raises Problem where the folder of softened pictures holds none of a registered frame."""
     report.progress(0, 8, "Unfolding the head")
-    mesh = meshes.read_obj(capture.head)
+    whole = read_head(capture)
     width = images.size(capture.texture)[0]
-    head = Unfolded.of(mesh, min(WORKING_SIZE, width))
-    transfer = radiance_transfer(head.caster, mesh.vertices, meshes.vertex_normals(mesh), SKY_RAYS,
+    head = whole.unfold(min(WORKING_SIZE, width))
+    transfer = radiance_transfer(whole.caster, whole.mesh.vertices, whole.normals, SKY_RAYS,
                                  lambda done, of: report.progress(done, 4 * of, "Casting rays at the sky"))
     evidence = _evidence(capture, head, ambient_occlusion(transfer))
     source = source_of(capture, settings)

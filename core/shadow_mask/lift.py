@@ -5,48 +5,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from ..contract.messages import Reporter
-from ..geometry.meshes import Mesh, vertex_normals
-from ..geometry.raster import RayCaster, interpolate, rasterize_uv, render_view, sample, visible_from
+from ..face.head import Unfolded
+from ..geometry.raster import RayCaster, render_view, sample, visible_from
 from ..geometry.views import View
 
 GRAZING = 0.2  # cosine of the steepest angle under which a texel is judged
 EDGE_PX = 0.012  # of the frame's longer side: so near a silhouette a small error of the head shows what lies behind
-
-
-@dataclass(frozen=True)
-class Unfolded:
-    """A mesh in its UVs: face int [S, S] (-1: none) and bary [S, S, 3] of the raster; points and unit normals [N, 3] of its N covered texels."""
-
-    mesh: Mesh
-    caster: RayCaster
-    face: np.ndarray
-    bary: np.ndarray
-    points: np.ndarray
-    normals: np.ndarray
-
-    @classmethod
-    def of(cls, mesh: Mesh, size: int) -> Unfolded:
-        face, bary = rasterize_uv(mesh, size)
-        inside = face >= 0
-        points, normals = (interpolate(values, mesh.faces, face[inside], bary[inside]) for values in (mesh.vertices, vertex_normals(mesh)))
-        return cls(mesh, RayCaster(mesh), face, bary, points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9))
-
-    @property
-    def covered(self) -> np.ndarray:
-        """bool [S, S]"""
-        return self.face >= 0
-
-    def spread(self, values: np.ndarray) -> np.ndarray:
-        """Per covered texel [N(, C)] -> float32 [S, S(, C)], 0 elsewhere."""
-        out = np.zeros((*self.face.shape, *values.shape[1:]), np.float32)
-        out[self.covered] = values
-        return out
 
 
 def lift_shadows(head: Unfolded, count: int, masks: Iterable[tuple[View, np.ndarray]], report: Reporter) -> np.ndarray:

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..contract.messages import Reporter
+from ..face.head import Unfolded
 from ..geometry.raster import interpolate
 from ..light.sunlight import fit_light, log_likelihood
-from .lift import Unfolded
 from .tidy import cohere
 
 FIT_TEXELS = 1200

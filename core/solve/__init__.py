@@ -20,6 +20,7 @@ from ..contract.capture import Capture
 from ..contract.hashes import hash_tree
 from ..contract.messages import Reporter
 from ..contract.settings import Settings, result_settings
+from ..face.head import read_head
 from ..imaging import images
 from . import checkpoint, comparison, drawing, initial, layout, maps, tone
 from .checkpoint import Solution
@@ -57,19 +58,20 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     recipe = recipe_of(settings, prior)
     report.progress(0, recipe.steps, "reading the texture, the head and the masks")
     size = layout.whole_size(options.size, prior.multiple) if options.prior else max(options.size // 32, 4) * 32  # the network halves the map several times
-    known = evidence = read_evidence(capture, size)
-    elsewhere = layout.fitted(capture, known, prior, report) if options.prior else None
+    head = read_head(capture)
+    known = evidence = read_evidence(capture, head, size)
+    elsewhere = layout.fitted(capture, head, known, prior, report) if options.prior else None
     if elsewhere is not None:  # the authors' prior speaks of maps in other UVs
         evidence = elsewhere.evidence(known, recipe.released_boxes)
     _check_often(prior, report)
     cell = FACE_CROP / options.grid_cells * REFERENCE / evidence.extent.side
-    part = solve_edited(capture, settings, recipe, prior, evidence, cell, report) if settings.edited_part and elsewhere is None else None
+    part = solve_edited(capture, head, settings, recipe, prior, evidence, cell, report) if settings.edited_part and elsewhere is None else None
     if part is not None:
         _leave_figures(capture, evidence, *part, report)
         return
     conditions = mask_edit.conditions(capture, settings)
-    witness = (lambda marks: confirmed(capture, marks, evidence.size)) if elsewhere is None else list
-    start = initial.start(prior, evidence, tone.asked(capture, settings, known, report), cell, recipe, witness)
+    witness = (lambda marks: confirmed(capture, head, marks, evidence.size)) if elsewhere is None else list
+    start = initial.start(prior, evidence, tone.asked(capture, head, settings, known, report), cell, recipe, witness)
     report.figure("marks_kept_from_light", len(start.marks))
     images.write_srgb(capture.picture("solve", "edges_and_marks"), drawing.edges_and_marks(evidence, start.alpha, start.marks))
     state, seen = start.state, start.observations

@@ -12,6 +12,7 @@ from ..contract import mask_edit
 from ..contract.capture import Capture
 from ..contract.messages import Reporter
 from ..contract.settings import Settings
+from ..face.head import Head
 from . import checkpoint, initial, maps
 from .checkpoint import Solution
 from .confidence import spread
@@ -24,7 +25,7 @@ from .window import Window, coarse, cropped, solve_inside, window
 from .witnesses import confirmed
 
 
-def solve_edited(capture: Capture, settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidence, cell: float,
+def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidence, cell: float,
                  report: Reporter) -> tuple[maps.Maps, torch.Tensor] | None:
     """The maps with the edited part new, as they are now in maps/, and the skin tone [3]; None, and the reason in the log, where the whole map is to be solved.
 
@@ -43,7 +44,7 @@ def solve_edited(capture: Capture, settings: Settings, recipe: Recipe, prior: Pr
     near = torch.zeros_like(evidence.alpha)
     if part is not None:
         near[part.inside] = 1
-    start = initial.again(prior, evidence, earlier, cell, recipe, near, lambda marks: confirmed(capture, marks, evidence.size))
+    start = initial.again(prior, evidence, earlier, cell, recipe, near, lambda marks: confirmed(capture, head, marks, evidence.size))
     found = earlier if part is None else _sampled(settings, recipe, prior, evidence, earlier, start, part, report)
     state = State(0, None, found.denoised, found.lights)
     result = maps.finished(state, evidence, start, recipe, found.spread, found.gain)

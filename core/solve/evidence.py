@@ -13,7 +13,8 @@ import torch
 from ..contract.capture import Capture
 from ..contract.messages import Problem
 from ..face import beard, template
-from ..geometry import meshes, raster
+from ..face.head import Head
+from ..geometry import raster
 from ..imaging import images
 from .lighting import Shader
 from .prior import coordinates
@@ -73,7 +74,7 @@ class Evidence:
         return self.extent.side / self.size
 
 
-def read_evidence(capture: Capture, size: int) -> Evidence:
+def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     """The capture's texture, confidence, head and masks at size x size. Raises Problem for what is missing, empty or of another shape."""
     texture = images.read_linear(capture.texture)
     confidence = images.read_data(capture.texture_confidence)[..., 0]
@@ -86,14 +87,12 @@ def read_evidence(capture: Capture, size: int) -> Evidence:
         raise Problem("No texel of the texture was seen by any frame.", "Run the chain again from the cameras, and look at its report.")
     seen, bearded = _sized(confidence, size), _sized(beard.seen_in(texture, confidence), size)
     texture = _sized(texture * confidence[..., None], size) / np.maximum(seen, 1e-4)[..., None]  # what nobody saw must not darken its neighbours
-    head = meshes.read_obj(capture.head)
-    if head.uvs is None:
+    if head.mesh.uvs is None:
         raise Problem("The head has no UV coordinates.", "Run the registration stage again.")
-    face, bary = raster.rasterize_uv(head, size)
-    covered = face >= 0
+    covered = head.raster(size)[0] >= 0
     if not covered.any():
         raise Problem("The head's UV coordinates cover no texel.", "Run the registration stage again.")
-    normal = raster.bleed(raster.interpolate(meshes.vertex_normals(head), head.faces, face, bary), covered)
+    normal = raster.bleed(head.interpolate(head.normals, size), covered)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
     mask, asked = _shadow_mask(capture, size)
     protected = _sized(images.read_mask(capture.protect_mask), size) if capture.protect_mask.is_file() else np.zeros_like(mask)

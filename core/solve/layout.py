@@ -19,6 +19,7 @@ import torch
 
 from ..contract.capture import Capture
 from ..contract.messages import Problem, Reporter
+from ..face.head import Head
 from ..geometry import atlas, baking, meshes
 from .evidence import REFERENCE, Evidence, Extent
 from .lighting import Lights, sh_basis
@@ -114,12 +115,12 @@ def whole_size(asked: int, multiple: int) -> int:
     return max(asked // step, 1) * step
 
 
-def fitted(capture: Capture, e: Evidence, prior: Prior, report: Reporter) -> Layout:
+def fitted(capture: Capture, head: Head, e: Evidence, prior: Prior, report: Reporter) -> Layout:
     """The layout of the own head that lies in the capture, at the evidence's size. A released prior is given what it lacks to start from: the mean face
     of ours, and the tones of skins. Raises Problem where there is no own head, or its UVs are not the prior's."""
     if not (capture.own_head.is_file() and capture.own_head_skin.is_file()):
         raise Problem("The authors' prior works in the UVs of another head, and none was fitted to this face.", REMEDY)
-    head, own = meshes.read_obj(capture.head), meshes.read_obj(capture.own_head)
+    own = meshes.read_obj(capture.own_head)
     told, skin = json.loads(capture.own_head_skin.read_text(encoding="utf-8")), np.zeros(len(own.faces), bool)
     for first, end in told["skin_triangles"]:
         skin[first:end] = True
@@ -128,7 +129,7 @@ def fitted(capture: Capture, e: Evidence, prior: Prior, report: Reporter) -> Lay
     if not skin.any():
         raise strange
     ours = load()
-    layout = between(head, own, skin, e.size, ours.mean_face, lambda done: report.progress(done, 100, "laying the prior's UVs over the head"))
+    layout = between(head.mesh, own, skin, e.size, ours.mean_face, lambda done: report.progress(done, 100, "laying the prior's UVs over the head"))
     if not layout.fits(e.skin.numpy()):
         raise strange
     prior.mean_face, prior.tones = layout.mean_face(), ours.tones

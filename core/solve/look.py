@@ -16,7 +16,8 @@ import numpy as np
 from ..contract.capture import Capture
 from ..contract.messages import Problem, Reporter
 from ..face import faces, template
-from ..geometry import meshes, raster
+from ..face.head import Head
+from ..geometry import raster
 from ..geometry.views import View, read_views
 from ..imaging import images
 from .witnesses import visible
@@ -53,27 +54,25 @@ def look(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray, surroundi
     return Look(np.average(colours[best], axis=0, weights=weight[best] + 1e-9), _facing_front(colours, normals, weight), surroundings)
 
 
-def capture_look(capture: Capture, shadow: np.ndarray, report: Reporter) -> Look | None:
+def capture_look(capture: Capture, head: Head, shadow: np.ndarray, report: Reporter) -> Look | None:
     """From the selected frames as they were filmed. `shadow` [S, S]: the soft mask in UV. None where the frames or cameras are gone, or hardly any
     skin is seen."""
     if not capture.frames_json.is_file() or not capture.cameras.is_dir():
         return None
     views = [view for view in read_views(capture, selected_only=True) if view.path.is_file()]
-    head = meshes.read_obj(capture.head)
-    if not views or not template.is_built_in(head):
+    if not views or not head.built_in:
         return None
-    normals = meshes.vertex_normals(head)
-    uv = np.zeros((len(head.vertices), 2))
-    uv[head.faces] = head.uvs[head.face_uvs]
+    mesh, normals = head.mesh, head.normals
+    uv = np.zeros((len(mesh.vertices), 2))
+    uv[mesh.faces] = mesh.uvs[mesh.face_uvs]
     weight = raster.sample(skin_weight(512, shadow), np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512)
     points = np.flatnonzero(weight > 0.05)
-    caster = raster.RayCaster(head)
     seen = np.full((len(views), len(points), 3), np.nan)
     around = []
     for i, view in enumerate(views):
         report.progress(0, len(views), f"looking at the skin in frame {i + 1} of {len(views)}")
         frame = images.read_srgb(view.path)
-        seen[i] = _seen(view, frame, caster, head.vertices[points], normals[points])
+        seen[i] = _seen(view, frame, head.caster, mesh.vertices[points], normals[points])
         around.append(_surroundings(frame))
     known = np.isfinite(seen[..., 0]).sum(0) >= min(2, len(views))
     if known.sum() < FEWEST:

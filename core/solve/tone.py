@@ -14,6 +14,7 @@ import numpy as np
 from ..contract.capture import Capture
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
+from ..face.head import Head, read_head
 from ..imaging import images
 from .evidence import Evidence, read_evidence
 from .initial import skin_tone
@@ -30,8 +31,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """Leaves the figures skin_tone_srgb (R, G, B in 0..1), skin_tone_source and, where it comes from the frames, skin_tone_group,
     skin_tone_deviation_l (of L*) and skin_tone_error_de (expected delta E 2000). Raises Problem where no facial skin was seen."""
     report.progress(0, 1, "reading the texture, the head and the masks")
-    evidence = read_evidence(capture, SIZE)
-    tone = automatic(capture, settings, evidence, report)
+    head = read_head(capture)
+    evidence = read_evidence(capture, head, SIZE)
+    tone = automatic(capture, head, settings, evidence, report)
     if tone is not None:
         tell(tone, settings, report)
         return
@@ -46,18 +48,18 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.figure("skin_tone_source", "texture")
 
 
-def automatic(capture: Capture, settings: Settings, evidence: Evidence, report: Reporter) -> Tone | None:
+def automatic(capture: Capture, head: Head, settings: Settings, evidence: Evidence, report: Reporter) -> Tone | None:
     """The tone that the frames tell under the measured white point, or the scene's; None where frames or cameras are gone. `evidence` in the built-in UVs."""
     white = given_white(settings.solve.white_point)
-    seen = capture_look(capture, evidence.alpha.numpy(), report)
+    seen = capture_look(capture, head, evidence.alpha.numpy(), report)
     return None if seen is None else estimate(seen, white)
 
 
-def asked(capture: Capture, settings: Settings, evidence: Evidence, report: Reporter) -> str:
+def asked(capture: Capture, head: Head, settings: Settings, evidence: Evidence, report: Reporter) -> str:
     """What `initial.skin_tone` is asked for: the artist's tone, or the automatic one as sRGB "R,G,B", or "auto" where the texture must tell it."""
     if settings.solve.skin_tone != "auto":
         return settings.solve.skin_tone
-    tone = automatic(capture, settings, evidence, report)
+    tone = automatic(capture, head, settings, evidence, report)
     if tone is None:
         return "auto"
     tell(tone, settings, report)

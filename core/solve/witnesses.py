@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 
 from ..contract.capture import Capture
-from ..geometry import meshes, raster
+from ..face.head import Head
+from ..geometry import raster
 from ..geometry.views import View, read_views
 from ..imaging import images
 from .marks import Mark
@@ -20,21 +21,18 @@ AGREED = 0.6  # share of the views that see the place
 FEWEST = 2  # views; where fewer saw it the texture alone decides
 
 
-def confirmed(capture: Capture, marks: list[Mark], size: int) -> list[Mark]:
+def confirmed(capture: Capture, head: Head, marks: list[Mark], size: int) -> list[Mark]:
     """The marks, in texels of a size x size map, that the delit views agree on; all of them where this capture has no cameras or no delit views."""
     if not marks or not capture.frames_json.is_file() or not capture.cameras.is_dir():
         return marks
     pictures = [(view, path) for view in read_views(capture) if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
-    head = meshes.read_obj(capture.head)
-    face, bary = raster.rasterize_uv(head, size)
-    covered = face >= 0
-    points, normals = (raster.interpolate(values, head.faces, face, bary) for values in (head.vertices, meshes.vertex_normals(head)))
-    caster = raster.RayCaster(head)
+    covered = head.raster(size)[0] >= 0
+    points, normals = (head.interpolate(values, size) for values in (head.mesh.vertices, head.normals))
     at = tuple(np.round([[mark.row, mark.column] for mark in marks]).astype(int).clip(0, size - 1).T)
     there = points[at], normals[at] / np.maximum(np.linalg.norm(normals[at], axis=1, keepdims=True), 1e-9)
     seen, agreed = np.zeros(len(marks), int), np.zeros(len(marks), int)
     for view, path in pictures:
-        shown = visible(view, caster, *there) & covered[at]
+        shown = visible(view, head.caster, *there) & covered[at]
         if not shown.any():
             continue
         picture = np.log(np.maximum(images.read_linear(path), 1e-3)).mean(-1)

@@ -8,17 +8,17 @@ that the tone comes from all views and the pores from the one that saw them best
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from ..contract.capture import Capture
+from ..contract.frame_records import read_frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import template
-from ..geometry import meshes
+from ..face.head import Head, Unfolded, read_head
 from ..geometry.views import read_views
 from ..imaging import images
 from .align import align
@@ -27,7 +27,7 @@ from .detail import fine_detail
 from .fill import fill
 from .filmed import filmed
 from .foreign import clothes, leave_out_background
-from .projection import Observation, Surface, observe
+from .projection import Observation, observe
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
@@ -36,8 +36,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
     Raises Problem where no view was delit or none of them sees the head.
     """
-    head = meshes.read_obj(capture.head)
-    if head.uvs is None:
+    head = read_head(capture)
+    if head.mesh.uvs is None:
         raise Problem("The registered head has no UVs.", "Run the stage registration again.")
     observations, surface = observe_all(capture, head, settings.texture.size, report)
     built = build(observations, surface, settings, report)
@@ -72,26 +72,26 @@ class Built:
     losses: dict
 
 
-def observe_all(capture: Capture, head: meshes.Mesh, size: int, report: Reporter) -> tuple[list[Observation], Surface]:
+def observe_all(capture: Capture, head: Head, size: int, report: Reporter) -> tuple[list[Observation], Unfolded]:
     """What each delit view sees of the head on a map of `size`; the frame's own sharpness counts. Raises Problem where no view was delit."""
-    sharpness = {f["name"]: f["sharpness"] for f in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]}
+    frames = read_frames(capture).by_name
     views = [(view, path) for view in read_views(capture) if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
     if not views:
         raise Problem("There is no delit frame of a registered view.",
                       "Run the stage delight, or put pictures named like the frames into the delighter's folder.")
     report.progress(0, len(views) + 6, "unfolding the head")
-    surface = Surface.of(head, size)
-    best = max(sharpness[view.name] for view, _ in views) or 1.0
+    surface = head.unfold(size)
+    best = max(frames[view.name].sharpness for view, _ in views) or 1.0
     observations = []
     for i, (view, path) in enumerate(views):
         report.progress(i, len(views) + 6, f"projecting {view.name}")
-        observations.append(observe(view, images.read_linear(path), surface, sharpness[view.name] / best))
+        observations.append(observe(view, images.read_linear(path), surface, frames[view.name].sharpness / best))
     return observations, surface
 
 
-def build(observations: list[Observation], surface: Surface, settings: Settings, report: Reporter, aligned: bool = True) -> Built:
+def build(observations: list[Observation], surface: Unfolded, settings: Settings, report: Reporter, aligned: bool = True) -> Built:
     """One map from what the views see; changes the observations (gains, warps, weights). `aligned`: off for measurements only."""
-    built_in = template.is_built_in(surface.caster.mesh)
+    built_in = surface.head.built_in
     if built_in:
         leave_out_background(observations, report)
     gains = equalise(observations)

@@ -12,9 +12,10 @@ import cv2
 import numpy as np
 
 from ..contract.messages import Reporter
+from ..face.head import Unfolded
 from ..geometry import raster
 from .blend import blurred, weighted_mean
-from .projection import Observation, Surface
+from .projection import Observation
 
 ROUNDS = 2
 LARGEST = 10 / 1024
@@ -23,7 +24,7 @@ SMOOTH = 24 / 1024
 """Gaussian sigma of the warp's smoothing, as a part of the map's side."""
 
 
-def align(observations: list[Observation], surface: Surface, report: Reporter) -> float:
+def align(observations: list[Observation], surface: Unfolded, report: Reporter) -> float:
     """Resamples every observation along its warp. Returns the mean length of the last warps in texels, where they count."""
     if len(observations) < 2:
         return 0.0

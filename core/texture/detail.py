@@ -12,8 +12,9 @@ import cv2
 import numpy as np
 
 from ..contract.messages import Reporter
+from ..face.head import Unfolded
 from ..geometry import raster
-from .projection import Observation, Surface, log_colours
+from .projection import Observation, log_colours
 
 WORTH = 1.3
 """Pixels per texel of the texture from which a map twice as fine is worth its while; half of it, from twice as many, one four times as fine."""
@@ -26,7 +27,7 @@ SHARP = 2.0
 """Exponent of the views' weights: near the best view's own detail, yet of several."""
 
 
-def fine_detail(observations: list[Observation], surface: Surface, report: Reporter) -> np.ndarray | None:
+def fine_detail(observations: list[Observation], surface: Unfolded, report: Reporter) -> np.ndarray | None:
     """Float32 [F S, F S, 2] for a texture of S texels: the band of log luminance (natural), and Wiener's factor in [0, 1] that it is already multiplied by.
     None where the frames hold nothing finer than the texture, or fewer than two views see the head."""
     factor = finer(observations)

@@ -13,9 +13,10 @@ import numpy as np
 
 from ..contract.messages import Problem, Reporter
 from ..face import faces, template
+from ..face.head import Unfolded
 from ..geometry import raster
 from ..imaging import images
-from .projection import Observation, Surface
+from .projection import Observation
 
 COLOUR = 0.35
 """How far the logarithms of R/G and B/G of a cloth lie from the face's skin; light that a delighter left does not reach that far."""
@@ -53,7 +54,7 @@ def leave_out_background(observations: list[Observation], report: Reporter) -> i
     return cut
 
 
-def clothes(log_texture: np.ndarray, confidence: np.ndarray, surface: Surface) -> np.ndarray:
+def clothes(log_texture: np.ndarray, confidence: np.ndarray, surface: Unfolded) -> np.ndarray:
     """How surely each texel shows a cloth, float32 [S, S] in [0, 1]: parts of the neck that reach its rim and have not the colour of the face's skin.
 
     The last texels at the rim always count: whatever the neck ends at throws its shade and its outline there.
@@ -78,9 +79,9 @@ def clothes(log_texture: np.ndarray, confidence: np.ndarray, surface: Surface) -
     return np.clip(1.5 * cv2.GaussianBlur(found.astype(np.float32), (0, 0), radius / 3, borderType=cv2.BORDER_REPLICATE), 0, 1) * surface.covered
 
 
-def _rim(surface: Surface, neck: np.ndarray) -> np.ndarray:
+def _rim(surface: Unfolded, neck: np.ndarray) -> np.ndarray:
     """uint8 [S, S]: texels on the edge at which the mesh ends below the neck."""
-    mesh, size = surface.caster.mesh, len(neck)
+    mesh, size = surface.mesh, len(neck)
     edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     uv_edges = mesh.face_uvs[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     _, first, count = np.unique(edges, axis=0, return_index=True, return_counts=True)

@@ -17,11 +17,12 @@ from torch import Tensor
 from torch.nn import functional
 
 from ..contract.messages import Reporter
+from ..face.head import Unfolded
 from ..geometry import raster
 from ..imaging import images
 from .blend import blurred
 from .features import Features
-from .projection import DARKEST, Observation, Surface
+from .projection import DARKEST, Observation
 
 TILE = 288
 """Pixels along a side of the part of a view that one step looks at: bounds memory and seconds whatever the frames' size; a multiple of 16."""
@@ -45,7 +46,7 @@ class Target:
     trust: np.ndarray  # float32 [h, w] in [0, 1]: how far a pixel may pull; zero off the head
 
 
-def refine(log_texture: np.ndarray, observations: list[Observation], surface: Surface, wanted: np.ndarray, features: Features, steps: int,
+def refine(log_texture: np.ndarray, observations: list[Observation], surface: Unfolded, wanted: np.ndarray, features: Features, steps: int,
            report: Reporter, device: str = "cpu") -> tuple[np.ndarray, dict]:
     """The blend log_texture [S, S, 3] with its detail optimised, and {"before", "after"}: the mean loss over the same tiles.
 
@@ -81,7 +82,7 @@ def refine(log_texture: np.ndarray, observations: list[Observation], surface: Su
     return result.astype(np.float32), {"before": before, "after": after}
 
 
-def _target(observation: Observation, surface: Surface, wanted: np.ndarray) -> Target | None:
+def _target(observation: Observation, surface: Unfolded, wanted: np.ndarray) -> Target | None:
     """A view's pixels that see wanted texels; None where there are none. Follows the alignment, so all views pull at the same texels."""
     seen = (observation.weight > 0) & wanted
     if seen.sum() < 64:
@@ -93,7 +94,7 @@ def _target(observation: Observation, surface: Surface, wanted: np.ndarray) -> T
     (w, h), view, size = high - low, observation.view, len(wanted)
     y, x = np.mgrid[0:OVER * h, 0:OVER * w]
     at = (np.stack([x.ravel(), y.ravel()], -1) + 0.5) / OVER + low
-    mesh, caster = surface.caster.mesh, surface.caster
+    mesh, caster = surface.mesh, surface.caster
     directions = view.rays(at * [view.width / width, view.height / height])
     face, bary, _ = caster.first_hits(np.repeat(view.centre[None], len(directions), 0), directions)
     uv = raster.interpolate(mesh.uvs, mesh.face_uvs, face, bary)

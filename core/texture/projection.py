@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from ..face.head import Unfolded
 from ..geometry import raster
-from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.views import View
 
 DARKEST = 2e-3
@@ -19,24 +19,6 @@ MARGIN_PX = (1.5, 12.0)
 """Pixels from a silhouette at which a texel starts to count, and counts in full."""
 GRAZING = 0.15
 """Cosine of the steepest viewing angle that counts."""
-
-
-@dataclass
-class Surface:
-    """The head unfolded: per texel of its UV charts a point in the world and a unit normal."""
-
-    covered: np.ndarray  # bool [S, S]: texels inside a chart
-    points: np.ndarray  # [N, 3] metres, of the covered texels
-    normals: np.ndarray  # [N, 3]
-    caster: raster.RayCaster
-
-    @classmethod
-    def of(cls, mesh: Mesh, size: int) -> Surface:
-        face, bary = raster.rasterize_uv(mesh, size)
-        covered = face >= 0
-        points = raster.interpolate(mesh.vertices, mesh.faces, face[covered], bary[covered])
-        normals = raster.interpolate(vertex_normals(mesh), mesh.faces, face[covered], bary[covered])
-        return cls(covered, points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12), raster.RayCaster(mesh))
 
 
 @dataclass
@@ -61,9 +43,8 @@ class Observation:
         self.log_colour = log_colours(self.picture, pixels)
 
 
-def observe(view: View, picture: np.ndarray, surface: Surface, sharpness: float) -> Observation:
+def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float) -> Observation:
     """Projects every texel into a linear picture [H, W, 3] of any size of that view. sharpness in [0, 1] scales its weight."""
-    covered = surface.covered
     xy, depth = view.project(surface.points)
     inside = (depth > 0) & (xy[:, 0] > 1) & (xy[:, 1] > 1) & (xy[:, 0] < view.width - 1) & (xy[:, 1] < view.height - 1)
     towards = view.centre - surface.points
@@ -78,10 +59,10 @@ def observe(view: View, picture: np.ndarray, surface: Surface, sharpness: float)
     ramp = np.clip((margin - near) / (far - near), 0, 1)
     quality = np.where(seen, np.clip((cosine - GRAZING) / (1 - GRAZING), 0, 1) * ramp, 0)
     scale = [picture.shape[1] / view.width, picture.shape[0] / view.height]
-    pixels = _scatter(np.nan_to_num(xy, nan=-1) * scale, covered)
+    pixels = surface.spread(np.nan_to_num(xy, nan=-1) * scale)
     reference = np.median(distance[seen]) if seen.any() else 1.0
     weight = quality ** 2 * sharpness * (reference / distance) ** 2
-    return Observation(view, picture, pixels, log_colours(picture, pixels), _scatter(quality, covered), _scatter(weight, covered))
+    return Observation(view, picture, pixels, log_colours(picture, pixels), surface.spread(quality), surface.spread(weight))
 
 
 def log_colours(picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
@@ -98,10 +79,3 @@ def _silhouette_distance(caster: raster.RayCaster, view: View, scale: float = 0.
     jump = cv2.morphologyEx(depth.astype(np.float32), cv2.MORPH_GRADIENT, np.ones((3, 3))) > 16 * footprint * depth  # 3 x 3 spans two pixels: 83 degrees
     to_jump = cv2.distanceTransform((~jump).astype(np.uint8), cv2.DIST_L2, 5) / scale
     return cv2.resize(to_jump, (view.width, view.height), interpolation=cv2.INTER_LINEAR)
-
-
-def _scatter(values: np.ndarray, covered: np.ndarray) -> np.ndarray:
-    """Per covered texel [N(, C)] -> float32 [S, S(, C)], zero elsewhere."""
-    out = np.zeros((*covered.shape, *values.shape[1:]), np.float32)
-    out[covered] = values
-    return out

@@ -17,6 +17,7 @@ from ..contract import stages
 from ..contract.capture import Capture, replacing_folder
 from ..contract.messages import Reporter
 from ..contract.settings import Settings
+from ..face.head import read_head
 from ..geometry import atlas, baking, meshes
 from ..geometry.meshes import Mesh
 from ..geometry.views import read_views
@@ -29,7 +30,7 @@ OWN_FAR_M = 0.012
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """head.obj and its maps, scan.ply, own_head.obj where there is one -> delivery/, whole or not at all."""
-    head = meshes.read_obj(capture.head)
+    head = read_head(capture).mesh
     maps = capture.maps_4k if all((capture.maps_4k / name).is_file() for name in stages.MAPS) else capture.maps
     source = baking.Source(head)
     with replacing_folder(capture.delivery) as folder:

@@ -12,7 +12,7 @@ import numpy as np
 from ..contract.capture import Capture, replacing_folder
 from ..contract.messages import Reporter
 from ..contract.settings import Settings
-from ..geometry import meshes
+from ..face.head import read_head
 from ..imaging import images
 from . import detail, drawing, gloss, hair
 from .maps import Maps, read_maps
@@ -69,7 +69,7 @@ def _whole(capture: Capture, maps: Maps, settings: Settings, report: Reporter) -
     if not (options.whole_head or options.hair):
         return maps, None
     report.progress(0, 1, "laying out the head")
-    surface = lay_out(meshes.read_obj(capture.head), len(maps.diffuse), report.check)
+    surface = lay_out(read_head(capture).mesh, len(maps.diffuse), report.check)
     if options.whole_head:
         report.progress(0, 1, "completing neck, ears and scalp")
         seen, maps = maps, complete(maps, surface, report, settings.seed)

@@ -4,13 +4,14 @@
 data-block is made behind the artist's back.
 """
 
-import json
 from dataclasses import dataclass
 
 import bpy
 import bpy.utils.previews
 
 from ...core.contract.capture import Capture
+from ...core.contract.frame_records import read_frames
+from ...core.contract.messages import Problem
 from .. import captures, status
 
 INTERVAL_S = 0.5
@@ -64,18 +65,18 @@ def look(root: str) -> bool:
 
 def _read(capture: Capture) -> Strip | None:
     try:
-        frames = json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]
-        values = [float(frame["sharpness"]) for frame in frames]
-        used = [i for i, frame in enumerate(frames) if frame["selected"]]
-    except (OSError, ValueError, KeyError, TypeError):
+        frames = read_frames(capture).records
+    except Problem:
         return None
     if not frames:
         return None
+    values = [frame.sharpness for frame in frames]
+    used = [i for i, frame in enumerate(frames) if frame.selected]
     limit = BLURRED * sorted(values)[len(values) // 2]
     choice = used or list(range(len(frames)))
     shown = [choice[i * len(choice) // min(MOST, len(choice))] for i in range(min(MOST, len(choice)))]
     sharpest = max(values) or 1.0
-    return Strip(tuple(Frame(frames[i]["name"].rpartition(".")[0], values[i] / sharpest, values[i] < limit, _icon(capture.frames / frames[i]["name"]))
+    return Strip(tuple(Frame(frames[i].name.rpartition(".")[0], values[i] / sharpest, values[i] < limit, _icon(capture.frames / frames[i].name))
                        for i in shown), len(frames), len(used), sum(value < limit for value in values))
 
 

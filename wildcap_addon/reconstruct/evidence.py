@@ -6,11 +6,11 @@ Both are children of the head if it is there, so that it may stand anywhere; the
 """
 
 import contextlib
-import json
 
 import bpy
 
 from ...core.contract.capture import Capture
+from ...core.contract.frame_records import read_frames
 from ...core.contract.messages import Problem
 from .. import captures, local_view
 from . import colmap_cameras
@@ -105,6 +105,6 @@ def _remove(item, kind: str) -> None:
 def _chosen(capture: Capture) -> set[str]:
     """The frames that the texture uses."""
     try:
-        return {frame["name"] for frame in json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"] if frame["selected"]}
-    except (OSError, ValueError, KeyError, TypeError):
+        return {frame.name for frame in read_frames(capture).records if frame.selected}
+    except Problem:
         return set()

@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The registered head of a capture, read once per stage and passed on: its mesh, and what is worked out from it when first asked for.
+
+All arrays are shared between those who hold the head, and cannot be written to: copy before writing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..contract.capture import Capture
+from ..geometry import meshes, raster
+from ..geometry.meshes import Mesh
+from . import template
+
+SHORTEST = 1e-9
+"""Length under which an interpolated normal has no direction."""
+
+
+class Head:
+    """A head in the world (metres), whatever its topology; what needs UVs takes for granted that `mesh` has them."""
+
+    def __init__(self, mesh: Mesh):
+        self.mesh = mesh
+        self._rasters: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Area-weighted unit normals [V, 3]."""
+        return _shared(meshes.vertex_normals(self.mesh))
+
+    @cached_property
+    def caster(self) -> raster.RayCaster:
+        return raster.RayCaster(self.mesh)
+
+    @cached_property
+    def built_in(self) -> bool:
+        """Whether it has the built-in head's topology and UVs, so that its masks hold for it."""
+        return template.is_built_in(self.mesh)
+
+    def raster(self, size: int) -> tuple[np.ndarray, np.ndarray]:
+        """Which triangle covers each texel of a map: face int32 [S, S] (-1: none) and bary float32 [S, S, 3]."""
+        if size not in self._rasters:
+            face, bary = raster.rasterize_uv(self.mesh, size)
+            self._rasters[size] = _shared(face), _shared(bary)
+        return self._rasters[size]
+
+    def interpolate(self, values: np.ndarray, size: int) -> np.ndarray:
+        """Values of the vertices [V, C] at a map's texels [S, S, C], zero off the head."""
+        return raster.interpolate(values, self.mesh.faces, *self.raster(size))
+
+    def unfold(self, size: int) -> Unfolded:
+        face, bary = self.raster(size)
+        inside = face >= 0
+        points, normals = (raster.interpolate(values, self.mesh.faces, face[inside], bary[inside]) for values in (self.mesh.vertices, self.normals))
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), SHORTEST)
+        return Unfolded(self, face, bary, _shared(points), _shared(normals))
+
+
+@dataclass(frozen=True)
+class Unfolded:
+    """A head in its UVs: face int32 [S, S] (-1: none) and bary float32 [S, S, 3] of the raster; points (metres) and unit normals [N, 3] of its N covered
+    texels, row by row."""
+
+    head: Head
+    face: np.ndarray
+    bary: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+
+    @property
+    def mesh(self) -> Mesh:
+        return self.head.mesh
+
+    @property
+    def caster(self) -> raster.RayCaster:
+        return self.head.caster
+
+    @cached_property
+    def covered(self) -> np.ndarray:
+        """bool [S, S]: texels of the head."""
+        return _shared(self.face >= 0)
+
+    def spread(self, values: np.ndarray) -> np.ndarray:
+        """Per covered texel [N(, C)] -> float32 [S, S(, C)], zero elsewhere."""
+        out = np.zeros((*self.face.shape, *values.shape[1:]), np.float32)
+        out[self.covered] = values
+        return out
+
+
+def read_head(capture: Capture) -> Head:
+    """The head of a capture that is registered. Raises Problem where head.obj is missing or holds no faces."""
+    mesh = meshes.read_obj(capture.head)
+    for array in (mesh.vertices, mesh.faces, mesh.uvs, mesh.face_uvs):
+        if array is not None:
+            _shared(array)
+    return Head(mesh)
+
+
+def _shared(array: np.ndarray) -> np.ndarray:
+    """The same array, closed to writing."""
+    array.setflags(write=False)
+    return array
