@@ -2,4 +2,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The method: from a phone video to the maps of a relightable head. Knows nothing of Blender."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

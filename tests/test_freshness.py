@@ -269,7 +269,7 @@ def test_a_run_keeps_what_older_code_made_says_so_and_forced_makes_it_again(capt
     monkeypatch.setattr(runner.report, "write", lambda *_: None)
     runner.run_job(write_job(capture, last="cameras"), said.append)
     assert ran == [] and states(capture) == ["older", "older"]
-    assert [line.text for line in said if isinstance(line, Log)][-1].startswith("Cameras was made by older code (WildCap 0.2.0) and is kept")
+    assert [line.text for line in said if isinstance(line, Log)][-1].startswith("Made by older code and kept: Frames, Cameras. Run a stage again")
     runner.run_job(write_job(capture, first="cameras", last="cameras"), said.append)
     assert ran == ["cameras"] and states(capture) == ["older", "done"]
 

@@ -45,11 +45,14 @@ def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None, 
                 return Done(round(time.monotonic() - started, 2))
             if job.force:
                 job.capture.forget([stage.name for stage in job.chain])
+            kept = []
             for step in job.chain:
                 stage = step.name
                 if cancelled():
                     raise CancelledError(stage)
-                run_stage(step, job, emit, cancelled)
+                kept += [step.label] if run_stage(step, job, emit, cancelled) == OLDER else []
+            if kept:
+                emit(Log(f"Made by older code and kept: {', '.join(kept)}. Run a stage again to have it made by WildCap {__version__}."))
     except CancelledError:
         return Cancelled(stage)
     except Exception as error:
@@ -60,16 +63,15 @@ def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None, 
     return Done(round(time.monotonic() - started, 2))
 
 
-def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
-    """Runs one stage unless it is fresh, records it, and rebuilds the report. Raises whatever the stage raises."""
+def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> str:
+    """Runs one stage, records it, and rebuilds the report, unless the stage is finished: done, or made by older code, which is not ours to replace.
+    Returns the state it was found in. Raises whatever the stage raises."""
     capture, settings = job.capture, job.settings
-    verdict = capture.verdict(stage, settings)
-    if verdict.state in FINISHED:
-        if verdict.state == OLDER:
-            emit(Log(f"{stage.label} was made by older code (WildCap {verdict.version}) and is kept; run the stage again to have it made by this one."))
+    state = capture.state(stage, settings)
+    if state in FINISHED:
         finished = capture.read()["stages"][stage.name]
         emit(StageDone(stage.name, finished["seconds"], True, finished["figures"]))
-        return
+        return state
     with _at_work(stage, capture, emit, cancelled) as reporter:
         try:
             # Outputs may be half new from here on: until the end, nobody may take them for the recorded result.
@@ -89,6 +91,7 @@ def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled
                 report.write(capture, settings)
             raise
     emit(StageDone(stage.name, round(seconds, 2), False, reporter.figures))
+    return state
 
 
 def run_tool(tool: Stage, job: Job, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:

@@ -1,0 +1,49 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether two captures hold the same results, byte for byte: what a change that should change nothing is judged by.
+
+    python -m benchmarks.same_maps BEFORE.wildcap AFTER.wildcap
+
+Compares every file that a stage of the chain writes. Exit code 1 where one differs or is missing on one side. The same seed and settings give the same
+bytes on one machine; another processor may round otherwise.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from core.contract import stages
+from core.contract.capture import Capture
+from core.contract.hashes import hash_tree
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("before", type=Path)
+    parser.add_argument("after", type=Path)
+    arguments = parser.parse_args()
+    one, other = Capture(arguments.before), Capture(arguments.after)
+    compared = different = 0
+    for stage in stages.STAGES:
+        before, after = (written(capture, stage) for capture in (one, other))
+        names = before.keys() | after.keys()
+        unlike = sorted(name for name in names if before.get(name) != after.get(name))
+        compared, different = compared + len(names), different + len(unlike)
+        print(f"{stage.label:12} {len(names) - len(unlike):4} files are the same" + (f", {len(unlike)} are not: {', '.join(unlike[:4])}" if unlike else ""))
+    print(f"{compared - different} of {compared} files are the same.")
+    return 1 if different or not compared else 0
+
+
+def written(capture: Capture, stage: stages.Stage) -> dict[str, str]:
+    """The files that a stage wrote: name relative to the capture -> content hash."""
+    found = {}
+    for name in stage.writes:
+        told = hash_tree(capture.root / name)
+        found |= {f"{name}{inside}": content for inside, content in told.items()} if isinstance(told, dict) else {name: told} if told else {}
+    return found
+
+
+if __name__ == "__main__":
+    sys.exit(main())
