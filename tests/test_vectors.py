@@ -15,7 +15,7 @@ import torch
 from core.solve import maps, prior
 from core.solve.initial import mean_tone
 from core.solve.light_fit import light_loss
-from core.solve.lighting import Lights, Shader, interpolation, sh_basis
+from core.solve.lighting import Lights, Shader, interpolation, shading_basis
 from core.solve.network import denoise
 from core.solve.problem import Observation, State, albedo, blurred
 from core.solve.recipes import RECIPES, Recipe
@@ -41,10 +41,10 @@ def close(ours, theirs, tolerance=2e-5):
 
 def test_vectors_sh_shading():
     v = arrays("sh_shading.npz")
-    basis = sh_basis(v["normal"][0])
+    basis = shading_basis(v["normal"][0])
     close(basis.permute(1, 2, 0), v["basis"])
     close((basis.permute(1, 2, 0) * v["gamma_map"]).sum(-1), v["shading_map"])
-    close((sh_basis(v["normal_nonunit"][0]).permute(1, 2, 0) * v["gamma_map"]).sum(-1), v["shading_map_nonunit"])
+    close((shading_basis(v["normal_nonunit"][0]).permute(1, 2, 0) * v["gamma_map"]).sum(-1), v["shading_map_nonunit"])
     shader = Shader(v["normal"][0], torch.zeros(16, 20), (1, 1))
     close(shader.main(Lights(v["gamma_global"][:, 0, 0], torch.zeros(3, 9, 1, 1), torch.ones(3))), v["shading_global"])
 

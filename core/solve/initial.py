@@ -16,7 +16,7 @@ from .border import missing
 from .checkpoint import Solution
 from .edges import with_edges
 from .evidence import Evidence, grid_cells, observations
-from .lighting import Lights, constant_light, fit_global, sh_basis
+from .lighting import Lights, constant_light, fit_global, shading_basis
 from .marks import Mark, with_marks
 from .prior import Prior, coordinates, mean_at
 from .problem import Observation, State
@@ -77,7 +77,7 @@ def again(prior: Prior, evidence: Evidence, earlier: Solution, cell: float, reci
 def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float, recipe: Recipe,
               mask: Callable[[torch.Tensor], torch.Tensor] = lambda alpha: alpha, witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
     """`begun` with M as it is used, the marks that light must not explain, and the observations under both."""
-    lit = torch.einsum("ck,khw->chw", begun.state.lights.glob, sh_basis(evidence.normal)) * albedo_of(begun.reference).clamp_min(1e-3)
+    lit = torch.einsum("ck,khw->chw", begun.state.lights.glob, shading_basis(evidence.normal)) * albedo_of(begun.reference).clamp_min(1e-3)
     light = evidence.texture * begun.exposure / lit.clamp_min(1e-3)
     if recipe.sharp_edges:
         evidence = with_edges(evidence, light, evidence.weight * (1 if recipe.trusting else evidence.trust))
@@ -141,7 +141,7 @@ def reference(prior: Prior, tone: torch.Tensor, evidence: Evidence, kind: str) -
         return uniform_skin(tone, evidence.size)
     if kind == "mean" or prior.references is None:
         return face_of_tone(prior.mean_face, tone, evidence.skin)
-    basis, weight = sh_basis(evidence.normal), evidence.weight * (1 - evidence.alpha)
+    basis, weight = shading_basis(evidence.normal), evidence.weight * (1 - evidence.alpha)
 
     def unexplained(face: torch.Tensor) -> float:
         light = first_lights(evidence.texture, albedo_of(face), evidence.normal, weight, (1, 1), OURS).glob
@@ -175,7 +175,7 @@ def first_lights(texture: torch.Tensor, albedo: torch.Tensor, normal: torch.Tens
     shade = mean_tone(texture, weight) / mean_tone(albedo, weight).clamp_min(1e-4)
     glob = constant_light(shade)
     if recipe.fitted:
-        basis = sh_basis(normal)
+        basis = shading_basis(normal)
         rest = texture - albedo * torch.einsum("ck,khw->chw", glob, basis)
         glob = glob + fit_global(rest, albedo, basis, weight, ridge=max(recipe.even, 0.02))
     return Lights(glob, torch.zeros(1 if recipe.one_chroma else 3, 9, *cells), (shade / shade.mean()).clone())

@@ -21,7 +21,7 @@ from ..contract.capture import Capture
 from ..contract.messages import Problem, Reporter
 from ..geometry import atlas, baking, meshes
 from .evidence import REFERENCE, Evidence, Extent
-from .lighting import Lights, sh_basis
+from .lighting import Lights, shading_basis
 from .maps import DARKEST, Maps
 from .prior import Prior, load, mean_at
 
@@ -70,7 +70,7 @@ class Layout:
         inside = self._inside()
         side = 2 * (torch.arange(e.size) + 0.5) / e.size - 1
         mean = mean_at(self.face, torch.stack(torch.meshgrid(side, side, indexing="xy"))[None], tone[None])[0]
-        light = torch.einsum("ck,khw->chw", lights.glob, sh_basis(e.normal)).clamp_min(1e-2) / exposure / solved.gain[:, None, None]
+        light = torch.einsum("ck,khw->chw", lights.glob, shading_basis(e.normal)).clamp_min(1e-2) / exposure / solved.gain[:, None, None]
         seen = torch.lerp((mean[:3] + 1) / 2, e.texture / light, e.weight.sqrt()).clamp(DARKEST, 1)
 
         def joined(baked: np.ndarray, beyond: np.ndarray) -> np.ndarray:
