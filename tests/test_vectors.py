@@ -124,7 +124,7 @@ def test_vectors_miniloop(run):
     rows, columns = slice(2, 34), slice(4, 36)
     if "prior_v1_coord" not in PRIORS:
         pytest.skip(f"the loop's prior, {VECTORS / 'prior_v1_coord'}, is missing")
-    network = prior.load(VECTORS / "prior_v1_coord", dtype=torch.float32)
+    denoiser = prior.load(VECTORS / "prior_v1_coord", dtype=torch.float32).of_tone()
 
     def crop(name):
         return v[name][0][:, rows, columns]
@@ -150,7 +150,7 @@ def test_vectors_miniloop(run):
         close(state.lights.grid, v["grid"][k], 2e-4)
 
     first = Lights(v["gamma_main"][0][:, 0, 0].clone(), torch.zeros(3, 9, 8, 8), torch.ones(3))
-    last = sample(network, {1: o}, State(0, None, reference, first), recipe, noise, compare)
+    last = sample(denoiser, {1: o}, State(0, None, reference, first), recipe, noise, compare)
     with torch.no_grad():
         close(albedo(last.denoised), v["out_diff"][0], 2e-4)
         close(blurred(albedo(last.denoised) * shader.total(last.lights)), v["out_shading"][0], 4e-4)
