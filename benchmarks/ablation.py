@@ -42,6 +42,7 @@ from core.solve.prior import WEIGHTS, load
 from core.solve.problem import State, albedo, photometric
 from core.solve.recipes import OURS, RECIPES, Recipe
 from core.solve.sampler import sample, seeded
+from core.solve.skin_tone import GIVEN, SkinTone
 
 from . import figures
 from .ablation_measures import measure, summary, table
@@ -171,12 +172,12 @@ def solve_row(given: UvProblem, row: str, seed: int, steps: int) -> np.ndarray:
     changes, cells, mask, with_prior = ROWS[row]
     recipe = RECIPES[NAMED[row]] if row in NAMED else replace(OURS, **{"steps": steps, **changes})
     skin = _skin(len(given.albedo))
-    tone = images.linear_to_srgb((given.albedo * skin[..., None]).sum((0, 1)) / skin.sum())
+    tone = SkinTone.from_linear((given.albedo * skin[..., None]).sum((0, 1)) / skin.sum(), GIVEN)
     return solved(given, recipe, tone, seed, cells, mask, with_prior)
 
 
-def solved(given: UvProblem, recipe: Recipe, tone: np.ndarray, seed: int = 0, cells: int = CELLS, mask: str = "painted", with_prior: bool = True) -> np.ndarray:
-    """The linear albedo [S, S, 3] under a recipe and a requested tone (sRGB)."""
+def solved(given: UvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0, cells: int = CELLS, mask: str = "painted", with_prior: bool = True) -> np.ndarray:
+    """The linear albedo [S, S, 3] under a recipe and a requested tone."""
     size, prior = len(given.albedo), _prior()
     with tempfile.TemporaryDirectory() as folder:
         capture = Capture(folder)
@@ -185,8 +186,8 @@ def solved(given: UvProblem, recipe: Recipe, tone: np.ndarray, seed: int = 0, ce
         images.write_data(capture.shadow_mask_auto, {"painted": given.mask, "empty": 0 * given.mask, "full": 0 * given.mask + 1}[mask])
         meshes.write_obj(capture.head, template.load())
         evidence = read_evidence(capture, read_head(capture), size)
-    start = initial.start(prior, evidence, ",".join(f"{v:.5f}" for v in tone), FACE_CROP / cells, recipe)
-    state = sample(prior, start.observations, start.state, recipe, seeded(seed)) if with_prior else texels_alone(start, recipe)
+    start = initial.start(prior, evidence, tone, FACE_CROP / cells, recipe)
+    state = sample(prior.of_tone(start.tone), start.observations, start.state, recipe, seeded(seed)) if with_prior else texels_alone(start, recipe)
     return maps.finished(state, evidence, start, recipe).diffuse
 
 

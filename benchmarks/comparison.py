@@ -42,6 +42,7 @@ from core.solve import FACE_CROP, initial, maps, recipe_of
 from core.solve.evidence import REFERENCE, Evidence, read_evidence
 from core.solve.prior import load
 from core.solve.sampler import sample, seeded
+from core.solve.skin_tone import parse_skin_tone
 from core.solve.witnesses import confirmed
 
 from . import figures, light_models
@@ -125,7 +126,8 @@ def solved(capture: Capture, settings: Settings, method: str, seed: int) -> tupl
     prior = _prior()
     recipe = recipe_of(settings, prior)
     cell = FACE_CROP / settings.solve.grid_cells * REFERENCE / evidence.extent.side
-    start = initial.start(prior, evidence, settings.solve.skin_tone, cell, recipe, lambda marks: confirmed(capture, head, marks, evidence.size))
+    tone = parse_skin_tone(settings.solve.skin_tone)
+    start = initial.start(prior, evidence, tone, cell, recipe, lambda marks: confirmed(capture, head, marks, evidence.size))
     fit = {}
     if method in LIGHTS:
         start, recipe, move = LIGHTS[method](start, recipe)
@@ -133,7 +135,7 @@ def solved(capture: Capture, settings: Settings, method: str, seed: int) -> tupl
     if method == FREE:
         state = texels_alone(start, replace(recipe, decay=0.995), FREE_UPDATES, smooth=FREE_SMOOTH, **fit)
     else:
-        state = sample(prior, start.observations, start.state, recipe, seeded(seed), **fit)
+        state = sample(prior.of_tone(start.tone), start.observations, start.state, recipe, seeded(seed), **fit)
     result = maps.finished(state, evidence, start, recipe)
     return result.diffuse, result.shading, time.monotonic() - began
 
@@ -147,7 +149,7 @@ def _by_hand(capture: Capture, evidence: Evidence, settings: Settings, method: s
         blurred, share = (cv2.GaussianBlur(a, (0, 0), BLUR * len(texture)) for a in (texture * weight, np.repeat(weight, 3, 2)))
         shading = np.maximum(blurred / np.maximum(share, 1e-3), 1e-3)
     skin = weight * evidence.skin.numpy()[..., None]
-    tone = images.srgb_to_linear(np.array([float(v) for v in settings.solve.skin_tone.split(",")], np.float32))
+    tone = np.array(parse_skin_tone(settings.solve.skin_tone).linear, np.float32)
     gain = tone * skin.sum() / np.maximum((texture / shading * skin).sum((0, 1)), 1e-6)
     return (texture / shading * gain).astype(np.float32), (shading / gain).astype(np.float32)
 

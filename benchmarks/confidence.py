@@ -26,6 +26,7 @@ from core.face import template
 from core.geometry import meshes
 from core.imaging import images
 from core.solve.recipes import OURS
+from core.solve.skin_tone import GIVEN, SkinTone, format_skin_tone
 
 from .figures import write
 from .solve_uv import problem
@@ -63,9 +64,9 @@ def solved(subject: int, shadows: str, size: int, steps: int) -> tuple[np.ndarra
     """Error [S, S] and confidence [S, S] of one problem, and bool [S, S], the face."""
     truth, texture, _, mask = problem(subject, size, shadows)
     skin = template.mask("skin", size) * (1 - template.mask("eyes", size))
-    tone = images.linear_to_srgb((truth * skin[..., None]).sum((0, 1)) / skin.sum())
+    tone = SkinTone.from_linear((truth * skin[..., None]).sum((0, 1)) / skin.sum(), GIVEN)
     settings = from_json({"delight": {"delighter": "none"},
-                          "solve": {"size": size, "steps": steps, "skin_tone": ",".join(f"{v:.5f}" for v in tone), "checkpoint_every": 600}})
+                          "solve": {"size": size, "steps": steps, "skin_tone": format_skin_tone(tone), "checkpoint_every": 600}})
     with tempfile.TemporaryDirectory() as folder:
         capture = Capture(folder)
         images.write_linear(capture.texture, texture)

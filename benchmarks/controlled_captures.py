@@ -26,6 +26,7 @@ from core.solve import FACE_CROP, initial, maps, recipe_of
 from core.solve.evidence import read_evidence
 from core.solve.prior import load
 from core.solve.sampler import sample, seeded
+from core.solve.skin_tone import parse_skin_tone
 
 from .flash_light import write_delit
 from .relit_maps import toned
@@ -48,8 +49,8 @@ def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, 
     began, prior = time.monotonic(), _prior()
     recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0)
     evidence = read_evidence(capture, read_head(capture), settings.solve.size)
-    start = initial.start(prior, evidence, settings.solve.skin_tone, FACE_CROP / settings.solve.grid_cells, recipe)
-    state = sample(prior, start.observations, start.state, recipe, seeded(settings.seed))
+    start = initial.start(prior, evidence, parse_skin_tone(settings.solve.skin_tone), FACE_CROP / settings.solve.grid_cells, recipe)
+    state = sample(prior.of_tone(start.tone), start.observations, start.state, recipe, seeded(settings.seed))
     return images.linear_to_srgb(maps.finished(state, evidence, start, recipe).diffuse), {"seconds": round(time.monotonic() - began, 1)}
 
 
@@ -82,9 +83,9 @@ def true_frames(source: Capture, truth: Path, work: Capture, settings: Settings)
 
 def as_albedo(capture: Capture, settings: Settings) -> np.ndarray:
     """The texture whose confident facial skin has been brought to the skin tone, sRGB [S, S, 3]."""
-    texture, tone = images.read_linear(capture.texture), np.array([float(v) for v in settings.solve.skin_tone.split(",")])
+    texture, tone = images.read_linear(capture.texture), np.array(parse_skin_tone(settings.solve.skin_tone).linear, np.float32)
     skin = images.read_data(capture.texture_confidence)[..., 0] * template.mask("skin", len(texture))
-    return images.linear_to_srgb(toned(texture, images.srgb_to_linear(tone), skin))
+    return images.linear_to_srgb(toned(texture, tone, skin))
 
 
 def _copy(source: Capture, work: Capture) -> None:

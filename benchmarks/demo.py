@@ -20,6 +20,7 @@ from core.contract.capture import Capture, write_json
 from core.contract.settings import QUALITIES, from_json, preset
 
 from . import albedo_score, figures
+from .people import skin_tone
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLE = ROOT / "core" / "synthetic" / "sample"
@@ -35,7 +36,7 @@ def main() -> int:
     arguments = parser.parse_args()
     capture = Capture(arguments.folder.resolve() / "sample.wildcap")
     started = time.monotonic()
-    tone = (SAMPLE / "skin_tone.txt").read_text(encoding="ascii").split("#")[0].replace(" ", "").strip()
+    tone = skin_tone(SAMPLE)
     code = subprocess.call([sys.executable, "-m", "core", "run", str(SAMPLE / "capture.mp4"), str(capture.root), "--quality", arguments.quality,
                             "--skin-tone", tone], cwd=ROOT)
     if code:

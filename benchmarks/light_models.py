@@ -20,7 +20,7 @@ from torch.nn import functional
 
 from core.solve.initial import Start
 from core.solve.light_fit import uneven, update_lights
-from core.solve.lighting import Lights, sh_basis
+from core.solve.lighting import Lights, shading_basis
 from core.solve.problem import Observation, albedo, photometric
 from core.solve.recipes import Recipe
 
@@ -40,7 +40,7 @@ class RegionShader:
     """Shading by K soft regions: sum over k of softmax(logits)_k (gamma^g + gamma_k) . basis(N_c)."""
 
     def __init__(self, normal: torch.Tensor):
-        self.basis = sh_basis(normal)  # [9, H, W]
+        self.basis = shading_basis(normal)  # [9, H, W]
 
     def main(self, lights: Lights) -> torch.Tensor:
         """Shading by what all regions share [3, H, W]."""

@@ -27,10 +27,11 @@ from core.imaging import images
 from core.solve.draft import restored
 from core.solve.lighting import Lights, Shader, constant_light
 from core.solve.network import denoise
-from core.solve.prior import WEIGHTS, Prior, condition, coordinates, load, mean_at
+from core.solve.prior import WEIGHTS, ConditionedPrior, Prior, condition, coordinates, load, mean_at
 from core.solve.problem import Observation, State
 from core.solve.recipes import OURS
 from core.solve.sampler import ancestral, karras, sample, seeded
+from core.solve.skin_tone import GIVEN, SkinTone
 from core.synthetic.skin import make_skin
 from core.training.patches import mean_map
 from core.training.skins import SCALES, carried_names, carried_skins, synthetic_skins
@@ -129,13 +130,14 @@ def measure_response(options: argparse.Namespace) -> None:
     for i, seed in enumerate(options.subjects):
         truth = skins[seed]
         other = skins[options.subjects[(i + 1) % len(options.subjects)]]
-        solved = given_diffuse(prior, truth, options.steps)
-        mean = mean_at(prior.mean_face, coordinates(options.size, slice(0, options.size), slice(0, options.size)), prior.tone[None])[0]
+        conditioned = of_subject(prior, truth)
+        solved = given_diffuse(conditioned, truth, options.steps)
         coords = coordinates(options.size, slice(0, options.size), slice(0, options.size))
+        mean = mean_at(prior.mean_face, coords, conditioned.tone)[0]
         noise = torch.randn(1, *truth.shape, generator=torch.Generator().manual_seed(0))
-        expected = prior.respond(truth[None], coords, noise)[0]
-        draft = given_diffuse(prior, truth, options.steps, "proximal")
-        again = restored(prior, draft[None], coords, replace(OURS, guidance="proximal"), 0)[0]
+        expected = conditioned.respond(truth[None], coords, noise)[0]
+        draft = given_diffuse(conditioned, truth, options.steps, "proximal")
+        again = restored(conditioned, draft[None], coords, replace(OURS, guidance="proximal"), 0)[0]
         rows.append([errors(maps, truth, face) for maps in (solved, expected, again, draft, mean, other)])
         print(f"{seed}: " + "; ".join(f"{name} {angle:.2f} deg, {gloss:.4f}" for name, (angle, gloss) in zip(NAMES, rows[-1], strict=True)), flush=True)
     means = np.mean(rows, 0)
@@ -154,12 +156,16 @@ def reflectance(seed: int, size: int) -> torch.Tensor:
     return torch.from_numpy(np.concatenate([2 * made.diffuse - 1, made.normal, 2 * made.specular[..., None] - 1], -1).transpose(2, 0, 1).copy())
 
 
-def given_diffuse(prior: Prior, truth: torch.Tensor, steps: int, guidance: str = "dps") -> torch.Tensor:
+def of_subject(prior: Prior, truth: torch.Tensor) -> ConditionedPrior:
+    """The prior told the mean albedo of the skin of a map [7, S, S]."""
+    skin = torch.from_numpy(template.mask("skin", truth.shape[-1]) * (1 - template.mask("eyes", truth.shape[-1])))
+    return prior.of_tone(SkinTone.from_linear(((truth[:3] + 1) / 2 * skin).sum((1, 2)) / skin.sum(), GIVEN))
+
+
+def given_diffuse(prior: ConditionedPrior, truth: torch.Tensor, steps: int, guidance: str = "dps") -> torch.Tensor:
     """The map [7, S, S] that the solver samples under even light where the texture is the true albedo."""
     size = truth.shape[-1]
     albedo, everywhere = (truth[:3] + 1) / 2, torch.ones(size, size)
-    skin = torch.from_numpy(template.mask("skin", size) * (1 - template.mask("eyes", size)))
-    prior.use_tone((albedo * skin).sum((1, 2)) / skin.sum())
     found = {}
     for factor in (1, 2, 4):
         side = size // factor
@@ -172,7 +178,7 @@ def given_diffuse(prior: Prior, truth: torch.Tensor, steps: int, guidance: str =
     recipe = replace(OURS, steps=steps, phases=(), guidance=guidance)
     coords = coordinates(size, slice(0, size), slice(0, size))
     lights = Lights(constant_light(torch.ones(3)), torch.zeros(1, 9, 1, 1), torch.ones(3))
-    start = mean_at(prior.mean_face, coords, prior.tone[None])
+    start = mean_at(prior.prior.mean_face, coords, prior.tone)
     return sample(prior, found, State(0, None, start, lights), recipe, seeded(0)).denoised[0] * everywhere
 
 

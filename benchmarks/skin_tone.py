@@ -26,11 +26,11 @@ from core.contract.settings import Settings, from_json
 from core.face.head import read_head
 from core.imaging import images
 from core.solve.evidence import read_evidence
-from core.solve.initial import skin_tone
 from core.solve.look import Look
-from core.solve.population import GROUPS, Tone, estimate, group, lab
+from core.solve.population import GROUPS, estimate_skin_tone, group, lab
 from core.solve.prior import WEIGHTS
-from core.solve.tone import SIZE, automatic
+from core.solve.skin_tone import SkinTone
+from core.solve.tone import SIZE, estimate_from_frames, estimate_from_texture
 from core.synthetic.identities import reserved_seeds
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.pigment import reflectance
@@ -63,7 +63,7 @@ def main() -> None:
         for light, scene in enumerate(scenes):
             for phone in range(PHONES):
                 look, card = photographed(scene, np.random.default_rng([seed, light, phone, 33]))
-                for row, tone in (("before", before(look, known)), ("scene", estimate(look)), ("measured", estimate(look, card))):
+                for row, tone in (("before", before(look, known)), ("scene", estimate_skin_tone(look)), ("measured", estimate_skin_tone(look, card))):
                     rows[row].append((name, *errors(tone, scene.tone)))
     print_table(rows, subjects)
     captures = {}
@@ -81,17 +81,16 @@ def expected(seed: int) -> str:
     return group(reflectance(np.array([p.melanin]), np.array([p.blood]), p.oxygen, p.scattering, p.slope, p.chroma)[0])
 
 
-def before(look: Look, known: list) -> Tone:
+def before(look: Look, known: list) -> SkinTone:
     """What auto took of a texture whose light was all taken out: the best lit skin."""
     colour = torch.from_numpy(np.asarray(look.best * min(1, BRIGHTEST / look.best.max()), np.float32))
-    linear = skin_tone("auto", colour[:, None, None].expand(3, 8, 8).contiguous(), torch.ones(8, 8), known).numpy()
-    return Tone(linear, np.nan, np.nan, group(linear))
+    return estimate_from_texture(colour[:, None, None].expand(3, 8, 8).contiguous(), torch.ones(8, 8), known)
 
 
-def errors(tone: Tone, truth: np.ndarray) -> tuple[float, float, float]:
-    """Signed error of L*, delta E 2000, and the stated deviation of L*."""
-    found, true = lab(tone.linear), lab(truth)
-    return float(found[0] - true[0]), float(deltaE_ciede2000(true, found)), tone.deviation
+def errors(tone: SkinTone, truth: np.ndarray) -> tuple[float, float, float]:
+    """Signed error of L*, delta E 2000, and the stated deviation of L*, nan where none is stated."""
+    found, true = lab(np.array(tone.linear)), lab(truth)
+    return float(found[0] - true[0]), float(deltaE_ciede2000(true, found)), np.nan if tone.deviation is None else tone.deviation
 
 
 def summary(rows: dict[str, list], subjects: dict[str, int]) -> dict[str, dict]:
@@ -127,9 +126,10 @@ def of_capture(capture: Capture, srgb: np.ndarray, known: list) -> dict:
     head = read_head(capture)
     evidence, settings = read_evidence(capture, head, SIZE), from_json({}, Settings())
     lit = evidence.skin * evidence.weight * (1 - evidence.alpha)
-    linear = skin_tone("auto", evidence.texture, lit, known).numpy()
+    by_row = {"before": estimate_from_texture(evidence.texture, lit, known),
+              "scene": estimate_from_frames(capture, head, settings, evidence, Reporter("skin_tone"))}
     found: dict = {"lightness": lab(truth)[0]}
-    for row, tone in (("before", Tone(linear, np.nan, np.nan, group(linear))), ("scene", automatic(capture, head, settings, evidence, Reporter("skin_tone")))):
+    for row, tone in by_row.items():
         signed, colour, stated = errors(tone, truth)
         print(f"{row:9} {capture.root.name:20} {group(truth):13} L* {lab(truth)[0]:.1f} error {signed:+.2f} delta E {colour:.2f} stated {stated:.2f}")
         found[row] = {"lightness": signed, "delta_e": colour, "stated": stated if np.isfinite(stated) else None}

@@ -26,6 +26,7 @@ from core.face import template
 from core.geometry import meshes
 from core.imaging import images
 from core.solve.recipes import OURS, RECIPES
+from core.solve.skin_tone import GIVEN, SkinTone, format_skin_tone
 from core.synthetic.light import uv_problem
 
 
@@ -57,13 +58,13 @@ def _solve_one(capture: Capture, seed: int, options: argparse.Namespace):
     size = options.size
     truth, texture, shadow, mask = problem(seed, size, options.shadows[seed % len(options.shadows)])
     skin = template.mask("skin", size) * (1 - template.mask("eyes", size))
-    tone = images.linear_to_srgb((truth * skin[..., None]).sum((0, 1)) / skin.sum())
+    tone = SkinTone.from_linear((truth * skin[..., None]).sum((0, 1)) / skin.sum(), GIVEN)
     images.write_linear(capture.texture, texture)
     images.write_data(capture.texture_confidence, np.ones((size, size), np.float32))
     images.write_data(capture.shadow_mask_auto, mask)
     meshes.write_obj(capture.head, template.load())
     settings = from_json({"delight": {"delighter": "none"}, "solve": {"size": size, "steps": options.steps, "guidance": options.guidance,
-                                    "recipe": options.recipe, "skin_tone": "auto" if options.auto_tone else ",".join(f"{v:.5f}" for v in tone)}})
+                                    "recipe": options.recipe, "skin_tone": "auto" if options.auto_tone else format_skin_tone(tone)}})
     began = time.monotonic()
     solve.run(capture, settings, Reporter("solve"))
     seconds = time.monotonic() - began

@@ -24,7 +24,7 @@ from core.contract.messages import Reporter
 from core.face import template
 from core.geometry import meshes
 from core.imaging import images
-from core.solve.lighting import fit_global, sh_basis
+from core.solve.lighting import fit_global, shading_basis
 from core.synthetic import light
 from core.synthetic.light import bake, random_light
 from core.synthetic.parameters import sample_parameters
@@ -145,7 +145,7 @@ def _painted(shadow: np.ndarray) -> np.ndarray:
 
 def _sh_part(shading: np.ndarray, normal: np.ndarray, face: np.ndarray) -> np.ndarray:
     """[S, S, 3]: the second-order SH of the normals that are nearest to a shading on the face."""
-    basis = sh_basis(torch.from_numpy(np.ascontiguousarray(normal.transpose(2, 0, 1), np.float32)))
+    basis = shading_basis(torch.from_numpy(np.ascontiguousarray(normal.transpose(2, 0, 1), np.float32)))
     wanted = torch.from_numpy(np.ascontiguousarray(shading.transpose(2, 0, 1), np.float32))
     gamma = fit_global(wanted, torch.ones_like(wanted), basis, torch.from_numpy(face.astype(np.float32)), ridge=1e-4)
     fitted = torch.einsum("ck,khw->hwc", gamma, basis).numpy()

@@ -31,9 +31,11 @@ from core.contract.messages import Reporter
 from core.contract.settings import Settings, from_json
 from core.face import template
 from core.imaging import images
+from core.solve.skin_tone import parse_skin_tone
 
 from .albedo_score import score_capture
 from .figures import write
+from .people import skin_tone
 from .shadow_captures import lifted_truth
 
 ROWS = ("chain", "solve_off", "raw_texture", "true_frames", "true_mask", "mask", "delighters")
@@ -49,7 +51,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="where the table's figures go, such as docs/figures/whole_chain.json; those of other captures stay")
     arguments = parser.parse_args()
     capture = Capture(arguments.capture.resolve())
-    tone = (arguments.truth / "skin_tone.txt").read_text(encoding="ascii").split("#")[0].replace(" ", "").strip()
+    tone = skin_tone(arguments.truth)
     settings = from_json({"solve": {**_solve_settings(capture), "skin_tone": tone}})
     rows = {row: _row(row, capture, arguments.truth, settings) for row in arguments.rows if row != "delighters"}
     if "delighters" in arguments.rows:
@@ -114,7 +116,7 @@ def _score_texture(capture: Capture, truth: Path, settings: Settings) -> dict:
     """The score of the texture whose confident facial skin has been brought to the skin tone."""
     texture = images.read_linear(capture.texture)
     skin = images.read_data(capture.texture_confidence)[..., 0] * template.mask("skin", len(texture))
-    tone = images.srgb_to_linear(np.array([float(v) for v in settings.solve.skin_tone.split(",")]))
+    tone = np.array(parse_skin_tone(settings.solve.skin_tone).linear, np.float32)
     scaled = texture * (tone * skin.sum() / (texture * skin[..., None]).sum((0, 1)))
     path = capture.root / "texture_as_albedo.png"
     images.write_srgb(path, images.linear_to_srgb(scaled), bits=16)

@@ -15,6 +15,7 @@ from core.geometry import meshes
 from core.imaging import images
 from core.solve import confidence, initial
 from core.solve.prior import load
+from core.solve.skin_tone import GIVEN, SkinTone, format_skin_tone
 
 SIZE = 128
 TONE = np.array([0.42, 0.26, 0.18], np.float32)  # linear
@@ -51,7 +52,7 @@ def settings(seed: int = 0, edited_part: bool = False, **options) -> Settings:
 
 def as_setting(tone: np.ndarray) -> str:
     """A linear colour as settings.solve.skin_tone."""
-    return ",".join(f"{v:.5f}" for v in images.linear_to_srgb(tone))
+    return format_skin_tone(SkinTone.from_linear(tone, GIVEN))
 
 
 SHORT = {"size": SIZE, "steps": 8, "guidance": "proximal", "skin_tone": as_setting(TONE), "checkpoint_every": 2}

@@ -18,12 +18,13 @@ from core.face import template
 from core.geometry import meshes, raster
 from core.geometry.views import read_views
 from core.imaging import images
-from core.light.skylight import fibonacci_sphere, radiance_transfer, sh_basis
+from core.light.skylight import fibonacci_sphere, radiance_transfer
+from core.light.spherical_harmonics import LAMBERT, per_function, sh_basis
 from core.light.sunlight import fit_light
 
 SKIN = np.array([0.45, 0.28, 0.20])
 SKY = np.zeros((9, 3))
-SKY[0], SKY[1], SKY[2], SKY[6] = [2.0, 2.3, 2.6], [-0.5, -0.4, -0.3], [0.3, 0.4, 0.6], [0.15, 0.15, 0.1]  # radiance, bluish from above
+SKY[0], SKY[1], SKY[2], SKY[6] = [2.0, 2.3, 2.6], [0.5, 0.4, 0.3], [0.3, 0.4, 0.6], [0.15, 0.15, 0.1]  # radiance, bluish from above
 SUN = np.array([-0.45, -0.60, 0.66]) / np.linalg.norm([-0.45, -0.60, 0.66])
 SUN_COLOUR = np.array([1.5, 1.25, 0.95])
 
@@ -115,7 +116,7 @@ def test_quarter_of_the_skin_in_shadow_does_not_move_the_light():
     rng = np.random.default_rng(0)
     normals = fibonacci_sphere(4000)
     normals = normals[normals[:, 1] < 0.2]  # the front, as cameras see it
-    transfer = sh_basis(normals) * np.array([1, *[2 / 3] * 3, *[1 / 4] * 5])  # a convex body: Lambert's cosine lobe (Ramamoorthi and Hanrahan 2001)
+    transfer = sh_basis(normals) * per_function(LAMBERT)  # a convex body
     shadow = np.cos(9 * normals[:, 0] + 4 * normals[:, 2]) > np.cos(0.25 * np.pi)  # leaves
     sky, sun = transfer @ SKY, np.maximum(normals @ SUN, 0)[:, None] * SUN_COLOUR
     colours = SKIN * (sky + ~shadow[:, None] * sun) * np.exp(rng.normal(0, 0.03, (len(normals), 1)))

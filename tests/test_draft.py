@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from benchmarks.prior_figures import errors, given_diffuse, reflectance
+from benchmarks.prior_figures import errors, given_diffuse, of_subject, reflectance
 from core.face import template
 from core.solve.draft import restored
 from core.solve.prior import coordinates, load
@@ -59,8 +59,9 @@ def test_a_sampled_map_and_another_guidance_stay_as_they_are():
 @pytest.mark.parametrize("seed", [9000, 9003])
 def test_the_shipped_prior_restores_a_held_out_subject(seed):
     """Both errors fall by an eighth at least, and a part of the map is restored as the whole is."""
-    size, prior = 256, load()
+    size = 256
     truth, face = reflectance(seed, size), torch.from_numpy(template.mask("face", size) > 0.5)
+    prior = of_subject(load(), truth)
     drawn = given_diffuse(prior, truth, 30, "proximal")  # as many as a draft takes
     coords = coordinates(size, slice(0, size), slice(0, size))
     out = restored(prior, drawn[None], coords, DRAFT, 0)[0]

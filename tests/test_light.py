@@ -7,10 +7,11 @@ import trimesh
 
 from core.geometry.meshes import Mesh
 from core.geometry.raster import RayCaster
+from core.light.spherical_harmonics import LAMBERT, UNIFORM, per_function, sh_basis
 from core.synthetic import light
 
 WHITE_SKY = np.zeros((9, 3))
-WHITE_SKY[0] = 1 / 0.282095
+WHITE_SKY[0] = UNIFORM
 
 
 def floor(half: float = 0.1, sphere: float | None = None) -> Mesh:
@@ -36,7 +37,7 @@ def test_one_direction_of_the_sky_is_lambert_s_answer_to_it():
     ball = trimesh.creation.icosphere(2, radius=0.1)
     normals = ball.vertices / 0.1
     found = light.transfer(ball.vertices, normals, RayCaster(Mesh(ball.vertices, ball.faces)), rays=512)
-    assert np.allclose(found, light.sh_basis(normals) * light.LAMBERT, atol=0.03)
+    assert np.allclose(found, sh_basis(normals) * per_function(LAMBERT), atol=0.03)
 
 
 def test_the_sun_on_a_floor_follows_the_cosine_and_casts_no_shadow():

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from core.solve.light_fit import BAND_OF, SIDEWAYS, uneven, update_lights
-from core.solve.lighting import Lights, Shader, constant_light, fit_global, interpolation, sh_basis
+from core.solve.lighting import Lights, Shader, constant_light, fit_global, interpolation, shading_basis
 from core.solve.problem import Observation, State
 from core.solve.recipes import OURS
 
@@ -25,7 +25,7 @@ def sphere(rows: int = 200, columns: int = 400):
 
 def test_basis_is_orthogonal_with_the_stated_band_scales():
     directions, solid = sphere()
-    basis = sh_basis(directions).reshape(9, -1)
+    basis = shading_basis(directions).reshape(9, -1)
     gram = (basis * solid.reshape(-1)) @ basis.T
     lambert = [np.pi] + [2 * np.pi / 3] * 3 + [np.pi / 4] * 5
     scale = [1] + [3**0.5] * 3 + [2 * 2**0.5] * 5
@@ -35,7 +35,7 @@ def test_basis_is_orthogonal_with_the_stated_band_scales():
 
 def test_shading_is_the_cosine_integral_of_the_radiance():
     directions, solid = sphere()
-    basis = sh_basis(directions)
+    basis = shading_basis(directions)
     factor = torch.tensor([np.pi] + [2 * np.pi / 3 * 3**0.5] * 3 + [np.pi / 4 * 2 * 2**0.5] * 5)
     y = basis / factor[:, None, None]  # orthonormal
     rng = np.random.default_rng(0)
@@ -45,7 +45,7 @@ def test_shading_is_the_cosine_integral_of_the_radiance():
     irradiance = torch.einsum("cn,chw->nhw", normals, directions).clamp_min(0)
     irradiance = (irradiance * radiance * solid).sum((1, 2))
     gamma = coefficients / torch.tensor([1] + [3**0.5] * 3 + [2 * 2**0.5] * 5)
-    assert torch.allclose((gamma[:, None] * sh_basis(normals)).sum(0), irradiance, atol=1e-3)
+    assert torch.allclose((gamma[:, None] * shading_basis(normals)).sum(0), irradiance, atol=1e-3)
 
 
 def test_constant_light_shades_a_sphere_evenly():
@@ -84,7 +84,7 @@ def test_interpolation_keeps_constants_and_lines():
 
 def test_global_light_is_found_in_closed_form():
     directions, _ = sphere(48, 48)
-    basis = sh_basis(directions.float())
+    basis = shading_basis(directions.float())
     generator = torch.Generator().manual_seed(1)
     gamma = constant_light(torch.ones(3)) + 0.1 * torch.randn(3, 9, generator=generator)
     albedo = 0.2 + 0.5 * torch.rand(3, 48, 48, generator=generator)
@@ -97,8 +97,8 @@ def test_global_light_is_found_in_closed_form():
 def test_what_tells_left_from_right_is_held_to_an_even_light_by_its_share_alone():
     """On a sphere the basis is orthogonal: the share of each light that a pull leaves follows from its norm in closed form."""
     directions, solid = sphere(24, 48)
-    basis = sh_basis(directions.float())
-    mirrored = sh_basis(directions.float() * torch.tensor([-1.0, 1, 1])[:, None, None])
+    basis = shading_basis(directions.float())
+    mirrored = shading_basis(directions.float() * torch.tensor([-1.0, 1, 1])[:, None, None])
     assert torch.allclose(mirrored, basis * (1 - 2 * SIDEWAYS)[:, None, None], atol=1e-6)
     recipe = replace(OURS, even=0.2, sides=0.05)
     weight = (solid / solid.mean()).sqrt().float()  # L_pho weighs squares: a quadrature over the sphere

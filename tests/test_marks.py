@@ -23,6 +23,7 @@ from core.solve.marks import Mark, find, unlike_shadow
 from core.solve.prior import load
 from core.solve.recipes import OURS
 from core.solve.sampler import sample, seeded
+from core.solve.skin_tone import GIVEN, SkinTone
 
 SIZE = 512
 TEXEL = 1024 / SIZE
@@ -116,9 +117,9 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     images.write_data(capture.shadow_mask, (distance_to(row - 1.5, column + 1.5) < 98).astype(np.float32))
     meshes.write_obj(capture.head, template.load())
     evidence, recipe = read_evidence(capture, read_head(capture), SIZE), replace(OURS, guidance="proximal", steps=16)
-    start = initial.start(prior, evidence, ",".join(f"{v:.5f}" for v in images.linear_to_srgb(TONE)), 8.0, recipe)
+    start = initial.start(prior, evidence, SkinTone.from_linear(TONE, GIVEN), 8.0, recipe)
     assert [(round(m.row / 4), round(m.column / 4)) for m in start.marks] == [(round(row / 4), round(column / 4))]
-    solved = maps.finished(sample(prior, start.observations, start.state, recipe, seeded(0)), evidence, start, recipe).diffuse
+    solved = maps.finished(sample(prior.of_tone(start.tone), start.observations, start.state, recipe, seeded(0)), evidence, start, recipe).diffuse
 
     def contrast(image):
         log, away = np.log(np.maximum(image, 1e-3)).mean(-1), distance_to(row, column)

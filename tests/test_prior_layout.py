@@ -27,6 +27,7 @@ from core.solve import initial, layout
 from core.solve.lighting import Lights
 from core.solve.maps import Maps
 from core.solve.prior import WEIGHTS, load
+from core.solve.skin_tone import GIVEN, SkinTone, format_skin_tone
 
 from .own_heads import person
 from .painted_skin import brief_confidence  # noqa: F401
@@ -93,14 +94,20 @@ def authors(tmp_path):
 
 
 def settings(prior, **options):
-    tone = ",".join(f"{v:.5f}" for v in images.linear_to_srgb(TONE))
+    tone = format_skin_tone(SkinTone.from_linear(TONE, GIVEN))
     return from_json({"solve": {"size": SIZE, "steps": 10, "guidance": "proximal", "skin_tone": tone, "prior": str(prior), **options}})
 
 
 def seen_layouts(monkeypatch) -> list[layout.Layout]:
     """Gets the layouts that runs from here on work in."""
     fitted, kept = layout.fitted, []
-    monkeypatch.setattr(layout, "fitted", lambda *given: kept.append(fitted(*given)) or kept[-1])
+
+    def keep(*given):
+        found = fitted(*given)
+        kept.append(found[0])
+        return found
+
+    monkeypatch.setattr(layout, "fitted", keep)
     return kept
 
 
@@ -124,7 +131,7 @@ def round_trip(there: layout.Layout, albedo: np.ndarray, normal: np.ndarray) -> 
     up = torch.zeros(3, size, size)
     up[2] = 1
     e = layout.Evidence(torch.zeros(3, size, size), 0 * ones, 0 * ones, up, ones > 0, ones, ones, 0 * ones, 0 * ones)
-    return there.returned(solved, e, Lights(torch.ones(3, 9), torch.zeros(1, 9, 1, 1), torch.ones(3)), 1.0, torch.from_numpy(TONE))
+    return there.returned(solved, e, Lights(torch.ones(3, 9), torch.zeros(1, 9, 1, 1), torch.ones(3)), 1.0, SkinTone.from_linear(TONE, GIVEN))
 
 
 def test_a_smooth_map_survives_both_ways(carried):

@@ -171,12 +171,12 @@ def test_noise_is_read_where_the_folder_carries_it_and_asked_for_where_not(tmp_p
     x = torch.zeros(1, 7, 16, 16)
     coords = prior.coordinates(64, slice(8, 24), slice(32, 48), centred=False)
     with pytest.raises(Problem, match="fixed random map"):
-        prior.load(tmp_path, dtype=torch.float32)(x, 1.0, coords)
+        prior.load(tmp_path, dtype=torch.float32).of_tone()(x, 1.0, coords)
     noise = np.random.default_rng(0).normal(size=(3, 64, 64)).astype(np.float32)
     np.save(tmp_path / released.NOISE_FILE, noise)
     loaded = prior.load(tmp_path, dtype=torch.float32)
     window = torch.from_numpy(noise[None, :, 8:24, 32:48])
-    assert (loaded(x, 1.0, coords) - denoise(loaded.network, x, torch.tensor([1.0]), window)).abs().max() < 1e-6
+    assert (loaded.of_tone()(x, 1.0, coords) - denoise(loaded.network, x, torch.tensor([1.0]), window)).abs().max() < 1e-6
     np.save(tmp_path / released.NOISE_FILE, noise[:2])
     with pytest.raises(Problem, match="of shape"):
         prior.load(tmp_path)

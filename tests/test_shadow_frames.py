@@ -21,7 +21,8 @@ from core.face.head import Head, Unfolded
 from core.geometry import meshes, raster
 from core.geometry.views import View
 from core.imaging import images
-from core.light.skylight import ambient_occlusion, radiance_transfer, sh_basis
+from core.light.skylight import ambient_occlusion, radiance_transfer
+from core.light.spherical_harmonics import sh_basis
 from core.shadow_mask import run, sunless
 from core.shadow_mask.frames import filtered, softening
 from core.shadow_mask.lift import lift_shadows

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 pytest.importorskip("torch")
-from core.contract.messages import Reporter
+import torch
+
+from core.contract.messages import Problem, Reporter
 from core.contract.settings import from_json
 from core.face.head import read_head
-from core.solve import look, population, tone
+from core.solve import look, population, prior, tone
+from core.solve.skin_tone import GIVEN, SCENE, TEXTURE, WHITE_POINT, SkinTone, format_skin_tone, parse_skin_tone
 from core.training import tones
 
 BRIGHT = np.array([1.4, 1.3, 1.2])
@@ -46,9 +49,9 @@ def test_with_a_measured_white_a_tone_is_what_it_is(reflects):
     known = population.population()
     true = known.tones[np.abs(known.tones[:, 0] - reflects).argmin()]
     shown = (true + population.SHEEN) * BRIGHT
-    found = [population.estimate(look.Look(gain * shown, gain * shown), white=gain * BRIGHT) for gain in (0.2, 0.7)]
+    found = [population.estimate_skin_tone(look.Look(gain * shown, gain * shown), white=gain * BRIGHT) for gain in (0.2, 0.7)]
     assert np.allclose(found[0].linear, found[1].linear, rtol=1e-3)
-    assert abs(population.lab(found[0].linear)[0] - population.lab(true)[0]) < 4 and 0 < found[0].deviation < 10
+    assert abs(population.lab(np.array(found[0].linear))[0] - population.lab(true)[0]) < 4 and 0 < found[0].deviation < 10
 
 
 def test_the_stated_deviation_holds_and_no_group_is_drawn_to_the_middle():
@@ -58,9 +61,9 @@ def test_the_stated_deviation_holds_and_no_group_is_drawn_to_the_middle():
         for k, scene in enumerate(tones.scenes_of(seed)[:2]):
             shown, card = tones.photographed(scene, np.random.default_rng([seed, k]))
             true = population.lab(scene.tone)[0]
-            found = population.estimate(shown)
-            signed.append(population.lab(found.linear)[0] - true)
-            measured.append(population.lab(population.estimate(shown, card).linear)[0] - true)
+            found = population.estimate_skin_tone(shown)
+            signed.append(population.lab(np.array(found.linear))[0] - true)
+            measured.append(population.lab(np.array(population.estimate_skin_tone(shown, card).linear))[0] - true)
             stated.append(found.deviation)
             light.append(true)
     signed, stated, light = np.array(signed), np.array(stated), np.array(light)
@@ -77,13 +80,42 @@ def test_groups_by_their_angle():
         assert group(from_lab(np.array([lightness, 12.0, 16.0]))) == name
 
 
+def test_a_setting_is_a_tone_and_a_tone_a_setting():
+    told = parse_skin_tone("0.69,0.54,0.45")
+    assert told.source == GIVEN and told.deviation is None and np.allclose(told.srgb, [0.69, 0.54, 0.45], atol=1e-6)
+    assert told.tensor.dtype == torch.float32 and tuple(told.tensor.tolist()) == told.linear
+    assert parse_skin_tone(format_skin_tone(told)) == told and parse_skin_tone("auto") is None
+    for wrong in ("pink", "0.5,0.4", "0.5,0.4,0", "0.5,0.4,1.1", "nan,0.4,0.3", ""):
+        with pytest.raises(Problem, match="not a colour"):
+            parse_skin_tone(wrong)
+
+
+def test_who_types_the_estimated_tone_gives_the_solve_the_same():
+    shown, white = look.Look(np.array([0.41, 0.27, 0.2]), np.array([0.35, 0.22, 0.17])), np.array([0.8, 0.77, 0.7])
+    for found, source in ((population.estimate_skin_tone(shown), SCENE), (population.estimate_skin_tone(shown, white), WHITE_POINT)):
+        assert found.source == source and found.group and found.deviation > 0 and found.error > 0
+        assert parse_skin_tone(format_skin_tone(found)).linear == found.linear
+
+
+def test_a_prior_is_told_a_tone_and_stays_as_it_is():
+    ours, coords = prior.load(dtype=torch.float32), prior.coordinates(1024, slice(480, 512), slice(480, 512))
+    x = torch.randn(1, 7, 32, 32, generator=torch.Generator().manual_seed(0))
+    before = dict(vars(ours))
+    light, dark = (ours.of_tone(SkinTone((tone, 0.7 * tone, 0.5 * tone), GIVEN)) for tone in (0.6, 0.1))
+    first = light(x, 1.0, coords)
+    assert not torch.equal(dark(x, 1.0, coords), first) and torch.equal(light(x, 1.0, coords), first)
+    assert all(vars(ours)[name] is value for name, value in before.items()) and len(before) == len(vars(ours))
+
+
 def test_the_artists_tone_wins_and_a_capture_without_cameras_asks_its_texture(tmp_path):
     from .painted_skin import make, settings
 
     capture, report = make(tmp_path / "a.wildcap"), Reporter("solve")
     head = read_head(capture)
     evidence = tone.read_evidence(capture, head, 64)
-    assert tone.asked(capture, head, settings(skin_tone="0.5,0.4,0.3"), evidence, report) == "0.5,0.4,0.3"
-    assert tone.asked(capture, head, settings(skin_tone="auto"), evidence, report) == "auto" and not report.figures
+    told = tone.resolve_skin_tone(capture, head, settings(skin_tone="0.5,0.4,0.3"), evidence, evidence, [], report)
+    assert told == SkinTone.from_srgb([0.5, 0.4, 0.3], GIVEN)
+    found = tone.resolve_skin_tone(capture, head, settings(skin_tone="auto"), evidence, evidence, [], report)
+    assert found.source == TEXTURE and not report.figures
     tone.run(capture, from_json({}), report)
     assert report.figures["skin_tone_source"] == "texture"

@@ -15,10 +15,11 @@ from core.contract.stages import MAPS
 from core.face import template
 from core.face.head import read_head
 from core.imaging import images
-from core.solve import initial
+from core.solve import initial, tone
 from core.solve.evidence import read_evidence, softened
 from core.solve.prior import WEIGHTS, load
 from core.solve.problem import albedo
+from core.solve.skin_tone import GIVEN, SkinTone
 from core.synthetic.identities import reserved_seeds
 
 from .painted_skin import SIZE, TONE, as_setting, brief_confidence, make, settings  # noqa: F401
@@ -136,9 +137,8 @@ def test_auto_tone_ignores_what_is_masked_and_stays_human():
     texture = torch.from_numpy(TONE)[:, None, None].expand(3, 20, 20).clone()
     weight = torch.ones(20, 20)
     texture[:, :5], weight[:5] = 0.01, 0.0
-    assert torch.allclose(initial.skin_tone("auto", texture, weight, []), torch.from_numpy(TONE), atol=1e-4)
-    assert initial.skin_tone("auto", texture * 10, weight, [])[1] <= initial.HUMAN_GREEN[1] + 1e-6
-    assert torch.allclose(initial.skin_tone("1,1,1", texture, weight, []), torch.ones(3))
+    assert np.allclose(tone.estimate_from_texture(texture, weight, []).linear, TONE, atol=1e-4)
+    assert tone.estimate_from_texture(texture * 10, weight, []).linear[1] <= tone.HUMAN_GREEN[1] + 1e-6
 
 
 def test_a_hard_mask_gets_a_soft_border():
@@ -159,13 +159,13 @@ def test_the_card_names_its_seeds_and_they_are_not_the_sample_subjects():
 
 def test_the_nearest_skin_is_the_one_that_was_filmed(capture):
     """Under another light, another tone and a shadow that M covers."""
-    prior, tone = load(), torch.from_numpy(TONE)
+    prior, told = load(), SkinTone.from_linear(TONE, GIVEN)
     evidence = read_evidence(capture, read_head(capture), SIZE)
     light = images.read_linear(capture.texture) / np.maximum(filmed(prior.mean_face, evidence), 1e-3)
     for skin in prior.references[[3, 7]]:
         evidence = replace(evidence, texture=torch.from_numpy((filmed(skin, evidence) * light).transpose(2, 0, 1)))
-        found = initial.reference(prior, tone, evidence, "nearest")
-        assert torch.equal(found, initial.face_of_tone(skin, tone, evidence.skin))
+        found = initial.reference(prior, told, evidence, "nearest")
+        assert torch.equal(found, initial.face_of_tone(skin, told.tensor, evidence.skin))
 
 
 def filmed(face, evidence) -> np.ndarray:

@@ -13,6 +13,7 @@ from core.contract.messages import Problem, Reporter
 from core.face import template
 from core.imaging import images
 from core.solve.prior import build, load
+from core.solve.skin_tone import GIVEN, SkinTone
 from core.synthetic import pigment
 from core.training import prior, skins
 from core.training.patches import Windows, mean_map, spread_about
@@ -143,6 +144,7 @@ def test_a_training_goes_on_where_it_stopped(carried, cache, tmp_path, monkeypat
     assert 0 < first["steps"] < second["steps"]
     assert second["skins"] == ["a"] and second["held_out_skins"] == ["b"] and second["notices"] == ["Theirs."]
     assert set(second["held_out"]["loss"]) == {"synthetic", "carried"} and not set(second["seeds"]) & set(second["held_out_seeds"])
-    assert load(out)(torch.zeros(1, 7, 32, 32), 1.0, torch.zeros(1, 2, 32, 32) + torch.linspace(0, 0.1, 32)).isfinite().all()
+    conditioned = load(out).of_tone(SkinTone((0.4, 0.3, 0.2), GIVEN))
+    assert conditioned(torch.zeros(1, 7, 32, 32), 1.0, torch.zeros(1, 2, 32, 32) + torch.linspace(0, 0.1, 32)).isfinite().all()
     with pytest.raises(Problem, match="other data"):
         prior.train_prior("cpu", out, QUIET, 0.03, None, [], cache)

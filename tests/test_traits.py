@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from core.solve.lighting import constant_light, sh_basis
+from core.solve.lighting import constant_light, shading_basis
 from core.solve.traits import held
 
 SIZE = 128
@@ -30,7 +30,7 @@ def lamp(colour, amount):
     """Shading [3, S, S] about one of a lamp from above and the front, in a colour."""
     gamma = constant_light(torch.ones(3))
     gamma[:, [1, 2, 5]] += amount * torch.tensor(colour)[:, None] * torch.tensor([0.5, 1.0, -0.4])
-    return torch.einsum("ck,khw->chw", gamma, sh_basis(NORMAL))
+    return torch.einsum("ck,khw->chw", gamma, shading_basis(NORMAL))
 
 
 def told(texture):

@@ -15,7 +15,7 @@ import torch
 from core.solve import maps, prior
 from core.solve.initial import mean_tone
 from core.solve.light_fit import light_loss
-from core.solve.lighting import Lights, Shader, interpolation, sh_basis
+from core.solve.lighting import Lights, Shader, interpolation, shading_basis
 from core.solve.network import denoise
 from core.solve.problem import Observation, State, albedo, blurred
 from core.solve.recipes import RECIPES, Recipe
@@ -41,10 +41,10 @@ def close(ours, theirs, tolerance=2e-5):
 
 def test_vectors_sh_shading():
     v = arrays("sh_shading.npz")
-    basis = sh_basis(v["normal"][0])
+    basis = shading_basis(v["normal"][0])
     close(basis.permute(1, 2, 0), v["basis"])
     close((basis.permute(1, 2, 0) * v["gamma_map"]).sum(-1), v["shading_map"])
-    close((sh_basis(v["normal_nonunit"][0]).permute(1, 2, 0) * v["gamma_map"]).sum(-1), v["shading_map_nonunit"])
+    close((shading_basis(v["normal_nonunit"][0]).permute(1, 2, 0) * v["gamma_map"]).sum(-1), v["shading_map_nonunit"])
     shader = Shader(v["normal"][0], torch.zeros(16, 20), (1, 1))
     close(shader.main(Lights(v["gamma_global"][:, 0, 0], torch.zeros(3, 9, 1, 1), torch.ones(3))), v["shading_global"])
 
@@ -124,7 +124,7 @@ def test_vectors_miniloop(run):
     rows, columns = slice(2, 34), slice(4, 36)
     if "prior_v1_coord" not in PRIORS:
         pytest.skip(f"the loop's prior, {VECTORS / 'prior_v1_coord'}, is missing")
-    network = prior.load(VECTORS / "prior_v1_coord", dtype=torch.float32)
+    denoiser = prior.load(VECTORS / "prior_v1_coord", dtype=torch.float32).of_tone()
 
     def crop(name):
         return v[name][0][:, rows, columns]
@@ -150,7 +150,7 @@ def test_vectors_miniloop(run):
         close(state.lights.grid, v["grid"][k], 2e-4)
 
     first = Lights(v["gamma_main"][0][:, 0, 0].clone(), torch.zeros(3, 9, 8, 8), torch.ones(3))
-    last = sample(network, {1: o}, State(0, None, reference, first), recipe, noise, compare)
+    last = sample(denoiser, {1: o}, State(0, None, reference, first), recipe, noise, compare)
     with torch.no_grad():
         close(albedo(last.denoised), v["out_diff"][0], 2e-4)
         close(blurred(albedo(last.denoised) * shader.total(last.lights)), v["out_shading"][0], 4e-4)

@@ -11,18 +11,17 @@ from collections.abc import Callable
 import numpy as np
 
 from ..geometry.raster import RayCaster
-
-EVEN = 1 / 0.282095  # the coefficient of radiance 1 from everywhere
+from .spherical_harmonics import UNIFORM, sh_basis
 
 
 def ambient_occlusion(transfer: np.ndarray) -> np.ndarray:
     """radiance_transfer [..., 9] -> [...] in [0, 1]: the share of an even sky's light that reaches the surface; 1 where nothing is in the way."""
-    return np.clip(EVEN * transfer[..., 0], 0, 1)
+    return np.clip(UNIFORM * transfer[..., 0], 0, 1)
 
 
 def radiance_transfer(caster: RayCaster, points: np.ndarray, normals: np.ndarray, rays: int = 128,
                       step: Callable[[int, int], None] = lambda done, of: None) -> np.ndarray:
-    """[N, 9]: irradiance / pi at surface points from each SH basis radiance, occluded by the mesh."""
+    """[N, 9]: irradiance / pi at surface points from the radiance of each orthonormal harmonic (spherical_harmonics.py), occluded by the mesh."""
     transfer = np.zeros((len(points), 9))
     directions = fibonacci_sphere(rays)
     basis = sh_basis(directions)
@@ -34,13 +33,6 @@ def radiance_transfer(caster: RayCaster, points: np.ndarray, normals: np.ndarray
         free = facing[~caster.blocked(points[facing] + 1e-3 * normals[facing], np.repeat(direction[None], len(facing), 0))]
         transfer[free] += cosine[free, None] * basis[i] * (4 / rays)
     return transfer
-
-
-def sh_basis(directions: np.ndarray) -> np.ndarray:
-    """Real orthonormal spherical harmonics to the second order at unit directions [..., 3] -> [..., 9]."""
-    x, y, z = np.moveaxis(directions, -1, 0)
-    return np.stack([0.282095 * np.ones_like(x), 0.488603 * y, 0.488603 * z, 0.488603 * x, 1.092548 * x * y, 1.092548 * y * z,
-                     0.315392 * (3 * z * z - 1), 1.092548 * x * z, 0.546274 * (x * x - y * y)], -1)
 
 
 def fibonacci_sphere(count: int) -> np.ndarray:

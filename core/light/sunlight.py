@@ -15,19 +15,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from .skylight import fibonacci_sphere
+from .spherical_harmonics import ORTHONORMAL, per_function
 
 SIGMA_LUMINANCE = 0.2  # spread of skin about its tone, in log units: common to the three channels ...
 SIGMA_CHROMA = 0.08  # ... and of the differences between channels
 OUTLIER = 0.05  # share of points that are neither (hair, highlights, misregistration)
 BOX = 3.0  # log units over which an outlier may lie, per channel
-RIDGE = 0.5  # skin varies in patches: a few dozen independent samples, against environments whose bands are a few tenths of their mean
+TABLED = np.array([0.282095, *[0.488603] * 3, 1.092548, 1.092548, 2 * 3**0.5 * 0.315392, 1.092548, 2 * 0.546274])
+# The harmonics' band factors with the six digits that tables print: RIDGE was chosen for coefficients of these, and a delit frame shows any other ridge
+RIDGE = np.array([0, *[0.5] * 3, *[2.0] * 5]) * (per_function(ORTHONORMAL) / TABLED) ** 2
+# Skin varies in patches: a few dozen independent samples, against environments whose bands are a few tenths of their mean
 SUN_GAIN = 0.15  # log likelihood per point that a sun must be worth, or uneven skin passes for a shadow
 FLOOR = 0.15  # the environment's shading never falls below this share of its median
 
 
 @dataclass(frozen=True)
 class Light:
-    """environment float64 [9, 3]: SH coefficients of radiance times skin tone; sun unit direction [3] towards it, its colour [3] (zeros: no sun).
+    """environment float64 [9, 3]: coefficients (orthonormal) of radiance times skin tone; sun unit direction [3] towards it, its colour [3] (zeros: no sun).
 
     floor float64 [3] is the least environment shading. The tone is part of both: shading 1 would be a surface of the skin's own colour under unit light.
     """
@@ -142,7 +146,7 @@ def _weighted_fit(transfer, cosine, values, lit, weights, has_sun, spread) -> tu
     w1, w0 = weights * lit, weights * (1 - lit)
     normal = a_lit.T @ (a_lit * w1[:, None]) + a_shade.T @ (a_shade * w0[:, None])
     right = a_lit.T @ (target * w1) + a_shade.T @ (target * w0)
-    ridge = np.diag([0.0, *[RIDGE] * 3, *[4 * RIDGE] * 5, 0.0]) * weights.sum() * spread
+    ridge = np.diag([*RIDGE, 0.0]) * weights.sum() * spread
     if not has_sun:
         ridge[9, 9] = 1.0
     solution = np.linalg.solve(normal + ridge + 1e-9 * np.eye(10), right)

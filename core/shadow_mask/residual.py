@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..light.spherical_harmonics import sh_polynomials
+
 SIGMA_LUMINANCE = 0.15  # spread of lit skin about its smooth expectation, natural log units ...
 SIGMA_CHROMA = 0.06  # ... and of the differences between channels
 OUTLIER = 0.05
@@ -72,7 +74,6 @@ def _log_likelihood(residual: np.ndarray) -> np.ndarray:
 
 
 def smooth_basis(normals: np.ndarray) -> np.ndarray:
-    """The polynomials of degree two in the normal [N, 9] (the span of the second-order spherical harmonics), centred."""
-    x, y, z = normals.T
-    columns = np.stack([x, y, z, x * y, y * z, x * z, x * x - y * y, 3 * z * z - 1], 1)
-    return np.concatenate([np.ones((len(x), 1)), columns - columns.mean(0)], 1)
+    """The polynomials of the second-order spherical harmonics in unit normals [N, 3], centred: [N, 9], the first column 1."""
+    columns = np.stack(sh_polynomials(normals)[1:], 1)
+    return np.concatenate([np.ones((len(columns), 1)), columns - columns.mean(0)], 1)

@@ -13,26 +13,28 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from ..contract import mask_edit
 from ..contract.capture import Capture
+from ..contract.code_key import code_key
 from ..contract.hashes import hash_tree
 from ..contract.messages import Reporter
 from ..contract.settings import Settings, result_settings
 from ..face.head import read_head
 from ..imaging import images
-from . import checkpoint, comparison, drawing, initial, layout, maps, tone
+from . import checkpoint, comparison, drawing, initial, layout, maps
 from .checkpoint import Solution
 from .confidence import spread
 from .draft import restored
 from .edited import solve_edited
 from .evidence import REFERENCE, Evidence, read_evidence
 from .memory import sample_within_memory, spare_memory
-from .prior import WEIGHTS, Prior, load
+from .prior import WEIGHTS, ConditionedPrior, Prior, load
 from .problem import State, unexplained
 from .recipes import RECIPES, Recipe
 from .sampler import seeded
+from .skin_tone import SkinTone
+from .tone import resolve_skin_tone
 from .window import coarse
 from .witnesses import confirmed
 
@@ -60,8 +62,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     size = layout.whole_size(options.size, prior.multiple) if options.prior else max(options.size // 32, 4) * 32  # the network halves the map several times
     head = read_head(capture)
     known = evidence = read_evidence(capture, head, size)
-    elsewhere = layout.fitted(capture, head, known, prior, report) if options.prior else None
-    if elsewhere is not None:  # the authors' prior speaks of maps in other UVs
+    elsewhere = None
+    if options.prior:  # the authors' prior speaks of maps in other UVs
+        elsewhere, prior = layout.fitted(capture, head, known, prior, report)
         evidence = elsewhere.evidence(known, recipe.released_boxes)
     _check_often(prior, report)
     cell = FACE_CROP / options.grid_cells * REFERENCE / evidence.extent.side
@@ -71,7 +74,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         return
     conditions = mask_edit.conditions(capture, settings)
     witness = (lambda marks: confirmed(capture, head, marks, evidence.size)) if elsewhere is None else list
-    start = initial.start(prior, evidence, tone.asked(capture, head, settings, known, report), cell, recipe, witness)
+    start = initial.start(prior, evidence, resolve_skin_tone(capture, head, settings, known, evidence, prior.tones, report), cell, recipe, witness)
+    denoiser = prior.of_tone(start.tone)
     report.figure("marks_kept_from_light", len(start.marks))
     images.write_srgb(capture.picture("solve", "edges_and_marks"), drawing.edges_and_marks(evidence, start.alpha, start.marks))
     state, seen = start.state, start.observations
@@ -92,9 +96,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             images.write_srgb(capture.preview / "loss.png", drawing.loss_curve(losses, steps))
             report.preview("preview/loss.png")
 
-    state = sample_within_memory(prior, seen, state, recipe, seeded(settings.seed), on_step, report.log)
-    state.denoised = restored(prior, state.denoised, seen[1].coords, recipe, settings.seed)
-    result, found = _finished(prior, state, evidence, start, recipe, settings.seed, report)
+    state = sample_within_memory(denoiser, seen, state, recipe, seeded(settings.seed), on_step, report.log)
+    state.denoised = restored(denoiser, state.denoised, seen[1].coords, recipe, settings.seed)
+    result, found = _finished(denoiser, state, evidence, start, recipe, settings.seed, report)
     delivered = result if elsewhere is None else elsewhere.returned(result, known, state.lights, start.exposure, start.tone)
     maps.write(capture, delivered, found, conditions)
     comparison.write(capture, known, delivered.diffuse)
@@ -103,7 +107,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     stored.unlink(missing_ok=True)
 
 
-def _finished(prior: Prior, state: State, evidence: Evidence, start: initial.Start, recipe: Recipe, seed: int, report: Reporter) -> tuple[maps.Maps, Solution]:
+def _finished(prior: ConditionedPrior, state: State, evidence: Evidence, start: initial.Start, recipe: Recipe, seed: int,
+              report: Reporter) -> tuple[maps.Maps, Solution]:
     """The maps with their confidence, and what a later solve of a part needs."""
     factor = max(start.observations)
     varied = spread(prior, start.observations[factor], coarse(start.reference, factor), state.lights, recipe, seed, report.check)
@@ -136,25 +141,25 @@ def _check_often(prior: Prior, report: Reporter) -> None:
             layer.register_forward_hook(after)
 
 
-def _key(evidence: Evidence, settings: Settings, tone: torch.Tensor) -> str:
+def _key(evidence: Evidence, settings: Settings, tone: SkinTone) -> str:
     """Stands for everything a run's bytes depend on."""
     digest = hashlib.blake2b(digest_size=16)
-    for tensor in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, tone):
+    for tensor in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, tone.tensor):
         digest.update(tensor.numpy().tobytes())
     digest.update(json.dumps([result_settings(settings.solve), settings.seed, settings.device]).encode())
-    digest.update(WEIGHTS.read_bytes())
+    digest.update(code_key(__package__).encode())  # with the prior's weights
     digest.update(json.dumps(hash_tree(Path(settings.solve.prior).expanduser()) if settings.solve.prior else "").encode())
     return digest.hexdigest()
 
 
-def _leave_figures(capture: Capture, evidence: Evidence, result: maps.Maps, tone: torch.Tensor, report: Reporter) -> None:
+def _leave_figures(capture: Capture, evidence: Evidence, result: maps.Maps, tone: SkinTone, report: Reporter) -> None:
     texture, weight = evidence.texture.numpy(), evidence.weight.numpy()
     explained = (result.diffuse * result.shading).transpose(2, 0, 1)
     error = images.linear_to_srgb(explained) - images.linear_to_srgb(texture)
     mean_square = float((error**2 * weight).sum() / max(3 * weight.sum(), 1e-6))
     report.figure("residual_psnr_db", round(-10 * np.log10(max(mean_square, 1e-10)), 1))
     report.figure("mask_share_of_face_percent", round(100 * float((evidence.alpha * evidence.skin).sum() / evidence.skin.sum()), 1))
-    report.figure("skin_tone_srgb", [round(float(v), 3) for v in images.linear_to_srgb(tone.numpy())])
+    report.figure("skin_tone_srgb", [round(float(v), 3) for v in tone.srgb])
     side = min(evidence.size, REFERENCE // 2)
     small = [images.resize(image, side, side) for image in (texture.transpose(1, 2, 0), result.diffuse, result.shading)]
     small[0] = small[0] * (small[1].mean() / max(small[0].mean(), 1e-6))

@@ -19,19 +19,20 @@ from ..contract.capture import replacing
 from ..contract.mask_edit import FIELD
 from .lighting import Lights
 from .problem import State
+from .skin_tone import EARLIER, SkinTone
 
 
 @dataclass(frozen=True)
 class Solution:
     """What a solve ended with, all of the whole map: denoised x_0 [1, 7, S, S] before the maps' own gain, lights, the mask as `painted` [S, S] and as it was
-    used (`alpha`), the spread [H, W] of a coarser map that the confidence took; tone [3] linear, gain [3] of the albedo, exposure of the texture."""
+    used (`alpha`), the spread [H, W] of a coarser map that the confidence took; the skin tone, gain [3] of the albedo, exposure of the texture."""
 
     denoised: torch.Tensor
     lights: Lights
     painted: torch.Tensor
     alpha: torch.Tensor
     spread: torch.Tensor
-    tone: torch.Tensor
+    tone: SkinTone
     gain: torch.Tensor
     exposure: float
 
@@ -39,7 +40,8 @@ class Solution:
 def write_solution(path: Path, found: Solution, conditions: dict[str, str]) -> None:
     """`conditions` are mask_edit's: under others this state is of no use."""
     lights = {"glob": found.lights.glob, "grid": found.lights.grid, "chroma": found.lights.chroma}
-    tensors = {name: getattr(found, name) for name in ("denoised", "painted", "alpha", "spread", "tone", "gain")} | lights
+    tensors = {name: getattr(found, name) for name in ("denoised", "painted", "alpha", "spread", "gain")} | lights
+    tensors["tone"] = found.tone.tensor
     tensors["exposure"] = torch.tensor(found.exposure, dtype=torch.float64)
     tensors = {name: tensor.detach().cpu().clone().contiguous() for name, tensor in tensors.items()}
     with replacing(path) as temporary:
@@ -55,7 +57,8 @@ def read_solution(path: Path, conditions: dict[str, str]) -> Solution | None:
                 return None
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
         lights = Lights(*(tensors.pop(name) for name in ("glob", "grid", "chroma")))
-        return Solution(lights=lights, exposure=tensors.pop("exposure").item(), **tensors)
+        tone = SkinTone.from_linear(tensors.pop("tone"), EARLIER)
+        return Solution(lights=lights, tone=tone, exposure=tensors.pop("exposure").item(), **tensors)
     except (OSError, SafetensorError, KeyError, TypeError, ValueError):
         return None
 

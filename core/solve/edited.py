@@ -18,16 +18,17 @@ from .checkpoint import Solution
 from .confidence import spread
 from .evidence import REFERENCE, Evidence, grid_cells
 from .lighting import Lights
-from .prior import Prior
+from .prior import ConditionedPrior, Prior
 from .problem import State
 from .recipes import Recipe
+from .skin_tone import SkinTone
 from .window import Window, coarse, cropped, solve_inside, window
 from .witnesses import confirmed
 
 
 def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidence, cell: float,
-                 report: Reporter) -> tuple[maps.Maps, torch.Tensor] | None:
-    """The maps with the edited part new, as they are now in maps/, and the skin tone [3]; None, and the reason in the log, where the whole map is to be solved.
+                 report: Reporter) -> tuple[maps.Maps, SkinTone] | None:
+    """The maps with the edited part new, as they are now in maps/, and the skin tone; None, and the reason in the log, where the whole map is to be solved.
 
     Without an edit the maps stay as they are.
     """
@@ -45,7 +46,7 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
     if part is not None:
         near[part.inside] = 1
     start = initial.again(prior, evidence, earlier, cell, recipe, near, lambda marks: confirmed(capture, head, marks, evidence.size))
-    found = earlier if part is None else _sampled(settings, recipe, prior, evidence, earlier, start, part, report)
+    found = earlier if part is None else _sampled(settings, recipe, prior.of_tone(earlier.tone), evidence, earlier, start, part, report)
     state = State(0, None, found.denoised, found.lights)
     result = maps.finished(state, evidence, start, recipe, found.spread, found.gain)
     if part is None:
@@ -58,7 +59,7 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
     return result, earlier.tone
 
 
-def _sampled(settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidence, earlier: Solution, start: initial.Start, part: Window,
+def _sampled(settings: Settings, recipe: Recipe, prior: ConditionedPrior, evidence: Evidence, earlier: Solution, start: initial.Start, part: Window,
              report: Reporter) -> Solution:
     def on_step(state: State, steps: int) -> None:
         report.progress(state.step, steps, f"sampling the edited part, step {state.step} of {steps}")

@@ -22,9 +22,10 @@ from ..contract.messages import Problem, Reporter
 from ..face.head import Head
 from ..geometry import atlas, baking, meshes
 from .evidence import REFERENCE, Evidence, Extent
-from .lighting import Lights, sh_basis
+from .lighting import Lights, shading_basis
 from .maps import DARKEST, Maps
 from .prior import Prior, load, mean_at
+from .skin_tone import SkinTone
 
 WINDOW = Extent(64, 128, 768, centred=False, factors=(1,))
 Box = tuple[int, int, int, int]
@@ -65,13 +66,13 @@ class Layout:
             found |= {"skin": tone, "weight": weight * face, "alpha": found["alpha"] * shadow}
         return replace(e, **found)
 
-    def returned(self, solved: Maps, e: Evidence, lights: Lights, exposure: float, tone: torch.Tensor) -> Maps:
+    def returned(self, solved: Maps, e: Evidence, lights: Lights, exposure: float, tone: SkinTone) -> Maps:
         """The window's maps in the built-in UVs. Beyond the window the albedo is the texture under the solved global light, or our mean face of that tone
         where nobody looked, without confidence. e: the evidence in the built-in UVs."""
         inside = self._inside()
         side = 2 * (torch.arange(e.size) + 0.5) / e.size - 1
-        mean = mean_at(self.face, torch.stack(torch.meshgrid(side, side, indexing="xy"))[None], tone[None])[0]
-        light = torch.einsum("ck,khw->chw", lights.glob, sh_basis(e.normal)).clamp_min(1e-2) / exposure / solved.gain[:, None, None]
+        mean = mean_at(self.face, torch.stack(torch.meshgrid(side, side, indexing="xy"))[None], tone.tensor[None])[0]
+        light = torch.einsum("ck,khw->chw", lights.glob, shading_basis(e.normal)).clamp_min(1e-2) / exposure / solved.gain[:, None, None]
         seen = torch.lerp((mean[:3] + 1) / 2, e.texture / light, e.weight.sqrt()).clamp(DARKEST, 1)
 
         def joined(baked: np.ndarray, beyond: np.ndarray) -> np.ndarray:
@@ -115,8 +116,8 @@ def whole_size(asked: int, multiple: int) -> int:
     return max(asked // step, 1) * step
 
 
-def fitted(capture: Capture, head: Head, e: Evidence, prior: Prior, report: Reporter) -> Layout:
-    """The layout of the own head that lies in the capture, at the evidence's size. A released prior is given what it lacks to start from: the mean face
+def fitted(capture: Capture, head: Head, e: Evidence, prior: Prior, report: Reporter) -> tuple[Layout, Prior]:
+    """The layout of the own head that lies in the capture, at the evidence's size, and a released prior with what it lacks to start from: the mean face
     of ours, and the tones of skins. Raises Problem where there is no own head, or its UVs are not the prior's."""
     if not (capture.own_head.is_file() and capture.own_head_skin.is_file()):
         raise Problem("The authors' prior works in the UVs of another head, and none was fitted to this face.", REMEDY)
@@ -132,8 +133,7 @@ def fitted(capture: Capture, head: Head, e: Evidence, prior: Prior, report: Repo
     layout = between(head.mesh, own, skin, e.size, ours.mean_face, lambda done: report.progress(done, 100, "laying the prior's UVs over the head"))
     if not layout.fits(e.skin.numpy()):
         raise strange
-    prior.mean_face, prior.tones = layout.mean_face(), ours.tones
-    return layout
+    return layout, prior.with_face(layout.mean_face(), ours.tones)
 
 
 def between(head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int, face: torch.Tensor, tick: Callable[[float], None]) -> Layout:

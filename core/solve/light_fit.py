@@ -8,12 +8,13 @@ from collections.abc import Callable
 
 import torch
 
-from .lighting import BANDS, Lights, fit_around_constant
+from ..light.spherical_harmonics import GAMMA_BANDS, per_function
+from .lighting import Lights, fit_around_constant
 from .problem import Observation, State, albedo, photometric
 from .recipes import Recipe
 
 BETAS = 0.9, 0.999
-BAND_OF = torch.tensor([BANDS[0]] + [BANDS[1]] * 3 + [BANDS[2]] * 5)
+BAND_OF = torch.tensor(per_function(GAMMA_BANDS))
 SIDEWAYS = torch.tensor([0.0, 0, 0, 1, 1, 0, 0, 1, 0])  # coefficients whose shading changes its sign from the head's left to its right (x, xy and xz)
 MOVING = {"both": (0, 1, 2), "main": (0,), "grid": (1, 2), "cells": (1,)}
 """Which of Lights.parameters() a phase moves."""

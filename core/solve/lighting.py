@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The light: second-order spherical harmonics for the whole face, and a texel grid of local ones inside the shadow mask (paper, section 3.3).
 
-Shading is linear and multiplies the albedo. Coefficients are in the constants of the authors' code: relative to a Lambertian surface
-under radiance y_lm the three bands are scaled by 1, sqrt 3 and 2 sqrt 2, without 1 / pi, which only rescales gamma.
+Shading is linear and multiplies the albedo. Coefficients are those of the authors' code, `spherical_harmonics.GAMMA_BANDS`.
 """
 
 from __future__ import annotations
@@ -13,17 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-BANDS = (0.8862269254527579, 1.7724538509055159, 2.4270323912447493)
-"""Factor of the polynomials of band 0, 1 and 2."""
+from ..light.spherical_harmonics import GAMMA_BANDS, sh_basis
 
 
-def sh_basis(normal: torch.Tensor) -> torch.Tensor:
-    """Shading of each unit coefficient for normals [3, ...] -> [9, ...]; lengths other than one enter the polynomials as they are."""
-    x, y, z = normal
-    one = torch.ones_like(x)
-    b0, b1, b2 = BANDS
-    second = [x * y, -y * z, (3 * z * z - 1) / (2 * 3**0.5), -x * z, (x * x - y * y) / 2]
-    return torch.stack([b0 * one, -b1 * y, b1 * z, -b1 * x, *(b2 * p for p in second)])
+def shading_basis(normal: torch.Tensor) -> torch.Tensor:
+    """Shading of each unit coefficient of gamma for normals [3, ...] -> [9, ...]; lengths other than one enter the polynomials as they are."""
+    return sh_basis(normal, GAMMA_BANDS, axis=0)
 
 
 @dataclass
@@ -55,7 +49,7 @@ class Shader:
     """
 
     def __init__(self, normal: torch.Tensor, alpha: torch.Tensor, cells: tuple[int, int], bilinear: bool = False):
-        self.basis = sh_basis(normal)  # [9, H, W]
+        self.basis = shading_basis(normal)  # [9, H, W]
         self.normal, self.alpha, self.cells, self.bilinear = normal, alpha, cells, bilinear
         height, width = alpha.shape
         rows, columns = (torch.nonzero(alpha.sum(1 - axis) > 0)[:, 0] for axis in (0, 1))
@@ -142,7 +136,7 @@ def fit_around_constant(texture: torch.Tensor, albedo: torch.Tensor, basis: torc
 def constant_light(shade: torch.Tensor) -> torch.Tensor:
     """gamma^g [3, 9] whose shading is `shade` [3] for every normal."""
     glob = torch.zeros(3, 9)
-    glob[:, 0] = shade / BANDS[0]
+    glob[:, 0] = shade / GAMMA_BANDS[0]
     return glob
 
 

@@ -20,6 +20,7 @@ from ..face.head import Head
 from ..geometry import raster
 from ..geometry.views import View, read_views
 from ..imaging import images
+from ..light.spherical_harmonics import sh_basis
 from .witnesses import visible
 
 FRONT = np.array([0.0, -1.0, 0.0])
@@ -32,6 +33,8 @@ SURROUNDED = 0.05  # least share of the frame that is surroundings
 SMOOTHED = 0.003  # of the frame's longer side: what noise and a head that is off by a pixel amount to
 LIKE = 0.75, 1.35  # brightness over that of evenly lit skin outside of which a point is shadow, mark or highlight
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+RIDGE = np.array([1e-6, *[0.03] * 3, 1.5, 1.5, 1.125, 1.5, 0.375]) / (4 * np.pi)
+# Per point, on the harmonics' coefficients: 1e-6, 0.01 and 0.1 on those of 1, of x, y, z and of xy, yz, z^2 - 1/3, xz, x^2 - y^2
 BEARD = 0.42  # v of the texture below which a beard may grow, whose colour is not the skin's
 
 
@@ -95,23 +98,17 @@ def skin_weight(size: int, shadow: np.ndarray) -> np.ndarray:
 def _facing_front(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """The colour [3] of skin whose normal is FRONT, by a light of second-order spherical harmonics fitted to the skin that turns that way."""
     weight = weight * np.clip(normals @ FRONT, 0, None)
-    basis, there = _polynomials(normals), _polynomials(FRONT[None])[0]
+    basis, there = sh_basis(normals), sh_basis(FRONT)
     kept = np.ones(len(colours))
     for _ in range(5):
         weighted = basis * (weight * kept)[:, None]
-        ridge = np.diag([1e-6, *[0.01] * 3, *[0.1] * 5]) * (weight * kept).sum()
+        ridge = np.diag(RIDGE) * (weight * kept).sum()
         light = np.linalg.solve(basis.T @ weighted + ridge, weighted.T @ colours)
         ratio = (colours @ LUMINANCE) / np.maximum(basis @ light @ LUMINANCE, 1e-6)
         kept = ((ratio > LIKE[0]) & (ratio < LIKE[1])).astype(float)
         if (weight * kept).sum() < 0.1 * weight.sum():
             break
     return np.maximum(there @ light, 1e-4)
-
-
-def _polynomials(normals: np.ndarray) -> np.ndarray:
-    """[N, 9] of unit normals [N, 3]: what second-order spherical harmonics span."""
-    x, y, z = normals.T
-    return np.stack([np.ones_like(x), x, y, z, x * y, y * z, x * z, z * z - 1 / 3, x * x - y * y], 1)
 
 
 def _seen(view: View, frame: np.ndarray, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -53,7 +53,7 @@ def finished(state: State, evidence: Evidence, start: Start, recipe: Recipe, spr
         diffuse = torch.lerp(diffuse, evidence.texture / shading, kept)
     diffuse = diffuse.clamp_min(DARKEST)
     if gain is None:
-        gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone, recipe.rescale)
+        gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone.tensor, recipe.rescale)
     normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
     specular = ((x[6] + 1) / 2).clamp(0, 1).numpy()
     explained = (1 - (shading / main).mean(0)).clamp(0, 1)  # the share of the darkness that was called shadow
@@ -63,7 +63,7 @@ def finished(state: State, evidence: Evidence, start: Start, recipe: Recipe, spr
 
 
 def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, rescale: str) -> torch.Tensor:
-    """Linear factors [3] that bring the mean under `weight` to `tone`: the mean of linear values, or ("srgb") of values to the power 1 / 2.2."""
+    """Linear factors [3] that bring the mean under `weight` to `tone` [3]: the mean of linear values, or ("srgb") of values to the power 1 / 2.2."""
     if rescale == "none":
         return torch.ones(3)
     gamma = 1.0 if rescale == "linear" else 2.2

@@ -17,7 +17,7 @@ import torch
 
 from ..contract.messages import Problem, out_of_memory
 from .lighting import Lights
-from .prior import Prior
+from .prior import ConditionedPrior, Prior
 from .problem import Observation, State
 from .recipes import Recipe
 from .sampler import sample
@@ -26,7 +26,7 @@ MMAP_THRESHOLD, LARGE = -3, 8 << 20  # glibc's name for it, and the bytes from w
 SAYS = "There was not enough memory for step {} of {}: it is done again in the low-memory mode, which is slower and gives the same maps."
 
 
-def sample_within_memory(prior: Prior, observations: dict[int, Observation], state: State, recipe: Recipe, noise: Callable[[int], Callable],
+def sample_within_memory(prior: ConditionedPrior, observations: dict[int, Observation], state: State, recipe: Recipe, noise: Callable[[int], Callable],
                          on_step: Callable[[State, int], None] = lambda state, steps: None, log: Callable[[str], None] = lambda text: None,
                          **options) -> State:
     """`sample`, to the same bytes whether it had to fall back or not; `log` is told if it had to.
@@ -53,7 +53,7 @@ def sample_within_memory(prior: Prior, observations: dict[int, Observation], sta
     return sample_within_memory(prior, observations, begun, recipe, noise, on_step, log, **options)
 
 
-def spare_memory(prior: Prior) -> None:
+def spare_memory(prior: Prior | ConditionedPrior) -> None:
     """Turns the low-memory mode on, and gives what is free back to the system, now and from here on."""
     prior.network.low_memory = True
     gc.collect()

@@ -20,6 +20,7 @@ from skimage import color
 
 from ..imaging import images
 from .look import LUMINANCE, Look
+from .skin_tone import DECIMALS, SCENE, WHITE_POINT, SkinTone
 
 DATA_FILES = ("weights/tones.json",)
 FILE = Path(__file__).parents[1] / DATA_FILES[0]
@@ -31,17 +32,6 @@ LEAST = 1.5  # deviation of L* that is always stated: faces differ from their to
 BETWEEN = 0.02  # log units between the population's tones: they stand for what lies between them, too
 GROUPS = ((55, "very light"), (41, "light"), (28, "intermediate"), (10, "tan"), (-30, "brown"), (-91, "dark"))
 """Individual typology angle in degrees above which a tone is of a group (Chardon et al. 1991; Del Bino and Bernerd 2013)."""
-
-
-@dataclass(frozen=True)
-class Tone:
-    """linear: the skin's mean albedo [3], linear sRGB; deviation: of its lightness L*, one standard deviation; error: the expected colour difference, delta
-    E 2000; group: what it is called."""
-
-    linear: np.ndarray
-    deviation: float
-    error: float
-    group: str
 
 
 @dataclass(frozen=True)
@@ -58,16 +48,17 @@ class Population:
 BEST, SURROUNDINGS, OVER_WHITE = [0, 1, 2], [3, 4, 5], [6, 7, 8]  # rows of the model
 
 
-def estimate(look: Look, white: np.ndarray | None = None) -> Tone:
-    """The tone behind a look; `white` [3] is the measured linear colour of a white surface that faces as the face does, or None."""
+def estimate_skin_tone(look: Look, white: np.ndarray | None = None) -> SkinTone:
+    """The tone behind a look, with its deviation, error and group; `white` [3] is the measured linear colour of a white surface that faces as the face does,
+    or None. Its sRGB is rounded to DECIMALS, as a tone that is typed has no more."""
     if white is not None:
-        return _posterior(OVER_WHITE, coordinates(look.front) - coordinates(white), np.square([MEASURED[0], MEASURED[1], MEASURED[1]]))
+        return _posterior(OVER_WHITE, coordinates(look.front) - coordinates(white), np.square([MEASURED[0], MEASURED[1], MEASURED[1]]), WHITE_POINT)
     if look.surroundings is None:
-        return _posterior(BEST, coordinates(look.best), np.zeros(3))
-    return _posterior(BEST + SURROUNDINGS, np.concatenate([coordinates(look.best), coordinates(look.surroundings)]), np.zeros(6))
+        return _posterior(BEST, coordinates(look.best), np.zeros(3), SCENE)
+    return _posterior(BEST + SURROUNDINGS, np.concatenate([coordinates(look.best), coordinates(look.surroundings)]), np.zeros(6), SCENE)
 
 
-def _posterior(rows: list[int], shown: np.ndarray, variance: np.ndarray) -> Tone:
+def _posterior(rows: list[int], shown: np.ndarray, variance: np.ndarray, source: str) -> SkinTone:
     """The estimate from these rows of the model, as they are `shown`; `variance` is added to the model's own."""
     known = population()
     of_tones = coordinates(known.tones + SHEEN)
@@ -76,7 +67,7 @@ def _posterior(rows: list[int], shown: np.ndarray, variance: np.ndarray) -> Tone
     covariance = known.covariance[np.ix_(rows, rows)] + np.diag(variance) + BETWEEN**2 * np.eye(len(rows)) + shiny[:, :, None] * shiny[:, None, :]
     likelihood = -0.5 * (np.einsum("ni,nij,nj->n", away, np.linalg.inv(covariance), away) + np.linalg.slogdet(covariance)[1])
     weight = np.exp(likelihood - likelihood.max())
-    return _stretched(known.tones, weight / weight.sum())
+    return _stretched(known.tones, weight / weight.sum(), source)
 
 
 def coordinates(linear: np.ndarray) -> np.ndarray:
@@ -108,7 +99,7 @@ def population() -> Population:
     return Population(*(np.array(stored[name]) for name in Population.__dataclass_fields__))
 
 
-def _stretched(tones: np.ndarray, weight: np.ndarray) -> Tone:
+def _stretched(tones: np.ndarray, weight: np.ndarray, source: str) -> SkinTone:
     """The posterior over the tones [N, 3] as an estimate without the prior's pull: for Gaussians of prior variance P and posterior variance V the
     likelihood's own centre is P / (P - V) times as far from the prior's mean, with variance P V / (P - V). Along L*; a* and b* follow as they go
     with it under the posterior."""
@@ -121,4 +112,6 @@ def _stretched(tones: np.ndarray, weight: np.ndarray) -> Tone:
     moved = mean + covariance[:, 0] / variance * (lightness - mean[0])
     linear = from_lab(moved)
     error = weight @ color.deltaE_ciede2000(values, np.broadcast_to(lab(linear), values.shape))
-    return Tone(linear, float(np.hypot(np.sqrt(factor * variance), LEAST)), float(error), group(linear))
+    deviation = float(np.hypot(np.sqrt(factor * variance), LEAST))
+    rounded = [round(float(value), DECIMALS) for value in images.linear_to_srgb(linear)]
+    return SkinTone.from_srgb(rounded, source, deviation=deviation, error=float(error), group=group(linear))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The slot for a diffusion prior of facial reflectance: `denoised = prior(x, sigma, coords)`.
+"""The slot for a diffusion prior of facial reflectance: `denoised = prior.of_tone(tone)(x, sigma, coords)`.
 
 x is [N, 7, H, W]: 2 * diffuse_linear - 1 (3), tangent-space normal xyz (3), 2 * specular - 1 (1), plus noise of standard deviation sigma.
 Two priors fit: ours (NAME.safetensors with its card NAME.json) and a folder with the authors' config.json and ckpt.pth.
@@ -8,6 +8,7 @@ Two priors fit: ours (NAME.safetensors with its card NAME.json) and a folder wit
 
 from __future__ import annotations
 
+import copy
 import json
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from safetensors import safe_open
 from ..contract.messages import Problem
 from . import released
 from .network import UNet, denoise, from_state
+from .skin_tone import SkinTone
 
 BLIND = 80.0  # noise level of a channel of which nothing is seen
 CLEAR = 0.01  # ... and of one that is known
@@ -25,13 +27,13 @@ WEIGHTS = Path(__file__).parent.parent / DATA_FILES[0]
 
 
 class Prior:
-    """A trained denoiser with what it is conditioned on.
+    """A trained denoiser with what it knows of all faces; `of_tone` makes it one of a person's.
 
-    Ours models what differs from the mean face of the subject's skin tone (`tone`, linear RGB [3]): a dark patch alone cannot say whether its skin
-    or its light is dark. mean_face [7, S, S] covers the UV square: albedo over skin tone, normal, 2 * specular - 1; spread [7]: deviation of skins
-    from it, of the albedo in units of the tone; references [N, 7, R, R] are single skins in the mean face's form. The released priors have none of these
-    and take no tone; their coordinates are not those of texel centres (`centred`), they bring the noise levels they were trained on (`sigmas`, least and
-    largest), and know maps of one size only (`one_scale`).
+    Ours models what differs from the mean face of the subject's skin tone: a dark patch alone cannot say whether its skin or its light is dark.
+    mean_face [7, S, S] covers the UV square: albedo over skin tone, normal, 2 * specular - 1; spread [7]: deviation of skins from it, of the albedo in
+    units of the tone; tones: those of the skins it was trained on, N times linear RGB [3]; references [N, 7, R, R] are single skins in the mean face's
+    form. The released priors have none of these and take no tone; their coordinates are not those of texel centres (`centred`), they bring the noise
+    levels they were trained on (`sigmas`, least and largest), and know maps of one size only (`one_scale`).
     """
 
     centred, sigmas, one_scale = True, None, False
@@ -40,15 +42,46 @@ class Prior:
                  references: torch.Tensor | None = None):
         self.network = network.eval().requires_grad_(False)
         self.octaves, self.mean_face, self.spread, self.tones, self.references = octaves, mean_face, spread, tones or [], references
-        self.tone = torch.tensor(tones).float().median(0).values if tones else None
         self.multiple = network.multiple
-        self._known: dict[str, torch.Tensor] = {}
+
+    def of_tone(self, tone: SkinTone) -> ConditionedPrior:
+        """The prior of a person with this skin tone."""
+        return ConditionedPrior(self, tone.tensor[None])
+
+    def with_face(self, mean_face: torch.Tensor, tones: list) -> Prior:
+        """The prior with a mean face and tones to start from."""
+        given = copy.copy(self)
+        given.mean_face, given.tones = mean_face, tones
+        return given
+
+    def condition_at(self, coords: torch.Tensor, tone: torch.Tensor | None) -> dict[str, torch.Tensor]:
+        """`denoise`'s arguments by name for maps at coords [N, 2, H, W] of skins of tone [1, 3]."""
+        blind = torch.zeros(1) if self.network.mapping_cond.in_features == 5 else None
+        return condition(coords, self.octaves, self.mean_face, self.spread, tone, blind)
+
+    def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor, tone: torch.Tensor | None) -> torch.Tensor:
+        """`ConditionedPrior.respond` for a skin of tone [1, 3]."""
+        device = self.network.proj_in.weight.device
+        known = condition(coords, self.octaves, self.mean_face, self.spread, tone, blind=torch.ones(1))
+        levels = torch.tensor([CLEAR] * 3 + [BLIND] * 4)[None, :, None, None]
+        x = torch.where(levels < BLIND, maps, known["mean"]) + levels * noise
+        told = {name: value.to(device) for name, value in known.items()}
+        out = denoise(self.network, x.to(device), torch.full((1,), CLEAR, device=device), levels=levels.to(device), **told).to(maps.device)
+        return torch.cat([maps[:, :3], out[:, 3:]], 1)
+
+
+class ConditionedPrior:
+    """What the sampler denoises with: a prior, which stays as it is, and the tone [1, 3], linear RGB, of the skin it is to expect (None: it takes none)."""
+
+    def __init__(self, prior: Prior, tone: torch.Tensor | None):
+        self.prior, self.tone, self.network = prior, tone, prior.network
+        self._known: dict[str, torch.Tensor] = {}  # the last map's condition: it is the same at every noise level
 
     def __call__(self, x: torch.Tensor, sigma: float, coords: torch.Tensor) -> torch.Tensor:
         """The expected clean map given x at noise level sigma. coords [N, 2, H, W] from `coordinates`, one texel apart in the map's own scale."""
         device = self.network.proj_in.weight.device  # the map may live elsewhere: the network is all that is slow
         if self._known.get("coords") is not coords:
-            known = self._condition(coords)
+            known = self.prior.condition_at(coords, self.tone)
             if "mean" in known:  # it goes in as it is: kept as the network takes it, at half the memory
                 known["condition"] = known["condition"].to(self.network.proj_in.weight.dtype)
             self._known = {"coords": coords, **{name: value.to(device) for name, value in known.items()}}
@@ -60,21 +93,7 @@ class Prior:
 
         A sample's are one possibility; these are the mean of all, in one evaluation of the network.
         """
-        device = self.network.proj_in.weight.device
-        known = condition(coords, self.octaves, self.mean_face, self.spread, self.tone[None], blind=torch.ones(1))
-        levels = torch.tensor([CLEAR] * 3 + [BLIND] * 4)[None, :, None, None]
-        x = torch.where(levels < BLIND, maps, known["mean"]) + levels * noise
-        told = {name: value.to(device) for name, value in known.items()}
-        out = denoise(self.network, x.to(device), torch.full((1,), CLEAR, device=device), levels=levels.to(device), **told).to(maps.device)
-        return torch.cat([maps[:, :3], out[:, 3:]], 1)
-
-    def _condition(self, coords: torch.Tensor) -> dict[str, torch.Tensor]:
-        blind = torch.zeros(1) if self.network.mapping_cond.in_features == 5 else None
-        return condition(coords, self.octaves, self.mean_face, self.spread, self.tone[None], blind)
-
-    def use_tone(self, tone: torch.Tensor) -> None:
-        """Conditions the prior on a skin tone, linear RGB [3]."""
-        self.tone, self._known = tone, {}
+        return self.prior.respond(maps, coords, noise, self.tone)
 
 
 class ReleasedPrior(Prior):
@@ -93,11 +112,16 @@ class ReleasedPrior(Prior):
             raise Problem("This prior is conditioned on a fixed random map, which is not in its folder.",
                           f"Save the map it was trained with beside ckpt.pth as {released.NOISE_FILE}, float32 of shape 3, S, S.")
 
-    def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor) -> torch.Tensor:
+    def of_tone(self, tone: SkinTone | None = None) -> ConditionedPrior:
+        """It takes no tone: the same for everybody."""
+        return ConditionedPrior(self, None)
+
+    def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor, tone: torch.Tensor | None) -> torch.Tensor:
         """The maps as they are: a released prior was not taught to answer in one evaluation."""
         return maps
 
-    def _condition(self, coords: torch.Tensor) -> dict[str, torch.Tensor]:
+    def condition_at(self, coords: torch.Tensor, tone: torch.Tensor | None) -> dict[str, torch.Tensor]:
+        """The encoded coordinates, or the fixed random map there. Raises Problem where that is missing."""
         self.check()
         if self.kind != "noise":
             return {"condition": positional_encoding(coords, self.octaves)}

@@ -18,6 +18,8 @@ from . import initial
 from .evidence import read_evidence
 from .prior import WEIGHTS, load
 from .recipes import RECIPES
+from .skin_tone import parse_skin_tone
+from .tone import estimate_from_texture
 
 CELL = 8.0
 """Texels of a 1024 map per light of the grid: none is fitted here, but a start lays them out."""
@@ -31,7 +33,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     evidence = read_evidence(capture, read_head(capture), max(min(height, 1024) // 32, 4) * 32)
     report.progress(1, 2, "looking for the shadow's edges")
     recipe = replace(RECIPES["wildcap"], sharp_edges=True, protect_marks=False)
-    found = initial.start(prior, evidence, settings.solve.skin_tone, CELL, recipe)
+    tone = parse_skin_tone(settings.solve.skin_tone) or estimate_from_texture(evidence.texture, initial.lit_skin(evidence), prior.tones)
+    found = initial.start(prior, evidence, tone, CELL, recipe)
     snapped = np.clip(images.resize(found.alpha.numpy(), width, height), 0, 1)
     images.write_data(capture.shadow_mask_edges, snapped)
     painted = images.resize(evidence.alpha.numpy(), width, height)

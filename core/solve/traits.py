@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import torch
 
-from .lighting import fit_global, sh_basis
+from .lighting import fit_global, shading_basis
 
 LARGE = 40.0  # deviation of the blur that leaves the large shapes, in texels of a 1024 map
 TRAITS = 0.6  # variance that a light seems to explain, beside what it leaves, where all of it are traits; chosen as DELIT was
@@ -40,7 +40,7 @@ def held(texture: torch.Tensor, reference: torch.Tensor, normal: torch.Tensor, w
 
 def _held(shapes: np.ndarray, normal: torch.Tensor, weight: torch.Tensor) -> float:
     """For shapes [S, S, 3], logarithms; the pull falls with the square of what is explained."""
-    shapes, basis = torch.from_numpy(np.ascontiguousarray(shapes.transpose(2, 0, 1))), sh_basis(normal)
+    shapes, basis = torch.from_numpy(np.ascontiguousarray(shapes.transpose(2, 0, 1))), shading_basis(normal)
     fitted = torch.einsum("ck,khw->chw", fit_global(shapes, torch.ones_like(shapes), basis, weight.sqrt(), ridge=1e-3), basis)
     mean = (fitted * weight).sum((1, 2), keepdim=True) / weight.sum()
     explained, left = (float((weight * part**2).sum()) for part in (fitted - mean, shapes - fitted))

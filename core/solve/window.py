@@ -18,7 +18,7 @@ from torch.nn import functional
 from .draft import restored
 from .lighting import Lights
 from .memory import sample_within_memory
-from .prior import Prior
+from .prior import ConditionedPrior
 from .problem import Observation, State
 from .recipes import Recipe
 from .sampler import seeded
@@ -76,7 +76,7 @@ def window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int], mult
     return Window(tuple(inside), tuple(seen), tuple(cells_seen), moving[0][:, None] & moving[1][None])
 
 
-def solve_inside(prior: Prior, observations: dict[int, Observation], denoised: torch.Tensor, lights: Lights, part: Window, recipe: Recipe, seed: int,
+def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], denoised: torch.Tensor, lights: Lights, part: Window, recipe: Recipe, seed: int,
                  on_step: Callable[[State, int], None] = lambda state, steps: None,
                  log: Callable[[str], None] = lambda text: None) -> tuple[torch.Tensor, Lights]:
     """The map [1, 7, S, S] and the lights of an earlier solve with the window sampled anew under `observations` of the whole map, by coarsening factor."""

@@ -17,13 +17,13 @@ from ..face import template
 from ..geometry import raster
 from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.noise import noise
-from ..light.skylight import radiance_transfer, sh_basis
+from ..light.skylight import radiance_transfer
+from ..light.spherical_harmonics import LAMBERT, UNIFORM, per_function, sh_basis
 from .parameters import sample_parameters
 from .skin import make_skin
 
 TRANSFER_RAYS = 192
 SUN_RAYS = 20
-LAMBERT = np.array([1.0] + [2 / 3] * 3 + [1 / 4] * 5)  # a Lambertian surface's response per coefficient, over pi (Ramamoorthi and Hanrahan 2001)
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ def random_light(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.n
     for _ in range(4):  # broad lights from anywhere but below
         towards = rng.normal(size=3) * [1, 1, 0.6] + [0, -0.3, 0.5]
         tint = np.exp(rng.normal(0, 0.15, 3)) * rng.uniform(0.1, 0.5)
-        sky += (LAMBERT * sh_basis(towards / np.linalg.norm(towards)))[:, None] * tint
-    sky[0] += 0.2 / 0.282095 * np.exp(rng.normal(0, 0.1, 3))  # keeps the radiance positive
+        sky += (sh_basis(towards / np.linalg.norm(towards)) * per_function(LAMBERT))[:, None] * tint
+    sky[0] += 0.2 * UNIFORM * np.exp(rng.normal(0, 0.1, 3))  # keeps the radiance positive
     azimuth, elevation = rng.uniform(-1.0, 1.0), rng.uniform(0.1, 1.2)
     sun = np.array([np.sin(azimuth) * np.cos(elevation), -np.cos(azimuth) * np.cos(elevation), np.sin(elevation)])
     warmth = rng.uniform(0, 1)

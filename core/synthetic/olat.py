@@ -14,7 +14,8 @@ import numpy as np
 
 from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.raster import RayCaster
-from ..light.skylight import fibonacci_sphere, sh_basis
+from ..light.skylight import fibonacci_sphere
+from ..light.spherical_harmonics import sh_basis
 
 LIGHTS = 256
 LIFT = 1e-3  # metres off the surface from which a ray starts

@@ -13,9 +13,10 @@ import cv2
 import numpy as np
 
 from ..imaging import images
+from ..light.spherical_harmonics import sh_basis
 from .environments import Environment, made_environment, panorama_environment, seen
 from .identities import subject_mesh
-from .light import in_the_way, sh_basis
+from .light import in_the_way
 from .olat import BASIS, DIRECTIONS, LIGHTS, LightStage, light_stage, mirrored, transport
 from .parameters import adorned, sample_parameters
 from .response import curve, develop, expose

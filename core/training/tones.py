@@ -20,6 +20,7 @@ from ..contract.capture import write_json
 from ..contract.messages import Problem, Reporter
 from ..face import template
 from ..geometry import meshes, raster
+from ..light.spherical_harmonics import LAMBERT, per_function, sh_basis
 from ..solve.look import FRONT, Look, look, skin_weight
 from ..solve.population import FILE, SHEEN, coordinates
 from ..synthetic import light, pigment
@@ -88,7 +89,7 @@ def scenes_of(seed: int) -> list[Scene]:
         sheen = np.exp(rng.normal(np.log(SHEEN), 0.5)) * (0.5 * shading + 0.5 * bright)
         turned = FRONT + rng.normal(0, CARD_TILT, 3)
         turned /= np.linalg.norm(turned)
-        card = np.maximum((light.LAMBERT * light.sh_basis(turned)) @ sky, 0.005) + max(turned @ sun, 0) * colour
+        card = np.maximum((sh_basis(turned) * per_function(LAMBERT)) @ sky, 0.005) + max(turned @ sun, 0) * colour
         used = (weight > 0.05) & ~shadowed
         found.append(Scene(seed, (skin_map[where] * shading + sheen)[used], normals[used], weight[used], tone, bright, card))
     return found
