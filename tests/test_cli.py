@@ -15,6 +15,7 @@ import pytest
 from core.contract import stages
 from core.contract.capture import Capture
 from core.contract.messages import Problem
+from core.contract.portable_paths import read_portable
 from core.contract.settings import preset
 from core.imaging import images
 from core.imaging.mask_import import import_mask
@@ -79,7 +80,7 @@ def test_options_reach_the_stages(tiny, capture, film, tmp_path):
     core("run", film, capture.root, "--skin-tone", "0.6,0.5,0.4", "--delighter", "folder", "--folder", tmp_path, "--seed", "7", "--quality", "film",
          "--prior", tmp_path, cwd=tiny)
     record = capture.read()["stages"]
-    assert record["solve"]["settings"]["prior"] == str(tmp_path)
+    assert read_portable(record["solve"]["settings"]["prior"], capture.root) == tmp_path
     assert record["solve"]["settings"]["skin_tone"] == "0.6,0.5,0.4" and record["solve"]["seed"] == 7
     assert record["solve"]["settings"]["steps"] == preset("film").solve.steps
     assert record["delight"]["settings"].items() >= {"delighter": "folder", "folder": str(tmp_path)}.items()
