@@ -33,7 +33,8 @@ import cv2
 import numpy as np
 import torch
 
-from core.contract.capture import Capture, replacing_folder, write_json
+from core.contract.capture import Capture
+from core.contract.files import replacing_folder, write_json
 from core.contract.messages import Reporter
 from core.contract.settings import Settings, from_json, preset
 from core.face.head import read_head

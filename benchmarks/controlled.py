@@ -24,7 +24,8 @@ from pathlib import Path
 
 import numpy as np
 
-from core.contract.capture import Capture, write_json
+from core.contract.capture import Capture
+from core.contract.files import write_json
 from core.contract.messages import Problem
 from core.contract.settings import from_json, preset
 from core.face import template

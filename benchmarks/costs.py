@@ -24,7 +24,8 @@ import av
 import numpy as np
 
 from core.contract import stages
-from core.contract.capture import Capture, replacing_folder
+from core.contract.capture import Capture
+from core.contract.files import replacing_folder
 from core.contract.frame_records import read_frames, write_frames
 from core.contract.messages import Problem
 from core.solve.prior import fast_dtype

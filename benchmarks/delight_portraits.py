@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from core.contract.capture import replacing
+from core.contract.files import replacing
 from core.imaging import images
 from core.synthetic import pigment
 from core.synthetic.identities import subject_mesh

@@ -16,7 +16,8 @@ import time
 from pathlib import Path
 
 from core.contract import report
-from core.contract.capture import Capture, write_json
+from core.contract.capture import Capture
+from core.contract.files import write_json
 from core.contract.settings import QUALITIES, from_json, preset
 
 from . import albedo_score, figures

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from core.contract.capture import write_json
+from core.contract.files import write_json
 from core.contract.messages import Problem
 
 ROOT = Path(__file__).resolve().parent.parent

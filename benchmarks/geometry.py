@@ -21,7 +21,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from core.contract import stages
-from core.contract.capture import Capture, write_json
+from core.contract.capture import Capture
+from core.contract.files import write_json
 from core.contract.frame_records import read_frames
 from core.contract.messages import Problem
 from core.contract.settings import Settings

@@ -22,7 +22,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from core.contract.capture import Capture, replacing, write_json
+from core.contract.capture import Capture
+from core.contract.files import replacing, write_json
 from core.contract.messages import Done, StageDone
 from core.contract.settings import QUALITIES, Settings, from_json, preset
 from core.contract.stages import STAGES

@@ -26,7 +26,8 @@ from pathlib import Path
 
 import numpy as np
 
-from core.contract.capture import Capture, write_json
+from core.contract.capture import Capture
+from core.contract.files import write_json
 from core.imaging import images
 from core.synthetic import sample
 from core.synthetic.parameters import sample_parameters

@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from core.contract.capture import Capture, write_json
+from core.contract.capture import Capture
+from core.contract.files import write_json
 from core.face import template
 from core.imaging import images
 from core.upscale.gloss import on_cheeks_and_forehead

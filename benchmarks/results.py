@@ -22,7 +22,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from core.contract.capture import replacing
+from core.contract.files import replacing
 from core.contract.messages import Problem
 
 from . import figures, tied_figures

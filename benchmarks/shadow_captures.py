@@ -15,7 +15,8 @@ import cv2
 import numpy as np
 import pycolmap
 
-from core.contract.capture import Capture, replacing_folder
+from core.contract.capture import Capture
+from core.contract.files import replacing_folder
 from core.contract.frame_records import FrameRecord, Frames, read_frames, write_frames
 from core.contract.messages import Reporter
 from core.face import template

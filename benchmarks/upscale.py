@@ -28,7 +28,8 @@ from flip_evaluator import evaluate as flip_evaluate
 from skimage.metrics import structural_similarity
 
 from core import texture
-from core.contract.capture import Capture, replacing_folder
+from core.contract.capture import Capture
+from core.contract.files import replacing_folder
 from core.contract.messages import Reporter
 from core.contract.settings import Settings
 from core.face import template

@@ -19,7 +19,7 @@ import numpy as np
 import torch
 import trimesh
 
-from core.contract.capture import replacing
+from core.contract.files import replacing
 from core.contract.messages import Reporter
 from core.face import template
 from core.geometry import meshes

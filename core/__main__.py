@@ -106,9 +106,6 @@ def _run(options: argparse.Namespace) -> int:
     # A shell that starts a job in the background has it ignore Ctrl-C's signal; here the signal means cancel, whoever sends it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     capture = Capture(options.capture)
-    strangers = [path.name for path in capture.root.iterdir() if path not in vars(capture).values()] if capture.root.is_dir() else []
-    if strangers and not capture.json.is_file():
-        raise Problem(f"{capture.root} is no capture: it holds {strangers[0]}.", "Name a new folder, as NAME.wildcap, and it will be made.")
     job = write_job(capture, source="" if options.source == "-" else options.source, first=options.first, last=options.last, settings=values,
                     quality=options.quality)
     return terminal.follow(ROOT, capture, job, consent.by_flag(capture) if options.send_frames else {})
@@ -125,6 +122,7 @@ def _deliver(options: argparse.Namespace) -> int:
     before = read_job(capture.job).settings if capture.job.is_file() else settings.Settings()  # job.json is also what `status` judges the stages by
     chosen = {**settings.to_json(before), "deliver": wanted}
     plan = delivery_plan.plan(capture, settings.from_json(chosen).deliver)
+    delivery_plan.check_target(plan)
     code = terminal.follow(ROOT, capture, write_job(capture, tool="deliver", settings=chosen), {})
     if code == 0:
         print(plan.target)
@@ -162,7 +160,7 @@ def _status(options: argparse.Namespace) -> int:
     print(f"source        {capture.source or 'none yet'}")
     for stage in stages.STAGES:
         finished, verdict = record["stages"].get(stage.name), capture.verdict(stage, chosen)
-        print(f"{stage.name:13} {verdict.state:6}" + (f" {finished['seconds']:8.1f} s  {finished['finished']}" if finished else "")
+        print(f"{stage.name:13} {verdict.state:6}" + (f" {finished['seconds']:8.1f} s  {finished.get('finished', '')}" if finished else "")
               + (f"  {verdict.reason()}" if verdict.reason() else ""))
     if capture.shadow_mask.is_file():
         print("shadow mask   painted")

@@ -8,8 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from core.contract import stages
 from core.contract.capture import Capture
 from core.contract.messages import Message
+from core.contract.settings import Settings
 from core.geometry import meshes
 from core.imaging import images
 from core.worker.job import write_job
@@ -34,11 +36,18 @@ def make(root: Path) -> Capture:
     images.write_data(capture.maps / "normal.png", normals, 16)
     images.write_data(capture.maps / "specular_albedo.png", np.where(u < 0.5, 0.2, 0.4), 16)
     images.write_data(capture.maps / "confidence.png", np.ones((SIDE, SIDE)))
-    record = {"format": 1, "source": "/home/anna/film.mp4", "source_stamp": [["film.mp4", 7, 1]], "stages": {}}
-    record["stages"]["solve"] = {"finished": "2026-11-22T00:00:00", "version": "0.1.0", "seed": 3, "device": "cpu", "seconds": 1.0, "figures": {}, "key": "",
-                                 "settings": {"steps": 20, "prior": "/home/anna/prior"}}
-    capture.json.write_text(json.dumps(record))
+    record_solve(capture)
     return capture
+
+
+def record_solve(capture: Capture) -> None:
+    """capture.json of one whose maps were solved from what lies there now, by older code."""
+    record = {"format": 2, "source": "/home/anna/film.mp4", "source_stamp": [["film.mp4", 7, 1]], "stages": {}}
+    chosen = Settings()
+    record["stages"]["solve"] = {**capture.conditions(stages.by_name("solve"), chosen), "code": "of before", "finished": "2026-11-22T00:00:00",
+                                 "version": "0.1.0", "seed": chosen.seed, "device": "cpu", "seconds": 1.0, "figures": {},
+                                 "settings": {"steps": chosen.solve.steps, "prior": "/home/anna/prior"}}
+    capture.json.write_text(json.dumps(record))
 
 
 def in_tiles(capture: Capture) -> None:

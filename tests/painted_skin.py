@@ -32,6 +32,7 @@ def brief_confidence():
 
 def make(root: Path) -> Capture:
     made = Capture(root)
+    made.claim()
     skin = torch.from_numpy(template.mask("skin", SIZE).copy())
     face = initial.face_of_tone(load().mean_face, torch.from_numpy(TONE), skin)
     y, x = np.mgrid[:SIZE, :SIZE] / SIZE

@@ -66,6 +66,7 @@ def make(root: Path, solved: bool = True) -> Path:
         (root / "maps" / "normal.png").write_bytes(plain((128, 128, 255)))
         for name in ("diffuse_albedo.exr", "shading.exr", "confidence.png"):
             (root / "maps" / name).write_bytes(b"stands in")
+    (root / "capture.json").write_text('{"format": 2, "source": "", "stages": {}}', encoding="utf-8")
     return root
 
 

@@ -10,7 +10,8 @@ import pytest
 from core import __main__ as cli
 from core import registration
 from core.contract import artist_landmarks, stages
-from core.contract.capture import Capture, write_json
+from core.contract.capture import Capture
+from core.contract.files import write_json
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import Settings, from_json
 from core.geometry import meshes

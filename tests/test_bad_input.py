@@ -133,7 +133,8 @@ def test_a_full_disk_is_told_and_nothing_is_lost(face, tmp_path):
     disk.mkdir()
     command = f'"{sys.executable}" -B -m core run "{face}" "{disk}/a.wildcap" --until frames'
     script = f"""
-        mount -t tmpfs -o size=200k tmpfs "{disk}" && mkdir "{disk}/a.wildcap" && echo painted > "{disk}/a.wildcap/shadow_mask.png"
+        mount -t tmpfs -o size=200k tmpfs "{disk}" && mkdir "{disk}/a.wildcap"
+        printf '{{"format": 2, "source": "", "stages": {{}}}}' > "{disk}/a.wildcap/capture.json"; echo painted > "{disk}/a.wildcap/shadow_mask.png"
         {command} >/dev/null; echo "code $?"
         ls -A "{disk}/a.wildcap" | grep -c tmp
         mount -o remount,size=50m "{disk}"

@@ -2,15 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The capture folder: what it records, who may work in it, and that no file is ever half written."""
 
-import json
-import os
-import subprocess
-import sys
 
 import pytest
 
 from core.contract import stages
-from core.contract.capture import FORMAT, Capture, replacing, replacing_folder, write_json
+from core.contract.capture import FORMAT, Capture
+from core.contract.files import replacing, replacing_folder, write_json
 from core.contract.messages import Problem
 from core.contract.settings import Settings
 
@@ -64,32 +61,6 @@ def test_a_capture_of_a_newer_version_is_refused_and_left_alone(capture):
     assert capture.json.read_bytes() == before
 
 
-def test_a_living_lock_is_refused_by_name_and_a_dead_one_taken_over(capture):
-    with capture.locked():
-        with pytest.raises(Problem, match=f"process {os.getpid()}"), Capture(capture.root).locked():
-            pass
-        assert json.loads(capture.lock.read_text())["pid"] == os.getpid()
-    assert not capture.lock.exists()
-    dead = subprocess.Popen([sys.executable, "-c", ""])
-    dead.wait()
-    with capture.locked():
-        owner = json.loads(capture.lock.read_text())
-    for text in (json.dumps({**owner, "pid": dead.pid}), "", '{"pid": 1'):
-        capture.lock.write_text(text)
-        with capture.locked():
-            pass
-    if sys.platform == "linux":
-        unasked = subprocess.Popen([sys.executable, "-c", ""])
-        os.waitid(os.P_PID, unasked.pid, os.WEXITED | os.WNOWAIT)  # it has ended, and stays in the list of processes
-        capture.lock.write_text(json.dumps({**owner, "pid": unasked.pid}))
-        with capture.locked():
-            pass
-        unasked.wait()
-    capture.lock.write_text(json.dumps({**owner, "pid": dead.pid, "host": "another machine"}))
-    with pytest.raises(Problem, match="another machine"), capture.locked():
-        pass
-
-
 def test_replacing_keeps_the_old_file_until_the_new_one_is_complete(tmp_path):
     path = tmp_path / "file.txt"
     path.write_text("old")
@@ -104,6 +75,7 @@ def test_replacing_keeps_the_old_file_until_the_new_one_is_complete(tmp_path):
 
 
 def test_replacing_a_folder_is_all_or_nothing(tmp_path):
+    Capture(tmp_path).claim()
     path = tmp_path / "frames"
     with replacing_folder(path) as folder:
         (folder / "1").write_text("old")
@@ -113,17 +85,8 @@ def test_replacing_a_folder_is_all_or_nothing(tmp_path):
     assert (path / "1").read_text() == "old"
     with replacing_folder(path) as folder:
         (folder / "2").write_text("new")
-    assert [file.name for file in path.iterdir()] == ["2"] and list(tmp_path.iterdir()) == [path]
-
-
-def test_tidying_takes_back_a_folder_that_was_put_aside_and_drops_the_rest(capture):
-    os.replace(capture.frames, capture.root / ".frames.old")  # killed between the two renames
-    (capture.root / ".scan.123.tmp.ply").write_bytes(b"half")
-    (capture.root / ".delit.123.tmp").mkdir()
-    (capture.frames.parent / ".cameras.old").mkdir()
-    capture.tidy()
-    assert states(capture) == ["done", "done"]
-    assert not list(capture.root.glob(".*"))
+    assert [file.name for file in path.iterdir()] == ["2"]
+    assert {file.name for file in tmp_path.iterdir()} == {"frames", "capture.json", "written.jsonl"}
 
 
 def test_a_file_in_the_way_of_the_folder_is_told(tmp_path):

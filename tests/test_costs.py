@@ -11,7 +11,8 @@ import pytest
 
 from benchmarks import costs, figures, stage_cost
 from core.contract import stages
-from core.contract.capture import Capture, write_json
+from core.contract.capture import Capture
+from core.contract.files import write_json
 
 DONE = {"seconds": 12.4, "processor_s": 20.0, "peak_mb": 1640, "load": 0.1, "others": 0.05}
 TICKS = os.sysconf("SC_CLK_TCK")

@@ -10,7 +10,8 @@ import numpy as np
 import pycolmap
 import pytest
 
-from core.contract.capture import Capture, write_json
+from core.contract.capture import Capture
+from core.contract.files import write_json
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import from_json
 from core.delight import run

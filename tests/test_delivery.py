@@ -199,7 +199,7 @@ def test_provenance_tells_all_and_no_folder(capture):
     told = json.loads(text)
     assert "anna" not in text and str(capture.root.parent) not in text and "/home" not in text and str(ROOT) not in text
     assert told["capture"]["sources"] == [{"name": "film.mp4", "bytes": 7, "sha256": "not there any more"}]
-    assert told["stages"]["solve"]["seed"] == 3 and told["stages"]["solve"]["settings"] == {"steps": 20, "prior": "prior"}
+    assert told["stages"]["solve"]["seed"] == 0 and told["stages"]["solve"]["settings"] == {"steps": 20, "prior": "prior"}
     assert told["versions"]["packages"]["numpy"] == np.__version__ and told["versions"]["Python"]
     prior = next(entry for entry in told["weights"] if entry["name"] == "prior.safetensors")
     assert len(prior["sha256"]) == 64 and prior["licence"] == "GPL-3.0-or-later" and prior["notices"]

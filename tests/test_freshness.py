@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from core.contract import freshness, hashes, stages
-from core.contract.capture import FORMAT, Capture, write_json
+from core.contract.capture import FORMAT, Capture
+from core.contract.files import write_json
 from core.contract.hashes import hash_source, same_source
 from core.contract.messages import Log, Problem
 from core.contract.portable_paths import read_portable, write_portable

@@ -13,7 +13,8 @@ import pycolmap
 import pytest
 
 from core.__main__ import main
-from core.contract.capture import Capture, write_json
+from core.contract.capture import Capture
+from core.contract.files import write_json
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import from_json
 from core.face import template
@@ -61,6 +62,7 @@ def seen(view: View, texture: np.ndarray) -> np.ndarray:
 def capture(tmp_path) -> Capture:
     """Frames of a head with a shadow on the left cheek, whose texture has lost it: only the frames can tell."""
     capture = Capture(tmp_path / "face.wildcap")
+    capture.claim()
     meshes.write_obj(capture.head, template.load())
     model = pycolmap.Reconstruction()
     model.add_camera_with_trivial_rig(views()[0].camera)

@@ -12,7 +12,8 @@ import pycolmap
 import pytest
 
 from benchmarks.shadow_mask import scores
-from core.contract.capture import Capture, write_json
+from core.contract.capture import Capture
+from core.contract.files import write_json
 from core.contract.messages import Reporter
 from core.contract.settings import from_json
 from core.face import template

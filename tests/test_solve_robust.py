@@ -106,9 +106,11 @@ def test_a_mask_over_everything_still_gives_a_face(without_mask, tmp_path):
 def test_holes_in_the_texture_are_filled_and_spoil_nothing_else(without_mask, tmp_path):
     capture = Capture(tmp_path)
     texture = images.read_linear(without_mask.texture)
-    texture[70:76, 40:46] = np.nan
-    texture[10, 10, 0], texture[100, 64, 2] = np.inf, -np.inf
+    confidence = images.read_data(without_mask.texture_confidence)[..., 0]
+    for hole, colour in ((np.s_[70:76, 40:46], 0), (np.s_[10, 10], 1000), (np.s_[100, 64], -1000)):
+        texture[hole], confidence[hole] = colour, 0
     images.write_linear(capture.texture, texture)
+    images.write_data(capture.texture_confidence, confidence)
     maps, whole = solved(capture, without_mask), solved(without_mask)
     assert maps["confidence.png"][70:76, 40:46].max() == 0
     assert np.abs(maps["diffuse_albedo.exr"][71:75, 41:45].mean((0, 1)) / TONE - 1).max() < 0.25, "what nobody saw is the mean face"

@@ -12,8 +12,8 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from core.contract import consent, switchlight_api
-from core.contract.capture import Capture, write_json
+from core.contract import consent, files, switchlight_api
+from core.contract.capture import Capture
 from core.contract.messages import CancelledError, Problem, Reporter
 from core.contract.settings import from_json
 from core.delight import run, switchlight_calls
@@ -64,7 +64,7 @@ def make(root, count: int = 4, selected: int = 3) -> Capture:
     for i, frame in enumerate(frames):
         frame["selected"] = i < selected
         (capture.frames / frame["name"]).write_bytes(standin.png([[(100 + 10 * i, 80, 60)] * SIZE[0]] * SIZE[1]))
-    write_json(capture.frames_json, {"frames": frames})
+    files.write_json(capture.frames_json, {"frames": frames})
     return capture
 
 

@@ -13,6 +13,7 @@ import pytest
 from core.__main__ import main
 from core.contract import consent
 from core.contract import switchlight_api as service
+from core.contract.capture import Capture
 from core.worker.job import write_job
 
 from .switchlight_server import KEY, Service
@@ -26,6 +27,7 @@ JOB = [sys.executable, "-B", "-c", "import sys, pathlib; from core.worker.runner
 
 @pytest.fixture
 def capture(tmp_path):
+    Capture(tmp_path / "Zoë.wildcap").claim()
     capture = make(tmp_path / "Zoë.wildcap", 6, 6)
     capture.head.write_text("v 0 0 0\n", encoding="ascii")
     capture.set_source("")

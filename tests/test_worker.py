@@ -230,7 +230,7 @@ def test_poll_never_waits(root, capture, video):
 
 def test_only_protocol_lines_leave_by_stdout(root, capture, video):
     """Without the client: every line of the real stdout is a message, and stdin's end ends the worker."""
-    capture.root.mkdir()
+    capture.claim()
     (capture.root / "mood.json").write_text('{"frames": "print"}')
     job = tiny_chain.write_job(capture, source=video, last="frames")
     command = [sys.executable, "-E", "-s", "-B", "-m", "core.worker", str(job)]

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from core.contract.capture import Capture, storage_problem
+from core.contract.capture import Capture
+from core.contract.files import storage_problem
 from core.contract.messages import Done, Failed, Problem
 from core.worker import installation
 from core.worker.job import read_job, write_job

@@ -24,7 +24,7 @@ GROUND = ("__init__.py", "__main__.py", "contract", "worker")
 ROOM = '''
 import errno, hashlib, json, os, sys, time
 from ..contract import stages
-from ..contract.capture import replacing, replacing_folder
+from ..contract.files import replacing, replacing_folder
 from ..contract.messages import Problem
 
 def run(capture, settings, report):
@@ -94,7 +94,7 @@ def build(folder: Path) -> Path:
 
 def start(root: Path, capture: Capture, mood: dict | None = None, **job) -> Worker:
     """Writes the job and starts the worker, with this Python."""
-    capture.root.mkdir(parents=True, exist_ok=True)
+    capture.claim()
     (capture.root / "mood.json").write_text(json.dumps(mood or {}))
     worker = Worker(Path(sys.executable), root, write_job(capture, **job), capture.logs / "worker.log")
     worker.start()

@@ -12,7 +12,7 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ..core.contract.capture import write_json
+from ..core.contract.files import write_json
 from ..core.contract.messages import Problem
 from ..core.contract.settings import QUALITIES, Settings, preset
 from . import extension

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..contract.capture import replacing, write_json
+from ..contract.files import replacing, write_json
 from ..face.template import ASSETS, template_hash
 from ..geometry import meshes
 from ..geometry.meshes import Mesh

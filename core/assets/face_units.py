@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..contract.capture import replacing
+from ..contract.files import replacing
 from ..face.template import ASSETS, load
 from .acting import LEFT_EYE, RIGHT_EYE, OpenHead, open_head
 from .identities import SAMPLES, bodies

@@ -66,4 +66,4 @@ def trailing_number(name: str) -> int | None:
     """The number a name ends with, without its ending: frame_0012.png -> 12."""
     stem = PurePath(name.replace("\\", "/")).stem
     digits = stem[len(stem.rstrip("0123456789")):]
-    return int(digits) if digits else None
+    return int(digits) if 0 < len(digits) < 19 else None

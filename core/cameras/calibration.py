@@ -11,11 +11,14 @@ import pycolmap
 
 from ..contract.frame_records import VIDEO, FrameRecord, Frames
 from ..contract.messages import Problem, Reporter
+from ..geometry.mesh_checks import FARTHEST
 from ..imaging import images
 from .calibrated import Calibrated
 from .importers import blender_cameras, colmap_folder, metashape, realityscan
 
 FEWEST = 3
+MOST_BYTES = 256 << 20
+"""Of another program's text file: a thousand cameras have one MB, and what Metashape writes of their points is left out by its export of cameras."""
 
 
 def import_cameras(path: Path, frames: Frames, folder: Path, report: Reporter) -> pycolmap.Reconstruction:
@@ -51,15 +54,19 @@ def read_cameras(path: Path) -> list[Calibrated]:
         raise Problem(f"{path.name} is no kind of camera file that is known here.",
                       "Choose a COLMAP folder, Metashape's cameras (.xml), RealityScan's internal/external camera parameters (.csv), or Blender's (.json).")
     try:
+        if path.is_file() and path.stat().st_size > MOST_BYTES:
+            raise Problem(f"{path.name} is larger than {MOST_BYTES >> 20} MB, which is no list of cameras.", "Export the cameras without points.")
         cameras = colmap_folder.read(path) if path.is_dir() else readers[path.suffix.lower()](path.read_text(encoding="utf-8-sig"), path.name)
     except (OSError, UnicodeDecodeError) as error:
         raise Problem(f"{path.name} cannot be read ({error}).", "Export the cameras again.") from error
     if not cameras:
         raise Problem(f"{path.name} holds no solved camera.", "Align the pictures in the program it comes from, then export the cameras again.")
     for camera in cameras:
-        if not (np.isfinite(camera.params).all() and np.isfinite(camera.rotation).all() and np.isfinite(camera.translation).all() and camera.params[0] > 0
+        sized = (camera.width, camera.height) == (0, 0) or min(camera.width, camera.height) > 0
+        finite = all((np.abs(values) <= FARTHEST).all() for values in (camera.params, camera.rotation, camera.translation))  # false for NaN, too
+        if not (sized and finite and camera.params[0] > 0
                 and np.allclose(camera.rotation @ camera.rotation.T, np.eye(3), atol=1e-4) and np.linalg.det(camera.rotation) > 0):
-            raise Problem(f"The camera of {camera.name} in {path.name} is no camera: its rotation or focal length makes no sense.",
+            raise Problem(f"The camera of {camera.name} in {path.name} is no camera: its rotation, focal length or size makes no sense.",
                           "Export the cameras again; a file that was edited by hand may be damaged.")
     return cameras
 

@@ -6,10 +6,8 @@ and on the head alone where it did not keep still. The first model that passes t
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pycolmap
@@ -92,11 +90,11 @@ def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter
 def _by_features(skin: bool, frames: Frames, capture: Capture, found: dict, settings: Settings, report: Reporter,
                  alone: bool = False) -> tuple[Solved | None, Matches, str | None]:
     """The model of one kind of features, the matches, and its shortcoming; `alone`: on the head only. A model whose head moved is given, with that fault."""
-    with tempfile.TemporaryDirectory(prefix="wildcap_") as temporary:
+    with capture.workspace() as work:
         if alone:
             found = found if len(found) > len(frames.records) / 2 else find_landmarks(frames.records, capture.frames, report)
-            head_masks(found, frames.records, capture.frames, Path(temporary), report)
-        model, matches = solve_structure(frames, capture.frames, skin, settings.cameras.matching, settings.seed, report, Path(temporary) if alone else None)
+            head_masks(found, frames.records, capture.frames, work, report)
+        model, matches = solve_structure(frames, capture, skin, settings.cameras.matching, settings.seed, report, work if alone else None)
     fault = shortcoming(model, len(frames.records))
     if fault:
         return None, matches, fault

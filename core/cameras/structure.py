@@ -8,15 +8,16 @@ import json
 import queue
 import subprocess
 import sys
-import tempfile
 import threading
 from collections.abc import Sequence
 from pathlib import Path
 
 import pycolmap
 
+from ..contract.capture import Capture
 from ..contract.frame_records import VIDEO, FrameRecord, Frames
 from ..contract.messages import Problem, Reporter
+from ..geometry.models import read_model
 from ..imaging import images
 from .matches import Matches, read_matches
 
@@ -26,18 +27,21 @@ STEPS = {"finding features": (0.0, 0.4), "matching features": (0.4, 0.6), "placi
 NO_MODEL = 3
 
 
-def solve_structure(frames: Frames, folder: Path, skin: bool, matching: str, seed: int, report: Reporter,
+def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str, seed: int, report: Reporter,
                     masks: Path | None = None) -> tuple[pycolmap.Reconstruction | None, Matches]:
-    """The largest model of `frames`, whose pictures lie in `folder`, in COLMAP's own world (None where nothing fits together),
+    """The largest model of the capture's `frames`, in COLMAP's own world (None where nothing fits together),
     and all matches. `masks`: folder with NAME.png, where black hides what moves otherwise."""
-    records = frames.records
+    records, folder = frames.records, capture.frames
     sequential = matching == "sequential" or (matching == "auto" and frames.kind == VIDEO and len(records) > ALL_PAIRS)
-    with tempfile.TemporaryDirectory(prefix="wildcap_") as temporary:
+    with capture.workspace() as work:
         job = {"images": str(folder.resolve()), "groups": camera_groups(records, folder), "skin": skin, "sequential": sequential,
-               "masks": str(masks) if masks else None, "seed": seed, "database": str(Path(temporary) / "database.db"), "output": str(Path(temporary) / "model")}
-        path = Path(temporary) / "job.json"
+               "masks": str(masks) if masks else None, "seed": seed, "database": str(work / "database.db"), "output": str(work / "model")}
+        path = work / "job.json"
         path.write_text(json.dumps(job), encoding="utf-8")
-        model = pycolmap.Reconstruction(job["output"]) if _follow(path, report) else None
+        try:
+            model = read_model(Path(job["output"])) if _follow(path, report) else None
+        except (OSError, ValueError) as error:
+            raise Problem(f"The camera solver left a model that cannot be used ({error}).", "Run the stage cameras again.") from error
         return model, read_matches(Path(job["database"]))
 
 

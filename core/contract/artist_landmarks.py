@@ -8,12 +8,13 @@ registration reads it when it is there, and a point in it wins over what was fou
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from .capture import Capture, write_json
+from .capture import Capture
+from .files import remove_file, write_json
+from .json_files import read_json
 from .messages import Problem
 
 COUNT = 468
@@ -24,7 +25,7 @@ FARTHEST_M = 0.5
 def read(path: Path) -> dict[int, tuple[float, float, float]]:
     """The points by index; empty where there is no file. Raises Problem for a file that is not of this form."""
     try:
-        record = json.loads(Path(path).read_text(encoding="utf-8"))
+        record = read_json(path)
     except FileNotFoundError:
         return {}
     except (OSError, ValueError) as error:
@@ -50,7 +51,7 @@ def put(capture: Capture, points: Mapping) -> dict[int, tuple[float, float, floa
     if known:
         write_json(capture.landmarks_artist, {"points": {str(k): list(p) for k, p in sorted(known.items())}})
     else:
-        capture.landmarks_artist.unlink(missing_ok=True)
+        remove_file(capture.landmarks_artist)
     return known
 
 
@@ -60,10 +61,10 @@ def _checked(points: Mapping, whose: str) -> dict[int, tuple[float, float, float
         index = _index(key, whose)
         try:
             x, y, z = (float(v) for v in point)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             x = y = z = math.nan
         if not all(abs(v) <= FARTHEST_M for v in (x, y, z)):  # false for nan, too
-            raise Problem(f"{whose}: landmark {index} is at {point!r}, which is no place on the head.",
+            raise Problem(f"{whose}: landmark {index} is at {point!r:.60}, which is no place on the head.",
                           "Give x, y and z in metres; the origin lies between the eyes.")
         found[index] = (x, y, z)
     return found
@@ -71,6 +72,6 @@ def _checked(points: Mapping, whose: str) -> dict[int, tuple[float, float, float
 
 def _index(key, whose: str) -> int:
     text = str(key)
-    if not text.isdecimal() or int(text) >= COUNT:
-        raise Problem(f"{whose}: there is no landmark {key!r}.", f"Landmarks are counted from 0 to {COUNT - 1}, as in landmarks.json.")
+    if not (text.isdecimal() and len(text) <= len(str(COUNT)) and int(text) < COUNT):
+        raise Problem(f"{whose}: there is no landmark {key!r:.60}.", f"Landmarks are counted from 0 to {COUNT - 1}, as in landmarks.json.")
     return int(text)

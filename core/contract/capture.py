@@ -8,84 +8,24 @@ Ground floor: standard library only. A file that exists is complete: everything 
 from __future__ import annotations
 
 import contextlib
-import errno
-import json
 import os
-import re
 import shutil
-import socket
 import time
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import asdict
 from pathlib import Path
 
-from . import format_1, freshness, stages
+from . import capture_record, format_1, freshness, lease, ownership, stages
+from .files import storage_problem, write_json
 from .freshness import Verdict
 from .hashes import hash_source, same_source
+from .json_files import is_number, read_json
 from .messages import Problem
 from .portable_paths import convert_settings, write_portable
 from .settings import Settings
 
 FORMAT = 2
 """Version of the capture folder's layout; a capture of a newer format is refused. Format 1 is that of WildCap 0.1.0 (format_1.py)."""
-
-
-@contextlib.contextmanager
-def replacing(path: Path):
-    """A temporary path of the same suffix in the same folder; renamed to `path` on success, removed on failure.
-
-    Disk-full and read-only errors become a Problem.
-    """
-    path = Path(path)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        yield temporary
-        with open(temporary, "rb") as file:
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except OSError as error:
-        raise storage_problem(error, path) from error
-    finally:
-        with contextlib.suppress(OSError):  # it is not there, or its folder is none
-            temporary.unlink()
-
-
-@contextlib.contextmanager
-def replacing_folder(path: Path):
-    """As `replacing`, for a folder whose files belong together; the old folder goes only when the new one is complete."""
-    path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    old = path.with_name(f".{path.name}.old")
-    try:
-        shutil.rmtree(temporary, ignore_errors=True)
-        temporary.mkdir(parents=True)
-        yield temporary
-        shutil.rmtree(old, ignore_errors=True)
-        if path.exists():
-            os.replace(path, old)
-        os.replace(temporary, path)
-        shutil.rmtree(old, ignore_errors=True)
-    except OSError as error:
-        raise storage_problem(error, path) from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-
-
-def storage_problem(error: OSError, path: Path) -> Problem:
-    """The Problem of a failed write: disk full, read-only, or what the system says."""
-    path = Path(*(re.sub(r"^\.(.+)\.\d+\.tmp", r"\1", part) for part in path.parts))  # the name it would have had
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return Problem(f"The disk is full: {path} could not be written.",
-                       "Free some space (a capture needs about 1 GB) and run again; finished stages are kept.")
-    if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
-        return Problem(f"{path} cannot be written: the folder is read-only.", "Choose a folder you may write to, or change its permissions.")
-    return Problem(f"{path} could not be written ({error.strerror or error}).", "Check the disk and the folder, then run again.")
-
-
-def write_json(path: Path, value) -> None:
-    with replacing(path) as temporary:
-        temporary.write_text(json.dumps(value, indent=1, ensure_ascii=False), encoding="utf-8")
 
 
 class Capture:
@@ -140,16 +80,17 @@ class Capture:
     def read(self) -> dict:
         """capture.json, or an empty record. Raises Problem when it is damaged or of a newer format."""
         try:
-            record = json.loads(self.json.read_text(encoding="utf-8"))
+            record = read_json(self.json)
         except FileNotFoundError:
             return {"format": FORMAT, "source": "", "stages": {}}
         except (OSError, ValueError) as error:
             raise Problem(f"{self.json} cannot be read ({error}).",
                           "Restore it from a backup, or delete it to start this capture anew; pictures and masks stay.") from error
-        if not isinstance(record, dict) or not isinstance(record.get("stages"), dict):
-            raise Problem(f"{self.json} is not a capture record.", "Choose a folder that ends in .wildcap, or delete this file to start anew.")
-        if record.get("format", 0) > FORMAT:
+        if isinstance(record, dict) and is_number(record.get("format"), FORMAT + 1):
             raise Problem("This capture was made by a newer version of WildCap.", "Update the extension to open it; nothing was changed.")
+        if fault := capture_record.find_fault(record):
+            raise Problem(f"{self.json} is not a capture record: {fault}.",
+                          "Choose a folder that ends in .wildcap, or delete this file to start anew; pictures and masks stay.")
         return record
 
     @property
@@ -157,8 +98,17 @@ class Capture:
         """The video, or the folder of photographs, that the capture is made from; it may be gone. None where none was chosen."""
         return freshness.source_of(self.root, self.read())
 
+    def refuse_inside(self, source: str | Path) -> None:
+        """Raises Problem for a source that lies in the capture, or that the capture lies in: what is written would replace it, or be read again."""
+        place, root = (Path(os.path.realpath(path)) for path in (source, self.root))
+        if place == root or place.is_relative_to(root):
+            raise Problem(f"{source} lies in the capture {self.root}, which writes its own files there.", "Keep the video or photographs elsewhere.")
+
     def set_source(self, source: str | Path) -> None:
         """Records where the pictures come from, and what they hold: a video may be put away once its frames are taken."""
+        if str(source):
+            self.refuse_inside(source)
+        self.claim()
         record = self.read()
         stamp, path = record.get("source_stamp", []), Path(source) if str(source) else None
         changed = {**record, **format_1.keep_stamp(stamp), "format": FORMAT, "source": self._portable(path) if path else "",
@@ -219,71 +169,54 @@ class Capture:
         """The `verdict`'s state alone."""
         return self.verdict(stage, settings).state
 
+    @contextlib.contextmanager
+    def workspace(self):
+        """A folder in the capture for what a stage needs for a while; it goes when the stage ends, or, where that was killed, with the next run."""
+        folder = self.root / f".work.{os.getpid()}.{time.monotonic_ns()}.tmp"
+        try:
+            ownership.note_temporary(self.root, folder)
+            folder.mkdir(parents=True)
+            yield folder
+        except OSError as error:
+            raise storage_problem(error, folder) from error
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
     def has(self, name: str) -> bool:
         path = self.root / name
         return any(path.iterdir()) if name.endswith("/") and path.is_dir() else path.is_file()
 
-    def tidy(self) -> None:
-        """Removes what killed writers left behind, and takes back a folder that one of them had just put aside. Only under the lock."""
-        for old in self.root.glob(".*.old"):
-            path = self.root / old.name[1:-len(".old")]
-            if not path.exists():
-                os.replace(old, path)
-        for left in [*self.root.glob(".*.old"), *self.root.glob("**/.*.tmp*")]:
-            shutil.rmtree(left, ignore_errors=True) if left.is_dir() else left.unlink(missing_ok=True)
+    def claim(self) -> None:
+        """Makes the folder a capture, if it is not one yet. Raises Problem for a folder that holds something else, and where it cannot be written."""
+        if not self.json.is_file():
+            self.refuse_strangers()
+            write_json(self.json, {"format": FORMAT, "source": "", "stages": {}})
+
+    def refuse_strangers(self) -> None:
+        """Raises Problem where the folder, which is no capture yet, holds something."""
+        try:
+            strangers = [path.name for path in sorted(self.root.iterdir())] if self.root.is_dir() else []
+        except OSError as error:
+            raise storage_problem(error, self.root) from error
+        if strangers:
+            raise Problem(f"{self.root} is no capture: it holds {strangers[0]}.", "Name a new folder, as NAME.wildcap, and it will be made.")
 
     # -- lock
 
     def check_free(self) -> None:
         """Raises Problem naming the worker that works here, if one does; a dead process's lock does not count."""
-        owner = _read_owner(self.lock)
-        if owner and (owner["host"] != socket.gethostname() or _alive(owner["pid"])):
-            raise Problem(f"Another worker (process {owner['pid']} on {owner['host']}, since {owner['start']}) is working on this capture.",
-                          f"Wait for it or cancel it there; if it is gone, delete {self.lock}.") from None
+        found = lease.holder(self.lock)
+        if found is not None:
+            raise lease.refuse(found, self.lock)
 
     @contextlib.contextmanager
-    def locked(self):
-        """Keeps every other worker out. Raises Problem naming who works here; a dead process's lock is taken over."""
+    def locked(self, tell: Callable[[str], None] = lambda text: None):
+        """Keeps every other worker out, and clears away what killed ones left. Raises Problem naming who works here, and for a folder that is no capture;
+        `tell` hears of a longer wait (lease.hold)."""
+        self.claim()
         try:
-            self.root.mkdir(parents=True, exist_ok=True)
-            mine = {"pid": os.getpid(), "host": socket.gethostname(), "start": time.strftime("%Y-%m-%dT%H:%M:%S")}
-            while True:
-                try:
-                    with open(self.lock, "x", encoding="utf-8") as file:
-                        json.dump(mine, file)
-                    break
-                except FileExistsError:
-                    self.check_free()
-                    self.lock.unlink(missing_ok=True)
+            with lease.hold(self.root, tell):
+                ownership.clear_leftovers(self.root)
+                yield
         except OSError as error:
             raise storage_problem(error, self.root) from error
-        try:
-            yield
-        finally:
-            self.lock.unlink(missing_ok=True)
-
-
-def _read_owner(lock: Path) -> dict | None:
-    try:
-        owner = json.loads(lock.read_text(encoding="utf-8"))
-        return owner if {"pid", "host", "start"} <= set(owner) else None
-    except (OSError, ValueError):
-        return None  # half written by a process that died
-
-
-def _alive(pid: int) -> bool:
-    if os.name == "nt":
-        import ctypes
-
-        handle = ctypes.windll.kernel32.OpenProcess(0x1000, False, pid)  # PROCESS_QUERY_LIMITED_INFORMATION
-        if handle:
-            ctypes.windll.kernel32.CloseHandle(handle)
-        return bool(handle)
-    try:
-        with contextlib.suppress(PermissionError):
-            os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    with contextlib.suppress(OSError, IndexError):  # Linux: a process that has ended, but that nobody has asked after, as in a container without an init
-        return Path(f"/proc/{pid}/stat").read_bytes().rpartition(b") ")[2][:1] != b"Z"
-    return True

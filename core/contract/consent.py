@@ -17,9 +17,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from . import switchlight_api as service
-from .capture import Capture, storage_problem, write_json
+from .capture import Capture
+from .files import storage_problem, write_json
 from .frame_records import read_frames
 from .hashes import hash_file
+from .json_files import read_json
 from .messages import Problem
 
 GIVEN_VARIABLE = "WILDCAP_SWITCHLIGHT_CONSENT"
@@ -97,7 +99,7 @@ def withdraw(capture: Capture) -> None:
 def given(capture: Capture, plan: Sending) -> bool:
     """Whether all that would be sent was agreed to: these pictures, from this place, to this machine, for no more credits. Damaged records count as none."""
     try:
-        record = json.loads(capture.consent.read_text(encoding="utf-8"))
+        record = read_json(capture.consent)
         return (record["capture"] == _place(capture) and record["host"] == plan.host and record["preview"] is plan.preview
                 and plan.credits <= record["credits"] and plan.frames.items() <= record["frames"].items())
     except (OSError, ValueError, KeyError, TypeError, AttributeError):

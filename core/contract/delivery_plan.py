@@ -7,6 +7,7 @@ Ground floor: standard library only. The worker makes the maps in a folder besid
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -15,8 +16,9 @@ import unicodedata
 from dataclasses import dataclass
 from pathlib import Path
 
-from .capture import Capture, storage_problem
+from .capture import Capture
 from .delivery_presets import FORMATS, PICTURES, PRESETS, Format, Preset
+from .files import storage_problem
 from .messages import Problem
 from .settings import DeliverSettings
 
@@ -29,7 +31,7 @@ MADE_BY = "WildCap for Blender"
 @dataclass(frozen=True)
 class Plan:
     """`name` begins every file's name; `pictures` is 'png8', 'png16' or 'exr'; `colour` 'srgb' or 'linear'; `normals` 'opengl' or 'directx'; `unit` 'm'
-    or 'cm'; `target` is the folder, `staged` what it is until it is whole."""
+    or 'cm'; `target` is the folder, `staged` what it is until it is whole; `replace`: files of an older delivery that were changed since are given up."""
 
     name: str
     what: str
@@ -42,6 +44,7 @@ class Plan:
     numbered: bool
     target: Path
     staged: Path
+    replace: bool = False
 
     @property
     def suffix(self) -> str:
@@ -58,7 +61,7 @@ class Plan:
 
 
 def plan(capture: Capture, settings: DeliverSettings) -> Plan:
-    """Raises Problem for choices that do not go together, and for a folder that holds what is not ours."""
+    """Raises Problem for choices that do not go together. What lies at the target is judged by `check_target`."""
     preset = PRESETS[settings.preset]
     format_name = preset.format if settings.format == "preset" else settings.format
     format = FORMATS[format_name]
@@ -77,10 +80,9 @@ def plan(capture: Capture, settings: DeliverSettings) -> Plan:
     name = safe_name(capture.root.stem)
     base = Path(settings.folder).expanduser() if settings.folder else capture.exports
     target = base / f"{name}_{settings.what}_{settings.preset}_{format_name}"
-    _check(target)
     numbered = preset.numbered if settings.udim == "preset" else settings.udim == "numbered"
     return Plan(name, settings.what, preset, format, pictures, colour, format.normals or preset.normals, format.unit or preset.unit, numbered,
-                target, target.with_name(f".{target.name}.staged"))
+                target, target.with_name(f".{target.name}.staged"), settings.replace)
 
 
 def safe_name(text: str) -> str:
@@ -101,11 +103,12 @@ def needs(capture: Capture, what: str) -> Path:
 
 
 def put_in_place(plan: Plan) -> None:
-    """The staged folder gets its name; an older delivery there goes only then. Raises Problem where that cannot be."""
+    """The staged folder gets its name; an older delivery there goes only then, but for files that others put there: those stay. Raises Problem where that
+    cannot be, and then everything is as it was."""
     old = plan.target.with_name(f".{plan.target.name}.old")
     try:
-        _check(plan.target)
-        shutil.rmtree(old, ignore_errors=True)
+        _recover(plan.target, old)
+        check_target(plan)
         if plan.target.exists():
             os.replace(plan.target, old)
         try:
@@ -114,7 +117,7 @@ def put_in_place(plan: Plan) -> None:
             if old.exists():
                 os.replace(old, plan.target)
             raise
-        shutil.rmtree(old, ignore_errors=True)
+        _recover(plan.target, old)
     except OSError as error:
         raise storage_problem(error, plan.target) from error
 
@@ -125,13 +128,58 @@ def discard(plan: Plan) -> None:
         shutil.rmtree(left, ignore_errors=True)
 
 
-def _check(target: Path) -> None:
-    """Raises Problem for a folder that no delivery has made: it would be replaced as a whole."""
-    try:
-        if not target.exists() or target.is_dir() and not any(target.iterdir()):
-            return
-        made_by = json.loads((target / PROVENANCE).read_text(encoding="utf-8")).get("made_by")
-    except (OSError, ValueError, AttributeError):
-        made_by = None
-    if made_by != MADE_BY:
+def check_target(plan: Plan) -> None:
+    """Raises Problem for a folder that no delivery has made, for files of an older delivery that somebody changed since, unless the plan replaces those,
+    and for files of others that are in the way."""
+    target = plan.target
+    if not target.exists() or target.is_dir() and not any(target.iterdir()):
+        return
+    delivered = _delivered(target)
+    if delivered is None:
         raise Problem(f"{target} holds files that no delivery has put there.", "Move them away, or choose another folder to deliver to.")
+    changed = [name for name, digest in delivered.items() if (target / name).is_file() and not _is(target / name, digest)]
+    if changed and not plan.replace:
+        raise Problem(f"{_listed(changed)} in {target} changed since the last delivery, which would be replaced.",
+                      "Move what you want to keep to another folder, or deliver again with Replace Changed Files (--replace) to give it up.")
+    new = {path.relative_to(plan.staged).as_posix() for path in plan.staged.rglob("*") if path.is_file()} if plan.staged.is_dir() else set()
+    blocked = sorted(name for name in new - delivered.keys() if (target / name).exists())
+    if blocked:
+        raise Problem(f"{_listed(blocked)} in {target} is in the way: no delivery has put it there.", "Move it to another folder, or deliver to another one.")
+
+
+def _recover(target: Path, old: Path) -> None:
+    """Ends what was begun when `old`, an older delivery, was put aside: what a delivery wrote goes, what others put there moves back to where it was."""
+    if not old.exists():
+        return
+    if not target.exists():
+        os.replace(old, target)
+        return
+    delivered = _delivered(old) or {}
+    for file in sorted(path for path in old.rglob("*") if path.is_file() or path.is_symlink()):
+        name = file.relative_to(old).as_posix()
+        if name not in delivered and name != PROVENANCE and not (target / name).exists():
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(file, target / name)
+    (old / PROVENANCE).unlink(missing_ok=True)  # last: it says which files are whose
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _delivered(target: Path) -> dict[str, str] | None:
+    """What the delivery in a folder wrote: file -> SHA-256; None for a folder that no delivery has made."""
+    try:
+        told = json.loads((target / PROVENANCE).read_text(encoding="utf-8"))
+        return {PROVENANCE: "", **told.get("files", {})} if told.get("made_by") == MADE_BY else None
+    except (OSError, ValueError, AttributeError, TypeError):
+        return None
+
+
+def _is(path: Path, digest: str) -> bool:
+    """Whether a delivered file is as it was; the provenance itself may be."""
+    if not digest:
+        return True
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest() == digest
+
+
+def _listed(names: list[str], most: int = 4) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

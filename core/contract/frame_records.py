@@ -8,12 +8,14 @@ older version did not write have their defaults. Pixels are those of the written
 
 from __future__ import annotations
 
-import json
+import math
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from pathlib import Path
 
-from .capture import Capture, write_json
+from .capture import Capture
+from .files import write_json
+from .json_files import is_number, plain_name, read_json
 from .messages import Problem
 
 VIDEO, PHOTOGRAPHS = "video", "photographs"
@@ -69,12 +71,12 @@ class Frames:
 
 
 def read_frames(capture: Capture) -> Frames:
-    """Raises Problem where frames.json is missing or damaged."""
+    """Raises Problem where frames.json is missing, damaged, or names as a frame what is no file of its own folder."""
     try:
-        told = json.loads(capture.frames_json.read_text(encoding="utf-8"))
+        told = read_json(capture.frames_json)
         return Frames(tuple(_record(entry) for entry in told["frames"]), told.get("kind"))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise Problem(f"The frames of this capture cannot be read ({error}).", "Run the stage frames again.") from error
+        raise Problem(f"The frames of this capture cannot be read ({capture.frames_json.name}: {error}).", "Run the stage frames again.") from error
 
 
 def write_frames(folder: Path, frames: Frames) -> None:
@@ -85,6 +87,32 @@ def write_frames(folder: Path, frames: Frames) -> None:
 
 def _record(entry: dict) -> FrameRecord:
     record = FrameRecord(**{key: tuple(value) if isinstance(value, list) else value for key, value in entry.items() if key in KEYS})
-    if not isinstance(record.name, str) or not isinstance(record.sharpness, int | float):
-        raise ValueError(f"{record.name!r} is no frame")
+    if not plain_name(record.name):
+        raise ValueError(f"{record.name!r} is no name of a frame")
+    for name, sound in _JUDGES.items():
+        if not sound(getattr(record, name)):
+            raise ValueError(f"{record.name} has the {name} {getattr(record, name)!r:.60}")
     return record
+
+
+def _numbers(count: int, low: float = -math.inf, optional: bool = True):
+    """A judge of tuples of `count` numbers from `low` on; of None, too, where they are optional."""
+    return lambda value: value is None and optional or isinstance(value, tuple) and len(value) == count and all(is_number(each, low) for each in value)
+
+
+def _number(low: float = -math.inf, optional: bool = False):
+    return lambda value: value is None and optional or is_number(value, low)
+
+
+def _is_measure(value) -> bool:
+    """Whether it was measured, though it may be no number (NaN): of a face that lies outside of the picture there is nothing to measure."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+_JUDGES = {
+    "video_frame": _number(0, True), "time_s": _number(optional=True), "source": lambda value: isinstance(value, str), "size": _numbers(2, 1),
+    "sharpness": _number(), "selected": lambda value: isinstance(value, bool), "face_box": _numbers(4), "face_score": _number(),
+    "yaw_deg": _number(optional=True), "focal_px": _number(0, True), "blur": _is_measure, "brightness": _is_measure, "clipped": _is_measure,
+    "noise": _is_measure,
+    "eyes_open": _numbers(2), "blink": lambda value: isinstance(value, bool), "other_face": _number(), "gain": _numbers(3, optional=False)}
+"""Attribute -> whether a value from the file can be that."""

@@ -11,7 +11,9 @@ import shutil
 import time
 from pathlib import Path
 
-from .capture import Capture, replacing
+from . import ownership
+from .capture import Capture
+from .files import replacing
 
 KEPT = 10
 
@@ -30,7 +32,8 @@ def keep(capture: Capture, mask: Path, content: bytes | None = None) -> Path | N
     with replacing(copy) as temporary:
         shutil.copyfile(mask, temporary) if content is None else temporary.write_bytes(content)
     for old in sorted(capture.mask_history.glob(f"{mask.stem}_*{mask.suffix}"))[:-KEPT]:
-        old.unlink(missing_ok=True)
+        if ownership.is_ours(capture.root, old):
+            old.unlink(missing_ok=True)
     return copy
 
 

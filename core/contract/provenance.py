@@ -18,9 +18,10 @@ from pathlib import Path
 
 from .. import __version__
 from . import stages
-from .capture import Capture, write_json
+from .capture import Capture
 from .code_key import data_files
 from .delivery_plan import MADE_BY, PROVENANCE, Plan
+from .files import write_json
 from .hashes import hash_source, same_source
 from .settings import Settings
 

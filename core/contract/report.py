@@ -14,7 +14,8 @@ from pathlib import Path
 
 from .. import __version__
 from . import stages
-from .capture import Capture, replacing
+from .capture import Capture
+from .files import replacing
 from .freshness import STALE
 from .settings import Settings, tooltips
 
@@ -68,7 +69,7 @@ def _summary(record: dict) -> str:
     done = record["stages"].values()
     seconds = sum(stage["seconds"] for stage in done)
     last = max((stage["finished"].replace("T", " ") for stage in done), default="never")
-    return f"{len(record['stages'])} of {len(stages.STAGES)} stages finished in {_duration(seconds)}; last change {last}"
+    return f"{len(record['stages'])} of {len(stages.STAGES)} stages finished in {_duration(seconds)}; last change {html.escape(last)}"
 
 
 def _section(capture: Capture, stage: stages.Stage, finished: dict | None, settings: Settings) -> str:

@@ -172,6 +172,8 @@ class DeliverSettings:
     """Folder to deliver to; empty: exports in the capture's folder"""
     roughness: int = setting(45, min=0, max=100, unit="percent")
     """Roughness of the cheeks, in the maps and materials that hold it; Blender puts in what the head's material has"""
+    replace: bool = setting(False, label="Replace Changed Files", flag="--replace")
+    """Give up what was changed in the files of an older delivery to the same folder; off: such a delivery is refused. Files of others stay in any case"""
     whole: bool = setting(False)
     """Write the mesh as well, without Blender, as OBJ"""
 

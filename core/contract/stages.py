@@ -8,6 +8,7 @@ Ground floor: standard library only; a stage's module is imported by the worker 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path, PurePath
 
 from .messages import Problem
 
@@ -62,6 +63,19 @@ LABELS = {stage.name: stage.label for stage in (*STAGES, *TOOLS)}
 
 NAMES = tuple(stage.name for stage in STAGES)
 MASK_STAGE = "shadow_mask"  # in Blender the chain stops after it, for the artist
+
+
+def advise_remaking(path: Path, otherwise: str) -> str:
+    """What to do about a damaged file: have the stage that wrote it run again where it is an output in a capture; `otherwise` for a user's own file."""
+    for stage in STAGES:
+        for name in stage.writes:
+            own = PurePath(name).parts
+            parts = path.parts[:-1] if name.endswith("/") else path.parts
+            while len(parts) > len(own) and name.endswith("/") and parts[-len(own):] != own:  # delit/shadow/00001.png
+                parts = parts[:-1]
+            if parts[-len(own):] == own and Path(*parts[:-len(own)], "capture.json").is_file():
+                return f"Run the stage {stage.name} again."
+    return otherwise
 
 
 def by_name(name: str) -> Stage:

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..contract.capture import Capture, replacing_folder
+from ..contract.capture import Capture
+from ..contract.files import replacing_folder
 from ..contract.messages import Reporter
 from ..contract.settings import Settings
 from ..imaging import images

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..contract import switchlight_api as service
-from ..contract.capture import replacing
+from ..contract.files import replacing
 from ..contract.messages import Problem, Reporter
 from ..imaging import images
 from .switchlight_calls import Account, AgainError, albedo

@@ -11,29 +11,37 @@ import json
 from pathlib import Path
 
 from ..contract import delivery_plan, provenance, stages
-from ..contract.capture import Capture, replacing_folder, write_json
+from ..contract.capture import Capture
 from ..contract.delivery_plan import PACKING, TEXTURES, Plan
 from ..contract.delivery_presets import HAIR, SCAN_MAPS, Picture
+from ..contract.files import replacing_folder, write_json
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import template
 from ..face.head import read_head
+from ..geometry import meshes
 from ..imaging import images
-from . import maps, wavefront
+from . import checks, maps, wavefront
 
 HEAD_TILE = 1001
 METRES = {"m": 1.0, "cm": 0.01}
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """The map set, packing.json that tells Blender what it is, and provenance.json -> the plan's staged folder, whole or not at all."""
+    """The map set, packing.json that tells Blender what it is, and provenance.json -> the plan's staged folder, whole or not at all.
+
+    Raises Problem, and delivers nothing, where a stage is out of date, or one of its files is damaged."""
     plan = delivery_plan.plan(capture, settings.deliver)
+    delivery_plan.check_target(plan)
     mesh = delivery_plan.needs(capture, plan.what)
+    checks.check_stages(capture, plan.what, settings, report)
     if settings.deliver.whole and plan.format.suffix != ".obj":
         raise Problem(f"{plan.format.title} is written by Blender.", "Choose OBJ here, or deliver from the add-on's panel.")
     tiles = _tiles(capture, plan, settings)
     several = len(tiles) > 1
     built_in = read_head(capture).built_in
+    if mesh != capture.head:
+        meshes.read_obj(mesh)  # what is shipped as it lies there is read once, to know that it is whole
     mean, regions = _mean_specular(capture, built_in), built_in and plan.what == "head"
     pictures = _pictures(plan, settings)
     delivery_plan.discard(plan)

@@ -15,6 +15,8 @@ import numpy as np
 from ..contract import skin_regions
 from ..contract.delivery_plan import Plan
 from ..contract.delivery_presets import COLOUR, NORMAL, Picture
+from ..contract.messages import Problem
+from ..contract.stages import advise_remaking
 from ..face import template
 from ..imaging import images
 
@@ -58,10 +60,14 @@ class Sources:
         values = self._file(term)
         return values / self.unit if term == "displacement" else values
 
+    def check(self, name: str) -> None:
+        """Raises Problem for a file that is cut off or damaged, or no square."""
+        self._file(name)
+
     def _file(self, name: str) -> np.ndarray:
         if name not in self._read:
-            read = {"albedo": images.read_linear, "clean": images.read_linear, "lit": images.read_linear, "normal": _read_normal}.get(name, images.read_mask)
-            self._read[name] = _sized(read(self.paths[name]), self.size, name == "normal")
+            read = images.read_linear if name in ("albedo", "clean", "lit") else images.read_normals if name == "normal" else images.read_mask
+            self._read[name] = _sized(_square(self.paths[name], read(self.paths[name])), self.size, name == "normal")
         return self._read[name]
 
 
@@ -70,6 +76,7 @@ def write(picture: Picture, sources: Sources, path: Path, plan: Plan) -> None:
     bits = {"png8": 8, "png16": 16, "exr": 16}[plan.pictures]
     as_it_is = picture.channels[0].endswith((".r", ".x")) and len(picture.channels) == 3 and _file_of(picture.channels[0])
     if as_it_is and _stored_alike(picture, sources, plan, as_it_is):
+        sources.check(as_it_is)
         shutil.copyfile(sources.paths[as_it_is], path)  # byte for byte what the worker's stage wrote
         return
     pixels = np.stack([sources.channel(term) for term in picture.channels], 2)
@@ -115,8 +122,12 @@ def _stored_alike(picture: Picture, sources: Sources, plan: Plan, name: str) -> 
     return right and plan.pictures == "png16" and source.suffix == ".png" and images.bits(source) == 16 and images.size(source) == (sources.size, sources.size)
 
 
-def _read_normal(path: Path) -> np.ndarray:
-    return images.read_data(path)[..., :3] * 2 - 1
+def _square(path: Path, pixels: np.ndarray) -> np.ndarray:
+    """The pixels [S, S(, C)] themselves. Raises Problem for a map of another shape."""
+    height, width = pixels.shape[:2]
+    if width != height:
+        raise Problem(f"{path} is {width} x {height}, and a map is square.", advise_remaking(path, "Run the stage that makes it again."))
+    return pixels
 
 
 def _sized(pixels: np.ndarray, size: int, unit: bool) -> np.ndarray:

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..contract.capture import Capture, replacing_folder
+from ..contract.capture import Capture
+from ..contract.files import replacing_folder
 from ..contract.frame_records import PHOTOGRAPHS, VIDEO, FrameRecord, Frames, write_frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings

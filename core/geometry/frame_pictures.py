@@ -20,6 +20,9 @@ from .views import View, read_views
 
 KINDS = (".png", ".jpg", ".jpeg", ".exr", ".tif", ".tiff", ".webp")
 
+SMALLEST = 8
+"""How many times smaller than its frame a picture may be: of a face 600 pixels wide it has 75 left, too few for a texture, enough for its tones."""
+
 
 def pictures_of(capture: Capture, folder: str, what: str) -> list[tuple[View, Path]]:
     """Each registered view with its picture in `folder`, in frame order; `what`: a word for these pictures, "delit".
@@ -32,10 +35,16 @@ def pictures_of(capture: Capture, folder: str, what: str) -> list[tuple[View, Pa
 def read_picture(path: Path, view: View, what: str) -> np.ndarray:
     """sRGB [H, W, 3] at the frame's size. Raises Problem where the picture has another shape than its frame."""
     image = images.read_srgb(path)
-    if abs(image.shape[1] / image.shape[0] - view.width / view.height) > 0.01:
-        raise Problem(f"{path} is {image.shape[1]} x {image.shape[0]}, but its frame is {view.width} x {view.height}.",
-                      f"{what.title()} pictures are made from the frames in the capture's frames folder, without cropping or turning them.")
+    check_shape(path, image, view, what)
     return image if image.shape[:2] == (view.height, view.width) else images.resize(image, view.width, view.height)
+
+
+def check_shape(path: Path, image: np.ndarray, view: View, what: str) -> None:
+    """Raises Problem where a picture [H, W, ...] has another shape than its frame, or is too small to show the same."""
+    height, width = image.shape[:2]
+    if abs(width / height - view.width / view.height) > 0.01 or width * SMALLEST < view.width:
+        raise Problem(f"{path} is {width} x {height}, but its frame is {view.width} x {view.height}.",
+                      f"{what.title()} pictures are made from the frames in the capture's frames folder, without cropping or turning them.")
 
 
 def match(views: list[View], video_frames: dict[str, int], path: Path, what: str = "delit",

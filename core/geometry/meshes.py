@@ -4,14 +4,18 @@
 
 from __future__ import annotations
 
+import io
+import struct
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import trimesh
 
-from ..contract.capture import replacing
+from ..contract.files import replacing
 from ..contract.messages import Problem
+from ..contract.stages import advise_remaking
+from .mesh_checks import MOST_OBJ_BYTES, MOST_PLY_BYTES, check_ply, damaged, find_fault, open_mesh
 
 
 @dataclass(frozen=True)
@@ -50,35 +54,57 @@ def vertex_normals(mesh: Mesh) -> np.ndarray:
 
 
 def read_obj(path: Path) -> Mesh:
-    """Triangles and triangulated polygons with their UVs. Raises Problem for a file without faces."""
+    """Triangles and triangulated polygons with their UVs. Raises Problem for a file without faces, and for one that is damaged: a line without its
+    numbers, positions that are no numbers, faces with vertices that are not there."""
     vertices, uvs, faces, face_uvs, polygons = [], [], [], [], []
-    try:
-        text = Path(path).read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise Problem(f"{path} cannot be read ({error.strerror}).", "Run the stage that makes it, or choose another file.") from error
-    for line in text.replace("\\\n", " ").splitlines():
+    text = open_mesh(Path(path), MOST_OBJ_BYTES).decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
+    for number, line in enumerate(text.replace("\\\n", " ").split("\n"), 1):
         key, *words = line.split() or [""]
-        if key == "v":
-            vertices.append(words[:3])
-        elif key == "vt":
-            uvs.append(words[:2])
-        elif key == "f":
-            corners = [(corner.split("/") + [""])[:2] for corner in words]
-            polygons.append(len(corners) - 2)
-            for i in range(1, len(corners) - 1):
-                triangle = corners[0], corners[i], corners[i + 1]
-                faces.append([int(c[0]) for c in triangle])
-                face_uvs.append([int(c[1] or 0) for c in triangle])
+        try:
+            if key == "v":
+                x, y, z = words[:3]
+                vertices.append((x, y, z))
+            elif key == "vt":
+                uvs.append((words[0], words[1] if len(words) > 1 else "0"))
+            elif key == "f":
+                corners = [_corner(word, len(vertices), len(uvs)) for word in words]
+                if len(corners) < 3:
+                    raise ValueError
+                polygons.append(len(corners) - 2)
+                for i in range(1, len(corners) - 1):
+                    triangle = corners[0], corners[i], corners[i + 1]
+                    faces.append([c[0] for c in triangle])
+                    face_uvs.append([c[1] for c in triangle])
+        except (ValueError, IndexError):
+            raise damaged(Path(path), f"line {number} is {line.strip()!r:.60}") from None
     if not faces:
         raise Problem(f"{path} holds no faces.", "Choose an OBJ file with a mesh in it.")
-    has_uvs = len(uvs) > 0 and min(map(min, face_uvs)) != 0
-    mesh = Mesh(np.array(vertices, np.float64), _from_one(faces, len(vertices)),
-                np.array(uvs, np.float64) if has_uvs else None, _from_one(face_uvs, len(uvs)) if has_uvs else None)
-    return _unfolded(mesh, np.array(polygons))
+    has_uvs = len(uvs) > 0 and min(map(min, face_uvs)) >= 0
+    try:
+        mesh = Mesh(np.array(vertices, np.float64).reshape(-1, 3), np.array(faces, np.int64),
+                    np.array(uvs, np.float64) if has_uvs else None, np.array(face_uvs, np.int64) if has_uvs else None)
+    except (ValueError, OverflowError) as error:
+        raise damaged(Path(path), str(error)) from error
+    return _unfolded(_sound(Path(path), mesh), np.array(polygons))
+
+
+def read_obj_vertices(path: Path) -> np.ndarray:
+    """The vertices [V, 3] of an OBJ, without its faces. Raises Problem as `read_obj` does."""
+    path = Path(path)
+    text = open_mesh(path, MOST_OBJ_BYTES).decode("utf-8-sig", "replace")
+    try:
+        vertices = np.array([line.split()[1:4] for line in text.splitlines() if line.startswith("v ")], np.float64).reshape(-1, 3)
+    except ValueError as error:
+        raise damaged(path, str(error)) from error
+    if fault := find_fault(vertices, np.zeros((0, 3), np.int64), None, None):
+        raise damaged(path, fault)
+    return vertices
 
 
 def write_obj(path: Path, mesh: Mesh) -> None:
-    """Positions to a micrometre, UVs to 1e-6, atomically."""
+    """Positions to a micrometre, UVs to 1e-6, atomically. Raises Problem, and writes nothing, for a mesh without faces or with values that are no
+    numbers."""
+    _check_written(path, mesh)
     lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in mesh.vertices]
     if mesh.uvs is not None:
         lines += [f"vt {u:.6f} {v:.6f}" for u, v in mesh.uvs]
@@ -90,15 +116,48 @@ def write_obj(path: Path, mesh: Mesh) -> None:
 
 
 def read_ply(path: Path) -> Mesh:
-    """The triangles of a PLY file."""
-    loaded = trimesh.load(path, process=False, force="mesh")
-    return Mesh(np.asarray(loaded.vertices, np.float64), np.asarray(loaded.faces, np.int64))
+    """The triangles of a PLY file, ASCII or binary of either byte order; polygons are cut into triangles. Raises Problem for a damaged one."""
+    path = Path(path)
+    content = open_mesh(path, MOST_PLY_BYTES)
+    check_ply(path, content)
+    try:
+        loaded = trimesh.load(io.BytesIO(content), file_type="ply", process=False, force="mesh")
+        mesh = Mesh(np.asarray(loaded.vertices, np.float64), np.asarray(loaded.faces, np.int64))
+    except (ValueError, LookupError, TypeError, AttributeError, OverflowError, struct.error, NotImplementedError) as error:
+        raise damaged(path, str(error).splitlines()[0][:100] if str(error) else type(error).__name__) from error
+    if not len(mesh.faces):
+        raise damaged(path, "it holds no faces")
+    return _sound(path, mesh)
 
 
 def write_ply(path: Path, mesh: Mesh) -> None:
-    """Binary PLY, atomically."""
+    """Binary PLY, atomically. Raises Problem, and writes nothing, for a mesh without faces or with values that are no numbers."""
+    _check_written(path, mesh)
     with replacing(path) as temporary:
         temporary.write_bytes(trimesh.exchange.ply.export_ply(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)))
+
+
+def _sound(path: Path, mesh: Mesh) -> Mesh:
+    """The mesh itself. Raises Problem where it cannot be one."""
+    if fault := find_fault(mesh.vertices, mesh.faces, mesh.uvs, mesh.face_uvs):
+        raise damaged(path, fault)
+    return mesh
+
+
+def _check_written(path: Path, mesh: Mesh) -> None:
+    if fault := find_fault(mesh.vertices, mesh.faces, mesh.uvs, mesh.face_uvs) or ("" if len(mesh.faces) else "it has no faces"):
+        raise Problem(f"{path} was not written: {fault}.",
+                      advise_remaking(Path(path), "Run again, and if it stays, report it with the logs of this capture. Finished stages are kept."))
+
+
+def _corner(word: str, vertices: int, uvs: int) -> tuple[int, int]:
+    """A corner of an OBJ's face, "3/7/1" or "-1//-1", as indices from zero of its vertex and UV (-1: it has none); `vertices` and `uvs` have been read so
+    far, from which negative numbers count back. Raises ValueError for what is none."""
+    vertex, uv = (word.split("/") + [""])[:2]
+    found = [int(text) - 1 if not text.startswith("-") else int(text) + count for text, count in ((vertex, vertices), (uv or "0", uvs))]
+    if found[0] < 0 or uv and found[1] < 0:
+        raise ValueError(word)
+    return found[0], found[1]
 
 
 def _unfolded(mesh: Mesh, counts: np.ndarray) -> Mesh:
@@ -106,7 +165,7 @@ def _unfolded(mesh: Mesh, counts: np.ndarray) -> Mesh:
 
     counts [P]: triangles of each polygon, which lie one after the other.
     """
-    if counts.max() < 2 or mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
+    if counts.max() < 2:
         return mesh
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
     across = np.cross(b - a, c - a)
@@ -128,12 +187,6 @@ def _unfolded(mesh: Mesh, counts: np.ndarray) -> Mesh:
                     face_uvs[own] = np.concatenate([mesh.face_uvs[start, :1], mesh.face_uvs[own, 1], mesh.face_uvs[start + count - 1, 2:]])[fan]
                 break
     return replace(mesh, faces=faces, face_uvs=face_uvs)
-
-
-def _from_one(indices: list, count: int) -> np.ndarray:
-    """OBJ indices (from one, negative from the end) to indices from zero."""
-    indices = np.array(indices, np.int64)
-    return np.where(indices < 0, indices + count, indices - 1)
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

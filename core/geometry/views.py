@@ -15,7 +15,9 @@ import pycolmap
 
 from ..contract.capture import Capture
 from ..contract.frame_records import read_frames
+from ..contract.json_files import plain_name
 from ..contract.messages import Problem
+from .models import pose_of, read_model
 
 
 @dataclass(frozen=True)
@@ -68,15 +70,20 @@ def read_views(capture: Capture, selected_only: bool = False) -> list[View]:
     """The registered frames in frame order. Raises Problem where the frames or the cameras are missing or damaged."""
     frames = read_frames(capture).by_name
     try:
-        model = pycolmap.Reconstruction(str(capture.cameras))
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
+        model = read_model(capture.cameras)
+        strange = [image.name for image in model.images.values() if not plain_name(image.name)]
+        if strange:
+            raise ValueError(f"{strange[0]!r} is no name of a frame")
+    except (OSError, ValueError) as error:
         raise Problem(f"The cameras of this capture cannot be read ({error}).", "Run the stages frames and cameras again.") from error
     views = []
     for image in sorted(model.images.values(), key=lambda image: image.name):
         frame = frames.get(image.name)
         if frame is None or (selected_only and not frame.selected):
             continue
-        pose = image.cam_from_world() if callable(image.cam_from_world) else image.cam_from_world
+        if not image.has_pose:
+            continue
+        pose = pose_of(image)
         views.append(View(image.name, capture.frames / image.name, model.cameras[image.camera_id],
                           pose.rotation.matrix(), np.array(pose.translation), frame.selected))
     return views

@@ -16,8 +16,13 @@ import cv2
 import numpy as np
 import OpenImageIO as oiio
 
-from ..contract.capture import replacing
+from ..contract.files import replacing
 from ..contract.messages import Problem
+from ..contract.stages import advise_remaking
+from .checks import SAVE_ANEW, check_written, open_picture, read_pixels
+
+TURNS = {1: (False, 1, 1), 2: (False, 1, -1), 3: (False, -1, -1), 4: (False, -1, 1), 5: (True, 1, 1), 6: (True, 1, -1), 7: (True, -1, -1), 8: (True, -1, 1)}
+"""EXIF orientation -> how it comes upright: whether rows become columns, then the order of rows and of columns. (OpenImageIO's reorient mistakes 5 for 7.)"""
 
 
 def srgb_to_linear(srgb: np.ndarray) -> np.ndarray:
@@ -49,6 +54,14 @@ def read_data(path: Path) -> np.ndarray:
     return _read(path)
 
 
+def read_normals(path: Path) -> np.ndarray:
+    """The vectors [H, W, 3] of a normal map, which stores [-1, 1] as [0, 1]; not brought to length 1. Raises Problem for a grey picture."""
+    pixels = _read(path)
+    if pixels.shape[2] < 3:
+        raise Problem(f"{path} is grey, and a normal map has three channels.", advise_remaking(Path(path), SAVE_ANEW))
+    return pixels[..., :3] * 2 - 1
+
+
 def read_mask(path: Path) -> np.ndarray:
     """A grey picture [H, W] in [0, 1], stored values; of a colour picture the mean of R, G, B."""
     pixels = _read(path)
@@ -57,9 +70,7 @@ def read_mask(path: Path) -> np.ndarray:
 
 def size(path: Path) -> tuple[int, int]:
     """Width and height as stored, without reading the pixels."""
-    image = oiio.ImageInput.open(str(path))
-    if image is None:
-        raise Problem(f"{path} is not a picture that can be read ({oiio.geterror().strip()}).", "Run the stage that makes it again, or save it anew.")
+    image = open_picture(path)
     width, height = image.spec().width, image.spec().height
     image.close()
     return width, height
@@ -67,9 +78,7 @@ def size(path: Path) -> tuple[int, int]:
 
 def bits(path: Path) -> int:
     """Bits per channel as stored: 8, 16 or 32."""
-    image = oiio.ImageInput.open(str(path))
-    if image is None:
-        raise Problem(f"{path} is not a picture that can be read ({oiio.geterror().strip()}).", "Run the stage that makes it again, or save it anew.")
+    image = open_picture(path)
     size = image.spec().format.size()
     image.close()
     return 8 * size
@@ -106,6 +115,7 @@ def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8, quality: int = 92, s
 
     `small`, here and below: what is shipped is packed as tightly as it goes, at ten times the time; an EXR loses what the eye does not see (DWAA).
     """
+    check_written(Path(path), np.asarray(srgb), half=False)  # clipped, infinity would be white
     _write(path, np.clip(srgb, 0, 1), f"uint{bits}", "sRGB", quality, small=small)
 
 
@@ -134,17 +144,15 @@ def _rgb(pixels: np.ndarray) -> np.ndarray:
 
 
 def _read(path: Path) -> np.ndarray:
-    image = oiio.ImageBuf(str(path))
-    if not image.read(0, 0, True, oiio.FLOAT):
-        raise Problem(f"{path} is not a picture that can be read ({image.geterror().strip()}).", "Save it again as PNG, JPEG or EXR.")
-    if image.spec().getattribute("Orientation") not in (None, 1):
-        image = oiio.ImageBufAlgo.reorient(image)
-    return np.asarray(image.get_pixels(oiio.FLOAT), np.float32)
+    pixels, turned = read_pixels(Path(path))
+    lying, rows, columns = TURNS.get(turned, TURNS[1])
+    return np.ascontiguousarray((pixels.swapaxes(0, 1) if lying else pixels)[::rows, ::columns])
 
 
 def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str, quality: int = 92, straight: bool = False, small: bool = False) -> None:
     path = Path(path)
     pixels = np.ascontiguousarray(pixels if pixels.ndim == 3 else pixels[..., None], np.float32)
+    check_written(path, pixels, kind == "half")
     height, width, channels = pixels.shape
     spec = oiio.ImageSpec(width, height, channels, kind)
     spec.attribute("oiio:ColorSpace", colour_space)

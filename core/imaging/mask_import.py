@@ -12,11 +12,15 @@ from ..contract.messages import Problem
 from ..contract.settings import Settings
 from . import images
 
+MOST_STRETCH = 1.02
+"""How much more a mask may grow one way than the other: a pixel lost to rounding at 64 texels, not a picture of another shape."""
+
 
 def import_mask(capture: Capture, picture: Path) -> Path:
     """Writes shadow_mask.png (8 bit grey, at the texture's size) from `picture`; the mask before it goes to mask_history/.
 
-    Returns the mask's path. Raises Problem for what is no picture or no capture, or when the folder cannot be written.
+    Returns the mask's path. Raises Problem for what is no picture, one of another shape than the texture's, or no capture, or when the folder cannot be
+    written.
     """
     if not capture.json.is_file():
         raise Problem(f"There is no capture at {capture.root}.", "Choose a folder that ends in .wildcap.")
@@ -24,6 +28,10 @@ def import_mask(capture: Capture, picture: Path) -> Path:
         raise Problem(f"There is no picture at {picture}.", "Check its name.")
     mask = images.read_mask(picture)
     width, height = _texture_size(capture)
+    across, down = mask.shape[1] / width, mask.shape[0] / height
+    if max(across, down) > MOST_STRETCH * min(across, down):
+        raise Problem(f"{picture} is {mask.shape[1]} x {mask.shape[0]}, but the texture is {width} x {height}: it would be stretched.",
+                      "Paint the mask on the capture's texture.png, without cropping it.")
     if mask.shape != (height, width):
         mask = images.resize(mask, width, height)
     mask_history.keep(capture, capture.shadow_mask)
@@ -34,5 +42,4 @@ def import_mask(capture: Capture, picture: Path) -> Path:
 def _texture_size(capture: Capture) -> tuple[int, int]:
     if not capture.texture_png.is_file():
         return Settings().texture.size, Settings().texture.size
-    height, width = images.read_data(capture.texture_png).shape[:2]
-    return width, height
+    return images.size(capture.texture_png)

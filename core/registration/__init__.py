@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..contract import artist_landmarks
-from ..contract.capture import Capture, write_json
+from ..contract.capture import Capture
+from ..contract.files import write_json
 from ..contract.messages import Reporter
 from ..contract.settings import Settings
 from ..face import template

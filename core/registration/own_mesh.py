@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..contract.capture import replacing
+from ..contract.files import replacing
 from ..contract.messages import Problem, Reporter
 from ..geometry import atlas, meshes
 from ..geometry.meshes import Mesh
@@ -135,19 +135,16 @@ def _numbers(path: Path) -> list:
 def _positions(path: Path) -> np.ndarray:
     """The vertices [V, 3] of an OBJ, without its faces."""
     try:
-        with open(path, encoding="utf-8", errors="replace") as file:
-            return np.array([line.split()[1:4] for line in file if line.startswith("v ")], np.float64).reshape(-1, 3)
-    except (OSError, ValueError) as error:
-        raise Problem(f"The shape {path} cannot be read ({error}).", "Export it again, or take it out of the folder.") from error
+        return meshes.read_obj_vertices(path)
+    except Problem as problem:
+        raise Problem(f"The shape {path.name} cannot be read: {problem.problem}", "Export it again, or take it out of the folder.") from problem
 
 
 def _check(mesh: Mesh, path: Path) -> None:
     """Raises Problem for a mesh that cannot be a head."""
     count = len(mesh.vertices)
-    if not np.isfinite(mesh.vertices).all() or np.ptp(mesh.vertices, axis=0).min() <= 0:
-        raise Problem(f"{path.name} holds positions that are no numbers, or is flat.", "Export it again as OBJ.")
-    if mesh.faces.min() < 0 or mesh.faces.max() >= count:
-        raise Problem(f"{path.name} has polygons with vertices that are not in it.", "Export it again as OBJ, one object per file.")
+    if np.ptp(mesh.vertices, axis=0).min() <= 0:
+        raise Problem(f"{path.name} is flat.", "Export it again as OBJ.")
     if not LEAST_VERTICES <= count <= MOST_VERTICES:
         raise Problem(f"{path.name} has {count} vertices.",
                       f"Choose a head of {LEAST_VERTICES} to {MOST_VERTICES} vertices: no primitive, and no sculpt at its finest.")

@@ -15,7 +15,8 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from ..contract.capture import Capture, write_json
+from ..contract.capture import Capture
+from ..contract.files import remove_file, write_json
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import template
@@ -70,7 +71,7 @@ def run(capture: Capture, settings: Settings, head: Mesh, ours: BuiltIn, report:
     """Writes own_head.obj, or removes that of another template where none is chosen."""
     if not settings.registration.template:
         for path in (capture.own_head, capture.own_head_skin, capture.picture("registration", "own_template")):
-            path.unlink(missing_ok=True)
+            remove_file(path)
         return
     own = own_mesh.read(settings.registration.template, report)
     fitted = fit(own, head, ours, report)

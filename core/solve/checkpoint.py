@@ -15,7 +15,7 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 
-from ..contract.capture import replacing
+from ..contract.files import replacing
 from ..contract.mask_edit import FIELD
 from .lighting import Lights
 from .problem import State

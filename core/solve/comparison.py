@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..contract.capture import Capture, replacing_folder
+from ..contract.capture import Capture
+from ..contract.files import replacing_folder
 from ..imaging import images
 from .evidence import Evidence
 

@@ -80,9 +80,7 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     confidence = images.read_data(capture.texture_confidence)[..., 0]
     if texture.shape[:2] != confidence.shape or texture.shape[0] != texture.shape[1]:
         raise Problem("The texture and its confidence do not fit together.", "Run the texture stage again.")
-    known = np.isfinite(texture).all(-1) & np.isfinite(confidence)
-    confidence = np.where(known, np.clip(confidence, 0, 1), 0)
-    texture = np.where(known[..., None], np.clip(texture, 0, None), 0)
+    confidence, texture = np.clip(confidence, 0, 1), np.clip(texture, 0, None)
     if confidence.max() < 1e-3:
         raise Problem("No texel of the texture was seen by any frame.", "Run the chain again from the cameras, and look at its report.")
     seen, bearded = _sized(confidence, size), _sized(beard.seen_in(texture, confidence), size)

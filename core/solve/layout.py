@@ -8,7 +8,6 @@ its masks lie in it (their soft shapes are not at hand).
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -19,6 +18,7 @@ import torch
 
 from ..contract.capture import Capture
 from ..contract.messages import Problem, Reporter
+from ..contract.own_head import read_skin
 from ..face.head import Head
 from ..geometry import atlas, baking, meshes
 from .evidence import REFERENCE, Evidence, Extent
@@ -122,11 +122,11 @@ def fitted(capture: Capture, head: Head, e: Evidence, prior: Prior, report: Repo
     if not (capture.own_head.is_file() and capture.own_head_skin.is_file()):
         raise Problem("The authors' prior works in the UVs of another head, and none was fitted to this face.", REMEDY)
     own = meshes.read_obj(capture.own_head)
-    told, skin = json.loads(capture.own_head_skin.read_text(encoding="utf-8")), np.zeros(len(own.faces), bool)
-    for first, end in told["skin_triangles"]:
+    (template, runs), skin = read_skin(capture, len(own.faces)), np.zeros(len(own.faces), bool)
+    for first, end in runs:
         skin[first:end] = True
     skin &= (atlas.tiles(own) == 0).all(1)
-    strange = Problem(f"The UVs of the fitted template {told['template']} are not those the authors' prior was trained in.", REMEDY)
+    strange = Problem(f"The UVs of the fitted template {template} are not those the authors' prior was trained in.", REMEDY)
     if not skin.any():
         raise strange
     ours = load()

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from ..contract.capture import Capture, replacing_folder
+from ..contract.capture import Capture
+from ..contract.files import replacing_folder
 from ..contract.messages import Reporter
 from ..imaging import images
 from .checkpoint import Solution, write_solution

@@ -8,12 +8,12 @@ ckpt.pth is read as weights only: nothing in it is ever run.
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
 import numpy as np
 import torch
 
+from ..contract.json_files import read_json
 from ..contract.messages import Problem
 
 DATA_CHANNELS = 7
@@ -27,7 +27,7 @@ def read_config(folder: Path) -> dict:
     """config.json with the entries that may be left out, as {"model": ..., "cond": ...}. Raises Problem for what is no prior of ours to run."""
     path = folder / "config.json"
     try:
-        config = json.loads(path.read_text(encoding="utf-8"))
+        config = read_json(path)
         given, cond = dict(config["model"]), dict(config.get("cond") or {})
         model = {"type": "image_v1", "patch_size": 1, "augment_wrapper": True, "skip_stages": 0, "mapping_cond_dim": 0, "cross_cond_dim": 0,
                  "has_variance": False, "sigma_data": 1.0, **given}
@@ -81,8 +81,8 @@ def read_noise(folder: Path) -> torch.Tensor | None:
         values = np.load(path, allow_pickle=False).astype(np.float32)
     except (OSError, ValueError) as error:
         raise Problem(f"{path} cannot be read ({error}).", "Save the map again with numpy, as float32 of shape 3, S, S.") from error
-    if values.ndim != 3 or len(values) != 3 or values.shape[1] != values.shape[2]:
-        raise Problem(f"{path} is of shape {values.shape}.", "Save the map of the whole UV square, of shape 3, S, S.")
+    if values.ndim != 3 or len(values) != 3 or values.shape[1] != values.shape[2] or not np.isfinite(values).all():
+        raise Problem(f"{path} is of shape {values.shape}, or holds values that are no numbers.", "Save the map of the whole UV square, of shape 3, S, S.")
     return torch.from_numpy(values)[None]
 
 

@@ -25,7 +25,7 @@ import av
 import numpy as np
 import pycolmap
 
-from ..contract.capture import replacing, write_json
+from ..contract.files import replacing, write_json
 from ..face import template
 from ..geometry import meshes, raster
 from ..geometry.meshes import Mesh, vertex_normals

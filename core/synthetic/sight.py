@@ -16,7 +16,7 @@ import numpy as np
 import pycolmap
 from scipy.sparse import csr_matrix
 
-from ..contract.capture import replacing
+from ..contract.files import replacing
 from ..face import template
 from ..geometry import raster
 from ..geometry.views import View

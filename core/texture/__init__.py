@@ -9,17 +9,20 @@ that the tone comes from all views and the pores from the one that saw them best
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
 
 from ..contract.capture import Capture
+from ..contract.files import remove_file
 from ..contract.frame_records import read_frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import template
 from ..face.head import Head, Unfolded, read_head
-from ..geometry.views import read_views
+from ..geometry.frame_pictures import check_shape
+from ..geometry.views import View, read_views
 from ..imaging import images
 from .align import align
 from .blend import bands_of, blend, equalise, robust_weights
@@ -50,7 +53,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     images.write_data(capture.texture_confidence, built.confidence)
     _leave_figures(capture, report, observations, built, texture, surface.covered)
     detail = fine_detail(observations, surface, report)
-    capture.texture_detail.unlink(missing_ok=True)
+    remove_file(capture.texture_detail)
     if detail is not None:
         images.write_data(capture.texture_detail, detail)
         report.figure("fine_detail_size_px", len(detail))
@@ -85,8 +88,15 @@ def observe_all(capture: Capture, head: Head, size: int, report: Reporter) -> tu
     observations = []
     for i, (view, path) in enumerate(views):
         report.progress(i, len(views) + 6, f"projecting {view.name}")
-        observations.append(observe(view, images.read_linear(path), surface, frames[view.name].sharpness / best))
+        observations.append(observe(view, _delit(path, view), surface, frames[view.name].sharpness / best))
     return observations, surface
+
+
+def _delit(path: Path, view: View) -> np.ndarray:
+    """A delit picture, linear [H, W, 3]. Raises Problem where it is not of its frame's shape."""
+    linear = images.read_linear(path)
+    check_shape(path, linear, view, "delit")
+    return linear
 
 
 def build(observations: list[Observation], surface: Unfolded, settings: Settings, report: Reporter, aligned: bool = True) -> Built:

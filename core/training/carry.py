@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 
 from .. import registration
-from ..contract.capture import replacing_folder
+from ..contract.files import replacing_folder
 from ..contract.messages import Problem, Reporter
 from ..face import template
 from ..geometry import baking

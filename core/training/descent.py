@@ -16,7 +16,7 @@ from pathlib import Path
 import torch
 from torch.utils.data import DataLoader, Dataset
 
-from ..contract.capture import replacing
+from ..contract.files import replacing
 from ..contract.messages import Problem, Reporter
 
 STATE = "state.pt"

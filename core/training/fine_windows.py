@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 import torch
 
-from ..contract.capture import replacing
+from ..contract.files import replacing
 from ..contract.messages import Reporter
 from ..face import template
 from ..geometry import raster

@@ -17,7 +17,7 @@ import numpy as np
 import torch
 from safetensors.torch import load_file
 
-from ..contract.capture import replacing
+from ..contract.files import replacing
 from ..contract.messages import Reporter
 from ..delight.unet import SIDE, network_input
 from ..geometry.meshes import vertex_normals

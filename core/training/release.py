@@ -10,7 +10,7 @@ from pathlib import Path
 import torch
 from safetensors.torch import save_file
 
-from ..contract.capture import replacing
+from ..contract.files import replacing
 
 
 def release(out: Path, state: dict, config: dict, data: str, command: str, held_out: dict, tensors: dict[str, torch.Tensor] | None = None, **more) -> dict:

@@ -19,7 +19,7 @@ import torch
 from scipy.ndimage import map_coordinates
 from scipy.spatial import cKDTree
 
-from ..contract.capture import replacing
+from ..contract.files import replacing
 from ..contract.messages import Problem, Reporter
 from ..face import template
 from ..geometry import raster

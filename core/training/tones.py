@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..contract.capture import write_json
+from ..contract.files import write_json
 from ..contract.messages import Problem, Reporter
 from ..face import template
 from ..geometry import meshes, raster

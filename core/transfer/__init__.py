@@ -14,8 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from ..contract import stages
-from ..contract.capture import Capture, replacing_folder
+from ..contract.capture import Capture
+from ..contract.files import replacing_folder
 from ..contract.messages import Reporter
+from ..contract.own_head import read_skin
 from ..contract.settings import Settings
 from ..face.head import read_head
 from ..geometry import atlas, baking, meshes
@@ -47,7 +49,7 @@ def _own(capture: Capture, folder: Path, source: baking.Source, maps: Path, size
     """own_head.obj and its maps, one set per UV tile that its skin lies in."""
     own, told = meshes.read_obj(capture.own_head), {}
     skin = np.zeros(len(own.faces), bool)
-    for first, end in json.loads(capture.own_head_skin.read_text(encoding="utf-8"))["skin_triangles"]:
+    for first, end in read_skin(capture, len(own.faces))[1]:
         skin[first:end] = True
     numbers = list(np.unique(atlas.tiles(own)[skin], axis=0))
     several = len(numbers) > 1 or atlas.udim(numbers[0]) != 1001

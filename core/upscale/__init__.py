@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..contract.capture import Capture, replacing_folder
+from ..contract.capture import Capture
+from ..contract.files import replacing_folder
 from ..contract.messages import Reporter
 from ..contract.settings import Settings
 from ..face.head import read_head

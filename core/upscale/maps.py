@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..contract.messages import Problem
 from ..imaging import images
 
 
@@ -25,7 +26,13 @@ class Maps:
 
 
 def read_maps(folder: Path) -> Maps:
-    """The maps that the solver wrote."""
-    normal = images.read_data(folder / "normal.png")[..., :3] * 2 - 1
-    return Maps(images.read_linear(folder / "diffuse_albedo.exr"), normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
+    """The maps that the solver wrote. Raises Problem where one is damaged or of another size than the others."""
+    normal = images.read_normals(folder / "normal.png")
+    found = Maps(images.read_linear(folder / "diffuse_albedo.exr"), normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
                 images.read_mask(folder / "specular_albedo.png"), images.read_mask(folder / "confidence.png"), images.read_linear(folder / "shading.exr"))
+    side = len(found.diffuse)
+    for name, pixels in vars(found).items():
+        if pixels.shape[:2] != (side, side):
+            raise Problem(f"The maps in {folder} do not fit together: {name} is {pixels.shape[1]} x {pixels.shape[0]}, the albedo {side} high.",
+                          "Run the stage solve again.")
+    return found

@@ -15,7 +15,7 @@ import threading
 import time
 from pathlib import Path
 
-from ..contract.capture import storage_problem
+from ..contract.files import storage_problem
 from ..contract.messages import FINAL, Cancelled, Failed, Log, Message, Problem, from_line
 
 GRACE_S = 0.7

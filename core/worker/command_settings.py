@@ -8,11 +8,11 @@ Ground floor: standard library only. Names, types, choices and help come from th
 from __future__ import annotations
 
 import argparse
-import json
 import textwrap
 from dataclasses import Field
 from pathlib import Path
 
+from ..contract.json_files import read_json
 from ..contract.messages import Problem
 from ..contract.setting_values import absolute_path, describe_values, value_from_text, value_to_text
 from ..contract.settings import STAGE_KINDS, Settings, find_setting, from_json, known_settings, tooltips
@@ -61,8 +61,8 @@ def read_file(path: Path) -> dict:
     """The settings in a JSON file, its relative paths made absolute from its folder. Raises Problem for a file that is not there or not of settings."""
     path = Path(absolute_path(str(path)))
     try:
-        values = json.loads(path.read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError, RecursionError) as error:
+        values = read_json(path)
+    except (OSError, ValueError) as error:
         raise Problem(f"The settings file {path} cannot be read ({error}).", 'It is a JSON file like {"solve": {"steps": 30}, "seed": 1}.') from error
     from_json(values)
     return {stage: {name: absolute_path(value, path.parent) if "path" in find_setting(f"{stage}.{name}").metadata else value for name, value in own.items()}

@@ -13,7 +13,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from ..contract.capture import storage_problem
+from ..contract.files import storage_problem
 from ..contract.messages import Problem
 from .background import Task
 

@@ -12,7 +12,7 @@ import shutil
 import sys
 from pathlib import Path
 
-from ..contract.capture import storage_problem
+from ..contract.files import storage_problem
 from ..contract.messages import Problem
 from .background import Task
 from .environment import PYTHONS, answer, python_of, required, verify

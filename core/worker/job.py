@@ -7,12 +7,14 @@ Ground floor: standard library only.
 
 from __future__ import annotations
 
-import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..contract import stages
-from ..contract.capture import Capture, write_json
+from ..contract.capture import Capture
+from ..contract.files import write_json
+from ..contract.json_files import read_json
 from ..contract.messages import Problem
 from ..contract.portable_paths import convert_settings, read_portable, write_portable
 from ..contract.settings import Settings, from_json, preset
@@ -38,12 +40,16 @@ def write_job(capture: Capture, *, source: str | Path = "", first: str | None = 
     `first` (a stage's name) begins with that stage and forces it and those after it; None begins with the first one and
     skips what is fresh. `last` ends the job, None: the last stage. `settings` ({stage: {name: value}}, seed, device) lie
     over the preset `quality`. `tool` names one of stages.TOOLS that runs in place of the chain. Raises Problem for an unknown name or value, when the
-    folder cannot be written, and while another worker is at the capture: job.json is the record of what that one was asked.
+    folder cannot be written, for file names that are no text, and while another worker is at the capture: job.json is the record of what that one was asked.
     """
     chosen = convert_settings(settings or {}, lambda path: write_portable(path, capture.root))
     values = {"capture": ".", "source": write_portable(source, capture.root) if str(source) else "", "from": first, "until": last, "settings": chosen,
               "quality": quality, **({"tool": tool} if tool else {})}
+    _check_names(capture.root, source)
     _job(values, capture.root)
+    if str(source):
+        capture.refuse_inside(source)
+    capture.claim()
     capture.check_free()
     write_json(capture.job, values)
     return capture.job
@@ -52,9 +58,20 @@ def write_job(capture: Capture, *, source: str | Path = "", first: str | None = 
 def read_job(path: Path) -> Job:
     """The job of a file. Raises Problem when it is damaged or asks for what there is not."""
     try:
-        return _job(json.loads(Path(path).read_text(encoding="utf-8")), Path(path).parent)
+        return _job(read_json(path), Path(path).parent)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise Problem(f"The job file {path} cannot be read ({error}).", "Start the job again from Blender or with `python -m core run`.") from error
+
+
+def _check_names(root: Path, source: str | Path) -> None:
+    """Raises Problem for a name that is no text, in the path of the capture or of its source, or of a photograph: no record could hold it."""
+    inside = os.listdir(source) if str(source) and os.path.isdir(source) else []
+    for name in (os.path.abspath(root), str(source), *inside):
+        try:
+            name.encode()
+        except UnicodeEncodeError:
+            raise Problem(f"The name {name.encode(errors='backslashreplace').decode()!r} is not in UTF-8.",
+                          "Rename the file or folder: it may come from an old disk or archive.") from None
 
 
 def _job(values: dict, folder: Path) -> Job:

@@ -17,8 +17,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from .. import __version__
-from ..contract import report
-from ..contract.capture import Capture, storage_problem
+from ..contract import ownership, report
+from ..contract.capture import Capture
+from ..contract.files import storage_problem
 from ..contract.freshness import FINISHED, OLDER
 from ..contract.messages import Cancelled, CancelledError, Done, Failed, Log, Message, Problem, Progress, Reporter, StageDone, out_of_memory
 from ..contract.stages import Stage
@@ -34,8 +35,7 @@ def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None, 
     stage = ""
     try:
         job = read_job(path)
-        with job.capture.locked():
-            job.capture.tidy()
+        with job.capture.locked(lambda text: emit(Log(text))):
             if job.tool is None:
                 _take_source(job, emit)
             _check_device(job.settings.device)
@@ -76,6 +76,7 @@ def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled
         try:
             # Outputs may be half new from here on: until the end, nobody may take them for the recorded result.
             capture.forget([stage.name])
+            kept_before = ownership.kept_files(capture.root)
             conditions = capture.conditions(stage, settings)
             started = time.monotonic()
             _room(stage).run(capture, settings, reporter)
@@ -83,6 +84,8 @@ def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled
             lost = [name for name in stage.writes if not capture.has(name)]
             if lost:
                 raise RuntimeError(f"the stage {stage.name} ended without writing {lost[0]}")
+            for kept in sorted(ownership.kept_files(capture.root) - kept_before):
+                emit(Log(f"A file was not as WildCap had written it, and was in the way of a new one: it is now {kept}."))
             capture.finish(stage, conditions, seconds, settings, reporter.figures, __version__, reporter.findings)
             report.write(capture, settings)
         except Problem as problem:

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract.capture import Capture, replacing_folder, storage_problem
+from ...core.contract import ownership
+from ...core.contract.capture import Capture
+from ...core.contract.files import replacing_folder, storage_problem, write_json
 from ...core.contract.messages import Problem
 from .. import captures, preferences, status
 from ..base_operator import BaseOperator
@@ -40,6 +42,7 @@ def copy_to(folder: Path) -> Capture:
         raise Problem("The sample head is missing from this installation.", "Install the extension's zip again.")
     capture = Capture(folder / "sample_head.wildcap")
     if not capture.head.is_file():
+        capture.refuse_strangers()
         try:
             with replacing_folder(capture.root) as temporary:
                 shutil.copytree(SHIPPED, temporary, dirs_exist_ok=True, copy_function=shutil.copyfile)
@@ -47,8 +50,13 @@ def copy_to(folder: Path) -> Capture:
                 built_in = (SHIPPED.parent / "head.obj").read_text(encoding="ascii").splitlines(keepends=True)
                 (temporary / capture.head.name).write_text(moved + "".join(line for line in built_in if not line.startswith("v ")), encoding="ascii")
                 (temporary / VERTICES).unlink()
+                write_json(temporary / capture.json.name, capture.read())
+                ownership.claim_all(temporary)
         except shutil.Error as error:  # a list of (source, target, reason)
             raise storage_problem(OSError(0, str(error.args[0][0][2])), capture.root) from error
+    elif not capture.json.is_file():  # by WildCap 0.1.0
+        ownership.adopt_first_format(capture.root)
+        write_json(capture.json, capture.read())
     return capture
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract.capture import write_json
+from ...core.contract.files import write_json
 
 
 def write_cameras(scene: bpy.types.Scene, path: str) -> int:

@@ -27,14 +27,16 @@ class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
         """What is written where, what of an older delivery goes, and what the format drops."""
         plan = planned(bpy.context)
         where = iface_("{} with its maps, for {}, goes to {}").format(plan.mesh, plan.preset.title, plan.target)
-        replaced = (iface_("The delivery that is there is replaced as a whole, once the new one is complete."),) if plan.target.exists() else ()
+        replaced = (iface_("The delivery that is there is replaced once the new one is complete; files that you added stay."),) if plan.target.exists() else ()
         return (where, *replaced, *plan.format.drops, plan.preset.hint)
 
     def work(self, context):
         item = captures.require(context)
         plan, root = planned(context), captures.root(item)
+        delivery_plan.check_target(plan)
         chosen = {**properties.values(item)["deliver"], "roughness": roughness(captures.head(context, item)), "whole": False}
         jobs.start(item, "deliver", tool="deliver", then=lambda: waiting.maps_made(root, plan), deliver=chosen)
+        item.deliver.replace = False  # it was meant for this delivery
 
 
 class WILDCAP_OT_finish_delivery(BaseOperator, bpy.types.Operator):

@@ -42,7 +42,7 @@ class WILDCAP_PT_deliver(CapturePanel, bpy.types.Panel):
             problems.draw_text(body, sentence, width, 'INFO')
         header, body = layout.panel("wildcap_deliver_maps", default_closed=True)
         header.label(text="Maps")
-        for name in ("size", "pictures", "colour", "udim", "hair", "clean", "folder") if body else ():
+        for name in ("size", "pictures", "colour", "udim", "hair", "clean", "folder", "replace") if body else ():
             body.prop(settings, name)
         draw_settings(layout, item, stages.by_name("transfer"))
         if settings.what != "head":

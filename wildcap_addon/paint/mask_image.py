@@ -13,7 +13,8 @@ import bpy
 import numpy as np
 
 from ...core.contract import mask_history
-from ...core.contract.capture import Capture, replacing
+from ...core.contract.capture import Capture
+from ...core.contract.files import replacing
 from ...core.contract.messages import Problem
 from .. import colours
 

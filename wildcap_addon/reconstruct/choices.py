@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract.capture import storage_problem
+from ...core.contract.files import storage_problem
 from ...core.contract.messages import Problem
 from .. import captures
 from ..base_operator import BaseOperator

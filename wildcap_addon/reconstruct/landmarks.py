@@ -5,13 +5,12 @@
 Each empty is a child of the head, so that the head may stand anywhere; its own coordinates are those of the capture's world.
 """
 
-import json
-
 import bpy
 from mathutils import Vector
 
 from ...core.contract import artist_landmarks
 from ...core.contract.capture import Capture
+from ...core.contract.json_files import read_json
 from ...core.contract.messages import Problem
 from .. import captures, local_view
 
@@ -80,7 +79,7 @@ def hide() -> None:
 def _known(capture: Capture) -> dict[int, list[float]]:
     """Where the landmarks are: as found, and over that as the artist has put them."""
     try:
-        found = json.loads(capture.landmarks.read_text(encoding="utf-8"))["points"]
+        found = read_json(capture.landmarks)["points"]
         points = {int(index): [float(v) for v in point] for index, point in found.items()}
     except FileNotFoundError as error:
         raise Problem("This capture has no landmarks.", "Click Reconstruct first: they are found in the frames.") from error

@@ -5,13 +5,13 @@
     renders/contact_sheet.png, and the pictures it is made of as renders/PRESET.png and .exr
 """
 
-import os
 from pathlib import Path
 
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 
+from ...core.contract.files import place_file
 from ..properties import LIGHTS
 from . import captions, lights, output, reel
 
@@ -66,4 +66,4 @@ def _save(pixels: np.ndarray, path: Path) -> None:
     image.file_format, image.filepath_raw = 'PNG', str(temporary)
     image.save()
     bpy.data.images.remove(image)
-    os.replace(temporary, path)
+    place_file(temporary, path)

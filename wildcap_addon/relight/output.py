@@ -6,7 +6,6 @@ are taken, and its PNG is made of that, through the scene's view transform.
 Blender renders in a thread of its own, in which nothing of Blender may be touched: what is left to do waits for the window's next moment.
 """
 
-import os
 import shutil
 import struct
 import zlib
@@ -16,7 +15,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract.capture import storage_problem
+from ...core.contract.files import place_file, place_folder, storage_problem
 
 SCENE = "WildCap Relight"
 
@@ -152,11 +151,10 @@ def _finish() -> None:
         return
     running, _running = _running, Running()
     for source, path in running.stills.items():
-        os.replace(source, path.with_suffix(".exr"))
+        place_file(source, path.with_suffix(".exr"))
         _picture(path)
     if running.folder is not None:
-        shutil.rmtree(running.folder, ignore_errors=True)
-        os.replace(_hidden(running.folder), running.folder)
+        place_folder(_hidden(running.folder), running.folder)
     _free()
     if running.then is not None:
         running.then()
@@ -181,7 +179,7 @@ def _picture(path: Path) -> None:
     note = b"tEXtNote\0" + view_label(scene).encode("latin-1", "replace")
     header = 8 + 25  # the signature and IHDR, which comes first
     _hidden(path).write_bytes(data[:header] + struct.pack(">I", len(note) - 4) + note + struct.pack(">I", zlib.crc32(note)) + data[header:])
-    os.replace(_hidden(path), path)
+    place_file(_hidden(path), path)
 
 
 def view_label(scene: bpy.types.Scene) -> str:

@@ -11,10 +11,9 @@ matrix_world is Blender's own: camera to world, row by row, the camera looking a
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 
+from ...contract.json_files import parse_json
 from ...contract.messages import Problem
 from ..calibrated import Calibrated, rigid, trailing_number
 
@@ -22,7 +21,7 @@ from ..calibrated import Calibrated, rigid, trailing_number
 def read(text: str, name: str) -> list[Calibrated]:
     """Raises Problem for another kind of JSON, or a camera whose numbers are missing."""
     try:
-        record = json.loads(text)
+        record = parse_json(text)
     except ValueError as error:
         raise Problem(f"{name} is damaged ({error}).", "Write the cameras from Blender again.") from error
     if not isinstance(record, dict) or not isinstance(record.get("cameras"), list):
@@ -36,7 +35,7 @@ def read(text: str, name: str) -> list[Calibrated]:
             centre = [float(x) for x in camera.get("centre_px", (width / 2, height / 2))]
             matrix = np.array(camera["matrix_world"], float).reshape(4, 4) @ np.diag([1.0, -1.0, -1.0, 1.0])
             frame = int(camera["frame"]) if "frame" in camera else trailing_number(label)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise Problem(f"Camera {label} in {name} is incomplete ({error}).",
                           "Each camera needs matrix_world and, once or for each, width, height, focal_px.") from error
         found.append(Calibrated(label, frame, "PINHOLE", (focal, focal, *centre), width, height, *rigid(matrix, label)))

@@ -7,9 +7,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pycolmap
 
 from ...contract.messages import Problem
+from ...geometry.models import pose_of, read_model
 from ..calibrated import PIXELS, Calibrated, trailing_number
 
 
@@ -20,8 +20,8 @@ def read(folder: Path) -> list[Calibrated]:
         raise Problem(f"The folder {folder.name} holds no COLMAP model (cameras.bin and images.bin, or .txt).",
                       "Choose the folder that COLMAP wrote; in its window: File, Export model.")
     try:
-        model = pycolmap.Reconstruction(str(places[0]))
-    except (ValueError, RuntimeError, IndexError) as error:
+        model = read_model(places[0])
+    except (OSError, ValueError) as error:
         raise Problem(f"The COLMAP model in {places[0]} cannot be read ({str(error).splitlines()[0]}).",
                       "Export the model again, all its files together.") from error
     found = []
@@ -32,7 +32,7 @@ def read(folder: Path) -> list[Calibrated]:
         kind = camera.model.name
         if kind not in PIXELS:
             raise Problem(f"The COLMAP model has a lens of kind {kind}, which is not supported.", f"Solve it with one of {', '.join(PIXELS)}.")
-        pose = image.cam_from_world() if callable(image.cam_from_world) else image.cam_from_world
+        pose = pose_of(image)
         found.append(Calibrated(image.name, trailing_number(image.name), kind, tuple(camera.params), camera.width, camera.height,
                                 pose.rotation.matrix(), np.array(pose.translation)))
     return found

@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files that are whole or not there: everything is written under a temporary name, and gets its own when it is complete.
+
+In a capture nothing of the user's is deleted or overwritten on the way (ownership.py), and a worker that was replaced writes nothing (lease.py). Standard
+library only.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+import re
+import shutil
+from pathlib import Path
+
+from . import ownership
+from .hashes import hash_file
+from .lease import check_lease
+from .messages import Problem
+
+_UMASK = os.umask(0o022)
+os.umask(_UMASK)
+MODE = 0o666 & ~_UMASK
+"""Of every file of a capture: as the user's other files."""
+
+
+@contextlib.contextmanager
+def replacing(path: Path):
+    """A temporary path of the same suffix in the same folder; renamed to `path` on success, removed on failure.
+
+    In a capture, a file at `path` that is not as WildCap wrote it is kept aside (ownership.py), and nothing is written by a worker that was replaced
+    (lease.py). Disk-full and read-only errors become a Problem.
+    """
+    path = Path(path)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
+    root = None if path.name in ownership.BOOKS else ownership.root_of(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if root is not None:
+            ownership.note_temporary(root, temporary)
+        yield temporary
+        with open(temporary, "rb") as file:
+            os.fsync(file.fileno())
+        place_file(temporary, path)
+    except OSError as error:
+        raise storage_problem(error, path) from error
+    finally:
+        with contextlib.suppress(OSError):  # it is not there, or its folder is none
+            temporary.unlink()
+
+
+@contextlib.contextmanager
+def replacing_folder(path: Path):
+    """As `replacing`, for a folder whose files belong together; the old folder goes only when the new one is complete. In a capture, those of the old
+    one's files that others put there stay where they are."""
+    path = Path(path)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    root = ownership.root_of(path)
+    try:
+        shutil.rmtree(temporary, ignore_errors=True)
+        if root is not None:
+            ownership.note_temporary(root, temporary)
+        temporary.mkdir(parents=True)
+        yield temporary
+        place_folder(temporary, path)
+    except OSError as error:
+        raise storage_problem(error, path) from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def place_file(temporary: Path, path: Path) -> None:
+    """Gives a complete file its name. In a capture, one that is there and not as WildCap wrote it is kept aside."""
+    root = None if path.name in ownership.BOOKS else ownership.root_of(path)
+    os.chmod(temporary, MODE)  # some libraries write files that only their owner may read
+    if root is not None:
+        check_lease(root)
+        if path.is_file() and not ownership.is_ours(root, path):
+            ownership.keep_aside(root, path)
+        ownership.note_written(root, {_inside(root, path): hash_file(temporary)})
+    check_lease(root or path.parent)
+    os.replace(temporary, path)
+
+
+def place_folder(temporary: Path, path: Path) -> None:
+    """Gives a complete folder its name. In a capture, files that others put into the one before stay, and those of ours that were changed are kept aside."""
+    root, old = ownership.root_of(path), path.with_name(f".{path.name}.old")
+    written = [file for file in temporary.rglob("*") if file.is_file()]
+    for file in written:
+        os.chmod(file, MODE)
+    if root is None:
+        shutil.rmtree(old, ignore_errors=True)
+    else:
+        check_lease(root)
+        if old.exists():  # of a process that was killed between the two renames
+            ownership.take_back(root, old)
+        ownership.note_temporary(root, old)
+        ownership.note_written(root, {_inside(root, path / file.relative_to(temporary)): hash_file(file) for file in written})
+        check_lease(root)
+    if path.exists():
+        os.replace(path, old)
+    os.replace(temporary, path)
+    if root is not None:
+        ownership.clear_replaced(root, old, path)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def remove_file(path: Path) -> None:
+    """Removes a file of a capture that is there; one that is not as WildCap wrote it is kept aside."""
+    root = ownership.root_of(path)
+    try:
+        if path.is_file():
+            if root is not None and not ownership.is_ours(root, path):
+                ownership.keep_aside(root, path)
+            else:
+                check_lease(root or path.parent)
+                path.unlink()
+    except OSError as error:
+        raise storage_problem(error, path) from error
+
+
+def storage_problem(error: OSError, path: Path) -> Problem:
+    """The Problem of a failed write: disk full, read-only, or what the system says."""
+    path = Path(*(re.sub(r"^\.(.+)\.\d+\.tmp", r"\1", part) for part in path.parts))  # the name it would have had
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return Problem(f"The disk is full: {path} could not be written.",
+                       "Free some space (a capture needs about 1 GB) and run again; finished stages are kept.")
+    if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+        return Problem(f"{path} cannot be written: the folder is read-only.", "Choose a folder you may write to, or change its permissions.")
+    return Problem(f"{path} could not be written ({error.strerror or error}).", "Check the disk and the folder, then run again.")
+
+
+def write_json(path: Path, value) -> None:
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(value, indent=1, ensure_ascii=False), encoding="utf-8")
+
+
+def _inside(root: Path, path: Path) -> str:
+    return Path(os.path.relpath(os.path.abspath(path), root)).as_posix()

@@ -1,0 +1,185 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The lock of a capture: a lease, which its holder refreshes and which another may take once it has seen no refresh for a whole term.
+
+The file `lock` is made with O_EXCL, which every file system has; hard links some have not. It names the process that holds it and a token of its own, and
+its time of change is the refresh: who waits only looks whether that changes, by a clock of their own, for clocks of two machines differ. A holder that was
+asleep and has been replaced finds another token in the file, and every write into the capture asks for that first. Standard library only.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import secrets
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from .messages import Problem
+from .processes import identify_process, is_at_work, is_gone
+
+TERM_S = 30.0
+"""How long a lease lasts without a refresh: several times what a busy disk or file server may hold a refresh up."""
+REFRESHES = 5
+"""How often it is refreshed in one term."""
+LOOK_S = 0.1
+SUCCESSION = ".succeeding"
+"""Ending of the file that keeps two who found the same lease expired from both taking it."""
+_held: dict[str, Lease] = {}  # capture folder -> the lease that this process holds
+
+
+@dataclass(frozen=True)
+class Lease:
+    """One holder's claim on a capture: the file and the token that must stand in it."""
+
+    path: Path
+    token: str
+
+    def holds(self) -> bool:
+        """Whether nobody has taken it over."""
+        return (_read(self.path) or {}).get("token") == self.token
+
+
+def check_lease(root: Path) -> None:
+    """Raises Problem where this process had the capture and another one took it over while this one was asleep: it may write nothing more."""
+    lease = _held.get(_key(root))
+    if lease is not None and not lease.holds():
+        raise Problem("Another worker has taken this capture over while this one was asleep; nothing more was written here.",
+                      "Look at what the other one does, and run again when it has ended: finished stages are kept.")
+
+
+def holder(path: Path) -> dict | None:
+    """Who holds the lease in the file `path`, as far as can be told at once: None where nobody does, or a process that has ended."""
+    found = _read(path)
+    return None if found is None or found and is_gone(found) else found
+
+
+def refuse(found: dict, path: Path) -> Problem:
+    """The Problem of a capture that is worked on."""
+    if not found:
+        return Problem("Another worker is just beginning to work on this capture.", "Wait for it or cancel it there.")
+    return Problem(f"Another worker (process {found['pid']} on {str(found['host']).partition('/')[0]}, since {found['since']}) is working on this capture.",
+                   f"Wait for it or cancel it there; if it is gone, delete {path}.")
+
+
+@contextlib.contextmanager
+def hold(root: Path, tell: Callable[[str], None] = lambda text: None) -> Iterator[Lease]:
+    """Holds the lease of a capture folder, which must be there. Raises Problem naming who works there.
+
+    A process of this machine that is at work is refused at once, and one that has ended is replaced at once. For one that was stopped, or that lives on
+    another machine, a term is waited for a refresh; `tell` hears of that.
+    """
+    lease = Lease(root / "lock", secrets.token_hex(8))
+    while not _make(lease):
+        expired = _wait_out(lease.path, tell)
+        if expired is not None:
+            _take_over(lease, *expired)
+    _held[_key(root)] = lease
+    ended = threading.Event()
+    keeper = threading.Thread(target=_refresh, args=(lease, ended), name="wildcap-lease", daemon=True)
+    keeper.start()
+    try:
+        yield lease
+    finally:
+        ended.set()
+        keeper.join()
+        del _held[_key(root)]
+        if lease.holds():
+            lease.path.unlink(missing_ok=True)
+
+
+def _make(lease: Lease) -> bool:
+    """Makes the file, in one step with its content but for the moment in between, in which it is empty and counts as being made."""
+    content = {**identify_process(), "since": time.strftime("%Y-%m-%dT%H:%M:%S"), "token": lease.token}
+    try:
+        descriptor = os.open(lease.path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
+    except FileExistsError:
+        return False
+    with open(descriptor, "wb") as file:
+        file.write(json.dumps(content).encode())
+    return True
+
+
+def _wait_out(path: Path, tell: Callable[[str], None]) -> tuple[dict, tuple | None] | None:
+    """What the lease says that can be taken over, and its stamp: its holder has ended, or a term went by without a refresh. None where it was given back.
+    Raises Problem when it is held."""
+    first, began, told = _stamp(path), time.monotonic(), False
+    while True:
+        found = _read(path)
+        if found is None or found and is_gone(found):
+            return None if found is None else (found, first)
+        if _stamp(path) != first or found and is_at_work(found):
+            raise refuse(_read(path) or found, path)
+        waited = time.monotonic() - began
+        if waited > TERM_S:
+            return found, first
+        if waited > 1 and not told:
+            tell("Looking whether the worker that holds this capture is still at work ...")
+            told = True
+        time.sleep(LOOK_S)
+
+
+def _take_over(lease: Lease, expired: dict, stamp: tuple | None) -> None:
+    """Removes the lease that said `expired`, unless somebody was faster. Only one at a time may: the file beside it keeps the others out."""
+    path = lease.path
+    succession = Lease(path.with_name(path.name + SUCCESSION), lease.token)
+    if not _make(succession):
+        _clear(succession.path)
+        return
+    try:
+        if _read(path) == expired and _stamp(path) == stamp:
+            aside = path.with_name(f"{path.name}.{lease.token}")
+            with contextlib.suppress(FileNotFoundError):
+                os.rename(path, aside)
+                if _read(aside) != expired and not path.exists():  # the old holder awoke, gave it back, and somebody else has it since
+                    os.rename(aside, path)
+                aside.unlink(missing_ok=True)
+    finally:
+        succession.path.unlink(missing_ok=True)
+
+
+def _clear(succession: Path) -> None:
+    """Waits a moment for whoever is taking the lease over; removes what one that was killed in the middle of it has left."""
+    found, stamp, began = _read(succession), _stamp(succession), time.monotonic()
+    while _stamp(succession) == stamp and stamp is not None:
+        if found and is_gone(found) or time.monotonic() - began > TERM_S:
+            succession.unlink(missing_ok=True)
+            return
+        time.sleep(LOOK_S / 10)
+
+
+def _refresh(lease: Lease, ended: threading.Event) -> None:
+    while not ended.wait(TERM_S / REFRESHES):
+        with contextlib.suppress(OSError):
+            if not lease.holds():
+                return
+            os.utime(lease.path)
+
+
+def _read(path: Path) -> dict | None:
+    """What the file says; {} where it is empty or half written, None where it is not there."""
+    try:
+        found = json.loads(path.read_bytes())
+        if isinstance(found, dict) and "start" in found:  # by WildCap 0.1.0
+            found["since"] = found.pop("start")
+        return found if isinstance(found, dict) and {"host", "pid", "since"} <= found.keys() else {}
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, RecursionError):
+        return {}
+
+
+def _stamp(path: Path) -> tuple | None:
+    try:
+        info = path.stat()
+    except FileNotFoundError:
+        return None
+    return info.st_mtime_ns, info.st_size, info.st_ino
+
+
+def _key(root: Path) -> str:
+    return os.path.abspath(root)

@@ -1,0 +1,194 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whose a file in a capture is. WildCap deletes and replaces what it wrote, as it wrote it, and nothing else.
+
+The capture's written.jsonl says what that is: one line for each file, with its content's hash, added before the file gets its name. So what a killed stage
+left is known to be ours, and a file that somebody put there or changed is known not to be. Standard library only.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import shutil
+from collections.abc import Iterable
+from functools import lru_cache
+from pathlib import Path
+
+from .hashes import hash_file
+from .processes import identify_process, is_gone
+
+RECORD = "written.jsonl"
+KEPT = "kept"
+"""Folder of a capture for what was in the way: files of ours that somebody changed, and others under a name of ours."""
+BOOKS = frozenset({"capture.json", "job.json", "lock", RECORD})
+"""The capture's own books, which are ours whatever stands in them."""
+LONG_BYTES = 1 << 18
+"""Of the record, from which on it is shortened: some thousand lines, of a long film's frames or of a day's painting."""
+FIVE = "[0-9]" * 5
+FIRST_FORMAT = ("frames/frames.json", f"frames/{FIVE}.jpg", "cameras/*.bin", "scan.ply", "head.obj", "own_head.obj", "own_head.json", "landmarks.json",
+                f"delit/{FIVE}.png", f"delit/shadow/{FIVE}.png", "texture*.exr", "texture*.png", "shadow_mask*.png", "protect_mask.png", "mask_history/*.png",
+                "maps/*.png", "maps/*.exr", "maps/solved.safetensors", "maps_4k/*.png", "maps_4k/*.exr", "delivery/own_*", "delivery/scan*",
+                "delivery/displacement.exr", "comparison/*.png", "comparison/*.jpg", "preview/*.png", "report/*_*.jpg", "report.html", "consent.json",
+                "checkpoints/solve.safetensors", "landmarks_artist.json", "switchlight/*.png")
+"""What WildCap 0.1.0 wrote, which kept no such record."""
+LEFT_BEFORE = re.compile(r"^\..+\.(\d+)\.tmp(\..+)?$|^\..+\.old$")
+"""Temporary names of 0.1.0."""
+
+
+def root_of(path: Path) -> Path | None:
+    """The capture that a path lies in, if it lies in one; not what lies in a temporary folder of one, which is ours as a whole."""
+    parents = Path(os.path.abspath(path)).parents
+    for folder in parents:
+        if (folder / "capture.json").is_file():
+            return folder
+        if folder.name.startswith("."):
+            return None
+    return None
+
+
+def note_written(root: Path, hashes: dict[str, str]) -> None:
+    """Adds files (path in the capture -> content hash) to the record, before they get their names."""
+    _append(root, [{"path": path, "hash": digest} for path, digest in hashes.items() if path not in BOOKS])
+
+
+def note_temporary(root: Path, path: Path) -> None:
+    """Adds a temporary file or folder of this process to the record, before it is made."""
+    _append(root, [{"temporary": _inside(root, path), "by": identify_process()}])
+
+
+def claim_all(folder: Path) -> None:
+    """Starts the record of a capture that was put together elsewhere by us: all that lies in it is ours."""
+    note_written(folder, {_inside(folder, path): hash_file(path) for path in _files(folder)})
+
+
+def is_ours(root: Path, path: Path) -> bool:
+    """Whether a file of the capture is as we wrote it."""
+    inside = _inside(root, path)
+    return inside in BOOKS or hash_file(path) in _read(root)[0].get(inside, ())
+
+
+def keep_aside(root: Path, path: Path, was: str = "") -> Path:
+    """Moves a file out of the way of one of ours, to kept/ under its own name (or `was`, a path in the capture), or with a number where that is taken.
+    Returns its new place."""
+    place = root / KEPT / (was or _inside(root, path))
+    place.parent.mkdir(parents=True, exist_ok=True)
+    free = next(free for free in (place, *(place.with_stem(f"{place.stem}_{number}") for number in range(2, 10_000))) if not free.exists())
+    os.replace(path, free)
+    return free
+
+
+def clear_replaced(root: Path, old: Path, path: Path) -> None:
+    """Empties `old`, the folder that was at `path` before a new one took its name. What is ours goes, what somebody changed is kept aside, and a file that
+    others put there moves back to where it was."""
+    for file in _files(old):
+        was = path / file.relative_to(old)
+        ours = hash_file(file) in _read(root)[0].get(_inside(root, was), ())
+        if ours:
+            file.unlink()
+        elif was.exists() or _inside(root, was) in _read(root)[0]:
+            keep_aside(root, file, _inside(root, was))
+        else:
+            was.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(file, was)
+    shutil.rmtree(old, ignore_errors=True)  # empty folders alone are left in it
+
+
+def clear_leftovers(root: Path) -> None:
+    """Removes the temporary files of processes that have ended, and takes back a folder that one of them had just put aside."""
+    for left, by in _read(root)[1].items():
+        path = root / left
+        if is_gone(by) and path.exists():
+            if path.suffix == ".old":
+                take_back(root, path)
+            elif path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
+    _shorten(root)
+
+
+def _shorten(root: Path) -> None:
+    """Rewrites a record that has grown long without what no file answers to any more. Only under the lease; a line that another process of the user adds in
+    the same moment is lost, and its file then counts as changed, which loses nothing."""
+    record = root / RECORD
+    if not record.is_file() or record.stat().st_size < LONG_BYTES:
+        return
+    written, temporary = _read(root)
+    lines = [{"path": path, "hash": hash_file(root / path)} for path in written if (root / path).is_file() and is_ours(root, root / path)]
+    lines += [{"temporary": path, "by": by} for path, by in temporary.items() if (root / path).exists()]
+    short = record.with_name(f".{RECORD}.{os.getpid()}.tmp")
+    short.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
+    os.replace(short, record)
+
+
+def take_back(root: Path, old: Path) -> None:
+    """A folder that was put aside for a new one: finishes that, or undoes it where the new one never came."""
+    path = old.with_name(old.name[1:-len(".old")])
+    if path.exists():
+        clear_replaced(root, old, path)
+    else:
+        os.replace(old, path)
+
+
+def _read(root: Path) -> tuple[dict[str, set[str]], dict[str, dict]]:
+    """What was written: path -> content hashes; and what was temporary: path -> process. A capture of 0.1.0 gets its record here."""
+    record = root / RECORD
+    if not record.is_file() and _has_finished_stages(root):
+        adopt_first_format(root)
+    try:
+        info = record.stat()
+    except FileNotFoundError:
+        return {}, {}
+    return _parse(record, info.st_size, info.st_mtime_ns)
+
+
+@lru_cache(maxsize=8)
+def _parse(record: Path, size: int, changed: int) -> tuple[dict[str, set[str]], dict[str, dict]]:
+    """The record as it was at that size and time."""
+    written: dict[str, set[str]] = {}
+    temporary: dict[str, dict] = {}
+    for line in record.read_text(encoding="utf-8", errors="replace").splitlines():
+        with contextlib.suppress(ValueError, KeyError, TypeError):  # a line that was cut off when its writer was killed
+            entry = json.loads(line)
+            if "path" in entry:
+                written.setdefault(entry["path"], set()).add(entry["hash"])
+            else:
+                temporary[entry["temporary"]] = entry["by"]
+    return written, temporary
+
+
+def adopt_first_format(root: Path) -> None:
+    """Makes the record of a capture of 0.1.0: what its finished stages wrote, and what killed ones left."""
+    note_written(root, {_inside(root, path): hash_file(path) for pattern in FIRST_FORMAT for path in sorted(root.glob(pattern)) if path.is_file()})
+    gone = {**identify_process(), "pid": -1}
+    _append(root, [{"temporary": _inside(root, path), "by": gone} for path in root.glob("**/.*") if LEFT_BEFORE.match(path.name)])
+
+
+def _has_finished_stages(root: Path) -> bool:
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        return bool(json.loads((root / "capture.json").read_text(encoding="utf-8")).get("stages"))
+    return False
+
+
+def _append(root: Path, lines: Iterable[dict]) -> None:
+    """In one write, so that the lines of two processes do not mix."""
+    text = "".join(json.dumps(line) + "\n" for line in lines)
+    if text:
+        with open(root / RECORD, "ab", buffering=0) as file:
+            file.write(text.encode())
+
+
+def _inside(root: Path, path: Path) -> str:
+    return Path(os.path.relpath(os.path.abspath(path), os.path.abspath(root))).as_posix()
+
+
+def _files(folder: Path) -> list[Path]:
+    return [path for path in sorted(folder.rglob("*")) if path.is_file() or path.is_symlink()]
+
+
+def kept_files(root: Path) -> set[str]:
+    """What was kept aside so far: paths in the capture."""
+    return {_inside(root, path) for path in _files(root / KEPT)} if (root / KEPT).is_dir() else set()

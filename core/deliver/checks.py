@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether what is delivered is what the capture's inputs and settings ask for."""
+
+from __future__ import annotations
+
+from .. import __version__
+from ..contract import stages
+from ..contract.capture import Capture
+from ..contract.freshness import OLDER, STALE
+from ..contract.messages import Problem, Reporter
+from ..contract.settings import Settings
+
+LAST = {"head": "upscale", "own_mesh": "transfer", "scan": "transfer"}
+"""What is delivered -> the last stage that it comes from. A head's displacement, which the stage after it makes, is left out where there is none."""
+
+
+def check_stages(capture: Capture, what: str, settings: Settings, report: Reporter) -> None:
+    """Raises Problem naming a stage, of those that `what` comes from, whose inputs or settings have changed since. What older code made is delivered, and
+    named in the log."""
+    older = []
+    last = stages.NAMES.index(LAST[what])
+    if what == "head" and (capture.delivery / "displacement.exr").is_file():
+        last = stages.NAMES.index("transfer")
+    for stage in stages.STAGES[:last + 1]:
+        verdict = capture.verdict(stage, settings)
+        if verdict.state == STALE:
+            raise Problem(f"The stage {stage.label} is out of date: {verdict.reason()}.",
+                          f"Click Reconstruct, or run the stage {stage.name} and those after it again, then deliver.")
+        older += [stage.label] if verdict.state == OLDER else []
+    if older:
+        report.log(f"Made by older code and delivered as it is: {', '.join(older)}. Run a stage again to have it made by WildCap {__version__}.")

@@ -1,0 +1,131 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""COLMAP models: the one door to their files. Binary ones are walked through record by record before pycolmap reads them, for it believes every count.
+
+Formats: COLMAP's documentation, "Output format". Numbers are little-endian.
+"""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+
+PARAMS = {0: 3, 1: 4, 2: 4, 3: 5, 4: 8, 5: 8, 6: 12, 7: 5, 8: 4, 9: 5, 10: 12, 11: 16, 12: 4, 13: 5, 14: 3, 15: 4}
+"""How many parameters each camera model has, by its number."""
+MOST_BYTES = 1 << 30
+"""Of one file, binary or text; a model of 300 frames has 0.1 GB, and pycolmap takes about five times a file's size."""
+NAME_BYTES = 4096
+"""The longest path that a system has."""
+LONGEST_SIDE = 1 << 16
+"""Pixels: beyond what any picture file here may have."""
+
+
+class _Cursor:
+    """A place in a file's bytes. Every method raises ValueError where the file ends before what it should hold."""
+
+    def __init__(self, content: bytes):
+        self.content, self.at = content, 0
+
+    def skip(self, size: int) -> None:
+        if size > len(self.content) - self.at:
+            raise ValueError("it ends before its last record")
+        self.at += size
+
+    def take(self, form: str) -> int:
+        start = self.at
+        self.skip(struct.calcsize(form))
+        return struct.unpack_from(form, self.content, start)[0]
+
+    def skip_name(self) -> None:
+        end = self.content.find(b"\0", self.at, self.at + NAME_BYTES)
+        if end < 0:
+            raise ValueError("a name in it does not end")
+        self.at = end + 1
+
+
+def _camera(file: _Cursor) -> None:
+    file.skip(4)
+    model = file.take("<i")
+    if model not in PARAMS:
+        raise ValueError(f"it has a camera model of number {model}")
+    file.skip(16 + 8 * PARAMS[model])
+
+
+def _image(file: _Cursor) -> None:
+    file.skip(4 + 7 * 8 + 4)  # number, rotation and translation, number of its camera
+    file.skip_name()
+    file.skip(24 * file.take("<Q"))
+
+
+def _point(file: _Cursor) -> None:
+    file.skip(8 + 3 * 8 + 3 + 8)  # number, position, colour, error
+    file.skip(8 * file.take("<Q"))
+
+
+def _rig(file: _Cursor) -> None:
+    file.skip(4)
+    sensors = file.take("<I")
+    if sensors:
+        file.skip(8)
+    for _ in range(sensors - 1):
+        file.skip(8)
+        if file.take("<B"):
+            file.skip(7 * 8)
+
+
+def _frame(file: _Cursor) -> None:
+    file.skip(4 + 4 + 7 * 8)
+    file.skip(16 * file.take("<I"))
+
+
+RECORDS = {"cameras": _camera, "images": _image, "points3D": _point, "rigs": _rig, "frames": _frame}
+"""File -> what passes over one of its records. COLMAP before 3.12 wrote no rigs and frames."""
+
+
+def read_model(folder: Path) -> pycolmap.Reconstruction:
+    """The model in a folder, binary or text. Raises OSError where it cannot be opened, ValueError where it is damaged: what its records say does not fit
+    the files' sizes, cameras or poses that are no finite numbers, a lens without a focal length."""
+    ending = "bin" if (folder / "cameras.bin").is_file() and (folder / "images.bin").is_file() else "txt"
+    for name, record in RECORDS.items():
+        file = folder / f"{name}.{ending}"
+        if not file.exists() and name not in ("cameras", "images"):
+            continue
+        if file.stat().st_size > MOST_BYTES:
+            raise ValueError(f"{file.name} is larger than {MOST_BYTES >> 30} GB")
+        if ending == "bin":
+            _walk(file, record)
+    try:
+        model = pycolmap.Reconstruction(str(folder))
+    except (KeyError, IndexError, RuntimeError) as error:
+        raise ValueError(str(error).splitlines()[0]) from error
+    for image in model.images.values():
+        pose = pose_of(image) if image.has_pose else None
+        if image.camera_id not in model.cameras:
+            raise ValueError(f"the camera of {image.name} is missing")
+        if pose is not None and not (np.isfinite(pose.rotation.quat).all() and np.isfinite(pose.translation).all() and np.any(pose.rotation.quat)):
+            raise ValueError(f"the pose of {image.name} is no place")
+    for number, camera in model.cameras.items():
+        lengths = [camera.params[i] for i in camera.focal_length_idxs()]
+        if not (0 < camera.width <= LONGEST_SIDE and 0 < camera.height <= LONGEST_SIDE and np.isfinite(camera.params).all() and min(lengths) > 0):
+            raise ValueError(f"the lens of camera {number} makes no sense")
+    return model
+
+
+def pose_of(image: pycolmap.Image) -> pycolmap.Rigid3d:
+    """What takes points of the world into an image's camera; pycolmap's versions give it in two ways."""
+    return image.cam_from_world() if callable(image.cam_from_world) else image.cam_from_world
+
+
+def _walk(path: Path, record) -> None:
+    """Raises ValueError where the file does not hold just the records that it promises."""
+    file = _Cursor(path.read_bytes())
+    try:
+        for _ in range(file.take("<Q")):
+            record(file)
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {error}") from error
+    if file.at != len(file.content):
+        raise ValueError(f"{path.name}: it goes on after its last record")

@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A delivery over an older one: files that others put there stay, files of ours that were changed are refused by name, a kill loses nothing."""
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from core.contract import delivery_plan
+from core.contract.capture import Capture
+from core.contract.messages import Done, Failed, Problem
+from core.contract.settings import DeliverSettings
+
+from . import delivered
+
+OBJ = {"format": "obj", "whole": True}
+
+
+@pytest.fixture
+def capture(tmp_path) -> Capture:
+    return delivered.make(tmp_path / "Zoë et moi.wildcap")
+
+
+def folder(capture: Capture, what: str = "head", preset: str = "blender", mesh: str = "obj") -> Path:
+    return capture.exports / f"Zoe_et_moi_{what}_{preset}_{mesh}"
+
+
+def test_files_that_others_added_stay_and_the_delivery_goes_on(capture):
+    delivered.deliver(capture, **OBJ)
+    place = folder(capture)
+    (place / "my notes.txt").write_text("mine")
+    (place / "textures" / "painted.psd").write_text("mine too")
+    (place / "look").mkdir()
+    (place / "look" / "shader.ma").write_text("and mine")
+    first = (place / delivery_plan.PROVENANCE).stat().st_ino
+    assert isinstance(delivered.deliver(capture, **{**OBJ, "hair": False}), Done)
+    assert (place / "my notes.txt").read_text() == "mine" and (place / "textures" / "painted.psd").read_text() == "mine too"
+    assert (place / "look" / "shader.ma").read_text() == "and mine" and (place / delivery_plan.PROVENANCE).stat().st_ino != first
+    assert [path.name for path in capture.exports.iterdir()] == [place.name], "nothing is left beside it"
+
+
+def test_files_of_ours_that_were_changed_are_refused_by_name_and_given_up_when_asked(capture):
+    delivered.deliver(capture, **OBJ)
+    picture = next((folder(capture) / "textures").glob("*.png"))
+    picture.write_bytes(b"graded by hand")
+    ended = delivered.deliver(capture, **OBJ)
+    assert isinstance(ended, Failed) and picture.name in ended.problem and "--replace" in ended.remedy
+    assert picture.read_bytes() == b"graded by hand"
+    assert isinstance(delivered.deliver(capture, **OBJ, replace=True), Done)
+    assert picture.read_bytes() != b"graded by hand"
+
+
+def test_a_file_of_others_under_a_name_of_the_new_delivery_is_refused_by_name(capture):
+    delivered.deliver(capture, **{**OBJ, "pictures": "png16"})
+    (folder(capture) / "textures" / "face_diffuse.exr").write_text("mine")
+    plan = delivery_plan.plan(capture, DeliverSettings(format="obj", pictures="exr"))
+    before = {path: path.read_bytes() for path in sorted(capture.exports.rglob("*.*")) if path.is_file()}
+    (plan.staged / "textures").mkdir(parents=True)
+    (plan.staged / "textures" / "face_diffuse.exr").write_text("ours")
+    with pytest.raises(Problem, match="textures/face_diffuse.exr .*is in the way"):
+        delivery_plan.put_in_place(plan)
+    delivery_plan.discard(plan)
+    assert {path: path.read_bytes() for path in sorted(capture.exports.rglob("*.*")) if path.is_file()} == before
+
+
+@pytest.mark.parametrize("at", range(6))
+def test_killed_at_any_rename_a_delivery_loses_nothing_of_others(capture, at, monkeypatch):
+    delivered.deliver(capture, **OBJ)
+    place = folder(capture)
+    for name in ("a notes.txt", "b notes.txt"):
+        (place / name).write_text(name)
+    plan = delivery_plan.plan(capture, DeliverSettings(format="obj"))
+    shutil.copytree(place, plan.staged, ignore=shutil.ignore_patterns("*notes.txt"))
+    renames, rename = [], os.replace
+
+    def counted(*places):
+        renames.append(places)
+        if len(renames) > at:
+            raise KeyboardInterrupt  # nothing of ours catches it, as nothing catches a kill
+        rename(*places)
+
+    monkeypatch.setattr(delivery_plan.os, "replace", counted)
+    try:
+        delivery_plan.put_in_place(plan)
+    except KeyboardInterrupt:
+        pass
+    monkeypatch.setattr(delivery_plan.os, "replace", rename)
+    delivery_plan.discard(plan)
+    assert isinstance(delivered.deliver(capture, **OBJ), Done), "the next delivery ends what was begun"
+    assert {path.name: path.read_text() for path in place.glob("* notes.txt")} == {name: name for name in ("a notes.txt", "b notes.txt")}
+    assert [path.name for path in capture.exports.iterdir()] == [place.name]

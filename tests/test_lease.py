@@ -1,0 +1,187 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The lock of a capture: never two inside, the dead replaced at once, the sleeping after a term, and who was replaced writes nothing more."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from core.contract import lease, processes
+from core.contract.capture import Capture
+from core.contract.files import replacing, write_json
+from core.contract.messages import Problem
+
+RACES = int(os.environ.get("WILDCAP_RACES", 300))
+
+
+@pytest.fixture
+def capture(tmp_path) -> Capture:
+    capture = Capture(tmp_path / "a.wildcap")
+    capture.claim()
+    return capture
+
+
+@pytest.fixture
+def soon(monkeypatch):
+    monkeypatch.setattr(lease, "TERM_S", 0.5)
+
+
+def written_by(**changed) -> str:
+    return json.dumps({**processes.identify_process(), "since": "2026-11-22T00:00:00", "token": "another", **changed})
+
+
+def test_a_worker_that_is_at_work_is_refused_at_once_by_name(capture):
+    with capture.locked():
+        began = time.monotonic()
+        with pytest.raises(Problem, match=f"process {os.getpid()}"), Capture(capture.root).locked():
+            pass
+        assert time.monotonic() - began < 1
+        with pytest.raises(Problem, match=f"process {os.getpid()}"):
+            capture.check_free()
+    assert not capture.lock.exists()
+    capture.check_free()
+
+
+def test_one_that_has_ended_is_replaced_at_once_also_where_its_number_went_to_another_or_the_machine_began_anew(capture):
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    texts = [written_by(pid=dead.pid), written_by(began="long ago"), written_by(host=processes.name_host().partition("/")[0] + "/00000000/1"),
+             json.dumps({"pid": dead.pid, "host": processes.name_host().partition("/")[0], "start": "2026-11-22T00:00:00"})]  # the last by 0.1.0
+    for text in texts:
+        capture.lock.write_text(text)
+        began = time.monotonic()
+        with capture.locked():
+            assert json.loads(capture.lock.read_text())["pid"] == os.getpid()
+        assert time.monotonic() - began < 2
+
+
+@pytest.mark.parametrize("text", ["", '{"pid": 1', "null", "[]", "another machine"])
+def test_an_empty_lock_is_being_made_and_another_machine_s_is_waited_for(capture, soon, text):
+    capture.lock.write_text(written_by(host=text) if text == "another machine" else text)
+    told: list[str] = []
+    began = time.monotonic()
+    with capture.locked(told.append):
+        assert time.monotonic() - began > 0.5, "no refresh for a whole term, by our own clock"
+    assert not capture.lock.exists()
+
+
+def test_a_refresh_that_is_seen_keeps_the_lease_whatever_time_it_tells(capture, monkeypatch):
+    monkeypatch.setattr(lease, "TERM_S", 3.0)
+    capture.lock.write_text(written_by(host="another machine"))
+    beat = subprocess.Popen([sys.executable, "-c", f"import os, time; time.sleep(1); os.utime({str(capture.lock)!r}, (5, 5)); time.sleep(1)"])
+    with pytest.raises(Problem, match="another machine"), capture.locked():
+        pass
+    beat.wait()
+    assert capture.lock.exists()
+
+
+def test_the_holder_refreshes_and_gives_back_only_its_own(capture, soon):
+    with capture.locked():
+        before = capture.lock.stat().st_mtime_ns
+        deadline = time.monotonic() + 5
+        while capture.lock.stat().st_mtime_ns == before:
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        capture.lock.write_text(written_by(host="another machine"))
+    assert "another machine" in capture.lock.read_text()
+
+
+def test_who_was_replaced_writes_nothing_more(capture):
+    with capture.locked():
+        write_json(capture.root / "texture.json", 1)
+        capture.lock.write_text(written_by())
+        before = {path: path.read_bytes() for path in capture.root.iterdir()}
+        for attempt in (lambda: write_json(capture.root / "texture.json", 2), lambda: capture.forget(["frames"]) or capture.stop("x", Problem("a", "b"))):
+            with pytest.raises(Problem, match="taken this capture over"):
+                attempt()
+        with pytest.raises(Problem, match="taken this capture over"), replacing(capture.root / "deep" / "new.txt") as temporary:
+            temporary.write_text("x")
+        after = {path: path.read_bytes() for path in capture.root.iterdir() if path.is_file() and path.name != "written.jsonl"}
+    assert all(before[path] == content for path, content in after.items())
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="no such signal here")
+def test_a_worker_that_was_stopped_is_replaced_after_a_term_and_stays_out_when_it_awakes(capture, soon):
+    code = f"""
+import sys, time
+sys.path.insert(0, {str(Path(__file__).parents[1])!r})
+from core.contract import lease
+from core.contract.capture import Capture
+from core.contract.files import write_json
+from core.contract.messages import Problem
+lease.TERM_S = 0.5
+capture = Capture({str(capture.root)!r})
+with capture.locked():
+    print("in", flush=True)
+    for count in range(10_000):
+        try:
+            write_json(capture.root / "count.json", count)
+        except Problem as problem:
+            print(problem.problem, flush=True)
+            break
+        time.sleep(0.01)
+"""
+    other = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    assert other.stdout.readline() == "in\n"
+    time.sleep(0.3)
+    os.kill(other.pid, signal.SIGSTOP)
+    os.waitpid(other.pid, os.WUNTRACED)
+    try:
+        with capture.locked():
+            write_json(capture.root / "count.json", "ours")
+            os.kill(other.pid, signal.SIGCONT)
+            assert "taken this capture over" in other.stdout.readline()
+            assert (capture.root / "count.json").read_text() == '"ours"'
+            other.wait()
+            assert capture.lock.exists(), "it gives back nothing that is ours"
+    finally:
+        other.kill()
+        other.wait()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.parametrize("beginning", ["free", "dead"])
+def test_never_two_inside(capture, beginning):
+    """RACES times, all at once: three processes that want in, from nothing or over a dead one's lock."""
+    arena = capture.root / "arena"
+    arena.mkdir()
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    failures = 0
+    for race in range(RACES // 2):
+        if beginning == "dead":
+            capture.lock.write_text(written_by(pid=dead.pid))
+        children = []
+        ready, go = os.pipe()
+        for _ in range(3):
+            pid = os.fork()
+            if pid == 0:
+                os.close(go)
+                os.read(ready, 1)  # end of file: all at once
+                code = 0
+                try:
+                    with lease.hold(capture.root):
+                        place = arena / "inside"
+                        try:
+                            os.close(os.open(place, os.O_CREAT | os.O_EXCL))
+                            os.unlink(place)
+                        except FileExistsError:
+                            code = 1
+                except Problem:
+                    code = 2
+                finally:
+                    os._exit(code)
+            children.append(pid)
+        os.close(go)
+        os.close(ready)
+        codes = [os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) for pid in children]
+        failures += 1 in codes
+        assert 0 in codes, f"nobody got in: {codes} in race {race}"
+        assert not capture.lock.exists() and not list(capture.root.glob("lock*"))
+    assert failures == 0

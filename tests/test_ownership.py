@@ -1,0 +1,287 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What WildCap did not write it never deletes or overwrites; what it wrote and somebody changed is kept aside; what a killed writer left goes."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from core.contract import ownership, processes
+from core.contract.capture import Capture
+from core.contract.files import remove_file, replacing, replacing_folder
+from core.contract.messages import Log, Problem
+from core.worker.job import write_job
+from core.worker.runner import run_job
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture
+def capture(tmp_path) -> Capture:
+    capture = Capture(tmp_path / "anna.wildcap")
+    capture.claim()
+    return capture
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file() and path.name != ownership.RECORD}
+
+
+# -- which folder is a capture
+
+
+def test_a_folder_that_holds_something_else_is_never_taken_over(tmp_path):
+    """`core run anna/frames anna`: the folder's names look like a capture's."""
+    album = tmp_path / "anna"
+    (album / "frames").mkdir(parents=True)
+    (album / "frames" / "holiday.jpg").write_bytes(b"a picture")
+    before = contents(tmp_path)
+    capture = Capture(album)
+    for attempt in (lambda: capture.claim(), lambda: capture.set_source(tmp_path / "film.mp4"), lambda: write_job(capture)):
+        with pytest.raises(Problem, match="is no capture: it holds frames"):
+            attempt()
+    with pytest.raises(Problem, match="is no capture"), capture.locked():
+        pass
+    assert contents(tmp_path) == before
+
+
+def test_a_source_inside_the_capture_is_refused(capture):
+    (capture.root / "my film.mp4").write_bytes(b"film")
+    (capture.root / "frames").mkdir()
+    for source in (capture.root / "my film.mp4", capture.root / "frames", capture.root):
+        for attempt in (lambda source=source: capture.set_source(source), lambda source=source: write_job(capture, source=source)):
+            with pytest.raises(Problem, match="lies in the capture"):
+                attempt()
+
+
+# -- single files
+
+
+def test_a_file_of_ours_is_replaced_and_one_that_was_changed_is_kept_aside(capture):
+    path = capture.root / "texture.txt"
+    for text in ("one", "two"):
+        with replacing(path) as temporary:
+            temporary.write_text(text)
+    assert contents(capture.root).keys() == {"capture.json", "texture.txt"}
+    path.write_text("by hand")
+    for text in ("three", "four"):
+        with replacing(path) as temporary:
+            temporary.write_text(text)
+    path.write_text("by hand again")
+    with replacing(path) as temporary:
+        temporary.write_text("five")
+    assert path.read_text() == "five"
+    assert (capture.root / "kept" / "texture.txt").read_text() == "by hand" and (capture.root / "kept" / "texture_2.txt").read_text() == "by hand again"
+
+
+def test_a_stranger_under_a_name_of_ours_is_kept_aside(capture):
+    (capture.root / "scan.ply").write_text("my own scan")
+    with replacing(capture.scan) as temporary:
+        temporary.write_text("ours")
+    assert (capture.root / "kept" / "scan.ply").read_text() == "my own scan"
+
+
+def test_removing_removes_ours_alone(capture):
+    path = capture.root / "texture_detail.exr"
+    with replacing(path) as temporary:
+        temporary.write_text("ours")
+    remove_file(path)
+    assert not path.exists()
+    path.write_text("theirs")
+    remove_file(path)
+    remove_file(path)
+    assert not path.exists() and (capture.root / "kept" / path.name).read_text() == "theirs"
+
+
+def test_every_file_of_a_capture_has_the_users_mode(capture):
+    with replacing(capture.root / "a.bin") as temporary:
+        os.close(os.open(temporary, os.O_CREAT | os.O_WRONLY, 0o600))
+    with replacing_folder(capture.frames) as folder:
+        os.close(os.open(folder / "b.bin", os.O_CREAT | os.O_WRONLY, 0o600))
+    (capture.root.parent / "theirs").write_text("")
+    usual = (capture.root.parent / "theirs").stat().st_mode
+    assert {(capture.root / "a.bin").stat().st_mode, (capture.frames / "b.bin").stat().st_mode, capture.json.stat().st_mode} == {usual}
+
+
+# -- folders
+
+
+def make_frames(capture: Capture, *names: str, text: str = "frame") -> None:
+    with replacing_folder(capture.frames) as folder:
+        for name in names:
+            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).write_text(text)
+
+
+def test_files_that_others_put_into_a_folder_of_ours_stay_where_they_are(capture):
+    make_frames(capture, "00000.jpg", "00001.jpg")
+    (capture.frames / "holiday.jpg").write_text("a picture")
+    (capture.frames / "more").mkdir()
+    (capture.frames / "more" / "notes.txt").write_text("notes")
+    make_frames(capture, "00000.jpg", text="new")
+    assert contents(capture.frames) == {"00000.jpg": b"new", "holiday.jpg": b"a picture", "more/notes.txt": b"notes"}
+
+
+def test_a_changed_file_in_a_folder_of_ours_is_kept_aside_whether_there_is_a_new_one_or_not(capture):
+    make_frames(capture, "00000.jpg", "00001.jpg")
+    for name in ("00000.jpg", "00001.jpg"):
+        (capture.frames / name).write_text(f"retouched {name}")
+    make_frames(capture, "00000.jpg", text="new")
+    assert contents(capture.frames) == {"00000.jpg": b"new"}
+    assert contents(capture.root / "kept") == {f"frames/{name}": f"retouched {name}".encode() for name in ("00000.jpg", "00001.jpg")}
+
+
+KILLED = """
+import os, sys
+sys.path.insert(0, {root!r})
+from core.contract import capture as module
+from core.contract.capture import Capture
+from core.contract.files import replacing_folder
+at = {at}
+count = 0
+rename = os.replace
+def counted(*places):
+    global count
+    count += 1
+    if count > at:
+        os._exit(9)
+    rename(*places)
+module.os.replace = counted
+with replacing_folder(Capture({capture!r}).frames) as folder:
+    (folder / "00000.jpg").write_text("new")
+    if at < 0:
+        os._exit(9)
+"""
+
+
+@pytest.mark.parametrize("at", range(-1, 6))
+def test_killed_at_any_rename_nothing_is_lost_and_the_next_run_clears_up(capture, at):
+    make_frames(capture, "00000.jpg", "00001.jpg")
+    (capture.frames / "00001.jpg").write_text("retouched")
+    for name in ("holiday.jpg", "z.jpg"):
+        (capture.frames / name).write_text(name)
+    subprocess.run([sys.executable, "-c", KILLED.format(root=str(ROOT), at=at, capture=str(capture.root))], check=False)
+    with capture.locked():
+        assert not [path for path in capture.root.rglob(".*")], "what the killed one left is gone"
+    found = contents(capture.root)
+    assert {found[name] for name in found if name.startswith("frames/holiday") or name.startswith("frames/z")} == {b"holiday.jpg", b"z.jpg"}
+    assert found["frames/00000.jpg"] in (b"frame", b"new")
+    assert b"retouched" in found.values()
+
+
+def test_temporary_files_in_use_and_those_of_others_are_never_cleared_away(capture):
+    (capture.root / ".mine.123.tmp.txt").write_text("it looks like one")
+    with replacing(capture.root / "slow.txt") as temporary:
+        temporary.write_text("half")
+        with capture.locked():
+            assert temporary.exists()
+    assert (capture.root / "slow.txt").exists() and (capture.root / ".mine.123.tmp.txt").exists()
+
+
+def test_what_a_stage_needs_for_a_while_lies_in_the_capture_and_goes_with_its_process(capture):
+    with capture.workspace() as work:
+        assert work.is_relative_to(capture.root) and work.is_dir()
+    assert not work.exists()
+    code = f"""
+import sys, time
+sys.path.insert(0, {str(ROOT)!r})
+from core.contract.capture import Capture
+with Capture({str(capture.root)!r}).workspace() as work:
+    (work / "database.db").write_text("half")
+    print(work, flush=True)
+    time.sleep(60)
+"""
+    other = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    left = Path(other.stdout.readline().strip())
+    with capture.locked():
+        assert left.exists(), "in use"
+    other.send_signal(signal.SIGKILL)
+    other.wait()
+    with capture.locked():
+        assert not left.exists()
+
+
+# -- captures of 0.1.0, and what runs tell
+
+
+def test_a_capture_of_0_1_0_gets_a_record_of_what_it_wrote_and_of_nothing_else(tmp_path):
+    root = tmp_path / "old.wildcap"
+    (root / "frames").mkdir(parents=True)
+    for name, text in (("frames/00000.jpg", "frame"), ("frames/frames.json", "{}"), ("frames/2026 holiday.jpg", "a picture"), ("head.obj", "head"),
+                       ("notes.txt", "mine"), (".scan.99999999.tmp.ply", "half")):
+        (root / name).write_text(text)
+    (root / "capture.json").write_text(json.dumps({"format": 1, "source": "", "stages": {"frames": {}}}))
+    capture = Capture(root)
+    with capture.locked():
+        pass
+    assert not (root / ".scan.99999999.tmp.ply").exists()
+    make_frames(capture, "00000.jpg", text="new")
+    with replacing(capture.head) as temporary:
+        temporary.write_text("new")
+    assert contents(root).keys() == {"capture.json", "frames/00000.jpg", "frames/2026 holiday.jpg", "head.obj", "notes.txt"}
+
+
+def test_a_record_with_a_line_cut_off_is_read_and_a_lost_one_loses_no_file(capture):
+    make_frames(capture, "00000.jpg")
+    record = capture.root / ownership.RECORD
+    with open(record, "ab") as file:
+        file.write(b'{"path": "frames/000')
+    with open(record, "ab") as file:
+        file.write(b"\n")
+    make_frames(capture, "00000.jpg", text="new")
+    assert contents(capture.root).keys() == {"capture.json", "frames/00000.jpg"}
+    record.unlink()
+    make_frames(capture, "00000.jpg", text="newer")
+    assert contents(capture.root / "kept") == {"frames/00000.jpg": b"new"}
+
+
+def test_a_long_record_is_shortened_to_what_is_there(capture, monkeypatch):
+    monkeypatch.setattr(ownership, "LONG_BYTES", 2000)
+    make_frames(capture, "00000.jpg", "00001.jpg")
+    for number in range(40):
+        with replacing(capture.shadow_mask) as temporary:
+            temporary.write_text(str(number))
+    (capture.frames / "00001.jpg").write_text("retouched")
+    with capture.locked():
+        pass
+    lines = [json.loads(line) for line in (capture.root / ownership.RECORD).read_text().splitlines()]
+    assert [line["path"] for line in lines] == ["frames/00000.jpg", "shadow_mask.png"], "what was changed is not ours"
+    make_frames(capture, "00000.jpg", text="new")
+    assert contents(capture.root / "kept") == {"frames/00001.jpg": b"retouched"} or (capture.frames / "00001.jpg").read_text() == "retouched"
+
+
+def test_a_copy_of_a_capture_knows_what_is_ours_by_content(capture, tmp_path):
+    make_frames(capture, "00000.jpg")
+    copied = Capture(tmp_path / "copy.wildcap")
+    shutil.copytree(capture.root, copied.root, copy_function=shutil.copyfile)
+    make_frames(copied, "00000.jpg", text="new")
+    assert not (copied.root / "kept").exists()
+
+
+def test_a_run_tells_what_it_kept_aside(capture, monkeypatch):
+    from core.worker import runner
+
+    monkeypatch.setattr(runner.report, "write", lambda *_: None)
+    monkeypatch.setattr(runner, "_room", lambda step: type("Room", (), {"run": staticmethod(lambda capture, *_: make_frames(capture, "00000.jpg"))}))
+    make_frames(capture, "00000.jpg", text="old")
+    (capture.frames / "00000.jpg").write_text("retouched")
+    film = capture.root.parent / "film.mp4"
+    film.write_bytes(b"film")
+    said: list = []
+    run_job(write_job(capture, source=film, last="frames"), said.append)
+    assert any(isinstance(line, Log) and line.text.endswith("it is now kept/frames/00000.jpg.") for line in said), said
+
+
+def test_processes_are_told_apart():
+    me = processes.identify_process()
+    assert not processes.is_gone(me) and processes.is_at_work(me)
+    assert processes.is_gone({**me, "began": "another time"}) and processes.is_gone({**me, "pid": 2**22 + 1})
+    container = {**me, "pid": 2**22 + 1, "host": processes.name_host() + "0"}
+    assert not processes.is_gone(container) and not processes.is_at_work(container), "a number there means nothing here"
+    assert not processes.is_gone({**me, "host": "another machine"}) and not processes.is_at_work({**me, "host": "another machine"})
