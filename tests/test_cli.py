@@ -157,7 +157,7 @@ def half(height: int, width: int) -> np.ndarray:
 def test_any_size_and_depth_becomes_the_mask(painted, tmp_path):
     images.write_data(tmp_path / "16 bit.png", half(128, 128), bits=16)
     images.write_data(tmp_path / "small.exr", half(16, 16))
-    images.write_srgb(tmp_path / "colour.jpg", np.repeat(half(100, 60)[..., None], 3, 2))
+    images.write_srgb(tmp_path / "colour.jpg", np.repeat(half(100, 100)[..., None], 3, 2))
     images.write_srgb(tmp_path / "alpha.png", np.dstack([half(64, 64)] * 3 + [np.ones((64, 64), np.float32)]))
     for picture in sorted(tmp_path.glob("*.*g")) + [tmp_path / "small.exr"]:
         result = core("mask", "import", painted.root, picture)
