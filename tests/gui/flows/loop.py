@@ -30,7 +30,7 @@ SHADE = """
 import sys
 import numpy as np
 from pathlib import Path
-from core import images
+from core.imaging import images
 root, u, v, radius, left = Path(sys.argv[1]), *map(float, sys.argv[2:])
 texture = images.read_linear(root / "texture.exr")
 rows, columns = np.mgrid[:len(texture), :len(texture)] + 0.5
