@@ -103,14 +103,14 @@ def make(root: Path) -> None:
         path.unlink()
     (root / "cameras" / "points3D.bin").write_bytes(struct.pack("<Q", 0))
     (root / "landmarks.json").write_text('{"points": {}}', encoding="ascii")
-    (root / "face.mp4").write_bytes(b"stands in")
+    (root.parent / "face.mp4").write_bytes(b"stands in")
 
 
 def registered(root: Path, item) -> None:
     """Writes the record that its first four stages would have left."""
     captures, properties, stages = addon.module("captures"), addon.module("properties"), addon.module("jobs").stages
     capture, settings = captures.folder(item), properties.settings(item)
-    capture.set_source(root / "face.mp4")
+    capture.set_source(root.parent / "face.mp4")
     for stage in stages.STAGES[:stages.NAMES.index("delight")]:
         capture.finish(stage, capture.conditions(stage, settings), 1.0, settings, {}, "0.1.0")
 
