@@ -189,8 +189,15 @@ class Capture:
     def claim(self) -> None:
         """Makes the folder a capture, if it is not one yet. Raises Problem for a folder that holds something else, and where it cannot be written."""
         if not self.json.is_file():
-            self.refuse_strangers()
+            if not self._was_capture():
+                self.refuse_strangers()
             write_json(self.json, {"format": FORMAT, "source": "", "stages": {}})
+
+    def _was_capture(self) -> bool:
+        """Whether a folder without capture.json, which a damaged one may be deleted from to start anew, has been a capture: by our record, or by a job."""
+        with contextlib.suppress(OSError, ValueError, TypeError):
+            return (self.root / ownership.RECORD).is_file() or {"capture", "from", "until", "quality"} <= set(read_json(self.job))
+        return False
 
     def refuse_strangers(self) -> None:
         """Raises Problem where the folder, which is no capture yet, holds something."""
