@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which folder becomes a capture: a new one, an empty one, or one that is or was a capture; any other is refused, and nothing in it is touched."""
+
+from pathlib import Path
+
+import pytest
+
+from core.contract import ownership
+from core.contract.capture import Capture
+from core.contract.files import replacing_folder
+from core.contract.messages import Problem
+from core.worker.job import write_job
+
+
+@pytest.fixture
+def capture(tmp_path) -> Capture:
+    capture = Capture(tmp_path / "anna.wildcap")
+    capture.claim()
+    return capture
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file() and path.name != ownership.RECORD}
+
+
+def test_a_folder_that_holds_something_else_is_never_taken_over(tmp_path):
+    """`core run anna/frames anna`: the folder's names look like a capture's."""
+    album = tmp_path / "anna"
+    (album / "frames").mkdir(parents=True)
+    (album / "frames" / "holiday.jpg").write_bytes(b"a picture")
+    before = contents(tmp_path)
+    capture = Capture(album)
+    for attempt in (lambda: capture.claim(), lambda: capture.set_source(tmp_path / "film.mp4"), lambda: write_job(capture)):
+        with pytest.raises(Problem, match="is no capture: it holds frames"):
+            attempt()
+    with pytest.raises(Problem, match="is no capture"), capture.locked():
+        pass
+    assert contents(tmp_path) == before
+
+
+def test_a_capture_whose_record_was_deleted_to_start_anew_is_one_still_and_loses_nothing(capture, tmp_path):
+    with replacing_folder(capture.frames) as folder:
+        (folder / "00000.jpg").write_text("frame")
+    capture.shadow_mask.write_text("painted")
+    before = contents(capture.root)
+    capture.json.unlink()
+    capture.claim()
+    assert contents(capture.root) == before
+    first = Capture(tmp_path / "by 0.1.0.wildcap")  # which kept no record of what it wrote
+    first.root.mkdir()
+    (first.root / "job.json").write_text('{"capture": "/x", "source": "", "from": null, "until": null, "settings": {}, "quality": "draft"}')
+    first.shadow_mask.write_text("painted")
+    first.claim()
+    assert first.read()["stages"] == {} and first.shadow_mask.read_text() == "painted"
+    for text in ("{}", "[1]", "null", "{"):
+        first.json.unlink(missing_ok=True)
+        first.job.write_text(text)
+        with pytest.raises(Problem, match="is no capture"):
+            first.claim()
+
+
+def test_a_source_inside_the_capture_is_refused(capture):
+    (capture.root / "my film.mp4").write_bytes(b"film")
+    (capture.root / "frames").mkdir()
+    for source in (capture.root / "my film.mp4", capture.root / "frames", capture.root):
+        for attempt in (lambda source=source: capture.set_source(source), lambda source=source: write_job(capture, source=source)):
+            with pytest.raises(Problem, match="lies in the capture"):
+                attempt()
