@@ -99,7 +99,7 @@ class Capture:
         return freshness.source_of(self.root, self.read())
 
     def refuse_inside(self, source: str | Path) -> None:
-        """Raises Problem for a source that lies in the capture, or that the capture lies in: what is written would replace it, or be read again."""
+        """Raises Problem for a source that is the capture or lies in it: what is written there could replace it, or be read again."""
         place, root = (Path(os.path.realpath(path)) for path in (source, self.root))
         if place == root or place.is_relative_to(root):
             raise Problem(f"{source} lies in the capture {self.root}, which writes its own files there.", "Keep the video or photographs elsewhere.")
@@ -176,9 +176,10 @@ class Capture:
         try:
             ownership.note_temporary(self.root, folder)
             folder.mkdir(parents=True)
-            yield folder
         except OSError as error:
             raise storage_problem(error, folder) from error
+        try:
+            yield folder
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
@@ -221,9 +222,10 @@ class Capture:
         """Keeps every other worker out, and clears away what killed ones left. Raises Problem naming who works here, and for a folder that is no capture;
         `tell` hears of a longer wait (lease.hold)."""
         self.claim()
-        try:
-            with lease.hold(self.root, tell):
+        with contextlib.ExitStack() as held:
+            try:
+                held.enter_context(lease.hold(self.root, tell))
                 ownership.clear_leftovers(self.root)
-                yield
-        except OSError as error:
-            raise storage_problem(error, self.root) from error
+            except OSError as error:
+                raise storage_problem(error, self.root) from error
+            yield

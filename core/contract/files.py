@@ -17,7 +17,7 @@ import shutil
 from pathlib import Path
 
 from . import ownership
-from .hashes import hash_file
+from .hashes import read_hash
 from .lease import check_lease
 from .messages import Problem
 
@@ -80,7 +80,7 @@ def place_file(temporary: Path, path: Path) -> None:
         check_lease(root)
         if path.is_file() and not ownership.is_ours(root, path):
             ownership.keep_aside(root, path)
-        ownership.note_written(root, {_inside(root, path): hash_file(temporary)})
+        ownership.note_written(root, {ownership.path_inside(root, path): read_hash(temporary)})
     check_lease(root or path.parent)
     os.replace(temporary, path)
 
@@ -98,14 +98,15 @@ def place_folder(temporary: Path, path: Path) -> None:
         if old.exists():  # of a process that was killed between the two renames
             ownership.take_back(root, old)
         ownership.note_temporary(root, old)
-        ownership.note_written(root, {_inside(root, path / file.relative_to(temporary)): hash_file(file) for file in written})
+        ownership.note_written(root, {ownership.path_inside(root, path / file.relative_to(temporary)): read_hash(file) for file in written})
         check_lease(root)
     if path.exists():
         os.replace(path, old)
     os.replace(temporary, path)
-    if root is not None:
+    if root is None:
+        shutil.rmtree(old, ignore_errors=True)
+    else:
         ownership.clear_replaced(root, old, path)
-    shutil.rmtree(old, ignore_errors=True)
 
 
 def remove_file(path: Path) -> None:
@@ -136,7 +137,3 @@ def storage_problem(error: OSError, path: Path) -> Problem:
 def write_json(path: Path, value) -> None:
     with replacing(path) as temporary:
         temporary.write_text(json.dumps(value, indent=1, ensure_ascii=False), encoding="utf-8")
-
-
-def _inside(root: Path, path: Path) -> str:
-    return Path(os.path.relpath(os.path.abspath(path), root)).as_posix()

@@ -15,9 +15,9 @@ import re
 import shutil
 from collections.abc import Iterable
 from functools import lru_cache
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
-from .hashes import hash_file
+from .hashes import read_hash
 from .processes import identify_process, is_gone
 
 RECORD = "written.jsonl"
@@ -27,12 +27,16 @@ BOOKS = frozenset({"capture.json", "job.json", "lock", RECORD})
 """The capture's own books, which are ours whatever stands in them."""
 LONG_BYTES = 1 << 18
 """Of the record, from which on it is shortened: some thousand lines, of a long film's frames or of a day's painting."""
-FIVE = "[0-9]" * 5
-FIRST_FORMAT = ("frames/frames.json", f"frames/{FIVE}.jpg", "cameras/*.bin", "scan.ply", "head.obj", "own_head.obj", "own_head.json", "landmarks.json",
-                f"delit/{FIVE}.png", f"delit/shadow/{FIVE}.png", "texture*.exr", "texture*.png", "shadow_mask*.png", "protect_mask.png", "mask_history/*.png",
-                "maps/*.png", "maps/*.exr", "maps/solved.safetensors", "maps_4k/*.png", "maps_4k/*.exr", "delivery/own_*", "delivery/scan*",
-                "delivery/displacement.exr", "comparison/*.png", "comparison/*.jpg", "preview/*.png", "report/*_*.jpg", "report.html", "consent.json",
-                "checkpoints/solve.safetensors", "landmarks_artist.json", "switchlight/*.png")
+DIGIT = "[0-9]"
+FIVE = 5 * DIGIT
+FIRST_FORMAT = (
+    "frames/frames.json", f"frames/{FIVE}.jpg", *(f"cameras/{name}.bin" for name in ("cameras", "images", "points3D", "rigs", "frames")), "scan.ply",
+    "head.obj", "own_head.obj", "own_head.json", "landmarks.json", "landmarks_artist.json", f"delit/{FIVE}.png", f"delit/shadow/{FIVE}.png",
+    "texture*.exr", "texture*.png", "shadow_mask*.png", "protect_mask.png", f"mask_history/*_mask_{8 * DIGIT}_{6 * DIGIT}_{3 * DIGIT}.png",
+    "maps/*.png", "maps/*.exr", "maps/solved.safetensors", "maps_4k/*.png", "maps_4k/*.exr", "delivery/own_*", "delivery/scan*",
+    "delivery/displacement.exr", "comparison/*.png", "comparison/*.jpg", "preview/*.png", "report/*_*.jpg", "report.html", "consent.json",
+    "checkpoints/solve.safetensors", "switchlight/*.png",
+)
 """What WildCap 0.1.0 wrote, which kept no such record."""
 LEFT_BEFORE = re.compile(r"^\..+\.(\d+)\.tmp(\..+)?$|^\..+\.old$")
 """Temporary names of 0.1.0."""
@@ -56,24 +60,24 @@ def note_written(root: Path, hashes: dict[str, str]) -> None:
 
 def note_temporary(root: Path, path: Path) -> None:
     """Adds a temporary file or folder of this process to the record, before it is made."""
-    _append(root, [{"temporary": _inside(root, path), "by": identify_process()}])
+    _append(root, [{"temporary": path_inside(root, path), "by": identify_process()}])
 
 
 def claim_all(folder: Path) -> None:
     """Starts the record of a capture that was put together elsewhere by us: all that lies in it is ours."""
-    note_written(folder, {_inside(folder, path): hash_file(path) for path in _files(folder)})
+    note_written(folder, {path_inside(folder, path): read_hash(path) for path in _files(folder)})
 
 
 def is_ours(root: Path, path: Path) -> bool:
     """Whether a file of the capture is as we wrote it."""
-    inside = _inside(root, path)
-    return inside in BOOKS or hash_file(path) in _read(root)[0].get(inside, ())
+    inside = path_inside(root, path)
+    return inside in BOOKS or _is_as_written(root, path, inside)
 
 
 def keep_aside(root: Path, path: Path, was: str = "") -> Path:
     """Moves a file out of the way of one of ours, to kept/ under its own name (or `was`, a path in the capture), or with a number where that is taken.
     Returns its new place."""
-    place = root / KEPT / (was or _inside(root, path))
+    place = root / KEPT / (was or path_inside(root, path))
     place.parent.mkdir(parents=True, exist_ok=True)
     free = next(free for free in (place, *(place.with_stem(f"{place.stem}_{number}") for number in range(2, 10_000))) if not free.exists())
     os.replace(path, free)
@@ -85,22 +89,29 @@ def clear_replaced(root: Path, old: Path, path: Path) -> None:
     others put there moves back to where it was."""
     for file in _files(old):
         was = path / file.relative_to(old)
-        ours = hash_file(file) in _read(root)[0].get(_inside(root, was), ())
-        if ours:
+        inside = path_inside(root, was)
+        if _is_as_written(root, file, inside):
             file.unlink()
-        elif was.exists() or _inside(root, was) in _read(root)[0]:
-            keep_aside(root, file, _inside(root, was))
+        elif os.path.lexists(was) or inside in _read(root)[0]:
+            keep_aside(root, file, inside)
         else:
             was.parent.mkdir(parents=True, exist_ok=True)
             os.replace(file, was)
-    shutil.rmtree(old, ignore_errors=True)  # empty folders alone are left in it
+    remove_empty_folders(old)
+
+
+def remove_empty_folders(folder: Path) -> None:
+    """A folder and those in it, as far as nothing else is left in them."""
+    for each in (*sorted((path for path in folder.rglob("*") if path.is_dir() and not path.is_symlink()), reverse=True), folder):
+        with contextlib.suppress(OSError):  # it is not empty
+            each.rmdir()
 
 
 def clear_leftovers(root: Path) -> None:
     """Removes the temporary files of processes that have ended, and takes back a folder that one of them had just put aside."""
     for left, by in _read(root)[1].items():
         path = root / left
-        if is_gone(by) and path.exists():
+        if is_gone(by) and path.exists() and path.parent.resolve().is_relative_to(root.resolve()):  # no link leads out of the capture
             if path.suffix == ".old":
                 take_back(root, path)
             elif path.is_dir():
@@ -117,7 +128,7 @@ def _shorten(root: Path) -> None:
     if not record.is_file() or record.stat().st_size < LONG_BYTES:
         return
     written, temporary = _read(root)
-    lines = [{"path": path, "hash": hash_file(root / path)} for path in written if (root / path).is_file() and is_ours(root, root / path)]
+    lines = [{"path": path, "hash": read_hash(root / path)} for path in written if (root / path).is_file() and is_ours(root, root / path)]
     lines += [{"temporary": path, "by": by} for path, by in temporary.items() if (root / path).exists()]
     short = record.with_name(f".{RECORD}.{os.getpid()}.tmp")
     short.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
@@ -136,8 +147,7 @@ def take_back(root: Path, old: Path) -> None:
 def _read(root: Path) -> tuple[dict[str, set[str]], dict[str, dict]]:
     """What was written: path -> content hashes; and what was temporary: path -> process. A capture of 0.1.0 gets its record here."""
     record = root / RECORD
-    if not record.is_file() and _has_finished_stages(root):
-        adopt_first_format(root)
+    _begin_record(root)
     try:
         info = record.stat()
     except FileNotFoundError:
@@ -155,16 +165,29 @@ def _parse(record: Path, size: int, changed: int) -> tuple[dict[str, set[str]], 
             entry = json.loads(line)
             if "path" in entry:
                 written.setdefault(entry["path"], set()).add(entry["hash"])
-            else:
-                temporary[entry["temporary"]] = entry["by"]
+            elif _is_temporary_name(entry["temporary"]) and {"host", "pid"} <= set(entry["by"]):
+                temporary[entry["temporary"]] = dict(entry["by"])
     return written, temporary
+
+
+def _is_temporary_name(path: str) -> bool:
+    """Whether it can be a temporary file or folder of ours: in the capture, and hidden. A record may come from a stranger with the capture it lies in."""
+    parts = PurePosixPath(path).parts
+    return bool(parts) and not {"..", "/"} & set(parts) and "\\" not in path and ":" not in path and parts[-1].startswith(".")
 
 
 def adopt_first_format(root: Path) -> None:
     """Makes the record of a capture of 0.1.0: what its finished stages wrote, and what killed ones left."""
-    note_written(root, {_inside(root, path): hash_file(path) for pattern in FIRST_FORMAT for path in sorted(root.glob(pattern)) if path.is_file()})
+    note_written(root, {path_inside(root, path): read_hash(path) for pattern in FIRST_FORMAT for path in sorted(root.glob(pattern)) if path.is_file()})
     gone = {**identify_process(), "pid": -1}
-    _append(root, [{"temporary": _inside(root, path), "by": gone} for path in root.glob("**/.*") if LEFT_BEFORE.match(path.name)])
+    _append(root, [{"temporary": path_inside(root, path), "by": gone} for path in root.glob("**/.*") if LEFT_BEFORE.match(path.name)])
+
+
+def _begin_record(root: Path) -> None:
+    """Before the first line of any other: what 0.1.0 wrote, where this is a capture of that."""
+    if not (root / RECORD).exists() and _has_finished_stages(root):
+        (root / RECORD).touch()
+        adopt_first_format(root)
 
 
 def _has_finished_stages(root: Path) -> bool:
@@ -175,14 +198,21 @@ def _has_finished_stages(root: Path) -> bool:
 
 def _append(root: Path, lines: Iterable[dict]) -> None:
     """In one write, so that the lines of two processes do not mix."""
+    _begin_record(root)
     text = "".join(json.dumps(line) + "\n" for line in lines)
     if text:
         with open(root / RECORD, "ab", buffering=0) as file:
             file.write(text.encode())
 
 
-def _inside(root: Path, path: Path) -> str:
+def path_inside(root: Path, path: Path) -> str:
+    """A path as the record has it: relative to the capture, with forward slashes."""
     return Path(os.path.relpath(os.path.abspath(path), os.path.abspath(root))).as_posix()
+
+
+def _is_as_written(root: Path, file: Path, inside: str) -> bool:
+    """Whether a file, which is or was at `inside`, holds what we wrote there. A link is nobody's but whoever made it."""
+    return not file.is_symlink() and read_hash(file) in _read(root)[0].get(inside, ())
 
 
 def _files(folder: Path) -> list[Path]:
@@ -191,4 +221,4 @@ def _files(folder: Path) -> list[Path]:
 
 def kept_files(root: Path) -> set[str]:
     """What was kept aside so far: paths in the capture."""
-    return {_inside(root, path) for path in _files(root / KEPT)} if (root / KEPT).is_dir() else set()
+    return {path_inside(root, path) for path in _files(root / KEPT)} if (root / KEPT).is_dir() else set()
