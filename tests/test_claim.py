@@ -2,26 +2,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which folder becomes a capture: a new one, an empty one, or one that is or was a capture; any other is refused, and nothing in it is touched."""
 
-from pathlib import Path
 
 import pytest
 
-from core.contract import ownership
 from core.contract.capture import Capture
-from core.contract.files import replacing_folder
 from core.contract.messages import Problem
 from core.worker.job import write_job
+
+from .kept_capture import contents, make, make_frames
 
 
 @pytest.fixture
 def capture(tmp_path) -> Capture:
-    capture = Capture(tmp_path / "anna.wildcap")
-    capture.claim()
-    return capture
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file() and path.name != ownership.RECORD}
+    return make(tmp_path / "anna.wildcap")
 
 
 def test_a_folder_that_holds_something_else_is_never_taken_over(tmp_path):
@@ -40,8 +33,7 @@ def test_a_folder_that_holds_something_else_is_never_taken_over(tmp_path):
 
 
 def test_a_capture_whose_record_was_deleted_to_start_anew_is_one_still_and_loses_nothing(capture, tmp_path):
-    with replacing_folder(capture.frames) as folder:
-        (folder / "00000.jpg").write_text("frame")
+    make_frames(capture, "00000.jpg")
     capture.shadow_mask.write_text("painted")
     before = contents(capture.root)
     capture.json.unlink()

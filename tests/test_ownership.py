@@ -19,18 +19,14 @@ from core.contract.messages import Log
 from core.worker.job import write_job
 from core.worker.runner import run_job
 
+from .kept_capture import contents, make, make_frames
+
 ROOT = Path(__file__).resolve().parent.parent
 
 
 @pytest.fixture
 def capture(tmp_path) -> Capture:
-    capture = Capture(tmp_path / "anna.wildcap")
-    capture.claim()
-    return capture
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file() and path.name != ownership.RECORD}
+    return make(tmp_path / "anna.wildcap")
 
 
 # -- single files
@@ -83,13 +79,6 @@ def test_every_file_of_a_capture_has_the_users_mode(capture):
 
 
 # -- folders
-
-
-def make_frames(capture: Capture, *names: str, text: str = "frame") -> None:
-    with replacing_folder(capture.frames) as folder:
-        for name in names:
-            (folder / name).parent.mkdir(exist_ok=True)
-            (folder / name).write_text(text)
 
 
 def test_files_that_others_put_into_a_folder_of_ours_stay_where_they_are(capture):
@@ -198,6 +187,19 @@ def test_a_capture_of_0_1_0_gets_a_record_of_what_it_wrote_and_of_nothing_else(t
     with replacing(capture.head) as temporary:
         temporary.write_text("new")
     assert contents(root).keys() == {"capture.json", "frames/00000.jpg", "frames/2026 holiday.jpg", "head.obj", "notes.txt"}
+
+
+def test_the_first_thing_written_into_a_capture_of_0_1_0_does_not_hide_what_it_wrote(tmp_path):
+    root = tmp_path / "old.wildcap"
+    root.mkdir()
+    (root / "capture.json").write_text(json.dumps({"format": 1, "source": "", "stages": {"solve": {}}}))
+    capture = Capture(root)
+    for path in (capture.shadow_mask, capture.head):
+        path.write_text("by 0.1.0")
+    for path in (capture.shadow_mask, capture.head):  # a mask painted in Blender, before any worker
+        with replacing(path) as temporary:
+            temporary.write_text("new")
+    assert not (root / "kept").exists()
 
 
 def test_a_record_with_a_line_cut_off_is_read_and_a_lost_one_loses_no_file(capture):

@@ -20,6 +20,7 @@ from .capture import Capture
 from .delivery_presets import FORMATS, PICTURES, PRESETS, Format, Preset
 from .files import storage_problem
 from .messages import Problem
+from .ownership import remove_empty_folders
 from .settings import DeliverSettings
 
 PROVENANCE = "provenance.json"
@@ -157,11 +158,17 @@ def _recover(target: Path, old: Path) -> None:
     delivered = _delivered(old) or {}
     for file in sorted(path for path in old.rglob("*") if path.is_file() or path.is_symlink()):
         name = file.relative_to(old).as_posix()
-        if name not in delivered and name != PROVENANCE and not (target / name).exists():
-            (target / name).parent.mkdir(parents=True, exist_ok=True)
-            os.replace(file, target / name)
+        if name == PROVENANCE:
+            continue
+        if name in delivered:
+            file.unlink()
+            continue
+        place = target / name  # taken where somebody put another of that name into the new one since
+        free = next(free for free in (place, *(place.with_stem(f"{place.stem}_{number}") for number in range(2, 10_000))) if not os.path.lexists(free))
+        free.parent.mkdir(parents=True, exist_ok=True)
+        os.replace(file, free)
     (old / PROVENANCE).unlink(missing_ok=True)  # last: it says which files are whose
-    shutil.rmtree(old, ignore_errors=True)
+    remove_empty_folders(old)
 
 
 def _delivered(target: Path) -> dict[str, str] | None:
