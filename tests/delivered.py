@@ -24,6 +24,15 @@ NORMALS = np.round((np.stack(np.meshgrid(np.linspace(-0.6, 0.6, SIDE), np.linspa
 """x and y of the normals as 16 bits store them, [S, S, 2]."""
 
 
+OBJ = {"format": "obj", "whole": True}
+"""The settings of a delivery that needs no Blender."""
+
+
+def folder(capture: Capture, what: str = "head", preset: str = "blender", mesh: str = "obj") -> Path:
+    """Where a capture named "Zoë et moi" is delivered to."""
+    return capture.exports / f"Zoe_et_moi_{what}_{preset}_{mesh}"
+
+
 def make(root: Path) -> Capture:
     """The capture, with a video's name on record that lies in a user's folder."""
     capture = Capture(standin.make(root))

@@ -2,15 +2,38 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stages recorded as finished without being run: what freshness is tested with."""
 
-from core.contract import freshness
+from pathlib import Path
+
+from core.contract import freshness, stages
 from core.contract.capture import Capture
 from core.contract.settings import Settings
 from core.contract.stages import Stage
 
+FRAMES, CAMERAS = stages.by_name("frames"), stages.by_name("cameras")
+
+
+def make(root: Path) -> Capture:
+    """A capture with frames and cameras that were made from them, beside its film."""
+    capture, film = Capture(root), root.parent / "film.mp4"
+    film.parent.mkdir(exist_ok=True)
+    film.write_bytes(b"film")
+    capture.set_source(film)
+    for folder in (capture.frames, capture.cameras):
+        folder.mkdir()
+        (folder / "a.bin").write_bytes(b"1")
+    for stage in (FRAMES, CAMERAS):
+        record(capture, stage, Settings())
+    return capture
+
+
+def states(capture: Capture, settings: Settings | None = None) -> list[str]:
+    """Of its frames and its cameras."""
+    return [capture.state(stage, settings or Settings()) for stage in (FRAMES, CAMERAS)]
+
 
 def record(capture: Capture, stage: Stage, settings: Settings) -> None:
     """As if the stage had just ended, with whatever lies in the capture."""
-    capture.finish(stage, capture.conditions(stage, settings), 1.0, settings, {}, "0.2.0")
+    capture.finish(stage, capture.conditions(stage, settings), 1.5, settings, {"count": 3}, "0.2.0")
 
 
 def changed(capture: Capture, stage: Stage, settings: Settings) -> tuple[str, ...]:

@@ -5,32 +5,16 @@
 
 import pytest
 
-from core.contract import stages
 from core.contract.capture import FORMAT, Capture
 from core.contract.files import replacing, replacing_folder, write_json
 from core.contract.messages import Problem
-from core.contract.settings import Settings
 
-CAMERAS, FRAMES = stages.by_name("cameras"), stages.by_name("frames")
+from .recorded import make, states
 
 
 @pytest.fixture
 def capture(tmp_path) -> Capture:
-    """With frames and cameras that were made from them."""
-    capture = Capture(tmp_path / "Zoë & Åse.wildcap")
-    video = tmp_path / "film.mp4"
-    video.write_bytes(b"film")
-    capture.set_source(video)
-    for folder in (capture.frames, capture.cameras):
-        folder.mkdir()
-        (folder / "a.bin").write_bytes(b"1")
-    for stage in (FRAMES, CAMERAS):
-        capture.finish(stage, capture.conditions(stage, Settings()), 1.5, Settings(), {"count": 3}, "0.1.0")
-    return capture
-
-
-def states(capture: Capture) -> list[str]:
-    return [capture.state(stage, Settings()) for stage in (FRAMES, CAMERAS)]
+    return make(tmp_path / "Zoë & Åse.wildcap")
 
 
 def test_a_missing_output_is_to_do_and_a_forgotten_stage_too(capture):
@@ -41,7 +25,7 @@ def test_a_missing_output_is_to_do_and_a_forgotten_stage_too(capture):
 
 def test_records_keep_what_was_used(capture):
     record = capture.read()["stages"]["cameras"]
-    assert record["settings"]["interpupillary_mm"] == 63.0 and record["figures"] == {"count": 3} and record["seconds"] == 1.5 and record["version"] == "0.1.0"
+    assert record["settings"]["interpupillary_mm"] == 63.0 and record["figures"] == {"count": 3} and record["seconds"] == 1.5 and record["version"] == "0.2.0"
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"stages": 3}', "\0\0"])

@@ -27,18 +27,12 @@ from core.imaging import images
 
 from . import delivered
 from .conftest import ROOT
-from .delivered import NORMALS, SIDE
-
-OBJ = {"format": "obj", "whole": True}
+from .delivered import NORMALS, OBJ, SIDE, folder
 
 
 @pytest.fixture
 def capture(tmp_path) -> Capture:
     return delivered.make(tmp_path / "Zoë et moi.wildcap")
-
-
-def folder(capture: Capture, what: str = "head", preset: str = "blender", mesh: str = "obj") -> Path:
-    return capture.exports / f"Zoe_et_moi_{what}_{preset}_{mesh}"
 
 
 def stored(path: Path) -> np.ndarray:

@@ -4,7 +4,6 @@
 
 import os
 import shutil
-from pathlib import Path
 
 import pytest
 
@@ -14,17 +13,12 @@ from core.contract.messages import Done, Failed, Problem
 from core.contract.settings import DeliverSettings
 
 from . import delivered
-
-OBJ = {"format": "obj", "whole": True}
+from .delivered import OBJ, folder
 
 
 @pytest.fixture
 def capture(tmp_path) -> Capture:
     return delivered.make(tmp_path / "Zoë et moi.wildcap")
-
-
-def folder(capture: Capture, what: str = "head", preset: str = "blender", mesh: str = "obj") -> Path:
-    return capture.exports / f"Zoe_et_moi_{what}_{preset}_{mesh}"
 
 
 def test_files_that_others_added_stay_and_the_delivery_goes_on(capture):
@@ -63,6 +57,18 @@ def test_a_file_of_others_under_a_name_of_the_new_delivery_is_refused_by_name(ca
         delivery_plan.put_in_place(plan)
     delivery_plan.discard(plan)
     assert {path: path.read_bytes() for path in sorted(capture.exports.rglob("*.*")) if path.is_file()} == before
+
+
+def test_what_others_put_into_both_an_older_delivery_and_the_new_one_is_kept_twice(capture):
+    """A kill left the older one aside; meanwhile somebody put a file of the same name into the new one."""
+    delivered.deliver(capture, **OBJ)
+    place = folder(capture)
+    old = place.with_name(f".{place.name}.old")
+    shutil.copytree(place, old)
+    (old / "notes.txt").write_text("older")
+    (place / "notes.txt").write_text("newer")
+    assert isinstance(delivered.deliver(capture, **OBJ), Done)
+    assert {path.name: path.read_text() for path in place.glob("notes*")} == {"notes.txt": "newer", "notes_2.txt": "older"} and not old.exists()
 
 
 @pytest.mark.parametrize("at", range(6))

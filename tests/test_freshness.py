@@ -19,32 +19,14 @@ from core.contract.portable_paths import read_portable, write_portable
 from core.contract.settings import Settings, from_json
 from core.worker.job import read_job, write_job
 
-CAMERAS, FRAMES, SOLVE = stages.by_name("cameras"), stages.by_name("frames"), stages.by_name("solve")
+from .recorded import CAMERAS, FRAMES, make, record, states
+
+SOLVE = stages.by_name("solve")
 
 
 @pytest.fixture
 def capture(tmp_path) -> Capture:
-    """With frames and cameras that were made from them, beside its film."""
-    capture = Capture(tmp_path / "project" / "Zoë & Åse.wildcap")
-    video = tmp_path / "project" / "film.mp4"
-    video.parent.mkdir()
-    video.write_bytes(b"film")
-    capture.set_source(video)
-    for folder in (capture.frames, capture.cameras):
-        folder.mkdir()
-        (folder / "a.bin").write_bytes(b"1")
-    for stage in (FRAMES, CAMERAS):
-        finish(capture, stage)
-    return capture
-
-
-def finish(capture: Capture, stage: stages.Stage, settings: Settings | None = None) -> None:
-    settings = settings or Settings()
-    capture.finish(stage, capture.conditions(stage, settings), 1.5, settings, {"count": 3}, "0.2.0")
-
-
-def states(capture: Capture, settings: Settings | None = None) -> list[str]:
-    return [capture.state(stage, settings or Settings()) for stage in (FRAMES, CAMERAS)]
+    return make(tmp_path / "project" / "Zoë & Åse.wildcap")
 
 
 def test_what_was_made_from_the_same_things_is_done(capture):
@@ -69,7 +51,7 @@ def test_a_setting_that_no_result_depends_on_changes_nothing(capture):
     for name in (*SOLVE.reads, *SOLVE.writes):
         (capture.root / name).parent.mkdir(exist_ok=True)
         (capture.root / name).write_bytes(b"x")
-    finish(capture, SOLVE)
+    record(capture, SOLVE, Settings())
     assert capture.state(SOLVE, from_json({"solve": {"checkpoint_every": 7}})) == "done"
     assert capture.state(SOLVE, from_json({"solve": {"steps": 7}})) == "stale"
 
@@ -80,9 +62,9 @@ def test_a_shared_setting_matters_where_it_is_named(capture):
 
 
 def test_a_setting_that_a_later_version_brings_has_had_its_default(capture):
-    record = capture.read()
-    del record["stages"]["cameras"]["settings"]["matching"]
-    write_json(capture.json, record)
+    told = capture.read()
+    del told["stages"]["cameras"]["settings"]["matching"]
+    write_json(capture.json, told)
     assert states(capture) == ["done", "done"]
     assert states(capture, from_json({"cameras": {"matching": "exhaustive"}})) == ["done", "stale"]
 
@@ -92,7 +74,7 @@ def test_what_a_setting_names_elsewhere_counts_by_what_it_holds(capture, tmp_pat
     model.write_text("cameras", encoding="utf-8")
     settings = from_json({"cameras": {"import_from": str(model)}})
     assert states(capture, settings) == ["done", "stale"], "it was solved without that file"
-    finish(capture, CAMERAS, settings)
+    record(capture, CAMERAS, settings)
     assert states(capture, settings) == ["done", "done"]
     assert states(capture) == ["done", "stale"], "the setting was emptied"
     moved = tmp_path / "moved.json"
@@ -217,8 +199,8 @@ def first_format(tmp_path) -> Capture:
     film = tmp_path / "film.mp4"
     film.write_bytes(b"a film")
     os.utime(film, ns=(1_700_000_000_000_000_000,) * 2)
-    record = json.loads(Path(__file__).with_name("capture_0_1_0.json").read_text(encoding="utf-8"))
-    write_json(capture.json, {**record, "source": str(film)})
+    told = json.loads(Path(__file__).with_name("capture_0_1_0.json").read_text(encoding="utf-8"))
+    write_json(capture.json, {**told, "source": str(film)})
     for stage in stages.STAGES:
         for name in (*stage.reads, *stage.writes):
             path = capture.root / name / "one" if name.endswith("/") else capture.root / name

@@ -15,7 +15,7 @@ import pytest
 from core.contract import ownership, processes
 from core.contract.capture import Capture
 from core.contract.files import remove_file, replacing, replacing_folder
-from core.contract.messages import Log
+from core.contract.messages import Log, Problem
 from core.worker.job import write_job
 from core.worker.runner import run_job
 
@@ -239,11 +239,17 @@ def test_a_copy_of_a_capture_knows_what_is_ours_by_content(capture, tmp_path):
     assert not (copied.root / "kept").exists()
 
 
-def test_a_run_tells_what_it_kept_aside(capture, monkeypatch):
+@pytest.mark.parametrize("fails", [False, True])
+def test_a_run_tells_what_it_kept_aside_also_where_it_fails(capture, monkeypatch, fails):
     from core.worker import runner
 
     monkeypatch.setattr(runner.report, "write", lambda *_: None)
-    monkeypatch.setattr(runner, "_room", lambda step: type("Room", (), {"run": staticmethod(lambda capture, *_: make_frames(capture, "00000.jpg"))}))
+    def run(capture, *_):
+        make_frames(capture, "00000.jpg")
+        if fails:
+            raise Problem("No face was found.", "Film one.")
+
+    monkeypatch.setattr(runner, "_room", lambda step: type("Room", (), {"run": staticmethod(run)}))
     make_frames(capture, "00000.jpg", text="old")
     (capture.frames / "00000.jpg").write_text("retouched")
     film = capture.root.parent / "film.mp4"

@@ -7,7 +7,7 @@ Ground floor: standard library only.
 
 from __future__ import annotations
 
-from .json_files import is_number
+from .json_files import is_number, plain_name
 
 ENTRY = {"finished": str, "version": str, "settings": dict, "seed": int, "device": str, "figures": dict, "findings": list, "inputs": dict, "code": str}
 """What is told of a finished stage, beside its seconds."""
@@ -40,7 +40,7 @@ def _is_stop(stopped) -> bool:
 
 def _is_stamp(value) -> bool:
     """Whether it is a source's stamp: [name, size, content hash, or time] of each file."""
-    return isinstance(value, list) and all(isinstance(file, list) and len(file) == 3 and isinstance(file[0], str) and is_number(file[1], 0)
+    return isinstance(value, list) and all(isinstance(file, list) and len(file) == 3 and plain_name(file[0]) and is_number(file[1], 0)
                                            and (isinstance(file[2], str) or is_number(file[2])) for file in value)
 
 

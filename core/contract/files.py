@@ -125,13 +125,18 @@ def remove_file(path: Path) -> None:
 
 def storage_problem(error: OSError, path: Path) -> Problem:
     """The Problem of a failed write: disk full, read-only, or what the system says."""
-    path = Path(*(re.sub(r"^\.(.+)\.\d+\.tmp", r"\1", part) for part in path.parts))  # the name it would have had
+    path = final_name(path)
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return Problem(f"The disk is full: {path} could not be written.",
                        "Free some space (a capture needs about 1 GB) and run again; finished stages are kept.")
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
         return Problem(f"{path} cannot be written: the folder is read-only.", "Choose a folder you may write to, or change its permissions.")
     return Problem(f"{path} could not be written ({error.strerror or error}).", "Check the disk and the folder, then run again.")
+
+
+def final_name(path: Path) -> Path:
+    """The name that a temporary file, or a file in a temporary folder, would have had."""
+    return Path(*(re.sub(r"^\.(.+)\.\d+\.tmp", r"\1", part) for part in path.parts))
 
 
 def write_json(path: Path, value) -> None:

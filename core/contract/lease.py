@@ -23,7 +23,8 @@ from .messages import Problem
 from .processes import identify_process, is_at_work, is_gone
 
 TERM_S = 30.0
-"""How long a lease lasts without a refresh: several times what a busy disk or file server may hold a refresh up."""
+"""How long a lease lasts without a refresh. A refresh that is held up for longer costs its holder the lease, and nobody a file; a shorter term would make
+that more frequent, a longer one has an artist wait longer for a machine that has gone."""
 REFRESHES = 5
 """How often it is refreshed in one term."""
 LOOK_S = 0.1

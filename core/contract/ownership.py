@@ -35,7 +35,8 @@ FIRST_FORMAT = (
     "texture*.exr", "texture*.png", "shadow_mask*.png", "protect_mask.png", f"mask_history/*_mask_{8 * DIGIT}_{6 * DIGIT}_{3 * DIGIT}.png",
     "maps/*.png", "maps/*.exr", "maps/solved.safetensors", "maps_4k/*.png", "maps_4k/*.exr", "delivery/delivery.json",
     *(f"delivery/own_{name}*.png" for name in ("diffuse_albedo", "normal", "specular_albedo", "confidence")), "delivery/own_head.obj", "delivery/scan.obj",
-    *(f"delivery/scan_{name}.png" for name in ("lit", "albedo", "albedo_known")), "delivery/displacement.exr", "comparison/*.png", "comparison/*.jpg", "preview/*.png", "report/*_*.jpg", "report.html", "consent.json",
+    *(f"delivery/scan_{name}.png" for name in ("lit", "albedo", "albedo_known")), "delivery/displacement.exr",
+    "comparison/*.png", "comparison/*.jpg", "preview/*.png", "report/*_*.jpg", "report.html", "consent.json",
     "checkpoints/solve.safetensors", "switchlight/*.png",
 )
 """What WildCap 0.1.0 wrote, which kept no such record."""

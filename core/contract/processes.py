@@ -35,19 +35,20 @@ def identify_process() -> dict:
 def is_gone(process: dict) -> bool:
     """Whether a process is certainly not running any more. One of another machine or container may be: only those beside us can be asked after."""
     name, run, space = _place(process)
-    ours = _place({"host": name_host()})
-    if name != ours[0]:
+    _, our_run, our_space = _place({"host": name_host()})
+    if name != socket.gethostname():
         return False
-    if run and run != ours[1]:
+    if run and run != our_run:
         return True  # this machine has been started again since
-    if space and space != ours[2]:
+    if space and space != our_space:
         return False
     return not _runs(process["pid"]) or (bool(process.get("began")) and process["began"] != _began(process["pid"]))
 
 
 def is_at_work(process: dict) -> bool:
     """Whether a process runs beside us and has not been stopped: then it is awake when we are."""
-    if _place(process)[0] != socket.gethostname() or _place(process)[2] not in ("", _place({"host": name_host()})[2]) or is_gone(process):
+    name, _, space = _place(process)
+    if name != socket.gethostname() or space not in ("", _place({"host": name_host()})[2]) or is_gone(process):
         return False
     with contextlib.suppress(OSError, IndexError):
         return Path(f"/proc/{process['pid']}/stat").read_bytes().rpartition(b") ")[2][:1] not in (b"T", b"t")

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 
-PARAMS = {0: 3, 1: 4, 2: 4, 3: 5, 4: 8, 5: 8, 6: 12, 7: 5, 8: 4, 9: 5, 10: 12, 11: 16, 12: 4, 13: 5, 14: 3, 15: 4}
+PARAMS = {int(number): len(pycolmap.Camera.create_from_model_id(0, number, 1.0, 1, 1).params)
+          for name, number in pycolmap.CameraModelId.__members__.items() if name != "INVALID"}
 """How many parameters each camera model has, by its number."""
 MOST_BYTES = 1 << 30
 """Of one file, binary or text; a model of 300 frames has 0.1 GB, and pycolmap takes about five times a file's size."""

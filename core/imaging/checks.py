@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
 
+from ..contract.files import final_name
 from ..contract.messages import Problem
 from ..contract.stages import advise_remaking
 
@@ -59,7 +59,7 @@ def check_written(path: Path, pixels: np.ndarray, half: bool) -> None:
     """Raises Problem for pixels [H, W(, C)] that must not be written to `path`: none at all, or some that are no numbers; `half`: of 16 bit floats."""
     fault = find_fault(pixels, MOST_HALF if half else MOST_VALUE)
     if fault:
-        path = Path(*(re.sub(r"^\.(.+)\.\d+\.tmp", r"\1", part) for part in path.parts))  # the name it would have had, in a folder that is replaced whole
+        path = final_name(path)
         raise Problem(f"{path} was not written: it would hold {fault}.",
                       advise_remaking(path, "Run again, and if it stays, report it with the logs of this capture. Finished stages are kept."))
 

@@ -76,7 +76,6 @@ def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled
         try:
             # Outputs may be half new from here on: until the end, nobody may take them for the recorded result.
             capture.forget([stage.name])
-            kept_before = ownership.kept_files(capture.root)
             conditions = capture.conditions(stage, settings)
             started = time.monotonic()
             _room(stage).run(capture, settings, reporter)
@@ -84,8 +83,6 @@ def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled
             lost = [name for name in stage.writes if not capture.has(name)]
             if lost:
                 raise RuntimeError(f"the stage {stage.name} ended without writing {lost[0]}")
-            for kept in sorted(ownership.kept_files(capture.root) - kept_before):
-                emit(Log(f"A file was not as WildCap had written it, and was in the way of a new one: it is now {kept}."))
             capture.finish(stage, conditions, seconds, settings, reporter.figures, __version__, reporter.findings)
             report.write(capture, settings)
         except Problem as problem:
@@ -137,7 +134,7 @@ def _take_source(job: Job, emit: Callable[[Message], None]) -> None:
         emit(Log(f"{source} is not there any more; the frames taken from it are used."))
         return
     if not job.force and not capture.made_from(source):
-        raise Problem(f"This capture was made from {known.name}, not from this {source.name}.",
+        raise Problem(f"This capture was made from {known.name if known else 'another source'}, not from this {source.name}.",
                       f"Choose another capture folder for another video, or run again from the stage {first.name} to replace everything but the painted masks.")
     capture.set_source(source)
 
@@ -163,6 +160,7 @@ def _at_work(step: Stage, capture: Capture, emit: Callable[[Message], None], can
     if missing:
         raise Problem(f"{step.label} needs {missing[0]}, which this capture does not have.", "Run the stages before it first: click Reconstruct.")
     emit(Progress(step.name, 0, 1, "Starting"))
+    kept_before = ownership.kept_files(capture.root)
     with _log_of(capture, step) as log:
         try:
             yield Reporter(step.name, _logging(emit, log), cancelled)
@@ -170,6 +168,9 @@ def _at_work(step: Stage, capture: Capture, emit: Callable[[Message], None], can
             with contextlib.suppress(OSError):  # the disk may be full; that is said elsewhere
                 traceback.print_exc(file=log)
             raise
+        finally:
+            for kept in sorted(ownership.kept_files(capture.root) - kept_before):
+                emit(Log(f"A file was not as WildCap had written it, and was in the way of a new one: it is now {kept}."))
 
 
 def _room(step: Stage):
