@@ -152,6 +152,13 @@ def test_docstrings_comments_and_layout_do_not_count_and_code_does():
         assert written(one) != written(other), one
 
 
+def test_only_a_plain_name_after_the_package_means_a_module_that_is_run(copy):
+    with open(copy / "scan" / "pairs.py", "a", encoding="utf-8") as source:
+        source.write('\nname = "x"\nNAMES = (f"{__package__}{name}", f"{__package__}", f"{name}.colmap", f"{__package__}.pairs")\n')
+    forget()
+    assert "cameras/colmap.py" not in code_key.modules("core.scan", copy) and "scan/pairs.py" in code_key.modules("core.scan", copy)
+
+
 def test_every_python_gives_the_same_keys():
     installed = [path for version in VERSIONS for path in (shutil.which(f"python{version}"), *Path.home().glob(f".pyenv/versions/{version}.*/bin/python"))]
     answers = {}

@@ -105,7 +105,8 @@ def _read_module(core: Path, file: str, changed: int) -> Module:
 def _run_module(core: Path, package: list[str], node: ast.JoinedStr) -> str:
     """The file of a module that is run as a process of its own, by the name f"{__package__}.NAME"; '' for any other string."""
     parts = _merge_constants(node.values)
-    if len(parts) != 2 or not isinstance(parts[0], ast.FormattedValue) or ast.unparse(parts[0].value) != "__package__":
+    shape = [type(part) for part in parts]
+    if shape != [ast.FormattedValue, ast.Constant] or ast.unparse(parts[0].value) != "__package__":
         return ""
     return _file_of(core, [*package, *parts[1].value.removeprefix(".").split(".")])
 
