@@ -42,6 +42,8 @@ class Service:
 
     def _handler(service):  # noqa: N805 - the handler has a self of its own
         class Handler(BaseHTTPRequestHandler):
+            counted = False
+
             def do_GET(self):
                 if self.path != "/v1/credits" or service.credits is None:
                     return self._json(404, {"message": "Not Found"})
@@ -51,6 +53,7 @@ class Service:
 
             def do_POST(self):
                 with service._lock:
+                    self.counted = True
                     service.at_once += 1
                     service.most_at_once = max(service.most_at_once, service.at_once)
                     service.times.append(time.monotonic())
@@ -59,8 +62,13 @@ class Service:
                 except (BrokenPipeError, ConnectionResetError):
                     pass  # the client has gone
                 finally:
-                    with service._lock:
-                        service.at_once -= 1
+                    self._end_call()
+
+            def _end_call(self):
+                """Before an answer's last bytes leave: once the client has them it begins its next call, and this thread may not have come further."""
+                with service._lock:
+                    service.at_once -= self.counted
+                    self.counted = False
 
             def _albedo(self):
                 body = self.rfile.read(int(self.headers["Content-Length"]))
@@ -95,6 +103,7 @@ class Service:
                         self.wfile.write(data[i:i + 1])
                         if service.released.wait(0.05):
                             return
+                self._end_call()
                 self.wfile.write(data[:len(data) // 2] if what == "cut" else data)
 
             def _json(self, status: int, value, headers=()):
@@ -104,6 +113,7 @@ class Service:
                     self.send_header(name, text)
                 self.send_header("Content-Length", str(len(data)))
                 self.end_headers()
+                self._end_call()
                 self.wfile.write(data)
 
             def log_message(self, *_):
