@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m core: run, deliver, settings, stages, delighters, presets, status, mask, landmarks, doctor, train.
+"""python -m core: run, deliver, settings, stages, delighters, presets, status, delete, mask, landmarks, doctor, train.
 
 The command line is one more host of the worker: it writes a job, starts the worker with this same Python and prints
 what it says. Failures are two lines, a problem and its remedy, and exit code 2; Ctrl-C ends with 130.
@@ -15,7 +15,7 @@ import sys
 from pathlib import Path
 
 from . import __version__
-from .contract import artist_landmarks, consent, delighter_cards, delivery_plan, delivery_presets, report, settings, stages
+from .contract import artist_landmarks, consent, deletion, delighter_cards, delivery_plan, delivery_presets, report, settings, stages
 from .contract.capture import Capture
 from .contract.messages import Problem
 from .worker import command_settings, terminal
@@ -69,6 +69,10 @@ def _parser() -> argparse.ArgumentParser:
     status = commands.add_parser("status", help="say which stages of a capture are done")
     status.add_argument("capture", metavar="CAPTURE", type=Path)
     status.set_defaults(command=_status)
+    gone = commands.add_parser("delete", help="delete a face: all that WildCap wrote of it; without --yes, list what would go and what would stay")
+    gone.add_argument("capture", metavar="CAPTURE", type=Path)
+    gone.add_argument("--yes", action="store_true", help="delete it, for good")
+    gone.set_defaults(command=_delete)
     mask = commands.add_parser("mask", help="bring a painted shadow mask in").add_subparsers(required=True, metavar="import")
     bring = mask.add_parser("import", help="make a picture the capture's shadow mask: white is shadow")
     bring.add_argument("capture", metavar="CAPTURE", type=Path)
@@ -166,6 +170,15 @@ def _status(options: argparse.Namespace) -> int:
         print("shadow mask   painted")
     for finding in report.findings(record):
         print(f"{'stopped' if finding['stopped'] else 'finding':13} {finding['problem']} {finding['remedy']}")
+    return 0
+
+
+def _delete(options: argparse.Namespace) -> int:
+    capture = Capture(options.capture)
+    found = deletion.delete(capture) if options.yes else deletion.plan(capture)
+    print(*deletion.lines(found), sep="\n")
+    if not options.yes:
+        print("Nothing was deleted; --yes does it.")
     return 0
 
 

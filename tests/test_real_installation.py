@@ -45,7 +45,7 @@ def test_from_the_question_through_a_cancel_to_a_solve_and_removed_again(addon, 
     asking_s = follow(jobs)
     assert problems.of("") is None, problems.of("")
     told = install.WILDCAP_OT_install_solver.tell()
-    plan = addon("setup.asking").answer(("plan", 'cpu', SOURCE))
+    plan = addon("asking").answer(("plan", 'cpu', SOURCE))
 
     bpy.ops.wildcap.install_solver()
     follow(jobs, lambda job: job.progress is not None and job.progress.done >= 8)
@@ -78,7 +78,7 @@ def test_from_the_question_through_a_cancel_to_a_solve_and_removed_again(addon, 
 
     assert install.WILDCAP_OT_remove_solver.tell() is None
     follow(jobs)
-    size, freed = addon("setup.asking").answer(("size", str(solver))), install.WILDCAP_OT_remove_solver.tell()
+    size, freed = addon("asking").answer(("size", str(solver))), install.WILDCAP_OT_remove_solver.tell()
     bpy.ops.wildcap.remove_solver()
     remove_s = follow(jobs)
     assert not solver.exists() and addon("preferences").python() is None and problems.of("") is None

@@ -13,7 +13,7 @@ bpy = pytest.importorskip("bpy")
 @pytest.fixture
 def setup(addon, tmp_path):
     """The add-on's set-up with an empty solver folder in "Löser", Blender online, and nothing known."""
-    preferences, asking = addon("preferences"), addon("setup.asking")
+    preferences, asking = addon("preferences"), addon("asking")
     system = bpy.context.preferences.system
     preferences.get().environment, system.use_online_access = str(tmp_path / "Löser"), True
     asking._answers.clear()
@@ -43,7 +43,7 @@ def plan_of(addon, disk: int = 1_600_000_000):
 
 
 def test_installing_asks_the_index_first_and_says_what_it_means(setup, monkeypatch, tmp_path):
-    install, asking, jobs = setup("setup.install"), setup("setup.asking"), setup("jobs")
+    install, asking, jobs = setup("setup.install"), setup("asking"), setup("jobs")
     if not bpy.app.online_access:
         pytest.skip("this Blender cannot go online")
     asked = []
@@ -64,7 +64,7 @@ def test_a_disk_that_is_too_small_is_known_before_the_download(setup):
     if not bpy.app.online_access:
         pytest.skip("this Blender cannot go online")
     setup("preferences").get().compute = 'cpu'
-    setup("setup.asking")._answers["plan", "cpu", "pytorch"] = plan_of(setup, disk=1 << 60)
+    setup("asking")._answers["plan", "cpu", "pytorch"] = plan_of(setup, disk=1 << 60)
     for click in (bpy.ops.wildcap.install_solver, setup("setup.install").WILDCAP_OT_install_solver.tell):
         with pytest.raises(Exception, match="are needed while the solver is installed"):
             click()
@@ -80,7 +80,7 @@ def test_offline_nothing_is_asked(setup):
 
 
 def test_removing_adds_up_what_is_freed_and_takes_the_solver_off(setup, tmp_path):
-    preferences, asking = setup("preferences"), setup("setup.asking")
+    preferences, asking = setup("preferences"), setup("asking")
     folder = tmp_path / "Löser"
     assert not bpy.ops.wildcap.remove_solver.poll()
     venv.create(folder, with_pip=False, symlinks=True)

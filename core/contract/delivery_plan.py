@@ -135,10 +135,10 @@ def check_target(plan: Plan) -> None:
     target = plan.target
     if not target.exists() or target.is_dir() and not any(target.iterdir()):
         return
-    delivered = _delivered(target)
+    delivered = read_delivered(target)
     if delivered is None:
         raise Problem(f"{target} holds files that no delivery has put there.", "Move them away, or choose another folder to deliver to.")
-    changed = [name for name, digest in delivered.items() if (target / name).is_file() and not _is(target / name, digest)]
+    changed = [name for name, digest in delivered.items() if (target / name).is_file() and not is_as_delivered(target / name, digest)]
     if changed and not plan.replace:
         raise Problem(f"{_listed(changed)} in {target} changed since the last delivery, which would be replaced.",
                       "Move what you want to keep to another folder, or deliver again with Replace Changed Files (--replace) to give it up.")
@@ -155,7 +155,7 @@ def _recover(target: Path, old: Path) -> None:
     if not target.exists():
         os.replace(old, target)
         return
-    delivered = _delivered(old) or {}
+    delivered = read_delivered(old) or {}
     for file in sorted(path for path in old.rglob("*") if path.is_file() or path.is_symlink()):
         name = file.relative_to(old).as_posix()
         if name == PROVENANCE:
@@ -171,7 +171,7 @@ def _recover(target: Path, old: Path) -> None:
     remove_empty_folders(old)
 
 
-def _delivered(target: Path) -> dict[str, str] | None:
+def read_delivered(target: Path) -> dict[str, str] | None:
     """What the delivery in a folder wrote: file -> SHA-256; None for a folder that no delivery has made."""
     try:
         told = json.loads((target / PROVENANCE).read_text(encoding="utf-8"))
@@ -180,7 +180,7 @@ def _delivered(target: Path) -> dict[str, str] | None:
         return None
 
 
-def _is(path: Path, digest: str) -> bool:
+def is_as_delivered(path: Path, digest: str) -> bool:
     """Whether a delivered file is as it was; the provenance itself may be."""
     if not digest:
         return True

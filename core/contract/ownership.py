@@ -67,7 +67,7 @@ def note_temporary(root: Path, path: Path) -> None:
 
 def claim_all(folder: Path) -> None:
     """Starts the record of a capture that was put together elsewhere by us: all that lies in it is ours."""
-    note_written(folder, {path_inside(folder, path): read_hash(path) for path in _files(folder)})
+    note_written(folder, {path_inside(folder, path): read_hash(path) for path in files_in(folder)})
 
 
 def is_ours(root: Path, path: Path) -> bool:
@@ -89,7 +89,7 @@ def keep_aside(root: Path, path: Path, was: str = "") -> Path:
 def clear_replaced(root: Path, old: Path, path: Path) -> None:
     """Empties `old`, the folder that was at `path` before a new one took its name. What is ours goes, what somebody changed is kept aside, and a file that
     others put there moves back to where it was."""
-    for file in _files(old):
+    for file in files_in(old):
         was = path / file.relative_to(old)
         inside = path_inside(root, was)
         if _is_as_written(root, file, inside):
@@ -217,10 +217,19 @@ def _is_as_written(root: Path, file: Path, inside: str) -> bool:
     return not file.is_symlink() and read_hash(file) in _read(root)[0].get(inside, ())
 
 
-def _files(folder: Path) -> list[Path]:
+def is_leftover(root: Path, path: Path) -> bool:
+    """Whether a file is temporary, or lies in a temporary folder, and its process has ended. Not in a folder that was put aside, which may hold files of
+    others."""
+    inside = PurePosixPath(path_inside(root, path))
+    owners = [by for left, by in _read(root)[1].items() if inside.is_relative_to(left) and not left.endswith(".old")]
+    return bool(owners) and not path.is_symlink() and all(is_gone(by) for by in owners)
+
+
+def files_in(folder: Path) -> list[Path]:
+    """All files and links in a folder and those below; what a link leads to is not looked at."""
     return [path for path in sorted(folder.rglob("*")) if path.is_file() or path.is_symlink()]
 
 
 def kept_files(root: Path) -> set[str]:
     """What was kept aside so far: paths in the capture."""
-    return {path_inside(root, path) for path in _files(root / KEPT)} if (root / KEPT).is_dir() else set()
+    return {path_inside(root, path) for path in files_in(root / KEPT)} if (root / KEPT).is_dir() else set()

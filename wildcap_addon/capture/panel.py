@@ -34,7 +34,9 @@ class WILDCAP_PT_capture(FoldedPanel, bpy.types.Panel):
             row = layout.row()
             row.enabled = False  # to be read: Locate moves the link, and what hangs on it
             row.prop(item, "path", text="")
-            layout.operator("wildcap.open_report", icon='URL')
+            row = layout.row(align=True)
+            row.operator("wildcap.open_report", icon='URL')
+            row.operator("wildcap.delete_face", icon='TRASH')
 
 
 class WILDCAP_PT_frames(CapturePanel, bpy.types.Panel):

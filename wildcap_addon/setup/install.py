@@ -8,9 +8,8 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.worker import environment, index, installation
-from .. import jobs, preferences
+from .. import asking, jobs, preferences
 from ..base_operator import Dialog
-from . import asking
 from .checking import REQUIREMENTS, accept
 
 COMPUTES = {"cpu": "the CPU", "cuda": "NVIDIA GPUs (CUDA)", "apple": "Apple GPUs (Metal)"}

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a dialog has to say and takes seconds to find out (how much to download, how much is freed): found in the background, then the dialog opens."""
+"""What a dialog has to say and takes seconds to find out (how much to download, what is deleted): found in the background, then the dialog opens."""
 
 from collections.abc import Callable
 
 import bpy
 
-from ...core.worker.background import Task
-from .. import jobs
+from ..core.worker.background import Task
+from . import jobs
 
 _answers: dict[tuple, object] = {}
 

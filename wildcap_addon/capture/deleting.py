@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operator: delete a face from the disk, after a list of all that goes and all that stays."""
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+
+from ...core.contract import deletion
+from ...core.contract.capture import Capture
+from ...core.worker.background import Task
+from .. import asking, captures, jobs
+from ..base_operator import Dialog
+
+
+class WILDCAP_OT_delete_face(Dialog, bpy.types.Operator):
+    """Delete all that WildCap wrote of this face, renders and exports among it: first you are told what goes. Files that you added or changed stay"""
+
+    bl_idname = "wildcap.delete_face"
+    bl_label = "Delete Face"
+
+    @classmethod
+    def poll(cls, context):
+        return cls.in_object_mode(context) and jobs.can_start(cls, context) and cls.allowed(
+            jobs.of("") is None, "The solver is being set up, or another face is looked at: wait for it, or click Cancel")
+
+    @staticmethod
+    def tell() -> tuple[str, ...] | None:
+        capture = captures.folder(captures.require(bpy.context))
+        key = ("deletion", str(capture.root))
+        found = asking.answer(key)
+        asking.forget(key)  # whoever closes the dialog and comes back is told what is there then
+        if found is None:
+            asking.ask(key, lambda task: look_at(task, capture), "delete_face")
+            return None
+        return (*deletion.lines(found, iface_), "A head in the scene stays as a mesh and loses its maps: deliver it first to keep them.")
+
+    def work(self, context):
+        capture = captures.folder(captures.require(context))
+        jobs.begin("", "ask", Task("setup", lambda task: delete(task, capture)), lambda: forget(str(capture.root)))
+
+
+def look_at(task: Task, capture: Capture) -> deletion.Deletion:
+    task.say(0, 1, "looking at every file of the face")
+    return deletion.plan(capture)
+
+
+def delete(task: Task, capture: Capture) -> deletion.Deletion:
+    task.say(0, 1, "deleting the face")
+    return deletion.delete(capture)
+
+
+def forget(root: str) -> None:
+    """Takes the capture off the lists of all scenes."""
+    for scene in bpy.data.scenes:
+        props = scene.wildcap
+        for index in reversed([i for i, item in enumerate(props.captures) if captures.root(item) == root]):
+            props.captures.remove(index)
+            props.active_index = max(0, min(props.active_index, len(props.captures) - 1))
+
+
+CLASSES = (WILDCAP_OT_delete_face,)
