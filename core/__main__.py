@@ -9,13 +9,14 @@ what it says. Failures are two lines, a problem and its remedy, and exit code 2;
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib.util
 import signal
 import sys
 from pathlib import Path
 
 from . import __version__
-from .contract import artist_landmarks, consent, deletion, delighter_cards, delivery_plan, delivery_presets, report, settings, stages
+from .contract import artist_landmarks, consent, deletion, delighter_cards, delivery_plan, delivery_presets, report, settings, stages, unforeseen
 from .contract.capture import Capture
 from .contract.messages import Problem
 from .worker import command_settings, terminal
@@ -37,6 +38,17 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         return 130
+    except Exception as error:  # the one place that catches everything: nobody reads a traceback
+        problem = unforeseen.explain(error, "the command", _log_of(arguments))
+        print(problem.problem, problem.remedy, sep="\n", file=sys.stderr)
+        return 2
+
+
+def _log_of(arguments: list[str]) -> Path | None:
+    """The log of the capture that a command line names, if it names one."""
+    with contextlib.suppress(OSError, ValueError):  # words that no path can be
+        return next((Capture(word).logs / unforeseen.LOG for word in arguments if Capture(word).json.is_file()), None)
+    return None
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -223,7 +235,9 @@ def _white(options: argparse.Namespace) -> int:
 def _doctor(options: argparse.Namespace) -> int:
     from .worker.doctor import examine
 
-    return examine(ROOT, Path(sys.executable))
+    found = examine(ROOT, Path(sys.executable))
+    print(found.text)
+    return 2 if found.problems else 0
 
 
 def _train(arguments: list[str]) -> int:

@@ -119,7 +119,7 @@ def test_an_unexpected_error_is_shown_as_a_problem(addon, capture, monkeypatch):
     monkeypatch.setattr(addon("head"), "bring_in", lambda *_: 1 / 0)
     with pytest.raises(RuntimeError, match="ZeroDivisionError"):
         bpy.ops.wildcap.bring_in_head()
-    assert "failed unexpectedly" in addon("problems").of(str(capture)).problem
+    assert "An error inside WildCap stopped" in addon("problems").of(str(capture)).problem
 
 
 def test_a_capture_of_a_newer_version_is_refused_and_left_alone(addon, tmp_path):

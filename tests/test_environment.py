@@ -168,10 +168,11 @@ def test_a_task_ends_with_its_problem_or_at_once_when_cancelled():
     def refuse(task):
         raise Problem("It cannot be.", "Let it be.")
 
-    for work, problem in ((refuse, "It cannot be."), (lambda task: 1 / 0, "Something failed unexpectedly: ZeroDivisionError: division by zero")):
+    for work, problem in ((refuse, "It cannot be."), (lambda task: 1 / 0, "An error inside WildCap stopped")):
         task = Task("try", work)
         task.start()
-        assert [message.problem for message in follow(task)] == [problem]
+        ended, = follow(task)
+        assert ended.problem.startswith(problem)
     task = Task("sleep", lambda task: task.run([sys.executable, "-c", "import time; time.sleep(60)"]))
     task.start()
     task.cancel()

@@ -65,12 +65,12 @@ def test_job_files_that_make_no_sense(capture, tmp_path):
 
 @pytest.mark.parametrize(("error", "words"), [
     (MemoryError(), "not enough memory for the stage solve"), (ModuleNotFoundError("No module named 'x'", name="x"), "has no module named x"),
-    (ZeroDivisionError("division by zero"), "stopped the stage solve (ZeroDivisionError: division by zero)"),
+    (ZeroDivisionError("division by zero"), "ZeroDivisionError: division by zero)."),
     (OSError(errno.ENOSPC, "No space left on device", "/disk/x.exr"), "The disk is full"),
     (OSError(errno.EROFS, "Read-only file system", "/disk/x.exr"), "the folder is read-only"),
     (OSError(errno.EIO, "Input/output error", "/disk/x.exr"), "could not be written (Input/output error)")])
-def test_what_stops_a_stage_is_explained(error, words):
-    problem = explained(error, "solve", Path("solve.log"))
+def test_what_stops_a_stage_is_explained(tmp_path, error, words):
+    problem = explained(error, "solve", tmp_path / "solve.log")
     assert words in problem.problem and problem.remedy.endswith(".")
 
 

@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What all operators share: any exception becomes a problem and a remedy in the panel, never a traceback in the artist's face; and how they ask first."""
 
-import traceback
+from pathlib import Path
 
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ..core.contract import unforeseen
 from ..core.contract.messages import Problem
 from . import captures, problems, status
 
@@ -42,9 +43,7 @@ class BaseOperator:
         except Problem as problem:
             return self._refuse(root, problem)
         except Exception as error:  # the one place that catches everything: an artist reads problems, not tracebacks
-            traceback.print_exc()
-            return self._refuse(root, Problem(f"{self.bl_label} failed unexpectedly: {type(error).__name__}: {error}",
-                                              "Nothing was deleted. Try again; if it stays, report it with the text of the system console."))
+            return self._refuse(root, unforeseen.explain(error, self.bl_label, Path(root) / "logs" / unforeseen.LOG if root else None))
         for key in ("", root, captures.root(captures.active(context))):
             problems.clear(key)
         status.refresh(context)

@@ -14,7 +14,7 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ..core.contract import messages, stages
+from ..core.contract import messages, stages, unforeseen
 from ..core.contract.messages import Problem
 from ..core.contract.settings import Settings
 from ..core.worker.background import Task
@@ -171,7 +171,11 @@ def _hear(root: str, job: Job, message: messages.Message) -> None:
 
 def _tick() -> float | None:
     before, shown = set(_jobs), _shown()
-    running = poll()
+    try:
+        running = poll()
+    except Exception as error:  # nobody is above a timer: without this, Blender would drop it and the tab stand still
+        problems.show("", unforeseen.explain(error, "listening to the solver"))
+        running = bool(_jobs)
     if shown != _shown():  # a redraw of the tab takes time from the worker, and from whoever paints
         status.redraw()
     if before - set(_jobs):

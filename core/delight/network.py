@@ -20,6 +20,7 @@ import numpy as np
 import torch
 from safetensors.torch import load_file
 
+from ..contract import shipped_files
 from ..contract.capture import Capture
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import DelightSettings, Settings
@@ -78,6 +79,7 @@ def load(device: str) -> DelightNet:
     card = WEIGHTS.with_suffix(".json")
     if not (WEIGHTS.is_file() and card.is_file()):
         raise Problem("The weights of the delighting network are missing.", "Install the add-on again, or choose the delighter 'shading'.")
+    shipped_files.require_whole(WEIGHTS)
     net = DelightNet(**json.loads(card.read_text(encoding="utf-8"))["model"])
     net.load_state_dict({name: value.float() for name, value in load_file(WEIGHTS).items()})
     return net.eval().to(torch.device(device), memory_format=torch.channels_last)

@@ -16,6 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from ..contract import shipped_files
 from ..contract.messages import Problem
 
 RIGHT_EYE, LEFT_EYE = (33, 133), (362, 263)
@@ -210,6 +211,7 @@ def _net(name: str):
     if path is None or not path.is_file():
         raise Problem("The networks that find faces (package mediapipe 0.10.21) are not installed.",
                       "Install them with `pip install --no-deps -r requirements/nets.txt`, or press Install Solver in the add-on's preferences.")
+    shipped_files.require_whole_net(path, name)
     try:
         return cv2.dnn.readNetFromTFLite(np.fromfile(path, np.uint8))  # by content: OpenCV may not open a path with accents
     except cv2.error as error:

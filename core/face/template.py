@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..contract import shipped_files
 from ..geometry import meshes
 from ..geometry.meshes import Mesh
 from ..imaging import images
@@ -23,13 +24,13 @@ MASKS = ("face", "skin", "lips", "brows", "eyes", "nose", "nostrils", "ears", "n
 @cache
 def load() -> Mesh:
     """The neutral head: metres, pupils 63 mm apart, +Z up, face towards -Y, u = 0.5 in the middle, the person's left at u > 0.5."""
-    return meshes.read_obj(ASSETS / "head.obj")
+    return meshes.read_obj(_shipped("head.obj"))
 
 
 @cache
 def identity() -> np.ndarray:
     """Displacements float32 [K, V, 3] in metres per unit coefficient; coefficients are independent and N(0, 1) over MakeHuman's heads."""
-    with np.load(ASSETS / "identity.npz", allow_pickle=False) as stored:
+    with np.load(_shipped("identity.npz"), allow_pickle=False) as stored:
         return stored["components"].astype(np.float32)
 
 
@@ -50,7 +51,7 @@ def landmark_weights() -> np.ndarray:
 def mask(name: str, size: int) -> np.ndarray:
     """A soft UV mask float32 [size, size] in [0, 1]; `name` is one of MASKS. The array is shared: copy before writing."""
     assert name in MASKS, name
-    return images.resize(images.read_mask(ASSETS / "masks" / f"{name}.png"), size, size).clip(0, 1)
+    return images.resize(images.read_mask(_shipped(f"masks/{name}.png")), size, size).clip(0, 1)
 
 
 def template_hash(mesh: Mesh) -> str:
@@ -68,4 +69,10 @@ def is_built_in(mesh: Mesh) -> bool:
 
 @cache
 def _record() -> dict:
-    return json.loads((ASSETS / "head.json").read_text(encoding="utf-8"))
+    return json.loads(_shipped("head.json").read_text(encoding="utf-8"))
+
+
+def _shipped(name: str) -> Path:
+    """A file of the assets. Raises Problem where it is missing or damaged."""
+    shipped_files.require_whole(ASSETS / name)
+    return ASSETS / name

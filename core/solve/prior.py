@@ -15,6 +15,7 @@ from pathlib import Path
 import torch
 from safetensors import safe_open
 
+from ..contract import shipped_files
 from ..contract.messages import Problem
 from . import released
 from .network import UNet, denoise, from_state
@@ -211,6 +212,7 @@ def positional_encoding(coords: torch.Tensor, octaves: int) -> torch.Tensor:
 
 
 def _load_ours(path: Path) -> Prior:
+    shipped_files.require_whole(path)
     card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     with safe_open(path, "pt") as file:
         tensors = {name: file.get_tensor(name).float() for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping

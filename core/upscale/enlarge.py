@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from safetensors.torch import load_file
 
+from ..contract import shipped_files
 from ..contract.messages import Problem
 from ..imaging import images
 from .maps import Maps
@@ -54,6 +55,7 @@ def load_network(path: Path = WEIGHTS) -> Rcan:
     card = Path(path).with_suffix(".json")
     if not (Path(path).is_file() and card.is_file()):
         raise Problem(f"The upscaler's weights are missing ({Path(path).name}).", "Install the extension again, or choose Lanczos as the way to enlarge.")
+    shipped_files.require_whole(path)
     network = Rcan(**json.loads(card.read_text(encoding="utf-8"))["model"])
     network.load_state_dict({name: value.float() for name, value in load_file(path).items()})
     return network.eval()

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from safetensors import safe_open
 
+from ..contract import shipped_files
 from ..contract.messages import Reporter
 from ..face import template
 from ..geometry.noise import noise
@@ -120,6 +121,7 @@ def _tone(channels: np.ndarray, trust: np.ndarray, surface: HeadSurface, seed: i
 
 def usual_skin(size: int) -> np.ndarray:
     """The prior's mean face in the form of `apart`'s channels, [S, S, 4], its albedo over the skin tone: necks are paler than cheeks, ears redder."""
+    shipped_files.require_whole(MEAN_FACE)
     with safe_open(MEAN_FACE, "numpy") as file:
         mean = file.get_tensor("mean_face").astype(np.float32).transpose(1, 2, 0)
     mean = cv2.resize(mean, (size, size), interpolation=cv2.INTER_LINEAR)

@@ -16,6 +16,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from ..contract import unforeseen
 from ..contract.messages import FINAL, Cancelled, CancelledError, Done, Failed, Message, Problem, Progress
 
 GRACE_S = 1.0
@@ -99,5 +100,6 @@ class Task:
         except Problem as problem:
             final = Failed(self.name, problem.problem, problem.remedy)
         except Exception as error:  # a thread has nobody above it: an artist reads problems, not tracebacks
-            final = Failed(self.name, f"Something failed unexpectedly: {type(error).__name__}: {error}", "Try again; if it stays, report it with this text.")
+            problem = unforeseen.explain(error, self.name)
+            final = Failed(self.name, problem.problem, problem.remedy)
         self._messages.put(final)

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from .. import __version__
-from ..contract import ownership, report
+from ..contract import ownership, report, unforeseen
 from ..contract.capture import Capture
 from ..contract.files import storage_problem
 from ..contract.freshness import FINISHED, OLDER
@@ -56,8 +56,6 @@ def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None, 
     except CancelledError:
         return Cancelled(stage)
     except Exception as error:
-        if not stage:
-            traceback.print_exc()  # a stage's own log has it already
         problem = explained(error, stage, path.parent / "logs" / f"{stage or 'worker'}.log")
         return Failed(stage, problem.problem, problem.remedy)
     return Done(round(time.monotonic() - started, 2))
@@ -103,7 +101,7 @@ def run_tool(tool: Stage, job: Job, emit: Callable[[Message], None], cancelled: 
 
 
 def explained(error: Exception, stage: str, log: Path) -> Problem:
-    """What any exception means to the user: a problem and a remedy, both whole sentences."""
+    """What any exception means to the user: a problem and a remedy, both whole sentences. The traceback of one that nobody foresaw goes to `log`."""
     if isinstance(error, Problem):
         return error
     during = f"the stage {stage}" if stage else "the job"
@@ -115,8 +113,7 @@ def explained(error: Exception, stage: str, log: Path) -> Problem:
                        "Install the solver in WildCap's setup panel, or see what `python -m core doctor` says.")
     if isinstance(error, OSError) and error.filename and not isinstance(error, FileNotFoundError):
         return storage_problem(error, Path(os.fsdecode(error.filename)))
-    return Problem(f"An error inside WildCap stopped {during} ({type(error).__name__}: {_first_line(error)}).",
-                   f"Run again, and if it stays, report it with the log {log}. Finished stages are kept.")
+    return unforeseen.explain(error, during, log)
 
 
 def _take_source(job: Job, emit: Callable[[Message], None]) -> None:
@@ -164,9 +161,9 @@ def _at_work(step: Stage, capture: Capture, emit: Callable[[Message], None], can
     with _log_of(capture, step) as log:
         try:
             yield Reporter(step.name, _logging(emit, log), cancelled)
-        except BaseException:
+        except Problem as problem:
             with contextlib.suppress(OSError):  # the disk may be full; that is said elsewhere
-                traceback.print_exc(file=log)
+                traceback.print_exception(problem, file=log)  # what it came from is of use to whoever reads the log
             raise
         finally:
             for kept in sorted(ownership.kept_files(capture.root) - kept_before):
@@ -212,8 +209,3 @@ def _logging(emit: Callable[[Message], None], log) -> Callable[[Message], None]:
         emit(message)
 
     return both
-
-
-def _first_line(error: Exception) -> str:
-    lines = str(error).strip().splitlines()
-    return lines[0][:200] if lines else "no message"

@@ -1,0 +1,125 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What comes with WildCap is as it was shipped, or is named: by the doctor, and by whoever needs it. And errors that nobody foresaw have an id."""
+
+import importlib
+import shutil
+from pathlib import Path
+
+import pytest
+
+from core.__main__ import main
+from core.contract import shipped_files, unforeseen
+from core.contract.messages import Problem
+from core.face import faces, template
+from core.solve import prior
+from core.training import manifest
+from core.upscale import enlarge, whole_head
+
+network = importlib.import_module("core.delight.network")  # the room has a function of that name
+
+
+@pytest.fixture
+def core(tmp_path, monkeypatch) -> Path:
+    """A copy of the shipped files, in the place of ours."""
+    for folder in manifest.FOLDERS:
+        shutil.copytree(shipped_files.CORE / folder, tmp_path / "core" / folder, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+    monkeypatch.setattr(shipped_files, "CORE", tmp_path / "core")
+    return tmp_path / "core"
+
+
+def test_the_manifest_is_that_of_the_files():
+    assert shipped_files.read_manifest() == manifest.make_manifest(), "run `python -m core.training.manifest`"
+    assert shipped_files.find_faults() == []
+
+
+def test_every_shipped_file_that_is_cut_changed_or_gone_is_named(core):
+    assert shipped_files.find_faults(core) == []
+    for name in shipped_files.read_manifest()["core"]:
+        path, whole = core / name, (core / name).read_bytes()
+        for damaged in (whole[:len(whole) // 2], whole[:-1] + bytes([whole[-1] ^ 1]), None):
+            path.unlink() if damaged is None else path.write_bytes(damaged)
+            fault, = shipped_files.find_faults(core)
+            assert str(path) in fault and ("missing" if damaged is None else "damaged") in fault
+            with pytest.raises(Problem, match="Install the extension again") as refusal:
+                shipped_files.require_whole(path)
+            assert str(path) in refusal.value.problem
+        path.write_bytes(whole)
+    (core / "head.obj").write_text("somebody else's")
+    shipped_files.require_whole(core / "head.obj")
+
+
+def test_line_ends_of_a_checkout_are_no_damage(core):
+    card = core / "weights" / "prior.json"
+    card.write_bytes(card.read_bytes().replace(b"\n", b"\r\n"))
+    assert shipped_files.find_faults(core) == []
+
+
+@pytest.mark.parametrize(("module", "name", "load"), [
+    (network, "delighter", lambda path: network.load("cpu")), (enlarge, "upscaler", enlarge.load_network), (prior, "prior", prior._load_ours),
+    (whole_head, "prior", lambda path: whole_head.usual_skin(8))])
+def test_damaged_weights_are_named_by_what_needs_them(core, monkeypatch, module, name, load):
+    path = core / "weights" / f"{name}.safetensors"
+    path.write_bytes(path.read_bytes()[:100_000])
+    for constant in ("WEIGHTS", "MEAN_FACE"):
+        monkeypatch.setattr(module, constant, path, raising=False)
+    with pytest.raises(Problem, match="is damaged: it is not as it was shipped") as refusal:
+        load(path)
+    assert path.name in refusal.value.problem
+
+
+def test_a_damaged_head_is_named(core, monkeypatch):
+    monkeypatch.setattr(template, "ASSETS", core / "assets")
+    (core / "assets" / "head.obj").write_bytes((core / "assets" / "head.obj").read_bytes()[:1000])
+    with pytest.raises(Problem, match="head.obj is damaged"):
+        template.load.__wrapped__()
+
+
+def test_damaged_face_nets_are_named(tmp_path, monkeypatch):
+    package = Path(faces.importlib.util.find_spec("mediapipe").submodule_search_locations[0])
+    for name in shipped_files.NETS:
+        (tmp_path / "modules" / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(package / "modules" / name, tmp_path / "modules" / name)
+    assert shipped_files.find_net_faults(tmp_path) == [] and len(shipped_files.find_net_faults(None)) == len(shipped_files.NETS)
+    cut = tmp_path / "modules" / shipped_files.NETS[1]
+    cut.write_bytes(cut.read_bytes()[:-1])
+    fault, = shipped_files.find_net_faults(tmp_path)
+    assert str(cut) in fault and "damaged" in fault
+    monkeypatch.setattr(faces.importlib.util, "find_spec", lambda name: type("Spec", (), {"submodule_search_locations": [str(tmp_path)]}))
+    with pytest.raises(Problem, match="is damaged") as refusal:
+        faces._net.__wrapped__(shipped_files.NETS[1])
+    assert str(cut) in refusal.value.problem and "force-reinstall" in refusal.value.remedy
+
+
+def test_the_doctor_names_a_cut_network(monkeypatch, capsys, tmp_path):
+    from core.worker import doctor
+
+    faults = ["/x/prior.safetensors is damaged: it is not as it was shipped."]
+    versions = doctor.environment.required(shipped_files.CORE.parent / "requirements")
+    answer = {"python": (3, 11), "versions": versions, "opencv": [], "errors": {}, "device": "cpu"}
+    monkeypatch.setattr(doctor.environment, "survey", lambda *_: answer)
+    assert main(["doctor"]) == 0 and "Nothing is missing." in capsys.readouterr().out
+    monkeypatch.setattr(doctor.shipped_files, "find_faults", lambda core: faults)
+    assert main(["doctor"]) == 2
+    said = capsys.readouterr().out
+    assert faults[0] in said and shipped_files.AGAIN in said and "Nothing is missing" not in said
+
+
+def test_the_same_fault_has_the_same_id_and_its_traceback_is_in_the_log_alone(tmp_path, capsys, monkeypatch):
+    def fail(text):
+        raise ValueError(text)
+
+    said = []
+    for number in (1, 2):
+        try:
+            fail(f"no. {number}")
+        except ValueError as error:
+            said.append(unforeseen.explain(error, "the trial", tmp_path / "logs" / "trial.log"))
+            said.append(unforeseen.identify(error))
+    assert said[1] == said[3] and said[1] in said[0].problem and "no. 2" in said[2].problem
+    log = (tmp_path / "logs" / "trial.log").read_text()
+    assert log.count(said[1]) == 2 and "Traceback" in log and "Traceback" not in str(said[0]) and "What was finished is kept" in said[0].remedy
+    monkeypatch.setattr("core.__main__.stages.STAGES", None)
+    assert main(["stages"]) == 2
+    told = capsys.readouterr().err
+    assert "Traceback" not in told and "WC-" in told and len(told.splitlines()) == 2
