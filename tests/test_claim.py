@@ -5,6 +5,7 @@
 
 import pytest
 
+from core.contract import ownership
 from core.contract.capture import Capture
 from core.contract.messages import Problem
 from core.worker.job import write_job
@@ -46,7 +47,8 @@ def test_a_capture_whose_record_was_deleted_to_start_anew_is_one_still_and_loses
     first.claim()
     assert first.read()["stages"] == {} and first.shadow_mask.read_text() == "painted"
     for text in ("{}", "[1]", "null", "{"):
-        first.json.unlink(missing_ok=True)
+        for path in (first.json, first.root / ownership.RECORD):
+            path.unlink(missing_ok=True)
         first.job.write_text(text)
         with pytest.raises(Problem, match="is no capture"):
             first.claim()

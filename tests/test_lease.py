@@ -71,6 +71,24 @@ def test_an_empty_lock_is_being_made_and_another_machine_s_is_waited_for(capture
     assert not capture.lock.exists()
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_one_that_was_killed_while_it_took_a_lease_over_leaves_nothing_beside_it(capture, monkeypatch):
+    """Between putting the dead one's lease aside and removing it: nobody who comes later has to take over anything."""
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    capture.lock.write_text(written_by(pid=dead.pid))
+    heir = os.fork()
+    if heir == 0:
+        monkeypatch.setattr(lease.Path, "unlink", lambda *_, **__: os._exit(9))
+        with lease.hold(capture.root):
+            os._exit(1)
+    assert os.waitstatus_to_exitcode(os.waitpid(heir, 0)[1]) == 9
+    assert len(list(capture.root.glob("lock*"))) == 2
+    (capture.root / "lock.txt").write_text("mine")
+    with capture.locked():
+        assert {path.name for path in capture.root.glob("lock*")} == {"lock", "lock.txt"}
+
+
 def test_a_refresh_that_is_seen_keeps_the_lease_whatever_time_it_tells(capture, monkeypatch):
     monkeypatch.setattr(lease, "TERM_S", 3.0)
     capture.lock.write_text(written_by(host="another machine"))

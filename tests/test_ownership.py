@@ -15,6 +15,7 @@ import pytest
 from core.contract import ownership, processes
 from core.contract.capture import Capture
 from core.contract.files import remove_file, replacing, replacing_folder
+from core.contract.hashes import read_hash
 from core.contract.messages import Log, Problem
 from core.worker.job import write_job
 from core.worker.runner import run_job
@@ -137,6 +138,18 @@ def test_killed_at_any_rename_nothing_is_lost_and_the_next_run_clears_up(capture
     assert b"retouched" in found.values()
 
 
+@pytest.mark.parametrize("at", [0, 1])
+def test_killed_while_it_writes_the_captures_own_books_leaves_nothing_either(tmp_path, at):
+    """capture.json when the folder becomes a capture (at 0: its first rename), and job.json."""
+    root = tmp_path / "anna.wildcap"
+    code = KILLED.replace("with replacing_folder", "Capture({capture!r}).claim()\nwith replacing").replace(".frames)", ".job)").replace(
+        '(folder / "00000.jpg")', "folder").replace("import replacing_folder", "import replacing")
+    subprocess.run([sys.executable, "-c", code.format(root=str(ROOT), at=at, capture=str(root))], check=False)
+    assert len(list(root.glob(".*.tmp.json"))) == 1
+    with Capture(root).locked():
+        assert contents(root).keys() == {"capture.json", "lock"}
+
+
 def test_temporary_files_in_use_and_those_of_others_are_never_cleared_away(capture):
     (capture.root / ".mine.123.tmp.txt").write_text("it looks like one")
     with replacing(capture.root / "slow.txt") as temporary:
@@ -207,13 +220,18 @@ def test_a_record_with_a_line_cut_off_is_read_and_a_lost_one_loses_no_file(captu
     record = capture.root / ownership.RECORD
     with open(record, "ab") as file:
         file.write(b'{"path": "frames/000')
-    with open(record, "ab") as file:
-        file.write(b"\n")
     make_frames(capture, "00000.jpg", text="new")
-    assert contents(capture.root).keys() == {"capture.json", "frames/00000.jpg"}
-    record.unlink()
     make_frames(capture, "00000.jpg", text="newer")
-    assert contents(capture.root / "kept") == {"frames/00000.jpg": b"new"}
+    assert contents(capture.root).keys() == {"capture.json", "frames/00000.jpg"}, "the line after it is a line of its own"
+    with open(record, "ab") as file:
+        file.write(b'{"path": "frames/000')
+    (capture.root / "a.txt").write_text("ours")
+    ownership.note_written(capture.root, {"a.txt": read_hash(capture.root / "a.txt")})
+    assert ownership.is_ours(capture.root, capture.root / "a.txt")
+    (capture.root / "a.txt").unlink()
+    record.unlink()
+    make_frames(capture, "00000.jpg", text="newest")
+    assert contents(capture.root / "kept") == {"frames/00000.jpg": b"newer"}
 
 
 def test_a_long_record_is_shortened_to_what_is_there(capture, monkeypatch):

@@ -17,6 +17,7 @@ from ..contract.files import replacing_folder
 from ..contract.frame_records import FrameRecord, Frames, read_frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
+from ..geometry.models import write_model
 from ..imaging import images
 from . import coverage
 from .calibration import import_cameras
@@ -50,7 +51,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         raise Problem(f"The camera moved only {widest:.0f} degrees around the head; {LEAST_COVERAGE_DEG:.0f} are the least.",
                       "Film again while you walk around the face from one ear to the other.")
     with replacing_folder(capture.cameras) as folder:
-        model.write_binary(str(folder))
+        write_model(folder, model)
         report.check()
     images.write_srgb(capture.picture("cameras", "world"), draw_cameras(model, frames.records, capture.frames))
     _findings(solved, frames.records, centres, report)

@@ -36,7 +36,7 @@ def replacing(path: Path):
     """
     path = Path(path)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
-    root = None if path.name in ownership.BOOKS else ownership.root_of(path)
+    root = path.parent if path.name == "capture.json" else ownership.root_of(path)  # which makes the folder a capture
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if root is not None:

@@ -80,6 +80,7 @@ def hold(root: Path, tell: Callable[[str], None] = lambda text: None) -> Iterato
         if expired is not None:
             _take_over(lease, *expired)
     _held[_key(root)] = lease
+    _clear_asides(lease.path)
     ended = threading.Event()
     keeper = threading.Thread(target=_refresh, args=(lease, ended), name="wildcap-lease", daemon=True)
     keeper.start()
@@ -151,6 +152,14 @@ def _clear(succession: Path) -> None:
             succession.unlink(missing_ok=True)
             return
         time.sleep(LOOK_S / 10)
+
+
+def _clear_asides(path: Path) -> None:
+    """Removes what one that was killed while it took a lease over has left beside it, of processes that have ended."""
+    for left in path.parent.glob(f"{path.name}.*"):
+        found = _read(left)
+        if found and is_gone(found):
+            left.unlink(missing_ok=True)
 
 
 def _refresh(lease: Lease, ended: threading.Event) -> None:

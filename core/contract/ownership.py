@@ -9,6 +9,7 @@ left is known to be ours, and a file that somebody put there or changed is known
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
 import re
@@ -133,6 +134,7 @@ def _shorten(root: Path) -> None:
     lines = [{"path": path, "hash": read_hash(root / path)} for path in written if (root / path).is_file() and is_ours(root, root / path)]
     lines += [{"temporary": path, "by": by} for path, by in temporary.items() if (root / path).exists()]
     short = record.with_name(f".{RECORD}.{os.getpid()}.tmp")
+    note_temporary(root, short)
     short.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
     os.replace(short, record)
 
@@ -199,12 +201,17 @@ def _has_finished_stages(root: Path) -> bool:
 
 
 def _append(root: Path, lines: Iterable[dict]) -> None:
-    """In one write, so that the lines of two processes do not mix."""
+    """In one write, so that the lines of two processes do not mix. Raises OSError where they do not fit on the disk."""
     _begin_record(root)
-    text = "".join(json.dumps(line) + "\n" for line in lines)
+    text = b"".join(json.dumps(line).encode() + b"\n" for line in lines)
     if text:
-        with open(root / RECORD, "ab", buffering=0) as file:
-            file.write(text.encode())
+        with open(root / RECORD, "ab+", buffering=0) as file:
+            end = file.seek(0, os.SEEK_END)
+            file.seek(max(end - 1, 0))
+            if end and file.read(1) != b"\n":  # a line that did not fit on the disk, or whose writer was killed
+                text = b"\n" + text
+            if file.write(text) < len(text):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(root / RECORD))
 
 
 def path_inside(root: Path, path: Path) -> str:

@@ -7,6 +7,8 @@ Formats: COLMAP's documentation, "Output format". Numbers are little-endian.
 
 from __future__ import annotations
 
+import errno
+import os
 import struct
 from pathlib import Path
 
@@ -113,6 +115,16 @@ def read_model(folder: Path) -> pycolmap.Reconstruction:
         if not (0 < camera.width <= LONGEST_SIDE and 0 < camera.height <= LONGEST_SIDE and np.isfinite(camera.params).all() and min(lengths) > 0):
             raise ValueError(f"the lens of camera {number} makes no sense")
     return model
+
+
+def write_model(folder: Path, model: pycolmap.Reconstruction) -> None:
+    """Writes a model's binary files. Raises OSError where they are not whole afterwards: pycolmap says nothing of a disk that is full."""
+    model.write_binary(str(folder))
+    try:
+        for name, record in RECORDS.items():
+            _walk(folder / f"{name}.bin", record)
+    except ValueError as error:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder)) from error
 
 
 def pose_of(image: pycolmap.Image) -> pycolmap.Rigid3d:
