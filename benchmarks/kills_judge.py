@@ -29,7 +29,7 @@ def after_kill(place: Path, known: Mapping[str, Collection[str]], masks: Mapping
     """Faults of a place in which something was killed: `known` are the complete contents that each file may have (hashes), `masks` those of the
     masks that were being painted. `within`: folders in which files are new in every run, of which only the user's are judged."""
     root = capture_at(place).root
-    found = _strangers(place, aside=True)
+    found = find_lost(place, aside=True)
     for name, contents in (masks or {}).items():
         if not (root / name).is_file() or (root / name).read_bytes() not in contents:
             found.append(f"{name} is neither the old mask nor a new one")
@@ -51,7 +51,7 @@ def after_resume(place: Path, undisturbed: Undisturbed, last: str, masks: Mappin
     """Faults of a place in which the run that goes on has ended: every stage up to `last` has the undisturbed run's bytes, all of the user's is in its
     place, and nothing else is left. `unlike`: stages whose bytes differ from run to run; `within` as of `after_kill`."""
     capture, expected = capture_at(place), undisturbed.end
-    found = after_kill(place, undisturbed.known, masks, within) + _strangers(place) + _left(place)
+    found = after_kill(place, undisturbed.known, masks, within) + find_lost(place) + _left(place)
     for stage in stages.STAGES[:stages.NAMES.index(last) + 1]:
         if stage.name in unlike:
             continue
@@ -67,7 +67,7 @@ def tree(folder: Path) -> dict[str, str]:
     return {path.relative_to(folder).as_posix(): read_hash(path) for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
-def _strangers(place: Path, aside: bool = False) -> list[str]:
+def find_lost(place: Path, aside: bool = False) -> list[str]:
     """The user's files that are gone or changed. `aside`: one may lie in the folder that was just being put aside for a new one (.NAME.old)."""
     root, found = capture_at(place).root, []
     for name, content in STRANGERS.items():

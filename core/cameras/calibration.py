@@ -57,6 +57,8 @@ def read_cameras(path: Path) -> list[Calibrated]:
         if path.is_file() and path.stat().st_size > MOST_BYTES:
             raise Problem(f"{path.name} is larger than {MOST_BYTES >> 20} MB, which is no list of cameras.", "Export the cameras without points.")
         cameras = colmap_folder.read(path) if path.is_dir() else readers[path.suffix.lower()](path.read_text(encoding="utf-8-sig"), path.name)
+    except Problem as problem:
+        raise problem if path.name in problem.problem else Problem(f"{path.name} cannot be used: {problem.problem}", problem.remedy) from problem
     except (OSError, UnicodeDecodeError) as error:
         raise Problem(f"{path.name} cannot be read ({error}).", "Export the cameras again.") from error
     if not cameras:

@@ -62,7 +62,7 @@ def holder(path: Path) -> dict | None:
 def refuse(found: dict, path: Path) -> Problem:
     """The Problem of a capture that is worked on."""
     if not found:
-        return Problem("Another worker is just beginning to work on this capture.", "Wait for it or cancel it there.")
+        return Problem("Another worker is just beginning to work on this capture.", f"Wait a moment and try again; if nobody works on it, delete {path}.")
     return Problem(f"Another worker (process {found['pid']} on {str(found['host']).partition('/')[0]}, since {found['since']}) is working on this capture.",
                    f"Wait for it or cancel it there; if it is gone, delete {path}.")
 

@@ -95,7 +95,7 @@ def clear_replaced(root: Path, old: Path, path: Path) -> None:
         inside = path_inside(root, was)
         if _is_as_written(root, file, inside):
             file.unlink()
-        elif os.path.lexists(was) or inside in _read(root)[0]:
+        elif os.path.lexists(was) or inside in read_record(root)[0]:
             keep_aside(root, file, inside)
         else:
             was.parent.mkdir(parents=True, exist_ok=True)
@@ -112,7 +112,7 @@ def remove_empty_folders(folder: Path) -> None:
 
 def clear_leftovers(root: Path) -> None:
     """Removes the temporary files of processes that have ended, and takes back a folder that one of them had just put aside."""
-    for left, by in _read(root)[1].items():
+    for left, by in read_record(root)[1].items():
         path = root / left
         if is_gone(by) and path.exists() and path.parent.resolve().is_relative_to(root.resolve()):  # no link leads out of the capture
             if path.suffix == ".old":
@@ -130,7 +130,7 @@ def _shorten(root: Path) -> None:
     record = root / RECORD
     if not record.is_file() or record.stat().st_size < LONG_BYTES:
         return
-    written, temporary = _read(root)
+    written, temporary = read_record(root)
     lines = [{"path": path, "hash": read_hash(root / path)} for path in written if (root / path).is_file() and is_ours(root, root / path)]
     lines += [{"temporary": path, "by": by} for path, by in temporary.items() if (root / path).exists()]
     short = record.with_name(f".{RECORD}.{os.getpid()}.tmp")
@@ -148,7 +148,7 @@ def take_back(root: Path, old: Path) -> None:
         os.replace(old, path)
 
 
-def _read(root: Path) -> tuple[dict[str, set[str]], dict[str, dict]]:
+def read_record(root: Path) -> tuple[dict[str, set[str]], dict[str, dict]]:
     """What was written: path -> content hashes; and what was temporary: path -> process. A capture of 0.1.0 gets its record here."""
     record = root / RECORD
     _begin_record(root)
@@ -221,14 +221,14 @@ def path_inside(root: Path, path: Path) -> str:
 
 def _is_as_written(root: Path, file: Path, inside: str) -> bool:
     """Whether a file, which is or was at `inside`, holds what we wrote there. A link is nobody's but whoever made it."""
-    return not file.is_symlink() and read_hash(file) in _read(root)[0].get(inside, ())
+    return not file.is_symlink() and read_hash(file) in read_record(root)[0].get(inside, ())
 
 
 def is_leftover(root: Path, path: Path) -> bool:
     """Whether a file is temporary, or lies in a temporary folder, and its process has ended. Not in a folder that was put aside, which may hold files of
     others."""
     inside = PurePosixPath(path_inside(root, path))
-    owners = [by for left, by in _read(root)[1].items() if inside.is_relative_to(left) and not left.endswith(".old")]
+    owners = [by for left, by in read_record(root)[1].items() if inside.is_relative_to(left) and not left.endswith(".old")]
     return bool(owners) and not path.is_symlink() and all(is_gone(by) for by in owners)
 
 

@@ -1,0 +1,210 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Ways to spoil a file, each by a random generator: what a bad disk, another program, a careless hand or an attacker would leave.
+
+A mutation takes the file's path and replaces it there; it says in a few words what it did. Which ones fit a file is told by its suffix.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import re
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+NUMBERS = ("nan", "-nan", "inf", "-inf", "1e30", "-1e30", "1e-310", "-1", "0", "999999999999", "1e999", "", "x", "1,5", "0x10")
+VALUES = (None, True, [], {}, "", "x", "../../etc/passwd", "..\\secret.jpg", "a\0b", "/tmp/there", -1, 0, 1e308, float("nan"), float("inf"), 10**400, [[]],
+          "\ud800", "<script>alert(1)</script>", "%s%n{0}", "ä" * 5000)
+"""What stands in a JSON file in the place of a sound value."""
+COUNTS = (2**60, 2**63, 2**31 - 1, 2**32 - 1, 0, 1)
+
+
+def truncate(path: Path, rng: random.Random) -> str:
+    content = path.read_bytes()
+    kept = rng.choice([0, 1, 8, rng.randrange(len(content) + 1), max(0, len(content) - 1), max(0, len(content) - rng.randrange(1, 64))])
+    _put(path, content[:kept])
+    return f"cut to {kept} of {len(content)} bytes"
+
+
+def flip(path: Path, rng: random.Random) -> str:
+    content = bytearray(path.read_bytes())
+    near = rng.random() < 0.5  # headers are where it hurts
+    for _ in range(count := rng.choice([1, 1, 4, 64])):
+        if content:
+            content[rng.randrange(min(len(content), 256) if near else len(content))] ^= 1 << rng.randrange(8)
+    _put(path, bytes(content))
+    return f"{count} bits flipped"
+
+
+def overwrite(path: Path, rng: random.Random) -> str:
+    content = bytearray(path.read_bytes())
+    start, size = rng.randrange(max(1, len(content))), rng.choice([4, 8, 512, 4096])
+    what = rng.choice(["zeros", "ones", "noise"])
+    content[start:start + size] = {"zeros": bytes(size), "ones": b"\xff" * size, "noise": rng.randbytes(size)}[what][:max(0, len(content) - start)]
+    _put(path, bytes(content))
+    return f"{what} of {size} bytes at {start}"
+
+
+def replace_whole(path: Path, rng: random.Random) -> str:
+    what = rng.choice(["noise", "text", "a page", "zeros", "a picture", "a pickle"])
+    _put(path, {"noise": rng.randbytes(rng.randrange(1, 5000)), "text": b"Dear diary,\nno face today.\n" * 20, "a page": b"<!doctype html><html>404</html>",
+                "zeros": bytes(4096), "a picture": png(4, 4, rng.randbytes(4 * 13)), "a pickle": b"\x80\x04cos\nsystem\n(S'true'\ntR."}[what])
+    return f"replaced by {what}"
+
+
+def append(path: Path, rng: random.Random) -> str:
+    content = path.read_bytes()
+    more = rng.choice([content, rng.randbytes(100), b"\n", b"\0" * 1000])
+    _put(path, content + more)
+    return f"{len(more)} bytes appended"
+
+
+def other_kind(path: Path, rng: random.Random) -> str:
+    what = rng.choice(["a folder", "a dangling link", "a link to itself", "a pipe", "a link to a folder"])
+    path.unlink()
+    if what == "a folder":
+        path.mkdir()
+    elif what == "a pipe":
+        os.mkfifo(path)
+    else:
+        path.symlink_to({"a dangling link": "nowhere", "a link to itself": path.name, "a link to a folder": "."}[what])
+    return f"replaced by {what}"
+
+
+def remove(path: Path, rng: random.Random) -> str:
+    path.unlink()
+    return "removed"
+
+
+def forge_png(path: Path, rng: random.Random) -> str:
+    width, height = rng.choice([(30016, 30016), (60000, 60000), (2**31 - 1, 1), (0, 0), (1, 1), (10000, 10), (3, 5)])
+    depth, colour = rng.choice([(8, 0), (8, 2), (16, 6), (1, 0), (8, 3)])
+    rows = zlib.compress(bytes(min(width * 4 + 1, 4000) * min(height, 100)))
+    _put(path, png(width, height, rows, depth, colour, compressed=True))
+    return f"a PNG of {width} x {height}, {depth} bit, colour type {colour}"
+
+
+def forge_exr(path: Path, rng: random.Random) -> str:
+    content = bytearray(path.read_bytes())
+    box = rng.choice([(0, 0, 59999, 59999), (0, 0, 2**31 - 1, 2**31 - 1), (-2**31, -2**31, 2**31 - 1, 2**31 - 1), (0, 0, -1, -1), (5, 5, 0, 0), (0, 0, 0, 0)])
+    for field in (b"dataWindow\0box2i\0", b"displayWindow\0box2i\0"):
+        at = content.find(field)
+        if at >= 0:
+            content[at + len(field) + 4:at + len(field) + 20] = struct.pack("<4i", *box)
+    _put(path, bytes(content))
+    return f"an EXR of {box}"
+
+
+def spoil_pixels(path: Path, rng: random.Random) -> str:
+    """Rewrites a picture with other values, size or channels."""
+    import numpy as np
+    import OpenImageIO as oiio
+
+    size = rng.choice([None, None, (1, 1), (7, 300), (33, 33)])
+    channels = rng.choice([1, 2, 3, 4, 7])
+    old = oiio.ImageBuf(str(path))
+    height, width = size or (max(1, old.spec().height), max(1, old.spec().width))
+    pixels = np.full((height, width, channels), 0.5, np.float32)
+    value = rng.choice([float("nan"), float("inf"), float("-inf"), 1e30, -1e30, -1.0, 1e-40, 0.0, 0.5])
+    if rng.random() < 0.5:
+        pixels[...] = value
+    else:
+        pixels[rng.randrange(height), rng.randrange(width)] = value
+    path.unlink()
+    output = oiio.ImageOutput.create(str(path))
+    output.open(str(path), oiio.ImageSpec(width, height, channels, "float" if path.suffix == ".exr" else "uint8"))
+    output.write_image(pixels)
+    output.close()
+    if not path.is_file():  # the format takes no such channels
+        path.write_bytes(b"")
+    return f"{width} x {height}, {channels} channels of {value}"
+
+
+def spoil_json(path: Path, rng: random.Random) -> str:
+    how = rng.choice(["value", "value", "value", "value", "key", "whole", "deep", "cut", "bytes"])
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError:
+        return truncate(path, rng)
+    if how in ("value", "key"):
+        places = list(_places(told))
+        if not places:
+            return replace_whole(path, rng)
+        box, key, way = rng.choice(places)
+        if how == "key":
+            box.pop(key)
+        else:
+            box[key] = rng.choice(VALUES)
+        text = _dump(told)
+        said = f"{way} {'removed' if how == 'key' else f'is now {box[key]!r:.40}'}"
+    else:
+        value = rng.choice(VALUES)
+        text, said = {"whole": (_dump(value), f"the whole is {value!r:.40}"), "deep": ("[" * 100_000, "nested 100,000 deep"),
+                      "cut": (_dump(told)[:rng.randrange(1, 200)], "cut off"), "bytes": ("\ufeff" + _dump(told), "with a byte order mark")}[how]
+    _put(path, text.encode("utf-8", "surrogatepass"))
+    return said
+
+
+def spoil_lines(path: Path, rng: random.Random) -> str:
+    """One number of a text file, as an OBJ, a PLY's header or an export of cameras."""
+    text = path.read_bytes().decode("latin-1")
+    head = text[:4000] if path.suffix == ".ply" else text
+    found = list(re.finditer(r"-?\d+(\.\d+)?(e-?\d+)?", head))
+    if not found:
+        return flip(path, rng)
+    at, new = rng.choice(found), rng.choice(NUMBERS)
+    _put(path, (text[:at.start()] + new + text[at.end():]).encode("latin-1"))
+    return f"{at.group()} is now {new!r}"
+
+
+def spoil_counts(path: Path, rng: random.Random) -> str:
+    """Eight bytes of a binary file of numbers, at a place where a count or a coordinate may stand."""
+    content = bytearray(path.read_bytes())
+    at = rng.choice([0, 8, 16, 24, rng.randrange(max(1, len(content) - 8))])
+    value = rng.choice([*COUNTS, None])
+    content[at:at + 8] = struct.pack("<d", rng.choice([float("nan"), float("inf"), 1e300])) if value is None else struct.pack("<Q", value)
+    _put(path, bytes(content))
+    return f"{'no finite number' if value is None else value} at {at}"
+
+
+ANY: tuple[Callable[[Path, random.Random], str], ...] = (truncate, truncate, flip, overwrite, replace_whole, append, other_kind, remove)
+SPECIAL = {".png": (forge_png, spoil_pixels, spoil_pixels), ".exr": (forge_exr, spoil_pixels, spoil_pixels), ".jpg": (spoil_pixels, forge_png),
+           ".json": (spoil_json,) * 8, ".obj": (spoil_lines,) * 5, ".ply": (spoil_lines, spoil_counts), ".bin": (spoil_counts,) * 5,
+           ".jsonl": (spoil_lines,), ".xml": (spoil_lines,) * 4, ".csv": (spoil_lines,) * 4, ".safetensors": (spoil_counts,) * 2}
+
+
+def mutate(path: Path, rng: random.Random) -> tuple[str, str]:
+    """Spoils a file; the mutation's name and what it did."""
+    ways = (*ANY, *SPECIAL.get(path.suffix, ()) * 2)
+    way = rng.choice(ways)
+    return way.__name__, way(path, rng)
+
+
+def png(width: int, height: int, rows: bytes, depth: int = 8, colour: int = 2, compressed: bool = False) -> bytes:
+    """A PNG's bytes, sound or not."""
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = struct.pack(">IIBBBBB", width & 0xffffffff, height & 0xffffffff, depth, colour, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", rows if compressed else zlib.compress(rows)) + chunk(b"IEND", b"")
+
+
+def _put(path: Path, content: bytes) -> None:
+    """Under the same name, but not into the same file: the sound one may have other names."""
+    path.unlink()
+    path.write_bytes(content)
+
+
+def _places(value, way: str = ""):
+    """(container, key, way to it) of everything in a JSON value."""
+    for key in list(value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()):
+        yield value, key, f"{way}/{key}"
+        yield from _places(value[key], f"{way}/{key}")
+
+
+def _dump(value) -> str:
+    return json.dumps(value, ensure_ascii=False)
