@@ -120,6 +120,8 @@ def _of_stage(stage: stages.Stage) -> Callable:
         ours = [file for file in files if file.name not in ("retouched.psd", "rig.txt") and not file.name.startswith(".") and file.is_file()]
         _run(case, stage.name)
         _spoil(case, rng.choice(ours), rng)
+        if stage.name == "cameras":
+            case.named = (*case.named, "cameras.json")  # which the pictures no longer fit
 
     return make
 
@@ -208,7 +210,7 @@ def _names(case: Case, stock: Stock, rng: random.Random) -> None:
     name, which = rng.choice(NAMES), rng.choice(["capture", "photographs", "photograph"])
     folder = stock.bring("photographs", case)
     shutil.rmtree(capture_at(case.place).root)
-    case.said, case.named = f"the {which} is named {name!r}", (name, ascii(name)[1:-1], name.encode(errors="backslashreplace").decode())
+    case.said, case.named = f"the {which} is named {name!r}", (name, ascii(name)[1:-1], ascii(name)[1:-1].replace("\\", "\\\\"))
     if which == "photograph":
         first = sorted(folder.iterdir())[0]
         first.rename(first.with_name(f"{name[:200]}.jpg"))

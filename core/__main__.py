@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m core: run, deliver, settings, stages, delighters, presets, status, delete, mask, landmarks, doctor, train.
+"""python -m core: run, deliver, settings, stages, delighters, presets, status, delete, mask, landmarks,
+doctor, report-problem, train.
 
 The command line is one more host of the worker: it writes a job, starts the worker with this same Python and prints
 what it says. Failures are two lines, a problem and its remedy, and exit code 2; Ctrl-C ends with 130.
@@ -85,6 +86,10 @@ def _parser() -> argparse.ArgumentParser:
     gone.add_argument("capture", metavar="CAPTURE", type=Path)
     gone.add_argument("--yes", action="store_true", help="delete it, for good")
     gone.set_defaults(command=_delete)
+    about = commands.add_parser("report-problem", help="write a zip to send: logs, versions, settings; no pictures, names or paths")
+    about.add_argument("capture", metavar="CAPTURE", type=Path, nargs="?")
+    about.add_argument("--to", metavar="ZIP", type=Path, required=True)
+    about.set_defaults(command=_report_problem)
     mask = commands.add_parser("mask", help="bring a painted shadow mask in").add_subparsers(required=True, metavar="import")
     bring = mask.add_parser("import", help="make a picture the capture's shadow mask: white is shadow")
     bring.add_argument("capture", metavar="CAPTURE", type=Path)
@@ -191,6 +196,17 @@ def _delete(options: argparse.Namespace) -> int:
     print(*deletion.lines(found), sep="\n")
     if not options.yes:
         print("Nothing was deleted; --yes does it.")
+    return 0
+
+
+def _report_problem(options: argparse.Namespace) -> int:
+    from .worker import problem_report
+
+    capture = Capture(options.capture) if options.capture else None
+    if capture is not None and not capture.json.is_file():
+        raise Problem(f"There is no capture at {capture.root}.", "Check the name, or leave it out for a report about the installation alone.")
+    print(problem_report.write(options.to, ROOT, Path(sys.executable), capture))
+    print(f"It holds {', '.join(problem_report.TOLD)}; no pictures, and no names or paths of yours. Nothing was sent: look into it first.")
     return 0
 
 

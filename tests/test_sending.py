@@ -102,6 +102,14 @@ def test_nothing_leaves_before_the_artist_agreed_to_these_frames(addon, item, ca
     assert "would go" in words(addon) and not folder.consent.exists()
 
 
+def test_the_dialog_shows_the_very_pictures_that_would_be_sent(addon, item, capture, online):
+    sending, icons = addon("reconstruct.sending"), addon("frame_icons")
+    dialog = type("Dialog", (), {})()
+    sending.WILDCAP_OT_allow_sending.tell(dialog)
+    assert len(dialog.icons) == len(dialog.told.frames) == 2
+    assert {str(capture / "frames" / name) for name in dialog.told.frames} <= set(icons._icons)
+
+
 def test_the_dialog_asks_again_where_the_frames_changed_meanwhile(addon, item, capture, online):
     sending = addon("reconstruct.sending")
     dialog = type("Dialog", (), {})()
@@ -166,7 +174,7 @@ def test_the_key_is_told_to_the_worker_of_that_delighter_alone(addon, item, capt
     assert started[-1][4] == {service.KEY_VARIABLE: KEY, **offline}
     monkeypatch.setenv(service.KEY_VARIABLE, "the machine's own")
     jobs.start(item, "reconstruct")
-    assert started[-1][4] == offline, "what the machine is set up with comes first"
+    assert started[-1][4] == {service.KEY_VARIABLE: "the machine's own", **offline}, "what the machine is set up with comes first"
     found: list = []
     preferences.draw_key(Layout(found), "Key")
     assert "WILDCAP_SWITCHLIGHT_KEY" in found[0][0]

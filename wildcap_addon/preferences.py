@@ -94,11 +94,12 @@ def has_switchlight_key() -> bool:
 
 
 def worker_environment(delighter: str) -> dict[str, str]:
-    """What a worker is told by its environment alone: the key of a paid delighter, the machine's own first, and that Blender is to stay offline."""
+    """What a worker is told by its environment alone: the key of a paid delighter, the machine's own first, and that Blender is to stay offline. Others do
+    not get to know the key."""
     if delighter != "switchlight":
         return {}
-    key = {} if os.environ.get(switchlight_api.KEY_VARIABLE) else {switchlight_api.KEY_VARIABLE: get().switchlight_key}
-    return {**key, **({} if bpy.app.online_access else {switchlight_api.OFFLINE_VARIABLE: "1"})}
+    key = os.environ.get(switchlight_api.KEY_VARIABLE) or get().switchlight_key
+    return {switchlight_api.KEY_VARIABLE: key, **({} if bpy.app.online_access else {switchlight_api.OFFLINE_VARIABLE: "1"})}
 
 
 def require_online(otherwise: str) -> None:

@@ -38,6 +38,8 @@ def draw(layout, problem: Problem | None, width: int) -> None:
     column.alert = not isinstance(problem, Notice)
     draw_text(column, problem.problem, width, 'ERROR' if column.alert else 'CHECKMARK')
     draw_text(box.column(), problem.remedy, width, 'INFO')
+    if column.alert:
+        box.operator("wildcap.save_report", icon='FILE_ARCHIVE')
 
 
 def draw_text(layout, text: str, width: int, icon: str = 'NONE') -> None:

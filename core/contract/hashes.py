@@ -30,6 +30,13 @@ def read_hash(path: Path) -> str:
         return _hash_whole(file, 0)
 
 
+def hash_bytes(content: bytes) -> str:
+    """What `read_hash` gives for a file that holds them."""
+    digest = _hasher()
+    digest.update(content)
+    return digest.hexdigest()
+
+
 def sample_file(path: Path) -> str:
     """As `hash_file`, but a file of more than WHOLE_BYTES is known by its size and BLOCKS blocks of it: a film, or another program's network."""
     return _remember(path, _hash_sampled)

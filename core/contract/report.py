@@ -82,7 +82,7 @@ def _section(capture: Capture, stage: stages.Stage, finished: dict | None, setti
     changed = _rows(_changed(stage.name, finished["settings"]), tooltips(type(getattr(settings, stage.name))))
     figures = _rows(finished["figures"])
     return (f'<section id="{stage.name}">{head}<p class="when">{_duration(finished["seconds"])}, {html.escape(finished["finished"].replace("T", " "))}, '
-            f'on {html.escape(finished["device"])}, seed {finished["seed"]}</p>{pictures}'
+            f'on {html.escape(finished["device"])}, seed {html.escape(str(finished["seed"]))}</p>{pictures}'
             + (f"<h3>Figures</h3>{figures}" if figures else "") + (f"<h3>Settings other than the defaults</h3>{changed}" if changed else "") + "</section>")
 
 

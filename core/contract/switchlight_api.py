@@ -33,6 +33,9 @@ OFFLINE_VARIABLE = "WILDCAP_OFFLINE"
 """Environment variables: the key, another server that speaks the same protocol (for tests), and that nothing may be sent."""
 
 
+_kept = ""
+
+
 def form(preview: bool) -> dict[str, str]:
     """The fields that go with a picture. Without auto_key's default, the background would have to be cut out before."""
     return {"auto_key": "true", "preview": "true" if preview else "false"}
@@ -66,9 +69,15 @@ def local(address: str) -> bool:
     return urllib.parse.urlsplit(address).hostname in ("127.0.0.1", "localhost", "::1")
 
 
+def keep_key() -> None:
+    """Takes the key out of this process's environment, which all that it starts would inherit, and keeps it for `key`."""
+    global _kept
+    _kept = os.environ.pop(KEY_VARIABLE, "")
+
+
 def key() -> str:
     """The artist's key. Raises Problem where there is none, or it cannot be one; its text is never part of a message."""
-    found = os.environ.get(KEY_VARIABLE, "").strip()
+    found = (os.environ.get(KEY_VARIABLE) or _kept).strip()
     if not found:
         raise Problem("SwitchLight needs a key, and there is none.",
                       f"Get one at {WEBSITE} and put it into the extension's preferences, or into the environment variable {KEY_VARIABLE}.")

@@ -18,7 +18,7 @@ import numpy as np
 from ..contract import consent
 from ..contract import switchlight_api as service
 from ..contract.capture import Capture
-from ..contract.hashes import hash_file
+from ..contract.hashes import hash_bytes, hash_file
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..geometry.views import View, read_views
@@ -62,11 +62,15 @@ def obtain(capture: Capture, plan: consent.Sending, report: Reporter) -> int:
 
 
 def parcel(capture: Capture, name: str, content: str, preview: bool) -> Parcel:
-    """A frame as it is sent: its file as it is. Raises Problem for a kind that the service does not take."""
+    """A frame as it is sent: its file as it is, and as it was agreed to. Raises Problem where it has changed, and for a kind that the service does not
+    take."""
     path = capture.frames / name
     if path.suffix.lower() not in KINDS:
         raise Problem(f"SwitchLight does not take pictures as {name} is.", "Run the stage frames again, which writes JPEG.")
-    return Parcel(name, path.read_bytes(), path.suffix.lower(), consent.answer(capture, content, preview))
+    data = path.read_bytes()
+    if hash_bytes(data) != content:
+        raise Problem(f"The frame {name} changed after you agreed to send it: nothing more was sent.", "Look at the frames, and click Allow Sending again.")
+    return Parcel(name, data, path.suffix.lower(), consent.answer(capture, content, preview))
 
 
 def _listening(report: Reporter, ask: Callable[[], float | None]) -> float | None:

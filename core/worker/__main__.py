@@ -16,6 +16,7 @@ import sys
 import threading
 from pathlib import Path
 
+from ..contract import switchlight_api
 from ..contract.messages import Message, to_line
 from .runner import run_job
 
@@ -25,6 +26,7 @@ PRIORITY = 15
 
 def main() -> None:
     emit = _take_stdout()
+    switchlight_api.keep_key()
     cancelled = threading.Event()
     threading.Thread(target=_listen, args=(cancelled,), name="control", daemon=True).start()
     if os.name == "posix":

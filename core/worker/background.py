@@ -16,7 +16,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from ..contract import unforeseen
+from ..contract import switchlight_api, unforeseen
 from ..contract.messages import FINAL, Cancelled, CancelledError, Done, Failed, Message, Problem, Progress
 
 GRACE_S = 1.0
@@ -65,7 +65,7 @@ class Task:
         """Runs a command, each line it writes through `hear`; its exit code and the last line with an error in it. Raises OSError when it cannot be
         started, and CancelledError where the task is cancelled before or meanwhile."""
         apart = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {"start_new_session": True}
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON") and name != switchlight_api.KEY_VARIABLE}
         self._process = subprocess.Popen([str(word) for word in command], env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                          stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace", **apart)
         if self._cancelled_at is not None:

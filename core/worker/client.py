@@ -15,6 +15,7 @@ import threading
 import time
 from pathlib import Path
 
+from ..contract import switchlight_api
 from ..contract.files import storage_problem
 from ..contract.messages import FINAL, Cancelled, Failed, Log, Message, Problem, from_line
 
@@ -143,11 +144,13 @@ def _package() -> str:
 
 
 def _environment(own: dict[str, str]) -> dict[str, str]:
-    """The caller's environment with the thread count of the libraries set and how they wait, unless the user has set it; `own` lies over it."""
+    """The caller's environment with the thread count of the libraries set and how they wait, unless the user has set it; `own` lies over it. The key of a
+    paid service is passed on by those alone who have it in `own`."""
     affinity = getattr(os, "sched_getaffinity", None)
     cores = len(affinity(0)) if affinity else os.cpu_count() or 1
     threads = str(cores if cores <= 2 else cores - 1)
-    return {**{name: threads for name in THREAD_VARIABLES}, **SPINS, **os.environ, **own}
+    inherited = {name: value for name, value in os.environ.items() if name != switchlight_api.KEY_VARIABLE}
+    return {**{name: threads for name in THREAD_VARIABLES}, **SPINS, **inherited, **own}
 
 
 def _apart() -> dict:

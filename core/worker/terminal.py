@@ -4,15 +4,17 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 import time
 from pathlib import Path
 
-from ..contract import stages
+from ..contract import stages, switchlight_api
 from ..contract.capture import Capture
 from ..contract.messages import Cancelled, Done, Failed, Log, Message, Progress, StageDone
 from .client import Worker
+from .job import read_job
 
 POLL_S = 0.1
 
@@ -20,6 +22,8 @@ POLL_S = 0.1
 def follow(root: Path, capture: Capture, job: Path, environment: dict[str, str]) -> int:
     """Runs a job with this Python and prints what it says; returns the exit code: 0, 2 for a problem, 130 after Ctrl-C. `environment` is the worker's own,
     beside ours."""
+    if read_job(job).settings.delight.delighter == "switchlight" and os.environ.get(switchlight_api.KEY_VARIABLE):
+        environment = {**environment, switchlight_api.KEY_VARIABLE: os.environ[switchlight_api.KEY_VARIABLE]}
     worker = Worker(Path(sys.executable), root, job, capture.logs / "worker.log", environment)
     line = _Line()
     worker.start()

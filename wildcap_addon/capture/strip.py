@@ -1,18 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The frames of a capture in a strip, each with how sharp it is. Read by a timer when a panel has asked; icons of their own, so that no
-data-block is made behind the artist's back.
-"""
+"""The frames of a capture in a strip, each with how sharp it is. Read by a timer when a panel has asked."""
 
 from dataclasses import dataclass
 
 import bpy
-import bpy.utils.previews
 
 from ...core.contract.capture import Capture
 from ...core.contract.frame_records import read_frames
 from ...core.contract.messages import Problem
-from .. import captures, status
+from .. import captures, frame_icons, status
 
 INTERVAL_S = 0.5
 MOST = 12
@@ -43,7 +40,6 @@ class Strip:
 
 _known: dict[str, tuple[int, Strip | None]] = {}  # capture folder -> (time of frames.json, strip)
 _wanted: set[str] = set()
-_icons: bpy.utils.previews.ImagePreviewCollection | None = None
 
 
 def of(item) -> Strip | None:
@@ -76,20 +72,8 @@ def _read(capture: Capture) -> Strip | None:
     choice = used or list(range(len(frames)))
     shown = [choice[i * len(choice) // min(MOST, len(choice))] for i in range(min(MOST, len(choice)))]
     sharpest = max(values) or 1.0
-    return Strip(tuple(Frame(frames[i].name.rpartition(".")[0], values[i] / sharpest, values[i] < limit, _icon(capture.frames / frames[i].name))
+    return Strip(tuple(Frame(frames[i].name.rpartition(".")[0], values[i] / sharpest, values[i] < limit, frame_icons.load(capture.frames / frames[i].name))
                        for i in shown), len(frames), len(used), sum(value < limit for value in values))
-
-
-def _icon(path) -> int:
-    """The icon of a frame; its picture is read when Blender first draws it."""
-    global _icons
-    if not path.is_file():
-        return 0
-    if _icons is None:
-        _icons = bpy.utils.previews.new()
-    key = str(path)
-    _icons.pop(key, None)
-    return _icons.load(key, key, 'IMAGE', force_reload=True).icon_id
 
 
 def _tick() -> float:
@@ -104,11 +88,7 @@ def register():
 
 
 def unregister():
-    global _icons
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
-    if _icons is not None:
-        bpy.utils.previews.remove(_icons)
-    _icons = None
     _known.clear()
     _wanted.clear()

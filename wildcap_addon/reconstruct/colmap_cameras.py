@@ -5,16 +5,20 @@
 File format: https://colmap.github.io/format.html (cameras.bin, images.bin).
 """
 
+import math
 import struct
 from dataclasses import dataclass
 from pathlib import Path
 
 from mathutils import Matrix, Quaternion
 
+from ...core.contract.json_files import plain_name
 from ...core.contract.messages import Problem
 
 PARAMETERS = {0: 3, 1: 4, 2: 4, 3: 5, 4: 8, 5: 8, 6: 12, 7: 5, 8: 4, 9: 5, 10: 12}
 """Number of parameters of each camera model, by COLMAP's number for it"""
+LONGEST_SIDE = 1 << 16
+"""Pixels: beyond what any picture file here may have"""
 TWO_FOCALS = (1, 4, 5, 6, 7, 10)
 """Models whose parameters begin with a focal length for each axis"""
 
@@ -35,11 +39,24 @@ class FrameCamera:
 def read(folder: Path) -> list[FrameCamera]:
     """The registered frames by name. Raises Problem where there are none, or the files are damaged."""
     try:
-        return sorted(_read(folder), key=lambda camera: camera.name)
+        found = sorted(_read(folder), key=lambda camera: camera.name)
+        for camera in found:
+            _check(camera)
+        return found
     except FileNotFoundError as error:
         raise Problem("This capture has no cameras yet.", "Click Reconstruct: they are found from the frames.") from error
     except (OSError, struct.error, KeyError, UnicodeDecodeError, ValueError) as error:
         raise Problem(f"The cameras in {folder} cannot be read ({type(error).__name__}: {error}).", "Do the stage Cameras again.") from error
+
+
+def _check(camera: FrameCamera) -> None:
+    """Raises ValueError for what no camera can be, and for a name that leads out of the folder of the frames."""
+    numbers = (camera.focal, *camera.centre, *(value for row in camera.matrix for value in row))
+    if not plain_name(camera.name):
+        raise ValueError(f"{camera.name!r} is no name of a frame")
+    sized = 0 < min(camera.width, camera.height) and max(camera.width, camera.height) <= LONGEST_SIDE
+    if not (sized and camera.focal > 0 and all(map(math.isfinite, numbers))):
+        raise ValueError(f"the camera of {camera.name} makes no sense")
 
 
 def _read(folder: Path) -> list[FrameCamera]:

@@ -7,8 +7,11 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.contract import consent
 from ...core.contract.messages import Problem
-from .. import captures, preferences, properties
+from .. import captures, frame_icons, preferences, properties
 from ..base_operator import BaseOperator, Dialog
+
+COLUMNS, SCALE = 6, 4.0
+"""Of the pictures in the dialog: how many side by side, and how many buttons high each is."""
 
 
 class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
@@ -19,6 +22,7 @@ class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
     bl_label = "Allow Sending"
 
     told: consent.Sending | None = None
+    icons: tuple[int, ...] = ()
 
     @classmethod
     def poll(cls, context):
@@ -26,8 +30,16 @@ class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
                                                          "Only SwitchLight sends anything: choose it as the delighter first")
 
     def tell(self) -> tuple[str, ...]:
-        self.told = plan(captures.require(bpy.context))
+        item = captures.require(bpy.context)
+        self.told = plan(item)
+        self.icons = tuple(frame_icons.load(captures.folder(item).frames / name) for name in self.told.frames)
         return tuple(consent.lines(self.told, iface_))
+
+    def draw(self, context):
+        super().draw(context)
+        grid = self.layout.grid_flow(row_major=True, columns=COLUMNS, even_columns=True, align=True)
+        for icon in self.icons:
+            grid.template_icon(icon_value=icon, scale=SCALE)
 
     def work(self, context):
         item = captures.require(context)

@@ -4,9 +4,9 @@
 
 import bpy
 
-from . import checking, install, operators, panel
+from . import checking, install, operators, panel, report
 
-_register, _unregister = bpy.utils.register_classes_factory((*install.CLASSES, *operators.CLASSES, *panel.CLASSES))
+_register, _unregister = bpy.utils.register_classes_factory((*install.CLASSES, *operators.CLASSES, *report.CLASSES, *panel.CLASSES))
 
 
 def register():

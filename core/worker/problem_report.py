@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A report about a problem, for the user to send: a zip of logs, versions, settings and states. No picture is in it, and nothing that tells who or where.
+
+Names of people, machines, folders and files of the user's are taken out of every text (`Scrubber`). Nothing is sent. Standard library only.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fnmatch
+import getpass
+import json
+import os
+import platform
+import re
+import socket
+import sys
+import unicodedata
+import zipfile
+from collections.abc import Iterable
+from dataclasses import fields
+from pathlib import Path, PurePosixPath
+
+from .. import __version__
+from ..contract import settings as contract_settings
+from ..contract import stages, switchlight_api, unforeseen
+from ..contract.capture import Capture
+from ..contract.deletion import LOGS
+from ..contract.files import replacing
+from ..contract.frame_records import read_frames
+from ..contract.messages import Problem
+from ..contract.ownership import BOOKS, FIRST_FORMAT
+from . import doctor
+from .job import read_job
+
+LOG_BYTES = 256 << 10
+"""Of each log, its end."""
+TOLD = ("logs", "versions", "settings", "which stages ended and with what figures", "what the doctor says")
+REMOVED = "<removed>"
+ABSOLUTE = re.compile(r"""(?<![\w<>:/\\.])(?:file:/{1,3}|[A-Za-z]:[\\/]|\\\\|~[\w.-]*[\\/]|/(?=[^\s/]))""")
+"""Where an absolute path begins: POSIX, a drive, a server's share, somebody's home, a file's URL."""
+COMMON = {"root", "user", "admin", "frames", "video", "capture", "photographs", "home", "users", "tmp", "var", "wildcap"}
+"""Words that tell nobody's name, and stand in every log."""
+
+
+def write(target: Path, root: Path, python: Path | None, capture: Capture | None = None, **versions: str) -> Path:
+    """Writes the zip; `root` holds core/, `python` is the worker's (None: there is none), `versions` those of the host. Raises Problem for a file that
+    is there already, and where it cannot be written."""
+    target = Path(target)
+    if target.suffix.lower() != ".zip":
+        target = target.with_name(f"{target.name}.zip")
+    if target.exists():
+        raise Problem(f"{target} is there already.", "Choose another name for the report: nothing of yours is written over.")
+    scrub = Scrubber(root, python, capture)
+    texts = {"doctor.txt": _examined(root, python), "unforeseen.txt": "\n".join(unforeseen.recent), **_logs(capture)}
+    told = {"versions": {"WildCap": __version__, "Python": platform.python_version(), "system": platform.system(), "release": platform.release(),
+                         "machine": platform.machine(), "processors": os.cpu_count(), **versions}, "capture": _described(capture)}
+    texts["report.json"] = json.dumps(told, indent=1, ensure_ascii=False)
+    with replacing(target) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, text in texts.items():
+            archive.writestr(name, scrub(text))
+    return target
+
+
+class Scrubber:
+    """Takes out of a text what tells who the user is and where their files lie. What lies in the extension, in the capture or in Python's folders keeps its
+    path from there on, for that is what a report is about."""
+
+    def __init__(self, root: Path, python: Path | None = None, capture: Capture | None = None, more: Iterable[str] = ()):
+        known = {root: "<WildCap>", sys.prefix: "<Python>", sys.base_prefix: "<Python>"}
+        if python is not None:
+            known[Path(python).parent.parent] = "<solver>"
+        if capture is not None:
+            known[capture.root] = "<capture>"
+        self._places = sorted(((form, word) for place, word in known.items() for path in {str(place), os.path.realpath(place)} for form in _forms(path)),
+                              key=lambda pair: -len(pair[0]))
+        names = {*_own_names(), *(_names_of(capture) if capture is not None else ()), *more}
+        self._names = sorted({form for name in names for form in _forms(name) if len(name) > 1 and name.lower() not in COMMON}, key=len, reverse=True)
+        key = os.environ.get(switchlight_api.KEY_VARIABLE, "").strip()
+        self._secrets = [key] if key else []
+
+    def __call__(self, text: str) -> str:
+        text = unicodedata.normalize("NFC", text)
+        for secret in self._secrets:
+            text = text.replace(secret, REMOVED)
+        for place, word in self._places:
+            text = re.sub(re.escape(place) + r"(?=[\\/'\"\s:,;.)]|$)", word, text, flags=re.IGNORECASE)
+        text = re.sub(r"<capture>[\\/]+([^\s'\":,;)]*)", lambda found: f"<capture>/{_own_file(found[1])}", text)
+        text = "\n".join(_without_paths(line) for line in text.split("\n"))
+        for name in self._names:
+            text = re.sub(rf"(?<!\w){re.escape(name)}(?!\w)", REMOVED, text, flags=re.IGNORECASE)
+        return text
+
+
+def _own_file(inside: str) -> str:
+    """A file's path in the capture where it is one that WildCap gives; others have names of the user's."""
+    inside = re.sub(r"[\\/]+", "/", inside)
+    stem = inside.rstrip(".")
+    return inside if stem in LOGS | BOOKS or any(fnmatch.fnmatchcase(stem, pattern) for pattern in FIRST_FORMAT) else "<file>"
+
+
+def _without_paths(line: str) -> str:
+    """A line without its absolute paths. Nobody can tell where one that holds blanks ends, but by the quote that it began with: the rest of the line goes."""
+    done = ""
+    while found := ABSOLUTE.search(line):
+        quote = line[found.start() - 1] if found.start() and line[found.start() - 1] in "'\"`" else ""
+        end = line.find(quote, found.end()) if quote else -1
+        done += line[:found.start()] + "<path>"
+        line = line[end:] if end >= 0 else ""
+    return done + line
+
+
+def _forms(text: str) -> set[str]:
+    """A text as it may stand in a log: composed, with either slash, and with backslashes doubled as JSON and repr write them."""
+    composed = unicodedata.normalize("NFC", str(text))
+    return {composed, composed.replace("\\", "\\\\"), composed.replace("\\", "/"), json.dumps(composed)[1:-1]}
+
+
+def _own_names() -> set[str]:
+    """The user's, the home's and the machine's."""
+    found = {platform.node(), platform.node().partition(".")[0], Path.home().name}
+    with contextlib.suppress(OSError, KeyError, ImportError):
+        found |= {getpass.getuser(), socket.gethostname()}
+    return {name for name in found if name}
+
+
+def _names_of(capture: Capture) -> set[str]:
+    """The capture's, those of its source and of the folders they lie in, and of the photographs."""
+    found = {capture.root.stem, *capture.root.absolute().parts}
+    with contextlib.suppress(Problem, OSError):
+        source = capture.source
+        if source is not None:
+            found |= {source.stem, *source.absolute().parts}
+    with contextlib.suppress(Problem, OSError):
+        for record in read_frames(capture).records:
+            found |= {record.source, PurePosixPath(record.source).stem} if record.source else set()
+    with contextlib.suppress(Problem, OSError):
+        found |= {str(stamp[0]) for stamp in capture.read().get("source_stamp", [])}
+    return {name for name in found if name.strip("/\\") and not name.isdigit()}
+
+
+def _examined(root: Path, python: Path | None) -> str:
+    if python is None:
+        return "No solver is set up."
+    try:
+        return doctor.examine(root, python, importing=False).text
+    except Problem as problem:
+        return str(problem)
+
+
+def _logs(capture: Capture | None) -> dict[str, str]:
+    """Name in the zip -> text, of the logs that are there; those of others are not ours to send."""
+    found = {}
+    for name in sorted(LOGS) if capture is not None else ():
+        with contextlib.suppress(OSError), open(capture.root / name, "rb") as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - LOG_BYTES))
+            found[name] = file.read().decode("utf-8", "replace")
+    return found
+
+
+def _described(capture: Capture | None) -> dict:
+    """The stages with their figures, and the settings without paths."""
+    if capture is None:
+        return {}
+    try:
+        record, chosen = capture.read(), read_job(capture.job).settings if capture.job.is_file() else contract_settings.Settings()
+    except Problem as problem:
+        return {"problem": str(problem)}
+    done = {name: {"state": capture.state(stages.by_name(name), chosen), **{key: stage.get(key) for key in ("seconds", "version", "device", "figures")}}
+            for name, stage in record["stages"].items() if name in stages.NAMES}
+    return {"stages": done, "stopped": record.get("stopped"), "settings": _without_path_settings(chosen)}
+
+
+def _without_path_settings(chosen: contract_settings.Settings) -> dict:
+    told = contract_settings.to_json(chosen)
+    for group in fields(chosen):
+        of_group = getattr(chosen, group.name)
+        for setting in fields(of_group) if isinstance(told[group.name], dict) else ():
+            if setting.metadata.get("path") and told[group.name][setting.name]:
+                told[group.name][setting.name] = REMOVED
+    return told

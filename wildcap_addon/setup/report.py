@@ -1,0 +1,53 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operator: save a report about a problem, to be sent by whoever wants to. Nothing is sent here."""
+
+import time
+from pathlib import Path
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+
+from ...core.worker import problem_report
+from ...core.worker.background import Task
+from .. import captures, jobs, preferences, problems
+from ..base_operator import BaseOperator
+
+
+class WILDCAP_OT_save_report(BaseOperator, bpy.types.Operator):
+    """Save a zip with logs, versions and settings, to send with a question: no pictures, no names, no paths of yours. Nothing is sent"""
+
+    bl_idname = "wildcap.save_report"
+    bl_label = "Save Report"
+
+    filepath: bpy.props.StringProperty(subtype='FILE_PATH')
+    filter_glob: bpy.props.StringProperty(default="*.zip", options={'HIDDEN'})
+
+    @classmethod
+    def poll(cls, context):
+        return cls.allowed(jobs.of("") is None, "The solver is being set up: wait for it, or click Cancel")
+
+    def invoke(self, context, event):
+        self.filepath = str(Path.home() / f"wildcap_report_{time.strftime('%Y-%m-%d_%H%M')}.zip")
+        context.window_manager.fileselect_add(self)
+        return {'RUNNING_MODAL'}
+
+    def work(self, context):
+        target, python = Path(bpy.path.abspath(self.filepath)), preferences.python()
+        item = captures.active(context)
+        capture = captures.folder(item) if item is not None else None
+        blender = bpy.app.version_string
+        task = Task("setup", lambda task: save(task, target, python, capture, blender))
+        jobs.begin("", "ask", task, lambda: tell(task.result))
+
+
+def save(task: Task, target: Path, python, capture, blender: str) -> Path:
+    task.say(0, 1, "writing the report")
+    return problem_report.write(target, jobs.ROOT, python, capture, Blender=blender)
+
+
+def tell(target: Path) -> None:
+    problems.show("", problems.Notice(iface_("The report is {}.").format(target), "Look into it before you send it."))
+
+
+CLASSES = (WILDCAP_OT_save_report,)
