@@ -20,7 +20,7 @@ from . import __version__
 from .contract import artist_landmarks, consent, deletion, delighter_cards, delivery_plan, delivery_presets, report, settings, stages, unforeseen
 from .contract.capture import Capture
 from .contract.messages import Problem
-from .worker import command_settings, terminal
+from .worker import command_settings, read_only, terminal
 from .worker.job import read_job, write_job
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -142,9 +142,10 @@ def _deliver(options: argparse.Namespace) -> int:
         raise Problem("A delivery without its mesh (deliver.whole off) is ended by Blender.", "Leave deliver.whole on, or deliver from the add-on's panel.")
     before = read_job(capture.job).settings if capture.job.is_file() else settings.Settings()  # job.json is also what `status` judges the stages by
     chosen = {**settings.to_json(before), "deliver": wanted}
-    plan = delivery_plan.plan(capture, settings.from_json(chosen).deliver)
-    delivery_plan.check_target(plan)
-    code = terminal.follow(ROOT, capture, write_job(capture, tool="deliver", settings=chosen), {})
+    with read_only.stand_in(capture, wanted.get("folder", "")) as writable:
+        plan = delivery_plan.plan(writable, settings.from_json(chosen).deliver)
+        delivery_plan.check_target(plan)
+        code = terminal.follow(ROOT, writable, write_job(writable, tool="deliver", settings=chosen), {})
     if code == 0:
         print(plan.target)
     return code

@@ -21,6 +21,9 @@ from .hashes import read_hash
 from .lease import check_lease
 from .messages import Problem
 
+_AWAY_NAMES = ("ESTALE", "ENOTCONN", "ETIMEDOUT", "EHOSTDOWN", "EHOSTUNREACH", "ENETDOWN", "ENETUNREACH", "ENODEV", "ENXIO", "EREMOTEIO")
+AWAY = {getattr(errno, name) for name in _AWAY_NAMES if hasattr(errno, name)}
+"""Errors of a file server or a disk that has gone."""
 _UMASK = os.umask(0o022)
 os.umask(_UMASK)
 MODE = 0o666 & ~_UMASK
@@ -131,6 +134,9 @@ def storage_problem(error: OSError, path: Path) -> Problem:
                        "Free some space (a capture needs about 1 GB) and run again; finished stages are kept.")
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
         return Problem(f"{path} cannot be written: the folder is read-only.", "Choose a folder you may write to, or change its permissions.")
+    if error.errno in AWAY or error.errno == errno.ENOENT and not Path(path.anchor).exists():
+        return Problem(f"The disk or file server that {path} lies on does not answer ({error.strerror or error}).",
+                       "See that it is connected, then run again: what was finished is kept.")
     return Problem(f"{path} could not be written ({error.strerror or error}).", "Check the disk and the folder, then run again.")
 
 

@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Disks that cannot be written to, or have gone."""
+
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from core.__main__ import main
+from core.contract.files import AWAY, replacing, storage_problem
+from core.contract.messages import Problem
+from core.worker import read_only
+
+from . import delivered
+
+
+def contents(folder: Path) -> dict:
+    return {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+@pytest.fixture
+def archive(tmp_path, monkeypatch):
+    """A finished capture on a disk that is read-only to all who ask."""
+    capture = delivered.make(tmp_path / "Zoë et moi.wildcap")
+    access = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: access(path, mode) and not (mode == os.W_OK and Path(path) == capture.root))
+    return capture
+
+
+def test_a_read_only_capture_is_delivered_elsewhere_and_looked_at_and_nothing_in_it_changes(archive, tmp_path, capsys):
+    before = contents(archive.root)
+    assert main(["deliver", str(archive.root), "--to", str(tmp_path / "out")]) == 0, capsys.readouterr().err
+    assert main(["status", str(archive.root)]) == 0
+    assert contents(archive.root) == before
+    folder, = (tmp_path / "out").iterdir()
+    assert folder.name.startswith("Zoe_et_moi_head") and list(folder.glob("*.obj")) and not list((tmp_path / "out").glob(".*"))
+    assert not any(path.is_symlink() for path in folder.rglob("*"))
+
+
+def test_without_another_folder_it_is_refused_by_name(archive, capsys):
+    before = contents(archive.root)
+    assert main(["deliver", str(archive.root)]) == 2
+    said = capsys.readouterr().err
+    assert "is read-only" in said and "--to" in said and contents(archive.root) == before
+
+
+def test_where_links_cannot_be_made_files_are_copied_and_where_nothing_can_it_is_said(archive, tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "symlink", lambda *_: (_ for _ in ()).throw(OSError(errno.EPERM, "no links")))
+    with read_only.stand_in(archive, str(tmp_path / "out")) as copy:
+        assert copy.head.read_bytes() == archive.head.read_bytes() and not copy.head.is_symlink()
+    assert not list((tmp_path / "out").iterdir())
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(Problem), read_only.stand_in(archive, str(tmp_path / "file")):
+        pass
+
+
+@pytest.mark.parametrize("code", sorted(AWAY))
+def test_a_file_server_that_has_gone_is_named(tmp_path, code):
+    path = tmp_path / "maps" / "normal.png"
+    assert "does not answer" in storage_problem(OSError(code, os.strerror(code), str(path)), path).problem
+    with pytest.raises(Problem, match="does not answer.*what was finished is kept"), replacing(path) as temporary:
+        raise OSError(code, os.strerror(code), str(temporary))
