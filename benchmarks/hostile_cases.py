@@ -99,7 +99,7 @@ def make(kind: Kind, place: Path, stock: Stock, rng: random.Random) -> Case:
 
 
 def _spoil(case: Case, path: Path, rng: random.Random) -> None:
-    way, said = in_fork(lambda: mutate(path, rng))  # picture libraries start threads, which no process that forks may have
+    way, said = in_fork(lambda: list(mutate(path, rng)))  # picture libraries start threads, which no process that forks may have
     case.spoiled, case.said = path, f"{path.relative_to(case.place)}: {way}, {said}"
     case.named = (path.name, path.parent.name) if path.parent.name in ("cameras", "model", "frames", "delit", "photographs") else (path.name,)
 

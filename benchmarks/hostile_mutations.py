@@ -105,9 +105,10 @@ def spoil_pixels(path: Path, rng: random.Random) -> str:
     import OpenImageIO as oiio
 
     size = rng.choice([None, None, (1, 1), (7, 300), (33, 33)])
-    channels = rng.choice([1, 2, 3, 4, 7])
-    old = oiio.ImageBuf(str(path))
-    height, width = size or (max(1, old.spec().height), max(1, old.spec().width))
+    channels = rng.choice([1, 2, 3, 4, 7] if path.suffix == ".exr" else [1, 3] if path.suffix == ".jpg" else [1, 2, 3, 4])
+    old = oiio.ImageInput.open(str(path))
+    height, width = size or (old.spec().height, old.spec().width)
+    old.close()
     pixels = np.full((height, width, channels), 0.5, np.float32)
     value = rng.choice([float("nan"), float("inf"), float("-inf"), 1e30, -1e30, -1.0, 1e-40, 0.0, 0.5])
     if rng.random() < 0.5:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every picture and mesh that is read or written passes one check: what is damaged is refused by name, what is merely unusual is not."""
 
+import os
 import struct
 import zlib
 from itertools import count
@@ -216,3 +217,24 @@ def test_meshes_that_are_none_are_not_written(tmp_path):
         for write, name in ((meshes.write_obj, "head.obj"), (meshes.write_ply, "scan.ply")):
             refused(lambda write=write, name=name, mesh=mesh: write(tmp_path / name, mesh), name, "was not written")
             assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes here")
+@pytest.mark.parametrize(("name", "read"), [
+    ("a.jpg", images.read_srgb), ("a.exr", images.size), ("a.obj", meshes.read_obj), ("a.ply", meshes.read_ply)])
+def test_a_pipe_under_a_file_s_name_is_refused_and_not_waited_for(tmp_path, name, read):
+    os.mkfifo(tmp_path / name)
+    refused(lambda: read(tmp_path / name), name)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes here")
+def test_a_pipe_among_a_capture_s_books_is_not_waited_for(tmp_path):
+    from core.contract.json_files import read_json
+    from core.contract.regular_files import require_regular
+
+    os.mkfifo(tmp_path / "capture.json")
+    for read in (read_json, require_regular):
+        with pytest.raises(OSError, match="a pipe or a device"):
+            read(tmp_path / "capture.json")
+    with pytest.raises(FileNotFoundError):
+        require_regular(tmp_path / "none")

@@ -48,7 +48,7 @@ def read_cameras(path: Path) -> list[Calibrated]:
     readers = {".xml": metashape.read, ".csv": realityscan.read, ".json": blender_cameras.read}
     if path.stem in ("cameras", "images", "points3D") and path.suffix.lower() in (".bin", ".txt"):
         path = path.parent  # a file of COLMAP's folder, as a file selector gives
-    if not path.exists():
+    if not (path.is_dir() or path.is_file()):
         raise Problem(f"There is no file or folder of cameras at {path}.", "Check the path in the setting, or empty it to solve the cameras here.")
     if not path.is_dir() and path.suffix.lower() not in readers:
         raise Problem(f"{path.name} is no kind of camera file that is known here.",

@@ -12,6 +12,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
+from .regular_files import require_regular
+
 WHOLE_BYTES = 64 << 20
 """Size up to which a source's file is read whole: every photograph, and a phone's video of half a minute."""
 BLOCKS, BLOCK_BYTES = 64, 1 << 20
@@ -26,7 +28,7 @@ def hash_file(path: Path) -> str:
 
 def read_hash(path: Path) -> str:
     """As `hash_file`, but always read: where being wrong would cost somebody a file. Two files within one tick of the disk's clock have the same time."""
-    with open(path, "rb") as file:
+    with open(require_regular(path), "rb") as file:
         return _hash_whole(file, 0)
 
 

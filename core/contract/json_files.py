@@ -11,6 +11,8 @@ import json
 import math
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
+from .regular_files import require_regular
+
 MOST_BYTES = 64 << 20
 """As objects, JSON takes about twenty times its size: 1.3 GB of memory. The largest that a stage writes, landmarks.json, has half a megabyte."""
 DEEPEST = 32
@@ -21,7 +23,7 @@ LONGEST_NUMBER = 40
 
 def read_json(path: Path):
     """The value of a JSON file, UTF-8 with or without a byte order mark. Raises OSError where it cannot be opened, ValueError where it is not sound."""
-    with open(path, "rb") as file:
+    with open(require_regular(path), "rb") as file:
         content = file.read(MOST_BYTES + 1)
     if len(content) > MOST_BYTES:
         raise ValueError(f"it is larger than {MOST_BYTES >> 20} MB")

@@ -21,6 +21,7 @@ from pathlib import Path
 
 from .messages import Problem
 from .processes import identify_process, is_at_work, is_gone
+from .regular_files import require_regular
 
 TERM_S = 30.0
 """How long a lease lasts without a refresh. A refresh that is held up for longer costs its holder the lease, and nobody a file; a shorter term would make
@@ -173,7 +174,7 @@ def _refresh(lease: Lease, ended: threading.Event) -> None:
 def _read(path: Path) -> dict | None:
     """What the file says; {} where it is empty or half written, None where it is not there."""
     try:
-        found = json.loads(path.read_bytes())
+        found = json.loads(require_regular(path).read_bytes())
         if isinstance(found, dict) and "start" in found:  # by WildCap 0.1.0
             found["since"] = found.pop("start")
         return found if isinstance(found, dict) and {"host", "pid", "since"} <= found.keys() else {}

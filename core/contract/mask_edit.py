@@ -16,6 +16,7 @@ from . import stages
 from .capture import Capture
 from .code_key import code_key
 from .hashes import hash_tree
+from .regular_files import require_regular
 from .settings import Settings, result_settings
 
 FIELD = "conditions"  # of the file's metadata
@@ -45,7 +46,7 @@ def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
 def _stored(path: Path) -> dict | None:
     """The conditions in a safetensors file's header: 8 bytes of length, then JSON; None where there are none."""
     try:
-        with open(path, "rb") as file:
+        with open(require_regular(path), "rb") as file:
             length, = struct.unpack("<Q", file.read(8))
             header = json.loads(file.read(min(length, 1 << 20)))
         return dict(json.loads(header["__metadata__"][FIELD]))

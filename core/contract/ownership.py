@@ -20,6 +20,7 @@ from pathlib import Path, PurePosixPath
 
 from .hashes import read_hash
 from .processes import identify_process, is_gone
+from .regular_files import require_regular
 
 RECORD = "written.jsonl"
 KEPT = "kept"
@@ -153,7 +154,7 @@ def read_record(root: Path) -> tuple[dict[str, set[str]], dict[str, dict]]:
     record = root / RECORD
     _begin_record(root)
     try:
-        info = record.stat()
+        info = require_regular(record).stat()
     except FileNotFoundError:
         return {}, {}
     return _parse(record, info.st_size, info.st_mtime_ns)

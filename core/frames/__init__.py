@@ -40,7 +40,7 @@ READING = 0.9
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """Writes capture.frames. Raises Problem where there are fewer than three readable frames, no face, two equal ones, or no motion."""
     path = capture.source
-    if path is None or not path.exists():
+    if path is None or not (path.is_dir() or path.is_file()):
         raise Problem(f"There is no video or folder of photographs at {str(path)!r}." if path else "No video was chosen.",
                       "Choose a video of the face, or a folder of photographs.")
     photographs = path.is_dir()

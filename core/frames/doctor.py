@@ -15,6 +15,8 @@ from ..contract.frame_records import FrameRecord
 from ..contract.messages import Problem, Reporter
 from .select import turns
 
+UNMEASURED = {"blur": 1.0, "brightness": 0.0, "clipped": 0.0, "noise": 0.0}
+"""Of what is too small to be measured, as a picture of one pixel."""
 FEW = 12
 """Below this many frames the result is accepted but the report warns."""
 BLURRED = 0.68
@@ -41,8 +43,9 @@ def examine(srgb: np.ndarray, box: tuple | None) -> dict:
         inside = srgb
     luma = inside @ np.array([0.299, 0.587, 0.114], np.float32)
     rows, columns = (slice(n // 6, n - n // 6) for n in luma.shape)  # the corners of a face's box show what is behind it
-    return {"blur": round(float(blur_effect(luma)), 4), "brightness": round(float(np.percentile(luma[rows, columns], 75)), 4),
+    told = {"blur": round(float(blur_effect(luma)), 4), "brightness": round(float(np.percentile(luma[rows, columns], 75)), 4),
             "clipped": round(float((inside[rows, columns].max(-1) > 0.99).mean()), 4), "noise": round(_noise(luma), 5)}
+    return {name: value if np.isfinite(value) else UNMEASURED[name] for name, value in told.items()}
 
 
 def blurred(records: list[FrameRecord], around: int = 10) -> np.ndarray:

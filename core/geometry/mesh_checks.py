@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..contract.messages import Problem
+from ..contract.regular_files import require_regular
 from ..contract.stages import advise_remaking
 
 MOST_OBJ_BYTES = 512 << 20
@@ -28,10 +29,11 @@ EXPORT_AGAIN = "Export it again, or choose another file."
 def open_mesh(path: Path, most: int) -> bytes:
     """The file's content. Raises Problem where it cannot be read, or has more than `most` bytes."""
     try:
-        with open(path, "rb") as file:
+        with open(require_regular(path), "rb") as file:
             content = file.read(most + 1)
     except OSError as error:
-        raise Problem(f"{path} cannot be read ({error.strerror}).", advise_remaking(path, "Run the stage that makes it, or choose another file.")) from error
+        advice = advise_remaking(path, "Run the stage that makes it, or choose another file.")
+        raise Problem(f"{path} cannot be read ({error.strerror or error}).", advice) from error
     if len(content) > most:
         raise Problem(f"{path} is larger than {most >> 20} MB.", "Decimate the mesh, and export it again.")
     return content

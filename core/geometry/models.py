@@ -15,6 +15,8 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 
+from ..contract.regular_files import require_regular
+
 PARAMS = {int(number): len(pycolmap.Camera.create_from_model_id(0, number, 1.0, 1, 1).params)
           for name, number in pycolmap.CameraModelId.__members__.items() if name != "INVALID"}
 """How many parameters each camera model has, by its number."""
@@ -134,7 +136,7 @@ def pose_of(image: pycolmap.Image) -> pycolmap.Rigid3d:
 
 def _walk(path: Path, record) -> None:
     """Raises ValueError where the file does not hold just the records that it promises."""
-    file = _Cursor(path.read_bytes())
+    file = _Cursor(require_regular(path).read_bytes())
     try:
         for _ in range(file.take("<Q")):
             record(file)

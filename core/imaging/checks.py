@@ -25,7 +25,7 @@ SAVE_ANEW = "Save it again as PNG, JPEG or EXR."
 
 def open_picture(path: Path) -> oiio.ImageInput:
     """The file with its header read. Raises Problem for what is no picture, or one that would take more than MOST_BYTES."""
-    image = oiio.ImageInput.open(str(path))
+    image = oiio.ImageInput.open(str(path)) if Path(path).is_file() else None  # a pipe would be waited for without end
     if image is None:
         raise Problem(f"{path} is not a picture that can be read ({_words(oiio.geterror())}).", advise_remaking(path, SAVE_ANEW))
     spec = image.spec()
