@@ -136,7 +136,7 @@ def _book(case: Case, stock: Stock, rng: random.Random) -> None:
     if name == "lock":
         (capture.root / name).write_text(json.dumps({"host": "elsewhere", "pid": 1, "began": 1.0, "token": "t"}))
     _spoil(case, capture.root / name, rng)
-    case.named = (*case.named, "capture.json", str(capture.root), *(["This capture"] if not (capture.root / name).is_file() else []))
+    case.named = (*case.named, "capture.json", str(capture.root), "This capture")  # which is what its books are about
 
 
 def _video(case: Case, stock: Stock, rng: random.Random) -> None:
@@ -176,7 +176,7 @@ def _settings(case: Case, stock: Stock, rng: random.Random) -> None:
         name = rng.choice(["frames.views", "solve.skin_tone", "delight.delighter", "scan.voxel_mm", "none.such", "registration.template", "", "seed", "frames"])
         value = rng.choice([*map(str, VALUES[3:-1]), "nan", "1e999", "0,0,0", "-5", "on"]).encode("utf-8", "replace").decode().replace("\0", "")
         case.command = ["run", "-", root, "--until", "frames", f"--set={name}={value[:500]}"]
-        case.said, case.named = f"--set {name}={value[:60]!r}", (name or "--set", "--set", name.rpartition(".")[2] or "--set")
+        case.said, case.named = f"--set {name}={value[:60]!r}", (name or "''", "--set", name.rpartition(".")[2] or "--set")
 
 
 def _cameras(case: Case, stock: Stock, rng: random.Random) -> None:

@@ -35,7 +35,7 @@ class Calibrated:
     rotation: np.ndarray
     translation: np.ndarray
 
-    def camera(self, number: int, width: int, height: int) -> pycolmap.Camera:
+    def camera(self, number: int, width: int, height: int, picture: str = "") -> pycolmap.Camera:
         """For a picture of this size. Raises Problem where its shape is not the calibration's."""
         params = np.array(self.params, float)
         lengths = PIXELS[self.model]
@@ -44,7 +44,8 @@ class Calibrated:
             params[lengths - 2:lengths] += width / 2, height / 2
         elif abs(self.width / self.height / (width / height) - 1) > 0.01:
             turned = abs(self.height / self.width / (width / height) - 1) < 0.01
-            raise Problem(f"The camera of {self.name} was solved for a picture of {self.width} x {self.height} pixels; here it is {width} x {height}.",
+            raise Problem(f"The camera of {self.name} was solved for a picture of {self.width} x {self.height} pixels; "
+                          f"{picture or 'here it'} is {width} x {height}.",
                           "Solve the cameras from pictures that were saved upright, without a rotation in their EXIF data, and give the same ones here."
                           if turned else "Give the very pictures the cameras were solved from: not cropped, not undistorted.")
         else:

@@ -50,7 +50,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         pictures = (replace(picture, srgb=np.ascontiguousarray(picture.srgb[:, ::-1])) for picture in pictures)
     with replacing_folder(capture.frames) as folder:
         records, thumbnails, contents = _write_frames(pictures, folder, report)
-        _check(records, thumbnails, photographs)
+        _check(path, records, thumbnails, photographs)
         records, contents, dropped = _drop_blurred(records, contents, folder)
         records = _even_out(records, contents, folder, report)
         shut = blinks([r.eyes_open for r in records], [r.time_s for r in records])
@@ -132,11 +132,11 @@ def _select(records: list[FrameRecord], count: int) -> list[FrameRecord]:
     return [replace(r, selected=i in chosen) for i, r in enumerate(records)]
 
 
-def _check(records: list[FrameRecord], thumbnails: np.ndarray, photographs: bool) -> None:
+def _check(path: Path, records: list[FrameRecord], thumbnails: np.ndarray, photographs: bool) -> None:
     if len(records) < FEWEST:
         what, remedy = ("photographs", "Take 30 or more photographs around the face.") if photographs else (
             "frames", "Film the face for 5 to 30 seconds while you walk half around it; a damaged file may be whole once copied again.")
-        raise Problem(f"Only {len(records)} {what} could be read; three are the least a head can be built from.", remedy)
+        raise Problem(f"Only {len(records)} {what} of {path.name} could be read; three are the least a head can be built from.", remedy)
     if not any(r.face_box for r in records):
         raise Problem("No face was found in any frame.",
                       "Film one face, upright, filling a third of the picture or more, and lit well enough to see the eyes.")
