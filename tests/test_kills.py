@@ -20,6 +20,8 @@ if not sys.platform.startswith("linux"):
     pytest.skip("kills are tried on Linux", allow_module_level=True)
 
 import numpy as np  # noqa: E402
+import torch  # noqa: E402
+from safetensors import SafetensorError  # noqa: E402
 
 from benchmarks import kills_judge, kills_worker  # noqa: E402
 from benchmarks.kills_capture import BESIDE, STRANGERS, Undisturbed, capture_at  # noqa: E402
@@ -27,9 +29,12 @@ from core.contract.files import replacing_folder  # noqa: E402
 from core.contract.hashes import read_hash  # noqa: E402
 from core.contract.messages import Problem  # noqa: E402
 from core.geometry.models import read_model, write_model  # noqa: E402
+from core.solve import checkpoint  # noqa: E402
+from core.solve.lighting import Lights  # noqa: E402
+from core.solve.problem import State  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
-TRIALS = 10
+TRIALS = 8
 
 
 def test_a_handful_of_kills_loses_nothing_and_ends_in_the_same_bytes():
@@ -114,18 +119,40 @@ def test_a_camera_model_that_did_not_fit_on_the_disk_gets_no_name(tmp_path):
         model.add_image_with_trivial_frame(pycolmap.Image(name=f"{number:05d}.jpg", camera_id=number, image_id=number), pycolmap.Rigid3d(np.eye(4)[:3]))
     cameras = tmp_path / "cameras"
 
-    def attempt(most_bytes: int) -> str:
+    def attempt() -> None:
+        with replacing_folder(cameras) as folder:
+            write_model(folder, model)
+
+    for most_bytes in (0, 7, 100, 1000):
+        assert "disk is full" in with_limit(most_bytes, attempt)
+        assert os.listdir(tmp_path) == []
+    assert with_limit(1 << 20, attempt) == "" and len(read_model(cameras).cameras) == 19
+    assert set(os.listdir(cameras)) == {f"{name}.bin" for name in ("cameras", "images", "points3D", "rigs", "frames")}
+
+
+def test_a_checkpoint_that_did_not_fit_on_the_disk_is_told_by_name(tmp_path, monkeypatch):
+    """safetensors has an error of its own, with the system's in words."""
+    state, path = State(1, None, torch.ones(1, 7, 32, 32), Lights(*torch.ones(3, 4)), []), tmp_path / "solve.safetensors"
+    assert "solve.safetensors could not be written" in with_limit(4096, lambda: checkpoint.write(path, state, "key")) and os.listdir(tmp_path) == []
+    assert with_limit(1 << 20, lambda: checkpoint.write(path, state, "key")) == "" and checkpoint.read(path, "key").step == 1
+
+    def full(*_, **__):
+        raise SafetensorError("Error while serializing: I/O error: No space left on device (os error 28)")
+
+    monkeypatch.setattr(checkpoint, "save_file", full)
+    with pytest.raises(Problem, match="disk is full"):
+        checkpoint.write(path, state, "key")
+
+
+def with_limit(most_bytes: int, attempt) -> str:
+    """The problem of an attempt, in a process of its own in which no file may be longer; '' for none."""
+    def work() -> str:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes))
         try:
-            with replacing_folder(cameras) as folder:
-                write_model(folder, model)
+            attempt()
         except Problem as problem:
             return problem.problem
         return ""
 
-    for most_bytes in (0, 7, 100, 1000):
-        assert "disk is full" in kills_worker.in_fork(lambda most=most_bytes: attempt(most))
-        assert os.listdir(tmp_path) == []
-    assert kills_worker.in_fork(lambda: attempt(1 << 20)) == "" and len(read_model(cameras).cameras) == 19
-    assert set(os.listdir(cameras)) == {f"{name}.bin" for name in ("cameras", "images", "points3D", "rigs", "frames")}
+    return kills_worker.in_fork(work)

@@ -8,6 +8,8 @@ Numbers are stored as tensors: safetensors writes several metadata fields in ran
 from __future__ import annotations
 
 import json
+import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -44,8 +46,7 @@ def write_solution(path: Path, found: Solution, conditions: dict[str, str]) -> N
     tensors["tone"] = found.tone.tensor
     tensors["exposure"] = torch.tensor(found.exposure, dtype=torch.float64)
     tensors = {name: tensor.detach().cpu().clone().contiguous() for name, tensor in tensors.items()}
-    with replacing(path) as temporary:
-        save_file(tensors, temporary, metadata={FIELD: json.dumps(conditions)})
+    _save(path, tensors, {FIELD: json.dumps(conditions)})
 
 
 def read_solution(path: Path, conditions: dict[str, str]) -> Solution | None:
@@ -71,8 +72,7 @@ def write(path: Path, state: State, key: str) -> None:
     tensors["step"] = torch.tensor(state.step)
     tensors |= {f"moment{k}": moment for k, moment in enumerate(state.moments)}
     tensors = {name: tensor.detach().cpu().clone().contiguous() for name, tensor in tensors.items()}
-    with replacing(path) as temporary:
-        save_file(tensors, temporary, metadata={"key": key})
+    _save(path, tensors, {"key": key})
 
 
 def read(path: Path, key: str) -> State | None:
@@ -88,3 +88,14 @@ def read(path: Path, key: str) -> State | None:
         return State(int(tensors["step"]), tensors.get("x"), tensors["denoised"], lights, moments)
     except (OSError, SafetensorError, KeyError, ValueError):
         return None
+
+
+def _save(path: Path, tensors: dict[str, torch.Tensor], metadata: dict[str, str]) -> None:
+    """Raises Problem where it cannot be written."""
+    with replacing(path) as temporary:
+        try:
+            save_file(tensors, temporary, metadata=metadata)
+        except SafetensorError as error:  # which tells the system's error in words alone: "No space left on device (os error 28)"
+            found = re.search(r"os error (\d+)", str(error))
+            number = int(found[1]) if found else 0
+            raise (OSError(0, str(error), str(path), number) if os.name == "nt" else OSError(number, str(error), str(path))) from error
