@@ -55,7 +55,7 @@ class Stock:
         folder.mkdir()
         end = undisturbed.end
         shutil.copy(SAMPLE / "capture.mp4", folder / "film.mp4")
-        shutil.copytree(end.frames, folder / "photographs", ignore=shutil.ignore_patterns("*.json", "*.psd"))
+        shutil.copytree(end.frames, folder / "photographs", ignore=shutil.ignore_patterns("*.json", "*.psd", ".*"))
         shutil.copytree(end.cameras, folder / "model", ignore=shutil.ignore_patterns("*.txt"))
         shutil.copy(SAMPLE / "cameras.json", folder / "cameras.json")
         (folder / "landmarks.json").write_text(json.dumps({"points": {"152": [0.0, -0.1, -0.1], "1": [0.0, -0.13, -0.03]}}))

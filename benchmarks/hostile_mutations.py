@@ -107,6 +107,8 @@ def spoil_pixels(path: Path, rng: random.Random) -> str:
     size = rng.choice([None, None, (1, 1), (7, 300), (33, 33)])
     channels = rng.choice([1, 2, 3, 4, 7] if path.suffix == ".exr" else [1, 3] if path.suffix == ".jpg" else [1, 2, 3, 4])
     old = oiio.ImageInput.open(str(path))
+    if old is None:  # a file of the user's that is no picture
+        return replace_whole(path, rng)
     height, width = size or (old.spec().height, old.spec().width)
     old.close()
     pixels = np.full((height, width, channels), 0.5, np.float32)

@@ -59,6 +59,8 @@ def read_job(path: Path) -> Job:
     """The job of a file. Raises Problem when it is damaged or asks for what there is not."""
     try:
         return _job(read_json(path), Path(path).parent)
+    except Problem as problem:
+        raise Problem(f"The job file {path} cannot be used: {problem.problem}", problem.remedy) from problem
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise Problem(f"The job file {path} cannot be read ({error}).", "Start the job again from Blender or with `python -m core run`.") from error
 
