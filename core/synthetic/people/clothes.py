@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a person wears at the neck: a shirt with a round collar or an open one with lapels, and shoulders beneath."""
+"""What a person wears at the neck: a shirt with a round neck or one like a V, and the shoulders beneath."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ from .person import Person
 AROUND = 144
 NECK = np.array([0.0, 0.075])  # x and y of the neck's axis, metres
 COLLAR_Z = -0.163  # of the shirt's upper edge at the side
-PROFILE = (  # radius over the neck's, drop below the edge, and how far the section is the shoulders' (0 round ... 1 wide), in metres
-    (0.000, -0.004, 0.0), (0.003, 0.000, 0.0), (0.005, 0.006, 0.0), (0.008, 0.014, 0.0), (0.020, 0.022, 0.15), (0.045, 0.034, 0.45), (0.075, 0.048, 0.75),
-    (0.095, 0.070, 0.95), (0.105, 0.120, 1.0), (0.108, 0.200, 1.0), (0.110, 0.300, 1.0))
+PROFILE = np.array([  # metres: wider than the neck at the sides, deeper than it, drop at the sides, drop in front and behind
+    (-0.001, -0.001, 0.010, 0.010), (0.000, 0.000, -0.003, -0.003), (0.003, 0.003, -0.004, -0.004), (0.005, 0.005, 0.002, 0.002), (0.006, 0.006, 0.014, 0.014),
+    (0.020, 0.015, 0.022, 0.028), (0.050, 0.030, 0.036, 0.050), (0.090, 0.040, 0.052, 0.080), (0.125, 0.046, 0.070, 0.110), (0.145, 0.050, 0.100, 0.150),
+    (0.150, 0.055, 0.170, 0.220), (0.150, 0.055, 0.300, 0.320)])
+ROWS = 44
 
 
 def shirt(person: Person, head: Mesh) -> Mesh:
@@ -24,17 +26,16 @@ def shirt(person: Person, head: Mesh) -> Mesh:
     turn = 2 * np.pi * np.arange(AROUND) / AROUND
     radius = _neck(head, turn)
     front = np.clip(-np.sin(turn), 0, 1)  # sin = -1 towards the face
-    dip = 0.018 * front**2 if person.collar == "crew" else 0.055 * np.clip((front - 0.75) / 0.25, 0, 1)
-    rows = []
-    for out, drop, wide in PROFILE:
-        reach = radius + out + (0.006 if person.collar == "polo" and drop < 0.015 else 0.0)
-        x, y = NECK[0] + reach * np.cos(turn) * (1 + 0.75 * wide), NECK[1] + reach * np.sin(turn) * (1 - 0.15 * wide)
-        rows.append(np.stack([x, y, COLLAR_Z - drop - dip * (1 - wide) - 0.05 * wide * np.abs(np.cos(turn)) ** 3 + 0 * turn], -1))
-    vertices = np.concatenate(rows)
-    folds = octaves(1000 * vertices, [60.0, 30.0], rng, smooth=True)[:, None]
+    dip = 0.020 * front**2 if person.collar == "crew" else 0.030 * front**4
+    at = np.linspace(0, len(PROFILE) - 1, ROWS)
+    side, deep, low, ahead = (np.interp(at, np.arange(len(PROFILE)), column)[:, None] for column in PROFILE.T)
+    c, s = np.cos(turn), np.sin(turn)
+    drop = low * c**2 + ahead * s**2 + dip * np.clip(1 - at / len(PROFILE), 0, 1)[:, None]
+    vertices = np.stack([NECK[0] + (radius + side) * c, NECK[1] + (radius + deep) * s, COLLAR_Z - drop], -1).reshape(-1, 3)
+    folds = octaves(1000 * vertices, [70.0, 28.0], rng, smooth=True)[:, None] * np.repeat(np.clip(side / 0.05, 0, 1), AROUND)[:, None]
     away = vertices - [*NECK, -0.25]
-    vertices = vertices + 0.0035 * folds * np.repeat([min(1.0, p[0] / 0.03) for p in PROFILE], AROUND)[:, None] * away / np.linalg.norm(away, axis=1, keepdims=True)
-    k, r = np.meshgrid(np.arange(AROUND), np.arange(len(PROFILE) - 1))
+    vertices = vertices + 0.003 * folds * away / np.linalg.norm(away, axis=1, keepdims=True)
+    k, r = np.meshgrid(np.arange(AROUND), np.arange(ROWS - 1))
     a, b = (r * AROUND + k).ravel(), (r * AROUND + (k + 1) % AROUND).ravel()
     return Mesh(vertices, np.concatenate([np.stack([a, a + AROUND, b], 1), np.stack([b, a + AROUND, b + AROUND], 1)]))
 

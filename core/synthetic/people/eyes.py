@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 IRIS_MM = 5.9  # radius of an adult's iris
-WHITE = np.array([0.60, 0.52, 0.47])  # linear albedo
+WHITE = np.array([0.50, 0.43, 0.39])  # linear albedo
 VESSELS = np.array([0.55, 0.20, 0.15])
 
 
@@ -19,7 +19,7 @@ def eye_picture(iris: np.ndarray, ball_radius: float, seed: int, size: int = 512
     angle = np.pi * (2 * np.hypot(x, y)).clip(0, 1) ** (1 / 0.6)
     turn = np.arctan2(y, x)
     rim = np.arcsin(IRIS_MM / (1000 * ball_radius))
-    pupil = rim * rng.uniform(0.30, 0.48)
+    pupil = rim * rng.uniform(0.36, 0.52)
     inward = np.clip((angle - pupil) / (rim - pupil), 0, 1)  # 0 at the pupil ... 1 at the rim
     fibres = sum(np.interp(turn, np.linspace(-np.pi, np.pi, n), np.append(v := rng.normal(size=n - 1), v[0])) for n in (60, 140, 260)) / np.sqrt(3)
     rough = gaussian_filter(rng.normal(size=(size, size)), 3) * 8

@@ -12,6 +12,7 @@ import numpy as np
 from ...geometry.meshes import Mesh
 from ..canvas import canvas
 from ..regions import regions
+from ..sample import together
 from ..skin import GROUND, Skin, paint_skin
 from . import beards, brows, eyes, head_hair, traits
 from .clothes import shirt
@@ -24,7 +25,7 @@ from .strands import Strands, Surface
 PARTS = ("skin", "lips", "brows", "lashes", "beard", "hair", "eyes", "clothes")
 """What is told apart in the truth."""
 OPENEST = 0.2  # lids that are less open than this are shut
-UNDER = {"hair": 0.8, "beard": 0.35, "brows": 0.35}  # how much of the hair's colour the skin between the roots takes where they are densest
+UNDER = {"hair": 0.8, "beard": 0.35, "brows": 0.15}  # how much of the hair's colour the skin between the roots takes where they are densest
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,9 @@ def make_figure(person: Person | int, size: int = 2048, facekit: Path | None = N
     head = person_mesh(person.seed, facekit)
     opened = open_lids(head, person.openness if person.openness >= OPENEST else 0.0, np.array(person.gaze))
     skin, seen, growth = paint(person, size)
-    return Figure(person, head, opened, shirt(person, head), skin, seen, eyes.eye_picture(np.array(person.iris), opened.balls[0].radius, person.seed),
-                  growth, grown(person, head, opened))
+    cloth = shirt(person, head)
+    return Figure(person, head, opened, cloth, skin, seen, eyes.eye_picture(np.array(person.iris), opened.balls[0].radius, person.seed),
+                  growth, grown(person, head, opened, cloth))
 
 
 def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.ndarray]]:
@@ -72,14 +74,14 @@ def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.nda
     return skin, on.spread(diffuse.astype(np.float32)), {part: on.spread(where.astype(np.float32)) for part, where in growth.items()}
 
 
-def grown(person: Person, head: Mesh, opened: OpenHead) -> tuple[Strands, ...]:
+def grown(person: Person, head: Mesh, opened: OpenHead, cloth: Mesh) -> tuple[Strands, ...]:
     """All hairs of a person: brows, lashes, and beard and hair where there are any."""
     ground, skin = ground_of(head), Surface(head)
     found = [brows.brows(person, ground, skin, _rng(person, 0)), brows.lashes(person, opened, _rng(person, 1))]
     if person.beard != "none":
         found.append(beards.beard(person, ground, skin, _rng(person, 2)))
     if person.hair != "none":
-        found.append(head_hair.head_hair(person, ground, skin, _rng(person, 3)))
+        found.append(head_hair.head_hair(person, ground, Surface(together(head, cloth)), _rng(person, 3)))
     return tuple(found)
 
 

@@ -17,7 +17,7 @@ COUNT = {"cropped": 34000, "short": 26000, "long": 24000}
 RADIUS_M = {"cropped": 0.00006, "short": 0.00008, "long": 0.00010}  # fewer hairs than people have, each a little thicker
 STEPS = {"cropped": 4, "short": 10, "long": 20}
 CROWN_MM = np.array([8.0, 120.0, 95.0])
-NAPE_MM = -82.0
+NAPE_MM, BEHIND_MM = -72.0, 100.0  # below the nape, and below the ears before them, grows nothing
 FACE = np.array([0.066, 0.026])  # half the width of the face and the depth (y) before which long hair does not hang, metres
 
 
@@ -26,7 +26,8 @@ def scalp_density(on: Canvas, seed: int) -> np.ndarray:
     rng = np.random.default_rng([seed, 66])
     ragged = on.soft(lambda at: octaves(at, [22.0, 10.0], rng, smooth=True))
     soft = np.clip(regions(on)["scalp"] * 2.2 - 0.75 + 0.15 * ragged, 0, 1)
-    return soft * np.clip((on.position[:, 2] - NAPE_MM) / 10, 0, 1)
+    behind_ears = np.clip((on.position[:, 1] - np.interp(on.position[:, 2], [-30, -12], [BEHIND_MM, -100])) / 8, 0, 1)
+    return soft * behind_ears * np.clip((on.position[:, 2] - NAPE_MM) / 10, 0, 1)
 
 
 def head_hair(person: Person, ground: Ground, skin: Surface, rng: np.random.Generator) -> Strands:
@@ -49,10 +50,10 @@ def head_hair(person: Person, ground: Ground, skin: Surface, rng: np.random.Gene
     else:
         fringe = (front > 0.4) & person.fringe
         length = np.where(fringe, np.minimum(length, _to_brows(roots.at)), length)
-        pull = np.where(fringe[:, None], [0, 0.1, -1.2], [0, 0.15, -2.8])
-        points = grow(roots, length, rng.normal(0.45, 0.1, count).clip(0.1), skin, pull, 0.002 + 0.010 * clearance, STEPS[style])
+        pull = np.where(fringe[:, None], [0, 0.1, -1.2], [0, 0.15, -3.6])
+        points = grow(roots, length, rng.normal(0.3, 0.08, count).clip(0.05), skin, pull, 0.002 + 0.007 * clearance, STEPS[style])
         points = np.where(fringe[:, None, None], points, _beside_the_face(points))
-    points = waved(points, roots.at, person.curl * {"cropped": 0.0008, "short": 0.004, "long": 0.010}[style], 14.0, rng)
+    points = waved(points, roots.at, person.curl * {"cropped": 0.0008, "short": 0.004, "long": 0.006}[style], 14.0, rng, 0.2)
     if style != "cropped":
         points = clumped(points, 26, 0.55, rng)
         points = clumped(points, 8, 0.35, rng)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..parameters import SkinParameters, adorned, sample_parameters
 
-IRISES = np.array([[0.030, 0.013, 0.006], [0.075, 0.035, 0.014], [0.11, 0.075, 0.032], [0.10, 0.13, 0.15], [0.13, 0.20, 0.28]])
+IRISES = np.array([[0.022, 0.010, 0.005], [0.050, 0.024, 0.010], [0.065, 0.045, 0.018], [0.055, 0.065, 0.070], [0.048, 0.078, 0.115]])
 """Linear albedo: dark brown, brown, hazel, grey, blue."""
 HAIR = ("none", "cropped", "short", "long")
 BEARD = ("none", "stubble", "moustache", "full")
@@ -20,7 +20,7 @@ BEARD = ("none", "stubble", "moustache", "full")
 class Person:
     """skin: parameters of the bare skin, without painted hair; iris: linear albedo [3]; openness of the lids in [0, 1], gaze [2] in degrees (left, up);
     hair and beard: of HAIR and BEARD, with their lengths in metres; colours: linear albedo; grey: share of hairs without pigment; brow: density, 1 is usual;
-    fringe: whether hair falls over the forehead; parting: x in metres; clothes: linear albedo of the shirt [3] and its collar (crew, polo);
+    fringe: whether hair falls over the forehead; parting: x in metres; clothes: linear albedo of the shirt [3] and its collar (crew, v);
     shade, tan: strength of the beard's shade and of tan lines in [0, 1]."""
 
     seed: int
@@ -54,7 +54,7 @@ def sample_person(seed: int) -> Person:
     dark = float(np.clip((0.25 - np.mean(skin.hair_colour)) / 0.2, 0, 1))
     hair = str(rng.choice(HAIR, p=(0.1, 0.3, 0.45, 0.15) if male else (0.02, 0.08, 0.3, 0.6)))
     beard = str(rng.choice(BEARD, p=(0.3, 0.3, 0.12, 0.28))) if male else "none"
-    brown = 0.25 + 0.6 * np.clip(skin.melanin / 0.15, 0, 1)
+    brown = 0.25 + 0.74 * np.clip(skin.melanin / 0.12, 0, 1)
     iris = IRISES[rng.choice(5, p=np.array([0.55 * brown, 0.45 * brown, 0.3 * (1 - brown), 0.25 * (1 - brown), 0.45 * (1 - brown)]))]
     brow_colour = np.asarray(skin.hair_colour) * np.exp(rng.normal(-0.1, 0.25))  # dyed and sun-bleached hair leaves the brows as they were
     bare = replace(skin, beard=0.0, brow_density=0.0, scalp_hair=0.0)
@@ -67,7 +67,7 @@ def sample_person(seed: int) -> Person:
         curl=float(rng.uniform(0.1, 0.8)), grey=float(np.clip((skin.age - 42) / 40, 0, 1) * rng.random()), beard=beard,
         beard_length={"none": 0.0, "stubble": rng.uniform(0.0006, 0.002), "moustache": rng.uniform(0.006, 0.012), "full": rng.uniform(0.008, 0.022)}[beard],
         shade=float(male * dark * rng.uniform(0.3, 1.0)), tan=float(rng.random() * (rng.random() < 0.5)),
-        clothes=_tuple(np.exp(rng.normal(np.log(0.12), 0.8)) * rng.uniform(0.5, 1.2, 3)), collar=str(rng.choice(["crew", "polo"])))
+        clothes=_tuple(np.exp(rng.normal(np.log(0.12), 0.8)) * rng.uniform(0.5, 1.2, 3)), collar=str(rng.choice(["crew", "v"])))
 
 
 def _tuple(values: np.ndarray) -> tuple[float, float, float]:

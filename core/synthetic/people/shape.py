@@ -3,7 +3,7 @@
 """A head that registration's identity basis cannot reach: a member of the basis plus a smooth, mostly symmetric displacement from which everything that
 the basis or a motion of the head explains has been taken.
 
-The displacement is that of ICT-FaceKit's identities where its folder is given (facekit.py), else a random field with features of the same size.
+The displacement is a random field and, where its folder is given, one of ICT-FaceKit's identities as well (facekit.py).
 """
 
 from __future__ import annotations
@@ -20,27 +20,44 @@ from ...geometry.noise import octaves
 from ..identities import identity_coefficients
 from .facekit import fields
 
-WAVELENGTHS_MM = [110.0, 70.0, 45.0]  # of the random field; of ICT-FaceKit's identities nine tenths of the variance outside the basis are as large
+WAVELENGTHS_MM = [140.0, 90.0]  # of the random field: smaller ones are caricatures at this strength
 ASYMMETRY = 0.35  # deviation of the asymmetric part over that of the symmetric one
 WITHIN = 0.6  # of the bald subjects' strength in the basis, so that both parts together stay a plausible head
-RESIDUAL_MM = 2.1, 2.6  # root mean square over the face that the basis leaves
+FACEKIT = 0.6  # share of ICT-FaceKit in the displacement where its folder is given, the rest is the random field: alone and this strong it ages every face
+RESIDUAL_MM = 2.05, 2.3  # root mean square over the face that the basis leaves
 
 
 def person_mesh(seed: int, facekit: Path | None = None) -> Mesh:
     """The closed head of a person in the template's topology and pose: metres, +Z up, face towards -Y."""
     rng = np.random.default_rng([seed, 60])
     basis = np.tensordot(WITHIN * identity_coefficients(seed), template.identity(), 1)
-    outside = unexplained(_from_facekit(facekit, rng) if facekit else _random_field(rng))
-    outside *= rng.uniform(*RESIDUAL_MM) / 1000 / root_mean_square(outside)
+    outside = _unit(_lessened(_random_field(rng)))
+    if facekit:
+        outside = (1 - FACEKIT) * outside + FACEKIT * _unit(_lessened(_from_facekit(facekit, rng)))
+    outside *= rng.uniform(*RESIDUAL_MM) / 1000 / root_mean_square(unexplained(outside))
     return template.load().moved(template.load().vertices + basis + outside)
 
 
 def unexplained(displacement: np.ndarray) -> np.ndarray:
     """The part of a displacement [V, 3] of the template that no identity, rotation, translation or scale explains, by least squares over the face."""
-    design, weight = _design()
-    count = len(weight)
-    solution = np.linalg.lstsq((design * weight[:, None, None]).reshape(3 * count, -1), (displacement * weight[:, None]).reshape(-1), rcond=None)[0]
-    return displacement - design @ solution
+    return _without_basis(displacement, face_weight())
+
+
+def _lessened(displacement: np.ndarray) -> np.ndarray:
+    """The smallest displacement over the whole head that a basis fit to the face leaves as much of: what the basis explains may go, but so that the back of
+    the head stays where it is."""
+    return _without_basis(displacement, 0.25 + 0.75 * face_weight())
+
+
+def _unit(displacement: np.ndarray) -> np.ndarray:
+    return displacement / root_mean_square(unexplained(displacement))
+
+
+def _without_basis(displacement: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """A displacement [V, 3] less its least-squares fit by the design, vertices counted by weight [V]."""
+    design, root = _design(), np.sqrt(weight)
+    system = (design * root[:, None, None]).reshape(3 * len(root), -1)
+    return displacement - design @ np.linalg.lstsq(system, (displacement * root[:, None]).reshape(-1), rcond=None)[0]
 
 
 def root_mean_square(displacement: np.ndarray) -> float:
@@ -63,12 +80,12 @@ def _at_vertices(mesh: Mesh, picture: np.ndarray) -> np.ndarray:
 
 
 @cache
-def _design() -> tuple[np.ndarray, np.ndarray]:
-    """The displacements [V, 3, 7 + K] of small rotations, translations, a scale and the identities; roots of the face's weights [V]."""
+def _design() -> np.ndarray:
+    """The displacements [V, 3, 7 + K] of small rotations, translations, a scale and the identities."""
     points = template.load().vertices
     turns = [np.cross(np.eye(3)[axis], points) for axis in range(3)]
     moves = [np.broadcast_to(np.eye(3)[axis], points.shape) for axis in range(3)]
-    return np.stack([*turns, *moves, points, *template.identity().astype(np.float64)], -1), np.sqrt(face_weight())
+    return np.stack([*turns, *moves, points, *template.identity().astype(np.float64)], -1)
 
 
 def _random_field(rng: np.random.Generator) -> np.ndarray:
