@@ -18,7 +18,7 @@ PLAIN = phone.Phone(shot=0, read=0, reduction=0, contrast=0, shoulder=0.8, local
 STEP = np.where(np.arange(64)[None, :, None] < 32, 0.3, 0.5) * np.ones((48, 64, 3))
 
 
-def test_a_plain_phone_shows_sRGB():
+def test_a_plain_phone_shows_srgb():
     linear = np.random.default_rng(0).uniform(0, 0.5, (8, 8, 3)).astype(np.float32)
     assert np.allclose(phone.develop(linear, PLAIN, np.array([1.0, 1, 1]), np.random.default_rng(0)), images.linear_to_srgb(linear), atol=1e-4)
 

@@ -46,7 +46,8 @@ def head_hair(person: Person, ground: Ground, skin: Surface, rng: np.random.Gene
         length = length * np.interp(roots.at[:, 2], [-70, 20, 80], [0.22, 0.5, 1.0])
         if person.fringe:
             length = np.where(front > 0.4, np.minimum(1.25 * length, _to_brows(roots.at)), length)
-        points = grow(roots, length, rng.normal(0.55, 0.12, count).clip(0.1), skin, _weight(front, 0.55, 0.9), 0.001 + 0.012 * clearance * length / 0.05, STEPS[style])
+        above = 0.001 + 0.24 * clearance * length
+        points = grow(roots, length, rng.normal(0.55, 0.12, count).clip(0.1), skin, _weight(front, 0.55, 0.9), above, STEPS[style])
     else:
         fringe = (front > 0.4) & person.fringe
         length = np.where(fringe, np.minimum(length, _to_brows(roots.at)), length)

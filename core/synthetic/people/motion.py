@@ -62,5 +62,6 @@ def motion_blur(picture: np.ndarray, flow: np.ndarray, shutter: float) -> np.nda
 
 def shifted(picture: np.ndarray, by: np.ndarray) -> np.ndarray:
     """The picture with what is at x moved to x + by, [H, W, 2] in pixels."""
-    y, x = np.mgrid[0:picture.shape[0], 0:picture.shape[1]].astype(np.float32)
-    return cv2.remap(picture, x - by[..., 0].astype(np.float32), y - by[..., 1].astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).reshape(picture.shape)
+    y, x = np.mgrid[0:picture.shape[0], 0:picture.shape[1]]
+    from_x, from_y = (x - by[..., 0]).astype(np.float32), (y - by[..., 1]).astype(np.float32)
+    return cv2.remap(picture, from_x, from_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).reshape(picture.shape)

@@ -17,9 +17,9 @@ from ..pigment import LUMINANCE
 
 @dataclass(frozen=True)
 class Phone:
-    """shot, read: the noise's variance is shot x signal + read^2, linear; reduction: strength of noise reduction in [0, 1]; contrast: of the tone curve, 0 none;
-    shoulder: sRGB level above which highlights are rolled off; local: local contrast, and its radius as a share of the height; sharpening and its radius in
-    pixels; crf: of H.264; readout, shutter: share of a frame's time in which the rows are read one after the other, and in which each is exposed; sway_mm and
+    """shot, read: the noise's variance is shot x signal + read^2, linear; reduction: strength of noise reduction in [0, 1]; contrast: of the tone curve, 0 is
+    none; shoulder: sRGB level from which highlights are rolled off; local: local contrast, and its radius as a share of the height; sharpening, and its radius
+    in pixels; crf: of H.264; readout, shutter: share of a frame's time in which the rows are read one after the other, and in which each is exposed; sway_mm,
     sway_degrees: deviations of the head's place and turn."""
 
     shot: float

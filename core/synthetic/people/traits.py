@@ -35,7 +35,7 @@ def shaded(person: Person, on: Canvas, diffuse: np.ndarray) -> np.ndarray:
     """The albedo [N, 3] with the shade of a shaven beard, which lies below the surface."""
     rng = np.random.default_rng([person.seed, 63])
     uneven = 1 + 0.15 * on.soft(lambda at: octaves(at, [14.0], rng, smooth=True))
-    return beard_shadow(diffuse, np.clip(regions(on)["beard"] * person.shade * uneven, 0, 1))
+    return beard_shadow(diffuse, np.clip(np.clip(1.6 * regions(on)["beard"], 0, 1) * 0.8 * person.shade * uneven, 0, 1))
 
 
 def symmetry(field: np.ndarray, on: Canvas) -> float:

@@ -20,13 +20,14 @@ from .figure import PARTS, Figure
 from .strands import prisms
 
 SKIN, LIPS, EYES, CLOTHES = (PARTS.index(name) for name in ("skin", "lips", "eyes", "clothes"))
+FACIAL = [PARTS.index(name) for name in ("brows", "lashes", "beard")]
 
 
 @dataclass(frozen=True)
 class Truth:
     """seen, bare float32 [h, w, 3]: linear albedo as it is seen, and of the skin and eyes below hair and clothes; alpha [h, w]; parts [h, w, len(PARTS)]: how
-    much of a pixel each part covers; face bool [h, w]: bare facial skin; normal [h, w, 3] of the head, unit, in its own axes; shadow bool [h, w]: where the
-    sun does not reach."""
+    much of a pixel each part covers; face bool [h, w]: the face with its brows and beard, without the eyes and what head hair or clothes hide;
+    normal [h, w, 3] of the head, unit, in its own axes; shadow bool [h, w]: where the sun does not reach."""
 
     seen: np.ndarray
     bare: np.ndarray
@@ -41,9 +42,8 @@ class Scene:
     """A figure ready for rays; hair and clothes are left out of the second caster, `body`."""
 
     def __init__(self, figure: Figure, blockers: Mesh | None = None):
-        body, part, colour = [figure.opened.skin, *(ball.mesh for ball in figure.opened.balls)], [SKIN, EYES, EYES], []
-        meshes = [*body, figure.shirt]
-        part.append(CLOTHES)
+        body = [figure.opened.skin, *(ball.mesh for ball in figure.opened.balls)]
+        meshes, part = [*body, figure.shirt], [SKIN, EYES, EYES, CLOTHES]
         flat = [np.zeros((len(mesh.faces), 3), np.float32) for mesh in body] + [np.full((len(figure.shirt.faces), 3), figure.person.clothes, np.float32)]
         for strands in figure.strands:
             mesh = prisms(strands)
@@ -82,6 +82,7 @@ def look(scene: Scene, view: View, sun: np.ndarray | None = None, over: int = 3)
     parts[skin, LIPS], parts[skin, SKIN] = lips, 1 - lips
     in_face = np.zeros(hit.shape, np.float32)
     in_face[skin] = facial
+    in_face[hit & np.isin(scene.part[np.maximum(face, 0)], FACIAL)] = 1
     dark = np.zeros(hit.shape, np.float32)
     if sun is not None:
         a, b, c = (scene.whole.mesh.vertices[scene.whole.mesh.faces[face[hit]][:, i]] for i in range(3))
