@@ -8,6 +8,7 @@ latter smears a picture. Cameras and normals are in the head's own axes, since t
 
 from __future__ import annotations
 
+import resource
 import time
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -37,7 +38,7 @@ def film(folder: Path, name: str, figure: Figure, light: scene.Light, said: str,
     target, capture = folder / name, Capture(folder / f"{name}.wildcap")
     if (target / "skin_tone.txt").exists():  # written last
         return capture
-    began, seed = time.monotonic(), figure.person.seed
+    began, spent, seed = time.monotonic(), _spent(), figure.person.seed
     taken = phone.sample_phone(seed)
     cameras, poses = scene.camera_path(seed, frames), motion.sway(frames, taken.sway_mm, taken.sway_degrees, np.random.default_rng([seed, 71]))
     work = folder / "rendered" / name
@@ -55,8 +56,14 @@ def film(folder: Path, name: str, figure: Figure, light: scene.Light, said: str,
     total, count = sum(albedo[face].sum(0, dtype=np.float64) for albedo, face in faces.values()), sum(int(face.sum()) for _, face in faces.values())
     with replacing(target / "skin_tone.txt") as temporary:
         temporary.write_text(",".join(f"{c:.4f}" for c in images.linear_to_srgb(total / count)) + "\n", encoding="ascii")
-    print(f"{name}: {(rendered - began) / 60:.1f} min of rendering, {(time.monotonic() - rendered) / 60:.1f} min of truth and video", flush=True)
+    print(f"{name}: {(rendered - began) / 60:.1f} min of rendering ({(_spent() - spent) / 60:.1f} of a core), "
+          f"{(time.monotonic() - rendered) / 60:.1f} min of truth and video", flush=True)
     return capture
+
+
+def _spent() -> float:
+    """Seconds that the finished child processes computed, on all cores together."""
+    return sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
 
 
 def _write_truth(target: Path, figure: Figure, light: scene.Light, views: list, poses: np.ndarray) -> dict[int, tuple[np.ndarray, np.ndarray]]:
@@ -101,7 +108,7 @@ def _write_record(target: Path, figure: Figure, light: scene.Light, said: str, i
     write_json(target / "cameras.json", {
         "name": target.name, "light": said, "focal_px": scene.FOCAL * SCALE, "width": round(scene.WIDTH * SCALE), "height": round(scene.HEIGHT * SCALE),
         "person": asdict(figure.person), "phone": asdict(taken),
-        "cameras": [{"frame": k, "matrix_world": matrix.tolist(), "head_pose": pose.tolist()} for k, (matrix, pose) in enumerate(zip(inside, poses, strict=True))]})
+        "cameras": [{"frame": k, "matrix_world": inside[k].tolist(), "head_pose": poses[k].tolist()} for k in range(len(inside))]})
 
 
 def _flows(figure: Figure, cameras: np.ndarray, poses: np.ndarray) -> list[np.ndarray]:

@@ -14,12 +14,12 @@ from core.synthetic import scene
 from core.synthetic.people import filmed
 from core.synthetic.people.figure import Figure, make_figure
 
-SIDE, SAMPLES, SCALE = 360, 24, 0.5
+SIDE, SAMPLES, SCALE = 290, 24, 0.5
 SUN = np.array([0.55, -0.70, 0.46])
 SKY = (0.50, 0.54, 0.60)
 SHOTS = (  # azimuth, height in degrees, distance and the point looked at in metres, factor on the focal length, bare
-    (4.0, 2.0, 0.75, (0.0, 0.02, -0.03), 1.0, False), (40.0, 6.0, 0.75, (0.0, 0.03, -0.03), 1.0, False),
-    (14.0, 0.0, 0.55, (0.030, -0.015, 0.006), 3.0, False), (22.0, 3.0, 0.75, (0.0, 0.02, -0.03), 1.0, True))
+    (4.0, 2.0, 0.75, (0.0, 0.02, -0.03), 1.55, False), (40.0, 6.0, 0.75, (0.0, 0.03, -0.03), 1.55, False),
+    (14.0, 0.0, 0.55, (0.030, -0.015, 0.006), 4.5, False), (22.0, 3.0, 0.75, (0.0, 0.02, -0.03), 1.55, True))
 
 
 def write_sheet(out: Path, seeds: list[int], work: Path, facekit: Path | None = None, beside: Path | None = None) -> None:
@@ -32,7 +32,7 @@ def write_sheet(out: Path, seeds: list[int], work: Path, facekit: Path | None = 
     if beside:
         paths = sorted(path for path in beside.iterdir() if path.suffix in (".png", ".jpg"))[:len(SHOTS)]
         rows.append(np.concatenate([_square(images.read_srgb(path)) for path in paths], 1))
-    images.write_srgb(out, np.concatenate(rows))
+    images.write_srgb(out, np.concatenate(rows), quality=82)
 
 
 def _shots(figure: Figure, work: Path) -> list[np.ndarray]:

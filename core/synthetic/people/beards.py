@@ -14,6 +14,7 @@ from .person import Person
 from .strands import Strands, Surface, clumped, coloured, grow, waved
 
 DENSITY = {"stubble": 0.75, "moustache": 1.3, "full": 0.85}  # hairs per mm^2 where it is densest
+SIDEBURNS = [[162, 127, 234, 93, 132, 58], [389, 356, 454, 323, 361, 288]]  # from the temples down to the jaw
 RADIUS_M = {"stubble": 0.00004, "moustache": 0.00005, "full": 0.00006}
 
 
@@ -40,12 +41,21 @@ def beard(person: Person, ground: Ground, skin: Surface, rng: np.random.Generato
 
 def beard_density(kind: str, on: Canvas, rng: np.random.Generator) -> np.ndarray:
     """Where it grows on a canvas, [N] in [0, 1], with the gaps that beards have."""
-    region = regions(on)["beard"]
+    region = np.maximum(regions(on)["beard"], 0.9 * _sideburns(on)) * (1 - regions(on)["ears"])
     patchy = on.soft(lambda at: octaves(at, [16.0, 9.0], rng, smooth=True))
     if kind == "moustache":
         square = np.min([((on.position - on.landmarks[mark]) ** 2).sum(1) for mark in MOUSTACHE], axis=0)
         region = region * np.exp(-0.5 * square / 6.5**2)
     return np.clip(region * 1.5 - 0.22 + 0.10 * patchy * region, 0, 1)
+
+
+def _sideburns(on: Canvas, radius: float = 9.0) -> np.ndarray:
+    """Closeness [N] in [0, 1] to the lines before the ears."""
+    lines = [on.landmarks[a] + t * (on.landmarks[b] - on.landmarks[a]) for side in SIDEBURNS for a, b in zip(side, side[1:], strict=False)
+             for t in np.linspace(0, 1, 6)]
+    forward = np.array([0, -9.0, 0])
+    square = np.min([((on.position - at - forward) ** 2).sum(1) for at in lines], axis=0)
+    return np.exp(-0.5 * square / radius**2).astype(np.float32)
 
 
 def _ways(on: Canvas) -> np.ndarray:

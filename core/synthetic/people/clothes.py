@@ -12,9 +12,9 @@ from .person import Person
 
 AROUND = 144
 NECK = np.array([0.0, 0.075])  # x and y of the neck's axis, metres
-COLLAR_Z = -0.163  # of the shirt's upper edge at the side
+COLLAR_Z = -0.160  # of the shirt's upper edge at the side
 PROFILE = np.array([  # metres: wider than the neck at the sides, deeper than it, drop at the sides, drop in front and behind
-    (-0.001, -0.001, 0.010, 0.010), (0.000, 0.000, -0.003, -0.003), (0.003, 0.003, -0.004, -0.004), (0.005, 0.005, 0.002, 0.002), (0.006, 0.006, 0.014, 0.014),
+    (-0.005, -0.005, 0.030, 0.030), (0.000, 0.000, -0.003, -0.003), (0.003, 0.003, -0.004, -0.004), (0.005, 0.005, 0.002, 0.002), (0.006, 0.006, 0.014, 0.014),
     (0.020, 0.015, 0.022, 0.028), (0.050, 0.030, 0.036, 0.050), (0.090, 0.040, 0.052, 0.080), (0.125, 0.046, 0.070, 0.110), (0.145, 0.050, 0.100, 0.150),
     (0.150, 0.055, 0.170, 0.220), (0.150, 0.055, 0.300, 0.320)])
 ROWS = 44
@@ -26,7 +26,7 @@ def shirt(person: Person, head: Mesh) -> Mesh:
     turn = 2 * np.pi * np.arange(AROUND) / AROUND
     radius = _neck(head, turn)
     front = np.clip(-np.sin(turn), 0, 1)  # sin = -1 towards the face
-    dip = 0.020 * front**2 if person.collar == "crew" else 0.030 * front**4
+    dip = 0.010 * front**2 if person.collar == "crew" else 0.018 * front**4
     at = np.linspace(0, len(PROFILE) - 1, ROWS)
     side, deep, low, ahead = (np.interp(at, np.arange(len(PROFILE)), column)[:, None] for column in PROFILE.T)
     c, s = np.cos(turn), np.sin(turn)

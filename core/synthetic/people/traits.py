@@ -17,7 +17,7 @@ from .person import Person
 
 SYMMETRIC = 0.85, 0.95
 WAVELENGTHS_MM = [70.0, 40.0]
-FADE_MM = 4.0  # half the width of a tan line
+FADE_MM = 7.0  # half the width of a tan line
 
 
 def broad_traits(person: Person, on: Canvas) -> tuple[np.ndarray, np.ndarray]:
@@ -57,7 +57,7 @@ def _shaded(on: Canvas, rng: np.random.Generator) -> np.ndarray:
         glasses = np.maximum(glasses, np.clip((1 - reach) * 19 / FADE_MM + 0.5, 0, 1))
     collar = np.clip((at[152, 2] - rng.uniform(35, 55) - position[:, 2]) / (2 * FADE_MM) + 0.5, 0, 1)
     worn = rng.random(3) < [0.4, 0.35, 0.7]
-    return (worn[0] * 0.35 * hat + worn[1] * 0.3 * glasses + worn[2] * 0.45 * collar).astype(np.float32)
+    return (worn[0] * 0.25 * hat + worn[1] * 0.3 * glasses + worn[2] * 0.45 * collar).astype(np.float32)
 
 
 def _even_noise(on: Canvas, rng: np.random.Generator) -> np.ndarray:
