@@ -19,6 +19,7 @@ import numpy as np
 from core.contract.capture import Capture
 from core.contract.files import replacing, write_json
 from core.contract.settings import Settings
+from core.face import template
 from core.geometry import meshes, raster
 from core.imaging import images
 from core.synthetic import sample, scene
@@ -94,7 +95,7 @@ def _write_record(target: Path, figure: Figure, light: scene.Light, said: str, i
     meshes.write_obj(target / "opened.obj", figure.opened.skin)
     write_maps(target / "maps", figure.skin)
     images.write_srgb(target / "maps" / "seen_albedo.png", images.linear_to_srgb(figure.seen), bits=16)
-    for part, where in figure.growth.items():
+    for part, where in uv_parts(figure).items():
         images.write_data(target / "maps" / f"part_{part}.png", where)
     for growth in figure.strands:
         with replacing(target / f"strands_{growth.part}.npz") as temporary, open(temporary, "wb") as file:
@@ -109,6 +110,15 @@ def _write_record(target: Path, figure: Figure, light: scene.Light, said: str, i
         "name": target.name, "light": said, "focal_px": scene.FOCAL * SCALE, "width": round(scene.WIDTH * SCALE), "height": round(scene.HEIGHT * SCALE),
         "person": asdict(figure.person), "phone": asdict(taken),
         "cameras": [{"frame": k, "matrix_world": inside[k].tolist(), "head_pose": poses[k].tolist()} for k in range(len(inside))]})
+
+
+def uv_parts(figure: Figure) -> dict[str, np.ndarray]:
+    """Where each part is on the head's own map, [S, S] in [0, 1]: the growths as dense as they root, eyes as the lids cover them, skin is the face's rest."""
+    parts = {name: template.mask(name, 1024) for name in ("lips", "eyes", "skin")}
+    parts |= {name: images.resize(where, 1024, 1024) for name, where in figure.growth.items()}
+    for name in figure.growth:
+        parts["skin"] = parts["skin"] * (1 - parts[name])
+    return parts
 
 
 def _flows(figure: Figure, cameras: np.ndarray, poses: np.ndarray) -> list[np.ndarray]:

@@ -18,7 +18,7 @@ from core.synthetic.identities import reserved_seeds, subject_mesh  # noqa: E402
 from core.synthetic.people import eyes, facekit, figure, lids, person, shape, strands, traits, truth  # noqa: E402
 
 SEED = 3  # a man with cropped hair, a full beard and open eyes
-SIZE = 512
+SIZE = 256
 
 
 @pytest.fixture(scope="module")
@@ -27,9 +27,17 @@ def someone():
 
 
 @pytest.fixture(scope="module")
-def seen(someone):
-    camera = scene.looking(np.array([[0.05, -0.5, 0.0]]), np.array([[0.0, 0.0, -0.03]]), np.zeros(1))[0]
-    return truth.look(truth.Scene(someone), sample.view_of(camera, 0.25), over=2)
+def ready(someone):
+    return truth.Scene(someone)
+
+
+def view(scale):
+    return sample.view_of(scene.looking(np.array([[0.05, -0.5, 0.0]]), np.array([[0.0, 0.0, -0.03]]), np.zeros(1))[0], scale)
+
+
+@pytest.fixture(scope="module")
+def seen(ready):
+    return truth.look(ready, view(0.25), over=2)
 
 
 def test_the_identity_basis_leaves_two_millimetres_of_a_person():
@@ -94,7 +102,7 @@ def test_an_eye_is_dark_in_the_middle_coloured_around_it_and_white_outside():
 
 def test_pigment_traits_are_mostly_alike_on_both_sides():
     on = canvas(SIZE)
-    for seed in (1, 2, 3):
+    for seed in (1, 2):
         for field in traits.broad_traits(person.sample_person(seed), on):
             assert field.std() > 0.01 and 0.84 < traits.symmetry(field, on) < 0.96
 
@@ -143,18 +151,17 @@ def test_hair_is_in_what_is_seen_and_not_in_the_bare_skin(someone, seen):
     assert np.abs(seen.seen - seen.bare)[clear].mean() < 0.01
 
 
-def test_the_sun_reaches_no_eye_behind_the_head(someone):
-    camera = scene.looking(np.array([[0.0, -0.5, 0.0]]), np.array([[0.0, 0.0, -0.03]]), np.zeros(1))[0]
-    view, ready = sample.view_of(camera, 0.1), truth.Scene(someone)
-    night, day = (truth.look(ready, view, np.array([0, y, 0.0]), over=1) for y in (1.0, -1.0))
+def test_a_sun_behind_the_head_reaches_no_face(ready):
+    night, day = (truth.look(ready, view(0.1), np.array([0, y, 0.0]), over=1) for y in (1.0, -1.0))
     assert night.shadow[night.face].mean() > 0.9 > 0.5 > day.shadow[day.face].mean()
 
 
 def test_a_seed_is_one_person(someone):
-    again = figure.make_figure(SEED, SIZE)
-    assert np.array_equal(again.seen, someone.seen) and all(np.array_equal(a.points, b.points) for a, b in zip(again.strands, someone.strands, strict=True))
-    other = figure.make_figure(replace(someone.person, iris=(0.1, 0.1, 0.1)), SIZE)
-    assert np.array_equal(other.skin.diffuse, someone.skin.diffuse) and not np.array_equal(other.eye, someone.eye)
+    assert person.sample_person(SEED) == someone.person != person.sample_person(SEED + 1)
+    assert np.array_equal(shape.person_mesh(SEED).vertices, someone.head.vertices)
+    assert np.array_equal(figure.paint(someone.person, SIZE)[1], someone.seen)
+    shaven = figure.grown(replace(someone.person, beard="none", hair="none"), someone.head, someone.opened, someone.shirt)
+    assert all(np.array_equal(a.points, b.points) for a, b in zip(shaven, someone.strands, strict=False)), "each growth has a stream of its own"
 
 
 def test_training_never_draws_a_person_who_is_filmed():

@@ -12,6 +12,9 @@ from ..parameters import SkinParameters, adorned, sample_parameters
 
 IRISES = np.array([[0.022, 0.010, 0.005], [0.050, 0.024, 0.010], [0.065, 0.045, 0.018], [0.055, 0.065, 0.070], [0.048, 0.078, 0.115]])
 """Linear albedo: dark brown, brown, hazel, grey, blue."""
+BROWS = np.array([[0.013, 0.010, 0.009], [0.05, 0.03, 0.018], [0.16, 0.06, 0.02], [0.30, 0.20, 0.11], [0.42, 0.40, 0.37]])
+"""Linear albedo of black, brown, red, fair and white hair."""
+DYED = 0.2  # share of people whose brows have one of these colours, whatever their skin
 HAIR = ("none", "cropped", "short", "long")
 BEARD = ("none", "stubble", "moustache", "full")
 
@@ -57,6 +60,9 @@ def sample_person(seed: int) -> Person:
     brown = 0.25 + 0.74 * np.clip(skin.melanin / 0.12, 0, 1)
     iris = IRISES[rng.choice(5, p=np.array([0.55 * brown, 0.45 * brown, 0.3 * (1 - brown), 0.25 * (1 - brown), 0.45 * (1 - brown)]))]
     brow_colour = np.asarray(skin.hair_colour) * np.exp(rng.normal(-0.1, 0.25))  # dyed and sun-bleached hair leaves the brows as they were
+    dye = np.random.default_rng([seed, 80])
+    if dye.random() < DYED:
+        brow_colour = BROWS[dye.integers(len(BROWS))]
     bare = replace(skin, beard=0.0, brow_density=0.0, scalp_hair=0.0)
     return Person(
         seed=seed, skin=bare, male=male, iris=_tuple(iris * np.exp(rng.normal(0, 0.2))),
