@@ -36,13 +36,13 @@ from core.synthetic.skin import Skin, make_skin
 from core.worker.job import write_job
 from core.worker.runner import run_job
 
-from .people_lights import KINDS
+from .people_lights import FURTHER, KINDS
 from .shadow_captures import registered, write_views
 
 
 @dataclass(frozen=True)
 class Person:
-    """name: the group of skin tone (benchmarks/delight_measures.py) and the capture's name; light: one of people_lights.KINDS."""
+    """name: the group of skin tone (benchmarks/delight_measures.py) and the capture's name; light: one of people_lights.KINDS or FURTHER."""
 
     name: str
     seed: int
@@ -121,7 +121,7 @@ def _set(person: Person, place: str) -> tuple[scene.Light, np.ndarray]:
     if place == "studio":
         return scene.Light((1.0, 1.0, 1.0)), scene.rig()
     path = scene.camera_path(person.seed, FRAMES)
-    return (scene.Light((0.0, 0.0, 0.0), flash=FLASH_W), path[1::FLASH_EVERY]) if place == "flash" else (KINDS[person.light](person.seed), path)
+    return (scene.Light((0.0, 0.0, 0.0), flash=FLASH_W), path[1::FLASH_EVERY]) if place == "flash" else ((KINDS | FURTHER)[person.light](person.seed), path)
 
 
 def write_maps(folder: Path, skin: Skin) -> None:

@@ -50,7 +50,16 @@ def haze(seed: int) -> Light:
     return Light(panorama((0.55, 0.62, 0.75), (0.75, 0.72, 0.68), (0.16, 0.14, 0.11)), Sun(_towards(58 * side, 36), 4.0, 0.09, (1.0, 0.95, 0.87)))
 
 
+def lamp_below(seed: int) -> Light:
+    """A lamp on a table below the face, in a dim room: shading upside down, shadows that rise from nose and lips."""
+    side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
+    return Light(panorama((0.035, 0.034, 0.033), (0.04, 0.038, 0.035), (0.06, 0.045, 0.03)), lamps=(
+        Lamp((0.16 * side, -0.50, -0.48), 0.10, 8.0, (1.0, 0.74, 0.46)),))
+
+
 KINDS = {"noon sun behind leaves": noon, "overcast": overcast, "window bars": window_bars, "mixed lamps": mixed_lamps, "hazy sun": haze}
+FURTHER = {"overcast": overcast, "lamp from below": lamp_below}
+"""The lights in which every person is photographed again (benchmarks/likenesses.py)."""
 
 
 def panorama(zenith, horizon, ground) -> np.ndarray:

@@ -31,9 +31,9 @@ from core.solve.population import GROUPS, estimate_skin_tone, group, lab
 from core.solve.prior import WEIGHTS
 from core.solve.skin_tone import SkinTone
 from core.solve.tone import SIZE, estimate_from_frames, estimate_from_texture
-from core.synthetic.identities import reserved_seeds
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.pigment import reflectance
+from core.synthetic.sample import RESERVED
 from core.training.prior import HELD_OUT_SEED
 from core.training.tones import PHONES, photographed, scenes_of
 
@@ -52,7 +52,7 @@ def main() -> None:
     known = json.loads(WEIGHTS.with_suffix(".json").read_text(encoding="utf-8"))["tones"]
     rows: dict[str, list] = {"before": [], "scene": [], "measured": []}
     subjects = dict.fromkeys((name for _, name in GROUPS), 0)
-    for seed in (*sorted(reserved_seeds()), *range(HELD_OUT_SEED, HELD_OUT_SEED + MOST)):
+    for seed in (*sorted(RESERVED["seeds"]), *range(HELD_OUT_SEED, HELD_OUT_SEED + MOST)):
         if min(subjects.values()) >= asked.each:
             break
         if subjects[expected(seed)] >= asked.each:

@@ -18,7 +18,7 @@ FLOORS = (("contract",), ("imaging",), ("geometry",), ("face", "light"))
 """Rooms that the stages share, from the bottom up: each imports the floors below its own, and itself."""
 SHARED = tuple(room for floor in FLOORS for room in floor)
 STAGES = {step.module.split(".")[1] for step in (*stages.STAGES, *stages.TOOLS)}
-BPY = {"core/synthetic/render.py"}
+BPY = {"core/synthetic/render.py", "core/synthetic/people/render.py"}
 
 
 @dataclass(frozen=True)

@@ -30,4 +30,5 @@ def identity_coefficients(seed: int) -> np.ndarray:
 @cache
 def reserved_seeds() -> frozenset[int]:
     """Seeds of subjects that are kept for measuring: nothing is trained on their identity, tone, moles or pores, now or later."""
-    return frozenset(json.loads((Path(__file__).parent / "reserved.json").read_text(encoding="utf-8"))["seeds"])
+    record = json.loads((Path(__file__).parent / "reserved.json").read_text(encoding="utf-8"))
+    return frozenset(record["seeds"]).union(*(range(first, last + 1) for first, last in record["blocks"]))

@@ -14,6 +14,7 @@ import json
 import math
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -27,14 +28,19 @@ def main() -> None:
     job = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-    _settings(scene, job)
-    _add(read_obj(Path(job["head"])), "head", _skin(job["maps"]))
+    apply_settings(scene, job)
+    add_mesh(read_obj(Path(job["head"])), "head", _skin(job["maps"]))
     if job["leaves"]:
-        _add(read_obj(Path(job["leaves"])), "leaves", _plain("leaves", (0.05, 0.13, 0.03))).visible_camera = False  # they are nearer than the camera
-    _light(scene, job)
+        add_mesh(read_obj(Path(job["leaves"])), "leaves", plain("leaves", (0.05, 0.13, 0.03))).visible_camera = False  # they are nearer than the camera
+    add_lights(scene, job)
     if job["room"]:
-        _room(job["seed"])
+        add_room(job["seed"])
     _torso(job["seed"])
+    camera = add_camera(scene, job)
+    render_frames(scene, camera, job)
+
+
+def add_camera(scene: bpy.types.Scene, job: dict) -> bpy.types.Object:
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     scene.collection.objects.link(camera)
     scene.camera = camera
@@ -48,10 +54,16 @@ def main() -> None:
         flash = bpy.data.objects.new("flash", lamp)
         flash.parent = camera
         scene.collection.objects.link(flash)
+    return camera
+
+
+def render_frames(scene: bpy.types.Scene, camera: bpy.types.Object, job: dict, place: Callable[[int], None] = lambda number: None) -> None:
+    """The job's frames that do not exist yet; `place` puts what moves where it is in a frame."""
     for number in job["frames"]:
         path = Path(job["out"]) / f"{number:05d}{job['suffix']}"
         if path.exists():
             continue
+        place(number)
         camera.matrix_world = Matrix(job["cameras"][number])
         part = path.with_suffix(f".part{job['suffix']}")
         scene.render.filepath = str(part)
@@ -60,7 +72,7 @@ def main() -> None:
         print(f"frame {number}", flush=True)
 
 
-def _settings(scene: bpy.types.Scene, job: dict) -> None:
+def apply_settings(scene: bpy.types.Scene, job: dict) -> None:
     scene.render.engine = 'CYCLES'
     scene.cycles.samples = job["samples"]
     scene.cycles.use_denoising, scene.cycles.denoising_quality, scene.cycles.denoising_prefilter = True, 'FAST', 'FAST'
@@ -75,7 +87,7 @@ def _settings(scene: bpy.types.Scene, job: dict) -> None:
     scene.view_settings.view_transform = 'Standard'
 
 
-def _add(mesh: Mesh, name: str, material: bpy.types.Material) -> bpy.types.Object:
+def add_mesh(mesh: Mesh, name: str, material: bpy.types.Material) -> bpy.types.Object:
     data = bpy.data.meshes.new(name)
     data.from_pydata(mesh.vertices.tolist(), [], mesh.faces.tolist())
     if mesh.uvs is not None:
@@ -90,7 +102,7 @@ def _add(mesh: Mesh, name: str, material: bpy.types.Material) -> bpy.types.Objec
 
 def _skin(maps: dict) -> bpy.types.Material:
     """Albedo, gloss and relief as the truth says; no subsurface scattering, so that albedo means the same in the picture and in the truth."""
-    material, nodes, links, shader = _principled("skin")
+    material, nodes, links, shader = principled("skin")
 
     def texture(name: str, space: str) -> bpy.types.Node:
         node = nodes.new("ShaderNodeTexImage")
@@ -108,16 +120,16 @@ def _skin(maps: dict) -> bpy.types.Material:
     return material
 
 
-def _plain(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
-    material, _, _, shader = _principled(name)
+def plain(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
+    material, _, _, shader = principled(name)
     shader.inputs["Base Color"].default_value = (*colour, 1)
     shader.inputs["Roughness"].default_value = 0.8
     return material
 
 
-def _patterned(name: str, rng: np.random.Generator, scale: float) -> bpy.types.Material:
+def patterned(name: str, rng: np.random.Generator, scale: float) -> bpy.types.Material:
     """Two colours mixed by a random texture: corners and blobs for structure from motion."""
-    material, nodes, links, shader = _principled(name)
+    material, nodes, links, shader = principled(name)
     kind = rng.choice(["ShaderNodeTexVoronoi", "ShaderNodeTexNoise"])  # neither repeats: what repeats misleads the matching of features
     texture, ramp, place = nodes.new(kind), nodes.new("ShaderNodeValToRGB"), nodes.new("ShaderNodeTexCoord")
     links.new(place.outputs["Object"], texture.inputs["Vector"])
@@ -133,14 +145,14 @@ def _patterned(name: str, rng: np.random.Generator, scale: float) -> bpy.types.M
     return material
 
 
-def _principled(name: str):
+def principled(name: str):
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     nodes = material.node_tree.nodes
     return material, nodes, material.node_tree.links, nodes["Principled BSDF"]
 
 
-def _light(scene: bpy.types.Scene, job: dict) -> None:
+def add_lights(scene: bpy.types.Scene, job: dict) -> None:
     if job["sun"]:
         sun = bpy.data.lights.new("sun", 'SUN')
         sun.energy, sun.angle, sun.color = job["sun"]["strength"], job["sun"]["angle"], job["sun"]["colour"]
@@ -167,10 +179,10 @@ def _hang(scene: bpy.types.Scene, light: bpy.types.Light, towards: Vector, posit
     scene.collection.objects.link(thing)
 
 
-def _room(seed: int, count: int = 90) -> None:
+def add_room(seed: int, count: int = 90) -> None:
     """Boxes of all sizes around and behind the head, and a floor, all patterned."""
     rng = np.random.default_rng([seed, 23])
-    materials = [_patterned(f"pattern{k}", rng, rng.uniform(8, 40)) for k in range(14)]
+    materials = [patterned(f"pattern{k}", rng, rng.uniform(8, 40)) for k in range(14)]
     for k in range(count):
         azimuth, radius = np.radians(rng.uniform(-205, 25)) + math.pi, rng.uniform(0.8, 2.4)
         position = (radius * math.cos(azimuth), radius * math.sin(azimuth), rng.uniform(-1.0, 1.0))
@@ -178,7 +190,7 @@ def _room(seed: int, count: int = 90) -> None:
         bpy.context.object.scale = rng.uniform(0.08, 0.45, 3) * radius / 1.5
         bpy.context.object.data.materials.append(materials[k % len(materials)])
     bpy.ops.mesh.primitive_plane_add(size=12, location=(0, 0, -1.2))
-    bpy.context.object.data.materials.append(_patterned("floor", rng, 6))
+    bpy.context.object.data.materials.append(patterned("floor", rng, 6))
 
 
 def _torso(seed: int) -> None:
@@ -187,7 +199,7 @@ def _torso(seed: int) -> None:
     bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, location=(0, 0.07, -0.34))
     bpy.context.object.scale = (0.21, 0.13, 0.19)
     bpy.ops.object.shade_smooth()
-    bpy.context.object.data.materials.append(_patterned("shirt", rng, 90))
+    bpy.context.object.data.materials.append(patterned("shirt", rng, 90))
 
 
 if __name__ == "__main__":

@@ -150,10 +150,10 @@ def frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarra
     return albedo, cover, (_shrunk(in_face, over) > 0.5) & (cover > 0.99), _shrunk(dark, over) > 0.5
 
 
-def write_video(path: Path, pictures: Iterable[np.ndarray]) -> None:
-    """H.264 at scene.RATE from sRGB pictures [H, W, 3] of one size, atomically."""
+def write_video(path: Path, pictures: Iterable[np.ndarray], crf: int = 18) -> None:
+    """H.264 at scene.RATE and of quality `crf` from sRGB pictures [H, W, 3] of one size, atomically."""
     with replacing(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=Fraction(scene.RATE), options={"crf": "18", "preset": "slow"})
+        stream = container.add_stream("libx264", rate=Fraction(scene.RATE), options={"crf": str(crf), "preset": "slow"})
         stream.pix_fmt = "yuv420p"
         for picture in pictures:
             stream.height, stream.width = picture.shape[:2]

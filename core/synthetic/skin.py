@@ -43,10 +43,13 @@ def make_skin(parameters: SkinParameters | int, size: int = 1024) -> Skin:
     return paint_skin(parameters, canvas(size), canvas(GROUND))
 
 
-def paint_skin(parameters: SkinParameters, on: Canvas, ground: Canvas) -> Skin:
-    """make_skin on any canvas; `ground` is a canvas of the same head (GROUND texels wide) on which marks are strewn."""
+def paint_skin(parameters: SkinParameters, on: Canvas, ground: Canvas, traits: tuple[np.ndarray, np.ndarray] | None = None, hair: bool = True) -> Skin:
+    """make_skin on any canvas; `ground` is a canvas of the same head (GROUND texels wide) on which marks are strewn. traits: what is added to the logarithms
+    of melanin and blood [N] each; hair: whether brows, lashes, beard and scalp are painted."""
     area = regions(on)
     melanin, blood = _pigments(parameters, on, area)
+    if traits is not None:
+        melanin, blood = melanin * np.exp(traits[0]), blood * np.exp(traits[1])
     height, hollow, dry = _relief(parameters, on, ground, area)
     blood = blood * np.exp(0.12 * hollow)
     melanin = melanin * np.exp(0.20 * _contrast(parameters) * hollow)
@@ -59,9 +62,10 @@ def paint_skin(parameters: SkinParameters, on: Canvas, ground: Canvas) -> Skin:
 
     diffuse = pigment.reflectance(melanin, blood, p.oxygen, p.scattering, p.slope, p.chroma) * (1 - 0.07 * np.clip(hollow, 0, 1))[:, None]
     diffuse = adornment.made_up(diffuse, area, adornment.lid_distance(on), p.make_up, np.random.default_rng([p.adorn_seed, 11]))
-    hair, diffuse = _hair(parameters, on, ground, area, diffuse)
-    specular = _specular(parameters, on, area, hollow, dry) * (1 - 0.55 * hair)
-    height = height + 0.05 * hair
+    specular = _specular(parameters, on, area, hollow, dry)
+    if hair:
+        cover, diffuse = _hair(parameters, on, ground, area, diffuse)
+        specular, height = specular * (1 - 0.55 * cover), height + 0.05 * cover
     return Skin(on.spread(np.clip(diffuse, 0, 1)), on.spread(specular), on.spread(height.astype(np.float32)),
                 on.spread(normals(height, on)), on.covered)
 

@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Stubble, moustaches and full beards of single hairs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...geometry.noise import octaves
+from ..canvas import Canvas
+from ..regions import MOUSTACHE, regions
+from .ground import Ground, strewn, turned
+from .person import Person
+from .strands import Strands, Surface, clumped, coloured, grow, waved
+
+DENSITY = {"stubble": 0.75, "moustache": 1.3, "full": 0.85}  # hairs per mm^2 where it is densest
+SIDEBURNS = [[162, 127, 234, 93, 132, 58], [389, 356, 454, 323, 361, 288]]  # from the temples down to the jaw
+RADIUS_M = {"stubble": 0.00004, "moustache": 0.00005, "full": 0.00006}
+
+
+def beard(person: Person, ground: Ground, skin: Surface, rng: np.random.Generator) -> Strands:
+    """Hairs that leave the mouth aside and fall; a longer beard is bent down and clumps."""
+    on, kind = ground.canvas, person.beard
+    roots = strewn(ground, DENSITY[kind] * beard_density(kind, on, np.random.default_rng([person.seed, 65])), _ways(on), rng)
+    roots = turned(roots, rng.normal(0, 0.3, len(roots.at)))
+    count = len(roots.at)
+    upper = np.clip((roots.at[:, 2] - on.landmarks[0, 2] + 6) / 8, 0, 1) * (np.abs(roots.at[:, 0]) < 32)  # a moustache is kept out of the mouth
+    most = np.interp(np.abs(roots.at[:, 0]), [0, 30, 60], [1.0, 0.8, 0.45]) if kind == "full" else np.ones(count)  # full on the chin, short by the ears
+    length = person.beard_length * rng.uniform(0.55, 1.15, count) * most
+    length = np.where(upper > 0.5, np.minimum(length, 0.009 * rng.uniform(0.6, 1.1, count)), length)
+    lift = rng.normal(0.75 if kind == "stubble" else 0.6, 0.15, count).clip(0.1, 1.3)
+    steps = 4 if kind == "stubble" else 8
+    pull = np.array([0, 0.12, -0.9]) * np.clip(length / 0.02, 0, 1)[:, None] - 0.35 * roots.normal
+    points = grow(roots, length, lift, skin, pull, length * rng.uniform(0.05, 0.45, count), steps)
+    if kind != "stubble":
+        points = waved(points, roots.at, 0.12 * person.beard_length * (0.4 + person.curl), 6.0, rng)
+        points = clumped(points, 9, 0.35, rng)
+    colour = coloured(count, np.asarray(person.hair_colour) * 0.9, min(1.0, 1.4 * person.grey), rng)
+    return Strands(points, np.full(count, RADIUS_M[kind], np.float32), colour, "beard")
+
+
+def beard_density(kind: str, on: Canvas, rng: np.random.Generator) -> np.ndarray:
+    """Where it grows on a canvas, [N] in [0, 1], with the gaps that beards have."""
+    region = np.maximum(regions(on)["beard"], 0.9 * _sideburns(on)) * (1 - regions(on)["ears"])
+    patchy = on.soft(lambda at: octaves(at, [16.0, 9.0], rng, smooth=True))
+    if kind == "moustache":
+        square = np.min([((on.position - on.landmarks[mark]) ** 2).sum(1) for mark in MOUSTACHE], axis=0)
+        region = region * np.exp(-0.5 * square / 6.5**2)
+    return np.clip(region * 1.5 - 0.22 + 0.10 * patchy * region, 0, 1)
+
+
+def _sideburns(on: Canvas, radius: float = 9.0) -> np.ndarray:
+    """Closeness [N] in [0, 1] to the lines before the ears."""
+    lines = [on.landmarks[a] + t * (on.landmarks[b] - on.landmarks[a]) for side in SIDEBURNS for a, b in zip(side, side[1:], strict=False)
+             for t in np.linspace(0, 1, 6)]
+    forward = np.array([0, -9.0, 0])
+    square = np.min([((on.position - at - forward) ** 2).sum(1) for at in lines], axis=0)
+    return np.exp(-0.5 * square / radius**2).astype(np.float32)
+
+
+def _ways(on: Canvas) -> np.ndarray:
+    """Down, and away from the middle below the nose; [N, 3]."""
+    x = on.position[:, :1]
+    moustache = np.clip((on.position[:, 2:] - on.landmarks[0, 2] + 8) / 8, 0, 1) * (np.abs(x) < 34)
+    aside = np.tanh(x / 8) * (0.22 + 0.9 * moustache)
+    return aside * [1.0, 0, 0] + [0, 0, -1.0] + np.clip(-60 - on.position[:, 2:], 0, 40) / 40 * [0, -0.15, 0]

@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a person wears at the neck: a shirt with a round neck or one like a V, and the shoulders beneath."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...geometry.meshes import Mesh
+from ...geometry.noise import octaves
+from .person import Person
+
+AROUND = 144
+NECK = np.array([0.0, 0.075])  # x and y of the neck's axis, metres
+COLLAR_Z = -0.160  # of the shirt's upper edge at the side
+PROFILE = np.array([  # metres: wider than the neck at the sides, deeper than it, drop at the sides, drop in front and behind
+    (-0.005, -0.005, 0.030, 0.030), (0.000, 0.000, -0.003, -0.003), (0.003, 0.003, -0.004, -0.004), (0.005, 0.005, 0.002, 0.002), (0.006, 0.006, 0.014, 0.014),
+    (0.020, 0.015, 0.022, 0.028), (0.050, 0.030, 0.036, 0.050), (0.090, 0.040, 0.052, 0.080), (0.125, 0.046, 0.070, 0.110), (0.145, 0.050, 0.100, 0.150),
+    (0.150, 0.055, 0.170, 0.220), (0.150, 0.055, 0.300, 0.320)])
+ROWS = 44
+
+
+def shirt(person: Person, head: Mesh) -> Mesh:
+    """A ring of cloth around the neck that widens to the shoulders; without UVs."""
+    rng = np.random.default_rng([person.seed, 67])
+    turn = 2 * np.pi * np.arange(AROUND) / AROUND
+    radius = _neck(head, turn)
+    front = np.clip(-np.sin(turn), 0, 1)  # sin = -1 towards the face
+    dip = 0.010 * front**2 if person.collar == "crew" else 0.018 * front**4
+    at = np.linspace(0, len(PROFILE) - 1, ROWS)
+    side, deep, low, ahead = (np.interp(at, np.arange(len(PROFILE)), column)[:, None] for column in PROFILE.T)
+    c, s = np.cos(turn), np.sin(turn)
+    drop = low * c**2 + ahead * s**2 + dip * np.clip(1 - at / len(PROFILE), 0, 1)[:, None]
+    vertices = np.stack([NECK[0] + (radius + side) * c, NECK[1] + (radius + deep) * s, COLLAR_Z - drop], -1).reshape(-1, 3)
+    folds = octaves(1000 * vertices, [70.0, 28.0], rng, smooth=True)[:, None] * np.repeat(np.clip(side / 0.05, 0, 1), AROUND)[:, None]
+    away = vertices - [*NECK, -0.25]
+    vertices = vertices + 0.003 * folds * away / np.linalg.norm(away, axis=1, keepdims=True)
+    k, r = np.meshgrid(np.arange(AROUND), np.arange(ROWS - 1))
+    a, b = (r * AROUND + k).ravel(), (r * AROUND + (k + 1) % AROUND).ravel()
+    return Mesh(vertices, np.concatenate([np.stack([a, a + AROUND, b], 1), np.stack([b, a + AROUND, b + AROUND], 1)]))
+
+
+def _neck(head: Mesh, turn: np.ndarray) -> np.ndarray:
+    """The neck's radius [len(turn)] in metres at the shirt's edge, in each direction around its axis."""
+    near = head.vertices[np.abs(head.vertices[:, 2] - COLLAR_Z) < 0.012]
+    arm = near[:, :2] - NECK
+    at, reach = np.arctan2(arm[:, 1], arm[:, 0]), np.linalg.norm(arm, axis=1)
+    apart = np.abs((turn[:, None] - at[None] + np.pi) % (2 * np.pi) - np.pi)
+    weight = np.exp(-((apart / 0.15) ** 2))
+    return (weight * reach).sum(1) / np.maximum(weight.sum(1), 1e-9) + 0.001

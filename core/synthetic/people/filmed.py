@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Linear frames of a person: the job for render.py and the process that does it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from ...contract.files import replacing, write_json
+from ...geometry import meshes
+from ...geometry.meshes import Mesh
+from ...imaging import images
+from .. import scene
+from .figure import Figure
+
+
+def render(work: Path, figure: Figure, light: scene.Light, cameras: np.ndarray, frames: Iterable[int], samples: int, scale: float = 1.0,
+           poses: np.ndarray | None = None, room: bool = True, bare: bool = False, focal: float = 1.0) -> None:
+    """work/NNNNN.exr, linear, of these frames (numbers into cameras [N, 4, 4], camera to world); files that exist are kept.
+
+    poses: where the head is in each frame, head to world [N, 4, 4], or still; scale: of the pictures' size; room: whether there is anything behind the person;
+    bare: without hair, lashes and clothes; focal: factor on the focal length, for close-ups.
+    """
+    parts = {"skin": skin_part(work, figure.opened.skin, figure.skin.diffuse if bare else figure.seen, figure.skin.specular, figure.skin.normal)}
+    for side, ball in zip(("left", "right"), figure.opened.balls, strict=True):
+        parts[f"{side}_eye"] = _written(work, f"{side}_eye", ball.mesh, "eyes", figure.eye)
+    strands = []
+    if not bare:
+        parts["shirt"] = _written(work, "shirt", figure.shirt, "cloth", np.full((2, 2, 3), figure.person.clothes, np.float32))
+        strands = [_write_strands(work, growth) for growth in figure.strands]
+    render_parts(work, figure.person.seed, parts, strands, light, cameras, frames, samples, scale, poses, room, focal)
+
+
+def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Path], light: scene.Light, cameras: np.ndarray, frames: Iterable[int],
+                 samples: int, scale: float = 1.0, poses: np.ndarray | None = None, room: bool = True, focal: float = 1.0) -> None:
+    """As `render`, of meshes and strands that are files already."""
+    work.mkdir(parents=True, exist_ok=True)
+    if light.blockers:
+        meshes.write_obj(work / "leaves.obj", light.blockers)
+    sky = light.sky
+    if isinstance(sky, np.ndarray):
+        images.write_linear(work / "sky.exr", sky)
+        sky = str(work / "sky.exr")
+    still = np.tile(np.eye(4), (len(cameras), 1, 1))
+    write_json(work / "job.json", {
+        "seed": seed, "room": room, "meshes": parts, "strands": [str(path) for path in strands],
+        "leaves": str(work / "leaves.obj") if light.blockers else None, "suffix": ".exr", "out": str(work), "frames": list(frames), "samples": samples,
+        "cameras": cameras.tolist(), "poses": (still if poses is None else poses).tolist(),
+        "sun": asdict(light.sun) | {"direction": light.sun.direction.tolist()} if light.sun else None, "sky": sky,
+        "lamps": [asdict(lamp) for lamp in light.lamps], "flash": light.flash,
+        "width": round(scene.WIDTH * scale), "height": round(scene.HEIGHT * scale), "focal_px": scene.FOCAL * scale * focal})
+    subprocess.run([sys.executable, "-m", "core.synthetic.people.render", str(work / "job.json")], cwd=Path(__file__).parents[3], check=True,
+                   stdout=subprocess.DEVNULL)
+
+
+def skin_part(work: Path, mesh: Mesh, albedo: np.ndarray, specular: np.ndarray, normal: np.ndarray) -> dict:
+    """A skin for render_parts: a mesh with UVs, its linear albedo [S, S, 3], Specular IOR Level [S, S] and unit tangent normals [S, S, 3]."""
+    part = _written(work, "skin", mesh, "skin", albedo)
+    images.write_data(work / "specular.png", specular, bits=16)
+    images.write_data(work / "normal.png", normal / 2 + 0.5, bits=16)
+    return part | {"specular": str(work / "specular.png"), "normal": str(work / "normal.png")}
+
+
+def _written(work: Path, name: str, mesh: Mesh, kind: str, albedo: np.ndarray) -> dict:
+    """A mesh and its albedo as files, and what the job says of them."""
+    work.mkdir(parents=True, exist_ok=True)
+    uv = np.zeros((len(mesh.faces), 3, 2)) if mesh.uvs is None else mesh.uvs[mesh.face_uvs]
+    with replacing(work / f"{name}.npz") as temporary, open(temporary, "wb") as file:
+        np.savez(file, vertices=mesh.vertices, faces=mesh.faces, uv=uv)
+    images.write_srgb(work / f"{name}.png", images.linear_to_srgb(albedo), bits=16)
+    return {"mesh": str(work / f"{name}.npz"), "kind": kind, "albedo": str(work / f"{name}.png")}
+
+
+def _write_strands(work: Path, growth) -> Path:
+    path = work / f"strands_{growth.part}.npz"
+    with replacing(path) as temporary, open(temporary, "wb") as file:
+        np.savez(file, points=growth.points, radius=growth.taper(), colour=growth.colour)
+    return path

@@ -1,0 +1,202 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A closed head cut open at the lids, with sockets and eyeballs behind them, from core/assets/face_units.npz (see NOTICE.md there).
+
+The lips stay closed. The head's triangles keep their numbers, so what is painted in its UVs stays where it was.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from ...face import template
+from ...geometry.meshes import Mesh
+
+SOFT = 0
+"""Kind of an inner vertex that goes with the rim before it; 1 and 2 are the left and the right eyeball."""
+CORNEA_BULGE, CORNEA_ANGLE = 0.06, 0.52  # of the asset's eyeballs: share of the radius, radians
+CLEAR_M = 0.0004  # between ball and lid
+REST_M = -0.003, 0.010  # how far an eyeball may lie behind the place that its surroundings give it
+
+
+@dataclass(frozen=True)
+class Ball:
+    """centre [3] metres; radius in metres; gaze [3] unit; mesh: its vertices, with UVs whose distance from the middle (0.5, 0.5) grows with the angle from
+    the pupil: 0.5 (angle / pi)^0.6."""
+
+    centre: np.ndarray
+    radius: float
+    gaze: np.ndarray
+    mesh: Mesh
+
+
+@dataclass(frozen=True)
+class OpenHead:
+    """skin: the head and its sockets in the template's UVs, the template's triangles first; balls: the left and the right eye; rims: upper and lower edge of
+    the left and the right lids as vertex numbers [N], from the inner corner outwards."""
+
+    skin: Mesh
+    balls: tuple[Ball, Ball]
+    rims: tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+def open_lids(head: Mesh, openness: float, gaze: np.ndarray) -> OpenHead:
+    """head: a closed head in the template's topology; openness in [0, 1]: 0 shut, 1 as far as MakeHuman opens them; gaze [2]: degrees that both eyes turn to
+    the person's left and up."""
+    unit = _asset()
+    rest = np.concatenate([head.vertices, head.vertices[unit.copies], _carried(unit, head)])
+    balls = []
+    for side in (0, 1):
+        ball = _ball(unit, head, side, gaze)
+        rows, moves = unit.opens[side]
+        rest[rows] = _outside(rest[rows] + openness * moves * _scale(unit, head), ball)
+        soft = unit.soft_of[side]
+        rest[soft] = _outside(rest[soft], ball)
+        balls.append(ball)
+    return OpenHead(_skin(unit, head, rest), tuple(balls), unit.rims)
+
+
+@dataclass(frozen=True)
+class _Asset:
+    """Of the eyes only: copies [C] the vertex that each doubles; corners [n, 3] triangle, corner, copy; faces [G, 3] and uvs [P, 2] of the sockets; parts
+    [P, 3]; anchors, weights [P, 6]; opens: rows and moves for the left and the right lids; soft_of: the rows of each socket; balls [2, 4]; ball meshes."""
+
+    copies: np.ndarray
+    corners: np.ndarray
+    faces: np.ndarray
+    uvs: np.ndarray
+    parts: np.ndarray
+    anchors: np.ndarray
+    weights: np.ndarray
+    opens: tuple
+    soft_of: tuple
+    balls: np.ndarray
+    ball_meshes: tuple
+    rims: tuple
+
+
+@cache
+def _asset() -> _Asset:
+    with np.load(template.ASSETS / "face_units.npz", allow_pickle=False) as stored:
+        z = {name: stored[name] for name in stored.files}
+    step, count, copies = float(z["step"]), int(z["head_vertices"]), z["copies"].astype(int)
+    lids = z["seam"] > 0
+    number = np.full(count + len(copies) + len(z["kind"]), -1)  # of the file's vertices here
+    number[:count] = np.arange(count)
+    number[count:count + len(copies)] = np.where(lids, count + np.cumsum(lids) - 1, copies)
+    first, parts = count + len(copies), z["parts"] * step
+    socket = np.flatnonzero((z["kind"] == SOFT) & (parts[:, 2] > -0.02))
+    number[first + socket] = count + lids.sum() + np.arange(len(socket))
+    quads = z["faces"].astype(int)
+    triangles = np.concatenate([quads[:, :3], quads[quads[:, 3] >= 0][:, [0, 2, 3]]])
+    inside = np.isin(triangles, first + socket).any(1) & (number[triangles] >= 0).all(1)
+    rows = np.cumsum(z["rows_eyesOpenLeft"].astype(int))
+    moves = z["moves_eyesOpenLeft"].T * step
+    mirror = z["mirror"].astype(int)
+    opens = []
+    for r, m in ((rows, moves), (mirror[rows], moves * [-1, 1, 1])):
+        kept = number[r] >= 0
+        opens.append((number[r[kept]], m[kept]))
+    weights = z["weights"][socket].astype(np.float64)
+    corners = z["corners"][number[z["corners"][:, 2]] >= count].copy()
+    corners[:, 2] = number[corners[:, 2]]
+    soft = count + lids.sum() + np.arange(len(socket))
+    return _Asset(copies[lids], corners, number[triangles[inside]], z["uvs"][socket].astype(np.float64), parts[socket], z["anchors"][socket].astype(int),
+                  weights / weights.sum(1, keepdims=True), tuple(opens), (soft[parts[socket, 0] > 0], soft[parts[socket, 0] <= 0]),
+                  z["balls"].astype(np.float64), tuple(_ball_mesh(z, first, parts, kind) for kind in (1, 2)), _rims(z, copies[lids], count))
+
+
+def _ball_mesh(z: dict, first: int, parts: np.ndarray, kind: int) -> Mesh:
+    """One eyeball as the asset has it."""
+    rows = np.flatnonzero(z["kind"] == kind)
+    number = np.full(len(z["kind"]), -1)
+    number[rows] = np.arange(len(rows))
+    quads = z["faces"].astype(int) - first
+    quads = quads[(quads[:, :3] >= 0).all(1)]
+    quads = quads[(number[quads[:, :3]] >= 0).all(1)]
+    triangles = number[np.concatenate([quads[:, :3], quads[quads[:, 3] >= 0][:, [0, 2, 3]]])]
+    return Mesh(parts[rows], triangles, z["uvs"][rows].astype(np.float64), triangles)
+
+
+def _rims(z: dict, doubled: np.ndarray, count: int) -> tuple:
+    """The edges of the lids, each from the nose outwards, without the corners."""
+    vertices, seam = template.load().vertices, z["seam"][z["seam"] > 0]
+    result = []
+    for side in (1, 2):
+        here = np.flatnonzero(seam == side)
+        here = here[np.argsort(np.abs(vertices[doubled[here], 0]))]
+        result.append((doubled[here], count + here))
+    return tuple(result)
+
+
+def _carried(unit: _Asset, head: Mesh) -> np.ndarray:
+    """The sockets' vertices [P, 3] on another head: moved as the rims before them are."""
+    shift = head.vertices - template.load().vertices
+    return unit.parts + (unit.weights[..., None] * shift[unit.anchors]).sum(1)
+
+
+def _scale(unit: _Asset, head: Mesh) -> float:
+    """How much wider the head's eyes are than the template's."""
+    rim = np.concatenate([upper for upper, _ in unit.rims])
+    return float(np.ptp(head.vertices[rim, 0]) / np.ptp(template.load().vertices[rim, 0]))
+
+
+def _ball(unit: _Asset, head: Mesh, side: int, gaze: np.ndarray) -> Ball:
+    """An eyeball moved as the lids before it are, then back along its gaze until the closed lids clear it, and turned."""
+    rest, (x, y, z, radius) = template.load().vertices, unit.balls[side]
+    centre = np.array([x, y, z])
+    arm = rest - centre
+    near = np.flatnonzero((np.linalg.norm(arm, axis=1) < 1.35 * radius) & (arm[:, 1] < -0.3 * radius))
+    moved = centre + (head.vertices[near] - rest[near]).mean(0)
+    radius = radius * _scale(unit, head)
+    turn = _turned(np.radians(gaze))
+
+    def clearance(back: float) -> float:
+        v = head.vertices[near] - (moved + [0, back, 0])
+        length = np.linalg.norm(v, axis=1)
+        return float((length - _surface(v / length[:, None], np.array([0, -1.0, 0]), radius)).min())
+
+    low, high = REST_M
+    for _ in range(20):
+        middle = (low + high) / 2
+        low, high = (low, middle) if clearance(middle) > CLEAR_M else (middle, high)
+    moved = moved + [0, high, 0]
+    mesh = unit.ball_meshes[side]
+    vertices = moved + (mesh.vertices - centre) @ turn.T * (radius / unit.balls[side, 3])
+    return Ball(moved, float(radius), turn @ [0, -1, 0], mesh.moved(vertices))
+
+
+def _surface(direction: np.ndarray, gaze: np.ndarray, radius: float) -> np.ndarray:
+    """Distance of an eyeball's surface, cornea and all, from its centre along unit directions [N, 3]."""
+    angle = np.arccos(np.clip(direction @ gaze, -1, 1))
+    return radius * (1 + CORNEA_BULGE * np.clip(1 - (angle / CORNEA_ANGLE) ** 2, 0, None))
+
+
+def _outside(points: np.ndarray, ball: Ball) -> np.ndarray:
+    """Points [N, 3] pushed out of the front of an eyeball."""
+    v = points - ball.centre
+    length = np.linalg.norm(v, axis=1, keepdims=True)
+    v = v / length
+    short = np.clip(_surface(v, ball.gaze, ball.radius) + CLEAR_M - length[:, 0], 0, 0.003) * (v[:, 1] < -0.2)
+    return points + v * short[:, None]
+
+
+def _skin(unit: _Asset, head: Mesh, vertices: np.ndarray) -> Mesh:
+    """The head's triangles, parted at the lids, then those of the sockets with the UVs of the skin beside them."""
+    faces = head.faces.copy()
+    faces[unit.corners[:, 0], unit.corners[:, 1]] = unit.corners[:, 2]
+    uv_of = np.zeros((len(vertices), 2))
+    uv_of[faces] = head.uvs[head.face_uvs]
+    uv_of[-len(unit.uvs):] = unit.uvs
+    uvs = np.concatenate([head.uvs, uv_of[unit.faces].reshape(-1, 2)])
+    face_uvs = np.concatenate([head.face_uvs, len(head.uvs) + np.arange(3 * len(unit.faces)).reshape(-1, 3)])
+    return replace(head, vertices=vertices, faces=np.concatenate([faces, unit.faces]), uvs=uvs, face_uvs=face_uvs)
+
+
+def _turned(radians: np.ndarray) -> np.ndarray:
+    """The rotation [3, 3] of an eye that looks along -y to the person's left (+x) and up."""
+    (c, s), (d, t) = (np.cos(radians[0]), np.sin(radians[0])), (np.cos(radians[1]), np.sin(radians[1]))
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.array([[1, 0, 0], [0, d, t], [0, -t, d]])

@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hairs as polylines: where they root, how they grow along and off the skin, how they clump; Cycles draws them as curves, the CPU as slim prisms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.noise import noise
+
+
+@dataclass(frozen=True)
+class Strands:
+    """One growth of hair. points float32 [M, K, 3] in metres from the root to the tip; radius float32 [M] in metres at the root, a third of it at the tip;
+    colour float32 [M, 3] linear albedo; part: its name among parts.PARTS."""
+
+    points: np.ndarray
+    radius: np.ndarray
+    colour: np.ndarray
+    part: str
+
+    def taper(self) -> np.ndarray:
+        """Radii [M, K] in metres."""
+        return self.radius[:, None] * np.linspace(1, 1 / 3, self.points.shape[1], dtype=np.float32)
+
+
+@dataclass(frozen=True)
+class Roots:
+    """Where hairs begin: position [M, 3] in metres, normal and direction [M, 3] unit, at [M, 3] the same places on the template in millimetres."""
+
+    position: np.ndarray
+    normal: np.ndarray
+    direction: np.ndarray
+    at: np.ndarray
+
+    def of(self, kept: np.ndarray) -> Roots:
+        return Roots(self.position[kept], self.normal[kept], self.direction[kept], self.at[kept])
+
+
+class Surface:
+    """What hairs may not enter: the nearest of a mesh's vertices stands for the skin."""
+
+    def __init__(self, mesh: Mesh):
+        self.vertices, self.normals = mesh.vertices, vertex_normals(mesh)
+        self.tree = cKDTree(mesh.vertices)
+
+    def height(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far points [N, 3] are above the skin, [N] in metres, and its normals there [N, 3]."""
+        distance, near = self.tree.query(points, 3)
+        weight = 1 / (distance + 1e-4)
+        weight /= weight.sum(1, keepdims=True)
+        normal = (weight[..., None] * self.normals[near]).sum(1)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+        foot = (weight[..., None] * self.vertices[near]).sum(1)
+        return ((points - foot) * normal).sum(1), normal
+
+
+def grow(roots: Roots, length: np.ndarray, lift: np.ndarray, skin: Surface, pull: np.ndarray, clearance: np.ndarray, steps: int) -> np.ndarray:
+    """Points float32 [M, steps, 3]: each hair of `length` [M] metres leaves the skin at angle `lift` [M] radians along its root's direction, is bent by `pull`
+    [M, 3] or [3] (per length of the hair), and stays `clearance` [M] metres above the skin, less near its root."""
+    lift = lift[:, None]
+    way = np.cos(lift) * roots.direction + np.sin(lift) * roots.normal
+    step = length[:, None] / (steps - 1)
+    points = [roots.position]
+    for k in range(1, steps):
+        way = way + np.broadcast_to(pull, way.shape) / (steps - 1)
+        way = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
+        there = points[-1] + way * step
+        height, normal = skin.height(there)
+        short = np.maximum(clearance * min(1.0, 3 * k / (steps - 1)) - height, 0)[:, None]
+        there = there + short * normal
+        inward = np.minimum((way * normal).sum(1, keepdims=True), 0)
+        way = np.where(short > 0, way - 0.9 * inward * normal, way)
+        points.append(there)
+    return np.stack(points, 1).astype(np.float32)
+
+
+def clumped(points: np.ndarray, each: int, strength: float, rng: np.random.Generator) -> np.ndarray:
+    """Hairs [M, K, 3] drawn towards one in `each` of them, the more the nearer to the tip; `strength` in [0, 1]."""
+    if len(points) < 2 * each:
+        return points
+    leaders = rng.choice(len(points), len(points) // each, replace=False)
+    leader = leaders[cKDTree(points[leaders, 0]).query(points[:, 0])[1]]
+    along = np.linspace(0, 1, points.shape[1], dtype=np.float32)[None, :, None]
+    share = strength * rng.uniform(0.4, 1.0, (len(points), 1, 1)).astype(np.float32) * along**1.3
+    return points * (1 - share) + points[leader] * share
+
+
+def waved(points: np.ndarray, at: np.ndarray, amplitude: float, wavelength_mm: float, rng: np.random.Generator, alone: float = 0.35) -> np.ndarray:
+    """Hairs [M, K, 3] rooted `at` [M, 3] mm that bend aside by `amplitude` metres at their tips: neighbours alike, each `alone` of it in its own way."""
+    along = np.linspace(0, 1, points.shape[1], dtype=np.float32)[None, :, None]
+    length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(1)[:, None, None]
+    out = points
+    for turn, share in ((1.0, 1.0), (2.3, 0.45)):
+        phase = 2 * noise(at, wavelength_mm, rng)[:, None, None] + alone * rng.normal(size=(len(points), 1, 1))
+        aside = np.stack([noise(at, 1.5 * wavelength_mm, rng) for _ in range(3)], 1) + alone * rng.normal(size=(len(points), 3))
+        out = out + share * amplitude * along * np.sin(2 * np.pi * turn * along * np.clip(length / 0.05, 0.4, 3) + phase) * aside[:, None]
+    return out.astype(np.float32)
+
+
+def coloured(count: int, colour: np.ndarray, grey: float, rng: np.random.Generator) -> np.ndarray:
+    """Albedos float32 [count, 3] about `colour` [3] linear, a share `grey` of the hairs without pigment."""
+    shade = np.exp(rng.normal(0, 0.22, (count, 1)) + rng.normal(0, 0.05, (count, 3)))
+    white = np.array([0.42, 0.40, 0.37]) * np.exp(rng.normal(0, 0.15, (count, 1)))
+    return np.where(rng.random((count, 1)) < grey, white, np.clip(colour * shade, 0.003, 0.8)).astype(np.float32)
+
+
+def moved(strands: Strands, shift) -> Strands:
+    """The same hairs with their points [M, K, 3] as `shift` maps them."""
+    return replace(strands, points=np.asarray(shift(strands.points), np.float32))
+
+
+def prisms(strands: Strands, sides: int = 3) -> Mesh:
+    """The hairs as prisms without caps: what a CPU's rays hit. Triangle t belongs to hair t // (2 sides (K - 1))."""
+    points, radius = strands.points.astype(np.float64), strands.taper().astype(np.float64)
+    count, knots = points.shape[:2]
+    way = np.gradient(points, axis=1)
+    way /= np.maximum(np.linalg.norm(way, axis=2, keepdims=True), 1e-12)
+    across = np.cross(way, np.where(np.abs(way[..., 2:]) < 0.9, [0, 0, 1.0], [1.0, 0, 0]))
+    across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-12)
+    other = np.cross(way, across)
+    turn = 2 * np.pi * np.arange(sides) / sides
+    ring = np.cos(turn)[:, None] * across[:, :, None] + np.sin(turn)[:, None] * other[:, :, None]  # [M, K, sides, 3]
+    vertices = points[:, :, None] + radius[:, :, None, None] * ring
+    k, s = np.meshgrid(np.arange(knots - 1), np.arange(sides), indexing="ij")
+    a, b, c, d = k * sides + s, k * sides + (s + 1) % sides, (k + 1) * sides + s, (k + 1) * sides + (s + 1) % sides
+    one = np.stack([np.stack([a, c, b], -1), np.stack([b, c, d], -1)], 2).reshape(-1, 3)
+    faces = (np.arange(count)[:, None, None] * knots * sides + one).reshape(-1, 3)
+    return Mesh(vertices.reshape(-1, 3), faces)

@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a camera sees of a person before there is light, by rays on the CPU: albedo with and without what grows and is worn, parts, normals, shadow.
+
+Strands are slim prisms here and curves in Cycles; neither Blender nor a GPU is needed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...face import template
+from ...geometry import raster
+from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.views import View
+from ..sample import together
+from .figure import PARTS, Figure
+from .strands import prisms
+
+SKIN, LIPS, EYES, CLOTHES = (PARTS.index(name) for name in ("skin", "lips", "eyes", "clothes"))
+FACIAL = [PARTS.index(name) for name in ("brows", "lashes", "beard")]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """seen, bare float32 [h, w, 3]: linear albedo as it is seen, and of the skin and eyes below hair and clothes; alpha [h, w]; parts [h, w, len(PARTS)]: how
+    much of a pixel each part covers; face bool [h, w]: the face with its brows and beard, without the eyes and what head hair or clothes hide;
+    normal [h, w, 3] of the head, unit, in its own axes; shadow bool [h, w]: where the sun does not reach."""
+
+    seen: np.ndarray
+    bare: np.ndarray
+    alpha: np.ndarray
+    parts: np.ndarray
+    face: np.ndarray
+    normal: np.ndarray
+    shadow: np.ndarray
+
+
+class Scene:
+    """A figure ready for rays; hair and clothes are left out of the second caster, `body`."""
+
+    def __init__(self, figure: Figure, blockers: Mesh | None = None):
+        body = [figure.opened.skin, *(ball.mesh for ball in figure.opened.balls)]
+        meshes, part = [*body, figure.shirt], [SKIN, EYES, EYES, CLOTHES]
+        flat = [np.zeros((len(mesh.faces), 3), np.float32) for mesh in body] + [np.full((len(figure.shirt.faces), 3), figure.person.clothes, np.float32)]
+        for strands in figure.strands:
+            mesh = prisms(strands)
+            meshes.append(mesh)
+            part.append(PARTS.index(strands.part))
+            flat.append(np.repeat(strands.colour, len(mesh.faces) // len(strands.colour), 0))
+        self.figure = figure
+        self.part = np.concatenate([np.full(len(mesh.faces), p, np.int8) for mesh, p in zip(meshes, part, strict=True)])
+        self.colour = np.concatenate(flat)
+        self.uv = np.concatenate([mesh.uvs[mesh.face_uvs] for mesh in body])
+        self.body = raster.RayCaster(_joined(body))
+        self.normals = vertex_normals(self.body.mesh)
+        whole = _joined(meshes)
+        self.whole = raster.RayCaster(whole)
+        self.opaque = raster.RayCaster(together(whole, blockers)) if blockers else self.whole
+
+    def albedo(self, face: np.ndarray, bary: np.ndarray, skin: np.ndarray) -> np.ndarray:
+        """Linear albedo [N, 3] of what rays hit, `skin` [S, S, 3] being the skin's."""
+        out = self.colour[face]
+        for part, picture in ((SKIN, skin), (EYES, self.figure.eye)):
+            here = self.part[face] == part
+            uv = (self.uv[face[here]] * bary[here, :, None]).sum(1)
+            out[here] = raster.sample(picture, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * len(picture))
+        return out
+
+
+def look(scene: Scene, view: View, sun: np.ndarray | None = None, over: int = 3) -> Truth:
+    """The truth through a view in the head's own axes; sun: unit direction to it, in the same axes; `over`: rays along a pixel's side."""
+    face, bary, _ = raster.render_view(scene.whole, view, over)
+    hit = face >= 0
+    seen, parts = np.zeros((*hit.shape, 3), np.float32), np.zeros((*hit.shape, len(PARTS)), np.float32)
+    seen[hit] = scene.albedo(face[hit], bary[hit], scene.figure.seen)
+    parts[hit, scene.part[face[hit]]] = 1
+    skin = hit & (scene.part[np.maximum(face, 0)] == SKIN)
+    lips, facial = (_of_uv(scene, name, face[skin], bary[skin]) for name in ("lips", "face"))
+    parts[skin, LIPS], parts[skin, SKIN] = lips, 1 - lips
+    in_face = np.zeros(hit.shape, np.float32)
+    in_face[skin] = facial
+    in_face[hit & np.isin(scene.part[np.maximum(face, 0)], FACIAL)] = 1
+    dark = np.zeros(hit.shape, np.float32)
+    if sun is not None:
+        a, b, c = (scene.whole.mesh.vertices[scene.whole.mesh.faces[face[hit]][:, i]] for i in range(3))
+        normal = np.cross(b - a, c - a)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        points = a * bary[hit, :1] + b * bary[hit, 1:2] + c * bary[hit, 2:]
+        dark[hit] = (normal @ sun <= 0) | scene.opaque.blocked(points + 5e-4 * normal, np.repeat(sun[None], hit.sum(), 0))
+    bare, normal = _bare(scene, view, over)
+    cover = _shrunk(hit.astype(np.float32), over)
+    return Truth(_shrunk(seen, over) / np.maximum(cover, 1e-6)[..., None], bare, cover, _shrunk(parts, over), (_shrunk(in_face, over) > 0.5) & (cover > 0.99),
+                 normal, _shrunk(dark, over) > 0.5)
+
+
+def _bare(scene: Scene, view: View, over: int) -> tuple[np.ndarray, np.ndarray]:
+    """Albedo and normals [h, w, 3] each, without hair and clothes."""
+    face, bary, _ = raster.render_view(scene.body, view, over)
+    hit = face >= 0
+    colour, normal = np.zeros((*hit.shape, 3), np.float32), np.zeros((*hit.shape, 3), np.float32)
+    colour[hit] = scene.albedo(face[hit], bary[hit], scene.figure.skin.diffuse)
+    normal[hit] = raster.interpolate(scene.normals, scene.body.mesh.faces, face[hit], bary[hit])
+    cover, normal = _shrunk(hit.astype(np.float32), over)[..., None], _shrunk(normal, over)
+    return _shrunk(colour, over) / np.maximum(cover, 1e-6), normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+
+
+def _of_uv(scene: Scene, name: str, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
+    uv = (scene.uv[face] * bary[..., None]).sum(1)
+    return raster.sample(template.mask(name, 1024), np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 1024)
+
+
+def _joined(meshes: list[Mesh]) -> Mesh:
+    first = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate([mesh.faces + k for mesh, k in zip(meshes, first, strict=False)]))
+
+
+def _shrunk(image: np.ndarray, factor: int) -> np.ndarray:
+    """The mean of each factor x factor block."""
+    h, w = image.shape[0] // factor, image.shape[1] // factor
+    return image[:h * factor, :w * factor].reshape(h, factor, w, factor, *image.shape[2:]).mean((1, 3))
