@@ -26,7 +26,7 @@ from core.contract.settings import QUALITIES
 from core.face import template
 from core.imaging import images
 
-from . import figures, people
+from . import figures, freeze, people
 from .albedo_score import looks
 from .measures.table import Column, Scores, summarise, to_markdown, to_record
 from .pages import write_page
@@ -84,6 +84,8 @@ def main() -> int:
     asked = parser.parse_args()
     folder = asked.folder.resolve()
     truths = (asked.truths or folder).resolve()
+    if asked.run and (folder / freeze.RECORD).is_file():
+        parser.error(f"{folder} is what benchmarks/freeze.py kept, and stays as it is. Run a copy of it.")
     if asked.run:
         for path in sorted(folder.glob("*.wildcap")):
             if path.stem.startswith(tuple(asked.only)) and (truths / path.stem / "skin_tone.txt").is_file():
