@@ -26,7 +26,7 @@ from core.contract.settings import QUALITIES
 from core.face import template
 from core.imaging import images
 
-from . import figures, freeze, people
+from . import figures, freeze, people, state_scores
 from .albedo_score import looks
 from .measures.table import Column, Scores, summarise, to_markdown, to_record
 from .pages import write_page
@@ -128,7 +128,7 @@ def measure(captures: list[Filmed]) -> tuple[Scores, dict[str, dict[str, Figures
 def seen_in_pictures(filmed: Filmed, answers: dict[str, np.ndarray]) -> dict[str, Figures]:
     """`in_pictures` of a capture, kept with what it was made from: the maps, the truth and the measures' own code."""
     sources = {"inputs": {path.name: hash_file(path) for path in filmed.inputs()}, "truth": hash_tree(filmed.truth / "albedo"), "methods": list(answers),
-               "code": {path.name: hash_file(path) for path in sorted(Path(__file__).parent.glob("measures/*.py")) + [Path(in_pictures.__code__.co_filename)]}}
+               "code": {path.name: hash_file(path) for path in sorted(Path(__file__).parent.glob("measures/*.py")) + [Path(state_scores.__file__)]}}
     kept = filmed.work / f"{filmed.name}.json"
     if kept.is_file() and (stored := json.loads(kept.read_text(encoding="utf-8")))["sources"] == json.loads(json.dumps(sources)):
         return stored["figures"]

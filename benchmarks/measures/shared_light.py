@@ -50,13 +50,12 @@ def fit_light(ratios: list[np.ndarray], normals: list[np.ndarray]) -> SharedLigh
     share = np.concatenate([np.full(len(r), 1 / len(r)) for r in ratios])
     weight, coefficients = share, np.zeros(9)
     for _ in range(ROUNDS):
-        before = coefficients
-        root = np.sqrt(weight)[:, None]
-        coefficients = np.linalg.lstsq(basis * root, value * root[:, 0], rcond=1e-9)[0]
+        before, weighted = coefficients, basis * weight[:, None]
+        coefficients = np.linalg.pinv(weighted.T @ basis, rcond=1e-10, hermitian=True) @ (weighted.T @ value)
         rest = np.abs(value - basis @ coefficients)
         scale = max(TO_DEVIATION * float(np.median(rest)), 1e-9)
         weight = share * np.minimum(1, HUBER * scale / np.maximum(rest, 1e-12))
-        if np.abs(coefficients - before).max() < 1e-6:
+        if np.abs(coefficients - before).max() < 1e-5:
             break
     light = basis @ coefficients
     middle = (share * light).sum() / share.sum()
