@@ -55,7 +55,7 @@ def _photograph(seed: int, light: int, group: str, work: Path) -> Photograph:
     path = work / "portraits" / f"{seed}_{light}.npz"
     if not path.is_file():
         print(f"\rportrait of subject {seed}", end="", file=sys.stderr, flush=True)
-        stage, sight = portrait_parts(seed)
+        stage, sight = portrait_parts(seed, SIZE)
         made = relit(sight, stage, np.random.default_rng([seed, 41, light]))
         with replacing(path) as temporary:
             np.savez_compressed(temporary, **{name: np.round(255 * np.clip(p, 0, 1)).astype(np.uint8) if name == "srgb" else np.float16(p)
@@ -67,7 +67,7 @@ def _photograph(seed: int, light: int, group: str, work: Path) -> Photograph:
 
 
 @lru_cache(maxsize=1)
-def portrait_parts(seed: int, size: int = SIZE) -> tuple[LightStage, Sight]:
+def portrait_parts(seed: int, size: int) -> tuple[LightStage, Sight]:
     """The light stage of a subject, and the subject as its camera sees it in a picture of side `size`."""
     stage, skin = light_stage(subject_mesh(seed)), make_skin(adorned(sample_parameters(seed), seed), TEXELS)
     return stage, sight_of(stage, skin, np.random.default_rng([seed, 40, 0]), size)

@@ -108,7 +108,6 @@ def make(person: Person, folder: Path, place: str = "wild") -> Capture:
         _write_truth(truth, frame, albedo, alpha, face, shadow if light.sun else None)
         total, count = total + albedo[face].sum(0, dtype=np.float64), count + int(face.sum())
     views = [sample.view_of(matrix, SCALE) for matrix in cameras]
-    capture.claim()
     write_views(capture, views, _developed(work, len(cameras), faces, person.seed), min(Settings().frames.views, len(views)))
     sample.write_video(truth / "capture.mp4", _developed(work, len(cameras), faces, person.seed))
     meshes.write_obj(capture.head, registered(head, person.seed))

@@ -3,7 +3,7 @@
 """The captures that benchmarks/state.py measures, as maps in the UVs of their heads: the answers, the truth as their own cameras show it, and the normals.
 
 A folder holds NAME.wildcap and beside it, or in another folder, NAME/ with the truth (benchmarks/albedo_score.py says its layout; head.obj, the true head,
-tells which captures show the same person; parts/PART.png are masks in the head's UVs, where there are any).
+tells which captures show the same person; maps/part_NAME.png are masks in the head's UVs, where there are any).
 """
 
 from __future__ import annotations
@@ -98,9 +98,11 @@ class Filmed:
         return unfolded.spread(unfolded.normals @ rotation_between(self.head.mesh.vertices, template.load().vertices).T)
 
     def parts(self) -> dict[str, np.ndarray]:
-        """Part -> bool [SIZE, SIZE]: the truth's own masks where it has any, else those of the built-in head. Skin is what no other part has."""
-        own = {path.stem: images.read_mask(path) for path in sorted((self.truth / "parts").glob("*.png"))}
-        found = {name: images.resize(mask, SIZE, SIZE) > 0.5 for name, mask in ({name: template.mask(name, SIZE) for name in PARTS} | own).items()}
+        """Part -> bool [SIZE, SIZE]: the truth's own masks where it has any, else those of the built-in head, where they are at least half as dense as
+        where they are densest. Skin is what no other part has."""
+        own = {path.stem.removeprefix("part_"): images.read_mask(path) for path in sorted((self.truth / "maps").glob("part_*.png"))}
+        soft = {name: images.resize(mask, SIZE, SIZE) for name, mask in ({name: template.mask(name, SIZE) for name in PARTS} | own).items()}
+        found = {name: mask > 0.5 * max(float(mask.max()), 1e-3) for name, mask in soft.items()}
         others = np.logical_or.reduce([mask for name, mask in found.items() if name != "skin"])
         return {**found, "skin": found["skin"] & ~others}
 

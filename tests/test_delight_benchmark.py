@@ -131,7 +131,7 @@ def test_a_portrait_is_made_once_and_is_its_albedo_in_some_light(tmp_path, monke
     for name, value in {"SIZE": 96, "TEXELS": 128, "subjects_by_tone": lambda count: {"tan": [9110]}}.items():
         monkeypatch.setattr(delight_portraits, name, value)
     (made,) = delight_portraits.portraits(tmp_path, lights=1).photographs
-    monkeypatch.setattr(delight_portraits, "_sight", None)
+    monkeypatch.setattr(delight_portraits, "portrait_parts", None)
     (kept,) = delight_portraits.portraits(tmp_path, lights=1).photographs
     assert np.array_equal(made.srgb, kept.srgb) and np.array_equal(made.truth.albedo, kept.truth.albedo)
     face = made.truth.face

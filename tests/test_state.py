@@ -127,6 +127,18 @@ def test_captures_of_one_true_head_are_one_person(tmp_path):
     assert [(filmed.name, filmed.person) for filmed in found] == [("anna", "anna"), ("anna_flash", "anna"), ("ben", "ben"), ("scan", "scan")]
 
 
+def test_a_subjects_own_parts_come_before_the_built_in_heads(tmp_path):
+    filled(tmp_path, "anna", "A")
+    beard, brows = np.zeros((64, 64), np.float32), np.zeros((64, 64), np.float32)
+    beard[40:50, 20:40], brows[20:24, 20:40] = 0.4, 1.0  # as thin as it grows
+    for name, mask in (("beard", beard), ("brows", brows)):
+        images.write_data(tmp_path / "anna" / "maps" / f"part_{name}.png", mask)
+    parts = state_captures.find(tmp_path, tmp_path, tmp_path / "state")[0].parts()
+    assert parts["beard"][SIZE * 45 // 64, SIZE * 30 // 64] and parts["beard"].sum() == pytest.approx(200 * (SIZE / 64) ** 2, rel=0.15)
+    assert parts["brows"].sum() == pytest.approx(80 * (SIZE / 64) ** 2, rel=0.2) and parts["lips"].any()
+    assert not (parts["skin"] & (parts["beard"] | parts["brows"] | parts["lips"])).any() and parts["skin"].any()
+
+
 def test_normals_are_in_the_axes_of_the_head():
     turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
     points = np.random.default_rng(0).normal(size=(40, 3))

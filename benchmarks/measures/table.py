@@ -87,7 +87,7 @@ def to_record(found: dict[str, dict[str, Cell]], scores: Scores) -> dict:
 def _mean_text(cell: Cell | None, column: Column) -> str | None:
     if cell is None:
         return None
-    return f"{cell.mean:.{column.digits}f}" + ("" if cell.spread is None else f" ± {cell.spread:.{column.digits}f}")
+    return f"{round(cell.mean, column.digits) + 0.0:.{column.digits}f}" + ("" if cell.spread is None else f" ± {cell.spread:.{column.digits}f}")
 
 
 def _difference_text(cell: Cell | None, column: Column) -> str | None:
