@@ -163,6 +163,15 @@ def test_figures_in_pictures_are_kept_until_something_changes(tmp_path, monkeypa
     assert len(calls) == 2
 
 
+def test_a_capture_that_cannot_be_solved_is_named_and_the_others_go_on(tmp_path, monkeypatch, capsys):
+    def fail(capture, truth, until, quality):
+        raise SystemExit("There is no head.")
+
+    monkeypatch.setattr(state.people, "solve", fail)
+    state.run_chain(Capture(tmp_path / "anna.wildcap"), tmp_path / "anna", "draft")
+    assert capsys.readouterr().err == "anna: There is no head.\n"
+
+
 def test_the_page_says_what_the_solve_adds():
     row = {"psnr": 30.0, "psnr_shared": 31.0}
     text = state.by_capture_table({"anna": {DELIT: row, SOLVED: {"psnr": 30.5, "psnr_shared": 30.75}}, "ben": {DELIT: row}})
