@@ -22,10 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import av
-import cv2
 import numpy as np
-from flip_evaluator import evaluate as flip_evaluate
-from skimage.metrics import structural_similarity
 
 from core.contract.capture import Capture
 from core.contract.frame_records import read_frames
@@ -36,6 +33,7 @@ from core.geometry.views import read_views
 from core.imaging import images
 
 from .figures import markdown, write
+from .measures.pictures import detail, differences, face_box, log_green, shadow_step, with_gain
 
 LABELS = {"WildCap": "**WildCap**", "raw video": "the raw video", "flat true tone": "the true tone everywhere"}
 
@@ -142,53 +140,6 @@ def compare(predicted: np.ndarray, true: Truth, mask: np.ndarray) -> dict:
     figures["detail"] = detail(log, log_true, mask)
     figures["shadow_step"] = shadow_step(log - log_true, mask, true.shadow) if true.shadow is not None else math.nan
     return figures
-
-
-def face_box(mask: np.ndarray) -> tuple[slice, slice]:
-    """Rows and columns about a mask [H, W], by a margin wider than any of the measures' filters."""
-    return tuple(slice(max(side[0] - 40, 0), side[-1] + 41) for side in (np.flatnonzero(mask.any(axis)) for axis in (1, 0)))
-
-
-def with_gain(predicted: np.ndarray, true: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """sRGB [H, W, 3] after the gain per channel, in linear light, that gives it the truth's mean over the mask."""
-    linear_true, linear = images.srgb_to_linear(true), images.srgb_to_linear(predicted)
-    return images.linear_to_srgb(linear * (linear_true[mask].mean(0) / np.maximum(linear[mask].mean(0), 1e-6)))
-
-
-def log_green(srgb: np.ndarray) -> np.ndarray:
-    """sRGB [H, W, 3] -> logarithm of linear green [H, W]."""
-    return np.log(np.maximum(images.srgb_to_linear(srgb)[..., 1], 1e-3))
-
-
-def differences(predicted: np.ndarray, true: np.ndarray, mask: np.ndarray) -> dict:
-    """PSNR in dB, SSIM and FLIP of sRGB pictures [H, W, 3] over a mask, both grey outside of it."""
-    a, b = (np.where(mask[..., None], picture, 0.5).astype(np.float64) for picture in (predicted, true))
-    error = ((a - b)[mask] ** 2).mean()
-    _, ssim = structural_similarity(a, b, channel_axis=2, data_range=1.0, full=True)
-    flip, _, _ = flip_evaluate(b.astype(np.float32), a.astype(np.float32), "LDR", applyMagma=False, computeMeanError=False)
-    return {"psnr": float(-10 * np.log10(max(error, 1e-12))), "ssim": float(ssim[mask].mean()), "flip": float(np.squeeze(flip)[mask].mean())}
-
-
-def detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray) -> float:
-    """Correlation of two logarithms [H, W] between 1 and 3 px; 0 where the first is flat."""
-    inner = cv2.erode(mask.astype(np.uint8), np.ones((15, 15))) > 0
-    bands = []
-    for picture in (log, log_true):
-        picture = np.where(mask, picture, picture[mask].mean()).astype(np.float64)
-        bands.append((cv2.GaussianBlur(picture, (0, 0), 1) - cv2.GaussianBlur(picture, (0, 0), 3))[inner])
-    return float(np.corrcoef(bands)[0, 1]) if bands[0].std() > 1e-9 else 0.0
-
-
-def shadow_step(residual: np.ndarray, mask: np.ndarray, shadow: np.ndarray) -> float:
-    """Median of log(predicted / true) [H, W] along the lit side of the shadow's edge less the dark side's; nan where the boundary is too short to speak of."""
-    sides = [residual[band & mask] for band in edge_bands(shadow)]
-    return float(np.median(sides[0]) - np.median(sides[1])) if min(map(len, sides)) > 500 else math.nan
-
-
-def edge_bands(shadow: np.ndarray) -> list[np.ndarray]:
-    """The pixels 4 to 12 px from the edge of a shadow, bool [H, W]: on the lit side and on the dark one."""
-    distances = [cv2.distanceTransform(side.astype(np.uint8), cv2.DIST_L2, 5) for side in (~shadow, shadow)]
-    return [(distance > 4) & (distance < 12) for distance in distances]
 
 
 def mean_scores(results: list[dict]) -> dict:

@@ -35,10 +35,10 @@ from core.contract.settings import Settings
 from core.imaging import images
 
 from . import figures
-from .albedo_score import with_gain
 from .delight_measures import flat_tone, mean_of, score, sheet, shortfalls, square, table, tone_group
 from .delight_portraits import portraits
 from .delight_sets import Photograph, Photographs, frames, light_stage, registered
+from .measures.pictures import with_gain
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 SAMPLE = Path(__file__).resolve().parents[1] / "core" / "synthetic" / "sample"

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What benchmarks/delight.py measures of a delit picture, and the tables and sheets it makes of many.
 
-All figures are those of benchmarks/albedo_score.py after one gain per channel in linear light, so that neither the tone nor the light's colour counts.
+All figures are those of benchmarks/measures/pictures.py after one gain per channel in linear light, so that neither the tone nor the light's colour counts.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from core.imaging import images
 from core.synthetic import pigment
 
 from .ablation_measures import feature_distance
-from .albedo_score import Truth, detail, differences, edge_bands, face_box, log_green, shadow_step, with_gain
+from .albedo_score import Truth
+from .measures.pictures import detail, differences, edge_bands, face_box, log_green, shadow_step, with_gain
 
 FIGURES = ("psnr", "ssim", "flip", "features", "detail", "shadow_step")
 HIGHER_IS_BETTER = ("psnr", "ssim", "detail")

@@ -14,9 +14,10 @@ from core.contract.files import replacing
 from core.imaging import images
 from core.synthetic import pigment
 from core.synthetic.identities import subject_mesh
-from core.synthetic.olat import light_stage
+from core.synthetic.olat import LightStage, light_stage
 from core.synthetic.parameters import adorned, sample_parameters
 from core.synthetic.portrait import relit, sight_of
+from core.synthetic.sight import Sight
 from core.synthetic.skin import make_skin
 
 from .albedo_score import Truth
@@ -54,7 +55,7 @@ def _photograph(seed: int, light: int, group: str, work: Path) -> Photograph:
     path = work / "portraits" / f"{seed}_{light}.npz"
     if not path.is_file():
         print(f"\rportrait of subject {seed}", end="", file=sys.stderr, flush=True)
-        stage, sight = _sight(seed)
+        stage, sight = portrait_parts(seed, SIZE)
         made = relit(sight, stage, np.random.default_rng([seed, 41, light]))
         with replacing(path) as temporary:
             np.savez_compressed(temporary, **{name: np.round(255 * np.clip(p, 0, 1)).astype(np.uint8) if name == "srgb" else np.float16(p)
@@ -66,7 +67,7 @@ def _photograph(seed: int, light: int, group: str, work: Path) -> Photograph:
 
 
 @lru_cache(maxsize=1)
-def _sight(seed: int):
-    """The light stage of a subject, and the subject as its camera sees it."""
+def portrait_parts(seed: int, size: int) -> tuple[LightStage, Sight]:
+    """The light stage of a subject, and the subject as its camera sees it in a picture of side `size`."""
     stage, skin = light_stage(subject_mesh(seed)), make_skin(adorned(sample_parameters(seed), seed), TEXELS)
-    return stage, sight_of(stage, skin, np.random.default_rng([seed, 40, 0]), SIZE)
+    return stage, sight_of(stage, skin, np.random.default_rng([seed, 40, 0]), size)

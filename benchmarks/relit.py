@@ -35,7 +35,7 @@ from core.synthetic.pigment import LUMINANCE
 from core.synthetic.skin import make_skin
 
 from . import figures
-from .albedo_score import differences, face_box
+from .measures.pictures import differences, face_box
 from .people import PEOPLE, write_maps
 from .relit_maps import face_mask, read_rows, read_worn, write_row
 from .relit_renders import MARGIN

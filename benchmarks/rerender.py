@@ -26,8 +26,9 @@ from core.imaging import images
 
 from . import figures
 from .ablation_measures import feature_distance
-from .albedo_score import Look, Truth, differences, face_box, with_gain
+from .albedo_score import Look, Truth
 from .comparison import LIGHTS, OURS, row_folder
+from .measures.pictures import differences, face_box, with_gain
 from .people import PEOPLE
 
 ROWS = (OURS, *LIGHTS)

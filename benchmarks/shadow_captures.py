@@ -106,6 +106,7 @@ def _photograph(capture: Capture, mesh: Mesh, texture: np.ndarray, rng: np.rando
 def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarray], selected: int | None = None) -> None:
     """frames/ with frames.json, and cameras/: sRGB pictures [H, W, 3] with the known cameras that took them, which share one lens; so many of them, evenly
     spread, are selected for the texture, or all."""
+    capture.claim()
     taken = np.linspace(0, len(views) - 1, selected or len(views)).round().astype(int)
     model = pycolmap.Reconstruction()
     model.add_camera_with_trivial_rig(views[0].camera)

@@ -10,10 +10,11 @@ import pytest
 
 pytest.importorskip("flip_evaluator")
 
-from benchmarks import albedo_score, delight, delight_portraits  # noqa: E402
+from benchmarks import delight, delight_portraits  # noqa: E402
 from benchmarks.albedo_score import Truth  # noqa: E402
 from benchmarks.delight_measures import FIGURES, flat_tone, mean_of, score, shortfalls, table, tone_group  # noqa: E402
 from benchmarks.delight_sets import Photograph, Photographs, light_stage  # noqa: E402
+from benchmarks.measures import pictures  # noqa: E402
 from core.contract.messages import Problem  # noqa: E402
 from core.contract.settings import Settings  # noqa: E402
 from core.imaging import images  # noqa: E402
@@ -130,7 +131,7 @@ def test_a_portrait_is_made_once_and_is_its_albedo_in_some_light(tmp_path, monke
     for name, value in {"SIZE": 96, "TEXELS": 128, "subjects_by_tone": lambda count: {"tan": [9110]}}.items():
         monkeypatch.setattr(delight_portraits, name, value)
     (made,) = delight_portraits.portraits(tmp_path, lights=1).photographs
-    monkeypatch.setattr(delight_portraits, "_sight", None)
+    monkeypatch.setattr(delight_portraits, "portrait_parts", None)
     (kept,) = delight_portraits.portraits(tmp_path, lights=1).photographs
     assert np.array_equal(made.srgb, kept.srgb) and np.array_equal(made.truth.albedo, kept.truth.albedo)
     face = made.truth.face
@@ -141,7 +142,7 @@ def test_a_portrait_is_made_once_and_is_its_albedo_in_some_light(tmp_path, monke
 @pytest.mark.skipif(not FACEOLAT.is_dir(), reason="the light stage's photographs are not at hand")
 @pytest.mark.parametrize(("person", "raw", "flat"), [("049", (20.16, 0.722), (24.87, 0.864)), ("071", (21.27, 0.798), (25.46, 0.878))])
 def test_the_floors_of_the_light_stage(monkeypatch, person, raw, flat):
-    monkeypatch.setattr(albedo_score, "flip_evaluate", lambda true, *_, **__: (np.zeros(true.shape[:2]), 0, {}))  # slow, and not what is asked
+    monkeypatch.setattr(pictures, "flip_evaluate", lambda true, *_, **__: (np.zeros(true.shape[:2]), 0, {}))  # slow, and not what is asked
     photographs = [p for p in light_stage(FACEOLAT).photographs if p.group == person]
     none = mean_of([score(p.srgb, p.srgb, p.truth, features=False) for p in photographs])
     true = photographs[0].truth

@@ -1,0 +1,36 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Skin, brows, lips and beard scored apart: a mean over a face is a mean over its skin, and hides what became of the rest.
+
+All parts share the one gain per channel of the whole face: a brow that is bleached is an error, not a tone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .shared_light import log_ratio
+from .tone import squared_error, to_decibels, to_tone
+
+LEAST_TEXELS = 100
+
+
+@dataclass(frozen=True)
+class PartScore:
+    """psnr in dB, in sRGB; bias: median of the grey log(answer / truth), above 0 where the part is too bright; deviation: its standard deviation within
+    the part; texels: how many there are."""
+
+    psnr: float
+    bias: float
+    deviation: float
+    texels: int
+
+
+def score_parts(answer: np.ndarray, truth: np.ndarray, parts: dict[str, np.ndarray]) -> dict[str, PartScore]:
+    """Linear colours of the face's texels [N, 3]; parts: bool [N] each. Parts of few texels are left out."""
+    toned = to_tone(answer, truth.mean(0))
+    ratio = log_ratio(toned, truth)
+    return {name: PartScore(to_decibels(squared_error(toned[where], truth[where])), float(np.median(ratio[where])), float(ratio[where].std()), int(where.sum()))
+            for name, where in parts.items() if where.sum() >= LEAST_TEXELS}

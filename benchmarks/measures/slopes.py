@@ -1,0 +1,29 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Two slopes that tell skin from light, on pairs of pictures that differ in one of them alone.
+
+Change only the pigment: the answer's albedo should follow (slope 1). Change only the light: it should not (slope 0). Doing nothing scores 1 and 1, a flat
+colour 0 and 0; no answer that treats pigment and light alike can score better than one number for both.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+DARKEST = 1e-3
+
+
+def slope(answers: tuple[np.ndarray, np.ndarray], causes: tuple[np.ndarray, np.ndarray], where: np.ndarray) -> float | None:
+    """How far the change between two answers follows the change between their causes: least squares over the pixels `where` bool [H, W], all channels.
+
+    answers: two albedos; causes: the two true albedos, or the two pictures; linear [H, W, 3]. Changes are of logarithms, each channel about its mean, for
+    a gain is not judged. None where the causes hardly differ (by less than 1 % in deviation).
+    """
+    moved, cause = (_change(pair, where) for pair in (answers, causes))
+    return float((moved * cause).sum() / (cause * cause).sum()) if cause.std() > 0.01 else None
+
+
+def _change(pair: tuple[np.ndarray, np.ndarray], where: np.ndarray) -> np.ndarray:
+    one, other = (np.log(np.maximum(np.asarray(linear)[where], DARKEST)) for linear in pair)
+    change = (other - one).astype(np.float64)
+    return change - change.mean(0)

@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The captures that benchmarks/state.py measures, as maps in the UVs of their heads: the answers, the truth as their own cameras show it, and the normals.
+
+A folder holds NAME.wildcap and beside it, or in another folder, NAME/ with the truth (benchmarks/albedo_score.py says its layout; head.obj, the true head,
+tells which captures show the same person; maps/part_NAME.png are masks in the head's UVs, where there are any).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from core.contract.capture import Capture
+from core.contract.hashes import hash_file
+from core.contract.messages import Problem
+from core.contract.settings import Settings
+from core.face import template
+from core.face.head import Head, read_head
+from core.geometry.raster import interpolate
+from core.imaging import images
+
+from .controlled_captures import true_frames
+from .measures.references import BLUR, FLAT, NOTHING, TRUE, blur_divided_out, flat_colour
+
+SIZE = 512
+"""Side of the maps on which measures in UV space are taken: a texel is about half a millimetre."""
+SEEN = 0.3
+"""Least confidence of a texture, of the delit and of the true frames', at texels that count."""
+DELIT, SOLVED = "delit texture", "solved"
+METHODS = (NOTHING, FLAT, BLUR, TRUE, DELIT, SOLVED)
+PARTS = ("skin", "brows", "lips", "eyes")
+
+
+@dataclass(frozen=True)
+class Filmed:
+    """One capture with its truth; person: the name of the first capture, in order of names, of the same true head; work: where what is made of it is kept."""
+
+    name: str
+    person: str
+    capture: Capture
+    truth: Path
+    work: Path
+
+    @cached_property
+    def head(self) -> Head:
+        """Raises Problem for a head whose UVs are not the built-in one's: parts and landmarks are known there alone."""
+        head = read_head(self.capture)
+        if not head.built_in:
+            raise Problem(f"{self.capture.root} has an own head.", "Measure captures of the built-in head.")
+        return head
+
+    @cached_property
+    def true_capture(self) -> Capture:
+        """A copy whose delit frames are the true albedo, up to its texture; made once, and again where the head or the cameras changed."""
+        copy, same = Capture(self.work / f"{self.name}.wildcap"), ("head.obj", "cameras/cameras.bin", "cameras/images.bin")
+        if copy.texture_confidence.is_file() and any(hash_file(copy.root / name) != hash_file(self.capture.root / name) for name in same):
+            copy.texture_confidence.unlink()
+        return true_frames(self.capture, self.truth, copy, Settings())
+
+    def inputs(self) -> list[Path]:
+        """The files that the figures of this capture depend on, but for the truth's pictures."""
+        capture = self.capture
+        return [path for path in (capture.head, capture.texture_filmed, capture.texture, capture.texture_confidence, capture.maps / "diffuse_albedo.png",
+                                  capture.maps / "confidence.png", self.truth / "cameras.json", self.truth / "head.obj") if path.is_file()]
+
+    @cached_property
+    def truth_map(self) -> np.ndarray:
+        """The texture of the true albedo frames, linear [S, S, 3] at its own size."""
+        return images.read_linear(self.true_capture.texture)
+
+    @cached_property
+    def where(self) -> np.ndarray:
+        """bool [SIZE, SIZE]: texels of the face that the capture and its true frames saw well."""
+        seen = [images.resize(images.read_data(capture.texture_confidence)[..., 0], SIZE, SIZE) > SEEN for capture in (self.capture, self.true_capture)]
+        return (template.mask("face", SIZE) > 0.5) & seen[0] & seen[1]
+
+    def answer(self, method: str) -> np.ndarray | None:
+        """What a method takes for the albedo, linear [S, S, 3]; None where the capture was not taken so far."""
+        if method == TRUE:
+            return self.truth_map
+        path = {DELIT: self.capture.texture, SOLVED: self.capture.maps / "diffuse_albedo.png"}.get(method, self.capture.texture_filmed)
+        if not path.is_file():
+            return None
+        answer = images.read_linear(path)
+        if method in (FLAT, BLUR):
+            where = images.resize(self.where.astype(np.float32), len(answer), len(answer)) > 0.5
+            return (flat_colour if method == FLAT else blur_divided_out)(answer, where)
+        return answer
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Unit normals [SIZE, SIZE, 3] in the axes of the built-in head, however the capture's world lies; zero off the head."""
+        unfolded = self.head.unfold(SIZE)
+        return unfolded.spread(unfolded.normals @ rotation_between(self.head.mesh.vertices, template.load().vertices).T)
+
+    def parts(self) -> dict[str, np.ndarray]:
+        """Part -> bool [SIZE, SIZE]: the truth's own masks where it has any, else those of the built-in head, where they are at least half as dense as
+        where they are densest. Skin is what no other part has."""
+        own = {path.stem.removeprefix("part_"): images.read_mask(path) for path in sorted((self.truth / "maps").glob("part_*.png"))}
+        soft = {name: images.resize(mask, SIZE, SIZE) for name, mask in ({name: template.mask(name, SIZE) for name in PARTS} | own).items()}
+        found = {name: mask > 0.5 * max(float(mask.max()), 1e-3) for name, mask in soft.items()}
+        others = np.logical_or.reduce([mask for name, mask in found.items() if name != "skin"])
+        return {**found, "skin": found["skin"] & ~others}
+
+
+def find(folder: Path, truths: Path, work: Path) -> list[Filmed]:
+    """The captures of a folder that have a texture and a truth, in order of their names."""
+    pairs = [(path.stem, Capture(path), truths / path.stem) for path in sorted(folder.glob("*.wildcap"))]
+    pairs = [(name, capture, truth) for name, capture, truth in pairs if capture.texture.is_file() and (truth / "albedo").is_dir()]
+    first: dict[str, str] = {}
+    return [Filmed(name, first.setdefault(_true_head(truth), name), capture, truth, work) for name, capture, truth in pairs]
+
+
+def landmarks_in_uv(size: int = SIZE) -> np.ndarray:
+    """The 468 landmarks on a map of the built-in head, [468, 2] in texels."""
+    mesh, (face, bary) = template.load(), template.landmarks()
+    uv = interpolate(mesh.uvs, mesh.face_uvs, face, bary)
+    return np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * size
+
+
+def rotation_between(points: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """The rotation [3, 3] that brings points [N, 3] nearest to others of the same order (Kabsch 1976)."""
+    u, _, vt = np.linalg.svd((points - points.mean(0)).T @ (others - others.mean(0)))
+    return vt.T @ np.diag([1, 1, np.sign(np.linalg.det(vt.T @ u.T))]) @ u.T
+
+
+def _true_head(truth: Path) -> str:
+    """What tells two people apart: the true head, or the truth itself where it has none."""
+    return hash_file(truth / "head.obj") if (truth / "head.obj").is_file() else str(truth)
