@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
+from ...core.contract.messages import Problem
 from ...core.worker import problem_report
 from ...core.worker.background import Task
 from .. import captures, jobs, preferences, problems
@@ -33,6 +34,8 @@ class WILDCAP_OT_save_report(BaseOperator, bpy.types.Operator):
         return {'RUNNING_MODAL'}
 
     def work(self, context):
+        if not self.filepath:
+            raise Problem("No file was chosen for the report.", "Click Save Report and say where it goes.")
         target, python = Path(bpy.path.abspath(self.filepath)), preferences.python()
         item = captures.active(context)
         capture = captures.folder(item) if item is not None else None
