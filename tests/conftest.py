@@ -115,7 +115,8 @@ def wildcap(enabled_extension):
 
 @pytest.fixture
 def addon(wildcap):
-    """import_module inside the add-on."""
+    """import_module inside the add-on, in which no job of another test is left."""
+    import_module(f"{wildcap}.wildcap_addon.jobs")._jobs.clear()
     return lambda name: import_module(f"{wildcap}.wildcap_addon.{name}")
 
 

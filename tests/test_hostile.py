@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A hundred hostile inputs, other ones each time: each is met with a good end or a refusal that names it. And the judge of them finds what is wrong."""
+"""Hostile inputs: each is met with a good end or a refusal that names it. And the judge of them finds what is wrong."""
 
 import json
+import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -22,9 +22,10 @@ from benchmarks.hostile_run import Ended  # noqa: E402
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def test_a_hundred_hostile_inputs_do_no_harm():
-    seed = time.time_ns() % 10**6
-    command = [sys.executable, "-m", "benchmarks.hostile", "--count", "100", "--seed", str(seed), "--until", "scan", "--delighter", "none"]
+def test_hostile_inputs_do_no_harm():
+    """The same ones each time, until a thousand others have gone by without a fault; WILDCAP_HOSTILE=COUNT:SEED tries others."""
+    count, _, seed = os.environ.get("WILDCAP_HOSTILE", "30:1").partition(":")
+    command = [sys.executable, "-m", "benchmarks.hostile", "--count", count, "--seed", seed, "--until", "scan", "--delighter", "none"]
     ended = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
     assert ended.returncode == 0, ended.stdout[-4000:] + ended.stderr[-2000:]
 

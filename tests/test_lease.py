@@ -17,6 +17,8 @@ from core.contract.capture import Capture
 from core.contract.files import replacing, write_json
 from core.contract.messages import Problem
 
+from . import kept_capture
+
 RACES = int(os.environ.get("WILDCAP_RACES", 300))
 
 
@@ -133,6 +135,7 @@ from core.contract import lease
 from core.contract.capture import Capture
 from core.contract.files import write_json
 from core.contract.messages import Problem
+
 lease.TERM_S = 0.5
 capture = Capture({str(capture.root)!r})
 with capture.locked():
@@ -203,3 +206,18 @@ def test_never_two_inside(capture, beginning):
         assert 0 in codes, f"nobody got in: {codes} in race {race}"
         assert not capture.lock.exists() and not list(capture.root.glob("lock*"))
     assert failures == 0
+
+
+@pytest.mark.parametrize("kind", ["dangling link", "link to itself", "folder", "pipe"])
+def test_what_is_no_lock_is_refused_by_name_and_not_waited_for(tmp_path, kind):
+    capture = kept_capture.make(tmp_path / "a.wildcap")
+    if kind == "folder":
+        capture.lock.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(capture.lock)
+    else:
+        capture.lock.symlink_to("nowhere" if kind == "dangling link" else capture.lock.name)
+    for ask in (capture.check_free, lambda: capture.locked().__enter__()):
+        with pytest.raises(Problem, match="is in the way"):
+            ask()
+    assert os.path.lexists(capture.lock)

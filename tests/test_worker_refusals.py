@@ -111,3 +111,9 @@ def finish(task) -> Failed | Done:
         messages += task.poll()
         time.sleep(0.01)
     return messages[-1]
+
+
+def test_a_job_file_that_asks_for_what_cannot_be_is_named(tmp_path):
+    (tmp_path / "job.json").write_text('{"capture": ".", "source": "", "settings": {"registration": -1}}')
+    with pytest.raises(Problem, match="job.json cannot be used: The settings of the stage registration are no object"):
+        read_job(tmp_path / "job.json")

@@ -56,6 +56,7 @@ def check_lease(root: Path) -> None:
 
 def holder(path: Path) -> dict | None:
     """Who holds the lease in the file `path`, as far as can be told at once: None where nobody does, or a process that has ended."""
+    _refuse_stranger(path)
     found = _read(path)
     return None if found is None or found and is_gone(found) else found
 
@@ -66,6 +67,12 @@ def refuse(found: dict, path: Path) -> Problem:
         return Problem("Another worker is just beginning to work on this capture.", f"Wait a moment and try again; if nobody works on it, delete {path}.")
     return Problem(f"Another worker (process {found['pid']} on {str(found['host']).partition('/')[0]}, since {found['since']}) is working on this capture.",
                    f"Wait for it or cancel it there; if it is gone, delete {path}.")
+
+
+def _refuse_stranger(path: Path) -> None:
+    """Raises Problem for a link, a folder or a pipe under the lock's name, which no worker has put there and none can give back."""
+    if path.is_symlink() or path.exists() and not path.is_file():
+        raise Problem(f"{path} is in the way: it is no lock of WildCap's.", "Move it away, or delete it.")
 
 
 @contextlib.contextmanager
@@ -110,6 +117,7 @@ def _make(lease: Lease) -> bool:
 def _wait_out(path: Path, tell: Callable[[str], None]) -> tuple[dict, tuple | None] | None:
     """What the lease says that can be taken over, and its stamp: its holder has ended, or a term went by without a refresh. None where it was given back.
     Raises Problem when it is held."""
+    _refuse_stranger(path)
     first, began, told = _stamp(path), time.monotonic(), False
     while True:
         found = _read(path)
