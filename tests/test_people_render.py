@@ -24,7 +24,7 @@ EVEN = scene.Light((1.0, 1.0, 1.0))
 
 @pytest.fixture(scope="module")
 def pictured(tmp_path_factory):
-    """A bald man in a green shirt with stubble, blue eyes and black brows: two linear frames of 180 x 240 under an even light of radiance 1, and their truth."""
+    """A bald man in a green shirt with stubble, blue eyes and black brows: two linear frames under an even light of radiance 1, and their truth."""
     asked = replace(person.sample_person(5), male=True, hair="none", beard="stubble", beard_length=0.002, openness=0.95, gaze=(0.0, 0.0), iris=IRIS,
                     brow=1.0, brow_colour=tuple(person.BROWS[0]), clothes=SHIRT, shade=0.0)
     someone = figure.make_figure(asked, 512)
