@@ -15,7 +15,6 @@ from .strands import Strands, Surface, clumped, coloured, grow, waved
 
 DENSITY = {"stubble": 0.75, "moustache": 1.3, "full": 0.85}  # hairs per mm^2 where it is densest
 SIDEBURNS = [[162, 127, 234, 93], [389, 356, 454, 323]]  # from the temples down before the ears
-FORWARD_MM = np.array([0, -9.0, 0])  # of the middle of the hair from those lines
 RADIUS_M = {"stubble": 0.00004, "moustache": 0.00005, "full": 0.00006}
 
 
@@ -66,9 +65,11 @@ def _moustache(on: Canvas) -> np.ndarray:
 
 def _sideburns(on: Canvas, radius: float = 9.0) -> np.ndarray:
     """Closeness [N] in [0, 1] to the lines before the ears."""
-    lines = [on.landmarks[a] + t * (on.landmarks[b] - on.landmarks[a]) + FORWARD_MM for side in SIDEBURNS for a, b in zip(side, side[1:], strict=False)
+    lines = [on.landmarks[a] + t * (on.landmarks[b] - on.landmarks[a]) for side in SIDEBURNS for a, b in zip(side, side[1:], strict=False)
              for t in np.linspace(0, 1, 6)]
-    return on.soft(lambda at: np.exp(-0.5 * np.min([((at - line) ** 2).sum(1) for line in lines], axis=0) / radius**2))
+    forward = np.array([0, -9.0, 0])
+    square = np.min([((on.position - at - forward) ** 2).sum(1) for at in lines], axis=0)
+    return np.exp(-0.5 * square / radius**2).astype(np.float32)
 
 
 def _ways(on: Canvas) -> np.ndarray:
