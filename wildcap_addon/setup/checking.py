@@ -29,7 +29,7 @@ def judge(python: Path, importing: bool) -> str:
 def refuse(python: Path, faults: list[str]) -> None:
     if faults:
         raise Problem(f"{python} cannot run the solver. {' '.join(faults[:3])}",
-                      f"Install what {REQUIREMENTS / 'worker.txt'} lists, then nets.txt beside it with --no-deps; or click Install Solver.")
+                      f"Install what {REQUIREMENTS / 'worker.txt'} lists; or click Install Solver, which brings it up to date.")
 
 
 def accept(python: Path) -> None:
