@@ -253,7 +253,7 @@ def test_a_base_python_is_found_and_fits():
 
 def test_this_environment_is_judged_fit():
     found = survey(Path(sys.executable), REQUIREMENTS)
-    assert set(found["versions"]) == set(required(REQUIREMENTS)) and found["device"] in ("cpu", "cuda", "mps")
+    assert set(found["versions"]) == set(required(REQUIREMENTS)) and found["device"] == "", "not tried without loading anything"
     assert judge(found, REQUIREMENTS) == []
 
 

@@ -133,11 +133,12 @@ def test_the_set_up_is_shown_until_a_solver_answers_and_again_when_it_does_not(s
     assert panel.poll(bpy.context) and preferences.python() is None
     assert "torch" in setup("problems").of("").problem and setup("problems").of("").remedy
     monkeypatch.setattr(checking.environment, "judge", lambda found, requirements: [])
-    monkeypatch.setattr(checking.environment, "survey", lambda python, requirements, importing: {"device": "cuda" if importing else "cpu"})
+    found = {"device": "cuda", "reason": "cuda takes 0.1 s."}
+    monkeypatch.setattr(checking.environment, "survey", lambda python, requirements, importing: found if importing else {"device": "", "reason": ""})
     checking.accept(bare / "bin" / "python")
     assert not panel.poll(bpy.context) and preferences.get().device == ""
     wait(checking)
-    assert preferences.get().device == "cuda" and preferences.python() == bare / "bin" / "python"
+    assert preferences.get().device == "cuda" and preferences.get().device_reason == "cuda takes 0.1 s." and preferences.python() == bare / "bin" / "python"
     checking._checks.clear()
 
 

@@ -90,7 +90,7 @@ def test_the_doctor_names_a_cut_network(monkeypatch, capsys, tmp_path):
 
     faults = ["/x/prior.safetensors is damaged: it is not as it was shipped."]
     versions = doctor.environment.required(shipped_files.CORE.parent / "requirements")
-    answer = {"python": (3, 11), "versions": versions, "opencv": [], "errors": {}, "device": "cpu"}
+    answer = {"python": (3, 11), "versions": versions, "opencv": [], "errors": {}, "device": "cpu", "reason": ""}
     monkeypatch.setattr(doctor.environment, "survey", lambda *_: answer)
     assert main(["doctor"]) == 0 and "Nothing is missing." in capsys.readouterr().out
     monkeypatch.setattr(doctor.shipped_files, "find_faults", lambda core: faults)

@@ -41,6 +41,7 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
     packages: bpy.props.EnumProperty(name="Packages From", items=SOURCES, default='pytorch', description="Where Install Solver downloads from")
     wheels: bpy.props.StringProperty(name="Wheels", subtype='DIR_PATH', description="The folder of wheels that Install Solver takes all packages from")
     device: bpy.props.StringProperty(name="Device", description="What the solver's Python was found to compute on")
+    device_reason: bpy.props.StringProperty(name="Why This Device", description="What was found when the solver's devices were tried")
     captures: bpy.props.StringProperty(
         name="Captures Folder", subtype='DIR_PATH',
         description="Where new captures go while the .blend is not saved; empty: WildCap in the documents folder",
@@ -66,6 +67,8 @@ def draw_solver(layout, preferences) -> None:
     device = DEVICES.get(preferences.device, preferences.device)
     if ready and device:
         layout.label(text=iface_("The solver is ready ({})").format(device), translate=False, icon='CHECKMARK')
+        if preferences.device_reason:
+            layout.label(text=preferences.device_reason, translate=False)
     else:
         layout.label(text="The solver is ready" if ready else "There is no solver yet", icon='CHECKMARK' if ready else 'INFO')
     column = layout.column()
@@ -125,9 +128,10 @@ def set_aside(path: Path) -> None:
     _aside.add(str(path))
 
 
-def set_python(path: Path | None, device: str = "") -> None:
+def set_python(path: Path | None, device: str = "", reason: str = "") -> None:
+    """Makes `path` the solver's Python; `device` is what it was found to compute on, `reason` why."""
     _aside.discard(str(path))
-    get().python, get().device = str(path or ""), device
+    get().python, get().device, get().device_reason = str(path or ""), device, reason
     bpy.context.preferences.is_dirty = True  # Blender saves preferences on exit
 
 

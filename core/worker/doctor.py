@@ -34,7 +34,7 @@ def examine(root: Path, python: Path, importing: bool = True) -> Findings:
     found = environment.survey(python, requirements, importing)
     lines = [f"WildCap       {__version__} at {root}",
              f"Python        {found['python'][0]}.{found['python'][1]} at {python}",
-             f"device        {found['device']}" + ("" if found["device"] == "cpu" else f"  (use it with --device {found['device']})")]
+             f"device        {found['device'] or 'not tried'}" + (f"  ({found['reason']})" if found["reason"] else "")]
     for name, version in environment.required(requirements).items():
         has = found["versions"][name]
         lines.append(f"  {name:32} {has or 'missing':14}" + ("" if has and has.partition("+")[0] == version else f" {version} is needed"))

@@ -49,9 +49,11 @@ def verify(python: Path, requirements: Path, importing: bool = False) -> list[st
 
 def survey(python: Path, requirements: Path, importing: bool = False) -> dict:
     """What a Python has: {"python": [major, minor], "versions": {package: version or None}, "opencv": [packages], "errors": {module: text},
-    "device": "cpu", "cuda" or "mps"}. Raises Problem when it cannot be run."""
+    "device": "cpu", "cuda" or "mps", "reason": why that one}. Raises Problem when it cannot be run. The device is proven by a pass of the network (importing),
+    else nothing is known of it: ''."""
     modules = [MODULES.get(name, name) for name in required(requirements)] if importing else []
-    printed = answer(python, _SURVEY % {"names": list(required(requirements)), "modules": modules}, 300)
+    root = str(Path(requirements).parent) if importing else ""
+    printed = answer(python, _SURVEY % {"names": list(required(requirements)), "modules": modules, "root": root}, 300)
     try:
         return json.loads(printed.splitlines()[-1])
     except (ValueError, IndexError):
@@ -115,11 +117,17 @@ for module in %(modules)s:
         importlib.import_module(module)
     except Exception as error:
         errors[module] = f"{type(error).__name__}: {error}".splitlines()[0]
-torch = sys.modules.get("torch")
-device = "cpu" if torch is None else "cuda" if torch.cuda.is_available() else "mps" if torch.backends.mps.is_available() else "cpu"
+device, reason = "", ""
+if %(root)r and "torch" in sys.modules and not errors:
+    sys.path.insert(0, %(root)r)
+    try:
+        from core.solve.device import prove
+        device, reason = prove().device, prove().reason
+    except Exception as error:
+        device, reason = "cpu", f"The network does not run: {type(error).__name__}: {error}".splitlines()[0]
 opencv = sorted({d.name for d in metadata.distributions() if d.name and d.name.lower().startswith("opencv")})
 versions = {name: version(name) for name in %(names)s}
-print(json.dumps({"python": sys.version_info[:2], "versions": versions, "opencv": opencv, "errors": errors, "device": device}))
+print(json.dumps({"python": sys.version_info[:2], "versions": versions, "opencv": opencv, "errors": errors, "device": device, "reason": reason}))
 """
 
 
