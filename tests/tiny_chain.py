@@ -75,6 +75,11 @@ def _dwell(mood, report):
         time.sleep(0.02)
 '''
 
+DEVICE = """
+from types import SimpleNamespace
+prove = lambda: SimpleNamespace(device="cpu", reason="There is no other.")
+"""
+
 
 def build(folder: Path) -> Path:
     """Makes the code tree under `folder` and returns it: the worker's root."""
@@ -89,6 +94,7 @@ def build(folder: Path) -> Path:
     for stage in stages.STAGES:
         (core / stage.name).mkdir()
         (core / stage.name / "__init__.py").write_text(ROOM, encoding="utf-8")
+    (core / "solve" / "device.py").write_text(DEVICE, encoding="utf-8")
     return folder
 
 

@@ -11,6 +11,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.contract import switchlight_api
 from ..core.contract.messages import Problem
+from ..core.worker import environment
 from . import extension
 
 COMPUTES = [('auto', "Automatic", "For the GPU where there is an NVIDIA one or an Apple one, else for the CPU"),
@@ -18,6 +19,7 @@ COMPUTES = [('auto', "Automatic", "For the GPU where there is an NVIDIA one or a
               [('cuda', "CUDA", "For NVIDIA GPUs; several times larger")]),
             ('cpu', "CPU", "For the processor alone: the smallest")]
 SOURCES = [('pytorch', "PyTorch and PyPI", "PyTorch from its own package index where PyPI lacks the build for your device, all others from PyPI"),
+           ('folder', "A Folder of Wheels", "All packages from a folder, as `python -m core wheels` makes one: no network needed"),
            ('pip', "As pip Is Set Up", "All packages from where this machine's pip is set up to look (pip.conf, PIP_INDEX_URL), as with a studio's own index; "
             "that also decides what its PyTorch computes on")]
 DEVICES = {"cpu": "CPU", "cuda": "CUDA", "mps": "Metal", "": ""}
@@ -33,11 +35,13 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
     )
     environment: bpy.props.StringProperty(
         name="Solver Folder", subtype='DIR_PATH',
-        description="Where Install Solver puts its packages; empty: in the extension's own user folder",
+        description="Where Install Solver puts its packages; empty: .wildcap/solver in your home folder",
     )
     compute: bpy.props.EnumProperty(name="Compute On", items=COMPUTES, default='auto', description="What Install Solver downloads PyTorch for")
     packages: bpy.props.EnumProperty(name="Packages From", items=SOURCES, default='pytorch', description="Where Install Solver downloads from")
+    wheels: bpy.props.StringProperty(name="Wheels", subtype='DIR_PATH', description="The folder of wheels that Install Solver takes all packages from")
     device: bpy.props.StringProperty(name="Device", description="What the solver's Python was found to compute on")
+    device_reason: bpy.props.StringProperty(name="Why This Device", description="What was found when the solver's devices were tried")
     captures: bpy.props.StringProperty(
         name="Captures Folder", subtype='DIR_PATH',
         description="Where new captures go while the .blend is not saved; empty: WildCap in the documents folder",
@@ -63,12 +67,16 @@ def draw_solver(layout, preferences) -> None:
     device = DEVICES.get(preferences.device, preferences.device)
     if ready and device:
         layout.label(text=iface_("The solver is ready ({})").format(device), translate=False, icon='CHECKMARK')
+        if preferences.device_reason:
+            layout.label(text=preferences.device_reason, translate=False)
     else:
         layout.label(text="The solver is ready" if ready else "There is no solver yet", icon='CHECKMARK' if ready else 'INFO')
     column = layout.column()
     column.use_property_split = True
     column.prop(preferences, "compute")
     column.prop(preferences, "packages")
+    if preferences.packages == 'folder':
+        column.prop(preferences, "wheels")
     column.prop(preferences, "environment", text="Folder")
     column = layout.column(align=True)
     column.operator("wildcap.install_solver", icon='IMPORT')
@@ -120,16 +128,31 @@ def set_aside(path: Path) -> None:
     _aside.add(str(path))
 
 
-def set_python(path: Path | None, device: str = "") -> None:
+def set_python(path: Path | None, device: str = "", reason: str = "") -> None:
+    """Makes `path` the solver's Python; `device` is what it was found to compute on, `reason` why."""
     _aside.discard(str(path))
-    get().python, get().device = str(path or ""), device
+    get().python, get().device, get().device_reason = str(path or ""), device, reason
     bpy.context.preferences.is_dirty = True  # Blender saves preferences on exit
 
 
 def environment_folder() -> Path:
-    """Where Install Solver makes its environment: kept across updates, outside the extension's own files."""
-    chosen = get().environment
-    return Path(bpy.path.abspath(chosen) if chosen else bpy.utils.extension_path_user(extension.NAME, path="solver"))
+    """Where Install Solver makes its environment: kept across updates, outside the extension's own files. One that 0.1.0 made stays where it put it,
+    but on Windows, where paths there grow too long."""
+    chosen, earlier = get().environment, Path(bpy.utils.extension_path_user(extension.NAME, path="solver"))
+    if chosen:
+        return Path(bpy.path.abspath(chosen))
+    return earlier if os.name != "nt" and (earlier / "pyvenv.cfg").is_file() else environment.default_folder()
+
+
+def wheels_folder() -> Path | None:
+    """The folder of wheels to install from; None where packages come from elsewhere. Raises Problem where it is none."""
+    if get().packages != 'folder':
+        return None
+    folder = Path(bpy.path.abspath(get().wheels))
+    if not get().wheels or not any(folder.glob("*.whl")):
+        raise Problem(f"There are no wheels in {folder if get().wheels else 'a folder that is not chosen'}.",
+                      "Choose the folder that `python -m core wheels` made, in the extension's preferences under Wheels.")
+    return folder
 
 
 def captures_folder(saved: bool = True) -> Path:

@@ -80,7 +80,7 @@ class WILDCAP_PG_capture(bpy.types.PropertyGroup):
     )
     device: bpy.props.EnumProperty(
         name="Device", default="auto", description=SHARED_TOOLTIPS["device"],
-        items=[("auto", "Automatic", "What the solver's Python was found to compute on when it was set up"), ("cpu", "CPU", ""), ("cuda", "CUDA", ""),
+        items=[("auto", "Automatic", "Where a pass of the solver's network ran fastest when it was set up"), ("cpu", "CPU", ""), ("cuda", "CUDA", ""),
                ("mps", "Metal", "")],
     )
     seed: bpy.props.IntProperty(name="Seed", min=0, default=0, description=SHARED_TOOLTIPS["seed"])
@@ -167,8 +167,8 @@ def _value(group, field):
 
 
 def device(item: WILDCAP_PG_capture) -> str:
-    """'cpu', 'cuda' or 'mps': the capture's own choice, else what the solver's Python computes on."""
-    return item.device if item.device != "auto" else preferences.get().device or "cpu"
+    """'cpu', 'cuda' or 'mps': the capture's own choice, else what the solver's Python was found to compute on; 'auto' where that is not known yet."""
+    return item.device if item.device != "auto" else preferences.get().device or "auto"
 
 
 def settings(item: WILDCAP_PG_capture) -> core_settings.Settings:

@@ -131,7 +131,7 @@ class Capture:
         record["format"] = FORMAT
         record["stages"][stage.name] = {
             **conditions, "seconds": round(seconds, 2), "finished": time.strftime("%Y-%m-%dT%H:%M:%S"), "version": version,
-            "settings": chosen, "seed": settings.seed, "device": settings.device, "figures": figures,
+            "settings": chosen, "seed": settings.seed, "device": settings.compute_device, "figures": figures,
             "findings": list(findings),
         }
         write_json(self.json, record)

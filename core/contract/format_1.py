@@ -37,7 +37,7 @@ def matches(root: Path, record: dict, stage: Stage, settings: Settings) -> bool:
     finished, made = record["stages"][stage.name], _code_and_data()[stage.name]
     chosen = asdict(getattr(settings, stage.name))
     parts: list = [{name: chosen.get(name, value) for name, value in finished.get("settings", {}).items() if name not in INDIFFERENT},
-                   {name: getattr(settings, name) for name in made["shared"]}, made["code"]]
+                   {name: getattr(settings, "compute_device" if name == "device" else name) for name in made["shared"]}, made["code"]]
     if stage.name == "frames":
         parts.append(record.get(STAMP, record.get("source_stamp", [])))
     named = chosen[PATHS[stage.name]] if stage.name in PATHS else ""

@@ -100,7 +100,8 @@ def _changed_settings(finished: dict, stage: Stage, settings: Settings) -> list[
     chosen, then = getattr(settings, stage.name), {**asdict(type(getattr(settings, stage.name))()), **finished["settings"]}
     paths = {f.name for f in fields(chosen) if "path" in f.metadata}
     changed = [f"{stage.name}.{name}" for name, value in result_settings(chosen).items() if name not in paths and then[name] != value]
-    return changed + [name for name in stage.shared if finished[name] != getattr(settings, name)]
+    any_device = {"device"} if settings.device == "auto" else set()  # what another one has made, here or on another machine, is as good
+    return changed + [name for name in stage.shared if name not in any_device and finished[name] != getattr(settings, name)]
 
 
 def _digest(tree: str | dict) -> str:

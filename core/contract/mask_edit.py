@@ -37,7 +37,7 @@ def obstacle(capture: Capture, settings: Settings) -> str:
 def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
     """All that a solve depends on beside its masks: name -> hash."""
     stage = stages.by_name("solve")
-    chosen = [result_settings(settings.solve), settings.seed, settings.device, settings.delight.delighter]
+    chosen = [result_settings(settings.solve), settings.seed, settings.compute_device, settings.delight.delighter]
     files = {name: hash_tree(capture.root / name) for name in (*stage.reads, *stage.wishes) if "mask" not in name}
     found = {**files, "the solver's settings": chosen, "the solver's code": code_key(stage.module)}
     return {name: hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=8).hexdigest() for name, value in found.items()}

@@ -184,8 +184,8 @@ class Settings:
 
     seed: int = setting(0, min=0, max=2**31 - 1, flag="--seed")
     """The same seed gives the same maps"""
-    device: str = setting("cpu", choices=("cpu", "cuda", "mps"), flag="--device")
-    """Where the solver computes"""
+    device: str = setting("auto", choices=("auto", "cpu", "cuda", "mps"), flag="--device")
+    """Where the solver computes; auto: where a pass of its network has been shown to run, and faster than on the CPU"""
     edited_part: bool = setting(False, flag="--edited-part", affects_result=False)  # how a result was reached is no condition of it
     """Solve only what a mask edit touched since the last solve, where that can be done"""
     frames: FramesSettings = field(default_factory=FramesSettings)
@@ -199,6 +199,11 @@ class Settings:
     upscale: UpscaleSettings = field(default_factory=UpscaleSettings)
     transfer: TransferSettings = field(default_factory=TransferSettings)
     deliver: DeliverSettings = field(default_factory=DeliverSettings)
+
+    @property
+    def compute_device(self) -> str:
+        """The device by name. A worker puts the one that it has proven in the place of auto before a stage runs; without a worker that is the CPU."""
+        return "cpu" if self.device == "auto" else self.device
 
 
 STAGE_KINDS = {f.name: f.default_factory for f in fields(Settings) if f.default_factory is not MISSING}

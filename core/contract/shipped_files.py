@@ -17,13 +17,9 @@ from .messages import Problem
 
 CORE = Path(__file__).resolve().parents[1]
 MANIFEST = CORE / "contract" / "shipped.json"
-TEXT = {".json", ".md", ".obj"}
+TEXT = {".json", ".md", ".obj", ".txt"}
 """A checkout on Windows may give these other line ends."""
-NETS = ("face_detection/face_detection_short_range.tflite", "face_landmark/face_landmark.tflite", "iris_landmark/iris_landmark.tflite",
-        "selfie_segmentation/selfie_segmentation.tflite")
-"""The networks that core/face/faces.py takes from the package mediapipe, in that package's folder modules/."""
 AGAIN = "Install the extension again, or check the source out again."
-NETS_AGAIN = "Reinstall it: `pip install --no-deps --force-reinstall -r requirements/nets.txt`, or press Install Solver again."
 
 
 def find_faults(core: Path = CORE) -> list[str]:
@@ -38,14 +34,6 @@ def find_faults(core: Path = CORE) -> list[str]:
     return faults
 
 
-def find_net_faults(package: Path | None) -> list[str]:
-    """What is missing or damaged of the face nets; `package` is the installed mediapipe's folder, None where there is none."""
-    found = {name: package / "modules" / name if package is not None else None for name in NETS}
-    return [*(f"The face net {name} is missing." for name, path in found.items() if path is None or not path.is_file()),
-            *(f"The face net {path} is damaged: it is not as it was shipped." for name, path in found.items()
-              if path is not None and path.is_file() and hash_shipped(path) != read_manifest()["nets"][name])]
-
-
 def require_whole(path: Path) -> None:
     """Raises Problem where a shipped file is missing or not as it was shipped; files that did not come with WildCap are none of its business."""
     path = Path(path).resolve()
@@ -56,15 +44,9 @@ def require_whole(path: Path) -> None:
         raise Problem(f"{path} is damaged: it is not as it was shipped.", AGAIN)
 
 
-def require_whole_net(path: Path, name: str) -> None:
-    """As `require_whole`, for one of NETS at `path`."""
-    if hash_shipped(path) != read_manifest()["nets"][name]:
-        raise Problem(f"The network {path} of the package mediapipe is damaged: it is not as it was shipped.", NETS_AGAIN)
-
-
 @cache
 def read_manifest() -> dict[str, dict[str, str]]:
-    """{"core": {path in core: SHA-256}, "nets": {name: SHA-256}}."""
+    """{"core": {path in core: SHA-256}}."""
     return json.loads(MANIFEST.read_text(encoding="utf-8"))
 
 

@@ -18,7 +18,7 @@ class Stage:
     """One step of the chain: `module`'s `run(capture, settings, report)` turns `reads` into `writes`.
 
     `wishes` are read when they are there. `shared` names the shared settings (seed, device) the result depends on; which code and which shipped
-    files it depends on is read from the sources (code_key.py).
+    files it depends on is read from the sources (code_key.py). `on_device` says that it computes on the device, where there is another than the CPU.
     """
 
     name: str
@@ -28,6 +28,7 @@ class Stage:
     module: str
     wishes: tuple[str, ...] = field(default=())
     shared: tuple[str, ...] = field(default=())
+    on_device: bool = False
 
 
 MAPS = ("diffuse_albedo.png", "diffuse_albedo.exr", "specular_albedo.png", "normal.png", "shading.exr", "confidence.png")
@@ -35,17 +36,19 @@ MAPS = ("diffuse_albedo.png", "diffuse_albedo.exr", "specular_albedo.png", "norm
 STAGES = (
     Stage("frames", "Frames", (), ("frames/",), "core.frames"),
     Stage("cameras", "Cameras", ("frames/",), ("cameras/",), "core.cameras", shared=("seed",)),
-    Stage("scan", "Scan", ("frames/", "cameras/"), ("scan.ply",), "core.scan", shared=("device",)),
+    Stage("scan", "Scan", ("frames/", "cameras/"), ("scan.ply",), "core.scan", shared=("device",), on_device=True),
     Stage("registration", "Head", ("frames/", "cameras/", "scan.ply"), ("head.obj", "landmarks.json"), "core.registration", wishes=("landmarks_artist.json",)),
-    Stage("delight", "Delight", ("frames/", "cameras/", "head.obj"), ("delit/",), "core.delight", shared=("device",)),
-    Stage("texture", "Texture", ("frames/", "delit/", "cameras/", "head.obj"), ("texture.exr", "texture.png", "texture_confidence.exr"), "core.texture"),
+    Stage("delight", "Delight", ("frames/", "cameras/", "head.obj"), ("delit/",), "core.delight", shared=("device",),
+          on_device=True),
+    Stage("texture", "Texture", ("frames/", "delit/", "cameras/", "head.obj"), ("texture.exr", "texture.png", "texture_confidence.exr"), "core.texture",
+          on_device=True),
     Stage("shadow_mask", "Shadow Mask", ("delit/", "cameras/", "head.obj", "texture.exr", "texture_confidence.exr"), ("shadow_mask_auto.png",),
           "core.shadow_mask", wishes=("texture_filmed.png", "frames/")),
     Stage("solve", "Solve", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
-          tuple(f"maps/{name}" for name in MAPS), "core.solve", shared=("seed",),
+          tuple(f"maps/{name}" for name in MAPS), "core.solve", shared=("seed",), on_device=True,
           wishes=("shadow_mask.png", "protect_mask.png", "texture_filmed.png", "frames/", "cameras/", "delit/")),
     Stage("upscale", "4K Maps", ("head.obj", *(f"maps/{name}" for name in MAPS)), tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale",
-          shared=("seed", "device"),
+          shared=("seed", "device"), on_device=True,
           wishes=("texture_detail.exr",)),
     Stage("transfer", "Delivery", ("head.obj", *(f"maps/{name}" for name in MAPS)), ("delivery/",), "core.transfer",
           wishes=(*(f"maps_4k/{name}" for name in MAPS), "own_head.obj", "own_head.json", "scan.ply", "frames/", "cameras/")),
@@ -53,8 +56,8 @@ STAGES = (
 
 TOOLS = (
     Stage("mask_edges", "Snap to Edges", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"), ("shadow_mask_edges.png",),
-          "core.solve.snapping"),
-    Stage("skin_tone", "Skin Tone", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"), (), "core.solve.tone"),
+          "core.solve.snapping", on_device=True),
+    Stage("skin_tone", "Skin Tone", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"), (), "core.solve.tone", on_device=True),
     Stage("white_point", "White Point", ("frames/",), (), "core.solve.white_point"),
     Stage("deliver", "Deliver", ("head.obj", *(f"maps/{name}" for name in MAPS if name.endswith(".png"))), (), "core.deliver"),
 )

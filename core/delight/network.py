@@ -47,7 +47,7 @@ FADE = 0.06  # of the square's side: along its border it gives way to the fitted
 
 def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
     """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see the head."""
-    net, views = load(settings.device), read_views(capture, selected_only=True)
+    net, views = load(settings.compute_device), read_views(capture, selected_only=True)
     head = lit_head(read_head(capture), views, report)
     looks, fitted = [], []
     for i, view in enumerate(views):

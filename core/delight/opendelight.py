@@ -32,7 +32,7 @@ RIM = 1.14  # how far beyond the landmarks there is skin, where there is a perso
 
 def opendelight(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
     """The selected frames in which a face is found. Raises Problem where none is, and for a checkpoint that is none."""
-    checkpoint = load(settings.delight.checkpoint, settings.device)
+    checkpoint = load(settings.delight.checkpoint, settings.compute_device)
     views = read_views(capture, selected_only=True)
     face, found = None, 0
     for i, view in enumerate(views):
@@ -46,7 +46,7 @@ def opendelight(capture: Capture, settings: Settings, report: Reporter) -> Itera
             report.log(f"No face was found in frame {view.name}; it is left out.")
             continue
         found += 1
-        yield Delit(view, delight_face(srgb, face, checkpoint, settings.device, step))
+        yield Delit(view, delight_face(srgb, face, checkpoint, settings.compute_device, step))
     report.figure("frames_without_face", len(views) - found)
     report.figure("detail_enhanced", checkpoint.enhancer is not None)
     if not found:

@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Faces and people in pictures: MediaPipe's detector, 468 face-mesh landmarks, eyelids and person segmentation, run by OpenCV.
 
-The networks are the .tflite files of the installed `mediapipe` package (Apache-2.0), which is found but never imported.
+The networks lie in core/weights/face_nets, with their notice (Apache-2.0).
 Bazarevsky et al., BlazeFace (2019); Kartynnik et al., Real-time Facial Surface Geometry (2019).
 """
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -22,10 +21,9 @@ from ..contract.messages import Problem
 RIGHT_EYE, LEFT_EYE = (33, 133), (362, 263)
 """Landmarks at the outer and inner corner of the person's right eye, and at the inner and outer of the left: they stay put when the lids close."""
 BROW, CHIN, NOSE = 9, 152, 1
-_SHORT_RANGE = "face_detection/face_detection_short_range.tflite"
-_LANDMARK = "face_landmark/face_landmark.tflite"
-_EYE = "iris_landmark/iris_landmark.tflite"
-_SEGMENTATION = "selfie_segmentation/selfie_segmentation.tflite"
+DATA_FILES = ("weights/face_nets/face_detection_short_range.tflite", "weights/face_nets/face_landmark.tflite",
+              "weights/face_nets/iris_landmark.tflite", "weights/face_nets/selfie_segmentation.tflite")
+_SHORT_RANGE, _LANDMARK, _EYE, _SEGMENTATION = (Path(__file__).resolve().parents[1] / name for name in DATA_FILES)
 
 
 @dataclass(frozen=True)
@@ -197,23 +195,17 @@ def _anchors() -> np.ndarray:
     return np.concatenate([np.stack(np.meshgrid(*[(np.arange(n) + 0.5) * 128 / n] * 2), -1).reshape(-1, 2).repeat(count, 0) for n, count in ((16, 2), (8, 6))])
 
 
-def _run(name: str, image: np.ndarray, outputs: tuple | None = None) -> list[np.ndarray]:
+def _run(network: Path, image: np.ndarray, outputs: tuple | None = None) -> list[np.ndarray]:
     """The network's outputs for a picture [S, S, 3] already in its range."""
-    net = _net(name)
+    net = _net(network)
     net.setInput(np.ascontiguousarray(image.transpose(2, 0, 1)[None], np.float32))
     return net.forward(outputs or net.getUnconnectedOutLayersNames())
 
 
 @cache
-def _net(name: str):
-    spec = importlib.util.find_spec("mediapipe")
-    path = Path(spec.submodule_search_locations[0]) / "modules" / name if spec else None
-    if path is None or not path.is_file():
-        raise Problem("The networks that find faces (package mediapipe 0.10.21) are not installed.",
-                      "Install them with `pip install --no-deps -r requirements/nets.txt`, or press Install Solver in the add-on's preferences.")
-    shipped_files.require_whole_net(path, name)
+def _net(path: Path):
+    shipped_files.require_whole(path)
     try:
         return cv2.dnn.readNetFromTFLite(np.fromfile(path, np.uint8))  # by content: OpenCV may not open a path with accents
     except cv2.error as error:
-        raise Problem(f"The network {path.name} of the package mediapipe cannot be read.",
-                      "Reinstall it: `pip install --no-deps --force-reinstall -r requirements/nets.txt`.") from error
+        raise Problem(f"OpenCV {cv2.__version__} cannot read the network {path.name}.", "Press Install Solver again: it brings the OpenCV that can.") from error

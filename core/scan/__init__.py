@@ -33,10 +33,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     views = read_views(capture)
     frames = read_frames(capture).by_name
     sharpness = np.array([frames[view.name].sharpness for view in views])
-    by_splats = splats.wanted(settings.scan.method, settings.device)
+    by_splats = splats.wanted(settings.scan.method, settings.compute_device)
     fused, maps = rounds.measure(views, sharpness, settings.scan.pairs, settings.scan.voxel_mm / 1000, HEAD_BOX, report)
     if fused is not None and by_splats:
-        fused, maps = splats.measure(fused.mesh, views, settings.scan.voxel_mm / 1000, HEAD_BOX, settings.device, report)
+        fused, maps = splats.measure(fused.mesh, views, settings.scan.voxel_mm / 1000, HEAD_BOX, settings.compute_device, report)
     if fused is None or len(fused.mesh.faces) < 1000:
         raise Problem("No surface of the head could be measured from these frames.",
                       "Use sharper frames that lie closer together: walk slowly, in good light, and keep the face in the picture.")

@@ -54,7 +54,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     where that can be done (edited.py). Raises Problem for unusable inputs and for divergence.
     """
     options = settings.solve
-    prior = load(Path(options.prior).expanduser() if options.prior else WEIGHTS, settings.device)
+    prior = load(Path(options.prior).expanduser() if options.prior else WEIGHTS, settings.compute_device)
     if options.low_memory:
         spare_memory(prior)
     recipe = recipe_of(settings, prior)
@@ -146,7 +146,7 @@ def _key(evidence: Evidence, settings: Settings, tone: SkinTone) -> str:
     digest = hashlib.blake2b(digest_size=16)
     for tensor in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, tone.tensor):
         digest.update(tensor.numpy().tobytes())
-    digest.update(json.dumps([result_settings(settings.solve), settings.seed, settings.device]).encode())
+    digest.update(json.dumps([result_settings(settings.solve), settings.seed, settings.compute_device]).encode())
     digest.update(code_key(__package__).encode())  # with the prior's weights
     digest.update(json.dumps(hash_tree(Path(settings.solve.prior).expanduser()) if settings.solve.prior else "").encode())
     return digest.hexdigest()

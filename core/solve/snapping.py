@@ -28,7 +28,7 @@ CELL = 8.0
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """The artist's mask, or the proposal -> shadow_mask_edges.png, 8 bit grey, of the texture's size."""
     report.progress(0, 2, "reading the texture, the head and the masks")
-    prior = load(Path(settings.solve.prior).expanduser() if settings.solve.prior else WEIGHTS, settings.device)
+    prior = load(Path(settings.solve.prior).expanduser() if settings.solve.prior else WEIGHTS, settings.compute_device)
     height, width = images.read_linear(capture.texture).shape[:2]
     evidence = read_evidence(capture, read_head(capture), max(min(height, 1024) // 32, 4) * 32)
     report.progress(1, 2, "looking for the shadow's edges")

@@ -39,7 +39,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     evidence = read_evidence(capture, head, SIZE)
     tone = estimate_from_frames(capture, head, settings, evidence, report)
     if tone is None:
-        prior = load(Path(settings.solve.prior).expanduser() if settings.solve.prior else WEIGHTS, settings.device)
+        prior = load(Path(settings.solve.prior).expanduser() if settings.solve.prior else WEIGHTS, settings.compute_device)
         tone = estimate_from_texture(evidence.texture, lit_skin(evidence), prior.tones)
     tell_skin_tone(tone, report)
 

@@ -117,9 +117,9 @@ def build(observations: list[Observation], surface: Unfolded, settings: Settings
         from .features import load_features  # torch is only needed here
         from .perceptual import refine
 
-        features = load_features(settings.texture.perceptual_network, settings.device)
+        features = load_features(settings.texture.perceptual_network, settings.compute_device)
         wanted = (confidence > 0.3) & (template.mask("face", len(confidence)) > 0.5 if built_in else True)
-        log_texture, losses = refine(log_texture, observations, surface, wanted, features, settings.texture.perceptual, report, settings.device)
+        log_texture, losses = refine(log_texture, observations, surface, wanted, features, settings.texture.perceptual, report, settings.compute_device)
         report.figure("perceptual_network", features.name)
     return Built(log_texture, confidence, gains, shift, losses)
 

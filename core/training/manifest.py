@@ -4,21 +4,17 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-from pathlib import Path
 
-from ..contract.shipped_files import CORE, MANIFEST, NETS, hash_shipped
+from ..contract.shipped_files import CORE, MANIFEST, hash_shipped
 
 FOLDERS = ("assets", "weights")
 
 
 def make_manifest() -> dict[str, dict[str, str]]:
-    """What the manifest says of the files as they are now, the face nets of the installed package mediapipe among them."""
+    """What the manifest says of the files as they are now."""
     files = (path for folder in FOLDERS for path in sorted((CORE / folder).rglob("*")) if path.is_file() and path.suffix not in (".py", ".pyc"))
-    package = Path(importlib.util.find_spec("mediapipe").submodule_search_locations[0])
-    return {"core": {path.relative_to(CORE).as_posix(): hash_shipped(path) for path in files},
-            "nets": {name: hash_shipped(package / "modules" / name) for name in NETS}}
+    return {"core": {path.relative_to(CORE).as_posix(): hash_shipped(path) for path in files}}
 
 
 if __name__ == "__main__":

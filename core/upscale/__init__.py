@@ -39,7 +39,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.figure("specular_mean", round(gloss.on_cheeks_and_forehead(maps.specular, maps.confidence), 4))
     maps, found = _whole(capture, maps, settings, report)
     share = SHARES[method]
-    large = enlarged(maps, size, method, settings.device, lambda done: report.progress(share * done, 1, "enlarging"))
+    large = enlarged(maps, size, method, settings.compute_device, lambda done: report.progress(share * done, 1, "enlarging"))
     with replacing_folder(capture.maps_4k) as folder:
         report.progress(share, 1, "writing the albedo")
         srgb = large[..., :3]

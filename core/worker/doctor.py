@@ -12,8 +12,6 @@ from .. import __version__
 from ..contract import shipped_files
 from . import environment
 
-NETS_CODE = "import importlib.util as u; spec = u.find_spec('mediapipe'); print(spec.submodule_search_locations[0] if spec else '')"
-
 
 @dataclass(frozen=True)
 class Findings:
@@ -36,25 +34,21 @@ def examine(root: Path, python: Path, importing: bool = True) -> Findings:
     found = environment.survey(python, requirements, importing)
     lines = [f"WildCap       {__version__} at {root}",
              f"Python        {found['python'][0]}.{found['python'][1]} at {python}",
-             f"device        {found['device']}" + ("" if found["device"] == "cpu" else f"  (use it with --device {found['device']})")]
+             f"device        {found['device'] or 'not tried'}" + (f"  ({found['reason']})" if found["reason"] else "")]
     for name, version in environment.required(requirements).items():
         has = found["versions"][name]
         lines.append(f"  {name:32} {has or 'missing':14}" + ("" if has and has.partition("+")[0] == version else f" {version} is needed"))
-    folder = environment.answer(python, NETS_CODE)
-    of_nets = shipped_files.find_net_faults(Path(folder) if folder else None)
-    lines.append(f"face nets     {len(shipped_files.NETS) - len(of_nets)} of {len(shipped_files.NETS)} whole")
     of_files = shipped_files.find_faults(root / "core")
     count = len(shipped_files.read_manifest()["core"])
     lines.append(f"own files     {count - len(of_files)} of {count} whole")
     lines += [f"weights       {path.name}: {_described(path)}" for path in sorted((root / "core" / "weights").glob("*.safetensors"))]
     of_packages = environment.judge(found, requirements)
     remedies = []
-    if of_packages or of_nets:
+    if of_packages:
         remedies.append(f"{python} -m pip install -r {requirements / 'worker.txt'}")
-        remedies.append(f"{python} -m pip install --no-deps {'--force-reinstall ' if of_nets else ''}-r {requirements / 'nets.txt'}")
     if of_files:
         remedies.append(shipped_files.AGAIN)
-    return Findings(tuple(lines), (*of_packages, *of_nets, *of_files), tuple(remedies))
+    return Findings(tuple(lines), (*of_packages, *of_files), tuple(remedies))
 
 
 def _described(path: Path) -> str:

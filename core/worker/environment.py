@@ -17,8 +17,8 @@ from ..contract.files import storage_problem
 from ..contract.messages import Problem
 from .background import Task
 
-PYTHONS = ((3, 11), (3, 12))
-"""Versions of Python for which every pinned requirement has a wheel."""
+PYTHONS = ((3, 11), (3, 12), (3, 13))
+"""Versions of Python for which every direct requirement has a wheel; locks.py has those that an environment is made for."""
 MODULES = {"opencv-contrib-python-headless": "cv2", "openimageio": "OpenImageIO", "scikit-image": "skimage"}
 """Modules of the packages that are called otherwise."""
 
@@ -28,9 +28,14 @@ def python_of(folder: Path) -> Path:
     return Path(folder) / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 
 
+def default_folder() -> Path:
+    """Where an environment goes: a short path, in no folder that a cloud or a roaming profile copies."""
+    return Path.home() / ".wildcap" / "solver"
+
+
 def required(requirements: Path) -> dict[str, str]:
-    """Package -> pinned version, of worker.txt and nets.txt in the folder `requirements`."""
-    lines = [line.partition("#")[0].strip() for name in ("worker.txt", "nets.txt") for line in (requirements / name).read_text(encoding="utf-8").splitlines()]
+    """Package -> pinned version, of worker.txt in the folder `requirements`."""
+    lines = [line.partition("#")[0].strip() for line in (requirements / "worker.txt").read_text(encoding="utf-8").splitlines()]
     return dict(line.split("==") for line in lines if line)
 
 
@@ -44,10 +49,11 @@ def verify(python: Path, requirements: Path, importing: bool = False) -> list[st
 
 def survey(python: Path, requirements: Path, importing: bool = False) -> dict:
     """What a Python has: {"python": [major, minor], "versions": {package: version or None}, "opencv": [packages], "errors": {module: text},
-    "device": "cpu", "cuda" or "mps"}. Raises Problem when it cannot be run."""
-    # mediapipe is never imported: its network files are read, nothing else.
-    modules = [MODULES.get(name, name) for name in required(requirements) if name != "mediapipe"] if importing else []
-    printed = answer(python, _SURVEY % {"names": list(required(requirements)), "modules": modules}, 300)
+    "device": "cpu", "cuda" or "mps", "reason": why that one}. Raises Problem when it cannot be run. The device is proven by a pass of the network (importing),
+    else nothing is known of it: ''."""
+    modules = [MODULES.get(name, name) for name in required(requirements)] if importing else []
+    root = str(Path(requirements).parent) if importing else ""
+    printed = answer(python, _SURVEY % {"names": list(required(requirements)), "modules": modules, "root": root}, 300)
     try:
         return json.loads(printed.splitlines()[-1])
     except (ValueError, IndexError):
@@ -111,11 +117,17 @@ for module in %(modules)s:
         importlib.import_module(module)
     except Exception as error:
         errors[module] = f"{type(error).__name__}: {error}".splitlines()[0]
-torch = sys.modules.get("torch")
-device = "cpu" if torch is None else "cuda" if torch.cuda.is_available() else "mps" if torch.backends.mps.is_available() else "cpu"
+device, reason = "", ""
+if %(root)r and "torch" in sys.modules and not errors:
+    sys.path.insert(0, %(root)r)
+    try:
+        from core.solve.device import prove
+        device, reason = prove().device, prove().reason
+    except Exception as error:
+        device, reason = "cpu", f"The network does not run: {type(error).__name__}: {error}".splitlines()[0]
 opencv = sorted({d.name for d in metadata.distributions() if d.name and d.name.lower().startswith("opencv")})
 versions = {name: version(name) for name in %(names)s}
-print(json.dumps({"python": sys.version_info[:2], "versions": versions, "opencv": opencv, "errors": errors, "device": device}))
+print(json.dumps({"python": sys.version_info[:2], "versions": versions, "opencv": opencv, "errors": errors, "device": device, "reason": reason}))
 """
 
 

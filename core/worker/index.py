@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..contract.messages import Problem
+from . import bare_environment, pip_steps
 
 UNPACKED = 3.5
 """Bytes on disk for each that is downloaded, where a wheel's directory cannot be read: 0.46 GB became 1.6 GB on Linux with torch for the CPU."""
@@ -46,26 +47,32 @@ class Plan:
         return self.download + self.disk
 
 
-def plan(base: Path, steps: list[list[str]], run: Callable[[list[str]], tuple[int, str]], say: Callable[[float, float, str], None] = lambda *_: None) -> Plan:
-    """What `pip install` with each of the argument lists `steps` would bring. `base` is the Python to ask with, `run` runs a command and gives its
-    exit code and last error, `say` takes how far it is. Raises Problem when the index cannot be reached or lacks a package."""
+def plan(requirements: Path, base: Path, compute: str, source: str, run: Callable[[list[str]], tuple[int, str]],
+         say: Callable[[float, float, str], None] = lambda *_: None, wheels: Path | None = None) -> Plan:
+    """What an installation would bring (see installation.py). `base` is the Python to make it from, `run` runs a command and gives its exit code and last
+    error, `say` takes how far it is. Raises Problem when there is no solver for this machine, or the index cannot be reached or lacks a package."""
+    lock = pip_steps.lock_of(base, requirements)
+    wheels = Path(wheels) if source == "folder" else None
     with tempfile.TemporaryDirectory(prefix="wildcap_index_", ignore_cleanup_errors=True) as folder:
         say(0, 4, "preparing to ask the package index")
-        run([base, "-m", "venv", folder])
-        python = next((p for p in (Path(folder) / "bin" / "python", Path(folder) / "Scripts" / "python.exe") if p.is_file()), base)
+        python = bare_environment.make(Path(folder) / "environment", base, requirements, run, wheels)
         pip = [python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", *RETRIES]
         say(1, 4, "preparing to ask the package index")
-        run([*pip, "--quiet", "--upgrade", "pip"])  # one that reads descriptions without downloading packages; an old one works, slowly
-        found = {}
-        for i, step in enumerate(steps):
-            say(2 + i / len(steps), 4, "asking the package index")
-            file = Path(folder) / f"{i}.json"
-            code, error = run([*pip, "--dry-run", "--quiet", "--ignore-installed", "--report", file, *step])
-            if code or not file.is_file():
-                raise Problem(f"The package index did not answer as expected ({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",
-                              "Check the network connection, and try again.")
-            for entry in json.loads(file.read_text(encoding="utf-8"))["install"]:
+        if wheels is None:
+            run([*pip, "--quiet", "--upgrade", "pip"])  # one that reads descriptions without downloading packages; an old one works, slowly
+        found, report = {}, Path(folder) / "report.json"
+
+        def ask(words: tuple[str, ...]) -> tuple[int, str]:
+            code, error = run([*pip, "--dry-run", "--quiet", "--ignore-installed", "--report", report, *words])
+            for entry in json.loads(report.read_text(encoding="utf-8"))["install"] if not code else ():
                 found[entry["metadata"]["name"]] = entry["metadata"]["version"], entry["download_info"]["url"]
+            return code, error
+
+        todo = pip_steps.steps(requirements, lock, compute, source, Path(folder), wheels)
+        code, error = pip_steps.carry_out(todo, ask, lambda done: say(2 + done / len(todo), 4, "asking the package index"))
+        if code:
+            raise Problem(f"The package index did not answer as expected ({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",
+                          "Check the network connection, and try again.")
         say(3, 4, "asking how large the packages are")
         with ThreadPoolExecutor(8) as pool:
             sizes = list(pool.map(wheel_size, [url for _, url in found.values()]))
@@ -98,14 +105,19 @@ def gigabytes(size: int) -> str:
 
 def wheel_size(url: str) -> tuple[int, int]:
     """(bytes to download, bytes unpacked) of a wheel at an address. Raises Problem when it is not there."""
+    total, files = wheel_files(url)
+    return total, round(sum(size * (1 + COMPILED * name.endswith(".py")) for name, size in files) if files else UNPACKED * total)
+
+
+def wheel_files(url: str) -> tuple[int, list[tuple[str, int]]]:
+    """Bytes to download of a wheel at an address, and its files with their bytes unpacked; no files where the server gives no parts of one.
+    Raises Problem when it is not there."""
     try:
         tail, total = _part(url, -END.size)
         signature, *_, size, offset, _ = END.unpack(tail)
-        if signature == b"PK\5\6":
-            return total, _unpacked(_part(url, offset, size)[0])
+        return total, _listed(_part(url, offset, size)[0]) if signature == b"PK\5\6" else []
     except (OSError, ValueError, struct.error) as error:
         raise Problem(f"{urllib.parse.urlsplit(url).hostname or url} did not answer ({error}).", "Check the network connection, and try again.") from error
-    return total, round(UNPACKED * total)
 
 
 def _part(url: str, offset: int, size: int | None = None) -> tuple[bytes, int]:
@@ -125,12 +137,11 @@ def _part(url: str, offset: int, size: int | None = None) -> tuple[bytes, int]:
         return answer.read(), int(found[1])
 
 
-def _unpacked(directory: bytes) -> int:
-    """Bytes on disk of the files in a zip file's central directory (PKWARE APPNOTE 4.3.12), Python's compiled ones counted in."""
-    total, at = 0.0, 0
+def _listed(directory: bytes) -> list[tuple[str, int]]:
+    """Name and bytes unpacked of the files in a zip file's central directory (PKWARE APPNOTE 4.3.12)."""
+    files, at = [], 0
     while directory[at:at + 4] == b"PK\1\2":
         size, name_length, *more = struct.unpack_from("<L3H", directory, at + 24)
-        python = directory[at + 46:at + 46 + name_length].endswith(b".py")
-        total += size * (1 + COMPILED if python else 1)
+        files.append((directory[at + 46:at + 46 + name_length].decode("utf-8", "replace"), size))
         at += 46 + name_length + sum(more)
-    return round(total)
+    return files

@@ -14,6 +14,7 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from .. import __version__
@@ -22,6 +23,7 @@ from ..contract.capture import Capture
 from ..contract.files import storage_problem
 from ..contract.freshness import FINISHED, OLDER
 from ..contract.messages import Cancelled, CancelledError, Done, Failed, Log, Message, Problem, Progress, Reporter, StageDone, out_of_memory
+from ..contract.settings import Settings
 from ..contract.stages import Stage
 from .job import Job, read_job
 
@@ -74,6 +76,7 @@ def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled
         try:
             # Outputs may be half new from here on: until the end, nobody may take them for the recorded result.
             capture.forget([stage.name])
+            settings = _with_device(stage, settings, reporter)
             conditions = capture.conditions(stage, settings)
             started = time.monotonic()
             _room(stage).run(capture, settings, reporter)
@@ -96,7 +99,7 @@ def run_tool(tool: Stage, job: Job, emit: Callable[[Message], None], cancelled: 
     """Runs one of stages.TOOLS and sends its figures. Raises whatever it raises."""
     started = time.monotonic()
     with _at_work(tool, job.capture, emit, cancelled) as reporter:
-        _room(tool).run(job.capture, job.settings, reporter)
+        _room(tool).run(job.capture, _with_device(tool, job.settings, reporter), reporter)
     emit(StageDone(tool.name, round(time.monotonic() - started, 2), False, reporter.figures))
 
 
@@ -137,16 +140,21 @@ def _take_source(job: Job, emit: Callable[[Message], None]) -> None:
 
 
 def _check_device(device: str) -> None:
-    """Raises Problem for a device that this machine does not have. torch is imported for others than the CPU only."""
-    if device == "cpu":
-        return
-    found = False
-    if device in ("cuda", "mps"):
+    """Raises Problem for a device that this machine does not have. torch is imported for GPUs only."""
+    if device not in ("cpu", "auto"):
         import torch
 
-        found = torch.cuda.is_available() if device == "cuda" else torch.backends.mps.is_available()
-    if not found:
-        raise Problem(f"This machine has no device {device} that torch can use.", "Choose cpu, or see what `python -m core doctor` says.")
+        if not (torch.cuda.is_available() if device == "cuda" else torch.backends.mps.is_available()):
+            raise Problem(f"This machine has no device {device} that torch can use.", "Choose auto, or see what `python -m core doctor` says.")
+
+
+def _with_device(step: Stage, settings: Settings, reporter: Reporter) -> Settings:
+    """The settings with the device that was proven in the place of auto, where a step computes on one; why that one goes to its log."""
+    if settings.device != "auto" or not step.on_device:
+        return settings
+    proof = importlib.import_module("..solve.device", __package__).prove()
+    reporter.log(f"Computing on {proof.device}: {proof.reason}")
+    return replace(settings, device=proof.device)
 
 
 @contextlib.contextmanager

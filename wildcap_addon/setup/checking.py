@@ -19,17 +19,17 @@ FIRST_S, INTERVAL_S = 2.0, 0.5
 _checks: list[Task] = []  # the one under way or done, if any
 
 
-def judge(python: Path, importing: bool) -> str:
-    """The device that a Python computes on, '' if its packages are not loaded. Raises Problem where it cannot run the solver."""
+def judge(python: Path, importing: bool) -> tuple[str, str]:
+    """The device that a Python computes on, and why; '' if its packages are not loaded. Raises Problem where it cannot run the solver."""
     found = environment.survey(python, REQUIREMENTS, importing)
     refuse(python, environment.judge(found, REQUIREMENTS))
-    return found["device"] if importing else ""
+    return (found["device"], found["reason"]) if importing else ("", "")
 
 
 def refuse(python: Path, faults: list[str]) -> None:
     if faults:
         raise Problem(f"{python} cannot run the solver. {' '.join(faults[:3])}",
-                      f"Install what {REQUIREMENTS / 'worker.txt'} lists, then nets.txt beside it with --no-deps; or click Install Solver.")
+                      f"Install what {REQUIREMENTS / 'worker.txt'} lists; or click Install Solver, which brings it up to date.")
 
 
 def accept(python: Path) -> None:
@@ -52,8 +52,8 @@ def look() -> float | None:
         if hasattr(message, "problem"):
             preferences.set_aside(python)
             problems.show("", Problem(message.problem, message.remedy))
-        elif _checks[0].result:
-            preferences.set_python(python, _checks[0].result)
+        elif _checks[0].result and _checks[0].result[0]:
+            preferences.set_python(python, *_checks[0].result)
         status.redraw()
     return INTERVAL_S if _checks[0].running else None
 

@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators that make the solver's environment and take it away; each says first what that means in gigabytes."""
 
+import os
 from pathlib import Path
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...core.worker import environment, index, installation
+from ...core.worker import environment, index, installation, locks, pip_steps
 from .. import asking, jobs, preferences
 from ..base_operator import Dialog
 from .checking import REQUIREMENTS, accept
@@ -28,22 +29,20 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
 
     @staticmethod
     def tell() -> tuple[str, ...] | None:
-        preferences.require_online("use a Python that has the packages already")
-        compute, source, folder = *chosen(), preferences.environment_folder()
-        plan = asking.answer(("plan", compute, source))
+        compute, source, wheels, folder = *chosen(), preferences.environment_folder()
+        plan = asking.answer(("plan", compute, source, wheels))
         if plan is None:
-            asking.ask(("plan", compute, source), lambda task: look_up(task, compute, source), "install_solver")
+            asking.ask(("plan", compute, source, wheels), lambda task: look_up(task, compute, source, wheels, folder), "install_solver")
             return None
         return told(plan, compute, folder, index.check_space(plan, folder))
 
     def work(self, context):
-        preferences.require_online("use a Python that has the packages already")
-        compute, source, folder = *chosen(), preferences.environment_folder()
-        plan = asking.answer(("plan", compute, source))
+        compute, source, wheels, folder = *chosen(), preferences.environment_folder()
+        plan = asking.answer(("plan", compute, source, wheels))
         if plan is not None:
             index.check_space(plan, folder)
         task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), compute=compute, source=source,
-                                         packages=len(plan.packages) if plan is not None else 0)
+                                         wheels=wheels, packages=len(plan.packages) if plan is not None else 0)
         asking.forget(("size", str(folder)))
         jobs.begin("", "install", task, lambda: accept(environment.python_of(folder)))
 
@@ -86,15 +85,21 @@ def told(plan: index.Plan, compute: str, folder: Path, free: int) -> tuple[str, 
             "You can go on working meanwhile, cancel, and continue later.")
 
 
-def chosen() -> tuple[str, str]:
-    """(compute, source) of the preferences, with what Automatic means here. Raises Problem for what cannot be here."""
-    return installation.compute_of(preferences.get().compute), preferences.get().packages
+def chosen() -> tuple[str, str, Path | None]:
+    """(compute, source, wheels) of the preferences, with what Automatic means here. Raises Problem for what cannot be here, and while Blender is to stay off
+    a network that is needed."""
+    source = preferences.get().packages
+    if source != 'folder':
+        preferences.require_online("choose A Folder of Wheels under Packages From, or use a Python that has the packages already")
+    return pip_steps.compute_of(preferences.get().compute), source, preferences.wheels_folder()
 
 
-def look_up(task, compute: str, source: str) -> index.Plan:
+def look_up(task, compute: str, source: str, wheels: Path | None, folder: Path) -> index.Plan:
     """The plan of an installation, asked of the package index."""
     task.say(0, 4, "looking for a Python to begin with")
-    return index.plan(installation.base_python(), installation.pip_steps(REQUIREMENTS, compute, source), task.run, task.say)
+    base = installation.base_python()
+    locks.check_path(pip_steps.lock_of(base, REQUIREMENTS), folder, limited=os.name == "nt")
+    return index.plan(REQUIREMENTS, base, compute, source, task.run, task.say, wheels)
 
 
 def measure(task, folder) -> int:

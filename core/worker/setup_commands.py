@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The commands that set a machine up: python -m core install and wheels. Standard library only: the Python that runs them has no packages yet."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+from ..contract.messages import Done, Failed, Problem, Progress
+from . import index, installation, locks, wheels
+from .background import Task
+from .environment import answer, python_of
+
+REQUIREMENTS = Path(__file__).resolve().parents[2] / "requirements"
+POLL_S = 0.1
+
+
+def add_commands(commands) -> None:
+    """Adds them to the subparsers of `python -m core`."""
+    install = commands.add_parser("install", help="make the solver's environment from this Python, as Install Solver does")
+    install.add_argument("folder", metavar="FOLDER", type=Path, help="new, empty, or one that an earlier installation began")
+    install.add_argument("--wheels", metavar="FOLDER", type=Path, help="a folder of wheels to install from, without a network")
+    _add_build(install)
+    install.set_defaults(command=_install)
+    bring = commands.add_parser("wheels", help="download all wheels of a platform into a folder, to install from without a network")
+    bring.add_argument("folder", metavar="FOLDER", type=Path)
+    bring.add_argument("--for", dest="name", choices=locks.names(), metavar="PLATFORM-PYTHON",
+                       help=f"{', '.join(locks.names())}; this machine and Python without it")
+    _add_build(bring)
+    bring.set_defaults(command=_wheels)
+
+
+def _add_build(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--compute", choices=("auto", "cpu", "cuda", "apple"), default="auto", help="what PyTorch computes on")
+    parser.add_argument("--packages", choices=("pytorch", "pip"), default="pytorch",
+                        help="where PyTorch comes from: its own index where PyPI lacks the build, or with all others from where pip is set up to look")
+
+
+def _install(options: argparse.Namespace) -> int:
+    folder = options.folder.absolute()
+    task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), Path(sys.executable), options.compute,
+                                     "folder" if options.wheels else options.packages, options.wheels)
+    _follow(task)
+    print(f"The solver is ready: {python_of(folder)}")
+    return 0
+
+
+def _wheels(options: argparse.Namespace) -> int:
+    name = options.name or locks.lock_name(answer(sys.executable, locks.DESCRIBE))
+    compute = "cpu" if options.compute == "auto" else options.compute
+    if compute == ("cuda" if name.startswith("macosx") else "apple"):
+        raise Problem(f"There is no solver for {compute} on {name}.", "Leave --compute out, or choose another.")
+    task = Task("wheels", lambda task: wheels.download(REQUIREMENTS, name, compute, options.packages, options.folder,
+                                                       lambda command: task.run(command, lambda line: _hear(task, line))))
+    _follow(task)
+    print(f"{len(task.result)} wheels for {name} in {options.folder}, {index.gigabytes(sum(path.stat().st_size for path in task.result))}; "
+          f"`python -m core install FOLDER --wheels {options.folder}` installs from them, and so does Install Solver")
+    return 0
+
+
+def _hear(task: Task, line: str) -> None:
+    if line.startswith(("Collecting", "  Downloading", "Saved")):
+        task.say(0, 1, line.strip().split(" (from")[0][:80])
+
+
+def _follow(task: Task) -> None:
+    """Runs a task to its end, its progress on stderr. Raises the Problem that it ends with."""
+    task.start()
+    try:
+        while task.running:
+            for message in task.poll():
+                if isinstance(message, Progress):
+                    print(message.text, file=sys.stderr)
+                elif isinstance(message, Failed):
+                    raise Problem(message.problem, message.remedy)
+                elif isinstance(message, Done):
+                    print(f"{message.seconds:.0f} s", file=sys.stderr)
+            time.sleep(POLL_S)
+    except KeyboardInterrupt:
+        task.cancel()
+        raise

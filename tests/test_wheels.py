@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The commands that set a machine up: a folder of wheels, and an installation from it without a network, for any platform that has a lock."""
+
+import hashlib
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from core.__main__ import main
+from core.contract.messages import Problem
+from core.worker import environment, locks, setup_commands, wheels
+
+HERE = locks.lock_name(environment.answer(sys.executable, locks.DESCRIBE))
+
+
+@pytest.fixture
+def index(tmp_path, monkeypatch) -> Path:
+    """Requirements of one small package, and of a small pip, which pip finds in a folder and nowhere else; our commands go by them."""
+    found, requirements = tmp_path / "index", tmp_path / "requirements"
+    found.mkdir()
+    (requirements / "locks").mkdir(parents=True)
+    (requirements / "worker.txt").write_text("tinytorch==1.0\n")
+    for name, lock in (("tinytorch", HERE), ("pip", "pip")):
+        path = found / f"{name}-1.0-py3-none-any.whl"
+        with zipfile.ZipFile(path, "w") as wheel:
+            info = f"{name}-1.0.dist-info"
+            wheel.writestr(f"{name}/__init__.py", "")
+            wheel.writestr(f"{info}/METADATA", f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+            wheel.writestr(f"{info}/WHEEL", "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+            wheel.writestr(f"{info}/RECORD", f"{name}/__init__.py,,\n{info}/METADATA,,\n{info}/WHEEL,,\n{info}/RECORD,,\n")
+        (requirements / "locks" / f"{lock}.txt").write_text(f"{name}==1.0 --hash=sha256:{hashlib.sha256(path.read_bytes()).hexdigest()}\n")
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    monkeypatch.setenv("PIP_FIND_LINKS", str(found))
+    monkeypatch.setattr(setup_commands, "REQUIREMENTS", requirements)
+    return found
+
+
+def test_a_folder_of_wheels_is_made_and_installed_from(index, tmp_path, monkeypatch, capsys):
+    folder, target = tmp_path / "wheels", tmp_path / "Löser"
+    assert main(["wheels", str(folder)]) == 0
+    assert {path.name.split("-")[0] for path in folder.iterdir()} == {"tinytorch", "pip"}
+    said = capsys.readouterr().out
+    assert f"2 wheels for {HERE}" in said and str(folder) in said
+    monkeypatch.delenv("PIP_FIND_LINKS")
+    assert main(["install", str(target), "--wheels", str(folder), "--compute", "cpu"]) == 0
+    python = environment.python_of(target)
+    assert str(python) in capsys.readouterr().out and environment.verify(python, setup_commands.REQUIREMENTS, importing=True) == []
+
+
+def test_what_keeps_wheels_from_coming_is_said(index, tmp_path, capsys):
+    (index / "tinytorch-1.0-py3-none-any.whl").unlink()
+    assert main(["wheels", str(tmp_path / "wheels")]) == 2
+    assert f"Not all wheels for {HERE} could be had (No matching distribution" in capsys.readouterr().err
+    assert main(["wheels", str(tmp_path / "wheels"), "--for", "macosx_arm64-3.13", "--compute", "cuda"]) == 2
+    assert "no solver for cuda on macosx_arm64-3.13" in capsys.readouterr().err
+    assert main(["install", str(tmp_path / "env"), "--compute", "cpu"]) == 2
+    assert "could not be downloaded" in capsys.readouterr().err
+    (tmp_path / "file").touch()
+    with pytest.raises(Problem, match="is no folder"):
+        wheels.download(setup_commands.REQUIREMENTS, HERE, "cpu", "pip", tmp_path / "file", lambda command: (0, ""))
