@@ -19,6 +19,8 @@ from .landmarks import fit_rays, pupils, template_landmarks
 ASTRAY, ASTRAY_WIDTH = 4.0, 0.1
 """A frame whose landmarks miss those of the others by so many times the usual, and by such a share of the face's width, shows a face that the net did
 not find: a profile, mostly."""
+SURE = 0.8
+"""Score of a face that was found; the net gives one that is there 0.95 and more."""
 FRONTAL_DEG = 45.0
 """Landmarks slide along the silhouette of a turned head, so frames within this yaw are taken where there are enough."""
 MOVED = 0.08
@@ -73,7 +75,7 @@ def find_head(model: pycolmap.Reconstruction, found: dict[str, faces.Face], inte
 
 def agreeing_faces(model: pycolmap.Reconstruction, found: dict[str, faces.Face]) -> dict[str, faces.Face]:
     """Those of the faces found in registered frames whose landmarks meet those of the other frames."""
-    seen = [(image, found[image.name]) for image in sorted(model.images.values(), key=lambda image: image.name) if image.has_pose and image.name in found]
+    seen = _sure(model, found)
     if len(seen) < 3:
         return {image.name: face for image, face in seen}
     origins, directions = zip(*(rays(image, model.cameras[image.camera_id], face) for image, face in seen), strict=True)
@@ -115,8 +117,16 @@ def intersect_rays(origins: np.ndarray, directions: np.ndarray, rounds: int = 10
     return points, angle
 
 
+def _sure(model: pycolmap.Reconstruction, found: dict[str, faces.Face]) -> list[tuple]:
+    """Registered images with their faces, without those that the net hardly believes itself, where there are others: in a profile it sees a face from in
+    front that is none."""
+    seen = [(image, found[image.name]) for image in sorted(model.images.values(), key=lambda image: image.name) if image.has_pose and image.name in found]
+    sure = [pair for pair in seen if pair[1].score > SURE]
+    return sure if len(sure) >= 2 else seen
+
+
 def _registered_with_face(model: pycolmap.Reconstruction, found: dict[str, faces.Face]) -> list[tuple]:
     """Registered images with their faces: those that face the camera most."""
-    seen = [(image, found[image.name]) for image in sorted(model.images.values(), key=lambda image: image.name) if image.has_pose and image.name in found]
+    seen = _sure(model, found)
     frontal = [pair for pair in seen if abs(pair[1].yaw_deg) < FRONTAL_DEG]
     return frontal if len(frontal) >= 4 else seen

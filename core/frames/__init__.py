@@ -70,7 +70,7 @@ def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[FrameR
         images.write_srgb(folder / name, picture.srgb, quality=95)
         if picture.full is not None:
             images.write_srgb(folder / FULL / name, picture.full, quality=95)
-        face, rival = _subject(picture.srgb, last)
+        face, rival = _subject(picture.srgb, last if picture.time_s is not None else None)
         last = face or last
         records.append(_record(picture, name, face, last, rival))
         thumbnails.append(images.resize(picture.srgb.mean(-1), 32, 32))
