@@ -2,13 +2,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cameras from the face: known ones found again from landmarks alone and with matches; a profile without a face comes in through matches."""
 
+from types import SimpleNamespace
+
 import numpy as np
+import pycolmap
 import pytest
 
 from benchmarks.cameras_against_truth import similarity
+from core.cameras.joint import refine
 from core.cameras.landmarks import fit_rays, pupils, template_landmarks
 from core.cameras.matches import Matches, tracks
 from core.cameras.resection import resect
+from core.cameras.world import agreeing_faces, find_head
 from core.contract.messages import Reporter
 from core.face.faces import Face
 from core.synthetic.painted_head import FOCAL, HEIGHT, WIDTH, camera
@@ -94,6 +99,42 @@ def test_wrong_matches_do_not_count_as_refinement(scene):
 def test_fewer_than_two_faces_give_nothing(scene):
     _, views, found = scene
     assert resect(group(views), {"0.jpg": found["0.jpg"]}, Matches(), Reporter("cameras")) is None
+
+
+def model_of(views: dict, focal: float, rng, off_m: float) -> pycolmap.Reconstruction:
+    """The true cameras, moved by about so much, with a lens of this focal length."""
+    model = pycolmap.Reconstruction()
+    model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="SIMPLE_RADIAL", width=WIDTH, height=HEIGHT, params=[focal, WIDTH / 2, HEIGHT / 2, 0]))
+    for number, (name, view) in enumerate(views.items(), 1):
+        shift = (view.translation + rng.normal(0, off_m, 3)) * [1, 1, focal / FOCAL]
+        pose = pycolmap.Rigid3d(np.concatenate([view.rotation, shift[:, None]], 1))
+        model.add_image_with_trivial_frame(pycolmap.Image(name=name, camera_id=1, image_id=number), pose)
+    return model
+
+
+def test_cameras_that_are_nearly_right_are_made_right_with_the_face(scene):
+    """Off by some pixels and a tenth of the focal length, with a profile that the net mistakes and one without a camera."""
+    rng, views, found = scene
+    views = views | {"8.jpg": camera(-85, 0.05), "9.jpg": camera(88, 0.05)}
+    profile = seen(camera(-40, 0.05), 0.5, rng)
+    report = Reporter("cameras")
+    matches = matched(views, rng)
+    start = model_of({name: view for name, view in views.items() if name != "9.jpg"}, 1.08 * FOCAL, rng, 0.002)
+    mistaken = found | {"8.jpg": profile}
+    assert set(agreeing_faces(start, mistaken)) == set(found)
+    missing = [{"names": ["9.jpg"], "width": WIDTH, "height": HEIGHT, "focal_px": None}]
+    refined = refine(start, mistaken, matches, True, report, missing)
+    centres, turns = off(SimpleNamespace(model=refined), views)
+    assert refined.num_reg_images() == 7 and centres.max() < 0.01 and turns.max() < 0.5
+    assert refined.cameras[1].params[0] == pytest.approx(FOCAL, rel=0.02)
+    assert find_head(refined, mistaken, 0.063).unlike_m < 0.002
+
+
+def test_cameras_without_matches_stay_what_they_are(scene):
+    rng, views, found = scene
+    start = model_of(views, FOCAL, rng, 0.001)
+    kept = refine(start, found, Matches({name: np.zeros((0, 2)) for name in views}, {}), True, Reporter("cameras"))
+    assert kept.cameras[1].params[0] == FOCAL and kept.num_reg_images() == len(views)
 
 
 def test_tracks_hang_together_and_ambiguous_ones_go():

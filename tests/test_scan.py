@@ -12,7 +12,7 @@ import trimesh
 
 from core import scan
 from core.contract.capture import Capture
-from core.contract.messages import CancelledError, Problem, Reporter
+from core.contract.messages import CancelledError, Reporter
 from core.contract.settings import from_json
 from core.geometry import meshes, raster
 from core.geometry.meshes import Mesh
@@ -148,12 +148,16 @@ def test_few_photographs_far_apart_still_pair_up():
     assert choose_pairs(centres[[0, 4]], np.ones(2), 24) == []
 
 
-def test_nothing_to_match_is_told(capture, monkeypatch):
+def test_where_no_surface_is_measured_the_chain_goes_on_with_what_matches(capture, monkeypatch):
     photograph(capture, around([-6, 0, 6]))
     monkeypatch.setattr(scan.rounds.faces, "segment_person", lambda srgb: np.zeros(srgb.shape[:2], np.float32))
-    with pytest.raises(Problem, match="No surface") as caught:
-        scan.run(capture, from_json({}), Reporter("scan"))
-    assert caught.value.remedy and not capture.scan.exists()
+    places = np.array([[0.0, -0.05, 0.0], [0.01, -0.06, 0.02], [3.0, 0.0, 0.0]])
+    monkeypatch.setattr(scan, "read_points", lambda capture: (places, places))
+    report = Reporter("scan")
+    scan.run(capture, from_json({}), report)
+    assert "No surface" in report.findings[0]["problem"] and report.figures["method"] == "none"
+    kept = meshes.read_ply(capture.scan, or_points=True)
+    assert np.allclose(kept.vertices, places[:2]) and kept.faces.shape == (0, 3), "what lies far from the head is none of it"
 
 
 def test_cancel_keeps_the_old_scan(capture):

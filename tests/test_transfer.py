@@ -215,6 +215,9 @@ def test_without_a_scan_there_is_still_a_delivery(capture):
     capture.scan.unlink()
     transfer.run(capture, settings_of(), Reporter("transfer"))
     assert [path.name for path in capture.delivery.iterdir()] == ["delivery.json"]
+    meshes.write_points(capture.scan, np.eye(3))  # where no surface was measured
+    transfer.run(capture, settings_of(), Reporter("transfer"))
+    assert [path.name for path in capture.delivery.iterdir()] == ["delivery.json"]
     capture.head.write_text("v 0 0 0\n")
     with pytest.raises(Problem):
         transfer.run(capture, settings_of(), Reporter("transfer"))

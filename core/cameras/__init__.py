@@ -22,14 +22,18 @@ from ..imaging import images
 from . import coverage
 from .calibration import import_cameras
 from .drawing import draw_cameras
+from .joint import refine
 from .landmarks import find_landmarks
 from .motion import expression_changes
 from .solving import MOST_FACES, Solved, solve
-from .world import find_head
+from .structure import ALL_PAIRS, solve_structure
+from .world import HeadFrame, find_head
 
 LEAST_COVERAGE_DEG = 15.0
 IMPORT_MISS = 0.05
 """Share of the face's width by which landmarks may miss in imported cameras: those of another capture, or read by other conventions, miss by far more."""
+IMPORT_NEAR = 6.0
+"""Cameras that miss by more than the next two figures, but not by so many times as much, are a few pixels off and can be refined."""
 IMPORT_UNLIKE_M = 0.004
 """How far a head may miss the landmarks in imported cameras; a person's does by 2 mm. Cameras in the wrong order may see a hollow face."""
 BLURRED = 0.6
@@ -78,9 +82,20 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
     records = [record for record in frames.records if record.name in names and record.yaw_deg is not None]
     records = [records[i] for i in np.unique(np.linspace(0, len(records) - 1, min(MOST_FACES, len(records))).round().astype(int))] if records else []
     found = find_landmarks(records, capture.frames, report)
-    head = find_head(model, found, settings.cameras.interpupillary_mm / 1000)
-    width = float(np.median([face.box[2] - face.box[0] for face in found.values()]))
-    if not (max(head.miss, head.error_px / width) < IMPORT_MISS and head.unlike_m < IMPORT_UNLIKE_M):
+    width = float(np.median([face.box[2] - face.box[0] for face in found.values()] or [1.0]))
+
+    def checked(model) -> tuple[HeadFrame, float]:
+        """The head, and by how many times what is allowed these cameras miss it."""
+        head = find_head(model, found, settings.cameras.interpupillary_mm / 1000)
+        return head, max(head.miss / IMPORT_MISS, head.error_px / width / IMPORT_MISS, head.unlike_m / IMPORT_UNLIKE_M)
+
+    head, off = checked(model)
+    if 1 <= off < IMPORT_NEAR and len(frames.records) <= ALL_PAIRS:
+        report.log("The imported cameras are a little off; they are refined by what matches in these pictures.")
+        matches = solve_structure(frames, capture, False, settings.cameras.matching, settings.seed, report)[1]
+        model = refine(model, found, matches, False, report)
+        head, off = checked(model)
+    if not off < 1:
         raise Problem(f"The cameras in {path.name} do not fit these pictures: the face's landmarks miss each other by {head.error_px:.0f} px "
                       f"({100 * head.error_px / width:.0f} % of the face's width), and a head by {1000 * head.unlike_m:.0f} mm.",
                       "Import the cameras that were solved from these very pictures, not cropped, under the same names; or empty the setting.")

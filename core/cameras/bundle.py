@@ -20,6 +20,7 @@ OFFSET_M = 0.002
 FOCAL_SPREAD = 0.35
 """Deviation of the logarithm of an unknown focal length from its prior: from a phone's wide to its portrait lens."""
 FEATURE_PX = 1.5
+"""Deviation of a match in cameras that come from the face, where what agrees is little and may be wrong."""
 TURNED_AWAY = 0.15
 """Cosine between a landmark's normal and the camera below which the landmark has slid onto the silhouette."""
 
@@ -27,7 +28,8 @@ TURNED_AWAY = 0.15
 @dataclass(frozen=True)
 class Bundle:
     """State: rotations [N, 3, 3] and translations [N, 3] into the cameras; focal [G] px with prior [G] and known [G]; lens [N], the camera's focal;
-    centre [N, 2], principal points px; coefficients [K]; points [P, 3] metres in the head's frame, the first 468 the landmarks."""
+    centre [N, 2], principal points px; coefficients [K]; points [P, 3] metres in the head's frame, the first 468 the landmarks; feature_px, the deviation
+    of a match; focal_spread, that of the logarithm of an unknown focal length."""
 
     rotations: np.ndarray
     translations: np.ndarray
@@ -38,6 +40,8 @@ class Bundle:
     centre: np.ndarray
     coefficients: np.ndarray
     points: np.ndarray
+    feature_px: float = FEATURE_PX
+    focal_spread: float = FOCAL_SPREAD
 
     def local(self, camera: np.ndarray, point: np.ndarray) -> np.ndarray:
         """Points in the frames of cameras [M, 3]."""
@@ -80,7 +84,7 @@ def adjust(bundle: Bundle, seen: Observations, rounds: int = 15) -> Bundle:
 def _sigma_px(bundle: Bundle, seen: Observations) -> np.ndarray:
     """Expected deviation of each observation [M] in pixels: a landmark's is a length on the head."""
     depth = np.maximum(bundle.local(seen.camera, seen.point)[:, 2], 0.05)
-    return np.where(seen.point < len(template_landmarks().mean), SIGMA_M * bundle.focal[bundle.lens[seen.camera]] / depth, FEATURE_PX)
+    return np.where(seen.point < len(template_landmarks().mean), SIGMA_M * bundle.focal[bundle.lens[seen.camera]] / depth, bundle.feature_px)
 
 
 def _weights(bundle: Bundle, seen: Observations) -> np.ndarray:
@@ -101,7 +105,7 @@ def _weights(bundle: Bundle, seen: Observations) -> np.ndarray:
 def _priors(bundle: Bundle) -> tuple[np.ndarray, np.ndarray]:
     """Residuals of the landmarks against the head of the identity space [468, 3], and of the logarithms of the focal lengths [G], in deviations."""
     model = template_landmarks()
-    return (bundle.points[:len(model.mean)] - model.shape(bundle.coefficients)) / OFFSET_M, np.log(bundle.focal / bundle.focal_prior) / FOCAL_SPREAD
+    return (bundle.points[:len(model.mean)] - model.shape(bundle.coefficients)) / OFFSET_M, np.log(bundle.focal / bundle.focal_prior) / bundle.focal_spread
 
 
 def _cost(bundle: Bundle, seen: Observations, weights: np.ndarray) -> float:
@@ -154,8 +158,8 @@ def _step(bundle: Bundle, seen: Observations, weights: np.ndarray, damping: floa
     u[tail, tail] += strength * flat.T @ flat + np.eye(flat.shape[1])
     g[tail] += bundle.coefficients - strength * OFFSET_M * flat.T @ offset.ravel()
     lenses = np.arange(6 * views, 6 * views + groups)
-    u[lenses, lenses] += 1 / FOCAL_SPREAD**2
-    g[lenses] += np.where(bundle.focal_known, 0, focal_off / FOCAL_SPREAD)
+    u[lenses, lenses] += 1 / bundle.focal_spread**2
+    g[lenses] += np.where(bundle.focal_known, 0, focal_off / bundle.focal_spread)
 
     u[np.diag_indices(shared)] *= 1 + damping
     u[np.diag_indices(shared)] += 1e-9

@@ -18,20 +18,24 @@ from pathlib import Path
 import pycolmap
 
 OVERLAP = 10
+PHONE = 1.0
+FOCALS = (PHONE, 2.0, 3.5)
+"""Focal lengths that photographs whose files tell none are tried with, as shares of the longer side: 53, 28 and 16 degrees of view."""
 CHUNK = 24
 """Pictures handed to COLMAP at once: enough to keep its threads busy, few enough to show progress."""
 
 
 def reconstruct(job: dict) -> bool:
     """Runs a job: images (folder), groups [{names, width, height, focal_px or null}] of one camera each, skin (feature settings), sequential,
-    seed, masks (folder or null), database and output (paths). Writes the largest model to output; False where there is none."""
+    photographs (few, of straight lenses whose focal length may be any), seed, masks (folder or null), database and output (paths). Writes the largest
+    model to output; False where there is none."""
     pycolmap.set_random_seed(job["seed"])
     _extract(job)
     _match(job)
-    models = _map(job)
+    models = _map_photographs(job) if job["photographs"] else _map(job)
     if not models:
         return False
-    best = max(models.values(), key=lambda model: model.num_reg_images())
+    best = max(models, key=_worth)
     Path(job["output"]).mkdir(parents=True, exist_ok=True)
     best.write_binary(job["output"])
     return True
@@ -52,7 +56,7 @@ def _extract(job: dict) -> None:
     for camera_id, group in enumerate(job["groups"], 1):
         reader = pycolmap.ImageReaderOptions()
         reader.camera_model = "SIMPLE_RADIAL"
-        reader.default_focal_length_factor = 1.0  # between a phone's wide (0.8) and its portrait lens (1.4)
+        reader.default_focal_length_factor = PHONE  # between a phone's wide (0.8) and its portrait lens (1.4)
         if group["focal_px"]:
             reader.camera_params = f"{group['focal_px']},{group['width'] / 2},{group['height'] / 2},0"
         if job["masks"]:
@@ -83,7 +87,26 @@ def _match(job: dict) -> None:
     _say("matching features", 1, 1)
 
 
-def _map(job: dict) -> dict[int, pycolmap.Reconstruction]:
+def _map_photographs(job: dict) -> list[pycolmap.Reconstruction]:
+    """The models from every focal length of FOCALS, where one is not told; what comes after the matches takes little time."""
+    unknown = [(camera_id, group) for camera_id, group in enumerate(job["groups"], 1) if not group["focal_px"]]
+    found = []
+    for factor in FOCALS if unknown else (PHONE,):
+        with pycolmap.Database.open(job["database"]) as stored:
+            for camera_id, group in unknown:
+                camera = stored.read_camera(camera_id)
+                camera.params = [factor * max(group["width"], group["height"]), group["width"] / 2, group["height"] / 2, 0]
+                stored.update_camera(camera)
+        found += _map(job)
+    return found
+
+
+def _worth(model: pycolmap.Reconstruction) -> tuple[int, int]:
+    """Which of several models is best: more frames first, then more of what was seen explained."""
+    return model.num_reg_images(), model.compute_num_observations()
+
+
+def _map(job: dict) -> list[pycolmap.Reconstruction]:
     options = pycolmap.IncrementalPipelineOptions()
     options.random_seed = job["seed"]
     options.mapper.random_seed = job["seed"]
@@ -91,6 +114,7 @@ def _map(job: dict) -> dict[int, pycolmap.Reconstruction]:
     options.num_threads = 1  # sums in a fixed order: the same seed gives the same cameras, and the mapper gains little from a second thread
     options.min_model_size = 3
     options.extract_colors = True
+    options.ba_refine_extra_params = not job["photographs"]  # a few pictures of a face do not tell a lens's distortion from its focal length
     total = sum(len(group["names"]) for group in job["groups"])
     if job["skin"] or total < 12:
         options.min_num_matches = 12
@@ -106,7 +130,7 @@ def _map(job: dict) -> dict[int, pycolmap.Reconstruction]:
 
     folder = Path(job["output"]).with_name("models")
     folder.mkdir(parents=True, exist_ok=True)
-    return pycolmap.incremental_mapping(job["database"], job["images"], str(folder), options, next_image_callback=another)
+    return list(pycolmap.incremental_mapping(job["database"], job["images"], str(folder), options, next_image_callback=another).values())
 
 
 def _aside(function, *arguments) -> None:

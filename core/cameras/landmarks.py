@@ -60,12 +60,17 @@ def template_landmarks() -> Landmarks:
 
 
 def find_landmarks(records: Sequence[FrameRecord], folder: Path, report: Reporter, text: str = "finding the face") -> dict[str, faces.Face]:
-    """Name -> face of each of `records` where one is found; a turned head is followed from the frame after it, too."""
+    """Name -> face of each of `records` where one is found; a turned head is followed from the frame before and the one after it, which are near in a
+    film: in a photograph that is only done where no face is found otherwise."""
     found: dict[str, faces.Face] = {}
     last = None
     for done, record in enumerate(records):
         report.progress(done, len(records), text)
-        last = faces.detect(images.read_srgb(folder / record.name), last)
+        srgb = images.read_srgb(folder / record.name)
+        face = faces.detect(srgb, last if record.time_s is not None else None)
+        if face is None and last is not None:
+            face = faces.detect(srgb, last)
+        last = face
         if last is not None:
             found[record.name] = last
     for record, following in zip(records[-2::-1], records[:0:-1], strict=True):

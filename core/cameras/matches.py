@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 import pycolmap
@@ -24,6 +24,12 @@ class Matches:
         """The pixels [M, 2] in either frame of a pair that is in `pairs`."""
         index = self.pairs[first, second]
         return self.keypoints[first][index[:, 0]], self.keypoints[second][index[:, 1]]
+
+    def scaled(self, scales: dict[str, tuple[float, float]]) -> Matches:
+        """The same matches in pictures of another size: name with its folder -> how much wider and higher. The names lose their folder."""
+        plain = {name: PurePosixPath(name).name for name in self.keypoints}
+        keypoints = {plain[name]: pixels * scales[name] for name, pixels in self.keypoints.items()}
+        return Matches(keypoints, {(plain[first], plain[second]): index for (first, second), index in self.pairs.items()})
 
     def kept(self, keep: dict[tuple[str, str], np.ndarray]) -> Matches:
         """Only those matches of each pair that `keep` [M] says."""

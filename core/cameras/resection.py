@@ -67,10 +67,10 @@ def resect(groups: list[dict], found: dict[str, faces.Face], matches: Matches, r
     seen, used = landmarks, []
     for step, share in enumerate(AGREE, 1):
         report.progress(step, 5, "refining cameras by what matches")
-        added, used, bundle = _agreeing(bundle, names, matches, share * width)
+        added, used, bundle = agreeing(bundle, names, matches, share * width)
         seen = Observations(*(np.concatenate([a, b]) for a, b in zip((landmarks.camera, landmarks.point, landmarks.pixel), added, strict=True)))
         bundle = adjust(bundle, seen, 10)
-    late = _place_by_matches(bundle, groups, group_of, names, used, matches)
+    late = place_by_matches(bundle, groups, group_of, names, used, matches)
     miss = np.linalg.norm(bundle.project(landmarks.camera, landmarks.point) - landmarks.pixel, axis=1)
     error = float(np.median(miss[model.trust[landmarks.point] > 0.2]))
     return Resection(_model(bundle, groups, group_of, names, seen, late), error, error / width, len(used), _trusted(names, matches, used), sorted(late))
@@ -110,7 +110,7 @@ def _first(groups: list[dict], group_of: dict, names: list[str], pixels: dict) -
                   np.zeros(len(model.basis)), model.mean.copy())
 
 
-def _agreeing(bundle: Bundle, names: list[str], matches: Matches, reach_px: float) -> tuple[tuple, list, Bundle]:
+def agreeing(bundle: Bundle, names: list[str], matches: Matches, reach_px: float) -> tuple[tuple, list, Bundle]:
     """Tracks whose triangulated point projects within `reach_px` in two frames or more: their observations, themselves, and the bundle with the points."""
     number = {name: i for i, name in enumerate(names)}
     points, used, camera, point, pixel = [], [], [], [], []
@@ -166,7 +166,7 @@ def _triangulate(bundle: Bundle, camera: np.ndarray, pixel: np.ndarray) -> np.nd
     return np.linalg.solve(across.sum(0), (across @ centres[:, :, None]).sum(0))[:, 0]
 
 
-def _place_by_matches(bundle: Bundle, groups: list[dict], group_of: dict, names: list[str], used: list, matches: Matches) -> dict[str, tuple]:
+def place_by_matches(bundle: Bundle, groups: list[dict], group_of: dict, names: list[str], used: list, matches: Matches) -> dict[str, tuple]:
     """name -> rotation, translation of frames without a face, by PnP on the tracks' points that their keypoints match."""
     marks = len(template_landmarks().mean)
     place = {member: bundle.points[marks + i] for i, track in enumerate(used) for member in track}

@@ -5,17 +5,19 @@
 from __future__ import annotations
 
 import json
+import math
 import queue
 import subprocess
 import sys
 import threading
 from collections.abc import Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
+import numpy as np
 import pycolmap
 
 from ..contract.capture import Capture
-from ..contract.frame_records import VIDEO, FrameRecord, Frames
+from ..contract.frame_records import FULL, PHOTOGRAPHS, VIDEO, FrameRecord, Frames
 from ..contract.messages import Problem, Reporter
 from ..geometry.models import read_model
 from ..imaging import images
@@ -30,11 +32,15 @@ NO_MODEL = 3
 def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str, seed: int, report: Reporter,
                     masks: Path | None = None) -> tuple[pycolmap.Reconstruction | None, Matches]:
     """The largest model of the capture's `frames`, in COLMAP's own world (None where nothing fits together),
-    and all matches. `masks`: folder with NAME.png, where black hides what moves otherwise."""
+    and all matches. `masks`: folder with NAME.png, where black hides what moves otherwise. Photographs are looked at as large as they were kept,
+    though not with masks; pixels are the frames' in any case."""
     records, folder = frames.records, capture.frames
     sequential = matching == "sequential" or (matching == "auto" and frames.kind == VIDEO and len(records) > ALL_PAIRS)
     with capture.workspace() as work:
-        job = {"images": str(folder.resolve()), "groups": camera_groups(records, folder), "skin": skin, "sequential": sequential,
+        groups = camera_groups(records, folder)
+        few = frames.kind == PHOTOGRAPHS and len(records) <= ALL_PAIRS
+        job = {"images": str(folder.resolve()), "groups": groups if masks else _enlarged(groups, folder), "skin": skin,
+               "sequential": sequential, "photographs": few,
                "masks": str(masks) if masks else None, "seed": seed, "database": str(work / "database.db"), "output": str(work / "model")}
         path = work / "job.json"
         path.write_text(json.dumps(job), encoding="utf-8")
@@ -42,7 +48,13 @@ def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str,
             model = read_model(Path(job["output"])) if _follow(path, report) else None
         except (OSError, ValueError) as error:
             raise Problem(f"The camera solver left a model that cannot be used ({error}).", "Run the stage cameras again.") from error
-        return model, read_matches(Path(job["database"]))
+        matches = read_matches(Path(job["database"]))
+        sizes = {name: (group["width"], group["height"]) for group in groups for name in group["names"]}
+        scales = {name: [small / large for small, large in zip(sizes[PurePosixPath(name).name], (group["width"], group["height"]), strict=True)]
+                  for group in job["groups"] for name in group["names"]}
+        if model is not None:
+            _reduce(model, sizes)
+        return model, matches.scaled(scales)
 
 
 def camera_groups(records: Sequence[FrameRecord], folder: Path) -> list[dict]:
@@ -53,6 +65,34 @@ def camera_groups(records: Sequence[FrameRecord], folder: Path) -> list[dict]:
         key = width, height, record.focal_px
         groups.setdefault(key, []).append(record.name)
     return [{"names": names, "width": w, "height": h, "focal_px": f} for (w, h, f), names in groups.items()]
+
+
+def _enlarged(groups: list[dict], folder: Path) -> list[dict]:
+    """The same groups of the larger pictures of these frames, whose names are full/NAME; those that have none stay as they are."""
+    split: dict[tuple, dict] = {}
+    for number, group in enumerate(groups):
+        for name in group["names"]:
+            there = (folder / FULL / name).is_file()
+            width, height = images.size(folder / FULL / name) if there else (group["width"], group["height"])
+            focal = group["focal_px"] and group["focal_px"] * math.hypot(width, height) / math.hypot(group["width"], group["height"])
+            one = split.setdefault((number, width, height), {"names": [], "width": width, "height": height, "focal_px": focal})
+            one["names"].append(f"{FULL}/{name}" if there else name)
+    return list(split.values())
+
+
+def _reduce(model: pycolmap.Reconstruction, sizes: dict[str, tuple[int, int]]) -> None:
+    """Brings a model of the larger pictures to the frames' own names and sizes (name -> width, height)."""
+    before = {number: (camera.width, camera.height) for number, camera in model.cameras.items()}
+    for image in model.images.values():
+        image.name = PurePosixPath(image.name).name
+        camera = model.cameras[image.camera_id]
+        scale = np.divide(sizes[image.name], before[image.camera_id])
+        if (camera.width, camera.height) != sizes[image.name]:
+            camera.rescale(*sizes[image.name])
+        if (scale != 1).any():
+            for point in image.points2D:
+                point.xy = point.xy * scale
+    model.update_point_3d_errors()
 
 
 def _follow(job: Path, report: Reporter) -> bool:

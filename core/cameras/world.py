@@ -16,6 +16,11 @@ from ..contract.messages import Problem
 from ..face import faces
 from .landmarks import fit_rays, pupils, template_landmarks
 
+ASTRAY, ASTRAY_WIDTH = 4.0, 0.1
+"""A frame whose landmarks miss those of the others by so many times the usual, and by such a share of the face's width, shows a face that the net did
+not find: a profile, mostly."""
+SURE = 0.8
+"""Score of a face that was found; the net gives one that is there 0.95 and more."""
 FRONTAL_DEG = 45.0
 """Landmarks slide along the silhouette of a turned head, so frames within this yaw are taken where there are enough."""
 MOVED = 0.08
@@ -52,6 +57,10 @@ def find_head(model: pycolmap.Reconstruction, found: dict[str, faces.Face], inte
     focal = np.array([model.cameras[image.camera_id].mean_focal_length() for image, _ in seen])
     width = np.median([face.box[2] - face.box[0] for _, face in seen])
     errors = np.median(angles * focal[:, None], axis=1)  # per frame, so that a head that sat elsewhere in a quarter of them shows
+    good = _together(errors, width)
+    if not good.all():
+        origins, directions = origins[good], directions[good]
+        points, _ = intersect_rays(origins, directions)
     scale, rotation, translation, coefficients = fit_rays(origins, directions, points)
     right, left = pupils(coefficients)
     apart = scale * float(np.linalg.norm(left - right))
@@ -62,6 +71,24 @@ def find_head(model: pycolmap.Reconstruction, found: dict[str, faces.Face], inte
     offset = head[None] - origins[:, None]
     miss = np.linalg.norm(np.cross(offset, directions), axis=-1)[:, template_landmarks().trust > 0.2]
     return HeadFrame(similarity, float(np.median(errors)), float(np.percentile(errors, 75) / width), apart, float(np.median(miss)) * size)
+
+
+def agreeing_faces(model: pycolmap.Reconstruction, found: dict[str, faces.Face]) -> dict[str, faces.Face]:
+    """Those of the faces found in registered frames whose landmarks meet those of the other frames."""
+    seen = _sure(model, found)
+    if len(seen) < 3:
+        return {image.name: face for image, face in seen}
+    origins, directions = zip(*(rays(image, model.cameras[image.camera_id], face) for image, face in seen), strict=True)
+    _, angles = intersect_rays(np.array(origins), np.array(directions))
+    focal = np.array([model.cameras[image.camera_id].mean_focal_length() for image, _ in seen])
+    good = _together(np.median(angles * focal[:, None], axis=1), np.median([face.box[2] - face.box[0] for _, face in seen]))
+    return {image.name: face for (image, face), kept in zip(seen, good, strict=True) if kept}
+
+
+def _together(errors: np.ndarray, width: float) -> np.ndarray:
+    """bool [N]: frames whose landmarks miss by no more than the others'; errors [N] and the face's width in pixels."""
+    good = errors <= max(ASTRAY * np.median(errors), ASTRAY_WIDTH * width)
+    return good if good.sum() >= 2 else np.ones(len(errors), bool)
 
 
 def rays(image: pycolmap.Image, camera: pycolmap.Camera, face: faces.Face) -> tuple[np.ndarray, np.ndarray]:
@@ -90,8 +117,16 @@ def intersect_rays(origins: np.ndarray, directions: np.ndarray, rounds: int = 10
     return points, angle
 
 
+def _sure(model: pycolmap.Reconstruction, found: dict[str, faces.Face]) -> list[tuple]:
+    """Registered images with their faces, without those that the net hardly believes itself, where there are others: in a profile it sees a face from in
+    front that is none."""
+    seen = [(image, found[image.name]) for image in sorted(model.images.values(), key=lambda image: image.name) if image.has_pose and image.name in found]
+    sure = [pair for pair in seen if pair[1].score > SURE]
+    return sure if len(sure) >= 2 else seen
+
+
 def _registered_with_face(model: pycolmap.Reconstruction, found: dict[str, faces.Face]) -> list[tuple]:
     """Registered images with their faces: those that face the camera most."""
-    seen = [(image, found[image.name]) for image in sorted(model.images.values(), key=lambda image: image.name) if image.has_pose and image.name in found]
+    seen = _sure(model, found)
     frontal = [pair for pair in seen if abs(pair[1].yaw_deg) < FRONTAL_DEG]
     return frontal if len(frontal) >= 4 else seen

@@ -19,6 +19,8 @@ from .json_files import is_number, plain_name, read_json
 from .messages import Problem
 
 VIDEO, PHOTOGRAPHS = "video", "photographs"
+FULL = "full"
+"""Folder in frames/ with the photographs under their frames' names as large as cameras are found by, in their own exposure; absent where none is larger."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..contract.capture import Capture
 from ..contract.files import replacing_folder
-from ..contract.frame_records import PHOTOGRAPHS, VIDEO, FrameRecord, Frames, write_frames
+from ..contract.frame_records import FULL, PHOTOGRAPHS, VIDEO, FrameRecord, Frames, write_frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import faces
@@ -47,7 +47,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     read = read_photographs if photographs else read_video
     pictures = read(path, settings.frames.max_frames, settings.frames.long_side, report)
     if settings.frames.mirrored:
-        pictures = (replace(picture, srgb=np.ascontiguousarray(picture.srgb[:, ::-1])) for picture in pictures)
+        pictures = (replace(picture, srgb=_flipped(picture.srgb), full=_flipped(picture.full)) for picture in pictures)
     with replacing_folder(capture.frames) as folder:
         records, thumbnails, contents = _write_frames(pictures, folder, report)
         _check(path, records, thumbnails, photographs)
@@ -68,13 +68,19 @@ def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[FrameR
     for picture in pictures:
         name = f"{picture.index:05d}.jpg"
         images.write_srgb(folder / name, picture.srgb, quality=95)
-        face, rival = _subject(picture.srgb, last)
+        if picture.full is not None:
+            images.write_srgb(folder / FULL / name, picture.full, quality=95)
+        face, rival = _subject(picture.srgb, last if picture.time_s is not None else None)
         last = face or last
         records.append(_record(picture, name, face, last, rival))
         thumbnails.append(images.resize(picture.srgb.mean(-1), 32, 32))
         contents.append(content_of(picture.srgb))
         report.progress(READING * picture.done, picture.of, f"frame {len(records)}, {'face found' if face else 'no face'}")
     return records, np.array(thumbnails), contents
+
+
+def _flipped(picture: np.ndarray | None) -> np.ndarray | None:
+    return None if picture is None else np.ascontiguousarray(picture[:, ::-1])
 
 
 def _subject(srgb: np.ndarray, last: faces.Face | None) -> tuple[faces.Face | None, float]:
@@ -105,6 +111,7 @@ def _drop_blurred(records: list[FrameRecord], contents: list, folder: Path) -> t
     dropped = [r.name for r, out in zip(records, bad, strict=True) if out]
     for name in dropped:
         (folder / name).unlink()
+        (folder / FULL / name).unlink(missing_ok=True)
     return [r for r, out in zip(records, bad, strict=True) if not out], [c for c, out in zip(contents, bad, strict=True) if not out], dropped
 
 

@@ -15,6 +15,8 @@ from .source import Picture, evenly, fit
 SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr")
 PHONE_ONLY = (".heic", ".heif", ".avif", ".dng")
 """OpenImageIO's wheel has no HEIF decoder, and FFmpeg reads the tiles of which an iPhone's HEIC consists without saying how they lie."""
+FEATURES_PX = 2000
+"""Longer side of the pictures that cameras are found by: photographs lie far apart, and what still matches between them is fine."""
 AS_JPEG = "Export them as JPEG or PNG (on an iPhone: Settings, Camera, Formats, Most Compatible)."
 
 
@@ -39,8 +41,9 @@ def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) 
             report.log(f"{path.name} is left out: {problem.problem}")
             continue
         focal = images.read_focal_35mm(path)
-        srgb = fit(srgb, long_side)
+        full = fit(srgb, max(FEATURES_PX, long_side))
         if "Display P3" in images.read_profile(path):  # an iPhone's JPEG
-            srgb = to_srgb(srgb, SDR, P3)
+            full = to_srgb(full, SDR, P3)
+        srgb = fit(full, long_side)
         focal_px = None if focal is None else round(focal / 36 * max(srgb.shape[:2]), 2)  # a full frame is 36 mm wide
-        yield Picture(srgb, int(index), None, path.name, focal_px, done, len(chosen))
+        yield Picture(srgb, int(index), None, path.name, focal_px, done, len(chosen), full if full.shape != srgb.shape else None)

@@ -15,7 +15,7 @@ from ..imaging import images
 class Picture:
     """One sampled picture: srgb [H, W, 3] upright and at its final size, index in the source (decoded frame or sorted file),
     time_s (None for a photograph), source (file name of a photograph), focal_px at this size where the file says it,
-    and how far the reading is: `done` of `of`."""
+    how far the reading is: `done` of `of`; and full [h, w, 3], the same picture larger, for the features that cameras are found by, where there is one."""
 
     srgb: np.ndarray
     index: int
@@ -24,6 +24,7 @@ class Picture:
     focal_px: float | None
     done: int
     of: int
+    full: np.ndarray | None = None
 
 
 def evenly(count: int, most: int) -> np.ndarray:

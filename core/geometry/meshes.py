@@ -115,17 +115,21 @@ def write_obj(path: Path, mesh: Mesh) -> None:
         temporary.write_text("\n".join(lines) + "\n", encoding="ascii")
 
 
-def read_ply(path: Path) -> Mesh:
-    """The triangles of a PLY file, ASCII or binary of either byte order; polygons are cut into triangles. Raises Problem for a damaged one."""
+def read_ply(path: Path, or_points: bool = False) -> Mesh:
+    """The triangles of a PLY file, ASCII or binary of either byte order; polygons are cut into triangles. Raises Problem for a damaged one.
+
+    `or_points`: one that holds points alone gives a mesh without faces, and is no damage.
+    """
     path = Path(path)
     content = open_mesh(path, MOST_PLY_BYTES)
     check_ply(path, content)
     try:
-        loaded = trimesh.load(io.BytesIO(content), file_type="ply", process=False, force="mesh")
-        mesh = Mesh(np.asarray(loaded.vertices, np.float64), np.asarray(loaded.faces, np.int64))
+        loaded = trimesh.load(io.BytesIO(content), file_type="ply", process=False, force=None if or_points else "mesh")
+        points, faces = (getattr(loaded, name, np.zeros((0, 3))) for name in ("vertices", "faces"))  # what is empty has neither
+        mesh = Mesh(np.asarray(points, np.float64).reshape(-1, 3), np.asarray(faces, np.int64))
     except (ValueError, LookupError, TypeError, AttributeError, OverflowError, struct.error, NotImplementedError) as error:
         raise damaged(path, str(error).splitlines()[0][:100] if str(error) else type(error).__name__) from error
-    if not len(mesh.faces):
+    if not len(mesh.faces) and not or_points:
         raise damaged(path, "it holds no faces")
     return _sound(path, mesh)
 
@@ -135,6 +139,13 @@ def write_ply(path: Path, mesh: Mesh) -> None:
     _check_written(path, mesh)
     with replacing(path) as temporary:
         temporary.write_bytes(trimesh.exchange.ply.export_ply(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)))
+
+
+def write_points(path: Path, points: np.ndarray) -> None:
+    """Points [N, 3] without faces as a binary PLY, atomically."""
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\nproperty float x\nproperty float y\nproperty float z\n"
+    with replacing(path) as temporary:
+        temporary.write_bytes(f"{header}element face 0\nproperty list uchar int vertex_indices\nend_header\n".encode() + points.astype("<f4").tobytes())
 
 
 def _sound(path: Path, mesh: Mesh) -> Mesh:

@@ -66,16 +66,22 @@ class View:
         return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
+def read_points(capture: Capture) -> tuple[np.ndarray, np.ndarray]:
+    """The points [N, 3] in metres that were matched between the frames, and unit mean directions [N, 3] to the cameras that saw them. Raises Problem."""
+    model = _read_model(capture)
+    centres = {number: np.asarray(image.projection_center()) for number, image in model.images.items() if image.has_pose}
+    places = np.array([point.xyz for point in model.points3D.values()]).reshape(-1, 3)
+    towards = np.zeros_like(places)
+    for i, point in enumerate(model.points3D.values()):
+        seen = np.array([centres[element.image_id] for element in point.track.elements if element.image_id in centres]).reshape(-1, 3) - places[i]
+        towards[i] = (seen / np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-9)).sum(0)
+    return places, towards / np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
+
+
 def read_views(capture: Capture, selected_only: bool = False) -> list[View]:
     """The registered frames in frame order. Raises Problem where the frames or the cameras are missing or damaged."""
     frames = read_frames(capture).by_name
-    try:
-        model = read_model(capture.cameras)
-        strange = [image.name for image in model.images.values() if not plain_name(image.name)]
-        if strange:
-            raise ValueError(f"{strange[0]!r} is no name of a frame")
-    except (OSError, ValueError) as error:
-        raise Problem(f"The cameras of this capture cannot be read ({error}).", "Run the stages frames and cameras again.") from error
+    model = _read_model(capture)
     views = []
     for image in sorted(model.images.values(), key=lambda image: image.name):
         frame = frames.get(image.name)
@@ -87,3 +93,14 @@ def read_views(capture: Capture, selected_only: bool = False) -> list[View]:
         views.append(View(image.name, capture.frames / image.name, model.cameras[image.camera_id],
                           pose.rotation.matrix(), np.array(pose.translation), frame.selected))
     return views
+
+
+def _read_model(capture: Capture) -> pycolmap.Reconstruction:
+    try:
+        model = read_model(capture.cameras)
+        strange = [image.name for image in model.images.values() if not plain_name(image.name)]
+        if strange:
+            raise ValueError(f"{strange[0]!r} is no name of a frame")
+    except (OSError, ValueError) as error:
+        raise Problem(f"The cameras of this capture cannot be read ({error}).", "Run the stages frames and cameras again.") from error
+    return model

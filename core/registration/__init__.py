@@ -3,25 +3,26 @@
 """Registration: the built-in head with its fixed topology and UVs takes the shape of the scan.
 
 Landmarks lifted from several frames place it, identity shapes bring it near, and a regularised non-rigid fit lays it on
-the scan; it stays watertight where the scan has holes.
+the scan; it stays watertight where the scan has holes. Where there is no scan it is fitted to what the views themselves show.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..contract import artist_landmarks
 from ..contract.capture import Capture
 from ..contract.files import write_json
+from ..contract.frame_records import PHOTOGRAPHS, read_frames
 from ..contract.messages import Reporter
 from ..contract.settings import Settings
 from ..face import template
 from ..geometry import meshes, raster
-from ..geometry.views import read_views
+from ..geometry.views import View, read_points, read_views
 from ..imaging import images
-from . import alignment, drawing, eyes, intersections, landmarks, nonrigid, own_template, quality
+from . import alignment, drawing, eyes, intersections, landmarks, nonrigid, own_template, quality, unscanned
 from .correspondence import Scan
 
 STEPS = 100.0
@@ -29,6 +30,8 @@ FOLLOWED = "face"
 """UV mask of the template whose region is drawn to the scan; ears, scalp and neck come by identity and stiffness alone."""
 SHAPED = {"face": 1.0, "neck": 0.3, "scalp": 0.15}
 """UV masks of what says which identity it is, and how loudly: hair and collars speak there, too."""
+SEEN = {"ears": 0.5, "neck": 0.3}
+"""Further UV masks that matched points and outlines speak of where there is no scan, and how loudly: collars and hair are there, too."""
 HELD = ("lips", "eyes", "brows")
 """UV masks whose landmarks keep their say to the end: the scan alone would let them slide."""
 
@@ -37,9 +40,36 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """frames/, cameras/, scan.ply -> head.obj, landmarks.json. Raises Problem where no face is found or the fit does not hold."""
     given = artist_landmarks.read(capture.landmarks_artist)
     views = read_views(capture)
-    surface = meshes.read_ply(capture.scan)
-    scan = Scan(surface)
-    found = landmarks.with_artists(landmarks.onto_surface(landmarks.find(views, report, STEPS), views, surface), given)
+    surface = meshes.read_ply(capture.scan, or_points=True)
+    found = landmarks.find(views, report, STEPS)
+    if not len(surface.faces):
+        subject = _subject(landmarks.with_artists(found, given), report)
+        _by_views(capture, settings, views, subject, report)
+        return
+    subject = _subject(landmarks.with_artists(landmarks.onto_surface(found, views, surface), given), report)
+    try:
+        _by_scan(capture, settings, views, surface, subject, report)
+    except quality.Unlike as problem:
+        if read_frames(capture).kind != PHOTOGRAPHS:
+            raise
+        report.log(f"{problem.problem} It is fitted without the scan.")
+        _by_views(capture, settings, views, _subject(landmarks.with_artists(found, given), report), report)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is known of a person before the fit: landmarks, with the artist's; the model that trusts those; weights of the vertices and landmarks as
+    `weights_of` gives them, without the lids where the eyes are open; trust [468]."""
+
+    found: landmarks.Landmarks
+    model: alignment.Model
+    follow: np.ndarray
+    shaped: np.ndarray
+    hold: np.ndarray
+    trust: np.ndarray
+
+
+def _subject(found: landmarks.Landmarks, report: Reporter) -> Subject:
     model = trusting(load_model(), found.put)
     follow, shaped, hold = weights_of(model)
     trust = found.trust
@@ -48,7 +78,26 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         report.log("The eyes are open: the lids follow the face around them, not the eyeballs.")
         (follow, trust), shaped = eyes.spared(follow, trust, lids), eyes.spared(shaped, trust, lids)[0]
         trust = np.where(found.put, found.trust, trust)
+    return Subject(found, model, follow, shaped, hold, trust)
 
+
+def _by_views(capture: Capture, settings: Settings, views: list[View], subject: Subject, report: Reporter) -> None:
+    model, found = subject.model, subject.found
+    seen = np.max([subject.follow, *(strength * _per_vertex(model.mesh, template.mask(name, 512)) for name, strength in SEEN.items())], axis=0)
+    points = unscanned.Points(*read_points(capture))
+    fitted = unscanned.fit(model, views, found, subject.trust, points, seen, report, 10, 0.9 * STEPS)
+    placed = model.mesh.moved(fitted.pose.apply(model.mesh.vertices))
+    vertices = intersections.mended(placed, fitted.vertices, lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
+    head, aligned = model.mesh.moved(vertices), model.mesh.moved(fitted.pose.apply(model.shape(fitted.coefficients)))
+    quality.figures(report, model, aligned, head, found, fitted.coefficients, np.zeros(0), subject.follow)
+    quality.figures_of_views(report, fitted, views, head)
+    quality.judge_views(report, views, head, fitted)
+    _finish(capture, settings, views, head, subject, report)
+
+
+def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: meshes.Mesh, subject: Subject, report: Reporter) -> None:
+    scan, found, model = Scan(surface), subject.found, subject.model
+    follow, shaped, hold, trust = subject.follow, subject.shaped, subject.hold, subject.trust
     report.progress(10, STEPS, "placing the head")
     pose, coefficients = alignment.fit_landmarks(model, found.points, trust)
     report.progress(15, STEPS, "finding the nearest head")
@@ -62,9 +111,14 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     distances = scan.distances(vertices[follow > 0.5], meshes.vertex_normals(head)[follow > 0.5])
     quality.figures(report, model, aligned, head, found, coefficients, distances, follow)
     quality.judge(report, head, scan, distances, follow)
+    _finish(capture, settings, views, head, subject, report)
+
+
+def _finish(capture: Capture, settings: Settings, views: list[View], head: meshes.Mesh, subject: Subject, report: Reporter) -> None:
+    found = subject.found
     meshes.write_obj(capture.head, head)
     write_json(capture.landmarks, landmarks.to_json(found))
-    own_template.run(capture, settings, head, own_template.BuiltIn(model, follow, shaped, hold), report)
+    own_template.run(capture, settings, head, own_template.BuiltIn(subject.model, subject.follow, subject.shaped, subject.hold), report)
     images.write_srgb(capture.picture("registration", "wireframe"), drawing.overlay(drawing.three_views(views, found), head, found))
 
 

@@ -115,6 +115,21 @@ def _step(model, pose, coefficients, points, trust, planes=None) -> tuple[Simila
         basis = model.identity[:, index] @ turn
         full = _jacobian(at, pose.translation, basis)  # [N, 3, P]
         rows.append(((full * normals[..., None]).sum(1), signed, weight))
+    return _solved(pose, coefficients, rows)
+
+
+def stepped(pose: Similarity, coefficients: np.ndarray, constraints: list[tuple]) -> tuple[Similarity, np.ndarray]:
+    """One such step for points that should move along directions. Of each kind of them: where they are [M, 3], their identity basis [K, M, 3] in the
+    model's own frame, unit directions [M, 3], distances [M] in metres and weights [M] in 1 / m^2."""
+    rows = []
+    for at, basis, direction, distance, weight in constraints:
+        full = _jacobian(at, pose.translation, basis @ (pose.scale * pose.rotation.T))
+        rows.append(((full * direction[..., None]).sum(1), distance, weight))
+    return _solved(pose, coefficients, rows)
+
+
+def _solved(pose: Similarity, coefficients: np.ndarray, rows: list[tuple]) -> tuple[Similarity, np.ndarray]:
+    """rows: (jacobian [M, 7 + K], residual [M], weight [M]) of each kind of data."""
     prior = np.concatenate([np.zeros(7), np.ones(len(coefficients))])
     normal_matrix, right = np.diag(prior + 1e-9), -prior * np.concatenate([np.zeros(7), coefficients])
     for jacobian, residual, weight in rows:

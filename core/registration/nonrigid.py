@@ -42,8 +42,8 @@ def fit(model: Model, start: np.ndarray, scan: Scan, follow: np.ndarray, hold: n
 
     Progress goes from `first` to `steps`.
     """
-    area, laplacian = _operators(model.mesh.moved(start))
-    anchors = _anchors(model)
+    area, laplacian = operators(model.mesh.moved(start))
+    marks = anchors(model)
     known = np.isfinite(points).all(1) & (trust * model.landmark_weight > 0)
     put = np.zeros(len(points), bool) if put is None else put & known
     vertices = start.copy()
@@ -57,11 +57,11 @@ def fit(model: Model, start: np.ndarray, scan: Scan, follow: np.ndarray, hold: n
         data = trimmed(np.where(follow > 0.02, signed, np.nan), reach) * follow
         aim = vertices + scan_normals * np.nan_to_num(signed)[:, None]
 
-        at = anchors @ vertices
+        at = marks @ vertices
         miss = np.nan_to_num(points - at)
-        surface = anchors @ normals
+        surface = marks @ normals
         surface /= np.linalg.norm(surface, axis=1, keepdims=True)
-        seen = np.where(put, 0, anchors @ data)[:, None]
+        seen = np.where(put, 0, marks @ data)[:, None]
         miss -= seen * (miss * surface).sum(1, keepdims=True) * surface  # in depth the scan knows better
         robust = 1 / (1 + (np.linalg.norm(miss, axis=1) / 0.005) ** 2)
         pin = LANDMARK_AREA_M2[0] * (LANDMARK_AREA_M2[1] / LANDMARK_AREA_M2[0]) ** part * np.maximum(1, hold * part)
@@ -71,9 +71,9 @@ def fit(model: Model, start: np.ndarray, scan: Scan, follow: np.ndarray, hold: n
         blind = 1 - follow * np.isfinite(signed)
         bending = np.maximum(length, BLIND_M * blind) ** 4
         pull = PULL + (BLIND_PULL - PULL) * (1 - follow)
-        matrix = (sparse.diags(area * (data + pull)) + anchors.T @ sparse.diags(pin) @ anchors
+        matrix = (sparse.diags(area * (data + pull)) + marks.T @ sparse.diags(pin) @ marks
                   + laplacian.T @ sparse.diags(bending / area) @ laplacian)
-        right = (area * data)[:, None] * (aim - start) + anchors.T @ (pin[:, None] * (at + miss - anchors @ start))
+        right = (area * data)[:, None] * (aim - start) + marks.T @ (pin[:, None] * (at + miss - marks @ start))
         # positive definite, so no pivoting: with it the factors fill up and take fifty times as long
         vertices = start + splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve(right)
     return vertices
@@ -84,7 +84,7 @@ def flipped_triangles(before: Mesh, after: Mesh) -> int:
     return int(flipped(before, after.vertices).sum())
 
 
-def _operators(mesh: Mesh) -> tuple[np.ndarray, sparse.csr_matrix]:
+def operators(mesh: Mesh) -> tuple[np.ndarray, sparse.csr_matrix]:
     """Area of each vertex [V] in square metres, and the cotangent Laplacian [V, V] (integrated: divide by the area for a mean)."""
     count = len(mesh.vertices)
     area, rows, columns, values = np.zeros(count), [], [], []
@@ -103,7 +103,7 @@ def _operators(mesh: Mesh) -> tuple[np.ndarray, sparse.csr_matrix]:
     return np.maximum(area, floor), (sparse.diags(np.asarray(weights.sum(1)).ravel()) - weights).tocsr()
 
 
-def _anchors(model: Model) -> sparse.csr_matrix:
+def anchors(model: Model) -> sparse.csr_matrix:
     """[468, V]: takes vertices to landmarks."""
     corners = model.mesh.faces[model.landmark_face]
     rows = np.repeat(np.arange(len(corners)), 3)

@@ -11,6 +11,7 @@ import numpy as np
 from ..contract.messages import Problem, Reporter
 from ..geometry import atlas
 from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.views import View
 from .alignment import Model
 from .correspondence import Scan
 from .intersections import flipped, intersecting
@@ -18,8 +19,16 @@ from .landmarks import Landmarks
 
 LEAST_SHARE, FARTHEST_M = 0.3, 0.004
 """A fit holds when this share of the followed vertices finds a partner on the scan, at this distance or nearer in the median."""
+MOST_MISS = 0.05
+"""Share of the face's width by which landmarks may miss a head that is fitted without a scan."""
+APART_DEG, WANTED_VIEWS = 25.0, 3
+"""So many photographs, so far apart as seen from the head, make a head; fewer a draft."""
 SHOWN = 0.75
 """Share of a side of the face that the scan should show."""
+
+
+class Unlike(Problem):
+    """A head that could not be laid over the scan."""
 
 
 def figures(report: Reporter, model: Model, aligned: Mesh, head: Mesh, found: Landmarks, coefficients: np.ndarray, distances: np.ndarray,
@@ -49,10 +58,10 @@ def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follo
     """Raises Problem where the fit does not hold; tells which side of the face the scan does not show."""
     wanted = follow > 0.5
     if len(distances) < LEAST_SHARE * wanted.sum():
-        raise Problem(f"The head could not be laid over the scan of the face: only {100 * len(distances) / wanted.sum():.0f} % of the face is in the scan.",
+        raise Unlike(f"The head could not be laid over the scan of the face: only {100 * len(distances) / wanted.sum():.0f} % of the face is in the scan.",
                       "Look at the scan's picture in the report; film again slower, in an arc from ear to ear, with the whole face in view.")
     if np.median(distances) > FARTHEST_M:
-        raise Problem(f"The head could not be laid over the scan of the face: it stays {1e3 * np.median(distances):.0f} mm away from it.",
+        raise Unlike(f"The head could not be laid over the scan of the face: it stays {1e3 * np.median(distances):.0f} mm away from it.",
                       "Look at the scan's picture in the report: where it is no face, film again with the head kept still and hair and hands off the face.")
     signed, _ = scan.match(head.vertices, vertex_normals(head), 0.01)
     for name, where in _sides(head, wanted).items():
@@ -60,6 +69,44 @@ def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follo
         if shown < SHOWN:
             report.finding(f"The scan shows only {100 * shown:.0f} % of {name}; the rest was guessed from the shape of heads.",
                            f"Film once more and bring {name} well into view, in sharp frames.")
+
+
+def figures_of_views(report: Reporter, fitted, views: list[View], head: Mesh) -> None:
+    """Figures of a fit (unscanned.Fitted) to what the views show."""
+    for name, count in fitted.used.items():
+        report.figure(f"constraints_by_{name}", count)
+        report.figure(f"miss_of_{name}_mm", round(1e3 * fitted.miss_m[name], 2) if count else None)
+    report.figure("views_apart", views_apart(views, head))
+
+
+def judge_views(report: Reporter, views: list[View], head: Mesh, fitted) -> None:
+    """Raises Problem where a head does not fit what the views show; tells where it is a draft."""
+    x = head.vertices[:, 0]
+    if not fitted.miss_m["landmarks"] < MOST_MISS * np.ptp(x):
+        raise Problem(f"The head could not be laid over the face in these pictures: its features miss by {1e3 * fitted.miss_m['landmarks']:.0f} mm.",
+                      "Use pictures of one still face, neither cropped nor mirrored; or give the cameras of a program that can solve them.")
+    apart = views_apart(views, head)
+    if apart < WANTED_VIEWS:
+        report.finding(f"This head is a draft: {'only ' if apart else ''}{apart} of the photographs show the face from sides at least {APART_DEG:.0f} degrees "
+                       "apart, and its depth is mostly guessed.",
+                       "Add photographs: one from the front and one from each side, about 40 degrees around, are the least for a likeness.")
+
+
+def views_apart(views: list[View], head: Mesh) -> int:
+    """How many views there are of which every two are at least APART_DEG apart as seen from the head."""
+    towards = np.stack([view.centre for view in views]) - head.vertices.mean(0)
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    near = np.degrees(np.arccos(np.clip(towards @ towards.T, -1, 1))) < APART_DEG
+    best = 0
+    for first in range(len(views)):  # the largest set is hard to find; greedy from every view is near enough
+        left, count = np.ones(len(views), bool), 0
+        order = [first, *np.argsort(near.sum(1))]
+        for i in order:
+            if left[i]:
+                count += 1
+                left &= ~near[i]
+        best = max(best, count)
+    return best
 
 
 def _sides(head: Mesh, wanted: np.ndarray) -> dict[str, np.ndarray]:

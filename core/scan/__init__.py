@@ -13,11 +13,12 @@ import time
 import numpy as np
 
 from ..contract.capture import Capture
+from ..contract.files import remove_file
 from ..contract.frame_records import read_frames
-from ..contract.messages import Problem, Reporter
+from ..contract.messages import Reporter
 from ..contract.settings import Settings
 from ..geometry import meshes, raster
-from ..geometry.views import View, read_views
+from ..geometry.views import View, read_points, read_views
 from ..imaging import images
 from . import rounds, splats
 
@@ -28,7 +29,7 @@ MOST_DISAGREEING = 0.03
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Writes capture.scan. Raises Problem where no pair of frames gives a surface."""
+    """Writes capture.scan: a surface, or, where no pair of frames gives one, the points that match between the frames."""
     started = time.monotonic()
     views = read_views(capture)
     frames = read_frames(capture).by_name
@@ -38,8 +39,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     if fused is not None and by_splats:
         fused, maps = splats.measure(fused.mesh, views, settings.scan.voxel_mm / 1000, HEAD_BOX, settings.compute_device, report)
     if fused is None or len(fused.mesh.faces) < 1000:
-        raise Problem("No surface of the head could be measured from these frames.",
-                      "Use sharper frames that lie closer together: walk slowly, in good light, and keep the face in the picture.")
+        _without_surface(capture, report)
+        report.figure("seconds", round(time.monotonic() - started, 1))
+        return
     mesh = fused.mesh
     meshes.write_ply(capture.scan, mesh)
     report.figure("method", "splats" if by_splats else "stereo")
@@ -55,6 +57,17 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         report.finding(f"The frames disagree about {100 * fused.disagreeing:.0f} % of the surface; it was left out of the scan.",
                        "Film again with the head kept still, the hair tied back and nothing shiny on the skin.")
     images.write_srgb(capture.picture("scan", "surface"), _draw(mesh, views))
+
+
+def _without_surface(capture: Capture, report: Reporter) -> None:
+    points = read_points(capture)[0]
+    points = points[((points > HEAD_BOX[0]) & (points < HEAD_BOX[1])).all(1)]
+    meshes.write_points(capture.scan, points)
+    remove_file(capture.picture("scan", "surface"))
+    report.figure("method", "none")
+    report.figure("points", len(points))
+    report.finding("No surface of the head could be measured from these frames. The head is fitted to the face's features, outlines and what matches alone.",
+                   "For a closer likeness take sharper pictures that lie closer together, every ten degrees around the face, in good light.")
 
 
 def _draw(mesh: meshes.Mesh, views: list[View], height: int = 480) -> np.ndarray:

@@ -39,8 +39,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         told = {}
         if capture.own_head.is_file():
             told["own_head"] = _own(capture, folder, source, maps, settings.transfer.size, report)
-        if settings.transfer.scan and capture.scan.is_file():
-            told["scan"] = _scan(capture, folder, head, source, maps, settings, report)
+        full = meshes.read_ply(capture.scan, or_points=True) if settings.transfer.scan and capture.scan.is_file() else None
+        if full is not None and len(full.faces):
+            told["scan"] = _scan(capture, folder, head, full, source, maps, settings, report)
         (folder / "delivery.json").write_text(json.dumps({"maps": maps.name, **told}, indent=1), encoding="utf-8")
     report.figure("maps_from", maps.name)
 
@@ -83,11 +84,10 @@ def _own(capture: Capture, folder: Path, source: baking.Source, maps: Path, size
     return told
 
 
-def _scan(capture: Capture, folder: Path, head: Mesh, source: baking.Source, maps: Path, settings: Settings, report: Reporter) -> dict:
+def _scan(capture: Capture, folder: Path, head: Mesh, full: Mesh, source: baking.Source, maps: Path, settings: Settings, report: Reporter) -> dict:
     """scan.obj with a lit and an albedo texture, and the head's displacement."""
     size = settings.transfer.scan_size
     report.progress(0, 10, "unwrapping the scan")
-    full = meshes.read_ply(capture.scan)
     mesh = scan.unwrapped(full, settings.transfer.scan_detail_mm / 1000, size)
     meshes.write_obj(folder / "scan.obj", mesh)
     at = baking.places(mesh, (0, 0), source, size, scan.FAR_M, lambda done: report.progress(1 + 3 * done, 10, "finding the head under the scan"))

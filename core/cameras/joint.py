@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cameras that are nearly right, made right: poses, focal lengths, identity and matched points adjusted at once, with what structure from motion left out.
+
+Cameras say which of all matches can be true, and more of them make better cameras. The face's landmarks, on a head of people's size and shape, hold
+what a few photographs alone leave open.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pycolmap
+
+from ..contract.messages import Reporter
+from ..face import faces
+from ..geometry.models import pose_of
+from .bundle import Bundle, Observations, adjust
+from .landmarks import template_landmarks
+from .matches import Matches
+from .resection import LEAST_MATCHES, agreeing, place_by_matches
+from .world import agreeing_faces, find_head
+
+AGREE = (0.0125, 0.006, 0.004)
+"""Shares of the face's width by which matches may miss, round by round."""
+FEATURE_SHARE = 1 / 3000
+"""Deviation of a match, as a share of a picture's longer side: features are looked for at 2,000 pixels."""
+FREE, TOLD = 3.0, 0.03
+"""Spreads of the logarithm of a focal length: of an unknown one, which what matches tells, and of one that a file told, which focusing changes."""
+FEWEST_TRACKS = 60
+
+
+def refine(model: pycolmap.Reconstruction, found: dict[str, faces.Face], matches: Matches, unknown_focal: bool, report: Reporter,
+           missing: Sequence[dict] = ()) -> pycolmap.Reconstruction:
+    """The refined model, in the head's world (metres), or `model` itself where too little matches or the refined one explains less. found: name -> face.
+    missing: [{names, width, height}] like camera groups, of frames that have no camera yet and may get one by their matches; they share the lens of
+    the frames of their size. Raises Problem where no face is found."""
+    head = find_head(model, found, 0.063)
+    model = pycolmap.Reconstruction(model)
+    model.transform(head.world_from_model)
+    seen_faces = agreeing_faces(model, found)
+    registered = sorted((image for image in model.images.values() if image.has_pose), key=lambda image: image.name)
+    names = [image.name for image in registered]
+    straight = _straightened(model, registered, matches)
+    bundle = _bundle(model, registered, unknown_focal)
+    marks = _landmarks(model, registered, seen_faces)
+    width = float(np.median([face.box[2] - face.box[0] for face in seen_faces.values()]))
+    before = None
+    for step, share in enumerate(AGREE):
+        report.progress(step, len(AGREE), "refining cameras by what matches")
+        added, tracks, bundle = agreeing(bundle, names, straight, share * width)
+        before = before if before is not None else len(tracks)
+        if len(tracks) < FEWEST_TRACKS:
+            return model
+        seen = Observations(*(np.concatenate([a, b]) for a, b in zip((marks.camera, marks.point, marks.pixel), added, strict=True)))
+        bundle = adjust(bundle, seen, 30)
+    if len(tracks) < 0.8 * before:
+        report.log("The cameras were not refined by the face: less would match than before.")
+        return model
+    lens_of = {(camera.width, camera.height): number for number, camera in model.cameras.items()}
+    groups = [{**group, "lens": lens_of[group["width"], group["height"]]} for group in missing if (group["width"], group["height"]) in lens_of]
+    late = _late(bundle, model, groups, names, tracks, straight)
+    if late:
+        report.log(f"Placed by what matches the refined cameras: {', '.join(sorted(late))}.")
+    return _rebuilt(model, bundle, registered, tracks, matches, late, groups)
+
+
+def _bundle(model: pycolmap.Reconstruction, registered: list, unknown_focal: bool) -> Bundle:
+    numbers = sorted(model.cameras)
+    poses = [pose_of(image) for image in registered]
+    focal = np.array([model.cameras[number].mean_focal_length() for number in numbers])
+    used = [model.cameras[image.camera_id] for image in registered]
+    return Bundle(np.array([pose.rotation.matrix() for pose in poses]), np.array([pose.translation for pose in poses]), focal, focal.copy(),
+                  np.zeros(len(numbers), bool), np.array([numbers.index(image.camera_id) for image in registered]),
+                  np.array([[camera.principal_point_x, camera.principal_point_y] for camera in used]), np.zeros(len(template_landmarks().basis)),
+                  template_landmarks().mean.copy(), FEATURE_SHARE * max(max(camera.width, camera.height) for camera in used),
+                  FREE if unknown_focal else TOLD)
+
+
+def _landmarks(model: pycolmap.Reconstruction, registered: list, found: dict[str, faces.Face]) -> Observations:
+    count, camera, pixel = len(template_landmarks().mean), [], []
+    for i, image in enumerate(registered):
+        if image.name in found:
+            camera.append(np.full(count, i))
+            pixel.append(_straight(model.cameras[image.camera_id], found[image.name].landmarks[:, :2].astype(np.float64)))
+    return Observations(np.concatenate(camera), np.tile(np.arange(count), len(camera)), np.concatenate(pixel))
+
+
+def _straight(camera: pycolmap.Camera, pixels: np.ndarray) -> np.ndarray:
+    """Pixels [N, 2] as a lens without distortion, with square pixels, would show them."""
+    plane = np.asarray(camera.cam_from_img(pixels)).reshape(-1, 2)
+    return plane * camera.mean_focal_length() + [camera.principal_point_x, camera.principal_point_y]
+
+
+def _straightened(model: pycolmap.Reconstruction, registered: list, matches: Matches) -> Matches:
+    camera_of = {image.name: model.cameras[image.camera_id] for image in registered}
+    keypoints = {name: _straight(camera_of[name], pixels) if name in camera_of and len(pixels) else pixels for name, pixels in matches.keypoints.items()}
+    return Matches(keypoints, matches.pairs)
+
+
+def _late(bundle: Bundle, model: pycolmap.Reconstruction, groups: list[dict], names: list[str], tracks: list, matches: Matches) -> dict[str, tuple]:
+    numbers = sorted(model.cameras)
+    focal = np.array([bundle.focal[numbers.index(group["lens"])] for group in groups])
+    group_of = {name: i for i, group in enumerate(groups) for name in group["names"] if name in matches.keypoints}
+    return place_by_matches(replace(bundle, focal=focal), groups, group_of, names, tracks, matches) if group_of else {}
+
+
+def _rebuilt(model: pycolmap.Reconstruction, bundle: Bundle, registered: list, tracks: list, matches: Matches, late: dict[str, tuple],
+             groups: list[dict]) -> pycolmap.Reconstruction:
+    """A model with the bundle's cameras and, as its points, the tracks."""
+    rebuilt, numbers = pycolmap.Reconstruction(), sorted(model.cameras)
+    for number in numbers:
+        camera = pycolmap.Camera(model.cameras[number].todict())
+        params, ratio = np.array(camera.params), bundle.focal[numbers.index(number)] / camera.mean_focal_length()
+        params[list(camera.focal_length_idxs())] *= ratio
+        camera.params = params
+        rebuilt.add_camera_with_trivial_rig(camera)
+    poses = {image.name: (bundle.rotations[i], bundle.translations[i], image.camera_id) for i, image in enumerate(registered)}
+    poses |= {name: (*pose, next(group["lens"] for group in groups if name in group["names"])) for name, pose in late.items()}
+    index: dict[str, list[int]] = {name: [] for name in poses}
+    members: list[list] = []
+    image_number = {name: number for number, name in enumerate(sorted(poses), 1)}
+    for track in tracks:
+        members.append([])
+        for name, keypoint in track:
+            members[-1].append(pycolmap.TrackElement(image_number[name], len(index[name])))
+            index[name].append(keypoint)
+    for name in sorted(poses):
+        rotation, translation, lens = poses[name]
+        keypoints = matches.keypoints[name][index[name]] if index[name] else np.zeros((0, 2))
+        image = pycolmap.Image(name=name, camera_id=lens, image_id=image_number[name], keypoints=keypoints)
+        rebuilt.add_image_with_trivial_frame(image, pycolmap.Rigid3d(np.concatenate([rotation, np.reshape(translation, (3, 1))], 1)))
+    first = len(template_landmarks().mean)
+    for place, elements in zip(bundle.points[first:], members, strict=True):
+        rebuilt.add_point3D(place, pycolmap.Track(elements), np.full(3, 128, np.uint8))
+    rebuilt.update_point_3d_errors()
+    return rebuilt
+
+
+def held(model: pycolmap.Reconstruction) -> bool:
+    """Whether every registered frame sees as many matched points as its pose needs."""
+    seen = Counter(element.image_id for point in model.points3D.values() for element in point.track.elements)
+    return all(seen[number] >= LEAST_MATCHES for number, image in model.images.items() if image.has_pose)

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a few views tell of a head without a scan, as one kind of constraint: a point of the surface should move so far along a direction.
+
+A landmark in a picture constrains the two directions across its ray, a matched point the surface's normal, a silhouette the normal in the picture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.views import View
+from .alignment import Model
+from .landmarks import Landmarks
+
+TURNED_AWAY, SQUARE = 0.15, 0.45
+"""Cosines between a landmark's normal and its view: below the first it has slid onto the outline and says nothing, from the second on it counts fully."""
+MOST_ANGLE_DEG = 60.0
+"""Between a matched point's mean viewing direction and the surface's normal: beyond, the point lies on something behind."""
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """M points of a mesh, at corners int64 [M, 3] with bary [M, 3], that should move by distance [M] (metres) along unit direction [M, 3] in the world;
+    weight [M] in [0, 1]: how far each is believed beside its like."""
+
+    corners: np.ndarray
+    bary: np.ndarray
+    direction: np.ndarray
+    distance: np.ndarray
+    weight: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.distance)
+
+    def at(self, values: np.ndarray) -> np.ndarray:
+        """Per-vertex values [..., V, C] at the points [..., M, C]."""
+        return (values[..., self.corners, :] * self.bary[..., None]).sum(-2)
+
+
+def joined(parts: list[Constraints]) -> Constraints:
+    return Constraints(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Constraints)))
+
+
+def from_landmarks(model: Model, vertices: np.ndarray, views: list[View], found: Landmarks, trust: np.ndarray, reach: float) -> Constraints:
+    """Two constraints per view and landmark that is seen squarely enough; trust [468]. What misses by much more than `reach` metres counts for little."""
+    at = model.at_landmarks(vertices)
+    normals = model.at_landmarks(vertex_normals(model.mesh.moved(vertices)))
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    corners = model.mesh.faces[model.landmark_face]
+    parts = [_none()]
+    for view in views:
+        if view.name not in found.images:
+            continue
+        pixels, used = found.images[view.name]
+        rays = view.rays(pixels)
+        towards = view.centre - at
+        towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+        facing = np.clip(((normals * towards).sum(1) - TURNED_AWAY) / (SQUARE - TURNED_AWAY), 0, 1)
+        weight = facing * used * trust * model.landmark_weight
+        index = np.flatnonzero(weight > 0.01)
+        along = ((at - view.centre) * rays).sum(1, keepdims=True)
+        miss = (view.centre + along * rays - at)[index]
+        side = np.cross(rays[index], view.rotation[1])
+        side /= np.linalg.norm(side, axis=1, keepdims=True)
+        robust = weight[index] / (1 + (miss**2).sum(1) / reach**2) ** 2
+        for direction in (side, np.cross(rays[index], side)):
+            parts.append(Constraints(corners[index], model.landmark_bary[index], direction, (miss * direction).sum(1), robust))
+    return joined(parts)
+
+
+def from_points(mesh: Mesh, follow: np.ndarray, points: np.ndarray, towards: np.ndarray, reach: float) -> Constraints:
+    """One constraint per matched point [N, 3] that lies within `reach` metres of the part of the mesh that follows (follow [V] > 0.5), on the side that
+    the views it was seen in look at; towards [N, 3]: unit mean direction to those."""
+    if not len(points):
+        return _none()
+    normals, index = vertex_normals(mesh), np.flatnonzero(follow > 0.02)
+    near, nearest = cKDTree(mesh.vertices[index]).query(points, distance_upper_bound=2 * reach)
+    found = np.isfinite(near)
+    vertex = index[nearest[found]]
+    direction = normals[vertex]
+    distance = ((points[found] - mesh.vertices[vertex]) * direction).sum(1)
+    aside = np.linalg.norm(points[found] - mesh.vertices[vertex] - distance[:, None] * direction, axis=1)
+    spacing = np.median(np.linalg.norm(mesh.vertices[mesh.faces[:, 0]] - mesh.vertices[mesh.faces[:, 1]], axis=1))
+    good = (np.abs(distance) < reach) & (aside < 3 * spacing) & ((towards[found] * direction).sum(1) > np.cos(np.radians(MOST_ANGLE_DEG)))
+    weight = np.clip(1 - (distance / reach) ** 2, 0, 1) ** 2 * follow[vertex]
+    corners = np.repeat(vertex[:, None], 3, 1)
+    bary = np.tile([1.0, 0.0, 0.0], (len(vertex), 1))
+    return Constraints(corners[good], bary[good], direction[good], distance[good], weight[good])
+
+
+def _none() -> Constraints:
+    return Constraints(np.zeros((0, 3), np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))

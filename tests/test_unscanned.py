@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A head without a scan: a synthetic person from a few photographs that lie far apart, under known cameras."""
+
+import json
+
+import numpy as np
+import pycolmap
+import pytest
+from scipy.spatial import cKDTree
+
+from core import registration
+from core.contract.capture import Capture
+from core.contract.messages import Reporter
+from core.contract.settings import from_json
+from core.geometry import meshes
+from core.geometry.views import read_points, read_views
+from core.imaging import images
+from core.registration import constraints, quality, silhouettes
+from core.synthetic import painted_head
+
+AZIMUTHS = (-72, -36, 0, 36, 72)
+SCALE = 1.5
+
+
+def shot(root, azimuths=AZIMUTHS, points: int = 300) -> Capture:
+    """A capture up to a scan that measured no surface: photographs of the person, their cameras, and points of the skin that matched, good to 0.3 mm."""
+    capture, model, rng = Capture(root), pycolmap.Reconstruction(), np.random.default_rng(0)
+    capture.frames.mkdir(parents=True)
+    mesh = painted_head.person()[0].mesh
+    normals = meshes.vertex_normals(mesh)
+    views = [painted_head.camera(azimuth, 0.03 * i, scale=SCALE) for i, azimuth in enumerate(azimuths)]
+    names = [f"{i:05d}.jpg" for i in range(len(views))]
+    model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="PINHOLE", width=views[0].width, height=views[0].height, params=views[0].camera.params
+                                                      if len(views[0].camera.params) == 4 else [*views[0].camera.params[:1], *views[0].camera.params[:3]]))
+    front = rng.choice(np.flatnonzero((mesh.vertices[:, 1] < 0.02) & (mesh.vertices[:, 2] > -0.11) & (mesh.vertices[:, 2] < 0.06)), points)
+    places, members = mesh.vertices[front] + rng.normal(0, 3e-4, (points, 3)), [[] for _ in front]
+    for number, (name, view) in enumerate(zip(names, views, strict=True), 1):
+        images.write_srgb(capture.frames / name, painted_head.photograph(view))
+        seen = np.flatnonzero(((view.centre - places) * normals[front]).sum(1) > 0)
+        image = pycolmap.Image(name=name, camera_id=1, image_id=number, keypoints=view.project(places[seen])[0])
+        for k, i in enumerate(seen):
+            members[i].append(pycolmap.TrackElement(number, k))
+        model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(np.concatenate([view.rotation, view.translation[:, None]], 1)))
+    for place, elements in zip(places, members, strict=True):
+        if len(elements) > 1:
+            model.add_point3D(place, pycolmap.Track(elements), np.zeros(3, np.uint8))
+    capture.cameras.mkdir()
+    model.write(str(capture.cameras))
+    frames = [{"name": name, "sharpness": 1.0, "selected": True, "video_frame": i} for i, name in enumerate(names)]
+    capture.frames_json.write_text(json.dumps({"kind": "photographs", "frames": frames}))
+    meshes.write_points(capture.scan, read_points(capture)[0])
+    return capture
+
+
+def off_mm(capture: Capture) -> np.ndarray:
+    """Distances of the person's face to the head, millimetres."""
+    truth, head = painted_head.person()[0].mesh, meshes.read_obj(capture.head)
+    follow = registration.weights_of(registration.load_model())[0] > 0.5
+    distance, index = cKDTree(head.vertices).query(truth.vertices[follow])
+    plane = np.abs(((truth.vertices[follow] - head.vertices[index]) * meshes.vertex_normals(head)[index]).sum(1))
+    return 1e3 * np.where(distance < 0.004, plane, distance)
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory) -> tuple[Capture, Reporter]:
+    capture, report = shot(tmp_path_factory.mktemp("fünf Fotos") / "face.wildcap"), Reporter("registration")
+    registration.run(capture, from_json({}), report)
+    return capture, report
+
+
+def test_five_photographs_far_apart_make_a_head(fitted):
+    capture, report = fitted
+    off = off_mm(capture)
+    assert np.median(off) < 1.0 and np.percentile(off, 90) < 3.0
+    assert report.figures["views_apart"] == 5 and not report.findings
+    assert min(report.figures[f"constraints_by_{name}"] for name in ("landmarks", "points", "outlines")) > 50
+    assert report.figures["flipped_triangles"] < 5 and report.figures["intersecting_triangles"] == 0
+    assert "199" in json.loads(capture.landmarks.read_text())["points"]
+
+
+def test_two_sides_make_a_draft_that_says_so(tmp_path):
+    capture, report = shot(tmp_path / "draft.wildcap", (-12, 0, 12), points=0), Reporter("registration")
+    registration.run(capture, from_json({}), report)
+    assert capture.head.is_file() and report.figures["views_apart"] < 3
+    assert report.findings[0]["problem"].startswith("This head is a draft") and "from each side" in report.findings[0]["remedy"]
+
+
+def test_landmarks_that_the_artist_puts_win(fitted, tmp_path):
+    capture, _ = fitted
+    chin = np.array(json.loads(capture.landmarks.read_text())["points"]["199"]) + [0, 0, -0.006]
+    moved = Capture(tmp_path / "moved.wildcap")
+    for folder in ("frames", "cameras"):
+        (moved.root / folder).mkdir(parents=True)
+        for path in (capture.root / folder).iterdir():
+            (moved.root / folder / path.name).write_bytes(path.read_bytes())
+    moved.scan.write_bytes(capture.scan.read_bytes())
+    moved.landmarks_artist.write_text(json.dumps({"points": {"199": chin.tolist()}}))
+    report = Reporter("registration")
+    registration.run(moved, from_json({}), report)
+    assert report.figures["landmarks_put_by_hand"] == 1 and report.figures["put_landmark_residual_mm"] < 2
+
+
+def test_an_outline_is_found_to_a_fraction_of_a_millimetre(fitted):
+    """The true head against its own pictures: what its outline should move by is nothing; and of one that is moved, what it was moved by."""
+    capture, _ = fitted
+    truth, model = painted_head.person()[0].mesh, registration.load_model()
+    follow, edges = registration.weights_of(model)[0], silhouettes.edges_of(truth)
+    view = read_views(capture)[0]
+    outline = silhouettes.prepare(view, truth, follow)
+    rest = silhouettes.compare(outline, truth, edges, follow, 0.006)
+    assert len(rest) > 15 and abs(np.median(rest.distance)) < 6e-4
+    towards = np.cross(view.axis, [0, 0, 1])
+    moved = silhouettes.compare(outline, truth.moved(truth.vertices + 0.003 * towards), edges, follow, 0.006)
+    expected = -0.003 * (moved.direction @ towards)
+    assert np.median(np.abs(moved.distance - expected)) < 1e-3
+
+
+def test_points_behind_the_skin_or_of_its_far_side_do_not_pull():
+    mesh = meshes.Mesh(np.array([[0, 0, 0], [0.002, 0, 0], [0, 0, 0.002]]), np.array([[0, 1, 2]]))
+    follow, normal = np.ones(3), np.array([0.0, -1, 0])
+    points = np.array([[0, -0.001, 0], [0, -0.02, 0], [0, -0.001, 0]])
+    found = constraints.from_points(mesh, follow, points, np.array([normal, normal, -normal]), 0.004)
+    assert len(found) == 1 and found.distance[0] == pytest.approx(0.001)
+
+
+@pytest.mark.parametrize(("azimuths", "count"), [((0, 30, 60, 90), 4), ((0, 10, 20), 1), ((-20, 0, 20), 2), ((-13, 0, 13, 40), 3)])
+def test_views_are_counted_by_how_far_they_lie_apart(azimuths, count):
+    head = painted_head.person()[0].mesh
+    middle = head.vertices.mean(0)
+    views = [painted_head.camera(azimuth, middle[2], 5.0, tuple(middle)) for azimuth in azimuths]
+    assert quality.views_apart(views, head) == count
