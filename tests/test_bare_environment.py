@@ -6,6 +6,7 @@ import hashlib
 import http.server
 import io
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -53,7 +54,7 @@ def test_an_environment_is_made_whatever_its_python_lacks(tmp_path, wheels, stri
     said = environment.answer(python, "import sys, pip; print(sys.prefix); print(*sys.version_info[:2]); print(getattr(pip, 'small', False))").splitlines()
     assert Path(said[0]).samefile(folder) and said[1] == "{} {}".format(*sys.version_info) and said[2] == str("ensurepip" in stripped)
     assert environment.answer(python, "import numpy") == "" and run([python, "-c", "import numpy"])[0], "none of the packages of the Python it was made from"
-    environment.remove(folder)
+    shutil.rmtree(folder)
 
 
 def test_what_another_environment_left_does_not_stay(tmp_path, wheels):

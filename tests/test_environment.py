@@ -241,9 +241,20 @@ def test_other_peoples_folders_are_left_alone(local, tmp_path):
     (mine / "a.jpg").write_bytes(b"1")
     with pytest.raises(Problem, match="other files"):
         installation.installation(mine, local, tmp_path / "log")
-    with pytest.raises(Problem, match="not a Python environment"):
+    (mine / "pyvenv.cfg").write_text("home = /usr/bin")  # an environment of somebody else's
+    with pytest.raises(Problem, match="other files"):
+        installation.installation(mine, local, tmp_path / "log")
+    with pytest.raises(Problem, match="no environment that WildCap made"):
         remove(mine)
     assert (mine / "a.jpg").is_file()
+
+
+def test_an_environment_that_was_half_made_is_made_anew(local, tmp_path):
+    folder = tmp_path / "env"
+    (folder / "lib" / "half").mkdir(parents=True)
+    (folder / installation.COMPUTE_FILE).write_text("")
+    assert isinstance(install(folder, local)[-1], Done)
+    assert not (folder / "lib" / "half").exists() and (folder / installation.COMPUTE_FILE).read_text()
 
 
 def test_a_base_python_is_found_and_fits():

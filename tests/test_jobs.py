@@ -113,7 +113,7 @@ def test_the_solver_goes_to_a_short_folder_or_where_it_was_and_only_environments
     mine.mkdir()
     (mine / "novel.txt").write_text("", encoding="utf-8")
     preferences.get().environment = str(mine)
-    with pytest.raises(RuntimeError, match="is not a Python environment"):
+    with pytest.raises(RuntimeError, match="is no environment that WildCap made"):
         bpy.ops.wildcap.remove_solver()
     preferences.get().environment = ""
     assert (mine / "novel.txt").is_file()

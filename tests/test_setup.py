@@ -104,6 +104,7 @@ def test_removing_adds_up_what_is_freed_and_takes_the_solver_off(setup, tmp_path
     folder = tmp_path / "Löser"
     assert not bpy.ops.wildcap.remove_solver.poll()
     venv.create(folder, with_pip=False, symlinks=True)
+    (folder / "wildcap_compute.txt").write_text("cpu")
     (folder / "big.bin").write_bytes(bytes(3_000_000))
     preferences.set_python(folder / "bin" / "python")
     tell = setup("setup.install").WILDCAP_OT_remove_solver.tell
@@ -116,7 +117,7 @@ def test_removing_adds_up_what_is_freed_and_takes_the_solver_off(setup, tmp_path
     assert not folder.exists() and preferences.python() is None and preferences.get().python == ""
     folder.mkdir()
     (folder / "photo.jpg").write_bytes(b"1")
-    with pytest.raises(RuntimeError, match="not a Python environment"):
+    with pytest.raises(RuntimeError, match="no environment that WildCap made"):
         bpy.ops.wildcap.remove_solver()
     assert (folder / "photo.jpg").is_file()
 

@@ -24,15 +24,14 @@ Run = Callable[[list], tuple[int, str]]
 """Runs a command; its exit code and the last line with an error in it."""
 
 
-def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | None = None, wheel_only: bool = False) -> Path:
-    """Makes an environment anew in `folder` from the Python `base`, and gives its Python. `wheels` is a folder to take pip from in place of an index;
-    with `wheel_only` pip comes from its wheel even where Python brings one. Raises Problem."""
+def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | None = None, wheel_only: bool = False, keep: str = "") -> Path:
+    """Makes an environment anew in `folder`, of which the file `keep` alone stays, from the Python `base`, and gives its Python. `wheels` is a folder to take
+    pip from in place of an index; with `wheel_only` pip comes from its wheel even where Python brings one. Raises Problem."""
     folder = Path(folder)
-    if (folder / "pyvenv.cfg").is_file():
-        _empty(folder)
+    _empty(folder, keep)
     code, error = run([base, "-m", "venv", "--without-pip", folder])
     if code:
-        _empty(folder)
+        _empty(folder, keep)
         _by_hand(folder, base)
     python = python_of(folder)
     if answer(python, "import sys; print(sys.prefix != sys.base_prefix)") != "True":
@@ -56,9 +55,11 @@ def unpack_pip(folder: Path, wheel: bytes) -> None:
         raise storage_problem(error, folder) from error
 
 
-def _empty(folder: Path) -> None:
-    """Deletes what a broken or other environment has in its folder; the folder stays."""
+def _empty(folder: Path, keep: str) -> None:
+    """Deletes what a broken or other environment has in its folder; the folder stays, and the file `keep` in it."""
     for path in list(folder.iterdir()) if folder.is_dir() else ():
+        if path.name == keep:
+            continue
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)
         else:

@@ -21,6 +21,9 @@ PYTHONS = ((3, 11), (3, 12), (3, 13))
 """Versions of Python for which every direct requirement has a wheel; locks.py has those that an environment is made for."""
 MODULES = {"opencv-contrib-python-headless": "cv2", "openimageio": "OpenImageIO", "scikit-image": "skimage"}
 """Modules of the packages that are called otherwise."""
+COMPUTE_FILE = "wildcap_compute.txt"
+"""Says in an environment for what, from where and by which lock it was made: another choice makes it anew, and so does one of an older WildCap. It is the
+first file in the folder, and says that the others are ours; empty while they are not complete."""
 
 
 def python_of(folder: Path) -> Path:
@@ -89,9 +92,9 @@ def remove(folder: Path) -> None:
 
 
 def check_removable(folder: Path) -> None:
-    """Raises Problem for a folder that is no environment."""
-    if Path(folder).exists() and not (Path(folder) / "pyvenv.cfg").is_file():
-        raise Problem(f"{folder} is not a Python environment, so it is not deleted.", "Choose the folder that the solver was installed to.")
+    """Raises Problem for a folder that is no environment of ours."""
+    if Path(folder).exists() and not (Path(folder) / COMPUTE_FILE).is_file():
+        raise Problem(f"{folder} is no environment that WildCap made, so it is not deleted.", "Choose the folder that the solver was installed to.")
 
 
 def removal(folder: Path) -> Task:

@@ -17,11 +17,8 @@ from ..contract.files import storage_problem
 from ..contract.messages import Problem
 from . import bare_environment, locks
 from .background import Task
-from .environment import answer, python_of, required, verify
+from .environment import COMPUTE_FILE, answer, python_of, required, verify
 from .pip_steps import carry_out, compute_of, lock_of, steps
-
-COMPUTE_FILE = "wildcap_compute.txt"
-"""Says in an environment for what, from where and by which lock it was made: another choice makes it anew, and so does one of an older WildCap."""
 
 
 def installation(folder: Path, requirements: Path, log: Path, base: Path | None = None, compute: str = "auto", source: str = "pytorch",
@@ -34,7 +31,7 @@ def installation(folder: Path, requirements: Path, log: Path, base: Path | None 
     folder is somebody else's.
     """
     folder, compute = Path(folder), compute_of(compute)
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / "pyvenv.cfg").is_file():
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / COMPUTE_FILE).is_file():
         raise Problem(f"{folder} holds other files.", "Choose an empty folder.")
     expected = packages or 3 * len(required(requirements))  # each brings about two more
     wheels = Path(wheels) if source == "folder" else None
@@ -97,7 +94,9 @@ def _bring(task: Task, folder: Path, requirements: Path, lock: locks.Lock, base:
     """One try of all steps; what is wrong then."""
     if anew:
         task.say(0, 100, "making the solver's folder")
-        bare_environment.make(folder, base, requirements, lambda command: task.run(command, hear), wheels)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / COMPUTE_FILE).write_text("", encoding="utf-8")
+        bare_environment.make(folder, base, requirements, lambda command: task.run(command, hear), wheels, keep=COMPUTE_FILE)
         (folder / COMPUTE_FILE).write_text(made_for, encoding="utf-8")
     pip = [python_of(folder), "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--progress-bar", "off"]
     code, error = carry_out(steps(requirements, lock, compute, source, folder, wheels), lambda words: task.run([*pip, *words], hear))
