@@ -9,13 +9,15 @@ WHEELS ?=
 DEMO ?= .demo
 EXTENSION_TOOL = $(wildcard $(VENV)/lib/python3*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py)
 
+RELEASE := $(shell sed -n 's/^version = "\(.*\)"/\1/p' blender_manifest.toml)
+
 # The oldest Blender that the add-on supports, and the newest whose module installs beside Python 3.11.
 BLENDERS ?= 4.2.0 5.0.1
 
 # What of the tests needs Blender.
 IN_BLENDER = addon captures setup evidence choices eyedropper white_card paint paint_session operators job_life relight skin_material skin_kept reel next_step refusals draw translations sending acting updates delete_face save_report
 
-.PHONY: demo test results test-blenders test-gui zip clean
+.PHONY: demo test results test-blenders test-gui zip site clean
 
 demo: $(VENV)/installed
 	$(BIN)/python -m benchmarks.demo $(DEMO)
@@ -47,6 +49,13 @@ test-gui: $(VENV)/installed zip
 zip: $(VENV)/installed
 	mkdir -p dist
 	$(BIN)/python $(EXTENSION_TOOL) build --source-dir . --output-dir dist
+
+# A repository of extensions to put on any web server of static files: the zip, its listing, and a page to drag it into Blender from.
+site: zip
+	rm -rf dist/site
+	mkdir -p dist/site
+	cp dist/wildcap-$(RELEASE).zip dist/site/
+	$(BIN)/python $(EXTENSION_TOOL) server-generate --repo-dir dist/site --html --html-template docs/site.html
 
 # The worker's packages by the lock of this platform and Python, as Install Solver brings them. The tests need Blender's module besides, which asks for another
 # NumPy than ours and works with it.

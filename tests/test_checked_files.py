@@ -51,7 +51,7 @@ def exr_header(path, side: int) -> bytes:
 def test_pixels_are_counted_before_memory_is_taken(tmp_path):
     (tmp_path / "vast.exr").write_bytes(exr_header(tmp_path / "small.exr", 60000))
     (tmp_path / "vast.png").write_bytes(png_header(30016, 30016))
-    for name, size in (("vast.exr", "60000 x 60000"), ("vast.png", "30016 x 30016")):
+    for name, size in (("vast.exr", "probably a corrupt or malicious header"), ("vast.png", "30016 x 30016")):
         for read in (images.read_linear, images.read_mask, images.size):
             refused(lambda read=read, name=name: read(tmp_path / name), name, size)
     (tmp_path / "large.png").write_bytes(png_header(8192, 8192))

@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ..core.contract import switchlight_api
+from ..core.contract import links, switchlight_api
 from ..core.contract.messages import Problem
 from ..core.worker import environment
 from . import extension
@@ -59,6 +59,7 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
         layout.prop(self, "python")
         layout.prop(self, "captures")
         draw_key(layout, "SwitchLight Key")
+        draw_links(layout)
 
 
 def draw_solver(layout, preferences) -> None:
@@ -82,6 +83,14 @@ def draw_solver(layout, preferences) -> None:
     column.operator("wildcap.install_solver", icon='IMPORT')
     column.operator("wildcap.use_python", icon='FILE_FOLDER')
     column.operator("wildcap.remove_solver", icon='TRASH')
+
+
+def draw_links(layout) -> None:
+    """Where WildCap is on the web, as far as that is set."""
+    row = layout.row()
+    for text, address in (("Website", links.WEBSITE), ("Report a Problem", links.REPORTS)):
+        if address:
+            row.operator("wm.url_open", text=text, icon='URL').url = address
 
 
 def draw_key(layout, label: str) -> None:

@@ -139,5 +139,6 @@ def unwrapped(scan: Mesh, cell: float, size: int) -> Mesh:
     """The reduced scan with UVs; triangles that the atlas could not lay out are dropped."""
     mesh = atlas.unwrap(reduced(scan, cell), size)
     uvs = mesh.uvs[mesh.face_uvs]
-    kept = np.abs(np.cross(uvs[:, 1] - uvs[:, 0], uvs[:, 2] - uvs[:, 0])) > 1e-14
+    (ax, ay), (bx, by) = (uvs[:, 1] - uvs[:, 0]).T, (uvs[:, 2] - uvs[:, 0]).T
+    kept = np.abs(ax * by - ay * bx) > 1e-14
     return replace(mesh, faces=mesh.faces[kept], face_uvs=mesh.face_uvs[kept])

@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The extension's own repository: Blender's tool lists it, and an older installation is updated from it, over a server on this machine."""
+
+import functools
+import hashlib
+import http.server
+import json
+import re
+import shutil
+import subprocess
+import sys
+import threading
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from core.contract import links
+
+bpy = pytest.importorskip("bpy")
+
+from .drawn import Layout  # noqa: E402
+
+ROOT = Path(__file__).resolve().parent.parent
+TOOL = Path(bpy.utils.system_resource('SCRIPTS')) / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
+MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+
+
+def run(*arguments: str) -> str:
+    result = subprocess.run([sys.executable, str(TOOL), *arguments], capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout + result.stderr
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory) -> Path:
+    """What the zip is built from, less what is large, so that it is built in a moment."""
+    folder = tmp_path_factory.mktemp("sources")
+    for name in ("__init__.py", "blender_manifest.toml", "LICENSE"):
+        shutil.copyfile(ROOT / name, folder / name)
+    shutil.copytree(ROOT / "wildcap_addon", folder / "wildcap_addon", ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
+
+
+def publish(sources: Path, site: Path, version: str) -> None:
+    """As `make site`, for the sources called a version."""
+    manifest = sources / "blender_manifest.toml"
+    manifest.write_text(re.sub(r'(?m)^version = ".*"', f'version = "{version}"', manifest.read_text(encoding="utf-8")), encoding="utf-8")
+    shutil.rmtree(site, ignore_errors=True)
+    site.mkdir()
+    run("build", "--source-dir", str(sources), "--output-dir", str(site))
+    run("server-generate", "--repo-dir", str(site), "--html", "--html-template", str(ROOT / "docs" / "site.html"))
+
+
+def test_an_older_installation_is_updated_from_our_repository(sources, tmp_path):
+    site, local = tmp_path / "site", tmp_path / "extensions"
+    local.mkdir()
+    handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=str(site))
+    handler.log_message = lambda *_: None
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    where = ("--remote-url", f"http://127.0.0.1:{server.server_port}/index.json", "--local-dir", str(local))
+    try:
+        for version in ("0.1.0", MANIFEST["version"]):
+            publish(sources, site, version)
+            run("sync", *where)
+            run("install", *where, "--blender-version", "4.2.0", "wildcap")
+            installed = tomllib.loads((local / "wildcap" / "blender_manifest.toml").read_text(encoding="utf-8"))
+            assert installed["version"] == version and (local / "wildcap" / "wildcap_addon" / "__init__.py").is_file()
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+def test_the_listing_and_the_page_name_the_zip(sources, tmp_path):
+    site = tmp_path / "site"
+    publish(sources, site, MANIFEST["version"])
+    entry, = json.loads((site / "index.json").read_text(encoding="utf-8"))["data"]
+    archive = site / f"wildcap-{MANIFEST['version']}.zip"
+    assert entry["id"] == "wildcap" and entry["version"] == MANIFEST["version"] and entry["license"] == MANIFEST["license"]
+    assert entry["archive_size"] == archive.stat().st_size and entry["archive_hash"] == f"sha256:{hashlib.sha256(archive.read_bytes()).hexdigest()}"
+    page = (site / "index.html").read_text(encoding="utf-8")
+    assert re.search(rf'href="[^"]*{re.escape(archive.name)}\?repository=[^"]*index\.json', page), "the drag brings the repository along"
+    assert "${" not in page
+    assert "Why it is here and not on extensions.blender.org" in page
+
+
+def test_the_manifest_names_every_licence_and_holder_of_what_ships():
+    assert set(MANIFEST["license"]) == {"SPDX:GPL-3.0-or-later", "SPDX:MIT", "SPDX:Apache-2.0", "SPDX:CC0-1.0"}
+    notices = (ROOT / "core" / "weights" / "prior.json").read_text(encoding="utf-8")
+    year, holder = re.search(r"Copyright \(c\) (\d{4}) ([A-Z]\w+ [A-Z]\w+)", notices).groups()
+    assert f"{year} {holder}" in MANIFEST["copyright"] and any("MediaPipe Authors" in name for name in MANIFEST["copyright"])
+    assert MANIFEST.get("website", "") == links.WEBSITE, "one constant says where WildCap is"
+
+
+def test_links_are_shown_once_they_are_set(addon, monkeypatch):
+    preferences = addon("preferences")
+    for website, reports, shown in (("", "", []), ("https://wildcap.example", "", ["Website"]), ("", "https://wildcap.example/new", ["Report a Problem"])):
+        monkeypatch.setattr(preferences.links, "WEBSITE", website)
+        monkeypatch.setattr(preferences.links, "REPORTS", reports)
+        found: list = []
+        preferences.draw_links(Layout(found))
+        assert [text for text, _ in found] == shown
