@@ -189,17 +189,21 @@ def test_a_capture_of_0_1_0_gets_a_record_of_what_it_wrote_and_of_nothing_else(t
     root = tmp_path / "old.wildcap"
     (root / "frames").mkdir(parents=True)
     for name, text in (("frames/00000.jpg", "frame"), ("frames/frames.json", "{}"), ("frames/2026 holiday.jpg", "a picture"), ("head.obj", "head"),
-                       ("notes.txt", "mine"), (".scan.99999999.tmp.ply", "half")):
+                       ("notes.txt", "mine"), (".scan.99999999.tmp.ply", "half"), ("frames/.00001.99999999.tmp.jpg", "half"),
+                       ("frames/.mine.1.tmp.jpg", "mine"), (".notes.old", "mine")):
         (root / name).write_text(text)
+    (root / ".maps.99999999.tmp").mkdir()
     (root / "capture.json").write_text(json.dumps({"format": 1, "source": "", "stages": {"frames": {}}}))
     capture = Capture(root)
     with capture.locked():
         pass
-    assert not (root / ".scan.99999999.tmp.ply").exists()
+    assert not any((root / name).exists() for name in (".scan.99999999.tmp.ply", "frames/.00001.99999999.tmp.jpg", ".maps.99999999.tmp"))
+    assert (root / "frames" / ".mine.1.tmp.jpg").read_text() == (root / ".notes.old").read_text() == "mine", "such names are not 0.1.0's alone"
     make_frames(capture, "00000.jpg", text="new")
     with replacing(capture.head) as temporary:
         temporary.write_text("new")
-    assert contents(root).keys() == {"capture.json", "frames/00000.jpg", "frames/2026 holiday.jpg", "head.obj", "notes.txt"}
+    assert contents(root).keys() == {"capture.json", "frames/00000.jpg", "frames/2026 holiday.jpg", "head.obj", "notes.txt", ".notes.old",
+                                     "frames/.mine.1.tmp.jpg"}
 
 
 def test_the_first_thing_written_into_a_capture_of_0_1_0_does_not_hide_what_it_wrote(tmp_path):
@@ -213,6 +217,19 @@ def test_the_first_thing_written_into_a_capture_of_0_1_0_does_not_hide_what_it_w
         with replacing(path) as temporary:
             temporary.write_text("new")
     assert not (root / "kept").exists()
+
+
+def test_a_capture_of_today_whose_record_was_lost_is_not_taken_for_one_of_0_1_0(capture):
+    make_frames(capture, "00000.jpg")
+    capture.json.write_text(json.dumps({"format": 2, "source": "", "stages": {"frames": {}}}))
+    (capture.root / ownership.RECORD).unlink()
+    left = capture.frames / ".00001.99999999.tmp.jpg"
+    left.write_text("anybody's")
+    with capture.locked():
+        pass
+    assert left.exists() and not ownership.is_ours(capture.root, capture.frames / "00000.jpg")
+    make_frames(capture, "00000.jpg", text="new")
+    assert (capture.root / "kept" / "frames" / "00000.jpg").exists() and left.exists()
 
 
 def test_a_record_with_a_line_cut_off_is_read_and_a_lost_one_loses_no_file(capture):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import fnmatch
 import json
 import os
 import re
@@ -42,8 +43,8 @@ FIRST_FORMAT = (
     "checkpoints/solve.safetensors", "switchlight/*.png",
 )
 """What WildCap 0.1.0 wrote, which kept no such record."""
-LEFT_BEFORE = re.compile(r"^\..+\.(\d+)\.tmp(\..+)?$|^\..+\.old$")
-"""Temporary names of 0.1.0."""
+LEFT_BEFORE = re.compile(r"\.(?P<stem>.+)\.\d+\.tmp(?P<suffix>\..+)?|\.(?P<old>.+)\.old")
+"""Temporary names of 0.1.0, whole."""
 
 
 def root_of(path: Path) -> Path | None:
@@ -185,19 +186,31 @@ def adopt_first_format(root: Path) -> None:
     """Makes the record of a capture of 0.1.0: what its finished stages wrote, and what killed ones left."""
     note_written(root, {path_inside(root, path): read_hash(path) for pattern in FIRST_FORMAT for path in sorted(root.glob(pattern)) if path.is_file()})
     gone = {**identify_process(), "pid": -1}
-    _append(root, [{"temporary": path_inside(root, path), "by": gone} for path in root.glob("**/.*") if LEFT_BEFORE.match(path.name)])
+    _append(root, [{"temporary": inside, "by": gone} for path in root.glob("**/.*") if _was_left_before(inside := path_inside(root, path))])
+
+
+def _was_left_before(inside: str) -> bool:
+    """Whether a path is a temporary one of 0.1.0's, for a file or a folder that it wrote. Others have files of such names, too."""
+    path = PurePosixPath(inside)
+    found = LEFT_BEFORE.fullmatch(path.name)
+    if not found:
+        return False
+    final = str(path.with_name(found["old"] or found["stem"] + (found["suffix"] or "")))
+    return any(fnmatch.fnmatchcase(final, each) or PurePosixPath(final) in PurePosixPath(each).parents for each in FIRST_FORMAT)
 
 
 def _begin_record(root: Path) -> None:
     """Before the first line of any other: what 0.1.0 wrote, where this is a capture of that."""
-    if not (root / RECORD).exists() and _has_finished_stages(root):
+    if not (root / RECORD).exists() and _is_of_first_format(root):
         (root / RECORD).touch()
         adopt_first_format(root)
 
 
-def _has_finished_stages(root: Path) -> bool:
-    with contextlib.suppress(OSError, ValueError, AttributeError):
-        return bool(json.loads((root / "capture.json").read_text(encoding="utf-8")).get("stages"))
+def _is_of_first_format(root: Path) -> bool:
+    """Whether 0.1.0 wrote it, and finished a stage. A newer one whose record was lost gets none: what is in it may be anybody's, and is kept aside."""
+    with contextlib.suppress(OSError, ValueError, AttributeError, TypeError):
+        record = json.loads((root / "capture.json").read_text(encoding="utf-8"))
+        return bool(record.get("stages")) and record.get("format", 0) < 2
     return False
 
 
