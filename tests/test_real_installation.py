@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The solver installed for real, by the add-on's own operators, to its end: minutes and gigabytes, so only with WILDCAP_REAL_INSTALLATION=pip
-(from where this machine's pip is set up to look) or =pytorch (from PyTorch's own index). Run it with -s: it prints its figures."""
+(from where this machine's pip is set up to look), =pytorch (from PyTorch's own index), or the path of a folder that `python -m core wheels` made, without a
+network. Run it with -s: it prints its figures."""
 
 import os
 import subprocess
@@ -12,19 +13,22 @@ import pytest
 bpy = pytest.importorskip("bpy")
 SOURCE = os.environ.get("WILDCAP_REAL_INSTALLATION", "")
 
-pytestmark = pytest.mark.skipif(SOURCE not in ("pip", "pytorch"), reason="installs gigabytes: WILDCAP_REAL_INSTALLATION=pip or =pytorch runs it")
+WHEELS = SOURCE if SOURCE and SOURCE not in ("pip", "pytorch") else ""
+
+pytestmark = pytest.mark.skipif(not SOURCE, reason="installs gigabytes: WILDCAP_REAL_INSTALLATION=pip, =pytorch or =FOLDER_OF_WHEELS runs it")
 
 
 @pytest.fixture
 def solver(addon, tmp_path):
     """The folder the solver goes to, with spaces and accents."""
     preferences = addon("preferences").get()
-    preferences.environment, preferences.packages, preferences.compute = str(tmp_path / "Löser für Zoë" / "le solveur"), SOURCE, 'cpu'
+    preferences.environment, preferences.compute = str(tmp_path / "Löser für Zoë" / "le solveur"), 'cpu'
+    preferences.packages, preferences.wheels = 'folder' if WHEELS else SOURCE, WHEELS
     preferences.captures = str(tmp_path / "Köpfe")
-    bpy.context.preferences.system.use_online_access = True
+    bpy.context.preferences.system.use_online_access = not WHEELS
     yield addon("preferences").environment_folder()
     addon("preferences").set_python(None)
-    preferences.environment, preferences.packages, preferences.captures = "", 'pytorch', ""
+    preferences.environment, preferences.packages, preferences.wheels, preferences.captures = "", 'pytorch', "", ""
     bpy.context.preferences.system.use_online_access = False
 
 
@@ -39,13 +43,13 @@ def follow(jobs, until=lambda job: False, limit_s: float = 1800) -> float:
 
 def test_from_the_question_through_a_cancel_to_a_solve_and_removed_again(addon, solver):
     jobs, install, problems, checking = addon("jobs"), addon("setup.install"), addon("problems"), addon("setup.checking")
-    if not bpy.app.online_access:
+    if not bpy.app.online_access and not WHEELS:
         pytest.skip("this Blender cannot go online")
     assert install.WILDCAP_OT_install_solver.tell() is None
     asking_s = follow(jobs)
     assert problems.of("") is None, problems.of("")
     told = install.WILDCAP_OT_install_solver.tell()
-    plan = addon("asking").answer(("plan", 'cpu', SOURCE))
+    plan = addon("asking").answer(("plan", *install.chosen()))
 
     bpy.ops.wildcap.install_solver()
     follow(jobs, lambda job: job.progress is not None and job.progress.done >= 8)

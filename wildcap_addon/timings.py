@@ -34,7 +34,7 @@ def record(settings: Settings, seconds: float) -> None:
     """Takes note of a solve that ran from its first step to its last, by the default recipe; others are no measure of it."""
     if settings.edited_part or settings.solve.recipe != "wildcap" or settings.solve.prior:
         return
-    _rates[settings.device] = seconds / work(settings)
+    _rates[settings.compute_device] = seconds / work(settings)
     with contextlib.suppress(Problem, OSError, ValueError):  # a folder that cannot be written: it is learned again the next time
         write_json(_file(), _rates)
 
