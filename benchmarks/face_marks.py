@@ -4,9 +4,9 @@
 
     python -m benchmarks.face_marks CAPTURE [MARKS] [--held-out] [--json PATH]
 
-MARKS: face_marks.json beside this file, of data/photographs: up to seventeen points per view, those that are seen and well defined there; numbers, no likeness. A miss is told in percent
-of the face's width in that view: the distance of the landmarks at the temples (234, 454) at the depth of the head. --held-out also fits the head again to the
-first three photographs alone, and to all but each profile, and judges it in the others, whose cameras stay.
+MARKS: face_marks.json beside this file, of data/photographs: up to seventeen points per view, those that are seen and well defined there; numbers, no
+likeness. A miss is told in percent of the face's width in that view: the distance of the landmarks at the temples (234, 454) at the depth of the head.
+--held-out also fits the head again to the first three photographs alone, and to all but each profile, and judges it in the others, whose cameras stay.
 """
 
 from __future__ import annotations

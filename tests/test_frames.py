@@ -177,6 +177,26 @@ def test_photographs_are_kept_larger_for_the_features_cameras_are_found_by(captu
         assert np.abs(cv2.resize(full, (320, 320), interpolation=cv2.INTER_AREA) - images.read_srgb(capture.frames / name)).mean() < 0.02
 
 
+def test_a_telephones_heic_is_read_upright_with_its_focal_length_and_colours(capture, tmp_path):
+    heif = pytest.importorskip("pillow_heif")
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    rationals = 26 + 2 + 3 * 12 + 4  # behind the two folders of tags
+    tags = struct.pack(">HHII", 0x920A, 5, 1, rationals) + struct.pack(">HHII", 0xA20E, 5, 1, rationals + 8) + struct.pack(">HHIHH", 0xA210, 3, 1, 3, 0)
+    exif = b"Exif\0\0MM\0*" + struct.pack(">IHHHIII", 8, 1, 0x8769, 4, 1, 26, 0) + struct.pack(">H", 3) + tags + bytes(4)
+    exif += struct.pack(">4I", 68, 10, 300, 1)  # a lens of 6.8 mm, and 300 pixels a centimetre: a sensor of SIZE pixels is 8 mm wide
+    for i in range(3):
+        picture = heif.from_bytes(mode="RGB", size=(SIZE, SIZE), data=moving_face(5 * i).tobytes())
+        picture.save(folder / f"{i}.heic", quality=90, exif=exif)
+    record, _ = take(capture, folder)
+    first = images.read_srgb(capture.frames / record["frames"][0]["name"])
+    assert np.abs(first - moving_face(0) / 255).mean() < 0.02
+    assert record["frames"][0]["focal_px"] == pytest.approx(6.8 / 8 * SIZE, rel=0.01)
+    (folder / "0.heic").write_bytes(b"heic")
+    (folder / "1.heic").write_bytes(b"heic")
+    assert "Only 1 photographs" in refused(Capture(tmp_path / "b.wildcap"), folder).problem
+
+
 def test_display_p3_photographs_are_brought_to_srgb(capture, tmp_path):
     """As iPhones write them: the profile is in the JPEG's second application segment."""
     text = b"Display P3\0"
@@ -190,9 +210,9 @@ def test_display_p3_photographs_are_brought_to_srgb(capture, tmp_path):
         data = path.read_bytes()
         if i:
             path.write_bytes(data[:2] + b"\xff\xe2" + struct.pack(">H", len(profile) + 2) + profile + data[2:])
-    (tmp_path / "photos" / "3.heic").write_bytes(b"heic")
+    (tmp_path / "photos" / "3.dng").write_bytes(b"raw")
     record, report = take(capture, tmp_path / "photos")
-    assert "1 HEIC or raw files were left out beside 3" in report.findings[0]["problem"]
+    assert "1 raw files were left out beside 3" in report.findings[0]["problem"]
     plain, wide = (images.read_srgb(capture.frames / record["frames"][i]["name"]) for i in (0, 1))
     assert np.abs(plain - moving_face(0) / 255).mean() < 0.01
     skin = moving_face(5) / 255
@@ -260,8 +280,8 @@ def test_bad_sources_end_in_a_sentence(capture, tmp_path):
     folder = tmp_path / "photos"
     folder.mkdir()
     assert "no photographs" in refused(capture, folder).problem
-    (folder / "a.heic").write_bytes(b"heic")
-    assert "HEIC" in refused(capture, folder).problem
+    (folder / "a.dng").write_bytes(b"raw")
+    assert "raw files" in refused(capture, folder).problem
     for i in range(2):
         images.write_srgb(folder / f"{i}.png", moving_face(9 * i).astype(np.float32) / 255)
     assert "Only 2 photographs" in refused(capture, folder).problem

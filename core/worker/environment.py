@@ -19,7 +19,7 @@ from .background import Task
 
 PYTHONS = ((3, 11), (3, 12))
 """Versions of Python for which every pinned requirement has a wheel."""
-MODULES = {"opencv-contrib-python-headless": "cv2", "openimageio": "OpenImageIO", "scikit-image": "skimage"}
+MODULES = {"opencv-contrib-python-headless": "cv2", "openimageio": "OpenImageIO", "scikit-image": "skimage", "pillow-heif": "pillow_heif"}
 """Modules of the packages that are called otherwise."""
 
 
