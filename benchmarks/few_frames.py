@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
+import sys
 import tempfile
 from pathlib import Path
 
@@ -21,7 +22,7 @@ import numpy as np
 
 from core import cameras, frames, registration, scan
 from core.contract.capture import Capture
-from core.contract.messages import Reporter
+from core.contract.messages import Log, Reporter
 from core.contract.settings import Settings
 from core.geometry import meshes
 from core.geometry.views import read_points
@@ -59,7 +60,7 @@ def reconstruct(capture: Capture, source: Path, with_scan: bool) -> dict:
     capture.root.mkdir(parents=True)
     capture.set_source(source)
     for name, room in (("frames", frames), ("cameras", cameras), ("scan", scan), ("registration", registration)):
-        report = Reporter(name)
+        report = Reporter(name, lambda message: print(message, file=sys.stderr) if isinstance(message, Log) else None)
         if name == "scan" and not with_scan:
             meshes.write_points(capture.scan, read_points(capture)[0])
             continue
