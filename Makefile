@@ -8,7 +8,7 @@ EXTENSION_TOOL = $(wildcard .venv/lib/python3*/site-packages/bpy/*/scripts/addon
 BLENDERS ?= 4.2.0 5.0.1
 
 # What of the tests needs Blender.
-IN_BLENDER = addon captures setup evidence choices eyedropper white_card paint paint_session operators job_life relight skin_material skin_kept reel next_step refusals draw translations sending acting updates
+IN_BLENDER = addon captures setup evidence choices eyedropper white_card paint paint_session operators job_life relight skin_material skin_kept reel next_step refusals draw translations sending acting updates delete_face save_report
 
 .PHONY: demo test results test-blenders test-gui zip clean
 

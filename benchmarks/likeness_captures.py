@@ -29,7 +29,7 @@ from core.synthetic.people.figure import PARTS, Figure
 from .people import TRUTHS, exposure, write_maps
 from .shadow_captures import registered, write_views
 
-SCALE, SAMPLES = 5 / 6, 7  # of 720 x 960; rays per pixel before denoising
+SCALE, SAMPLES = 5 / 6, 4  # of 720 x 960; rays per pixel before denoising
 PACE = 6
 
 

@@ -14,7 +14,7 @@ from core.synthetic import scene
 from core.synthetic.people import filmed
 from core.synthetic.people.figure import Figure, make_figure
 
-SIDE, SAMPLES, SCALE = 290, 24, 0.5
+SIDE, SAMPLES, SCALE = 290, 12, 0.5
 SUN = np.array([0.55, -0.70, 0.46])
 SKY = (0.50, 0.54, 0.60)
 SHOTS = (  # azimuth, height in degrees, distance and the point looked at in metres, factor on the focal length, bare

@@ -54,7 +54,7 @@ HELD_BACK = (
     Likeness("closed_2", 920003, "window bars"),
 )
 """By the same rule from 920001 on: rendered by nobody before the release of 0.2.0, and by this command only where they are named."""
-OWN_FRAMES, FURTHER_FRAMES = 60, 24
+OWN_FRAMES, FURTHER_FRAMES = 48, 24
 LIGHTS = {"overcast": "overcast", "below": "lamp from below"}
 OTHERWISE = "hazy sun"
 

@@ -35,7 +35,7 @@ from .people import TRUTHS, exposure
 from .people_lights import FURTHER, KINDS
 from .shadow_captures import write_views
 
-FRAMES, SCALE, SAMPLES, SEED = 24, 5 / 6, 8, 930001
+FRAMES, SCALE, SAMPLES, SEED = 24, 5 / 6, 6, 930001
 LIGHTS = {"leaves": "noon sun behind leaves", "overcast": "overcast", "window": "window bars", "lamps": "mixed lamps", "below": "lamp from below"}
 METRES = 0.0553  # one unit of the scan, with the pupils 63 mm apart
 MIDDLE = np.array([-0.007, -0.086, 0.094])  # between the pupils, metres in the axes of lps_sun/cameras.json: where the people's origin is

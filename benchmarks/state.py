@@ -8,11 +8,13 @@ FOLDER holds NAME.wildcap of benchmarks/people.py or of the same layout, or what
 --truths. All captures whose truths have the same head.obj show one person. Measured are the texture of the delit frames and the solved maps; captures
 that lack a texture are left out, or with --run taken through the chain first, from the stage delight on. FOLDER/state keeps each capture's figures in
 pictures, which take the time, and NAME.jpg with its maps: a second run goes on where the first stopped. Likenesses stay there; nothing of them is published.
+People whose figures --json's record holds already, by the same code, stay in it and on the page: the table may be made person by person.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import sys
 from pathlib import Path
@@ -94,13 +96,16 @@ def main() -> int:
     if not captures:
         parser.error(f"{folder} holds no capture with a texture and a truth. benchmarks/people.py makes them; --run takes them through the chain.")
     scores, by_capture = measure(captures)
+    code = code_of(captures)
+    if asked.json and asked.json.is_file():
+        scores, by_capture = with_earlier(figures.read(asked.json.stem, asked.json.parent)["figures"], scores, by_capture, code)
     text = sections(scores, by_capture)
     print("\n\n".join(f"{heading}\n\n{body}" for heading, body in text))
     if asked.page:
         write_page(asked.page, "The state of the albedo", COMMAND, text)
     if asked.json:
         found = summarise(scores, {name: column for columns in TABLES.values() for name, column in columns.items()}, DELIT)
-        figures.write(asked.json, "state", COMMAND, {**to_record(found, scores), "captures": by_capture})
+        figures.write(asked.json, "state", COMMAND, {**to_record(found, scores), "captures": by_capture, "code": code})
     return 0
 
 
@@ -133,10 +138,32 @@ def measure(captures: list[Filmed]) -> tuple[Scores, dict[str, dict[str, Figures
     return {method: rows for method, rows in scores.items() if rows}, by_capture
 
 
+def code_of(captures: list[Filmed]) -> dict[str, str]:
+    """What made the figures: the keys of the stages' code in the captures' records, and the hash of the measures'."""
+    stages = [filmed.capture.read()["stages"] for filmed in captures]
+    keys = {name: " ".join(sorted({each[name]["code"][:12] for each in stages if name in each})) for name in freeze.STAGES}
+    measures = " ".join(hash_file(path) for path in measuring())
+    return {**keys, "measures": hashlib.sha256(measures.encode()).hexdigest()[:12]}
+
+
+def measuring() -> list[Path]:
+    """The files that say what a figure is."""
+    return [*sorted(Path(__file__).parent.glob("measures/*.py")), Path(state_scores.__file__)]
+
+
+def with_earlier(record: dict, scores: Scores, by_capture: dict[str, dict[str, Figures]], code: dict[str, str]) -> tuple[Scores, dict]:
+    """What was measured now over what a record has of other people, if the same code made that; else that is left out, and said."""
+    if record.get("code") != code:
+        print("The record's figures were made by other code, and are replaced.", file=sys.stderr)
+        return scores, by_capture
+    everybody = figures.merged(record["people"], scores)
+    return {method: everybody[method] for method in METHODS if method in everybody}, {**record["captures"], **by_capture}
+
+
 def seen_in_pictures(filmed: Filmed, answers: dict[str, np.ndarray]) -> dict[str, Figures]:
     """`in_pictures` of a capture, kept with what it was made from: the maps, the truth and the measures' own code."""
     sources = {"inputs": {path.name: hash_file(path) for path in filmed.inputs()}, "truth": hash_tree(filmed.truth / "albedo"), "methods": list(answers),
-               "code": {path.name: hash_file(path) for path in sorted(Path(__file__).parent.glob("measures/*.py")) + [Path(state_scores.__file__)]}}
+               "code": {path.name: hash_file(path) for path in measuring()}}
     kept = filmed.work / f"{filmed.name}.json"
     if kept.is_file() and (stored := json.loads(kept.read_text(encoding="utf-8")))["sources"] == json.loads(json.dumps(sources)):
         return stored["figures"]

@@ -3,6 +3,7 @@
 """The add-on's part of a delivery: each file that Blender writes is read back by another reader, which finds mesh, unit, UVs, maps and shape keys."""
 
 import json
+import os
 import shutil
 import struct
 import subprocess
@@ -42,9 +43,10 @@ def capture(addon, tmp_path, monkeypatch):
         for i in range(len(key.data))[MOVED]:
             key.data[i].co += Vector(move)
 
-    def start(item, goal, *, tool, then, **shared):
-        ended = delivered.deliver(capture, **shared["deliver"])
-        assert isinstance(ended, Done), ended
+    def start(item, goal, *, tool, then, at, ended, **shared):
+        last = delivered.deliver(at, **shared["deliver"])
+        ended()
+        assert isinstance(last, Done), last
         then()
 
     monkeypatch.setattr(addon("jobs"), "start", start)
@@ -221,6 +223,19 @@ def test_a_delivery_waits_for_the_artist_to_leave_a_mode_and_a_failure_keeps_the
     waiting.forget()
     with pytest.raises(RuntimeError, match="Nothing was delivered"):
         bpy.ops.wildcap.open_delivery()
+
+
+def test_a_read_only_capture_is_delivered_to_another_folder_and_nothing_in_it_changes(addon, capture, tmp_path, monkeypatch):
+    access = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: access(path, mode) and not (mode == os.W_OK and Path(path) == capture.root))
+    before = {path: path.read_bytes() for path in capture.root.rglob("*") if path.is_file()}
+    with pytest.raises(RuntimeError, match="is read-only"):
+        bpy.ops.wildcap.deliver()
+    bpy.context.scene.wildcap.captures[0].deliver.folder = str(tmp_path / "out")
+    assert bpy.ops.wildcap.deliver() == {'FINISHED'}
+    folder, = (tmp_path / "out").iterdir()
+    assert list(folder.glob("*.glb")) and list((folder / "textures").iterdir()) and not any(path.is_symlink() for path in folder.rglob("*"))
+    assert {path: path.read_bytes() for path in capture.root.rglob("*") if path.is_file()} == before
 
 
 def test_a_blender_without_an_exporter_says_so(addon, capture, monkeypatch, tmp_path):

@@ -50,7 +50,8 @@ def a_capture(folder, name: str, mood: str = "") -> Capture:
 
 
 def running(capture: Capture) -> bool:
-    return capture.lock.is_file()
+    """Whether somebody is inside; a lock that is just being made is empty."""
+    return capture.lock.is_file() and capture.lock.stat().st_size > 0
 
 
 def pid_of(capture: Capture) -> int:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The authors' config.json and ckpt.pth: configurations of every kind against a network written out plainly here, and files that are none."""
 
+import io
 import json
 import math
 import pickle
@@ -177,9 +178,23 @@ def test_noise_is_read_where_the_folder_carries_it_and_asked_for_where_not(tmp_p
     loaded = prior.load(tmp_path, dtype=torch.float32)
     window = torch.from_numpy(noise[None, :, 8:24, 32:48])
     assert (loaded.of_tone()(x, 1.0, coords) - denoise(loaded.network, x, torch.tensor([1.0]), window)).abs().max() < 1e-6
-    np.save(tmp_path / released.NOISE_FILE, noise[:2])
-    with pytest.raises(Problem, match="of shape"):
-        prior.load(tmp_path)
+    for wrong in (noise[:2], noise[:, :8], noise.astype(np.int32), np.where(noise > 2, np.nan, noise)):
+        np.save(tmp_path / released.NOISE_FILE, wrong)
+        with pytest.raises(Problem, match="of shape"):
+            prior.load(tmp_path)
+
+
+@pytest.mark.parametrize("begins", [b"", b"PK\x03\x04", b"\x93NUMPY\x01\x00"])
+def test_a_noise_map_that_is_damaged_or_promises_more_than_it_holds_is_refused(tmp_path, begins):
+    path = tmp_path / released.NOISE_FILE
+    path.write_bytes(begins + b"x" * 64 if begins else b"")
+    with pytest.raises(Problem, match="noise.npy cannot be read"):
+        released.read_noise(tmp_path)
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "<f4", "fortran_order": False, "shape": (3, 1 << 20, 1 << 20)})
+    path.write_bytes(header.getvalue())
+    with pytest.raises(Problem, match="noise.npy cannot be read"):
+        released.read_noise(tmp_path)
 
 
 def test_what_the_config_says_of_noise_levels_is_kept(tmp_path):

@@ -168,5 +168,11 @@ def test_the_nearest_skin_is_the_one_that_was_filmed(capture):
         assert torch.equal(found, initial.face_of_tone(skin, told.tensor, evidence.skin))
 
 
+def test_a_confidence_of_another_size_is_named(capture):
+    images.write_data(capture.texture_confidence, np.ones((32, 32, 2), np.float32))
+    with pytest.raises(Problem, match=r"texture.exr is .* and texture_confidence.exr 32 x 32"):
+        read_evidence(capture, read_head(capture), SIZE)
+
+
 def filmed(face, evidence) -> np.ndarray:
     return albedo(initial.face_of_tone(face, torch.from_numpy(TONE), evidence.skin)).permute(1, 2, 0).numpy()

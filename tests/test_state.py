@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The state's figures on maps and looks whose answers are known, its captures by person, and figures that are kept."""
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -161,6 +162,26 @@ def test_figures_in_pictures_are_kept_until_something_changes(tmp_path, monkeypa
     filmed.capture.texture.write_text("another texture")
     state.seen_in_pictures(filmed, {NOTHING: np.zeros(1)})
     assert len(calls) == 2
+
+
+def test_people_measured_before_by_the_same_code_stay_in_the_record():
+    code, row = {"solve": "a", "measures": "b"}, {"psnr": 30.0}
+    record = {"people": {DELIT: {"anna": row}}, "captures": {"anna": {DELIT: row}}, "code": code}
+    scores, by_capture = state.with_earlier(record, {SOLVED: {"ben": row}, DELIT: {"ben": row}}, {"ben": {DELIT: row}}, code)
+    assert scores == {DELIT: {"anna": row, "ben": row}, SOLVED: {"ben": row}} and list(scores) == [DELIT, SOLVED] and set(by_capture) == {"anna", "ben"}
+    assert state.with_earlier(record, {}, {}, {**code, "solve": "c"}) == ({}, {})
+
+
+def test_what_made_the_figures_is_told_by_the_stages_and_the_measures(tmp_path):
+    filled(tmp_path, "anna", "A")
+    captures = state_captures.find(tmp_path, tmp_path, tmp_path / "state")
+    before = state.code_of(captures)
+    record = captures[0].capture.read()
+    record["stages"]["solve"] = {"finished": "2026-11-22T00:00:00", "seconds": 1.0, "settings": {}, "seed": 0, "device": "cpu", "figures": {}, "inputs": {},
+                                 "code": "1234567890abcdef", "version": "0.2.0"}
+    captures[0].capture.json.write_text(json.dumps(record))
+    after = state.code_of(captures)
+    assert before["solve"] == "" and after["solve"] == "1234567890ab" and len(after["measures"]) == 12 and after["delight"] == ""
 
 
 def test_a_capture_that_cannot_be_solved_is_named_and_the_others_go_on(tmp_path, monkeypatch, capsys):

@@ -91,6 +91,14 @@ def test_maps_of_the_wanted_size_are_left_as_they_are(capture):
         assert np.abs(images.read_data(again.maps_4k / name) - images.read_data(again.maps / name)).max() < 1e-4
 
 
+@pytest.mark.parametrize("name", ["normal.png", "specular_albedo.png", "confidence.png", "shading.exr"])
+def test_a_map_of_another_size_is_named(capture, name):
+    (images.write_linear if name.endswith(".exr") else images.write_data)(capture.maps / name, np.full((33, 33, 3) if name[0] in "ns" else (33, 33), 0.5))
+    with pytest.raises(Problem, match=f"{name} is 33 x 33 pixels, but diffuse_albedo.exr is 256 x 256") as caught:
+        read_maps(capture.maps)
+    assert caught.value.remedy == "Run the stage solve again."
+
+
 def test_a_cancel_between_maps_leaves_no_folder(capture):
     left = [2]
 

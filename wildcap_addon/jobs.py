@@ -15,6 +15,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.contract import messages, stages, unforeseen
+from ..core.contract.capture import Capture
 from ..core.contract.messages import Problem
 from ..core.contract.settings import Settings
 from ..core.worker.background import Task
@@ -33,6 +34,7 @@ class Job:
     goal: str  # 'reconstruct', 'solve', 'install', or 'ask' for what is found out or tidied up in seconds
     worker: Worker | Task
     then: Callable[[], None] | None = None  # called when it ended well
+    ended: Callable[[], None] | None = None  # called before that, however it ended
     well: bool = False
     on_preview: Callable[[str], None] | None = None  # called with the capture's folder when a preview is new, and when the job has ended
     settings: Settings | None = None
@@ -66,10 +68,10 @@ def can_start(operator, context) -> bool:
 
 
 def start(item, goal: str, *, first: str | None = None, last: str | None = None, tool: str = "", then: Callable[[], None] | None = None,
-          on_preview: Callable[[str], None] | None = None, **shared) -> Job:
-    """Starts the stages from `first` (or from what is not fresh) to `last`, or one of core.contract.stages.TOOLS, with `shared` settings for this once.
-    Raises Problem when it cannot."""
-    capture, root = captures.folder(item), captures.root(item)
+          ended: Callable[[], None] | None = None, on_preview: Callable[[str], None] | None = None, at: Capture | None = None, **shared) -> Job:
+    """Starts the stages from `first` (or from what is not fresh) to `last`, or one of core.contract.stages.TOOLS, with `shared` settings for this once;
+    `at` is a capture that stands in for this one. Raises Problem when it cannot."""
+    capture, root = at or captures.folder(item), captures.root(item)
     if root in _jobs:
         raise Problem("This capture is being worked on already.", "Wait for it, or click Cancel.")
     python = preferences.python()
@@ -80,7 +82,7 @@ def start(item, goal: str, *, first: str | None = None, last: str | None = None,
     path = write_job(capture, first=first, last=last, tool=tool, settings={**properties.values(item), **shared})
     settings = read_job(path).settings
     job = begin(root, goal, Worker(python, ROOT, path, capture.logs / "worker.log", preferences.worker_environment(settings.delight.delighter)), then)
-    job.on_preview, job.settings = on_preview, settings
+    job.on_preview, job.settings, job.ended = on_preview, settings, ended
     return job
 
 
@@ -99,7 +101,7 @@ def begin(root: str, goal: str, worker: Worker | Task, then: Callable[[], None] 
 def cancel(root: str) -> None:
     """Asks the capture's job ('': the installation) to stop; it does so within two seconds. One that waits leaves the line."""
     if root in _jobs and _jobs[root].waiting:
-        del _jobs[root]
+        _leave(root)
     elif root in _jobs:
         _jobs[root].worker.cancel()
 
@@ -112,7 +114,7 @@ def poll() -> bool:
         for message in job.worker.poll():
             _hear(root, job, message)
         if not job.worker.running:
-            del _jobs[root]
+            _leave(root)
             if job.on_preview is not None:
                 job.on_preview(root)
             _finish(root, job)
@@ -132,10 +134,16 @@ def _start_next() -> None:
             job.worker.start()
         except Problem as problem:
             problems.show(root, problem)
-            del _jobs[root]
+            _leave(root)
             continue
         job.waiting = False
         return
+
+
+def _leave(root: str) -> None:
+    job = _jobs.pop(root)
+    if job.ended is not None:
+        job.ended()
 
 
 def _finish(root: str, job: Job) -> None:
@@ -224,4 +232,5 @@ def unregister():
         bpy.app.timers.unregister(_tick)
     for job in [job for job in _jobs.values() if not job.waiting]:
         job.worker.terminate()
-    _jobs.clear()
+    for root in list(_jobs):
+        _leave(root)

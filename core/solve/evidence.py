@@ -79,7 +79,8 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     texture = images.read_linear(capture.texture)
     confidence = images.read_data(capture.texture_confidence)[..., 0]
     if texture.shape[:2] != confidence.shape or texture.shape[0] != texture.shape[1]:
-        raise Problem("The texture and its confidence do not fit together.", "Run the texture stage again.")
+        raise Problem(f"{capture.texture} is {texture.shape[1]} x {texture.shape[0]} pixels and {capture.texture_confidence.name} {confidence.shape[1]} x "
+                      f"{confidence.shape[0]}: they have to be alike and square.", "Run the texture stage again.")
     confidence, texture = np.clip(confidence, 0, 1), np.clip(texture, 0, None)
     if confidence.max() < 1e-3:
         raise Problem("No texel of the texture was seen by any frame.", "Run the chain again from the cameras, and look at its report.")

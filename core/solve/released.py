@@ -15,11 +15,14 @@ import torch
 
 from ..contract.json_files import read_json
 from ..contract.messages import Problem
+from ..contract.regular_files import require_regular
 
 DATA_CHANNELS = 7
 COND_KINDS = ("coord", "posenc", "noise")
 NOISE_FILE = "noise.npy"
 """Where the fixed random map of a prior that is conditioned on one is looked for: float32 [3, S, S] of the whole UV square."""
+MOST_NOISE_SIDE = 8192
+"""Texels: twice the side of the largest UV square that is solved."""
 CHOOSE = "Choose the folder with the authors' config.json and ckpt.pth, as they released them, or leave the prior empty to use ours."
 
 
@@ -78,11 +81,13 @@ def read_noise(folder: Path) -> torch.Tensor | None:
     if not path.is_file():
         return None
     try:
-        values = np.load(path, allow_pickle=False).astype(np.float32)
-    except (OSError, ValueError) as error:
+        stored = np.lib.format.open_memmap(require_regular(path), mode="r")  # mapped: a header that promises more than the file holds takes no memory
+    except (OSError, ValueError, EOFError) as error:
         raise Problem(f"{path} cannot be read ({error}).", "Save the map again with numpy, as float32 of shape 3, S, S.") from error
-    if values.ndim != 3 or len(values) != 3 or values.shape[1] != values.shape[2] or not np.isfinite(values).all():
-        raise Problem(f"{path} is of shape {values.shape}, or holds values that are no numbers.", "Save the map of the whole UV square, of shape 3, S, S.")
+    shape = stored.shape
+    if len(shape) != 3 or shape[0] != 3 or shape[1] != shape[2] or not 1 <= shape[1] <= MOST_NOISE_SIDE or stored.dtype.kind != "f" \
+            or not np.isfinite(values := stored.astype(np.float32)).all():
+        raise Problem(f"{path} is of shape {shape}, or holds values that are no numbers.", "Save the map of the whole UV square, of shape 3, S, S.")
     return torch.from_numpy(values)[None]
 
 

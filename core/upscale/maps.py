@@ -27,12 +27,14 @@ class Maps:
 
 def read_maps(folder: Path) -> Maps:
     """The maps that the solver wrote. Raises Problem where one is damaged or of another size than the others."""
-    normal = images.read_normals(folder / "normal.png")
-    found = Maps(images.read_linear(folder / "diffuse_albedo.exr"), normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
-                images.read_mask(folder / "specular_albedo.png"), images.read_mask(folder / "confidence.png"), images.read_linear(folder / "shading.exr"))
+    paths = {"diffuse": folder / "diffuse_albedo.exr", "normal": folder / "normal.png", "specular": folder / "specular_albedo.png",
+             "confidence": folder / "confidence.png", "shading": folder / "shading.exr"}
+    normal = images.read_normals(paths["normal"])
+    found = Maps(images.read_linear(paths["diffuse"]), normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
+                 images.read_mask(paths["specular"]), images.read_mask(paths["confidence"]), images.read_linear(paths["shading"]))
     side = len(found.diffuse)
     for name, pixels in vars(found).items():
         if pixels.shape[:2] != (side, side):
-            raise Problem(f"The maps in {folder} do not fit together: {name} is {pixels.shape[1]} x {pixels.shape[0]}, the albedo {side} high.",
+            raise Problem(f"{paths[name]} is {pixels.shape[1]} x {pixels.shape[0]} pixels, but {paths['diffuse'].name} is {found.diffuse.shape[1]} x {side}.",
                           "Run the stage solve again.")
     return found

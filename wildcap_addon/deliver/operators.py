@@ -2,12 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators: deliver the head, the artist's own mesh or the scan to another program; the maps are the worker's, the mesh file is Blender's."""
 
+from contextlib import ExitStack
+
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.contract import delivery_plan
 from ...core.contract.delivery_plan import Plan
 from ...core.contract.messages import Problem
+from ...core.worker import read_only
 from .. import captures, jobs, properties
 from ..base_operator import BaseOperator, Dialog
 from . import files, waiting
@@ -35,7 +38,13 @@ class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
         plan, root = planned(context), captures.root(item)
         delivery_plan.check_target(plan)
         chosen = {**properties.values(item)["deliver"], "roughness": roughness(captures.head(context, item)), "whole": False}
-        jobs.start(item, "deliver", tool="deliver", then=lambda: waiting.maps_made(root, plan), deliver=chosen)
+        until_it_ends = ExitStack()
+        at = until_it_ends.enter_context(read_only.stand_in(captures.folder(item), chosen["folder"]))
+        try:
+            jobs.start(item, "deliver", tool="deliver", then=lambda: waiting.maps_made(root, plan), at=at, ended=until_it_ends.close, deliver=chosen)
+        except BaseException:
+            until_it_ends.close()
+            raise
         item.deliver.replace = False  # it was meant for this delivery
 
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from ...geometry.noise import octaves
 from ..canvas import Canvas
-from ..regions import MOUSTACHE, regions
+from ..regions import regions
 from .ground import Ground, strewn, turned
 from .person import Person
 from .strands import Strands, Surface, clumped, coloured, grow, waved
 
 DENSITY = {"stubble": 0.75, "moustache": 1.3, "full": 0.85}  # hairs per mm^2 where it is densest
-SIDEBURNS = [[162, 127, 234, 93, 132, 58], [389, 356, 454, 323, 361, 288]]  # from the temples down to the jaw
+SIDEBURNS = [[162, 127, 234, 93], [389, 356, 454, 323]]  # from the temples down before the ears
 RADIUS_M = {"stubble": 0.00004, "moustache": 0.00005, "full": 0.00006}
 
 
@@ -41,12 +41,26 @@ def beard(person: Person, ground: Ground, skin: Surface, rng: np.random.Generato
 
 def beard_density(kind: str, on: Canvas, rng: np.random.Generator) -> np.ndarray:
     """Where it grows on a canvas, [N] in [0, 1], with the gaps that beards have."""
-    region = np.maximum(regions(on)["beard"], 0.9 * _sideburns(on)) * (1 - regions(on)["ears"])
+    region = _moustache(on) if kind == "moustache" else np.maximum(beard_region(on), 0.9 * _sideburns(on) * (1 - regions(on)["ears"]))
     patchy = on.soft(lambda at: octaves(at, [16.0, 9.0], rng, smooth=True))
-    if kind == "moustache":
-        square = np.min([((on.position - on.landmarks[mark]) ** 2).sum(1) for mark in MOUSTACHE], axis=0)
-        region = region * np.exp(-0.5 * square / 6.5**2)
-    return np.clip(region * 1.5 - 0.22 + 0.10 * patchy * region, 0, 1)
+    return np.clip(region * (1.05 + 0.15 * patchy) - 0.05, 0, 1)
+
+
+def beard_region(on: Canvas) -> np.ndarray:
+    """Where a man's beard can grow, [N] in [0, 1]: below a line from the ears to the corners of the nose, before the ears, down to below the jaw."""
+    x, y, z = np.abs(on.position[:, 0]), on.position[:, 1], on.position[:, 2]
+    nose, corner, chin, ear = (on.landmarks[mark] for mark in (2, 291, 152, 454))
+    line = np.interp(x, [0, 13, 24, 36, 52, ear[0]], [nose[2] + 1, nose[2] - 2, nose[2] - 2, corner[2] + 15, corner[2] + 25, ear[2] - 5])
+    jaw = np.interp(y, [chin[1], ear[1] - 10], [chin[2] - 10, corner[2] - 22])
+    soft = np.clip((line - z) / 9 + 0.4, 0, 1) * np.clip((ear[1] + 4 - y) / 8, 0, 1) * np.clip((z - jaw) / 14 + 0.5, 0, 1)
+    bare = 0.55 * np.exp(-0.5 * ((x - 15) / 5) ** 2 - 0.5 * ((z - corner[2] + 15) / 4) ** 2)  # on either side below the lower lip
+    return (soft * (1 - bare) * (1 - np.clip(1.5 * regions(on)["lips"], 0, 1))).astype(np.float32)
+
+
+def _moustache(on: Canvas) -> np.ndarray:
+    """The part of it above the mouth and at its corners, [N]."""
+    x, z, corner = np.abs(on.position[:, 0]), on.position[:, 2], on.landmarks[291]
+    return beard_region(on) * np.clip((corner[0] + 7 - x) / 6, 0, 1) * np.clip((z - corner[2] + 1) / 5, 0, 1)
 
 
 def _sideburns(on: Canvas, radius: float = 9.0) -> np.ndarray:

@@ -18,6 +18,10 @@ RADIUS_M = {"cropped": 0.00006, "short": 0.00008, "long": 0.00010}  # fewer hair
 STEPS = {"cropped": 4, "short": 10, "long": 20}
 CROWN_MM = np.array([8.0, 120.0, 95.0])
 NAPE_MM, BEHIND_MM = -72.0, 100.0  # below the nape, and below the ears before them, grows nothing
+FRINGE_MM = 56.0  # half the width of a fringe of long hair
+AXIS = np.array([0.0, 0.075])  # x and y about which long hair hangs, metres
+GATHER = 0.092, 0.125, 0.12  # half the width and depth beyond which it is drawn in, and the share by which single hairs may pass them
+SIDEBURN_MM = 34.0, 56.0, -6.0, 40.0  # front, back, bottom and top of the hair before the ears
 FACE = np.array([0.066, 0.026])  # half the width of the face and the depth (y) before which long hair does not hang, metres
 
 
@@ -27,7 +31,15 @@ def scalp_density(on: Canvas, seed: int) -> np.ndarray:
     ragged = on.soft(lambda at: octaves(at, [22.0, 10.0], rng, smooth=True))
     soft = np.clip(regions(on)["scalp"] * 2.2 - 0.75 + 0.15 * ragged, 0, 1)
     behind_ears = np.clip((on.position[:, 1] - np.interp(on.position[:, 2], [-30, -12], [BEHIND_MM, -100])) / 8, 0, 1)
-    return soft * behind_ears * np.clip((on.position[:, 2] - NAPE_MM) / 10, 0, 1)
+    scalp = soft * behind_ears * np.clip((on.position[:, 2] - NAPE_MM) / 10, 0, 1)
+    return np.maximum(scalp, (0.8 + 0.15 * ragged) * _before_the_ears(on)).clip(0, 1)
+
+
+def _before_the_ears(on: Canvas) -> np.ndarray:
+    """Where hair of the head comes down between temple and ear, [N] in [0, 1]."""
+    x, y, z = on.position.T
+    band = np.clip((y - SIDEBURN_MM[0]) / 5, 0, 1) * np.clip((SIDEBURN_MM[1] - y) / 4, 0, 1) * (np.abs(x) > 50)
+    return band * np.clip((z - SIDEBURN_MM[2]) / 8, 0, 1) * np.clip((SIDEBURN_MM[3] - z) / 8, 0, 1) * (1 - regions(on)["ears"])
 
 
 def head_hair(person: Person, ground: Ground, skin: Surface, rng: np.random.Generator) -> Strands:
@@ -49,7 +61,7 @@ def head_hair(person: Person, ground: Ground, skin: Surface, rng: np.random.Gene
         above = 0.001 + 0.24 * clearance * length
         points = grow(roots, length, rng.normal(0.55, 0.12, count).clip(0.1), skin, _weight(front, 0.55, 0.9), above, STEPS[style])
     else:
-        fringe = (front > 0.4) & person.fringe
+        fringe = (front > 0.4) & (np.abs(roots.at[:, 0]) < FRINGE_MM) & person.fringe
         length = np.where(fringe, np.minimum(length, _to_brows(roots.at)), length)
         pull = np.where(fringe[:, None], [0, 0.1, -1.2], [0, 0.15, -3.6])
         points = grow(roots, length, rng.normal(0.3, 0.08, count).clip(0.05), skin, pull, 0.002 + 0.007 * clearance, STEPS[style])
@@ -58,8 +70,22 @@ def head_hair(person: Person, ground: Ground, skin: Surface, rng: np.random.Gene
     if style != "cropped":
         points = clumped(points, 26, 0.55, rng)
         points = clumped(points, 8, 0.35, rng)
+    if style == "long":
+        points = _gathered(points)
     colour = coloured(count, np.asarray(person.hair_colour), person.grey, rng)
     return Strands(points, np.full(count, RADIUS_M[style], np.float32), colour, "hair")
+
+
+def _gathered(points: np.ndarray) -> np.ndarray:
+    """Long hair [M, K, 3] that stands far off below the ears' tops, drawn in: its neighbours hold it. What lies on the shoulders stays."""
+    x, y, z = np.moveaxis(points.astype(np.float64), -1, 0)
+    across = np.stack([x, y - AXIS[1]], -1)
+    reach = np.linalg.norm(across / GATHER[:2], axis=-1)
+    hangs = np.clip((0.04 - z) / 0.04, 0, 1) * np.clip((z + 0.15) / 0.05, 0, 1)
+    over = np.maximum(reach - 1, 0)
+    kept = np.where(over > 0, (1 + GATHER[2] * np.tanh(over / GATHER[2])) / np.maximum(reach, 1e-9), 1)
+    scale = 1 + hangs * (kept - 1)
+    return np.stack([x * scale, AXIS[1] + across[..., 1] * scale, z], -1).astype(np.float32)
 
 
 def _ways(on: Canvas, person: Person) -> np.ndarray:

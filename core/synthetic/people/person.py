@@ -66,7 +66,8 @@ def sample_person(seed: int) -> Person:
     bare = replace(skin, beard=0.0, brow_density=0.0, scalp_hair=0.0)
     return Person(
         seed=seed, skin=bare, male=male, iris=_tuple(iris * np.exp(rng.normal(0, 0.2))),
-        openness=0.0 if rng.random() < 0.2 else float(rng.uniform(0.72, 0.98)), gaze=(float(rng.normal(0, 3)), float(rng.normal(0, 2))),
+        openness=0.0 if rng.random() < 0.2 else float(rng.uniform(0.72, 0.98)),
+        gaze=(float(np.clip(rng.normal(0, 3), -6, 6)), float(np.clip(rng.normal(0, 2), -4, 4))),
         brow=skin.brow_density, brow_colour=_tuple(brow_colour), hair=hair,
         hair_length={"none": 0.0, "cropped": rng.uniform(0.004, 0.012), "short": rng.uniform(0.03, 0.06), "long": rng.uniform(0.16, 0.26)}[hair],
         hair_colour=skin.hair_colour, fringe=bool(rng.random() < 0.5), parting=float(rng.choice([0.0, rng.uniform(0.01, 0.035) * rng.choice([-1, 1])])),

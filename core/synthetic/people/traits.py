@@ -13,6 +13,7 @@ from ...geometry.noise import octaves
 from ..canvas import Canvas
 from ..hairs import beard_shadow
 from ..regions import regions
+from .beards import beard_region
 from .person import Person
 
 SYMMETRIC = 0.85, 0.95
@@ -35,7 +36,7 @@ def shaded(person: Person, on: Canvas, diffuse: np.ndarray) -> np.ndarray:
     """The albedo [N, 3] with the shade of a shaven beard, which lies below the surface."""
     rng = np.random.default_rng([person.seed, 63])
     uneven = 1 + 0.15 * on.soft(lambda at: octaves(at, [14.0], rng, smooth=True))
-    return beard_shadow(diffuse, np.clip(np.clip(1.6 * regions(on)["beard"], 0, 1) * 0.8 * person.shade * uneven, 0, 1))
+    return beard_shadow(diffuse, np.clip(beard_region(on) * 0.8 * person.shade * uneven, 0, 1))
 
 
 def symmetry(field: np.ndarray, on: Canvas) -> float:
