@@ -23,6 +23,8 @@ NAME = "bl_ext.user_default.wildcap"
 def main() -> None:
     import addon_utils  # bpy has made it importable
 
+    for stream in (sys.stdout, sys.stderr):  # what Blender's module prints when it is loaded beside another NumPy than its own is not the add-on's
+        print("Started.", file=stream, flush=True)
     locale.setlocale(locale.LC_ALL, "")  # as a toolkit does when it starts
     assert addon_utils.enable(NAME, default_set=True) is not None
     rooms = ("captures", "jobs", "preferences", "problems", "paint.session", "paint.mask_image")

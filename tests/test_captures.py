@@ -75,7 +75,7 @@ def test_drops_are_taken_where_the_tab_is_shown(addon):
     source = addon("capture.source")
     stage = ast.parse((Path(__file__).parents[1] / "core" / "frames" / "photographs.py").read_text(encoding="utf-8"))  # not imported: it needs OpenCV
     known = {node.targets[0].id: ast.literal_eval(node.value) for node in stage.body if isinstance(node, ast.Assign) and node.targets[0].id.isupper()}
-    assert set(source.PHOTOGRAPHS) == {*known["SUFFIXES"], *known["PHONE_ONLY"]}
+    assert set(source.PHOTOGRAPHS) == {*known["SUFFIXES"], *known["RAW"]}
 
     def taken(tab: str) -> bool:
         space, sidebar = SimpleNamespace(show_region_ui=bool(tab)), SimpleNamespace(type='UI', active_panel_category=tab)

@@ -161,22 +161,6 @@ def test_photographs_upright_with_focal_length(capture, tmp_path):
     assert "few" in report.figures["expected_quality"]
 
 
-def test_photographs_are_kept_larger_for_the_features_cameras_are_found_by(capture, tmp_path):
-    folder = tmp_path / "photos"
-    folder.mkdir()
-    for i in range(3):
-        large = cv2.resize(moving_face(5 * i), (2400, 2400) if i else (300, 300), interpolation=cv2.INTER_CUBIC)
-        images.write_srgb(folder / f"{i}.jpg", large.astype(np.float32) / 255)
-    record, _ = take(capture, folder, long_side=320, mirrored=True)
-    names = [frame["name"] for frame in record["frames"]]
-    assert [images.size(capture.frames / name) for name in names] == [(300, 300), (320, 320), (320, 320)]
-    assert sorted(path.name for path in (capture.frames / "full").iterdir()) == names[1:], "none is enlarged"
-    for name in names[1:]:
-        full = images.read_srgb(capture.frames / "full" / name)
-        assert full.shape == (2000, 2000, 3)
-        assert np.abs(cv2.resize(full, (320, 320), interpolation=cv2.INTER_AREA) - images.read_srgb(capture.frames / name)).mean() < 0.02
-
-
 def test_display_p3_photographs_are_brought_to_srgb(capture, tmp_path):
     """As iPhones write them: the profile is in the JPEG's second application segment."""
     text = b"Display P3\0"
@@ -190,9 +174,9 @@ def test_display_p3_photographs_are_brought_to_srgb(capture, tmp_path):
         data = path.read_bytes()
         if i:
             path.write_bytes(data[:2] + b"\xff\xe2" + struct.pack(">H", len(profile) + 2) + profile + data[2:])
-    (tmp_path / "photos" / "3.heic").write_bytes(b"heic")
+    (tmp_path / "photos" / "3.dng").write_bytes(b"raw")
     record, report = take(capture, tmp_path / "photos")
-    assert "1 HEIC or raw files were left out beside 3" in report.findings[0]["problem"]
+    assert "1 raw files were left out beside 3" in report.findings[0]["problem"]
     plain, wide = (images.read_srgb(capture.frames / record["frames"][i]["name"]) for i in (0, 1))
     assert np.abs(plain - moving_face(0) / 255).mean() < 0.01
     skin = moving_face(5) / 255
@@ -260,8 +244,8 @@ def test_bad_sources_end_in_a_sentence(capture, tmp_path):
     folder = tmp_path / "photos"
     folder.mkdir()
     assert "no photographs" in refused(capture, folder).problem
-    (folder / "a.heic").write_bytes(b"heic")
-    assert "HEIC" in refused(capture, folder).problem
+    (folder / "a.dng").write_bytes(b"raw")
+    assert "raw files" in refused(capture, folder).problem
     for i in range(2):
         images.write_srgb(folder / f"{i}.png", moving_face(9 * i).astype(np.float32) / 255)
     assert "Only 2 photographs" in refused(capture, folder).problem

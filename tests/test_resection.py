@@ -13,6 +13,7 @@ from core.cameras.joint import refine
 from core.cameras.landmarks import fit_rays, pupils, template_landmarks
 from core.cameras.matches import Matches, tracks
 from core.cameras.resection import resect
+from core.cameras.solving import Solved, worth
 from core.cameras.world import agreeing_faces, find_head
 from core.contract.messages import Reporter
 from core.face.faces import Face
@@ -135,6 +136,13 @@ def test_cameras_without_matches_stay_what_they_are(scene):
     start = model_of(views, FOCAL, rng, 0.001)
     kept = refine(start, found, Matches({name: np.zeros((0, 2)) for name in views}, {}), True, Reporter("cameras"))
     assert kept.cameras[1].params[0] == FOCAL and kept.num_reg_images() == len(views)
+
+
+def test_of_two_ways_the_one_that_places_more_frames_wins_unless_nothing_but_the_face_bears_it_out():
+    def solved(way: str, frames: int, refined: bool = True) -> Solved:
+        return Solved(SimpleNamespace(num_reg_images=lambda: frames), way, None, {}, refined=refined)
+
+    assert worth(solved("face", 5)) > worth(solved("skin", 3)) > worth(solved("face", 3)) > worth(solved("face", 5, refined=False))
 
 
 def test_tracks_hang_together_and_ambiguous_ones_go():

@@ -87,7 +87,7 @@ def test_a_write_is_named_by_the_file_it_was_for():
     ("Killed", "The installation stopped (no message).")])
 def test_an_installation_that_stops_says_why(tmp_path, monkeypatch, said, words):
     monkeypatch.setattr(installation, "lock_of", lambda *_: Lock("manylinux_x86_64-3.11", {}))
-    monkeypatch.setattr(installation.bare_environment, "make", lambda folder, *_: folder.mkdir())
+    monkeypatch.setattr(installation.bare_environment, "make", lambda *_, **__: None)
     monkeypatch.setattr(installation, "steps", lambda *_: [Step((said,))])
     monkeypatch.setattr(installation.Task, "run", lambda task, command, hear: hear(said) or (1, said if "ERROR" in said else ""))
     task = installation.installation(tmp_path / "env", REQUIREMENTS, tmp_path / "env.log", base=Path(sys.executable))

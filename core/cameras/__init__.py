@@ -22,7 +22,7 @@ from ..imaging import images
 from . import coverage
 from .calibration import import_cameras
 from .drawing import draw_cameras
-from .joint import refine
+from .joint import AGREE, WIDE, refine
 from .landmarks import find_landmarks
 from .motion import expression_changes
 from .solving import MOST_FACES, Solved, solve
@@ -93,7 +93,7 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
     if 1 <= off < IMPORT_NEAR and len(frames.records) <= ALL_PAIRS:
         report.log("The imported cameras are a little off; they are refined by what matches in these pictures.")
         matches = solve_structure(frames, capture, False, settings.cameras.matching, settings.seed, report)[1]
-        model = refine(model, found, matches, False, report)
+        model = refine(model, found, matches, False, report, agree=WIDE + AGREE)
         head, off = checked(model)
     if not off < 1:
         raise Problem(f"The cameras in {path.name} do not fit these pictures: the face's landmarks miss each other by {head.error_px:.0f} px "
@@ -105,7 +105,7 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
 def _findings(solved: Solved, records: Sequence[FrameRecord], centres: np.ndarray, report: Reporter) -> None:
     """What is wrong with a capture that can be used, and how to shoot it again."""
     shown = {record.name: record.shown for record in records}
-    if solved.way == "face":
+    if solved.way == "face" and not solved.held:
         rough = "refined by what little matches" if solved.refined else "to ten degrees or so"
         report.finding(f"The frames do not overlap enough to be matched: the cameras come from the face's landmarks, {rough}. Expect a rough head.",
                        "Take a photograph every ten degrees around the face, from ear to ear, with a busy background.")

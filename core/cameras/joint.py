@@ -26,6 +26,8 @@ from .world import agreeing_faces, find_head
 
 AGREE = (0.0125, 0.006, 0.004)
 """Shares of the face's width by which matches may miss, round by round."""
+WIDE = (0.06, 0.025)
+"""What goes before for cameras that may be some pixels off."""
 FEATURE_SHARE = 1 / 3000
 """Deviation of a match, as a share of a picture's longer side: features are looked for at 2,000 pixels."""
 FREE, TOLD = 3.0, 0.03
@@ -34,10 +36,10 @@ FEWEST_TRACKS = 60
 
 
 def refine(model: pycolmap.Reconstruction, found: dict[str, faces.Face], matches: Matches, unknown_focal: bool, report: Reporter,
-           missing: Sequence[dict] = ()) -> pycolmap.Reconstruction:
+           missing: Sequence[dict] = (), agree: Sequence[float] = AGREE) -> pycolmap.Reconstruction:
     """The refined model, in the head's world (metres), or `model` itself where too little matches or the refined one explains less. found: name -> face.
     missing: [{names, width, height}] like camera groups, of frames that have no camera yet and may get one by their matches; they share the lens of
-    the frames of their size. Raises Problem where no face is found."""
+    the frames of their size. agree: as AGREE, wider first where the cameras may be off. Raises Problem where no face is found."""
     head = find_head(model, found, 0.063)
     model = pycolmap.Reconstruction(model)
     model.transform(head.world_from_model)
@@ -49,10 +51,10 @@ def refine(model: pycolmap.Reconstruction, found: dict[str, faces.Face], matches
     marks = _landmarks(model, registered, seen_faces)
     width = float(np.median([face.box[2] - face.box[0] for face in seen_faces.values()]))
     before = None
-    for step, share in enumerate(AGREE):
-        report.progress(step, len(AGREE), "refining cameras by what matches")
+    for step, share in enumerate(agree):
+        report.progress(step, len(agree), "refining cameras by what matches")
         added, tracks, bundle = agreeing(bundle, names, straight, share * width)
-        before = before if before is not None else len(tracks)
+        before = before or (len(tracks) if share <= AGREE[0] else None)
         if len(tracks) < FEWEST_TRACKS:
             return model
         seen = Observations(*(np.concatenate([a, b]) for a, b in zip((marks.camera, marks.point, marks.pixel), added, strict=True)))

@@ -17,7 +17,7 @@ from ..contract.frame_records import PHOTOGRAPHS, VIDEO, FrameRecord, Frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import faces
-from .joint import refine
+from .joint import held, refine
 from .landmarks import find_landmarks
 from .matches import Matches
 from .mirrored import find_mirrored
@@ -43,7 +43,8 @@ FILM_AGAIN = ("Film again: the person sits still, the camera moves slowly around
 class Solved:
     """A model in a world of its own; how it was found: plain, skin or face; the head in it; the faces it was found by; whether the head moved
     before its background, and whether the camera stood still then; mirrored frames that were left out; tracks that refined a model from the face,
-    and whether they are enough to trust it; the matches it comes from, where more is to be made of them."""
+    and whether they are enough to trust it; the matches it comes from, where more is to be made of them; whether
+    after that every frame is held by what matches."""
 
     model: pycolmap.Reconstruction
     way: str
@@ -55,6 +56,7 @@ class Solved:
     tracks: int = 0
     refined: bool = True
     matches: Matches = field(default_factory=Matches)
+    held: bool = False
 
 
 def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
@@ -65,8 +67,6 @@ def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter
     found = find_landmarks(records if few else _spread(records), capture.frames, report)
     matches, faults, moved, stood, partial = Matches(), [], False, False, None
     for turn, way in enumerate(ways):
-        if way == "face" and partial:
-            continue
         if way == "face":
             if len(found) < len(records) <= 5 * MOST_FACES and not few:
                 found = find_landmarks(records, capture.frames, report)
@@ -83,32 +83,37 @@ def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter
                 matches = head_matches
                 solved, fault = alone, alone_fault
         if solved and not fault:
-            if partial and partial.model.num_reg_images() >= solved.model.num_reg_images():
+            if partial and worth(partial) > worth(solved):
                 solved, matches = partial, partial.matches
             rest = sorted({record.name for record in records} - {image.name for image in solved.model.images.values() if image.has_pose})
             mirrored = tuple(_mirrored(frames, rest, solved.model, capture, report) if way != "face" else ()) or solved.mirrored
             solved = replace(solved, head_moved=moved, stood_still=stood, mirrored=mirrored)
-            if few and len(rest) > len(mirrored) and "skin" in ways[turn + 1:]:
-                report.log(f"By {way}, {len(rest)} of {len(records)} frames do not fit the others; features that hold on skin are tried.")
-                partial = replace(solved, matches=matches)
+            partial = replace(solved, matches=matches)
+            if few and len(rest) > len(mirrored) and ways[turn + 1:]:
+                report.log(f"{len(rest)} of {len(records)} frames do not fit the others yet; another way is tried.")
                 continue
-            return solved if way == "face" else _refined(solved, frames, capture, matches, settings, report)
+            break
         faults.append(fault)
         report.log(f"By {way} features: {fault}" if way != "face" else f"By the face: {fault}")
     if partial:
-        return partial if partial.way == "face" else _refined(partial, frames, capture, partial.matches, settings, report)
+        return _refined(partial, frames, capture, settings, report)
     raise _explained(frames, faults, moved, stood, capture, report)
 
 
-def _refined(solved: Solved, frames: Frames, capture: Capture, matches: Matches, settings: Settings, report: Reporter) -> Solved:
+def worth(solved: Solved) -> tuple[bool, int, bool]:
+    """Which of two ways found better cameras: those that something else than the face bears out first, then the more, then those by features."""
+    return solved.way != "face" or solved.refined, solved.model.num_reg_images(), solved.way != "face"
+
+
+def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
     """Photographs that lie far apart with their cameras adjusted together with the face, and those that only then find a place; a film as it is."""
-    if frames.kind != PHOTOGRAPHS or len(frames.records) > ALL_PAIRS:
+    if frames.kind != PHOTOGRAPHS or len(frames.records) > ALL_PAIRS or not (solved.way != "face" or solved.refined):
         return solved
     fits = {image.name for image in solved.model.images.values() if image.has_pose}
     missing = [record for record in frames.records if record.name not in fits and record.name not in solved.mirrored]
     unknown = any(record.focal_px is None for record in frames.records)
-    model = refine(solved.model, solved.found, matches, unknown, report, camera_groups(missing, capture.frames))
-    return replace(solved, model=model, head=find_head(model, solved.found, settings.cameras.interpupillary_mm / 1000))
+    model = refine(solved.model, solved.found, solved.matches, unknown, report, camera_groups(missing, capture.frames))
+    return replace(solved, model=model, head=find_head(model, solved.found, settings.cameras.interpupillary_mm / 1000), held=held(model))
 
 
 def _by_features(skin: bool, frames: Frames, capture: Capture, found: dict, settings: Settings, report: Reporter,

@@ -12,12 +12,11 @@ from ..imaging import images
 from .colour import P3, SDR, to_srgb
 from .source import Picture, evenly, fit
 
-SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr")
-PHONE_ONLY = (".heic", ".heif", ".avif", ".dng")
-"""OpenImageIO's wheel has no HEIF decoder, and FFmpeg reads the tiles of which an iPhone's HEIC consists without saying how they lie."""
+SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr", ".heic", ".heif", ".avif")
+RAW = (".dng",)
 FEATURES_PX = 2000
 """Longer side of the pictures that cameras are found by: photographs lie far apart, and what still matches between them is fine."""
-AS_JPEG = "Export them as JPEG or PNG (on an iPhone: Settings, Camera, Formats, Most Compatible)."
+AS_JPEG = "Export them as JPEG or PNG."
 
 
 def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) -> Iterator[Picture]:
@@ -25,13 +24,12 @@ def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) 
     files = sorted(p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
     pictures = [p for p in files if p.suffix.lower() in SUFFIXES]
     if not pictures:
-        if any(p.suffix.lower() in PHONE_ONLY for p in files):
-            raise Problem(f"The photographs in {folder.name} are HEIC or raw files, which cannot be read.",
-                          AS_JPEG)
-        raise Problem(f"There are no photographs in {folder}.", "Choose a folder with JPEG, PNG, TIFF or WebP pictures of the face, or a video.")
-    unread = [p for p in files if p.suffix.lower() in PHONE_ONLY]
+        if any(p.suffix.lower() in RAW for p in files):
+            raise Problem(f"The photographs in {folder.name} are raw files, which cannot be read.", AS_JPEG)
+        raise Problem(f"There are no photographs in {folder}.", "Choose a folder with JPEG, HEIC, PNG, TIFF or WebP pictures of the face, or a video.")
+    unread = [p for p in files if p.suffix.lower() in RAW]
     if unread:
-        report.finding(f"{len(unread)} HEIC or raw files were left out beside {len(pictures)} photographs that can be read.", AS_JPEG)
+        report.finding(f"{len(unread)} raw files were left out beside {len(pictures)} photographs that can be read.", AS_JPEG)
     chosen = evenly(len(pictures), most)
     for done, index in enumerate(chosen, 1):
         path = pictures[index]

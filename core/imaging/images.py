@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Picture files and colour spaces: the one door. OpenImageIO reads and writes every file.
+"""Picture files and colour spaces: the one door. OpenImageIO reads and writes every file but telephones' HEIC, which heif.py reads.
 
 Arrays are float32, rows from the top, [H, W, C]. *sRGB* means encoded with the IEC 61966-2-1 curve in [0, 1];
 *linear* means scene or reflectance values with the same primaries; *data* is neither (masks, normals, specular).
@@ -19,8 +19,12 @@ import OpenImageIO as oiio
 from ..contract.files import replacing
 from ..contract.messages import Problem
 from ..contract.stages import advise_remaking
-from .checks import SAVE_ANEW, check_written, open_picture, read_pixels
+from . import heif
+from .checks import MOST_BYTES, SAVE_ANEW, check_written, open_picture, read_pixels
 
+EXIF = {heif.FOCAL_LENGTH: "FocalLength", heif.FOCAL_35MM: "FocalLengthIn35mmFilm", heif.PLANE_RESOLUTION: "FocalPlaneXResolution",
+        heif.PLANE_UNIT: "FocalPlaneResolutionUnit", heif.WIDTH: "PixelXDimension", heif.HEIGHT: "PixelYDimension"}
+"""EXIF's tags -> what OpenImageIO calls them."""
 TURNS = {1: (False, 1, 1), 2: (False, 1, -1), 3: (False, -1, -1), 4: (False, -1, 1), 5: (True, 1, 1), 6: (True, 1, -1), 7: (True, -1, -1), 8: (True, -1, 1)}
 """EXIF orientation -> how it comes upright: whether rows become columns, then the order of rows and of columns. (OpenImageIO's reorient mistakes 5 for 7.)"""
 
@@ -85,17 +89,22 @@ def bits(path: Path) -> int:
 
 
 def read_focal_35mm(path: Path) -> float | None:
-    """The focal length in millimetres of 35 mm film that a photograph's EXIF tells, or None."""
+    """The focal length in millimetres of 35 mm film that a photograph's EXIF tells, of itself or by the lens and the sensor's resolution, or None."""
+    if heif.is_heif(path):
+        return heif.focal_35mm(heif.read_exif(path), *heif.size(path))
     image = oiio.ImageInput.open(str(path))
     if image is None:
         return None
-    focal = image.spec().getattribute("Exif:FocalLengthIn35mmFilm")
+    spec = image.spec()
+    told = {tag: spec.getattribute(f"Exif:{name}") for tag, name in EXIF.items()}
     image.close()
-    return float(focal) if focal else None
+    return heif.focal_35mm({tag: float(value) for tag, value in told.items() if isinstance(value, int | float)}, spec.width, spec.height)
 
 
 def read_profile(path: Path) -> str:
     """The name of the colour profile in a picture ("Display P3"), or "" where it has none."""
+    if heif.is_heif(path):
+        return heif.read_profile(path)
     image = oiio.ImageInput.open(str(path))
     if image is None:
         return ""
@@ -144,6 +153,8 @@ def _rgb(pixels: np.ndarray) -> np.ndarray:
 
 
 def _read(path: Path) -> np.ndarray:
+    if heif.is_heif(path):
+        return heif.read_pixels(path, MOST_BYTES)
     pixels, turned = read_pixels(Path(path))
     lying, rows, columns = TURNS.get(turned, TURNS[1])
     return np.ascontiguousarray((pixels.swapaxes(0, 1) if lying else pixels)[::rows, ::columns])

@@ -47,10 +47,11 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         _by_views(capture, settings, views, subject, report)
         return
     subject = _subject(landmarks.with_artists(landmarks.onto_surface(found, views, surface), given), report)
+    photographs = read_frames(capture).kind == PHOTOGRAPHS
     try:
-        _by_scan(capture, settings, views, surface, subject, report)
+        _by_scan(capture, settings, views, surface, subject, quality.ENOUGH_SHARE if photographs else quality.LEAST_SHARE, report)
     except quality.Unlike as problem:
-        if read_frames(capture).kind != PHOTOGRAPHS:
+        if not photographs:
             raise
         report.log(f"{problem.problem} It is fitted without the scan.")
         _by_views(capture, settings, views, _subject(landmarks.with_artists(found, given), report), report)
@@ -95,7 +96,8 @@ def _by_views(capture: Capture, settings: Settings, views: list[View], subject: 
     _finish(capture, settings, views, head, subject, report)
 
 
-def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: meshes.Mesh, subject: Subject, report: Reporter) -> None:
+def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: meshes.Mesh, subject: Subject, least_share: float,
+             report: Reporter) -> None:
     scan, found, model = Scan(surface), subject.found, subject.model
     follow, shaped, hold, trust = subject.follow, subject.shaped, subject.hold, subject.trust
     report.progress(10, STEPS, "placing the head")
@@ -110,7 +112,7 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
     head, aligned = model.mesh.moved(vertices), model.mesh.moved(start)
     distances = scan.distances(vertices[follow > 0.5], meshes.vertex_normals(head)[follow > 0.5])
     quality.figures(report, model, aligned, head, found, coefficients, distances, follow)
-    quality.judge(report, head, scan, distances, follow)
+    quality.judge(report, head, scan, distances, follow, least_share)
     _finish(capture, settings, views, head, subject, report)
 
 

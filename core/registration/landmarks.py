@@ -18,6 +18,8 @@ from ..imaging import images
 from . import eyes
 
 MOST_VIEWS = 32
+FEW = 6
+"""Of so few views two with a face will do: the others may be profiles."""
 BEHIND_FACE_M = 0.06
 """How far behind the mean landmark the middle of the head is taken to be; says which side of the face a view sees."""
 
@@ -37,7 +39,7 @@ class Landmarks:
 
 
 def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
-    """Landmarks of the face all views look at. Raises Problem when fewer than three frames show one.
+    """Landmarks of the face all views look at. Raises Problem when fewer than three frames show one, or of a few views two.
 
     `steps` is the stage's total for the progress bar, of which detection is the first tenth.
     """
@@ -49,7 +51,7 @@ def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
         if face is not None:
             found.append((view, face.landmarks[:, :2] * [view.width / srgb.shape[1], view.height / srgb.shape[0]]))
             openings.append((face.yaw_deg, faces.eye_openness(srgb, face)))
-    if len(found) < 3:
+    if len(found) < (3 if len(chosen) > FEW else 2):
         raise Problem(f"A face was found in only {len(found)} of the {len(chosen)} frames that were looked at.",
                       "Film the face larger, in better light and from the front too, then start again from the video.")
     lifted = triangulate([view for view, _ in found], np.stack([pixels for _, pixels in found]))

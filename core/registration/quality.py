@@ -23,6 +23,8 @@ MOST_MISS = 0.05
 """Share of the face's width by which landmarks may miss a head that is fitted without a scan."""
 APART_DEG, WANTED_VIEWS = 25.0, 3
 """So many photographs, so far apart as seen from the head, make a head; fewer a draft."""
+ENOUGH_SHARE = 0.6
+"""The same for photographs, which show a head without their scan as well: patches of one do not lay it better."""
 SHOWN = 0.75
 """Share of a side of the face that the scan should show."""
 
@@ -54,10 +56,10 @@ def figures(report: Reporter, model: Model, aligned: Mesh, head: Mesh, found: La
     report.figure("uv_stretch_p95", round(float(np.percentile(stretched, 95)), 2))
 
 
-def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follow: np.ndarray) -> None:
+def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follow: np.ndarray, least_share: float = LEAST_SHARE) -> None:
     """Raises Problem where the fit does not hold; tells which side of the face the scan does not show."""
     wanted = follow > 0.5
-    if len(distances) < LEAST_SHARE * wanted.sum():
+    if len(distances) < least_share * wanted.sum():
         raise Unlike(f"The head could not be laid over the scan of the face: only {100 * len(distances) / wanted.sum():.0f} % of the face is in the scan.",
                       "Look at the scan's picture in the report; film again slower, in an arc from ear to ear, with the whole face in view.")
     if np.median(distances) > FARTHEST_M:

@@ -19,7 +19,7 @@ from .background import Task
 
 PYTHONS = ((3, 11), (3, 12), (3, 13))
 """Versions of Python for which every direct requirement has a wheel; locks.py has those that an environment is made for."""
-MODULES = {"opencv-contrib-python-headless": "cv2", "openimageio": "OpenImageIO", "scikit-image": "skimage"}
+MODULES = {"opencv-contrib-python-headless": "cv2", "openimageio": "OpenImageIO", "scikit-image": "skimage", "pillow-heif": "pillow_heif"}
 """Modules of the packages that are called otherwise."""
 COMPUTE_FILE = "wildcap_compute.txt"
 """Says in an environment for what, from where and by which lock it was made: another choice makes it anew, and so does one of an older WildCap. It is the

@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""HEIC, HEIF and AVIF, as telephones write them, by libheif (package pillow-heif), which OpenImageIO's wheel lacks. libheif turns pictures upright itself,
+so their EXIF orientation is told already.
+
+The package brings Pillow along; nothing here uses it.
+"""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from ..contract.messages import Problem
+
+SUFFIXES = (".heic", ".heif", ".avif")
+EXPORT = "Export it as JPEG or PNG (on an iPhone: Settings, Camera, Formats, Most Compatible)."
+EXIF_FOLDER, FOCAL_LENGTH, FOCAL_35MM, PLANE_RESOLUTION, PLANE_UNIT, WIDTH, HEIGHT = 0x8769, 0x920A, 0xA405, 0xA20E, 0xA210, 0xA002, 0xA003
+"""EXIF 2.3's numbers of its tags."""
+
+
+def is_heif(path: Path) -> bool:
+    return Path(path).suffix.lower() in SUFFIXES
+
+
+def read_pixels(path: Path, most_bytes: int) -> np.ndarray:
+    """The upright picture as stored, float32 [H, W, 3] in [0, 1]. Raises Problem for what is no such picture or would take more than `most_bytes`."""
+    picture = _opened(path)
+    width, height = picture.size
+    if 12 * width * height > most_bytes:
+        raise Problem(f"{path} has {width} x {height} pixels, which would take more than {most_bytes >> 30} GB of memory.", "Make it smaller.")
+    try:
+        pixels = np.asarray(picture)
+    except (ValueError, EOFError, SyntaxError, RuntimeError, OSError) as error:
+        raise _unreadable(path, error) from error
+    pixels = pixels[..., None] if pixels.ndim == 2 else pixels
+    pixels = np.repeat(pixels[..., :1], 3, 2) if pixels.shape[2] < 3 else pixels[..., :3]
+    return np.ascontiguousarray(pixels, np.float32) / np.iinfo(pixels.dtype).max
+
+
+def size(path: Path) -> tuple[int, int]:
+    return _opened(path).size
+
+
+def read_profile(path: Path) -> str:
+    """ "Display P3" where the picture's colours are in it, else ""."""
+    info = _opened(path).info
+    icc, nclx = info.get("icc_profile") or b"", info.get("nclx_profile") or {}
+    wide = b"Display P3" in icc or "Display P3".encode("utf-16-be") in icc or not icc and nclx.get("color_primaries") == 12
+    return "Display P3" if wide else ""
+
+
+def read_exif(path: Path) -> dict[int, float]:
+    """The numbers in a picture's EXIF data by their tags; {} where there are none."""
+    return parse_exif(_opened(path).info.get("exif") or b"")
+
+
+def parse_exif(block: bytes) -> dict[int, float]:
+    """Tag -> number, of the first folder and of EXIF's own; what is damaged is passed over."""
+    start = 6 if block.startswith(b"Exif\0\0") else 0
+    order = {b"II": "<", b"MM": ">"}.get(block[start:start + 2])
+    found: dict[int, float] = {}
+    try:
+        folders = [struct.unpack_from(order + "I", block, start + 4)[0]] if order else []
+        for at in folders:  # grows by EXIF's folder, once
+            for i in range(struct.unpack_from(order + "H", block, start + at)[0]):
+                tag, kind, count, value = struct.unpack_from(order + "HHII", block, start + at + 2 + 12 * i)
+                if tag == EXIF_FOLDER and len(folders) == 1:
+                    folders.append(value)
+                elif kind == 3 and count == 1:
+                    found[tag] = float(struct.unpack_from(order + "H", block, start + at + 10 + 12 * i)[0])
+                elif kind == 4 and count == 1:
+                    found[tag] = float(value)
+                elif kind == 5 and count == 1:
+                    above, below = struct.unpack_from(order + "II", block, start + value)
+                    found[tag] = above / below if below else 0.0
+    except struct.error:
+        pass
+    return found
+
+
+def focal_35mm(tags: dict[int, float], width: int, height: int) -> float | None:
+    """Millimetres of 35 mm film: as told, or from the lens and the sensor's resolution; None where neither is. width, height: the picture's."""
+    if tags.get(FOCAL_35MM, 0) > 0:
+        return tags[FOCAL_35MM]
+    unit = {2: 25.4, 3: 10.0, 4: 1.0}.get(int(tags.get(PLANE_UNIT, 2)))
+    if not unit or min(tags.get(FOCAL_LENGTH, 0), tags.get(PLANE_RESOLUTION, 0)) <= 0:
+        return None
+    sensor_mm = max(tags.get(WIDTH, width), tags.get(HEIGHT, height)) / tags[PLANE_RESOLUTION] * unit
+    return 36 * tags[FOCAL_LENGTH] / sensor_mm if 1 < sensor_mm < 100 else None
+
+
+def _opened(path: Path):
+    try:
+        import pillow_heif
+    except ImportError as error:
+        raise Problem(f"{Path(path).name} is a HEIC picture, and the package pillow-heif that reads them is not installed.",
+                      "Press Install Solver in the add-on's preferences, or export the pictures as JPEG.") from error
+    try:
+        return pillow_heif.open_heif(path, convert_hdr_to_8bit=False)
+    except (ValueError, EOFError, SyntaxError, RuntimeError, OSError) as error:
+        raise _unreadable(path, error) from error
+
+
+def _unreadable(path: Path, error: Exception) -> Problem:
+    return Problem(f"{path} is not a picture that can be read ({str(error).rstrip('.') or type(error).__name__}).", EXPORT)
