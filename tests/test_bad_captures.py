@@ -74,6 +74,15 @@ def test_a_mirrored_photograph_is_named(tmp_path):
     assert find_mirrored(["0.png", "1.png", "3.png"], [], tmp_path, Reporter("cameras")) == []
 
 
+def test_the_two_sides_of_a_symmetric_face_are_not_taken_for_each_others_mirror_image(tmp_path):
+    names, found = [f"{i}.png" for i in range(3)], {}
+    for name, azimuth, flip in zip(names, (-30, -28, -33), (1, -1, -1), strict=True):  # from the right, and as if from the left
+        images.write_srgb(tmp_path / name, painted_head.photograph(camera(azimuth, 0.02, scale=2), wall=False)[:, ::flip])
+        found[name] = faces.detect(images.read_srgb(tmp_path / name))
+    assert find_mirrored(names, [], tmp_path, Reporter("cameras")) == ["0.png"], "by the pictures alone it is one"
+    assert find_mirrored(names, [], tmp_path, Reporter("cameras"), found) == []
+
+
 def test_a_head_that_turns_before_a_still_camera_is_told(tmp_path):
     for i, turn in enumerate(np.linspace(-32, 32, 9)):
         images.write_srgb(tmp_path / "photos" / f"{i}.png", painted_head.photograph(camera(0, 0.03), turned_deg=turn))

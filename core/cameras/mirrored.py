@@ -6,12 +6,15 @@ cannot be told from its geometry. Lowe, Distinctive Image Features (2004); Arand
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import cv2
 import numpy as np
 
 from ..contract.messages import Reporter
+from ..face import faces
 from ..imaging import images
 
 SIDE = 640
@@ -21,22 +24,31 @@ LEAST = 20
 MOST_PAIRS = 60
 
 
-def find_mirrored(suspects: list[str], trusted: list[str], folder: Path, report: Reporter) -> list[str]:
-    """Names among `suspects` that are mirrored with respect to `trusted` pictures, or, where there are none, to most of themselves."""
+def find_mirrored(suspects: list[str], trusted: list[str], folder: Path, report: Reporter, found: Mapping[str, faces.Face] = MappingProxyType({})) -> list[str]:
+    """Names among `suspects` that are mirrored with respect to `trusted` pictures, or, where there are none, to most of themselves.
+
+    found: name -> face. Of two pictures that show a face from its two sides, one flipped looks like the other whatever is true, for faces are
+    symmetric: there only what lies beside the face counts.
+    """
     pairs = [(a, b) for a in suspects for b in trusted] or [(a, b) for i, a in enumerate(suspects) for b in suspects[i + 1:]]
     if len(pairs) > MOST_PAIRS:
         pairs = [pairs[i] for i in np.linspace(0, len(pairs) - 1, MOST_PAIRS).round().astype(int)]
     described: dict[tuple, tuple] = {}
+    sizes: dict[str, tuple[int, int]] = {}
 
     def features(name: str, flip: bool) -> tuple:
         if (name, flip) not in described:
-            described[name, flip] = _describe(images.read_srgb(folder / name), flip)
+            picture = images.read_srgb(folder / name)
+            sizes[name] = picture.shape[1], picture.shape[0]
+            described[name, flip] = _describe(picture, flip)
         return described[name, flip]
 
     relation: dict[tuple[str, str], int] = {}
     for done, (a, b) in enumerate(pairs):
         report.progress(done, len(pairs), "looking for mirrored pictures")
-        plain, flipped = (_agreeing(features(a, flip), features(b, False)) for flip in (False, True))
+        opposite = a in found and b in found and abs(found[a].yaw_deg + found[b].yaw_deg) < abs(found[a].yaw_deg - found[b].yaw_deg)
+        plain, flipped = (_agreeing(*(_beside(features(name, turned), found[name], turned, sizes[name]) if opposite else features(name, turned)
+                                      for name, turned in ((a, flip), (b, False)))) for flip in (False, True))
         if max(plain, flipped) >= LEAST and max(plain, flipped) > 2 * min(plain, flipped):
             relation[a, b] = 1 if plain > flipped else -1
     return _minority(relation, suspects, trusted)
@@ -54,6 +66,17 @@ def _minority(relation: dict[tuple[str, str], int], suspects: list[str], trusted
         side |= known
     less = -1 if trusted or sum(s < 0 for s in side.values()) <= len(side) / 2 else 1
     return sorted(name for name in suspects if side.get(name) == less)
+
+
+def _beside(features: tuple, face: faces.Face, flip: bool, size: tuple[int, int]) -> tuple:
+    """Those of a picture's features that do not lie on the head; size: width and height of the picture that the face was found in."""
+    points, values = features
+    x0, y0, x1, y1 = face.box
+    w, h = x1 - x0, y1 - y0
+    x0, x1 = (size[0] - x1, size[0] - x0) if flip else (x0, x1)
+    at = points / min(1.0, SIDE / max(size))
+    off = (at[:, 0] < x0 - 0.6 * w) | (at[:, 0] > x1 + 0.6 * w) | (at[:, 1] < y0 - 0.7 * h) if len(points) else np.zeros(0, bool)
+    return points[off], values[off]
 
 
 def _describe(srgb: np.ndarray, flip: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -86,7 +86,7 @@ def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter
             if partial and worth(partial) > worth(solved):
                 solved, matches = partial, partial.matches
             rest = sorted({record.name for record in records} - {image.name for image in solved.model.images.values() if image.has_pose})
-            mirrored = tuple(_mirrored(frames, rest, solved.model, capture, report) if way != "face" else ()) or solved.mirrored
+            mirrored = tuple(_mirrored(frames, rest, solved.model, found, capture, report) if way != "face" else ()) or solved.mirrored
             solved = replace(solved, head_moved=moved, stood_still=stood, mirrored=mirrored)
             partial = replace(solved, matches=matches)
             if few and len(rest) > len(mirrored) and ways[turn + 1:]:
@@ -97,7 +97,7 @@ def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter
         report.log(f"By {way} features: {fault}" if way != "face" else f"By the face: {fault}")
     if partial:
         return _refined(partial, frames, capture, settings, report)
-    raise _explained(frames, faults, moved, stood, capture, report)
+    raise _explained(frames, faults, found, moved, stood, capture, report)
 
 
 def worth(solved: Solved) -> tuple[bool, int, bool]:
@@ -150,7 +150,7 @@ def shortcoming(model: pycolmap.Reconstruction | None, frames: int) -> str | Non
 
 def _by_face(records: Sequence[FrameRecord], capture: Capture, found: dict, matches: Matches, settings: Settings,
              report: Reporter) -> tuple[Solved | None, str | None]:
-    mirrored = find_mirrored(sorted(found), [], capture.frames, report) if len(records) <= FEW else []
+    mirrored = find_mirrored(sorted(found), [], capture.frames, report, found) if len(records) <= FEW else []
     result = resect(camera_groups(records, capture.frames), {name: face for name, face in found.items() if name not in mirrored}, matches, report)
     registered = result.model.num_reg_images() if result else 0
     if registered < LEAST_VIEWS:
@@ -163,13 +163,13 @@ def _by_face(records: Sequence[FrameRecord], capture: Capture, found: dict, matc
                   refined=result.refined), None
 
 
-def _mirrored(frames: Frames, rest: list[str], model: pycolmap.Reconstruction, capture: Capture, report: Reporter) -> list[str]:
+def _mirrored(frames: Frames, rest: list[str], model: pycolmap.Reconstruction, found: dict, capture: Capture, report: Reporter) -> list[str]:
     """Among photographs that did not fit, those that are mirrored."""
     if not rest or frames.kind == VIDEO or len(rest) > 2 * FEW:
         return []
     trusted = sorted(image.name for image in model.images.values() if image.has_pose)
     some = [trusted[i] for i in np.unique(np.linspace(0, len(trusted) - 1, min(8, len(trusted))).round().astype(int))]
-    return find_mirrored(rest, some, capture.frames, report)
+    return find_mirrored(rest, some, capture.frames, report, found)
 
 
 def _spread(records: Sequence[FrameRecord]) -> list[FrameRecord]:
@@ -180,11 +180,11 @@ def _spread(records: Sequence[FrameRecord]) -> list[FrameRecord]:
     return [seen[i] for i in np.unique(np.linspace(0, len(seen) - 1, min(MOST_FACES, len(seen))).round().astype(int))] if seen else []
 
 
-def _explained(frames: Frames, faults: list[str], moved: bool, stood: bool, capture: Capture, report: Reporter) -> Problem:
+def _explained(frames: Frames, faults: list[str], found: dict, moved: bool, stood: bool, capture: Capture, report: Reporter) -> Problem:
     """The Problem that fits best what was tried."""
     records = frames.records
     names = {record.name: record.shown for record in records}
-    mirrored = find_mirrored(sorted(names), [], capture.frames, report) if frames.kind != VIDEO and len(names) <= FEW else []
+    mirrored = find_mirrored(sorted(names), [], capture.frames, report, found) if frames.kind != VIDEO and len(names) <= FEW else []
     if mirrored:
         they = "is mirrored: it fits" if len(mirrored) == 1 else "are mirrored: they fit"
         return Problem(f"{', '.join(names[name] for name in mirrored)} {they} the other pictures only when flipped left to right.",
