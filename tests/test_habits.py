@@ -65,7 +65,7 @@ def spend(profile: Path, *words: str, before: tuple[str, ...] = (), **environmen
     variables = {**os.environ, "BLENDER_USER_RESOURCES": str(profile), "HOME": str(profile), "PYTHONDONTWRITEBYTECODE": "1", **environment}
     result = subprocess.run([*before, sys.executable, str(ROOT / "tests" / "habits.py"), *words], env=variables, cwd=profile, capture_output=True, text=True,
                             timeout=300)
-    printed = "".join(text.partition("Started.\n")[2] or text for text in (result.stdout, result.stderr))
+    printed = "".join(text.split("Started.\n")[-1] for text in (result.stdout, result.stderr))
     found = [line.removeprefix("SEEN ") for line in result.stdout.splitlines() if line.startswith("SEEN ")]
     assert result.returncode == 0 and found and "Traceback" not in printed, printed[-4000:]
     return json.loads(found[0]), printed
