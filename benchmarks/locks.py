@@ -56,7 +56,7 @@ def write(name: str) -> None:
 def _figures(name: str, wheels: dict[str, Wheel]) -> list[str]:
     """What a lock says of its wheels' files, in two comments."""
     files = [index.wheel_files(wheel.url) for wheel in wheels.values()]
-    longest = max((path for _, listed in files for file, _ in listed if not file.endswith("/") for path in installed_paths(file, name)), key=len)
+    longest = max((path for _, listed in files for file, _ in listed for path in installed_paths(file, name)), key=len)
     return [f"# longest path: {len(longest)} characters below the environment's folder: {longest}\n", f"# download: {sum(size for size, _ in files)} bytes\n"]
 
 

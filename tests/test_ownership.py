@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from core.contract import ownership, processes
+from core.contract import ownership
 from core.contract.capture import Capture
 from core.contract.files import remove_file, replacing, replacing_folder
 from core.contract.hashes import read_hash
@@ -292,12 +292,3 @@ def test_a_run_tells_what_it_kept_aside_also_where_it_fails(capture, monkeypatch
     said: list = []
     run_job(write_job(capture, source=film, last="frames"), said.append)
     assert any(isinstance(line, Log) and line.text.endswith("it is now kept/frames/00000.jpg.") for line in said), said
-
-
-def test_processes_are_told_apart():
-    me = processes.identify_process()
-    assert not processes.is_gone(me) and processes.is_at_work(me)
-    assert processes.is_gone({**me, "began": "another time"}) and processes.is_gone({**me, "pid": 2**22 + 1})
-    container = {**me, "pid": 2**22 + 1, "host": processes.name_host() + "0"}
-    assert not processes.is_gone(container) and not processes.is_at_work(container), "a number there means nothing here"
-    assert not processes.is_gone({**me, "host": "another machine"}) and not processes.is_at_work({**me, "host": "another machine"})

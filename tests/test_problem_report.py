@@ -50,7 +50,7 @@ def test_what_helps_stays(capture):
     assert scrub(trace) == trace.replace(str(ROOT), "<WildCap>")
     assert scrub(f"{capture.root}/frames/00001.jpg cannot be read") == "<capture>/frames/00001.jpg cannot be read"
     assert scrub("/opt/solver/lib/python3.11/site-packages/torch/x.py") == "<solver>/lib/python3.11/site-packages/torch/x.py"
-    assert scrub("https://pypi.org/simple 12:30:05 2026-11-23 50% of 3/4") == "https://pypi.org/simple 12:30:05 2026-11-23 50% of 3/4"
+    assert scrub("https://example.org/simple 12:30:05 2026-11-23 50% of 3/4") == "https://example.org/simple 12:30:05 2026-11-23 50% of 3/4"
 
 
 def test_the_zip_holds_logs_versions_settings_and_states_and_no_picture(capture, tmp_path, capsys, monkeypatch):

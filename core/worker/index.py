@@ -142,6 +142,7 @@ def _listed(directory: bytes) -> list[tuple[str, int]]:
     files, at = [], 0
     while directory[at:at + 4] == b"PK\1\2":
         size, name_length, *more = struct.unpack_from("<L3H", directory, at + 24)
-        files.append((directory[at + 46:at + 46 + name_length].decode("utf-8", "replace"), size))
+        name = directory[at + 46:at + 46 + name_length].decode("utf-8", "replace")
+        files += [(name, size)] * (not name.endswith("/"))  # which a folder's does
         at += 46 + name_length + sum(more)
     return files
