@@ -53,8 +53,9 @@ def table(recorded: dict) -> str:
     rows: dict[str, Counter] = {}
     for kind, row in recorded["rows"].items():
         rows.setdefault(STAGES_FILES if kind.startswith("stage ") else kind, Counter()).update(row)
+    rows["all"] = Counter(recorded["all"])
     return markdown(["what was spoiled", "cases", "refused by name", "accepted, with sound results", "faults"],
-                    [[kind, *(row[name] for name in ("cases", "refused", "accepted", "faults"))] for kind, row in (*rows.items(), ("all", recorded["all"]))])
+                    [[kind, *(row[name] for name in ("cases", "refused", "accepted", "faults"))] for kind, row in rows.items()])
 
 
 def _run(arguments: argparse.Namespace, work: Path) -> int:
