@@ -10,12 +10,12 @@ import pytest
 pytest.importorskip("OpenImageIO")
 pytest.importorskip("pycolmap")
 
-from core.face import template  # noqa: E402
+from core.face import lids, template  # noqa: E402
 from core.geometry.meshes import vertex_normals  # noqa: E402
 from core.synthetic import sample, scene  # noqa: E402
 from core.synthetic.canvas import canvas  # noqa: E402
 from core.synthetic.identities import reserved_seeds, subject_mesh  # noqa: E402
-from core.synthetic.people import clothes, eyes, facekit, figure, lids, person, shape, strands, traits, truth  # noqa: E402
+from core.synthetic.people import clothes, eyes, facekit, figure, person, shape, strands, traits, truth  # noqa: E402
 
 SEED = 3  # a man with cropped hair, a full beard and open eyes
 SIZE = 256
@@ -90,6 +90,8 @@ def test_eyes_turn_where_they_look():
     ball = lids.open_lids(shape.person_mesh(SEED), 0.9, np.array([20.0, 10.0])).balls[0]
     (s, t), (c, d) = np.sin(np.radians([20, 10])), np.cos(np.radians([20, 10]))
     assert ball.gaze == pytest.approx([s * d, -c * d, t])
+    pupil = ball.mesh.vertices[np.linalg.norm(ball.mesh.uvs - 0.5, axis=1).argmin()] - ball.centre
+    assert pupil / np.linalg.norm(pupil) == pytest.approx(ball.gaze, abs=1e-3), "the pupil's picture is where it looks"
 
 
 def test_an_eye_is_dark_in_the_middle_coloured_around_it_and_white_outside():

@@ -122,3 +122,13 @@ def test_faces_are_found_and_landmarks_lie_on_the_template(frames, cameras):
     assert found >= 0.9 * asked
     distance = np.linalg.norm(np.nanmedian(lifted, 0) - truth, axis=1)
     assert np.nanmedian(distance[template.landmark_weights() > 0]) < 0.004
+
+
+def test_a_video_shows_the_pictures_it_was_made_of(tmp_path):
+    ramp = np.tile(np.linspace(0.1, 0.9, 64, dtype=np.float32)[:, None, None], (1, 48, 3))
+    sample.write_video(tmp_path / "made.mp4", [ramp, ramp[::-1], ramp])
+    with av.open(str(tmp_path / "made.mp4")) as video:
+        shown = [frame.to_ndarray(format="rgb24").astype(np.float32) / 255 for frame in video.decode(video=0)]
+    assert len(shown) == 3
+    for picture, frame in zip([ramp, ramp[::-1], ramp], shown, strict=True):
+        assert frame.shape == picture.shape and np.abs(frame - picture).max() < 0.03

@@ -37,6 +37,12 @@ class Mesh:
         return replace(self, vertices=np.asarray(vertices, np.float64))
 
 
+def joined(meshes: list[Mesh]) -> Mesh:
+    """Several meshes as one, without UVs; the triangles of the first come first."""
+    first = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate([mesh.faces + k for mesh, k in zip(meshes, first, strict=True)]))
+
+
 def face_normals(mesh: Mesh) -> np.ndarray:
     """Unit normals [F, 3]; zero for a degenerate triangle."""
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))

@@ -28,7 +28,7 @@ import pycolmap
 from ..contract.files import replacing, write_json
 from ..face import template
 from ..geometry import meshes, raster
-from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.meshes import Mesh, joined, vertex_normals
 from ..geometry.views import View
 from ..imaging import images
 from . import scene
@@ -96,7 +96,7 @@ def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> N
                                       "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
     write_video(out / "capture.mp4", (images.read_srgb(work / f"{k:05d}.png") for k in range(frames)))
     head, sun = subject_mesh(seed), scene.sun_of(seed)
-    opaque = together(head, scene.leaves(seed, sun))
+    opaque = joined([head, scene.leaves(seed, sun)])
     total, count = np.zeros(3), 0
     for frame in truth_frames(frames):
         albedo, alpha, face, shadow = frame_truth(head, opaque, skin, view_of(cameras[frame]), sun.direction)
@@ -155,15 +155,11 @@ def write_video(path: Path, pictures: Iterable[np.ndarray], crf: int = 18) -> No
     with replacing(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(scene.RATE), options={"crf": str(crf), "preset": "slow"})
         stream.pix_fmt = "yuv420p"
-        for picture in pictures:
-            stream.height, stream.width = picture.shape[:2]
+        for number, picture in enumerate(pictures):
+            if number == 0:  # the codec is open from the first picture on
+                stream.height, stream.width = picture.shape[:2]
             container.mux(stream.encode(av.VideoFrame.from_ndarray(np.round(picture * 255).astype(np.uint8), format="rgb24")))
         container.mux(stream.encode())
-
-
-def together(a: Mesh, b: Mesh) -> Mesh:
-    """Two meshes as one, without UVs."""
-    return Mesh(np.concatenate([a.vertices, b.vertices]), np.concatenate([a.faces, b.faces + len(a.vertices)]))
 
 
 def _shrunk(image: np.ndarray, factor: int) -> np.ndarray:

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...face.lids import OpenHead
 from ..regions import regions
 from .ground import Ground, strewn, turned
-from .lids import OpenHead
 from .person import Person
 from .strands import Roots, Strands, Surface, coloured, grow
 

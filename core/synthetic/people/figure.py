@@ -9,15 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ...geometry.meshes import Mesh
+from ...face.lids import OpenHead, open_lids
+from ...geometry.meshes import Mesh, joined
 from ..canvas import canvas
 from ..regions import regions
-from ..sample import together
 from ..skin import GROUND, Skin, paint_skin
 from . import beards, brows, eyes, head_hair, traits
 from .clothes import shirt
 from .ground import ground_of
-from .lids import OpenHead, open_lids
 from .person import Person, sample_person
 from .shape import person_mesh
 from .strands import Strands, Surface
@@ -81,7 +80,7 @@ def grown(person: Person, head: Mesh, opened: OpenHead, cloth: Mesh) -> tuple[St
     if person.beard != "none":
         found.append(beards.beard(person, ground, skin, _rng(person, 2)))
     if person.hair != "none":
-        found.append(head_hair.head_hair(person, ground, Surface(together(head, cloth)), _rng(person, 3)))
+        found.append(head_hair.head_hair(person, ground, Surface(joined([head, cloth])), _rng(person, 3)))
     return tuple(found)
 
 

@@ -13,9 +13,8 @@ import numpy as np
 
 from ...face import template
 from ...geometry import raster
-from ...geometry.meshes import Mesh, vertex_normals
+from ...geometry.meshes import Mesh, joined, vertex_normals
 from ...geometry.views import View
-from ..sample import together
 from .figure import PARTS, Figure
 from .strands import prisms
 
@@ -54,11 +53,11 @@ class Scene:
         self.part = np.concatenate([np.full(len(mesh.faces), p, np.int8) for mesh, p in zip(meshes, part, strict=True)])
         self.colour = np.concatenate(flat)
         self.uv = np.concatenate([mesh.uvs[mesh.face_uvs] for mesh in body])
-        self.body = raster.RayCaster(_joined(body))
+        self.body = raster.RayCaster(joined(body))
         self.normals = vertex_normals(self.body.mesh)
-        whole = _joined(meshes)
+        whole = joined(meshes)
         self.whole = raster.RayCaster(whole)
-        self.opaque = raster.RayCaster(together(whole, blockers)) if blockers else self.whole
+        self.opaque = raster.RayCaster(joined([whole, blockers])) if blockers else self.whole
 
     def albedo(self, face: np.ndarray, bary: np.ndarray, skin: np.ndarray) -> np.ndarray:
         """Linear albedo [N, 3] of what rays hit, `skin` [S, S, 3] being the skin's."""
@@ -110,11 +109,6 @@ def _bare(scene: Scene, view: View, over: int) -> tuple[np.ndarray, np.ndarray]:
 def _of_uv(scene: Scene, name: str, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
     uv = (scene.uv[face] * bary[..., None]).sum(1)
     return raster.sample(template.mask(name, 1024), np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 1024)
-
-
-def _joined(meshes: list[Mesh]) -> Mesh:
-    first = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
-    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate([mesh.faces + k for mesh, k in zip(meshes, first, strict=False)]))
 
 
 def _shrunk(image: np.ndarray, factor: int) -> np.ndarray:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A closed head cut open at the lids, with sockets and eyeballs behind them, from core/assets/face_units.npz (see NOTICE.md there).
+"""The built-in head cut open at the lids, with sockets and eyeballs behind them, from assets/face_units.npz (see NOTICE.md there).
 
 The lips stay closed. The head's triangles keep their numbers, so what is painted in its UVs stays where it was.
 """
@@ -12,13 +12,16 @@ from functools import cache
 
 import numpy as np
 
-from ...face import template
-from ...geometry.meshes import Mesh
+from ..geometry.meshes import Mesh
+from . import template
 
 SOFT = 0
 """Kind of an inner vertex that goes with the rim before it; 1 and 2 are the left and the right eyeball."""
 CORNEA_BULGE, CORNEA_ANGLE = 0.06, 0.52  # of the asset's eyeballs: share of the radius, radians
 CLEAR_M = 0.0004  # between ball and lid
+SAME_M = 1e-5
+DEEPEST_M = 0.003  # what lies deeper inside a ball is not before it
+FORWARD = np.array([0, -1.0, 0])
 REST_M = -0.003, 0.010  # how far an eyeball may lie behind the place that its surroundings give it
 
 
@@ -46,17 +49,102 @@ class OpenHead:
 def open_lids(head: Mesh, openness: float, gaze: np.ndarray) -> OpenHead:
     """head: a closed head in the template's topology; openness in [0, 1]: 0 shut, 1 as far as MakeHuman opens them; gaze [2]: degrees that both eyes turn to
     the person's left and up."""
+    turn = _turned(np.radians(gaze))
+    return open_around(head, tuple(place_ball(side, *carry_ball(head, side), turn @ FORWARD) for side in (0, 1)), (openness, openness))
+
+
+def open_around(head: Mesh, balls: tuple[Ball, Ball], openness: tuple[float, float], shift: np.ndarray | float = 0.0) -> OpenHead:
+    """The closed head with its lids open around given eyeballs; openness: of the left and of the right eye; shift [V + C + P, 3] metres: what all vertices are
+    moved by besides, before the lids are pushed out of the balls."""
     unit = _asset()
-    rest = np.concatenate([head.vertices, head.vertices[unit.copies], _carried(unit, head)])
-    balls = []
-    for side in (0, 1):
-        ball = _ball(unit, head, side, gaze)
+    rest = np.concatenate([head.vertices, head.vertices[unit.copies], _carried(unit, head)]) + shift
+    scale = _scale(unit, head)
+    for side, ball in enumerate(balls):
         rows, moves = unit.opens[side]
-        rest[rows] = _outside(rest[rows] + openness * moves * _scale(unit, head), ball)
+        rest[rows] = push_out(rest[rows] + openness[side] * moves * scale, ball)
         soft = unit.soft_of[side]
-        rest[soft] = _outside(rest[soft], ball)
-        balls.append(ball)
+        rest[soft] = push_out(rest[soft], ball)
     return OpenHead(_skin(unit, head, rest), tuple(balls), unit.rims)
+
+
+def carry_ball(head: Mesh, side: int) -> tuple[np.ndarray, float]:
+    """Centre [3] and radius of an eyeball (0: the left one): moved from the template as the lids before it are, then back until the closed lids clear it."""
+    unit, rest = _asset(), template.load().vertices
+    centre, radius = unit.balls[side, :3], unit.balls[side, 3]
+    arm = rest - centre
+    near = np.flatnonzero((np.linalg.norm(arm, axis=1) < 1.35 * radius) & (arm[:, 1] < -0.3 * radius))
+    moved = centre + (head.vertices[near] - rest[near]).mean(0)
+    radius = radius * _scale(unit, head)
+
+    def clearance(back: float) -> float:
+        v = head.vertices[near] - (moved + [0, back, 0])
+        length = np.linalg.norm(v, axis=1)
+        return float((length - _surface(v / length[:, None], FORWARD, radius)).min())
+
+    low, high = REST_M
+    for _ in range(20):
+        middle = (low + high) / 2
+        low, high = (low, middle) if clearance(middle) > CLEAR_M else (middle, high)
+    return moved + [0, high, 0], float(radius)
+
+
+def place_ball(side: int, centre: np.ndarray, radius: float, gaze: np.ndarray) -> Ball:
+    """The eyeball of a side (0: the left one) at a place, looking along the unit vector gaze [3]."""
+    unit = _asset()
+    mesh, (x, y, z, size) = unit.ball_meshes[side], unit.balls[side]
+    vertices = centre + (mesh.vertices - [x, y, z]) @ _towards(gaze).T * (radius / size)
+    return Ball(np.asarray(centre, np.float64), float(radius), np.asarray(gaze, np.float64), mesh.moved(vertices))
+
+
+@cache
+def corners() -> tuple[tuple[int, int], tuple[int, int]]:
+    """The vertices at the outer and the inner corner of the left and of the right eye: those that both lids' last edges share."""
+    unit, head = _asset(), template.load()
+    faces = head.faces.copy()
+    faces[unit.corners[:, 0], unit.corners[:, 1]] = unit.corners[:, 2]
+    return tuple(tuple(_shared_neighbour(faces, upper[end], lower[end]) for end in (-1, 0)) for upper, lower in unit.rims)
+
+
+def _shared_neighbour(faces: np.ndarray, upper: int, lower: int) -> int:
+    around = [set(faces[(faces == vertex).any(1)].ravel().tolist()) for vertex in (upper, lower)]
+    (corner,) = around[0] & around[1]
+    return corner
+
+
+def rows_of_lid(side: int, lid: int) -> np.ndarray:
+    """The vertices of an open head [N] that move with the upper (0) or the lower (1) lid of the left (0) or the right eye."""
+    unit, head = _asset(), template.load()
+    rows, upper = unit.opens[side][0], unit.rims[side][0]
+    order = upper[np.argsort(head.vertices[upper, 0])]
+    x, _, z = head.vertices[np.minimum(rows, len(head.vertices) - 1)].T
+    above = z > np.interp(x, head.vertices[order, 0], head.vertices[order, 2]) - 1e-7  # of the skin: above where the lids meet
+    above[np.isin(rows, unit.rims[side][1])] = False
+    count = len(head.vertices) + len(unit.copies)
+    height = np.zeros(len(head.vertices))
+    height[head.faces] = head.uvs[head.face_uvs][..., 1]
+    inside = rows >= count  # a socket's UVs go on from those of its lid, up or down
+    above[inside] = unit.uvs[rows[inside] - count, 1] > (unit.weights * height[unit.anchors])[rows[inside] - count].sum(1)
+    return rows[above == (lid == 0)]
+
+
+def belongs_to(opened: Mesh, head: Mesh) -> bool:
+    """Whether the skin of an open head is that closed one's: built alike, and equal where no lid moves."""
+    unit, moving = _asset(), np.zeros(len(head.vertices), bool)
+    count = len(head.vertices) + len(unit.copies) + len(unit.parts)
+    if len(opened.vertices) != count or len(opened.faces) != len(head.faces) + len(unit.faces):
+        return False
+    for rows, _ in unit.opens:
+        moving[rows[rows < len(moving)]] = True
+    return bool(np.abs(opened.vertices[:len(moving)] - head.vertices)[~moving].max() < SAME_M)
+
+
+def push_out(points: np.ndarray, ball: Ball) -> np.ndarray:
+    """Points [N, 3] pushed out of the front of an eyeball, CLEAR_M away from it."""
+    v = points - ball.centre
+    length = np.linalg.norm(v, axis=1, keepdims=True)
+    v = v / length
+    short = np.clip(_surface(v, ball.gaze, ball.radius) + CLEAR_M - length[:, 0], 0, DEEPEST_M) * (v[:, 1] < -0.2)
+    return points + v * short[:, None]
 
 
 @dataclass(frozen=True)
@@ -110,7 +198,7 @@ def _asset() -> _Asset:
 
 
 def _ball_mesh(z: dict, first: int, parts: np.ndarray, kind: int) -> Mesh:
-    """One eyeball as the asset has it."""
+    """One eyeball as the asset has it, turned about its centre so that it looks straight ahead; the asset's look down by two degrees."""
     rows = np.flatnonzero(z["kind"] == kind)
     number = np.full(len(z["kind"]), -1)
     number[rows] = np.arange(len(rows))
@@ -118,7 +206,9 @@ def _ball_mesh(z: dict, first: int, parts: np.ndarray, kind: int) -> Mesh:
     quads = quads[(quads[:, :3] >= 0).all(1)]
     quads = quads[(number[quads[:, :3]] >= 0).all(1)]
     triangles = number[np.concatenate([quads[:, :3], quads[quads[:, 3] >= 0][:, [0, 2, 3]]])]
-    return Mesh(parts[rows], triangles, z["uvs"][rows].astype(np.float64), triangles)
+    uvs, centre = z["uvs"][rows].astype(np.float64), z["balls"][kind - 1, :3].astype(np.float64)
+    pupil = parts[rows][np.linalg.norm(uvs - 0.5, axis=1).argmin()] - centre
+    return Mesh(centre + (parts[rows] - centre) @ _towards(pupil / np.linalg.norm(pupil)), triangles, uvs, triangles)
 
 
 def _rims(z: dict, doubled: np.ndarray, count: int) -> tuple:
@@ -144,44 +234,10 @@ def _scale(unit: _Asset, head: Mesh) -> float:
     return float(np.ptp(head.vertices[rim, 0]) / np.ptp(template.load().vertices[rim, 0]))
 
 
-def _ball(unit: _Asset, head: Mesh, side: int, gaze: np.ndarray) -> Ball:
-    """An eyeball moved as the lids before it are, then back along its gaze until the closed lids clear it, and turned."""
-    rest, (x, y, z, radius) = template.load().vertices, unit.balls[side]
-    centre = np.array([x, y, z])
-    arm = rest - centre
-    near = np.flatnonzero((np.linalg.norm(arm, axis=1) < 1.35 * radius) & (arm[:, 1] < -0.3 * radius))
-    moved = centre + (head.vertices[near] - rest[near]).mean(0)
-    radius = radius * _scale(unit, head)
-    turn = _turned(np.radians(gaze))
-
-    def clearance(back: float) -> float:
-        v = head.vertices[near] - (moved + [0, back, 0])
-        length = np.linalg.norm(v, axis=1)
-        return float((length - _surface(v / length[:, None], np.array([0, -1.0, 0]), radius)).min())
-
-    low, high = REST_M
-    for _ in range(20):
-        middle = (low + high) / 2
-        low, high = (low, middle) if clearance(middle) > CLEAR_M else (middle, high)
-    moved = moved + [0, high, 0]
-    mesh = unit.ball_meshes[side]
-    vertices = moved + (mesh.vertices - centre) @ turn.T * (radius / unit.balls[side, 3])
-    return Ball(moved, float(radius), turn @ [0, -1, 0], mesh.moved(vertices))
-
-
 def _surface(direction: np.ndarray, gaze: np.ndarray, radius: float) -> np.ndarray:
     """Distance of an eyeball's surface, cornea and all, from its centre along unit directions [N, 3]."""
     angle = np.arccos(np.clip(direction @ gaze, -1, 1))
     return radius * (1 + CORNEA_BULGE * np.clip(1 - (angle / CORNEA_ANGLE) ** 2, 0, None))
-
-
-def _outside(points: np.ndarray, ball: Ball) -> np.ndarray:
-    """Points [N, 3] pushed out of the front of an eyeball."""
-    v = points - ball.centre
-    length = np.linalg.norm(v, axis=1, keepdims=True)
-    v = v / length
-    short = np.clip(_surface(v, ball.gaze, ball.radius) + CLEAR_M - length[:, 0], 0, 0.003) * (v[:, 1] < -0.2)
-    return points + v * short[:, None]
 
 
 def _skin(unit: _Asset, head: Mesh, vertices: np.ndarray) -> Mesh:
@@ -200,3 +256,8 @@ def _turned(radians: np.ndarray) -> np.ndarray:
     """The rotation [3, 3] of an eye that looks along -y to the person's left (+x) and up."""
     (c, s), (d, t) = (np.cos(radians[0]), np.sin(radians[0])), (np.cos(radians[1]), np.sin(radians[1]))
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.array([[1, 0, 0], [0, d, t], [0, -t, d]])
+
+
+def _towards(gaze: np.ndarray) -> np.ndarray:
+    """The rotation [3, 3] that turns an eye from straight ahead to the unit vector gaze [3]: left or right first, then up or down, without roll."""
+    return _turned(np.array([np.arctan2(gaze[0], -gaze[1]), np.arcsin(np.clip(gaze[2], -1, 1))]))
