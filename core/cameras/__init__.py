@@ -69,6 +69,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
                         ("features", solved.way), ("solve_s", round(time.monotonic() - started, 1))):
         report.figure(name, value)
     report.figure("head_miss_mm", round(1000 * solved.head.unlike_m, 2))
+    if solved.swayed:
+        report.figure("head_swayed_percent", round(100 * solved.swayed, 1))
     if chosen:
         report.figure("pupils_apart_in_imported_units", round(solved.head.pupils_apart, 5))
     if solved.way == "face":

@@ -9,8 +9,9 @@ what a few photographs alone leave open.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 import pycolmap
@@ -46,8 +47,8 @@ def refine(model: pycolmap.Reconstruction, found: dict[str, faces.Face], matches
     seen_faces = agreeing_faces(model, found)
     registered = sorted((image for image in model.images.values() if image.has_pose), key=lambda image: image.name)
     names = [image.name for image in registered]
-    straight = _straightened(model, registered, matches)
-    bundle = _bundle(model, registered, unknown_focal)
+    straight = straightened(model, registered, matches)
+    bundle = as_bundle(model, registered, unknown_focal)
     marks = _landmarks(model, registered, seen_faces)
     width = float(np.median([face.box[2] - face.box[0] for face in seen_faces.values()]))
     before = None
@@ -67,10 +68,11 @@ def refine(model: pycolmap.Reconstruction, found: dict[str, faces.Face], matches
     late = _late(bundle, model, groups, names, tracks, straight)
     if late:
         report.log(f"Placed by what matches the refined cameras: {', '.join(sorted(late))}.")
-    return _rebuilt(model, bundle, registered, tracks, matches, late, groups)
+    return rebuilt(model, bundle, registered, tracks, matches, late, groups)
 
 
-def _bundle(model: pycolmap.Reconstruction, registered: list, unknown_focal: bool) -> Bundle:
+def as_bundle(model: pycolmap.Reconstruction, registered: list, unknown_focal: bool) -> Bundle:
+    """The model's cameras, in the head's world, of the frames `registered`."""
     numbers = sorted(model.cameras)
     poses = [pose_of(image) for image in registered]
     focal = np.array([model.cameras[number].mean_focal_length() for number in numbers])
@@ -97,7 +99,8 @@ def _straight(camera: pycolmap.Camera, pixels: np.ndarray) -> np.ndarray:
     return plane * camera.mean_focal_length() + [camera.principal_point_x, camera.principal_point_y]
 
 
-def _straightened(model: pycolmap.Reconstruction, registered: list, matches: Matches) -> Matches:
+def straightened(model: pycolmap.Reconstruction, registered: list, matches: Matches) -> Matches:
+    """The matches with pixels as lenses without distortion would show them."""
     camera_of = {image.name: model.cameras[image.camera_id] for image in registered}
     keypoints = {name: _straight(camera_of[name], pixels) if name in camera_of and len(pixels) else pixels for name, pixels in matches.keypoints.items()}
     return Matches(keypoints, matches.pairs)
@@ -110,9 +113,9 @@ def _late(bundle: Bundle, model: pycolmap.Reconstruction, groups: list[dict], na
     return place_by_matches(replace(bundle, focal=focal), groups, group_of, names, tracks, matches) if group_of else {}
 
 
-def _rebuilt(model: pycolmap.Reconstruction, bundle: Bundle, registered: list, tracks: list, matches: Matches, late: dict[str, tuple],
-             groups: list[dict]) -> pycolmap.Reconstruction:
-    """A model with the bundle's cameras and, as its points, the tracks."""
+def rebuilt(model: pycolmap.Reconstruction, bundle: Bundle, registered: list, tracks: list, matches: Matches, late: Mapping[str, tuple] = MappingProxyType({}),
+            groups: Sequence[dict] = ()) -> pycolmap.Reconstruction:
+    """A model with the bundle's cameras and, as its points, the tracks; late: poses by name of frames of `groups` that were placed afterwards."""
     rebuilt, numbers = pycolmap.Reconstruction(), sorted(model.cameras)
     for number in numbers:
         camera = pycolmap.Camera(model.cameras[number].todict())

@@ -23,6 +23,7 @@ from .matches import Matches
 from .mirrored import find_mirrored
 from .motion import camera_stood_still, head_masks
 from .resection import resect
+from .settled import settle
 from .structure import ALL_PAIRS, camera_groups, solve_structure
 from .world import HeadFrame, find_head
 
@@ -44,7 +45,7 @@ class Solved:
     """A model in a world of its own; how it was found: plain, skin or face; the head in it; the faces it was found by; whether the head moved
     before its background, and whether the camera stood still then; mirrored frames that were left out; tracks that refined a model from the face,
     and whether they are enough to trust it; the matches it comes from, where more is to be made of them; whether
-    after that every frame is held by what matches."""
+    after that every frame is held by what matches; swayed: the share of the error of the head's matches that went when the room had no say."""
 
     model: pycolmap.Reconstruction
     way: str
@@ -57,6 +58,7 @@ class Solved:
     refined: bool = True
     matches: Matches = field(default_factory=Matches)
     held: bool = False
+    swayed: float = 0.0
 
 
 def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
@@ -106,14 +108,22 @@ def worth(solved: Solved) -> tuple[bool, int, bool]:
 
 
 def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
-    """Photographs that lie far apart with their cameras adjusted together with the face, and those that only then find a place; a film as it is."""
+    """A film with its cameras placed with respect to the head, if that swayed; photographs that lie far apart with their cameras adjusted together with the
+    face, and those that only then find a place."""
+    apart = settings.cameras.interpupillary_mm / 1000
+    if frames.kind == VIDEO and solved.way != "face" and not solved.head_moved:
+        model, left = settle(solved.model, solved.head, solved.matches, report)
+        if model is solved.model:
+            return solved
+        report.log(f"The head swayed before its surroundings: what matches on it misses by {100 * (1 - left):.0f} % less on its own; its cameras are taken.")
+        return replace(solved, model=model, head=find_head(model, solved.found, apart), swayed=1 - left)
     if frames.kind != PHOTOGRAPHS or len(frames.records) > ALL_PAIRS or not (solved.way != "face" or solved.refined):
         return solved
     fits = {image.name for image in solved.model.images.values() if image.has_pose}
     missing = [record for record in frames.records if record.name not in fits and record.name not in solved.mirrored]
     unknown = any(record.focal_px is None for record in frames.records)
     model = refine(solved.model, solved.found, solved.matches, unknown, report, camera_groups(missing, capture.frames))
-    return replace(solved, model=model, head=find_head(model, solved.found, settings.cameras.interpupillary_mm / 1000), held=held(model))
+    return replace(solved, model=model, head=find_head(model, solved.found, apart), held=held(model))
 
 
 def _by_features(skin: bool, frames: Frames, capture: Capture, found: dict, settings: Settings, report: Reporter,

@@ -1,0 +1,119 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A head that swayed while it was filmed: cameras that were found from the whole picture, found anew with respect to the head, by what matches on it.
+
+Structure from motion follows the room, which shows more; a person who sits still sways before it by millimetres. Whether they did is measured: by how much
+better the head's own matches fit together once the room has no say.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pycolmap
+
+from ..contract.messages import Reporter
+from ..face import template
+from ..geometry.models import pose_of
+from .bundle import Bundle
+from .joint import as_bundle, rebuilt, straightened
+from .landmarks import similarity, template_landmarks
+from .matches import Matches
+from .resection import LEAST_MATCHES, agreeing
+from .world import HeadFrame
+
+REACH = (0.025, 0.0125, 0.006)
+"""Shares of the face's width by which matches may miss, round by round."""
+SWAYED = 0.7
+"""Share of the error that is left of the head's matches without the room, below which the head moved before it: fitting alone takes a tenth."""
+LEAST_TRACKS = 200
+"""Points on the head that several frames show, for poses of its own."""
+CHEST_M = -0.12
+"""Height below the eyes where what moves with the head ends."""
+
+
+def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, report: Reporter) -> tuple[pycolmap.Reconstruction, float]:
+    """The model with its cameras placed with respect to the head, in the head's world (metres), and the share of the error that is left of the head's matches;
+    `model` itself where the head kept still, or too little matches on it."""
+    room = pycolmap.Reconstruction(model)
+    room.transform(head.world_from_model)
+    registered = sorted((image for image in room.images.values() if image.has_pose), key=lambda image: image.name)
+    names, own, width = [image.name for image in registered], on_head(room, registered, matches), _face_width(room, registered)
+    straight, bundle = straightened(room, registered, own), as_bundle(room, registered, False)
+    _, tracks, still = agreeing(bundle, names, straight, REACH[0] * width)
+    if len(tracks) < LEAST_TRACKS:
+        return model, 1.0
+    before = _error(rebuilt(room, still, registered, tracks, own))
+    for step, share in enumerate(REACH):
+        report.progress(step, len(REACH), "finding the cameras with respect to the head")
+        _, tracks, bundle = agreeing(bundle, names, straight, share * width)
+        alone = rebuilt(room, bundle, registered, tracks, own)
+        _adjust(alone)
+        bundle = _with_poses(bundle, alone, names, tracks)
+    left = _error(alone) / max(before, 1e-9)
+    return (alone, left) if left < SWAYED and len(tracks) >= LEAST_TRACKS else (model, left)
+
+
+def on_head(model: pycolmap.Reconstruction, registered: list, matches: Matches) -> Matches:
+    """The matches between keypoints on the head; model: in the head's world."""
+    points = template.load().vertices
+    points = points[points[:, 2] > CHEST_M]
+    inside = {}
+    for image in registered:
+        camera, pose = model.cameras[image.camera_id], pose_of(image)
+        local = points @ pose.rotation.matrix().T + pose.translation
+        pixels, keypoints = np.asarray(camera.img_from_cam(local)), matches.keypoints.get(image.name, np.zeros((0, 2)))
+        if (local[:, 2] < 0.05).any() or not len(keypoints):
+            inside[image.name] = np.zeros(len(keypoints), bool)
+            continue
+        mask = np.zeros((camera.height, camera.width), np.uint8)
+        cv2.fillConvexPoly(mask, cv2.convexHull(np.clip(pixels, -1e4, 1e4).astype(np.int32)), 1)
+        x, y = np.clip(keypoints.astype(int), 0, [camera.width - 1, camera.height - 1]).T
+        inside[image.name] = mask[y, x] > 0
+    pairs = {(a, b): inside[a][index[:, 0]] & inside[b][index[:, 1]] for (a, b), index in matches.pairs.items() if a in inside and b in inside}
+    return matches.kept(pairs)
+
+
+def _face_width(model: pycolmap.Reconstruction, registered: list) -> float:
+    """Of the head's landmarks in pixels, in the median frame."""
+    across = np.ptp(template_landmarks().mean[:, 0])
+    depth = [(pose_of(image).rotation.matrix() @ np.zeros(3) + pose_of(image).translation)[2] for image in registered]
+    return float(np.median([model.cameras[image.camera_id].mean_focal_length() * across / z for image, z in zip(registered, depth, strict=True)]))
+
+
+def _error(model: pycolmap.Reconstruction) -> float:
+    """Median reprojection error of the points, in pixels."""
+    model.update_point_3d_errors()
+    return float(np.median([point.error for point in model.points3D.values()]))
+
+
+def _adjust(model: pycolmap.Reconstruction) -> None:
+    """Poses and points to the least reprojection error, in place; focal lengths stay: the room, which shows more, has told them."""
+    options = pycolmap.BundleAdjustmentOptions()
+    options.refine_focal_length = options.refine_extra_params = False
+    options.print_summary = False
+    options.ceres.solver_options.num_threads = 1  # the same bytes each time
+    options.ceres.loss_function_type = pycolmap.LossFunctionType.SOFT_L1
+    spoken = pycolmap.logging.minloglevel
+    pycolmap.logging.minloglevel = 2  # errors
+    try:
+        pycolmap.bundle_adjustment(model, options)
+    finally:
+        pycolmap.logging.minloglevel = spoken
+
+
+def _with_poses(bundle: Bundle, model: pycolmap.Reconstruction, names: list[str], tracks: list) -> Bundle:
+    """The bundle with the adjusted poses; a frame that shows too little of the head keeps its place among the others. The world stays the head's."""
+    shown = Counter(name for track in tracks for name, _ in track)
+    firm = np.array([shown[name] >= LEAST_MATCHES for name in names])
+    found = {image.name: pose_of(image) for image in model.images.values()}
+    rotations = np.array([found[name].rotation.matrix() for name in names])
+    translations = np.array([found[name].translation for name in names])
+    centres, before = (-np.einsum("nij,ni->nj", r, t) for r, t in ((rotations, translations), (bundle.rotations, bundle.translations)))
+    scale, turn, shift = similarity(centres[firm], before[firm], np.ones(int(firm.sum())))
+    rotations = np.where(firm[:, None, None], rotations @ turn.T, bundle.rotations)
+    centres = np.where(firm[:, None], scale * centres @ turn.T + shift, before)
+    return replace(bundle, rotations=rotations, translations=-np.einsum("nij,nj->ni", rotations, centres))

@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cameras of a film whose subject swayed before the room: known poses of a head found again by what matches on it, and a head at rest left alone."""
+
+import numpy as np
+import pycolmap
+import pytest
+from scipy.spatial.transform import Rotation
+
+from core.cameras.matches import Matches
+from core.cameras.settled import SWAYED, on_head, settle
+from core.cameras.world import HeadFrame
+from core.contract.messages import Reporter
+from core.face import template
+from core.geometry.models import pose_of
+from core.synthetic.painted_head import camera
+
+AZIMUTHS = np.linspace(-40, 40, 17)
+NEIGHBOURS, WRONG, NOISE_PX = 5, 0.2, 0.3
+IN_HEAD = HeadFrame(pycolmap.Sim3d(), 1.0, 0.01, 0.062, 0.001)
+
+
+def filmed(sway_m: float, sway_deg: float, count: int = 700):
+    """The model of the cameras in the room's world, all matches, and where the head was: its rotations [N, 3, 3] and shifts [N, 3]."""
+    rng = np.random.default_rng(1)
+    views = [camera(azimuth, 0.05 * np.sin(i), scale=1.5) for i, azimuth in enumerate(AZIMUTHS)]
+    head = template.load().vertices
+    head = head[(head[:, 1] < -0.01) & (head[:, 2] > -0.1)]
+    head = head[rng.choice(len(head), count, replace=False)]
+    room = rng.uniform([-1.5, 0.8, -1.0], [1.5, 1.4, 1.0], (count, 3))
+    turns = Rotation.from_rotvec(np.radians(sway_deg) * rng.normal(size=(len(views), 3))).as_matrix()
+    shifts = sway_m * rng.normal(size=(len(views), 3))
+    model, keypoints = pycolmap.Reconstruction(), {}
+    model.add_camera_with_trivial_rig(views[0].camera)
+    for i, (view, turn, shift) in enumerate(zip(views, turns, shifts, strict=True)):
+        name = f"{i:02d}.jpg"
+        pixels = np.concatenate([view.project(head @ turn.T + shift)[0], view.project(room)[0]])
+        keypoints[name] = pixels + rng.normal(0, NOISE_PX, pixels.shape)
+        image = pycolmap.Image(name=name, camera_id=1, image_id=i + 1, keypoints=np.zeros((0, 2)))
+        model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(np.c_[view.rotation, view.translation]))
+    pairs = {}
+    for i in range(len(views)):
+        for j in range(i + 1, min(i + NEIGHBOURS, len(views))):
+            index = np.stack([np.arange(2 * count)] * 2, 1)
+            wrong = rng.random(len(index)) < WRONG
+            index[wrong, 1] = rng.permutation(index[wrong, 1])
+            pairs[f"{i:02d}.jpg", f"{j:02d}.jpg"] = index
+    return model, Matches(keypoints, pairs), turns, shifts
+
+
+def missed_px(model, true, turns, shifts) -> np.ndarray:
+    """How far the face's points lie from where they were filmed, per frame, if the head is laid where the frames together see it best: [N]."""
+    points = template.load().vertices
+    points = points[(points[:, 1] < -0.03) & (points[:, 2] > -0.09)][::20]
+    found = {image.name: image for image in model.images.values()}
+    aims, poses = [], []
+    for image, turn, shift in zip(sorted(true.images.values(), key=lambda image: image.name), turns, shifts, strict=True):
+        poses.append(pose_of(found[image.name]))
+        local = (points @ turn.T + shift) @ pose_of(image).rotation.matrix().T + pose_of(image).translation
+        aims.append(np.asarray(true.cameras[1].img_from_cam(local)))
+    origin, rows = [], []
+    for pose, aim in zip(poses, aims, strict=True):
+        plane = np.asarray(model.cameras[1].cam_from_img(aim))
+        rays = np.c_[plane, np.ones(len(plane))] @ pose.rotation.matrix()
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+        rows.append(np.eye(3) - rays[:, :, None] * rays[:, None, :])
+        origin.append(-pose.rotation.matrix().T @ pose.translation)
+    rows = np.stack(rows)
+    place = np.linalg.solve(rows.sum(0), np.einsum("vnij,vj->ni", rows, np.array(origin))[..., None])[..., 0]
+    return np.array([np.linalg.norm(np.asarray(model.cameras[1].img_from_cam(place @ pose.rotation.matrix().T + pose.translation)) - aim, axis=1).mean()
+                     for pose, aim in zip(poses, aims, strict=True)])
+
+
+def test_the_head_is_followed_where_it_swayed():
+    model, matches, turns, shifts = filmed(0.0015, 0.6)
+    settled, left = settle(model, IN_HEAD, matches, Reporter("cameras"))
+    assert left < SWAYED and settled is not model
+    before, after = (missed_px(each, model, turns, shifts).mean() for each in (model, settled))
+    assert after < 0.25 * before and after < 0.3
+    assert {image.name for image in settled.images.values()} == {image.name for image in model.images.values()}
+    points = np.array([point.xyz for point in settled.points3D.values()])
+    on_skin = np.linalg.norm(points[:, None] - template.load().vertices[None, ::5], axis=2).min(1)
+    assert np.median(on_skin) < 0.005, "the world stays the head's, in metres"
+
+
+def test_a_head_at_rest_keeps_the_cameras_of_the_room():
+    model, matches, _, _ = filmed(0.0, 0.0)
+    settled, left = settle(model, IN_HEAD, matches, Reporter("cameras"))
+    assert settled is model and left > 0.8
+
+
+def test_a_film_in_which_hardly_anything_of_the_head_matches_is_left_as_it_is():
+    model, matches, _, _ = filmed(0.003, 1.0, count=150)
+    settled, left = settle(model, IN_HEAD, matches, Reporter("cameras"))
+    assert settled is model and left == pytest.approx(1.0)
+
+
+def test_only_what_matches_on_the_head_counts():
+    model, matches, _, _ = filmed(0.0, 0.0, count=300)
+    images = sorted(model.images.values(), key=lambda image: image.name)
+    kept = on_head(model, images, matches)
+    index = np.concatenate(list(kept.pairs.values()))
+    of_room = (index >= 300).any(1).mean()
+    assert 0.9 * len(np.concatenate(list(matches.pairs.values()))) / 2 * 0.8 < len(index) and of_room < 0.25  # the wall behind the head's outline stays
