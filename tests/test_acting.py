@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Face units on a head in Blender: at rest it is the head as solved, and what the artist did to it stays."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,24 @@ def head(capture):
     bpy.ops.wildcap.assemble_material()
     bpy.ops.wildcap.add_face_units()
     return bpy.context.view_layer.objects.active
+
+
+@pytest.fixture
+def open_eyed(capture, addon):
+    """A capture that was filmed with open eyes, half as wide as MakeHuman opens them and looking to the left, and the carried head it was made from."""
+    solved = write_head(capture, 0.95)
+    asset, carrying = addon("acting.asset").load(), addon("acting.carrying")
+    rest, units = carrying.carried(asset, solved)
+    for side in ("Left", "Right"):
+        rows, moves = units[f"eyesOpen{side}"]
+        rest[rows] += 0.5 * moves
+    sockets = np.flatnonzero((asset.kind == 0) & (asset.parts[:, 2] > -0.02))
+    rows = np.concatenate([np.arange(HEAD), HEAD + np.flatnonzero(asset.seam > 0), HEAD + COPIES + sockets])
+    (capture / "head_open.obj").write_text("".join("v {:.7f} {:.7f} {:.7f}\n".format(*place) for place in rest[rows]))
+    eye = {"centre": [0.029, 0.003, -0.002], "radius": 0.0145, "gaze": [0.28, -0.96, 0.0], "openness": 0.5, "iris_radius": 0.0058, "views": 6}
+    (capture / "eyes.json").write_text(json.dumps({"left": eye, "right": {**eye, "centre": [-0.029, 0.003, -0.002]}}))
+    (capture / "maps" / "irises.json").write_text(json.dumps({"left": [0.1, 0.2, 0.4], "right": [0.12, 0.2, 0.38]}))
+    return rest, rows
 
 
 def coordinates(data) -> np.ndarray:
@@ -104,6 +123,51 @@ def test_at_rest_it_is_the_head_that_was_solved_and_each_unit_of_the_eye_opens_t
     assert np.abs(after - before)[radius > 0.2].max() == 0
 
 
+def test_a_head_that_was_filmed_with_open_eyes_looks_back(capture, addon, open_eyed):
+    filmed, rows = open_eyed
+    solved = write_head(capture, 0.95)
+    bpy.ops.wildcap.bring_in_head()
+    head = bpy.context.view_layer.objects.active
+    assert not addon("acting.mesh").has(head)
+    bpy.ops.wildcap.assemble_material()
+    keys = head.data.shape_keys
+    assert addon("acting.mesh").has(head) and keys["eyesOpen"] == 1.0
+    seen = shown(head)
+    assert np.abs(seen[rows] - filmed[rows]).max() < 2e-6
+    eye = seen[_kind(addon) == 1]
+    assert np.abs(np.linalg.norm(eye - [0.029, 0.003, -0.002], axis=1) - 0.0145).max() < 0.07 * 0.0145  # the cornea stands out by 6 %
+    cornea = np.linalg.norm(eye - [0.029, 0.003, -0.002], axis=1) > 1.01 * 0.0145
+    front = eye[cornea].mean(0) - [0.029, 0.003, -0.002]
+    assert front / np.linalg.norm(front) == pytest.approx([0.28, -0.96, 0.0], abs=0.01)
+    image = np.array(head.data.materials[1].node_tree.nodes["WildCap Eye"].image.pixels[:]).reshape(512, 512, 4)
+    radius = np.hypot(*(np.mgrid[:512, :512] + 0.5 - 256)) / 512
+    assert (image[(radius > 0.1) & (radius < 0.13)][:, 2] > image[(radius > 0.1) & (radius < 0.13)][:, 0]).mean() > 0.9, "the blue that was measured"
+
+    keys.key_blocks["eyeBlinkLeft"].value = keys.key_blocks["eyeBlinkRight"].value = 1
+    assert np.abs(shown(head)[:HEAD] - solved).max() < 2e-6  # closed lids are one unit away
+    bpy.ops.wildcap.rest_face()
+    assert keys["eyesOpen"] == 1.0 and np.abs(shown(head)[rows] - filmed[rows]).max() < 2e-6
+    bpy.ops.wildcap.iris(iris='brown')
+    bpy.ops.wildcap.iris(iris='filmed')
+    assert head.data.materials[1].node_tree.nodes["WildCap Eye"].image["wildcap_iris"] == "0.110 0.200 0.390"
+    bpy.ops.wildcap.assemble_material()
+    assert head.data.shape_keys == keys  # once
+    (capture / "maps" / "irises.json").unlink()
+    with pytest.raises(RuntimeError, match="do not tell the colour"):
+        bpy.ops.wildcap.iris(iris='filmed')
+
+
+def test_a_damaged_record_of_the_eyes_is_named_and_the_skin_is_there(capture, addon, open_eyed):
+    (capture / "eyes.json").write_text("{}")
+    bpy.ops.wildcap.bring_in_head()
+    with pytest.raises(RuntimeError, match="eyes.json cannot be read"):
+        bpy.ops.wildcap.assemble_material()
+    head = bpy.context.view_layer.objects.active
+    assert head.data.materials[0].get("wildcap_skin") and not addon("acting.mesh").has(head)
+    (capture / "eyes.json").unlink()
+    assert bpy.ops.wildcap.assemble_material() == {'FINISHED'}
+
+
 def test_values_animation_and_materials_stay_when_another_shape_comes_in_and_over_a_reload(head, capture, addon, tmp_path):
     keys, slots = head.data.shape_keys, list(head.data.materials)
     keys.key_blocks["jawOpen"].value = 0.4
@@ -148,7 +212,7 @@ def test_lids_that_were_filmed_open_are_warned_of(addon, tmp_path):
 
     for seen, word in ((0.31, "open while filming"), (0.12, ""), (None, "")):
         record = {"stages": {"registration": {"figures": {"eye_opening": seen}}}}
-        told = addon("acting.operators").filmed_open(SimpleNamespace(read=lambda record=record: record))
+        told = addon("acting.operators").filmed_open(SimpleNamespace(read=lambda record=record: record, eyes=tmp_path / "eyes.json"))
         assert word in told and bool(told) == bool(word)
 
 

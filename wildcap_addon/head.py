@@ -16,6 +16,14 @@ PREVIEW = "WildCap Preview"
 FOLLOWERS = []
 """Functions (head object, new mesh) of rooms that made more of a head's mesh: whether it now has the new mesh's shape, which is then not needed."""
 
+COMPLETERS = []
+"""Functions (head object, capture) of rooms that add to a head whose skin is assembled: the eyes that it was filmed with."""
+
+
+def complete(obj, capture: Capture) -> None:
+    for add in COMPLETERS:
+        add(obj, capture)
+
 
 def bring_in(context, item) -> bpy.types.Object:
     """The capture's head in the scene, active and selected. An existing head keeps its place and materials and gets the new mesh."""

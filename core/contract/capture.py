@@ -43,6 +43,8 @@ class Capture:
         self.landmarks = self.root / "landmarks.json"
         self.landmarks_artist = self.root / "landmarks_artist.json"
         self.head = self.root / "head.obj"
+        self.head_open = self.root / "head_open.obj"  # the head with its lids as they were filmed; absent where the eyes were closed
+        self.eyes = self.root / "eyes.json"  # the eyeballs between them; likewise
         self.own_head = self.root / "own_head.obj"
         self.own_head_skin = self.root / "own_head.json"
         self.delit = self.root / "delit"
@@ -60,6 +62,7 @@ class Capture:
         self.mask_history = self.root / "mask_history"
         self.maps = self.root / "maps"
         self.solved = self.maps / "solved.safetensors"  # what a later solve of an edited part goes on from
+        self.irises = self.maps / "irises.json"  # their linear albedo; absent where the eyes were closed
         self.maps_4k = self.root / "maps_4k"
         self.delivery = self.root / "delivery"
         self.exports = self.root / "exports"  # deliveries, where no other folder is chosen

@@ -32,6 +32,7 @@ class Stage:
 
 
 MAPS = ("diffuse_albedo.png", "diffuse_albedo.exr", "specular_albedo.png", "normal.png", "shading.exr", "confidence.png")
+OPEN_EYES = ("head_open.obj", "eyes.json")
 
 STAGES = (
     Stage("frames", "Frames", (), ("frames/",), "core.frames"),
@@ -41,12 +42,12 @@ STAGES = (
     Stage("delight", "Delight", ("frames/", "cameras/", "head.obj"), ("delit/",), "core.delight", shared=("device",),
           on_device=True),
     Stage("texture", "Texture", ("frames/", "delit/", "cameras/", "head.obj"), ("texture.exr", "texture.png", "texture_confidence.exr"), "core.texture",
-          on_device=True),
+          on_device=True, wishes=OPEN_EYES),
     Stage("shadow_mask", "Shadow Mask", ("delit/", "cameras/", "head.obj", "texture.exr", "texture_confidence.exr"), ("shadow_mask_auto.png",),
-          "core.shadow_mask", wishes=("texture_filmed.png", "frames/")),
+          "core.shadow_mask", wishes=("texture_filmed.png", "frames/", *OPEN_EYES)),
     Stage("solve", "Solve", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
           tuple(f"maps/{name}" for name in MAPS), "core.solve", shared=("seed",), on_device=True,
-          wishes=("shadow_mask.png", "protect_mask.png", "texture_filmed.png", "frames/", "cameras/", "delit/")),
+          wishes=("shadow_mask.png", "protect_mask.png", "texture_filmed.png", "frames/", "cameras/", "delit/", *OPEN_EYES)),
     Stage("upscale", "4K Maps", ("head.obj", *(f"maps/{name}" for name in MAPS)), tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale",
           shared=("seed", "device"), on_device=True,
           wishes=("texture_detail.exr",)),

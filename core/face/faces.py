@@ -21,6 +21,8 @@ from ..contract.messages import Problem
 RIGHT_EYE, LEFT_EYE = (33, 133), (362, 263)
 """Landmarks at the outer and inner corner of the person's right eye, and at the inner and outer of the left: they stay put when the lids close."""
 BROW, CHIN, NOSE = 9, 152, 1
+EYE_CROP = 2.3
+"""Side of the square that the eye network is shown, in distances between the eye's corners."""
 DATA_FILES = ("weights/face_nets/face_detection_short_range.tflite", "weights/face_nets/face_landmark.tflite",
               "weights/face_nets/iris_landmark.tflite", "weights/face_nets/selfie_segmentation.tflite")
 _SHORT_RANGE, _LANDMARK, _EYE, _SEGMENTATION = (Path(__file__).resolve().parents[1] / name for name in DATA_FILES)
@@ -45,6 +47,27 @@ class Face:
         """How far the head is turned, in degrees: 0 faces the camera, positive where it turns to the picture's right."""
         across = self.landmarks[list(LEFT_EYE)].mean(0) - self.landmarks[list(RIGHT_EYE)].mean(0)
         return float(np.degrees(np.arctan2(across[2], np.linalg.norm(across[:2]))))
+
+
+@dataclass(frozen=True)
+class Eye:
+    """An eye in a picture, in pixels (centres at +0.5): upper and lower edge of its lids [9, 2], both from the outer corner to the inner one; centre [2]
+    and radius of the iris."""
+
+    upper: np.ndarray
+    lower: np.ndarray
+    iris: np.ndarray
+    iris_radius: float
+
+    @property
+    def opening(self) -> float:
+        """Height over width between the lids."""
+        width = np.linalg.norm(self.upper[-1] - self.upper[0])
+        return float(np.linalg.norm(self.upper[3:6] - self.lower[3:6], axis=1).mean() / max(width, 1e-6))
+
+    def scaled(self, scale: np.ndarray) -> Eye:
+        """The same eye in the picture at another size; scale [2]: new over old width and height, nearly alike."""
+        return Eye(self.upper * scale, self.lower * scale, self.iris * scale, self.iris_radius * float(np.mean(scale)))
 
 
 def detect(srgb: np.ndarray, last: Face | None = None) -> Face | None:
@@ -87,17 +110,29 @@ def prominence(face: Face, width: int, height: int) -> float:
 def eye_openness(srgb: np.ndarray, face: Face) -> tuple[float, float]:
     """Height over width of the opening between the lids of the person's right and left eye: 0.25 to 0.5 open, about 0.1 closed, where seen from
     in front. From the eye network: the face mesh calls closed lids half open."""
+    right, left = find_eyes(srgb, face)
+    return right.opening, left.opening
+
+
+def find_eyes(srgb: np.ndarray, face: Face) -> tuple[Eye, Eye]:
+    """The person's right and left eye in an sRGB picture [H, W, 3], by the eye network (Ablavatski et al., Real-time Pupil Tracking, 2020)."""
     image = np.clip(np.asarray(srgb, np.float32), 0, 1)
-    opening = []
-    for corners, mirrored in ((RIGHT_EYE, False), (LEFT_EYE, True)):
-        from_, to = face.landmarks[list(corners), :2].astype(np.float64)
-        side = 2.3 * max(float(np.linalg.norm(to - from_)), 1.0)
-        crop = _crop(image, (*((from_ + to) / 2), side, np.arctan2(*(to - from_)[::-1])), 64)[0]
-        if mirrored:
-            crop = crop[:, ::-1]  # the network knows right eyes
-        contour = next(points for points in _run(_EYE, crop) if points.size == 213).reshape(71, 3)[:16, :2]  # 9 below from corner to corner, 7 above
-        opening.append(float(np.linalg.norm(contour[11:14] - contour[3:6], axis=1).mean() / max(np.linalg.norm(contour[8] - contour[0]), 1e-6)))
-    return opening[0], opening[1]
+    return _find_eye(image, face, RIGHT_EYE, False), _find_eye(image, face, LEFT_EYE[::-1], True)
+
+
+def _find_eye(image: np.ndarray, face: Face, corners: tuple[int, int], mirrored: bool) -> Eye:
+    """`corners`: the landmarks at the outer and the inner one."""
+    ends = face.landmarks[list(corners), :2].astype(np.float64)
+    from_, to = ends[::-1] if mirrored else ends
+    side = EYE_CROP * max(float(np.linalg.norm(to - from_)), 1.0)
+    crop, to_crop = _crop(image, (*((from_ + to) / 2), side, np.arctan2(*(to - from_)[::-1])), 64)
+    outputs = {points.size: points.reshape(-1, 3)[:, :2] for points in _run(_EYE, crop[:, ::-1] if mirrored else crop)}  # it knows right eyes
+    marks = np.concatenate([outputs[213][:16], outputs[15]])
+    if mirrored:
+        marks[:, 0] = 64 - marks[:, 0]
+    marks = (marks - to_crop[:, 2]) @ np.linalg.inv(to_crop[:, :2]).T
+    contour = marks[:16]  # 9 below from the outer corner to the inner one, 7 above
+    return Eye(contour[[0, *range(9, 16), 8]], contour[:9], marks[16], float(np.linalg.norm(marks[17:] - marks[16], axis=1).mean()))
 
 
 def segment_person(srgb: np.ndarray) -> np.ndarray:

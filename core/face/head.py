@@ -7,15 +7,16 @@ All arrays are shared between those who hold the head, and cannot be written to:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ..contract.capture import Capture
+from ..contract.eyes_record import read_eyes
 from ..geometry import meshes, raster
 from ..geometry.meshes import Mesh
-from . import template
+from . import lids, template
 
 SHORTEST = 1e-9
 """Length under which an interpolated normal has no direction."""
@@ -24,8 +25,10 @@ SHORTEST = 1e-9
 class Head:
     """A head in the world (metres), whatever its topology; what needs UVs takes for granted that `mesh` has them."""
 
-    def __init__(self, mesh: Mesh):
+    def __init__(self, mesh: Mesh, before: Mesh | None = None):
+        """before: all that light and views meet on their way to the mesh, itself included, where that is more: sockets and eyeballs."""
         self.mesh = mesh
+        self._before = before or mesh
         self._rasters: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     @cached_property
@@ -35,7 +38,8 @@ class Head:
 
     @cached_property
     def caster(self) -> raster.RayCaster:
-        return raster.RayCaster(self.mesh)
+        """Its triangles are the mesh's, then those of what lies before it."""
+        return raster.RayCaster(self._before)
 
     @cached_property
     def built_in(self) -> bool:
@@ -99,6 +103,28 @@ def read_head(capture: Capture) -> Head:
         if array is not None:
             _shared(array)
     return Head(mesh)
+
+
+def read_filmed_head(capture: Capture) -> Head:
+    """The head as it was filmed, with the UVs and triangles of `read_head`'s: where its eyes were open, its lids are, and eyeballs lie between them, so that
+    no iris is seen on a lid. Raises Problem as `read_head` does, and where head_open.obj or eyes.json is damaged."""
+    head = read_head(capture)
+    if not (head.built_in and capture.head_open.is_file() and capture.eyes.is_file()):
+        return head
+    opened = meshes.read_obj(capture.head_open)
+    if not lids.belongs_to(opened, head.mesh):  # another head.obj was put beside it
+        return head
+    balls = [lids.place_ball(side, np.array(eye.centre), eye.radius, np.array(eye.gaze)).mesh for side, eye in enumerate(read_eyes(capture))]
+    whole = meshes.joined([opened, *balls])
+    count = len(head.mesh.faces)
+    mesh = replace(head.mesh, vertices=_shared(opened.vertices), faces=_shared(opened.faces[:count]))
+    return _Filmed(mesh, whole)
+
+
+class _Filmed(Head):
+    """The built-in head, its triangles parted between the lids."""
+
+    built_in = True
 
 
 def _shared(array: np.ndarray) -> np.ndarray:

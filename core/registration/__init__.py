@@ -14,7 +14,8 @@ import numpy as np
 
 from ..contract import artist_landmarks
 from ..contract.capture import Capture
-from ..contract.files import write_json
+from ..contract.eyes_record import write_eyes
+from ..contract.files import remove_file, write_json
 from ..contract.frame_records import PHOTOGRAPHS, read_frames
 from ..contract.messages import Reporter
 from ..contract.settings import Settings
@@ -22,7 +23,7 @@ from ..face import template
 from ..geometry import meshes, raster
 from ..geometry.views import View, read_points, read_views
 from ..imaging import images
-from . import alignment, drawing, eyes, intersections, landmarks, nonrigid, own_template, quality, unscanned
+from . import alignment, drawing, eyeballs, eyes, intersections, landmarks, nonrigid, own_template, quality, unscanned
 from .correspondence import Scan
 
 STEPS = 100.0
@@ -37,7 +38,10 @@ HELD = ("lips", "eyes", "brows")
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """frames/, cameras/, scan.ply -> head.obj, landmarks.json. Raises Problem where no face is found or the fit does not hold."""
+    """frames/, cameras/, scan.ply -> head.obj with closed lids, landmarks.json, and where the eyes were open head_open.obj and eyes.json.
+
+    Raises Problem where no face is found or the fit does not hold.
+    """
     given = artist_landmarks.read(capture.landmarks_artist)
     views = read_views(capture)
     surface = meshes.read_ply(capture.scan, or_points=True)
@@ -118,6 +122,15 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
 
 def _finish(capture: Capture, settings: Settings, views: list[View], head: meshes.Mesh, subject: Subject, report: Reporter) -> None:
     found = subject.found
+    remove_file(capture.head_open)
+    remove_file(capture.eyes)
+    if eyes.are_open(found.opening):
+        seen = eyeballs.fit(head, eyeballs.lift_rims(views, found), found.opening)
+        head = seen.head
+        meshes.write_obj(capture.head_open, seen.opened.skin)
+        write_eyes(capture, *seen.records())
+        eyeballs.figures(report, seen)
+        images.write_srgb(capture.picture("registration", "eyes"), drawing.eyes_overlay(views, found, seen.opened))
     meshes.write_obj(capture.head, head)
     write_json(capture.landmarks, landmarks.to_json(found))
     own_template.run(capture, settings, head, own_template.BuiltIn(subject.model, subject.follow, subject.shaped, subject.hold), report)

@@ -7,11 +7,15 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from ..face.lids import OpenHead
 from ..geometry import raster
 from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.views import View
 from ..imaging import images
 from .landmarks import Landmarks
+
+RIM_UV = (0.4 / np.pi) ** 0.6
+"""Distance from the middle of an eyeball's UVs of the ring at 0.4 radians, near the iris' edge, over the half of their width."""
 
 
 def overlay(views: list[View], mesh: Mesh, found: Landmarks, height: int = 640) -> np.ndarray:
@@ -19,6 +23,38 @@ def overlay(views: list[View], mesh: Mesh, found: Landmarks, height: int = 640) 
     caster, normals = raster.RayCaster(mesh), vertex_normals(mesh)
     edges = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     return np.hstack([_one(view, mesh, caster, normals, edges, found, height) for view in views])
+
+
+def eyes_overlay(views: list[View], found: Landmarks, opened: OpenHead, side: int = 300) -> np.ndarray:
+    """sRGB [3 side, 2 side, 3]: the right and the left eye in three frames, with the edges of the head's lids (green), a ring near the iris' edge
+    (blue) and the network's marks (red)."""
+    return np.vstack([np.hstack([_eye(view, found, opened, which, side) for which in (1, 0)]) for view in three_views(views, found)])
+
+
+def _eye(view: View, found: Landmarks, opened: OpenHead, which: int, side: int) -> np.ndarray:
+    ball = opened.balls[which]
+    (middle,), (depth,) = view.project(ball.centre[None])
+    reach = 1.4 * ball.radius * view.camera.mean_focal_length() / depth
+    srgb = images.read_srgb(view.path)
+    scale = side / (2 * reach)
+    full = np.array([srgb.shape[1] / view.width, srgb.shape[0] / view.height])
+    move = np.column_stack([np.diag(scale / full), side / 2 - scale * middle + 0.5 * scale / full - 0.5])  # cv2 counts from pixel centres
+    canvas = cv2.warpAffine(srgb.astype(np.float32), move, (side, side), flags=cv2.INTER_LINEAR)
+
+    def drawn(points, colour, closed=False):
+        at = np.round(((points - middle) * scale + side / 2 - 0.5) * 16).astype(np.int32)
+        cv2.polylines(canvas, [at], closed, colour, 1, cv2.LINE_AA, 4)
+
+    for rim in opened.rims[which]:
+        drawn(view.project(opened.skin.vertices[rim])[0], (0.2, 1.0, 0.3))
+    iris = ball.mesh.vertices[np.abs(2 * np.linalg.norm(ball.mesh.uvs - 0.5, axis=1) - RIM_UV) < 0.04]
+    for x, y in ((view.project(iris)[0] - middle) * scale + side / 2 - 0.5):
+        cv2.circle(canvas, (round(x), round(y)), 1, (0.2, 0.6, 1.0), -1, cv2.LINE_AA)
+    if view.name in found.eyes:
+        eye = found.eyes[view.name][2 - which]
+        for x, y in ((np.concatenate([eye.upper, eye.lower]) - middle) * scale + side / 2 - 0.5):
+            cv2.circle(canvas, (round(x), round(y)), 2, (1.0, 0.2, 0.1), -1, cv2.LINE_AA)
+    return canvas
 
 
 def three_views(views: list[View], found: Landmarks) -> list[View]:

@@ -28,7 +28,7 @@ BEHIND_FACE_M = 0.06
 class Landmarks:
     """points [468, 3] in metres (nan: not lifted), trust [468] in [0, 1], error_px the median reprojection error;
     images maps a frame's name to what was found in it: pixels [468, 2], and used bool [468]; opening of the eyes, height over width;
-    put bool [468]: which points the artist has given."""
+    put bool [468]: which points the artist has given; eyes: by a frame's name the yaw of the head in degrees and the right and the left eye, in its pixels."""
 
     points: np.ndarray
     trust: np.ndarray
@@ -36,6 +36,7 @@ class Landmarks:
     images: dict[str, tuple[np.ndarray, np.ndarray]]
     opening: float = float("nan")
     put: np.ndarray = field(default_factory=lambda: np.zeros(468, bool))
+    eyes: Mapping[str, tuple[float, faces.Eye, faces.Eye]] = field(default_factory=dict)
 
 
 def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
@@ -43,19 +44,20 @@ def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
 
     `steps` is the stage's total for the progress bar, of which detection is the first tenth.
     """
-    chosen, found, openings = spread(views, MOST_VIEWS), [], []
+    chosen, found, seen = spread(views, MOST_VIEWS), [], {}
     for i, view in enumerate(chosen):
         report.progress(0.1 * steps * i / len(chosen), steps, f"looking for the face in {view.name}")
         srgb = images.read_srgb(view.path)
         face = faces.detect(srgb)
         if face is not None:
-            found.append((view, face.landmarks[:, :2] * [view.width / srgb.shape[1], view.height / srgb.shape[0]]))
-            openings.append((face.yaw_deg, faces.eye_openness(srgb, face)))
+            scale = np.array([view.width / srgb.shape[1], view.height / srgb.shape[0]])
+            found.append((view, face.landmarks[:, :2] * scale))
+            seen[view.name] = (face.yaw_deg, *(eye.scaled(scale) for eye in faces.find_eyes(srgb, face)))
     if len(found) < (3 if len(chosen) > FEW else 2):
         raise Problem(f"A face was found in only {len(found)} of the {len(chosen)} frames that were looked at.",
                       "Film the face larger, in better light and from the front too, then start again from the video.")
     lifted = triangulate([view for view, _ in found], np.stack([pixels for _, pixels in found]))
-    return replace(lifted, opening=eyes.opening(openings))
+    return replace(lifted, opening=eyes.opening([(yaw, (right.opening, left.opening)) for yaw, right, left in seen.values()]), eyes=seen)
 
 
 def spread(views: list[View], count: int) -> list[View]:

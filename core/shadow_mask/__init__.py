@@ -15,7 +15,7 @@ from ..contract.capture import Capture
 from ..contract.messages import Reporter
 from ..contract.settings import Settings
 from ..face import template
-from ..face.head import Unfolded, read_head
+from ..face.head import Unfolded, read_filmed_head
 from ..geometry.raster import bleed, interpolate
 from ..imaging import images
 from ..light.skylight import ambient_occlusion, radiance_transfer
@@ -51,7 +51,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """texture.exr, texture_confidence.exr, head.obj, and where they are there texture_filmed.png and the frames' shadows -> shadow_mask_auto.png at the
     texture's size. Raises Problem where the folder of softened pictures holds none of a registered frame."""
     report.progress(0, 8, "Unfolding the head")
-    whole = read_head(capture)
+    whole = read_filmed_head(capture)
     width = images.size(capture.texture)[0]
     head = whole.unfold(min(WORKING_SIZE, width))
     transfer = radiance_transfer(whole.caster, whole.mesh.vertices, whole.normals, SKY_RAYS,

@@ -20,7 +20,7 @@ from ..contract.code_key import code_key
 from ..contract.hashes import hash_tree
 from ..contract.messages import Reporter
 from ..contract.settings import Settings, result_settings
-from ..face.head import read_head
+from ..face.head import read_filmed_head
 from ..imaging import images
 from . import checkpoint, comparison, drawing, initial, layout, maps
 from .checkpoint import Solution
@@ -60,7 +60,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     recipe = recipe_of(settings, prior)
     report.progress(0, recipe.steps, "reading the texture, the head and the masks")
     size = layout.whole_size(options.size, prior.multiple) if options.prior else max(options.size // 32, 4) * 32  # the network halves the map several times
-    head = read_head(capture)
+    head = read_filmed_head(capture)
     known = evidence = read_evidence(capture, head, size)
     elsewhere = None
     if options.prior:  # the authors' prior speaks of maps in other UVs

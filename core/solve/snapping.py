@@ -12,7 +12,7 @@ import numpy as np
 from ..contract.capture import Capture
 from ..contract.messages import Reporter
 from ..contract.settings import Settings
-from ..face.head import read_head
+from ..face.head import read_filmed_head
 from ..imaging import images
 from . import initial
 from .evidence import read_evidence
@@ -30,7 +30,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.progress(0, 2, "reading the texture, the head and the masks")
     prior = load(Path(settings.solve.prior).expanduser() if settings.solve.prior else WEIGHTS, settings.compute_device)
     height, width = images.read_linear(capture.texture).shape[:2]
-    evidence = read_evidence(capture, read_head(capture), max(min(height, 1024) // 32, 4) * 32)
+    evidence = read_evidence(capture, read_filmed_head(capture), max(min(height, 1024) // 32, 4) * 32)
     report.progress(1, 2, "looking for the shadow's edges")
     recipe = replace(RECIPES["wildcap"], sharp_edges=True, protect_marks=False)
     tone = parse_skin_tone(settings.solve.skin_tone) or estimate_from_texture(evidence.texture, initial.lit_skin(evidence), prior.tones)

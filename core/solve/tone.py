@@ -15,7 +15,7 @@ import torch
 from ..contract.capture import Capture
 from ..contract.messages import Reporter
 from ..contract.settings import Settings
-from ..face.head import Head, read_head
+from ..face.head import Head, read_filmed_head
 from .evidence import Evidence, read_evidence
 from .initial import lit_skin
 from .look import capture_look
@@ -35,7 +35,7 @@ UNKNOWN = [0.38, 0.23, 0.17]
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """Leaves the figures of `tell_skin_tone`. Raises Problem where no facial skin was seen."""
     report.progress(0, 1, "reading the texture, the head and the masks")
-    head = read_head(capture)
+    head = read_filmed_head(capture)
     evidence = read_evidence(capture, head, SIZE)
     tone = estimate_from_frames(capture, head, settings, evidence, report)
     if tone is None:

@@ -20,7 +20,7 @@ from ..contract.frame_records import read_frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import template
-from ..face.head import Head, Unfolded, read_head
+from ..face.head import Head, Unfolded, read_filmed_head
 from ..geometry.frame_pictures import check_shape
 from ..geometry.views import View, read_views
 from ..imaging import images
@@ -39,7 +39,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
     Raises Problem where no view was delit or none of them sees the head.
     """
-    head = read_head(capture)
+    head = read_filmed_head(capture)
     if head.mesh.uvs is None:
         raise Problem("The registered head has no UVs.", "Run the stage registration again.")
     observations, surface = observe_all(capture, head, settings.texture.size, report)

@@ -13,8 +13,10 @@ _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES,
 def register():
     _register()
     head.FOLLOWERS.append(mesh.renewed)
+    head.COMPLETERS.append(mesh.open_filmed_eyes)
 
 
 def unregister():
+    head.COMPLETERS.remove(mesh.open_filmed_eyes)
     head.FOLLOWERS.remove(mesh.renewed)
     _unregister()

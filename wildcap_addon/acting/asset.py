@@ -25,6 +25,7 @@ class FaceUnits:
     template: np.ndarray  # [V, 3]
     triangles: np.ndarray  # [F, 3] of the head as it is registered
     copies: np.ndarray  # [C] the vertex that each copy doubles
+    seam: np.ndarray  # [C] of the lips (0), the left lids (1) or the right ones (2)
     corners: np.ndarray  # [n, 3]: triangle, corner, the copy it has once cut
     faces: np.ndarray  # [G, 4] of the inner parts, -1 for no fourth corner
     slots: np.ndarray  # [G] material slot: 0 skin, 1 eyes, 2 mouth, 3 teeth
@@ -48,9 +49,9 @@ def load() -> FaceUnits:
         units = {}
         for name in stored["names"].tolist():
             units[name] = _unit(stored, name, mirror, step)
-        return FaceUnits(template, triangles, stored["copies"].astype(int), stored["corners"], stored["faces"].astype(int), stored["slots"], stored["uvs"],
-                         stored["kind"], stored["anchors"].astype(int), weights / np.maximum(weights.sum(1, keepdims=True), 1e-9),
-                         stored["parts"] * step, stored["balls"].astype(np.float64), mirror, units)
+        return FaceUnits(template, triangles, stored["copies"].astype(int), stored["seam"], stored["corners"],
+                         stored["faces"].astype(int), stored["slots"], stored["uvs"], stored["kind"], stored["anchors"].astype(int),
+                         weights / np.maximum(weights.sum(1, keepdims=True), 1e-9), stored["parts"] * step, stored["balls"].astype(np.float64), mirror, units)
 
 
 def _unit(stored, name: str, mirror: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from .asset import JAWS, LEFT_EYE, RIGHT_EYE, SIDES, SOFT, FaceUnits
+from .filmed import FilmedEyes
 
 STEPS = 80  # of averaging: each neighbourhood reaches some 7 (lids) to 20 mm (cheeks)
 CORNEA = (0.06, 0.52)  # how far it stands out, as a share of the radius, and how wide it is, radians
@@ -18,8 +19,11 @@ CLEAR = 0.0005  # metres between eyeball and lids
 BEHIND = 0.002  # metres between teeth and lips
 
 
-def carried(asset: FaceUnits, head: np.ndarray) -> tuple[np.ndarray, dict[str, tuple[np.ndarray, np.ndarray]]]:
-    """All vertices [V + C + P, 3] of the head cut open, at rest, and each unit's rows and displacements, for a registered head [V, 3]."""
+def carried(asset: FaceUnits, head: np.ndarray, filmed: FilmedEyes | None = None) -> tuple[np.ndarray, dict[str, tuple[np.ndarray, np.ndarray]]]:
+    """All vertices [V + C + P, 3] of the head cut open, at rest, and each unit's rows and displacements, for a registered head [V, 3].
+
+    filmed: eyes that were open while filming: the balls are those, and `eyesOpen` opens the lids as far as they were.
+    """
     turn = frames(asset.triangles, asset.template, head)  # [V, 3, 3]
     soft = asset.kind == SOFT
     anchors, weights = asset.anchors[soft], asset.weights[soft][..., None]
@@ -30,9 +34,14 @@ def carried(asset: FaceUnits, head: np.ndarray) -> tuple[np.ndarray, dict[str, t
     balls = []
     for kind, ball in ((LEFT_EYE, asset.balls[0]), (RIGHT_EYE, asset.balls[1])):
         rows = asset.kind == kind
-        matrix, centre = _similarity(asset, head, ball[:3], 2 * ball[3], ball[:3])
-        radius = ball[3] * np.cbrt(np.linalg.det(matrix))
-        centre = _behind_lids(asset, head, ball, matrix, centre, radius)
+        if filmed is None:
+            matrix, centre = _similarity(asset, head, ball[:3], 2 * ball[3], ball[:3])
+            radius = ball[3] * np.cbrt(np.linalg.det(matrix))
+            centre = _behind_lids(asset, head, ball, matrix, centre, radius)
+        else:
+            eye = filmed.eyes[kind - LEFT_EYE]
+            centre, radius = np.array(eye.centre), eye.radius
+            matrix = radius / ball[3] * _towards(np.array(eye.gaze)) @ _towards(_looks(asset, kind, ball)).T
         parts[rows], turns[rows] = centre + (asset.parts[rows] - ball[:3]) @ matrix.T, matrix
         balls.append((centre, radius, matrix))
     rows = asset.kind == JAWS
@@ -44,9 +53,33 @@ def carried(asset: FaceUnits, head: np.ndarray) -> tuple[np.ndarray, dict[str, t
     units = {name: (rows, np.einsum("nij,nj->ni", turns[rows], moves)) for name, (rows, moves) in asset.units.items()}
     for side, ball in zip(SIDES, balls, strict=True):
         rows, moves = units[f"eyesOpen{side}"]
-        moves = _over_ball(rest[rows], moves, ball)
+        moves = _over_ball(rest[rows], moves, ball) if filmed is None else _as_filmed(rest, rows, moves, filmed)
         units[f"eyesOpen{side}"], units[f"eyeBlink{side}"] = (rows, moves), (rows, -moves)
     return rest, units
+
+
+def _as_filmed(rest: np.ndarray, rows: np.ndarray, moves: np.ndarray, filmed: FilmedEyes) -> np.ndarray:
+    """An opening [n, 3] of the lids to where they were; what the capture does not tell of (the lips' seam is none of a lid's) moves as the unit says."""
+    place = np.full(len(rest), -1)
+    place[filmed.rows] = np.arange(len(filmed.rows))
+    known = place[rows] >= 0
+    moves = moves.copy()
+    moves[known] = filmed.places[place[rows[known]]] - rest[rows[known]]
+    return moves
+
+
+def _looks(asset: FaceUnits, kind: int, ball: np.ndarray) -> np.ndarray:
+    """Where an eyeball looks on the template: a unit vector [3]; two degrees down."""
+    rows = np.flatnonzero(asset.kind == kind)
+    pupil = asset.parts[rows[np.linalg.norm(asset.uvs[rows] - 0.5, axis=1).argmin()]] - ball[:3]
+    return pupil / np.linalg.norm(pupil)
+
+
+def _towards(gaze: np.ndarray) -> np.ndarray:
+    """The rotation [3, 3] that turns an eye from straight ahead (-y) to the unit vector gaze [3], without roll."""
+    side = np.cross([0, 0, 1.0], gaze)
+    side /= np.linalg.norm(side)
+    return np.stack([side, -gaze, np.cross(gaze, side)], -1)
 
 
 def frames(triangles: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:

@@ -10,17 +10,18 @@ IRIS_ANGLE = 0.42  # radians from the pupil's middle to the iris' rim, seen from
 PUPIL_ANGLE = 0.15
 IRISES = {"brown": (0.13, 0.055, 0.02), "hazel": (0.25, 0.16, 0.06), "green": (0.14, 0.20, 0.10), "blue": (0.12, 0.22, 0.36), "grey": (0.24, 0.27, 0.29)}
 """Linear colours."""
+DEFAULT = "brown"
 KEY = "wildcap_inside"
 
 
-def inside(name: str, iris: str) -> list[bpy.types.Material]:
-    """Eyes, mouth and teeth of a head, in the order of their slots; those that it has already keep the artist's changes."""
+def inside(name: str, iris: str | tuple) -> list[bpy.types.Material]:
+    """Eyes, mouth and teeth of a head, in the order of their slots; those that it has already keep the artist's changes. iris: one of IRISES, or a colour."""
     eyes = _material(f"{name} Eyes", "eyes", (0.8, 0.8, 0.8), 0.35, 1.0)
     _paint(eyes, name, iris)
     return [eyes, _material(f"{name} Mouth", "mouth", (0.22, 0.05, 0.045), 0.35, 0.3), _material(f"{name} Teeth", "teeth", (0.66, 0.58, 0.45), 0.25, 0.4)]
 
 
-def recolour(obj, iris: str) -> None:
+def recolour(obj, iris: str | tuple) -> None:
     """Another colour of the iris, in the eyes that the head has."""
     for material in obj.data.materials:
         if material is not None and material.get(KEY) == "eyes":
@@ -45,7 +46,7 @@ def _material(name: str, kind: str, colour: tuple, roughness: float, coat: float
     return material
 
 
-def _paint(material, name: str, iris: str) -> None:
+def _paint(material, name: str, iris: str | tuple) -> None:
     """The picture of the eye, packed, before the shader; one that is there gets the iris' new colour."""
     nodes, links = material.node_tree.nodes, material.node_tree.links
     node = nodes.get("WildCap Eye")
@@ -56,11 +57,13 @@ def _paint(material, name: str, iris: str) -> None:
         shader = next(n for n in nodes if n.type == 'BSDF_PRINCIPLED')
         links.new(node.outputs["Color"], shader.inputs["Base Color"])
         node.image = bpy.data.images.new(f"{name} Eye", SIZE, SIZE)
-    if node.image is not None and node.image.get("wildcap_iris") != iris:
-        node.image.pixels.foreach_set(picture(IRISES[iris]).ravel())
+    colour = IRISES.get(iris, iris)
+    told = iris if iris in IRISES else " ".join(f"{value:.3f}" for value in colour)
+    if node.image is not None and node.image.get("wildcap_iris") != told:
+        node.image.pixels.foreach_set(picture(colour).ravel())
         node.image.update()
         node.image.pack()
-        node.image["wildcap_iris"] = iris
+        node.image["wildcap_iris"] = told
 
 
 def picture(iris: tuple[float, float, float]) -> np.ndarray:

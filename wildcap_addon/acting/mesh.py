@@ -7,11 +7,15 @@ For exporters: the keys are called as ARKit calls them (`jawOpen`, `eyeBlinkLeft
 The custom property `MARK` of the mesh says that it has them.
 """
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 
+from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
-from . import carrying, materials
+from .. import captures
+from . import carrying, filmed, materials
 from .asset import GAZE, SIDES, FaceUnits, load
 
 MARK = "wildcap_face_units"
@@ -25,16 +29,27 @@ def has(obj) -> bool:
     return MARK in obj.data and obj.data.shape_keys is not None
 
 
-def add(obj, iris: str) -> None:
-    """Cuts the head open and gives it its face units. Raises Problem if it is not the built-in head, unchanged."""
+def open_filmed_eyes(obj, capture: Capture) -> None:
+    """A head that was filmed with open eyes gets its face units, and its lids as they were; one that has them, or shape keys of its own, stays as it is.
+    `head.complete` asks."""
+    asset = load()
+    if obj.data.shape_keys is None and is_built_in(obj, asset) and filmed.read(capture, asset) is not None:
+        add(obj)
+
+
+def add(obj, iris: str = "") -> None:
+    """Cuts the head open and gives it its face units; iris: one of materials.IRISES, '' for what was filmed, or brown. Eyes that were filmed open are open.
+
+    Raises Problem if it is not the built-in head, unchanged, and for a damaged capture."""
     asset = load()
     old = obj.data
     _check(obj, asset)
     head, normals = _vertices(old), _corner_normals(old)
-    carried = carrying.carried(asset, head)
+    seen = _filmed(obj, asset)
+    carried = carrying.carried(asset, head, seen)
     new = _built(old, asset, carried[0])
     slots = list(old.materials) or [None]
-    for material in slots[:1] + materials.inside(obj.name, iris):
+    for material in slots[:1] + materials.inside(obj.name, iris or measured_iris(seen) or materials.DEFAULT):
         new.materials.append(material)
     obj.data = new
     name = old.name
@@ -46,12 +61,33 @@ def add(obj, iris: str) -> None:
     for unit in asset.units:
         obj.shape_key_add(name=unit, from_mix=False).value = 0  # Blender 5 begins with 1
     _shape(obj, *carried, normals)
-    _drive(new.shape_keys)
+    _drive(new.shape_keys, seen is not None)
+
+
+def measured_iris(seen: filmed.FilmedEyes | None) -> tuple[float, float, float] | None:
+    """The colour of both irises, linear; None where none was measured."""
+    if seen is None or seen.irises is None:
+        return None
+    return tuple(float(sum(pair) / 2) for pair in zip(*seen.irises, strict=True))
+
+
+def filmed_iris(obj) -> tuple[float, float, float]:
+    """As `measured_iris`, of a head's capture. Raises Problem where none was measured."""
+    colour = measured_iris(_filmed(obj, load()))
+    if colour is None:
+        raise Problem("The frames do not tell the colour of these eyes.", "Choose a colour instead.")
+    return colour
+
+
+def _filmed(obj, asset: FaceUnits) -> filmed.FilmedEyes | None:
+    """What the head's capture knows of its eyes."""
+    return filmed.read(Capture(Path(bpy.path.abspath(obj[captures.HEAD_KEY]))), asset) if obj.get(captures.HEAD_KEY) else None
 
 
 def follow(obj, head: np.ndarray, normals: np.ndarray) -> None:
     """Moves a head that has its units to another registered shape [V, 3]; values, animation, drivers and the artist's own keys stay."""
-    _shape(obj, *carrying.carried(load(), head), normals)
+    asset = load()
+    _shape(obj, *carrying.carried(asset, head, _filmed(obj, asset)), normals)
 
 
 def _shape(obj, rest: np.ndarray, units: dict, normals: np.ndarray) -> None:
@@ -77,11 +113,11 @@ def _shape(obj, rest: np.ndarray, units: dict, normals: np.ndarray) -> None:
 
 
 def rest(obj) -> None:
-    """All values zero, lids closed: the head as solved."""
+    """All values zero, and the lids as they were filmed."""
     keys = obj.data.shape_keys
     for key in keys.key_blocks:
         key.value = 0
-    keys[OPEN] = 0.0
+    keys[OPEN] = float(keys.id_properties_ui(OPEN).as_dict()["default"])
     keys.update_tag()
 
 
@@ -94,13 +130,17 @@ def renewed(obj, mesh) -> bool:
 
 
 def _check(obj, asset: FaceUnits) -> None:
-    mesh = obj.data
-    if mesh.shape_keys is not None:
+    if obj.data.shape_keys is not None:
         raise Problem("This head has shape keys of its own.", "Remove them, or bring the head in anew, then click Add Face Units.")
-    corners = np.empty(len(mesh.loops), np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
-    if len(mesh.vertices) != len(asset.template) or not np.array_equal(corners, asset.triangles.ravel()):
+    if not is_built_in(obj, asset):
         raise Problem("Face units are made for the built-in head, and this is another mesh.", "Reconstruct with the built-in head, or bring the head in anew.")
+
+
+def is_built_in(obj, asset: FaceUnits) -> bool:
+    """Whether its mesh is the built-in head's, not cut open yet."""
+    corners = np.empty(len(obj.data.loops), np.int32)
+    obj.data.loops.foreach_get("vertex_index", corners)
+    return len(obj.data.vertices) == len(asset.template) and np.array_equal(corners, asset.triangles.ravel())
 
 
 def _built(old, asset: FaceUnits, rest: np.ndarray):
@@ -159,10 +199,11 @@ def _set_normals(mesh, normals: np.ndarray) -> None:
     mesh.normals_split_custom_set(every)
 
 
-def _drive(keys) -> None:
+def _drive(keys, filmed_open: bool) -> None:
     """Lids open by the slider, or as far as a unit of the eye is used: drivers of kind Maximum, which need no script."""
-    keys[OPEN] = 0.0
-    keys.id_properties_ui(OPEN).update(min=0.0, max=1.0, soft_min=0.0, soft_max=1.0, description="How far the lids are open; they were solved closed")
+    keys[OPEN] = 1.0 if filmed_open else 0.0
+    told = "How far the lids are open; 1 is as they were filmed" if filmed_open else "How far the lids are open; they were filmed closed"
+    keys.id_properties_ui(OPEN).update(min=0.0, max=1.0, soft_min=0.0, soft_max=1.0, default=keys[OPEN], description=told)
     for side in SIDES:
         driver = keys.key_blocks[f"{OPEN}{side}"].driver_add("value").driver
         driver.type = 'MAX'

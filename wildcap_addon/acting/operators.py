@@ -9,6 +9,7 @@ from .. import captures
 from ..base_operator import BaseOperator
 from . import materials, mesh
 
+FILMED = ("filmed", "As Filmed", "What the frames show, where the eyes were open; brown otherwise")
 OPEN = 0.22
 """Height over width of an eye from which the registration takes it for open (core/registration/eyes.py)."""
 
@@ -26,14 +27,14 @@ class WILDCAP_OT_add_face_units(_OnHead, bpy.types.Operator):
     bl_label = "Add Face Units"
     bl_options = {'REGISTER', 'UNDO'}
 
-    iris: bpy.props.EnumProperty(name="Iris", description="Colour of the eyes", items=[(name, name.title(), "") for name in materials.IRISES])
+    iris: bpy.props.EnumProperty(name="Iris", description="Colour of the eyes", items=[FILMED, *((name, name.title(), "") for name in materials.IRISES)])
 
     def work(self, context):
         item = captures.require(context)
         obj = captures.require_head(context, item)
         if mesh.has(obj):
             raise Problem("This head has its face units already.", "Move their sliders, here or under Shape Keys in the mesh's properties.")
-        mesh.add(obj, self.iris)
+        mesh.add(obj, "" if self.iris == FILMED[0] else self.iris)
         self.warn(filmed_open(captures.folder(item)))
 
 
@@ -44,14 +45,15 @@ class WILDCAP_OT_iris(_OnHead, bpy.types.Operator):
     bl_label = "Iris"
     bl_options = {'REGISTER', 'UNDO'}
 
-    iris: bpy.props.EnumProperty(name="Iris", description="Colour of the eyes", items=[(name, name.title(), "") for name in materials.IRISES])
+    iris: bpy.props.EnumProperty(name="Iris", description="Colour of the eyes", items=[FILMED, *((name, name.title(), "") for name in materials.IRISES)])
 
     def work(self, context):
-        materials.recolour(_acting(context), self.iris)
+        obj = _acting(context)
+        materials.recolour(obj, mesh.filmed_iris(obj) if self.iris == FILMED[0] else self.iris)
 
 
 class WILDCAP_OT_rest_face(_OnHead, bpy.types.Operator):
-    """Bring all face units back to zero: the head as it was solved"""
+    """Bring all face units back to zero and the lids to where they were filmed"""
 
     bl_idname = "wildcap.rest_face"
     bl_label = "Rest"
@@ -62,9 +64,11 @@ class WILDCAP_OT_rest_face(_OnHead, bpy.types.Operator):
 
 
 def filmed_open(capture) -> str:
-    """What there is to say of the lids of a face that was filmed with open eyes, '' for closed ones."""
+    """What there is to say of the lids of a face that was filmed with open eyes and reconstructed by WildCap 0.1.0, '' for others."""
     seen = capture.read()["stages"].get("registration", {}).get("figures", {}).get("eye_opening")
-    return "The eyes were open while filming: the lids carry a picture of them, which shows when they move" if seen is not None and seen > OPEN else ""
+    on_lids = seen is not None and seen > OPEN and not capture.eyes.is_file()
+    return ("The eyes were open while filming: the lids carry a picture of them, which shows when they move. Reconstruct again to have them open"
+            if on_lids else "")
 
 
 def _acting(context):

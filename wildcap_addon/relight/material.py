@@ -28,7 +28,7 @@ SET = "wildcap_set"
 
 
 def assemble(context, item) -> bpy.types.Material:
-    """The skin material on the capture's head, from the 4K maps where they are newest, else from the solved ones."""
+    """The skin material on the capture's head, from the 4K maps where they are newest, else from the solved ones; and what else belongs to a finished head."""
     capture = captures.folder(item)
     obj = captures.require_head(context, item)
     maps = status.delivered(capture)
@@ -42,6 +42,7 @@ def assemble(context, item) -> bpy.types.Material:
     _build(material, {path.name: path for path in (*maps, height) if path.is_file()}, obj)
     _set(material, {"Specular Amount": _specular_amount(capture), "Subsurface Scale": node_group.SCATTERING_M * _scale(obj)}, before)
     obj["wildcap_maps_time"] = max(path.stat().st_mtime for path in maps)
+    head.complete(obj, capture)
     return material
 
 

@@ -1,0 +1,188 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Eyes that were open while filming: marks lifted to the lids' edges, eyeballs placed by them, the head opened to meet them, and what that hides."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pycolmap
+import pytest
+
+pytest.importorskip("OpenImageIO")
+
+from core.contract.capture import Capture  # noqa: E402
+from core.contract.eyes_record import Eyeball, read_eyes, write_eyes  # noqa: E402
+from core.contract.messages import Problem  # noqa: E402
+from core.face import lids  # noqa: E402
+from core.face.faces import Eye  # noqa: E402
+from core.face.head import read_filmed_head, read_head  # noqa: E402
+from core.geometry import meshes  # noqa: E402
+from core.geometry.views import View  # noqa: E402
+from core.registration import eyeballs, lid_marks  # noqa: E402
+from core.synthetic.people import shape  # noqa: E402
+
+SEED = 4
+SLIPPED_M = np.array([0.0008, -0.0012, 0.0006])
+"""How far off the head lies that the eyes are fitted to: what a registration leaves."""
+
+
+@pytest.fixture(scope="module")
+def person():
+    head = shape.person_mesh(SEED)
+    return head, lids.open_lids(head, 0.8, np.array([6.0, -3.0]))
+
+
+@pytest.fixture(scope="module")
+def fitted(person):
+    head, opened = person
+    start = replace(head, vertices=head.vertices + SLIPPED_M)
+    return start, eyeballs.fit(start, tuple(rims_of(opened, side) for side in (0, 1)), 0.35)
+
+
+def rims_of(opened: lids.OpenHead, side: int) -> lid_marks.Rims:
+    """Nine marks on each edge, from the outer corner to the inner one, and the iris where the cornea's top is."""
+    outer, inner = (opened.skin.vertices[corner] for corner in lids.corners()[side])
+    edges = [np.concatenate([[inner], opened.skin.vertices[rim], [outer]])[::-1] for rim in opened.rims[side]]
+    chosen = [edge[np.linspace(0, len(edge) - 1, 9).round().astype(int)] for edge in edges]
+    ball = opened.balls[side]
+    return lid_marks.Rims(*chosen, ball.centre + (1 + lids.CORNEA_BULGE) * ball.radius * ball.gaze, 0.0059, 9)
+
+
+def view_from(degrees: float, distance: float = 0.5) -> View:
+    """A camera 1000 pixels wide that looks at the middle between the eyes, from an angle to the head's left."""
+    turn = np.radians(degrees)
+    back = np.array([np.sin(turn), -np.cos(turn), 0.0])
+    rotation = np.stack([np.cross(-back, [0, 0, 1.0]), [0, 0, -1.0], -back])
+    camera = pycolmap.Camera(model="PINHOLE", width=1000, height=1000, params=[1500, 1500, 500, 500])
+    return View(f"{degrees}.jpg", None, camera, rotation, -rotation @ (distance * back), True)
+
+
+def seen_eye(rims: lid_marks.Rims, view: View) -> Eye:
+    upper, lower, iris = (view.project(points)[0] for points in (rims.upper, rims.lower, rims.iris[None]))
+    depth = view.project(rims.iris[None])[1][0]
+    return Eye(upper, lower, iris[0], rims.iris_radius * 1500 / depth)
+
+
+def off_curve(points: np.ndarray, curve: np.ndarray) -> np.ndarray:
+    fine = np.concatenate([a + (b - a) * np.linspace(0, 1, 20)[:, None] for a, b in zip(curve, curve[1:], strict=False)])
+    return np.linalg.norm(points[:, None] - fine[None], axis=2).min(1)
+
+
+def test_marks_in_several_views_are_lifted_to_where_they_lie(person):
+    rims = rims_of(person[1], 0)
+    views = [view_from(degrees) for degrees in (-20, -5, 10, 25)]
+    found = lid_marks.lift(views, [seen_eye(rims, view) for view in views])
+    assert found.views == 4 and found.iris_radius == pytest.approx(0.0059, rel=1e-6)
+    for lifted, true in ((found.upper, rims.upper), (found.lower, rims.lower), (found.iris, rims.iris)):
+        assert np.abs(lifted - true).max() < 1e-6
+
+
+def test_one_frame_that_slips_does_not_count(person):
+    rims = rims_of(person[1], 0)
+    views = [view_from(degrees) for degrees in (-20, -10, 0, 10, 25)]
+    eyes = [seen_eye(rims, view) for view in views]
+    eyes[2] = replace(eyes[2], upper=eyes[2].upper + 25, lower=eyes[2].lower + 25, iris=eyes[2].iris + 25)
+    found = lid_marks.lift(views, eyes)
+    assert np.abs(found.upper - rims.upper).max() < 0.0012
+
+
+def test_views_that_stand_together_or_alone_lift_nothing(person):
+    rims = rims_of(person[1], 0)
+    for angles in ((10,), (10, 12)):
+        views = [view_from(degrees) for degrees in angles]
+        assert lid_marks.lift(views, [seen_eye(rims, view) for view in views]) is None
+
+
+def test_an_eye_is_not_read_beyond_the_nose_nor_in_a_blink(person):
+    rims = rims_of(person[1], 0)
+    eye = seen_eye(rims, view_from(0))
+    shut = replace(eye, upper=eye.lower + 0.3 * (eye.upper - eye.lower))
+    seen = [(0, eye), (-40, eye), (40, eye), (5, shut), (-60, eye)]
+    assert lid_marks.usable(seen, 0) == [0, 1]  # yaw is positive where the head turns to the picture's right, and hides its left eye
+    assert lid_marks.usable(seen, 1) == [0, 2]
+
+
+def test_lids_meet_the_edges_that_were_seen_and_balls_lie_behind_them(person, fitted):
+    _, opened = person
+    start, found = fitted
+    for side in (0, 1):
+        true, ball = opened.balls[side], found.opened.balls[side]
+        before = np.linalg.norm(lids.carry_ball(start, side)[0] - true.centre)
+        assert np.linalg.norm(ball.centre - true.centre) < min(0.0015, before)
+        assert abs(ball.radius - true.radius) < 0.001
+        assert np.degrees(np.arccos(np.clip(ball.gaze @ true.gaze, -1, 1))) < 5
+        for rim in (0, 1):
+            points = found.opened.skin.vertices[found.opened.rims[side][rim]]
+            off = off_curve(points, np.concatenate([opened.skin.vertices[lids.corners()[side][1]][None], opened.skin.vertices[opened.rims[side][rim]],
+                                                    opened.skin.vertices[lids.corners()[side][0]][None]]))
+            assert off.mean() < 0.0003 and off.max() < 0.001
+            clear = np.linalg.norm(points - ball.centre, axis=1) - ball.radius
+            assert clear.min() > 0.9 * lids.CLEAR_M
+
+
+def test_closed_lids_clear_the_balls_and_the_rest_of_the_head_stays(fitted):
+    start, found = fitted
+    moved = np.linalg.norm(found.head.vertices - start.vertices, axis=1)
+    far = np.min([np.linalg.norm(start.vertices - ball.centre, axis=1) for ball in found.opened.balls], axis=0) > 0.06
+    assert moved[far].max() < 1e-5 and moved.max() < 0.004
+    for ball in found.opened.balls:
+        v = found.head.vertices - ball.centre
+        near = (np.linalg.norm(v, axis=1) < 1.2 * ball.radius) & (v[:, 1] < -0.5 * ball.radius)
+        assert np.linalg.norm(v[near], axis=1).min() > ball.radius
+    assert lids.belongs_to(found.opened.skin, found.head)
+
+
+def test_an_eye_that_no_two_frames_show_is_open_as_wide_as_it_looks(person):
+    head, opened = person
+    found = eyeballs.fit(head, (rims_of(opened, 0), None), 0.33)
+    upper, lower = (found.opened.skin.vertices[rim] for rim in found.opened.rims[1])
+    outer, inner = (found.opened.skin.vertices[corner] for corner in lids.corners()[1])
+    middle = np.sort(np.linalg.norm(upper - lower, axis=1))[-9:].mean() / np.linalg.norm(outer - inner)
+    assert middle == pytest.approx(0.33, abs=0.02)
+    assert found.measured == (9, 0) and np.isnan(found.iris_radius[1])
+    assert found.records()[1].iris_radius == 0
+
+
+@pytest.fixture
+def capture(tmp_path, fitted):
+    capture = Capture(tmp_path / "face.wildcap")
+    capture.claim()
+    _, found = fitted
+    meshes.write_obj(capture.head, found.head)
+    meshes.write_obj(capture.head_open, found.opened.skin)
+    write_eyes(capture, *found.records())
+    return capture
+
+
+def test_no_iris_is_seen_on_a_lid(capture, fitted):
+    """From the front, rays to the irises meet the closed head's lids, and the filmed head's eyeballs, which are none of its triangles."""
+    _, found = fitted
+    closed, filmed = read_head(capture), read_filmed_head(capture)
+    assert filmed.built_in and len(filmed.mesh.faces) == len(closed.mesh.faces)
+    eye = np.array([0, -0.6, 0.0])
+    towards = np.stack([ball.centre + ball.radius * ball.gaze - eye for ball in found.opened.balls])
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    for head, before in ((closed, True), (filmed, False)):
+        face, _, _ = head.caster.first_hits(np.repeat(eye[None], 2, 0), towards)
+        assert ((face < len(head.mesh.faces)) == before).all()
+
+
+def test_another_head_put_beside_open_eyes_is_taken_as_it_is(capture):
+    meshes.write_obj(capture.head, shape.person_mesh(SEED + 1))
+    head = read_filmed_head(capture)
+    assert np.allclose(head.mesh.vertices, shape.person_mesh(SEED + 1).vertices, atol=1e-5)
+
+
+def test_the_record_of_the_eyes_comes_back_and_a_damaged_one_is_refused(capture):
+    left = Eyeball((0.03, 0.01, 0.0), 0.0155, (0.0, -1.0, 0.0), 0.9, 0.0058, 7)
+    write_eyes(capture, left, replace(left, centre=(-0.03, 0.01, 0.0), views=0))
+    assert read_eyes(capture) == (left, replace(left, centre=(-0.03, 0.01, 0.0), views=0))
+    told = json.loads(capture.eyes.read_text())
+    damage = (("left", "radius", 0), ("right", "gaze", [0, 0, 0]), ("left", "centre", [0, 0]), ("left", "centre", [0, "a", 0]), ("right", "views", None))
+    for side, name, value in damage:
+        broken = {**told, side: {**told[side], name: value}}
+        capture.eyes.write_text(json.dumps(broken))
+        with pytest.raises(Problem, match="eyes.json cannot be read") as problem:
+            read_eyes(capture)
+        assert problem.value.remedy == "Run the stage registration again."
