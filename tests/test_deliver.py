@@ -130,6 +130,24 @@ def test_gltf_with_files_refers_to_the_delivered_maps(capture):
     assert normal and json.loads((folder / "provenance.json").read_text())["delivery"]["normals"] == "opengl", "glTF has no other"
 
 
+def test_a_metahuman_gets_open_eyes_and_no_shape_keys(capture):
+    pytest.importorskip("ufbx")
+    bpy.context.scene.wildcap.captures[0].deliver.preset = 'metahuman'
+    with pytest.raises(RuntimeError, match="MetaHuman from Mesh wants a head with open eyes, and this one's lids are closed"):
+        bpy.ops.wildcap.deliver()
+    head = bpy.data.objects["face"]
+    moved = truth()
+    for name, rows in (("eyesOpenLeft", slice(200, 210)), ("eyesOpenRight", slice(300, 310))):
+        key = head.shape_key_add(name=name, from_mix=False)
+        for i in range(len(key.data))[rows]:
+            key.data[i].co += Vector((0, 0.001, 0.004))
+        moved[rows] += (0, 0.001, 0.004)
+    folder = deliver(capture, preset="metahuman")
+    read = by_another_reader(folder / "face.fbx")
+    assert not read["shapes"] and np.allclose(read["points"], 100 * y_up(moved), atol=1e-4)
+    assert len(head.data.shape_keys.key_blocks) == 5 and np.abs(truth() - moved).max() > 0.003, "the artist's head is as it was"
+
+
 def test_fbx_in_centimetres_with_shape_keys(capture):
     pytest.importorskip("ufbx")
     folder = deliver(capture, preset="unreal")

@@ -41,7 +41,8 @@ class Format:
 
 @dataclass(frozen=True)
 class Preset:
-    """A target. `hint` says in one sentence how it is brought in there. Y is up in every format but USD, which says its own axis."""
+    """A target. `hint` says in one sentence how it is brought in there; `open_eyes`: it wants the head with its lids open, and no shape keys. Y is up in every
+    format but USD, which says its own axis."""
 
     title: str
     hint: str
@@ -51,6 +52,7 @@ class Preset:
     pictures: str
     numbered: bool
     maps: tuple[Picture, ...]
+    open_eyes: bool = False
 
 
 _GLTF = (
@@ -79,9 +81,10 @@ PRESETS = {
             Picture("{name}_specular_level", ("level",)),
         )),
     "metahuman": Preset(
-        "MetaHuman from Mesh", "Import it as a static mesh for a MetaHuman Identity, which wants to see open eyes.", "fbx", "cm", "directx", "png8", False, (
+        "MetaHuman from Mesh", "Import it as a static mesh for a MetaHuman Identity: the head's eyes are open, as that wants them, and it has no shape keys.",
+        "fbx", "cm", "directx", "png8", False, (
             Picture("T_{name}_Color", ALBEDO, COLOUR, "base_color"),
-        )),
+        ), open_eyes=True),
     "unreal": Preset(
         "Unreal", "Leave Flip Green Channel off; switch sRGB off for all maps but BaseColor.", "fbx", "cm", "directx", "png8", False, (
             Picture("T_{name}_BaseColor", ALBEDO, COLOUR, "base_color"),

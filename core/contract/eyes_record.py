@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 from .capture import Capture
 from .files import write_json
@@ -45,9 +46,9 @@ def read_eyes(capture: Capture) -> tuple[Eyeball, Eyeball]:
         raise Problem(f"{capture.eyes} cannot be read ({error}).", "Run the stage registration again.") from error
 
 
-def write_irises(capture: Capture, left: Colour, right: Colour) -> None:
+def write_irises(path: Path, left: Colour, right: Colour) -> None:
     """The irises' linear albedo, beside the maps that it belongs to."""
-    write_json(capture.irises, dict(zip(SIDES, (left, right), strict=True)))
+    write_json(path, dict(zip(SIDES, (left, right), strict=True)))
 
 
 def read_irises(capture: Capture) -> tuple[Colour, Colour] | None:

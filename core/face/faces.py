@@ -23,6 +23,10 @@ RIGHT_EYE, LEFT_EYE = (33, 133), (362, 263)
 BROW, CHIN, NOSE = 9, 152, 1
 EYE_CROP = 2.3
 """Side of the square that the eye network is shown, in distances between the eye's corners."""
+NEAR_DEG, FAR_DEG = 50.0, 25.0
+"""How far the head may be turned for the marks of the eye on the near side of the nose to hold, and of the one beyond it."""
+AS_OPEN = 0.3
+"""Share by which an eye's opening may differ from its usual one: a blink, or a look down, beyond."""
 DATA_FILES = ("weights/face_nets/face_detection_short_range.tflite", "weights/face_nets/face_landmark.tflite",
               "weights/face_nets/iris_landmark.tflite", "weights/face_nets/selfie_segmentation.tflite")
 _SHORT_RANGE, _LANDMARK, _EYE, _SEGMENTATION = (Path(__file__).resolve().parents[1] / name for name in DATA_FILES)
@@ -64,6 +68,10 @@ class Eye:
         """Height over width between the lids."""
         width = np.linalg.norm(self.upper[-1] - self.upper[0])
         return float(np.linalg.norm(self.upper[3:6] - self.lower[3:6], axis=1).mean() / max(width, 1e-6))
+
+    def is_open_as(self, usual: float) -> bool:
+        """Whether it is about as open as an eye of this `opening`."""
+        return abs(self.opening / usual - 1) < AS_OPEN
 
     def scaled(self, scale: np.ndarray) -> Eye:
         """The same eye in the picture at another size; scale [2]: new over old width and height, nearly alike."""
@@ -112,6 +120,12 @@ def eye_openness(srgb: np.ndarray, face: Face) -> tuple[float, float]:
     in front. From the eye network: the face mesh calls closed lids half open."""
     right, left = find_eyes(srgb, face)
     return right.opening, left.opening
+
+
+def shows_eye(yaw_deg: float, side: int) -> bool:
+    """Whether marks of the left (0) or the right (1) eye hold in a picture of a head turned by so much."""
+    away = yaw_deg if side == 0 else -yaw_deg  # positive: the eye is on the far side
+    return -NEAR_DEG < away < FAR_DEG
 
 
 def find_eyes(srgb: np.ndarray, face: Face) -> tuple[Eye, Eye]:

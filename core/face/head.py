@@ -25,6 +25,9 @@ SHORTEST = 1e-9
 class Head:
     """A head in the world (metres), whatever its topology; what needs UVs takes for granted that `mesh` has them."""
 
+    eyes_open = False
+    """Whether the lids are open as they were filmed: then the vertices are those of lids.OpenHead."""
+
     def __init__(self, mesh: Mesh, before: Mesh | None = None):
         """before: all that light and views meet on their way to the mesh, itself included, where that is more: sockets and eyeballs."""
         self.mesh = mesh
@@ -124,7 +127,7 @@ def read_filmed_head(capture: Capture) -> Head:
 class _Filmed(Head):
     """The built-in head, its triangles parted between the lids."""
 
-    built_in = True
+    built_in = eyes_open = True
 
 
 def _shared(array: np.ndarray) -> np.ndarray:

@@ -111,6 +111,12 @@ def _shared_neighbour(faces: np.ndarray, upper: int, lower: int) -> int:
     return corner
 
 
+def edges(vertices: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
+    """The upper and the lower edge of the left (0) or the right lids of an open head's vertices, from the outer corner to the inner one [N, 3]."""
+    outer, inner = corners()[side]
+    return tuple(vertices[[outer, *rim[::-1], inner]] for rim in _asset().rims[side])
+
+
 def rows_of_lid(side: int, lid: int) -> np.ndarray:
     """The vertices of an open head [N] that move with the upper (0) or the lower (1) lid of the left (0) or the right eye."""
     unit, head = _asset(), template.load()

@@ -8,13 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..face.faces import Eye
+from ..face.faces import Eye, shows_eye
 from ..geometry.views import View
 
-NEAR_DEG, FAR_DEG = 50.0, 25.0
-"""How far the head may be turned for the marks of the eye on the near side of the nose to hold, and of the one beyond it."""
-USUAL = 0.3
-"""Share by which an eye's opening may differ from its usual one: a blink, or a look down, beyond."""
 LEAST_VIEWS, LEAST_DEG = 2, 8.0
 """So many views, so far apart, lift a mark."""
 ROUNDS = 10
@@ -41,13 +37,9 @@ class Rims:
 
 def usable(seen: list[tuple[float, Eye]], side: int) -> list[int]:
     """Which sights (yaw of the head in degrees, eye) of the left (0) or right (1) eye hold: it is not beyond the nose, and as open as it usually is."""
-    turned = np.array([yaw if side == 0 else -yaw for yaw, _ in seen])  # positive: the eye is on the far side
-    opening = np.array([eye.opening for _, eye in seen])
-    there = (turned < FAR_DEG) & (turned > -NEAR_DEG)
-    if not there.any():
-        return []
-    usual = np.median(opening[there])
-    return np.flatnonzero(there & (np.abs(opening / usual - 1) < USUAL)).tolist()
+    there = [i for i, (yaw, _) in enumerate(seen) if shows_eye(yaw, side)]
+    usual = float(np.median([seen[i][1].opening for i in there])) if there else 0.0
+    return [i for i in there if seen[i][1].is_open_as(usual)]
 
 
 def lift(views: list[View], eyes: list[Eye]) -> Rims | None:

@@ -22,7 +22,7 @@ from ..contract.messages import Reporter
 from ..contract.settings import Settings, result_settings
 from ..face.head import read_filmed_head
 from ..imaging import images
-from . import checkpoint, comparison, drawing, initial, layout, maps
+from . import checkpoint, comparison, drawing, initial, iris, layout, maps
 from .checkpoint import Solution
 from .confidence import spread
 from .draft import restored
@@ -70,6 +70,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     cell = FACE_CROP / options.grid_cells * REFERENCE / evidence.extent.side
     part = solve_edited(capture, head, settings, recipe, prior, evidence, cell, report) if settings.edited_part and elsewhere is None else None
     if part is not None:
+        iris.measure(capture, head, part[0].diffuse, report)
         _leave_figures(capture, evidence, *part, report)
         return
     conditions = mask_edit.conditions(capture, settings)
@@ -101,6 +102,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     result, found = _finished(denoiser, state, evidence, start, recipe, settings.seed, report)
     delivered = result if elsewhere is None else elsewhere.returned(result, known, state.lights, start.exposure, start.tone)
     maps.write(capture, delivered, found, conditions)
+    iris.measure(capture, head, delivered.diffuse, report)
     comparison.write(capture, known, delivered.diffuse)
     maps.write_preview(capture, state, seen, report)
     _leave_figures(capture, evidence, result, start.tone, report)

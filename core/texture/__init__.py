@@ -26,6 +26,7 @@ from ..geometry.views import View, read_views
 from ..imaging import images
 from .align import align
 from .blend import bands_of, blend, equalise, robust_weights
+from .blinks import leave_out_blinks
 from .detail import fine_detail
 from .fill import fill
 from .filmed import filmed
@@ -89,6 +90,7 @@ def observe_all(capture: Capture, head: Head, size: int, report: Reporter) -> tu
     for i, (view, path) in enumerate(views):
         report.progress(i, len(views) + 6, f"projecting {view.name}")
         observations.append(observe(view, _delit(path, view), surface, frames[view.name].sharpness / best))
+    report.figure("blinks", len(leave_out_blinks(capture, observations, surface, report)))
     return observations, surface
 
 

@@ -13,7 +13,7 @@ from ...core.contract.messages import Problem
 from ...core.worker import read_only
 from .. import captures, jobs, properties
 from ..base_operator import BaseOperator, Dialog
-from . import files, waiting
+from . import files, stand, waiting
 
 
 class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
@@ -37,6 +37,7 @@ class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
         item = captures.require(context)
         plan, root = planned(context), captures.root(item)
         delivery_plan.check_target(plan)
+        stand.require_eyes(plan, captures.head(context, item))
         chosen = {**properties.values(item)["deliver"], "roughness": roughness(captures.head(context, item)), "whole": False}
         until_it_ends = ExitStack()
         at = until_it_ends.enter_context(read_only.stand_in(captures.folder(item), chosen["folder"]))

@@ -12,9 +12,11 @@ from math import floor
 from pathlib import Path
 
 import bpy
+import numpy as np
 from mathutils import Matrix
 
 from ...core.contract.delivery_plan import PACKING, Plan
+from ...core.contract.messages import Problem
 from .. import colours, head
 
 SCENE = "WildCap Delivery"
@@ -23,6 +25,7 @@ FACTORS = {"m": 1.0, "cm": 100.0}
 LINKED = {".glb": ("base_color", "normal"), ".gltf": ("base_color", "normal"), ".usdc": ("base_color", "normal", "roughness"),
           ".fbx": ("base_color", "normal", "roughness", "specular"), ".obj": ("base_color", "normal", "roughness", "specular")}
 """What each format's exporter writes as it is. glTF's would make new pictures of roughness and specular."""
+LIDS = ("eyesOpenLeft", "eyesOpenRight")
 SOCKETS = {"base_color": "Base Color", "roughness": "Roughness", "specular": "Specular IOR Level"}
 
 
@@ -39,6 +42,8 @@ def standing(context, plan: Plan, source: bpy.types.Object | Path) -> Iterator[b
         mesh = source.data.copy() if isinstance(source, bpy.types.Object) else head.read_mesh_file(context, source)
         obj = bpy.data.objects.new(plan.name, mesh)
         mesh.name = plan.name
+        if plan.what == "head" and plan.preset.open_eyes:
+            _open_eyes(obj)
         _at_rest(mesh)
         mesh.transform(Matrix.Scale(FACTORS[plan.unit], 4), shape_keys=True)
         _materials(mesh, plan, packing)
@@ -53,6 +58,35 @@ def standing(context, plan: Plan, source: bpy.types.Object | Path) -> Iterator[b
             kept = getattr(bpy.data, name)
             for thing in set(kept) - before[name]:
                 kept.remove(thing)
+
+
+def require_eyes(plan: Plan, obj: bpy.types.Object | None) -> None:
+    """Raises Problem where the target wants open eyes and the head has lids that cannot open."""
+    if plan.what == "head" and plan.preset.open_eyes and (obj is None or not _lids(obj.data)):
+        raise Problem(f"{plan.preset.title} wants a head with open eyes, and this one's lids are closed.",
+                      "Click Add Face Units, under Face Units, and then Deliver again.")
+
+
+def _lids(mesh) -> list:
+    """The shape keys that open the lids: those that the head's face units bring along."""
+    return [mesh.shape_keys.key_blocks[name] for name in LIDS if name in mesh.shape_keys.key_blocks] if mesh.shape_keys is not None else []
+
+
+def _open_eyes(obj) -> None:
+    """The head of an object with its lids open for good, and without shape keys."""
+    count = 3 * len(obj.data.vertices)
+    rest, place = np.empty(count, np.float32), np.empty(count, np.float32)
+    obj.data.shape_keys.reference_key.data.foreach_get("co", rest)
+    opened = rest.copy()
+    for key in _lids(obj.data):
+        key.data.foreach_get("co", place)
+        opened += place - rest
+    keys = obj.data.shape_keys
+    obj.shape_key_clear()
+    if keys in set(bpy.data.shape_keys):  # nobody's any more, and Blender keeps it until the file is read again
+        bpy.data.batch_remove([keys])
+    obj.data.vertices.foreach_set("co", opened)
+    obj.data.update()
 
 
 def _at_rest(mesh) -> None:

@@ -50,6 +50,8 @@ def finish(context, item) -> Path:
     try:
         mesh = captures.require_head(context, item) if plan.what == "head" else delivery_plan.needs(captures.folder(item), plan.what)
         files.check(plan.format.suffix)
+        if plan.what == "head":
+            stand.require_eyes(plan, mesh)
         with stand.standing(context, plan, mesh):
             files.export(plan)
         (plan.staged / PACKING).unlink()

@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Open eyes of filmed people against their truth: edges of the lids, eyeballs, gaze and the colour of the irises.
+
+    python -m benchmarks.open_eyes FOLDER [--only NAME ...] [--json OUT.json]
+
+FOLDER/NAME is a person of benchmarks/likenesses.py, filmed with open eyes, and FOLDER/NAME.wildcap what `core run` made of the film, up to the solve where the
+colour is asked for. The truth is laid where the capture's cameras see the face as it was filmed (benchmarks/cameras_against_truth.py). Distances in mm: from
+the fitted edges of the lids to the true ones, mean and largest of an eye's two; between the centres of the eyeballs. The iris' true colour is the median of the
+eye's picture between pupil and rim; delta E is CIE 2000.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+from skimage.color import deltaE_ciede2000, rgb2lab
+
+from core.contract.capture import Capture
+from core.contract.eyes_record import SIDES, read_eyes, read_irises
+from core.face import lids
+from core.geometry import meshes
+from core.imaging import images
+from core.solve.iris import RING
+from core.synthetic.people import eyes
+from core.synthetic.people.figure import make_figure
+
+from .cameras_against_truth import place_truth
+from .figures import markdown, write
+from .likenesses import HELD_BACK, LIKENESSES
+
+COLUMNS = ("rim, mm", "rim's worst, mm", "centre, mm", "radius, mm", "gaze, degrees", "iris radius, mm", "iris, delta E", "openness", "true openness")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--only", nargs="+", choices=[person.name for person in (*LIKENESSES, *HELD_BACK)], default=[person.name for person in LIKENESSES])
+    parser.add_argument("--json", type=Path)
+    asked = parser.parse_args()
+    rows = {}
+    for name in asked.only:
+        capture = Capture(asked.folder.resolve() / f"{name}.wildcap")
+        if not capture.eyes.is_file():
+            print(f"{name}: the eyes were taken for closed")
+            continue
+        for side, row in zip(SIDES, compare(capture, asked.folder.resolve() / name), strict=True):
+            rows[f"{name}, {side}"] = row
+    print(markdown(["eye", *COLUMNS], [[name, *(None if row[column] is None else f"{row[column]:.2f}" for column in COLUMNS)] for name, row in rows.items()]))
+    if asked.json:
+        write(asked.json, "open_eyes", "python -m benchmarks.open_eyes FOLDER", {"rows": rows}, keep=True)
+
+
+def compare(capture: Capture, truth: Path) -> list[dict]:
+    """The figures of the left and of the right eye."""
+    (scale, turn, shift), _ = place_truth(capture, truth)
+    person = json.loads((truth / "cameras.json").read_text(encoding="utf-8"))["person"]
+    closed = meshes.read_obj(truth / "head.obj")
+    true = lids.open_lids(closed, person["openness"], np.array(person["gaze"]))
+    found, opened, colours = read_eyes(capture), meshes.read_obj(capture.head_open).vertices, read_irises(capture)
+    rows = []
+    for side, (ball, eye) in enumerate(zip(true.balls, found, strict=True)):
+        rims = [_off(opened[rim], _curve(true, side, lid) @ (scale * turn).T + shift) for lid, rim in enumerate(true.rims[side])]
+        centre = scale * turn @ ball.centre + shift
+        gaze = np.degrees(np.arccos(np.clip(turn @ ball.gaze @ np.array(eye.gaze), -1, 1)))
+        rows.append(dict(zip(COLUMNS, map(_plain, (
+            1e3 * np.mean([off.mean() for off in rims]), 1e3 * max(off.max() for off in rims), 1e3 * np.linalg.norm(centre - eye.centre),
+            1e3 * (eye.radius - scale * ball.radius), gaze, 1e3 * eye.iris_radius / scale - eyes.IRIS_MM,
+            None if colours is None else apart(np.array(colours[side]), true_iris(person, ball.radius)), eye.openness, person["openness"])), strict=True)))
+    return rows
+
+
+def true_iris(person: dict, radius: float) -> np.ndarray:
+    """Linear albedo [3] between pupil and rim, the median of the eyes' picture."""
+    picture = make_figure(person["seed"], 64).eye
+    size = len(picture)
+    y, x = (np.mgrid[0:size, 0:size] + 0.5) / size - 0.5
+    angle = np.pi * (2 * np.hypot(x, y)).clip(0, 1) ** (1 / 0.6)
+    share = np.sin(angle) * 1000 * radius / eyes.IRIS_MM
+    return np.median(picture[(share > RING[0]) & (share < RING[-1]) & (angle < 1)], axis=0)
+
+
+def apart(a: np.ndarray, b: np.ndarray) -> float:
+    """CIE delta E 2000 of two linear colours."""
+    lab = [rgb2lab(images.linear_to_srgb(np.float32(colour)).reshape(1, 1, 3)) for colour in (a, b)]
+    return float(deltaE_ciede2000(*lab)[0, 0])
+
+
+def _curve(opened: lids.OpenHead, side: int, lid: int) -> np.ndarray:
+    """The true edge of a lid from corner to corner [N, 3], finely."""
+    outer, inner = lids.corners()[side]
+    points = opened.skin.vertices[[inner, *opened.rims[side][lid], outer]]
+    return np.concatenate([a + (b - a) * np.linspace(0, 1, 20)[:, None] for a, b in zip(points, points[1:], strict=False)])
+
+
+def _off(points: np.ndarray, curve: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(points[:, None] - curve[None], axis=2).min(1)
+
+
+def _plain(value: float | None) -> float | None:
+    return None if value is None else round(float(value), 3)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,82 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames in which somebody blinks, among others: around that eye the texture does without them, and elsewhere it does not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("OpenImageIO")
+
+from core.contract.capture import Capture  # noqa: E402
+from core.contract.eyes_record import write_eyes  # noqa: E402
+from core.contract.messages import Reporter  # noqa: E402
+from core.face import faces, lids  # noqa: E402
+from core.face.head import read_filmed_head, read_head  # noqa: E402
+from core.geometry import meshes  # noqa: E402
+from core.imaging import images  # noqa: E402
+from core.registration import eyeballs  # noqa: E402
+from core.synthetic.painted_head import camera  # noqa: E402
+from core.synthetic.people import shape  # noqa: E402
+from core.texture import blinks  # noqa: E402
+from core.texture.projection import observe  # noqa: E402
+
+SEED, AZIMUTHS, SIZE = 4, (-20, -8, 8, 20, 70), 128
+
+
+@pytest.fixture
+def filmed(tmp_path, monkeypatch):
+    """A capture with open eyes, five views of it, and what would be found in each: the second shuts the left eye, and the last is a profile."""
+    capture = Capture(tmp_path / "face.wildcap")
+    capture.claim()
+    closed = shape.person_mesh(SEED)
+    opened = lids.open_lids(closed, 0.9, np.zeros(2))
+    meshes.write_obj(capture.head, closed)
+    meshes.write_obj(capture.head_open, opened.skin)
+    write_eyes(capture, *eyeballs.OpenEyes(closed, opened, (0.9, 0.9), np.full(2, 0.0059), (4, 4)).records())
+    head = read_filmed_head(capture)
+    surface, found, observations = head.unfold(SIZE), {}, []
+    for i, azimuth in enumerate(AZIMUTHS):
+        view = replace(camera(azimuth), name=f"{i}.png", path=tmp_path / f"{i}.png")
+        images.write_srgb(view.path, np.full((view.height, view.width, 3), 0.5, np.float32))
+        seen = [faces.Eye(*(view.project(edge[np.linspace(0, len(edge) - 1, 9).round().astype(int)])[0] for edge in lids.edges(head.mesh.vertices, side)),
+                          np.zeros(2), 0.0) for side in (0, 1)]
+        if i == 1:
+            seen[0] = replace(seen[0], upper=seen[0].lower + 0.3 * (seen[0].upper - seen[0].lower))
+        if i == 4:
+            seen[1] = replace(seen[1], upper=seen[1].lower)
+        found[view.name] = (-azimuth, *seen)
+        observations.append(observe(view, np.full((view.height, view.width, 3), 0.5, np.float32), surface, 1.0))
+    monkeypatch.setattr(blinks, "_eyes_in", lambda view: found[view.name])
+    return capture, observations, surface
+
+
+def around(surface, capture, side):
+    from core.contract.eyes_record import read_eyes
+
+    ball = read_eyes(capture)[side]
+    return surface.spread((np.linalg.norm(surface.points - ball.centre, axis=1) < 1.4 * ball.radius).astype(np.float32)) > 0
+
+
+def test_a_blink_is_left_out_around_its_eye_alone(filmed):
+    capture, observations, surface = filmed
+    before = [o.weight.copy() for o in observations]
+    assert blinks.leave_out_blinks(capture, observations, surface, Reporter("texture")) == ["1.png"]
+    left, right = (around(surface, capture, side) for side in (0, 1))
+    assert before[1][left].max() > 0 and observations[1].weight[left].max() == 0 and observations[1].quality[left].max() == 0
+    assert (observations[1].weight[right] == before[1][right]).all() and (observations[1].weight > 0).sum() > 0.8 * (before[1] > 0).sum()
+    for i in (0, 2, 3, 4):
+        assert (observations[i].weight == before[i]).all()
+
+
+def test_an_eye_keeps_what_it_has_where_no_other_view_shows_it(filmed):
+    capture, observations, surface = filmed
+    only = [observations[0], observations[1], replace(observations[2], weight=np.zeros_like(observations[2].weight))]
+    only[0] = replace(only[0], weight=np.zeros_like(only[0].weight))
+    assert blinks.leave_out_blinks(capture, only, surface, Reporter("texture")) == []
+
+
+def test_closed_eyes_do_not_blink(filmed):
+    capture, observations, _ = filmed
+    assert blinks.leave_out_blinks(capture, observations, read_head(capture).unfold(SIZE), Reporter("texture")) == []

@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The colour of irises, measured in pictures of a head whose irises are known, under coloured light, with a catchlight and a blink."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from skimage.color import deltaE_ciede2000, rgb2lab
+
+pytest.importorskip("OpenImageIO")
+
+from core.contract.eyes_record import Eyeball  # noqa: E402
+from core.contract.messages import Reporter  # noqa: E402
+from core.face import lids  # noqa: E402
+from core.face.head import Head  # noqa: E402
+from core.geometry import meshes, raster  # noqa: E402
+from core.imaging import images  # noqa: E402
+from core.solve import iris  # noqa: E402
+from core.synthetic.painted_head import camera  # noqa: E402
+from core.synthetic.people import eyes, shape  # noqa: E402
+
+SEED, SKIN = 4, np.array([0.42, 0.26, 0.19])
+AZIMUTHS = (-24, -12, 0, 12, 24)
+
+
+class Painted:
+    """A head of one tone with open eyes, seen by five cameras."""
+
+    def __init__(self, folder, colour, tone=SKIN, lit=(1.0, 0.8, 0.5), blink: int | None = None):
+        closed = shape.person_mesh(SEED)
+        self.opened = lids.open_lids(closed, 0.9, np.zeros(2))
+        self.picture = eyes.eye_picture(np.array(colour), self.opened.balls[0].radius, SEED, 512)
+        self.albedo = np.tile(np.float32(tone), (256, 256, 1))
+        self.head = self._filmed(closed, self.opened)
+        shut = self._filmed(closed, lids.open_lids(closed, 0.0, np.zeros(2)))
+        views = []
+        for i, azimuth in enumerate(AZIMUTHS):
+            view = replace(camera(azimuth, 0.03, scale=2.5), name=f"{i}.png", path=folder / f"{i}.png")
+            images.write_srgb(view.path, self._photograph(view, shut if i == blink else self.head, np.array(lit)))
+            views.append(view)
+        self.views = views
+
+    @staticmethod
+    def _filmed(closed, opened) -> Head:
+        count = len(closed.faces)
+        skin = replace(closed, vertices=opened.skin.vertices, faces=opened.skin.faces[:count])
+        head = Head(skin, meshes.joined([opened.skin, *(ball.mesh for ball in opened.balls)]))
+        head.built_in = True
+        return head
+
+    def _photograph(self, view, head, lit) -> np.ndarray:
+        whole = head.caster.mesh
+        face, bary, _ = raster.render_view(head.caster, view)
+        normal = raster.interpolate(meshes.vertex_normals(whole), whole.faces, face, bary)
+        colour = np.tile(self.albedo[0, 0], (*face.shape, 1))
+        first = len(self.opened.skin.faces)
+        for ball in self.opened.balls:
+            of_ball = (face >= first) & (face < first + len(ball.mesh.faces))
+            corners = ball.mesh.uvs[ball.mesh.faces[face[of_ball] - first]]
+            uv = (corners * bary[of_ball][:, :, None]).sum(1)
+            colour[of_ball] = raster.sample(self.picture, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512)
+            first += len(ball.mesh.faces)
+        shade = 0.5 + 0.4 * np.clip(normal @ np.array([0.3, -0.9, 0.3]), 0, 1)
+        picture = colour * shade[..., None] * lit
+        for ball in self.opened.balls:  # a window in the cornea
+            x, y = view.project((ball.centre + ball.radius * ball.gaze + [0.0015, 0, 0.0015])[None])[0][0].astype(int)
+            picture[y - 3:y + 3, x - 3:x + 3] = 1
+        return images.linear_to_srgb((picture * (face >= 0)[..., None]).astype(np.float32))
+
+    def eyeball(self, side: int) -> Eyeball:
+        ball = self.opened.balls[side]
+        return Eyeball(tuple(ball.centre), ball.radius, tuple(ball.gaze), 0.9, eyes.IRIS_MM / 1000, 5)
+
+    def found(self, side: int):
+        return iris.iris_colour(self.views, self.head, self.opened.balls[side], self.eyeball(side), self.albedo, Reporter("solve"))
+
+    def true(self) -> np.ndarray:
+        """The median of the picture between pupil and rim."""
+        y, x = (np.mgrid[0:512, 0:512] + 0.5) / 512 - 0.5
+        angle = np.pi * (2 * np.hypot(x, y)).clip(0, 1) ** (1 / 0.6)
+        share = np.sin(angle) * self.opened.balls[0].radius * 1000 / eyes.IRIS_MM
+        return np.median(self.picture[(share > 0.55) & (share < 0.85) & (angle < 1)], axis=0)
+
+
+def apart(found, true) -> float:
+    return float(deltaE_ciede2000(*(rgb2lab(images.linear_to_srgb(np.float32(v)).reshape(1, 1, 3)) for v in (found, true)))[0, 0])
+
+
+@pytest.mark.parametrize("colour", [(0.05, 0.024, 0.010), (0.048, 0.078, 0.115)])
+def test_the_colour_of_an_iris_is_found_under_warm_light(tmp_path, colour):
+    person = Painted(tmp_path, colour)
+    for side in (0, 1):
+        assert apart(person.found(side), person.true()) < 6
+
+
+def test_a_blink_and_another_skin_change_little(tmp_path):
+    person = Painted(tmp_path, (0.05, 0.06, 0.07), tone=np.array([0.06, 0.035, 0.022]), lit=(0.9, 0.9, 0.9), blink=2)
+    assert apart(person.found(0), person.true()) < 6
+
+
+def test_an_iris_that_no_frame_faces_has_no_colour(tmp_path):
+    person = Painted(tmp_path, (0.05, 0.06, 0.07))
+    behind = replace(person.opened.balls[0], gaze=np.array([0, 1.0, 0]))
+    assert iris.iris_colour(person.views, person.head, behind, person.eyeball(0), person.albedo, Reporter("solve")) is None
+    unseen = replace(person.eyeball(0), iris_radius=0.0)
+    assert iris.iris_colour(person.views, person.head, person.opened.balls[0], unseen, person.albedo, Reporter("solve")) is None
