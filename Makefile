@@ -15,7 +15,7 @@ RELEASE := $(shell sed -n 's/^version = "\(.*\)"/\1/p' blender_manifest.toml)
 BLENDERS ?= 4.2.0 5.0.1
 
 # What of the tests needs Blender.
-IN_BLENDER = addon captures setup evidence choices eyedropper white_card paint paint_session operators job_life relight skin_material skin_kept reel next_step refusals draw translations sending acting updates delete_face save_report
+IN_BLENDER = addon captures setup evidence choices eyedropper white_card paint paint_session operators job_life relight skin_material skin_kept reel make next_step refusals draw translations sending acting updates delete_face save_report
 
 .PHONY: demo test results test-blenders test-gui zip site clean
 

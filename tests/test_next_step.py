@@ -36,12 +36,14 @@ def test_the_chain_from_nothing_to_a_picture(step):
         step(done=(*BEFORE, "solve"), head=5.0, has_mask=True, maps=9.0, **head, **maps),
     ]
     assert [s.operator.split(".")[1] for s in chain] == [
-        "install_solver", "choose_video", "reconstruct", "bring_in_head", "paint_mask", "solve", "assemble_material", "render"]
+        "install_solver", "choose_video", "make_my_head", "bring_in_head", "paint_mask", "solve", "assemble_material", "render"]
     assert all(s.state and s.label for s in chain)
+    assert {s.operator.split(".")[1]: s.other[1].split(".")[1] for s in chain if s.other} == {"make_my_head": "reconstruct", "paint_mask": "accept_proposal"}
 
 
 def test_a_cancelled_reconstruction_continues(step):
     assert step(done=("frames", "cameras")).label == "Continue Reconstruction"
+    assert step(done=("frames", "cameras")).other[0] == "Make My Head"
     assert "Scan" in step(done=("frames", "cameras")).state
 
 

@@ -78,7 +78,7 @@ def test_a_film_replaces_the_frames_and_one_that_is_stopped_leaves_the_last(addo
 
 
 def test_the_command_line_renders_and_says_what_is_wrong(addon, capture, capsys):
-    execute = addon("relight.command").execute
+    execute = addon("terminal").execute
     assert execute(["turntable", str(capture), "--frames", "2", "--turns", "light", "--resolution", "16", "--samples", "1"]) == 0
     assert str(capture / "renders" / "turntable") in capsys.readouterr().out
     assert execute(["relight", str(capture), "moon"]) == 1

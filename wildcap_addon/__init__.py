@@ -5,9 +5,30 @@
 Rooms, in the order in which they register; each has `register` and `unregister`, and they leave in reverse.
 """
 
-from . import acting, capture, deliver, frame_icons, jobs, links, paint, panel, preferences, properties, reconstruct, relight, setup, solve, status, timings
+from . import (
+    acting,
+    capture,
+    deliver,
+    frame_icons,
+    jobs,
+    links,
+    make,
+    paint,
+    panel,
+    preferences,
+    properties,
+    reconstruct,
+    relight,
+    setup,
+    solve,
+    status,
+    terminal,
+    timings,
+)
 
-ROOMS = (frame_icons, preferences, properties, panel, setup, capture, reconstruct, paint, solve, relight, acting, deliver, links, status, timings, jobs)
+ROOMS = (frame_icons, preferences, properties, panel, setup, capture, reconstruct, paint, solve, relight, make, acting, deliver, links, status, timings, jobs,
+         terminal)
+
 
 
 def register():

@@ -31,12 +31,14 @@ ROOT = Path(__file__).resolve().parent.parent  # the folder that holds core/, wh
 class Job:
     """A worker at a capture, and the last thing it said. `previews` counts the preview pictures so far."""
 
-    goal: str  # 'reconstruct', 'solve', 'install', or 'ask' for what is found out or tidied up in seconds
+    goal: str  # 'make', 'reconstruct', 'solve', 'install', or 'ask' for what is found out or tidied up in seconds
     worker: Worker | Task
     then: Callable[[], None] | None = None  # called when it ended well
     ended: Callable[[], None] | None = None  # called before that, however it ended
     well: bool = False
     on_preview: Callable[[str], None] | None = None  # called with the capture's folder when a preview is new, and when the job has ended
+    on_stage: Callable[[str], object] | None = None  # called with the name of each stage that is done, or was done before
+    planned: tuple[str, ...] = ()  # the stages that it goes through
     settings: Settings | None = None
     waiting: bool = False  # in line behind another capture's job
     figures: dict = field(default_factory=dict)  # of the stage that ended last
@@ -46,8 +48,18 @@ class Job:
     log: list[str] = field(default_factory=list)
 
 
+@dataclass(frozen=True)
+class Results:
+    """take(context, list item) is called in Object Mode when nobody is in the middle of a move, for as long as wanted(its folder) says that something waits."""
+
+    take: Callable
+    wanted: Callable[[str], bool]
+
+
 before_start: list[Callable[[], None]] = []
 """What rooms do before a worker reads a capture: the mask that is being painted is saved. May raise Problem, and then nothing starts."""
+on_results: list["Results"] = []
+"""What rooms do with new results of the active capture."""
 _jobs: dict[str, Job] = {}  # capture folder -> its job; '' -> the installation
 
 
@@ -68,7 +80,8 @@ def can_start(operator, context) -> bool:
 
 
 def start(item, goal: str, *, first: str | None = None, last: str | None = None, tool: str = "", then: Callable[[], None] | None = None,
-          ended: Callable[[], None] | None = None, on_preview: Callable[[str], None] | None = None, at: Capture | None = None, **shared) -> Job:
+          ended: Callable[[], None] | None = None, on_preview: Callable[[str], None] | None = None, on_stage: Callable[[str], object] | None = None,
+          at: Capture | None = None, **shared) -> Job:
     """Starts the stages from `first` (or from what is not fresh) to `last`, or one of core.contract.stages.TOOLS, with `shared` settings for this once;
     `at` is a capture that stands in for this one. Raises Problem when it cannot."""
     capture, root = at or captures.folder(item), captures.root(item)
@@ -82,7 +95,8 @@ def start(item, goal: str, *, first: str | None = None, last: str | None = None,
     path = write_job(capture, first=first, last=last, tool=tool, settings={**properties.values(item), **shared})
     settings = read_job(path).settings
     job = begin(root, goal, Worker(python, ROOT, path, capture.logs / "worker.log", preferences.worker_environment(settings.delight.delighter)), then)
-    job.on_preview, job.settings, job.ended = on_preview, settings, ended
+    job.on_preview, job.settings, job.ended, job.on_stage = on_preview, settings, ended, on_stage
+    job.planned = () if tool else stages.NAMES[stages.NAMES.index(first or stages.NAMES[0]):stages.NAMES.index(last or stages.NAMES[-1]) + 1]
     return job
 
 
@@ -167,6 +181,10 @@ def _hear(root: str, job: Job, message: messages.Message) -> None:
             job.log = [*job.log[-99:], message.text]
         case messages.StageDone():
             job.progress, job.figures = None, message.figures
+            if job.on_stage is not None:
+                job.on_stage(message.stage)
+            if not message.skipped:
+                timings.record_stage(message.stage, message.seconds)
             if message.stage == "solve" and not message.skipped and job.settings is not None and not any("Going on after" in line for line in job.log):
                 timings.record(job.settings, message.seconds)
         case messages.Done():
@@ -186,9 +204,15 @@ def _tick() -> float | None:
         running = bool(_jobs)
     if shown != _shown():  # a redraw of the tab takes time from the worker, and from whoever paints
         status.redraw()
-    if before - set(_jobs):
-        _bring_in_results()
-    return INTERVAL_S if running else None
+    ended = bool(before - set(_jobs))
+    if ended or _wanted():
+        _bring_in_results(ended)
+    return INTERVAL_S if running or _wanted() else None
+
+
+def _wanted() -> bool:
+    root = captures.root(captures.active(bpy.context))
+    return any(results.wanted(root) for results in on_results)
 
 
 def _shown() -> list[tuple]:
@@ -196,24 +220,31 @@ def _shown() -> list[tuple]:
     return [(root, job.waiting, job.progress, job.previews) for root, job in _jobs.items()]
 
 
-def _bring_in_results() -> None:
-    """A new head comes in at once if the artist is in Object Mode and not in the middle of a move; otherwise it waits for the next click."""
+def _bring_in_results(ended: bool) -> None:
+    """What is new comes in at once if the artist is in Object Mode and not in the middle of a move: a new head when a job has ended, and what rooms do with
+    results. Otherwise it waits."""
     window = next(iter(bpy.context.window_manager.windows), None)
     if window is None or window.modal_operators:
         return
     with bpy.context.temp_override(window=window):
-        status.refresh(bpy.context)
+        if ended:
+            status.refresh(bpy.context)
         item = captures.active(bpy.context)
-        if bpy.context.mode == 'OBJECT' and item is not None and captures.head(bpy.context, item) is None and captures.folder(item).head.is_file():
+        if bpy.context.mode != 'OBJECT' or item is None:
+            return
+        for results in on_results:
+            results.take(bpy.context, item)
+        if ended and captures.head(bpy.context, item) is None and captures.folder(item).head.is_file():
             bpy.ops.wildcap.bring_in_head('EXEC_DEFAULT', True)
 
 
 def eta(job: Job) -> str:
-    """What is left of the stage, in words; '' when unknown."""
+    """What is left of the stage, and of the whole where the next ones' times are known from before, in words; '' when unknown."""
     seconds = job.progress.eta_s if job.progress else None
-    if seconds is None:
-        return ""
-    return iface_("{} s left").format(f"{seconds:.0f}") if seconds < 90 else iface_("{} min left").format(f"{seconds / 60:.0f}")
+    words = "" if seconds is None else iface_("{} s left").format(f"{seconds:.0f}") if seconds < 90 else iface_("{} min left").format(f"{seconds / 60:.0f}")
+    later = job.planned[job.planned.index(job.stage) + 1:] if job.stage in job.planned else ()
+    ahead = timings.of_stages(later) if later and seconds is not None else None
+    return words if ahead is None else iface_("{}, about {} min in all").format(words, max(1, round((seconds + ahead) / 60)))
 
 
 def stage_label(job: Job) -> str:

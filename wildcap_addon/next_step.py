@@ -30,18 +30,20 @@ class Facts:
 
 @dataclass(frozen=True)
 class Step:
-    """One line of state, and the button below it (operator '' for none)."""
+    """One line of state, the large button below it (operator '' for none), and a small one for another way: (label, operator, icon)."""
 
     state: str
     label: str
     operator: str
     icon: str
+    other: tuple[str, str, str] = ()
 
 
 BEFORE_MASK = stages.NAMES[:stages.NAMES.index(stages.MASK_STAGE) + 1]
 SET_UP = Step("The solver is not set up on this machine.", "Install Solver", "wildcap.install_solver", 'IMPORT')
 ASK = Step("SwitchLight waits for your consent. Nothing was sent.", "Allow Sending", "wildcap.allow_sending", 'LOCKED')
-WORDS = {"reconstruct": "Reconstructing ...", "solve": "Solving ...",
+MAKE = ("Make My Head", "wildcap.make_my_head", 'USER')
+WORDS = {"make": "Making your head ...", "reconstruct": "Reconstructing ...", "solve": "Solving ...",
          "tool": "Looking at the texture ...", "deliver": "Writing the maps ...", "wait": "Waiting for the job of another face ...",
          "install": "Installing the solver ...", "ask": "One moment ..."}
 
@@ -75,7 +77,10 @@ def _step_of(facts: Facts, status: Status, translated: Callable[[str], str]) -> 
     if missing:
         begun = len(missing) < len(BEFORE_MASK)
         state = translated("Stopped before {}.").format(translated(stages.by_name(missing[0]).label)) if begun else "The video is chosen."
-        return Step(state, "Continue Reconstruction" if begun else "Reconstruct", "wildcap.reconstruct", 'MESH_MONKEY') if facts.has_python else SET_UP
+        by_hand = ("Continue Reconstruction" if begun else "Reconstruct", "wildcap.reconstruct", 'MESH_MONKEY')
+        if not facts.has_python:
+            return SET_UP
+        return Step(state, *by_hand, other=MAKE) if begun else Step(state, *MAKE, other=by_hand)
     if facts.head_time < status.head_time:
         return Step("The head is ready.", "Bring In Head", "wildcap.bring_in_head", 'IMPORT')
     solved = status.has_maps and status.stages["solve"] in (*FINISHED, "absent")
@@ -84,7 +89,8 @@ def _step_of(facts: Facts, status: Status, translated: Callable[[str], str]) -> 
         step = Step(words, "Continue Solving", "wildcap.solve", 'LIGHT')
         return step if facts.has_python else SET_UP
     if not solved and not status.has_mask:
-        return Step("Check the shadow mask, then Solve.", "Check Shadow Mask", "wildcap.paint_mask", 'BRUSH_DATA')
+        accept = ("Accept Proposal", "wildcap.accept_proposal", 'CHECKMARK') if facts.has_python else ()
+        return Step("Check the shadow mask, then Solve.", "Check Shadow Mask", "wildcap.paint_mask", 'BRUSH_DATA', accept)
     if not solved:
         state = "The mask or the settings changed since the last solve." if status.stages["solve"] == "stale" else "The shadow mask is painted."
         return Step(state, "Solve", "wildcap.solve", 'LIGHT') if facts.has_python else SET_UP

@@ -35,6 +35,9 @@ class WILDCAP_PT_main(WildcapPanel, bpy.types.Panel):
             row = layout.row()
             row.scale_y = 2.0
             row.operator(step.operator, text=step.label, icon=step.icon)
+        if step.other:
+            label, operator, icon = step.other
+            layout.operator(operator, text=label, icon=icon)
         if step == next_step.SET_UP:
             layout.operator("wildcap.use_python", icon='FILE_FOLDER')
         if item is None:

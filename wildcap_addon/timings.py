@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long a solve takes on this machine: learned from the last one that ran here, kept in the extension's user folder.
+"""How long stages take on this machine: learned from the last ones that ran here, kept in the extension's user folder.
 
-A sampling step costs in proportion to the map's texels, and twice as much with the gradient through the network.
+Of a solve by its settings: a sampling step costs in proportion to the map's texels, and twice as much with the gradient through the network. Of the others as
+they last took.
 """
 
 import contextlib
 import json
+from collections.abc import Iterable
 from pathlib import Path
 
 import bpy
@@ -18,6 +20,8 @@ from ..core.contract.settings import QUALITIES, Settings, preset
 from . import extension
 
 _rates: dict[str, float] = {}  # device -> seconds per million texels and step
+_stages: dict[str, float] = {}  # stage -> seconds it took the last time
+STAGES = "stages"
 
 
 def minutes(quality: str, device: str) -> float | None:
@@ -35,8 +39,23 @@ def record(settings: Settings, seconds: float) -> None:
     if settings.edited_part or settings.solve.recipe != "wildcap" or settings.solve.prior:
         return
     _rates[settings.compute_device] = seconds / work(settings)
+    _keep()
+
+
+def record_stage(name: str, seconds: float) -> None:
+    """Takes note of a stage that ran."""
+    _stages[name] = seconds
+    _keep()
+
+
+def of_stages(names: Iterable[str]) -> float | None:
+    """Seconds that these stages took together the last time; None where one of them never ran here."""
+    return sum(_stages[name] for name in names) if all(name in _stages for name in names) else None
+
+
+def _keep() -> None:
     with contextlib.suppress(Problem, OSError, ValueError):  # a folder that cannot be written: it is learned again the next time
-        write_json(_file(), _rates)
+        write_json(_file(), {**_rates, STAGES: _stages})
 
 
 def work(settings: Settings) -> float:
@@ -54,10 +73,13 @@ def _file() -> Path:
 
 
 def register():
-    _rates.clear()
+    unregister()
     with contextlib.suppress(OSError, ValueError, TypeError, AttributeError):  # none yet, or not ours
-        _rates.update({str(device): float(rate) for device, rate in json.loads(_file().read_text(encoding="utf-8")).items()})
+        kept = json.loads(_file().read_text(encoding="utf-8"))
+        _stages.update({str(name): float(seconds) for name, seconds in kept.pop(STAGES, {}).items()})
+        _rates.update({str(device): float(rate) for device, rate in kept.items()})
 
 
 def unregister():
     _rates.clear()
+    _stages.clear()

@@ -4,15 +4,18 @@
 
 import bpy
 
-from . import operators, panel, waiting
+from .. import terminal
+from . import command, operators, panel, waiting
 
 _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *panel.CLASSES))
 
 
 def register():
     _register()
+    terminal.commands.extend(command.COMMANDS)
 
 
 def unregister():
+    terminal.forget(command.COMMANDS)
     waiting.forget()
     _unregister()

@@ -4,6 +4,7 @@
 
 import bpy
 
+from .. import terminal
 from . import command, compare, operators, output, panel
 
 _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *compare.CLASSES, *panel.CLASSES))
@@ -12,10 +13,10 @@ _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES,
 def register():
     _register()
     output.register()
-    command.register()
+    terminal.commands.extend(command.COMMANDS)
 
 
 def unregister():
-    command.unregister()
+    terminal.forget(command.COMMANDS)
     output.unregister()
     _unregister()

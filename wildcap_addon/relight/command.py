@@ -1,67 +1,52 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The renders of a capture from a terminal, without a window:
+"""The renders of a capture as words of the terminal: relight, contact_sheet, turntable."""
 
-    blender --command wildcap contact_sheet my_face.wildcap
-    blender --command wildcap relight my_face.wildcap three_point sunset --resolution 1024
-    blender --command wildcap turntable my_face.wildcap --light overcast --turns light --film
-"""
-
-import argparse
-import sys
 from pathlib import Path
 
-import bpy
-
-from ...core.contract.messages import Problem
+from ..terminal import Command
 from . import headless
 
-NAME = "wildcap"
-_handle = None
+
+def _relight(asked) -> list[Path]:
+    return headless.render_relit(asked.capture, asked.lights or headless.ALL, resolution=asked.resolution, samples=asked.samples)
 
 
-def execute(words: list[str]) -> int:
-    """Renders what the words ask for and prints the files. Returns 0, or 1 after telling what is wrong."""
-    asked = parser().parse_args(words)
-    size = {"resolution": asked.resolution, "samples": asked.samples}
-    try:
-        if asked.what == "relight":
-            made = headless.render_relit(asked.capture, asked.lights or headless.ALL, **size)
-        elif asked.what == "contact_sheet":
-            made = [headless.render_contact_sheet(asked.capture, view=asked.view, **size)]
-        else:
-            made = [headless.render_turntable(asked.capture, asked.light, asked.turns.upper(), asked.frames, asked.film, **size)]
-    except Problem as problem:
-        print(f"{problem.problem} {problem.remedy}", file=sys.stderr)
-        return 1
-    print(*made, sep="\n")
-    return 0
+def _contact_sheet(asked) -> list[Path]:
+    return [headless.render_contact_sheet(asked.capture, view=asked.view, resolution=asked.resolution, samples=asked.samples)]
 
 
-def parser() -> argparse.ArgumentParser:
-    """What can be asked for."""
-    whole = argparse.ArgumentParser(prog=f"blender --command {NAME}", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    kinds = whole.add_subparsers(dest="what", required=True)
-    relight = kinds.add_parser("relight", help="a picture and a linear EXR per light")
-    sheet = kinds.add_parser("contact_sheet", help="all lights in one picture")
-    table = kinds.add_parser("turntable", help="the head or the light once around")
-    for kind in (relight, sheet, table):
-        kind.add_argument("capture", type=Path)
-        kind.add_argument("--resolution", type=int, default=512, help="side in pixels")
-        kind.add_argument("--samples", type=int, default=32)
-    relight.add_argument("lights", nargs="*", metavar="LIGHT", help=f"{', '.join(headless.ALL)}, or one of Blender's worlds; default: all presets")
-    sheet.add_argument("--view", choices=("Standard", "AgX"), default="Standard")
-    table.add_argument("--light", default=headless.ALL[0])
-    table.add_argument("--turns", choices=("head", "light"), default="head")
-    table.add_argument("--frames", type=int, default=48)
-    table.add_argument("--film", action="store_true", help="one MP4, not PNG frames")
-    return whole
+def _turntable(asked) -> list[Path]:
+    return [headless.render_turntable(asked.capture, asked.light, asked.turns.upper(), asked.frames, asked.film, resolution=asked.resolution,
+                                      samples=asked.samples)]
 
 
-def register():
-    global _handle
-    _handle = bpy.utils.register_cli_command(NAME, execute)
+def _sized(kind) -> None:
+    kind.add_argument("capture", type=Path)
+    kind.add_argument("--resolution", type=int, default=512, help="side in pixels")
+    kind.add_argument("--samples", type=int, default=32)
 
 
-def unregister():
-    bpy.utils.unregister_cli_command(_handle)
+def _of_relight(kind) -> None:
+    _sized(kind)
+    kind.add_argument("lights", nargs="*", metavar="LIGHT", help=f"{', '.join(headless.ALL)}, or one of Blender's worlds; default: all presets")
+
+
+def _of_contact_sheet(kind) -> None:
+    _sized(kind)
+    kind.add_argument("--view", choices=("Standard", "AgX"), default="Standard")
+
+
+def _of_turntable(kind) -> None:
+    _sized(kind)
+    kind.add_argument("--light", default=headless.ALL[0])
+    kind.add_argument("--turns", choices=("head", "light"), default="head")
+    kind.add_argument("--frames", type=int, default=48)
+    kind.add_argument("--film", action="store_true", help="one MP4, not PNG frames")
+
+
+COMMANDS = (
+    Command("relight", "a picture and a linear EXR per light", _of_relight, _relight),
+    Command("contact_sheet", "all lights in one picture", _of_contact_sheet, _contact_sheet),
+    Command("turntable", "the head or the light once around", _of_turntable, _turntable),
+)

@@ -6,6 +6,8 @@
               Displacement (Non-Color, where the scan gave one) and the regions' attribute -> WildCap Skin
 """
 
+import hashlib
+import json
 from math import isclose
 
 import bpy
@@ -23,6 +25,8 @@ IMAGES = (
 )
 """Node, its file, and whether that holds data, no colours."""
 DISPLACEMENT = ("WildCap Displacement", "displacement.exr", True)
+MADE = "wildcap_made"
+"""Where the material keeps what it was when it was assembled."""
 SET = "wildcap_set"
 """Where the material keeps what was set by itself: a value that is another one now is the artist's"""
 
@@ -43,7 +47,35 @@ def assemble(context, item) -> bpy.types.Material:
     _set(material, {"Specular Amount": _specular_amount(capture), "Subsurface Scale": node_group.SCATTERING_M * _scale(obj)}, before)
     obj["wildcap_maps_time"] = max(path.stat().st_mtime for path in maps)
     head.complete(obj, capture)
+    material[MADE] = _fingerprint(material)
     return material
+
+
+def is_edited(obj) -> bool:
+    """Whether the head's material is somebody's own, or not as Assemble Material left it."""
+    current = obj.data.materials[0] if obj.data.materials else None
+    if current is None or KEY not in current and current.get("wildcap_texture"):
+        return False
+    return current.get(MADE) != _fingerprint(current)
+
+
+def _fingerprint(material) -> str:
+    """Stands for the nodes, their values and links; the pictures that they show, and what stands where, count for nothing."""
+    if material.node_tree is None:
+        return ""
+    told = []
+    for node in sorted(material.node_tree.nodes, key=lambda node: node.name):
+        if node.name != head.PREVIEW:  # comes and goes with a running solve
+            values = [_plain(socket.default_value) for socket in node.inputs if hasattr(socket, "default_value")]
+            links = [[link.from_node.name, link.from_socket.identifier] for socket in node.inputs for link in socket.links]
+            told.append([node.name, node.bl_idname, node.mute, values, links])
+    return hashlib.blake2b(json.dumps(told).encode(), digest_size=16).hexdigest()
+
+
+def _plain(value):
+    if isinstance(value, float):
+        return round(value, 5)
+    return str(value) if isinstance(value, (str, int)) or not hasattr(value, "__len__") else [round(float(part), 5) for part in value]
 
 
 def _material(obj) -> bpy.types.Material:

@@ -16,12 +16,17 @@ class WILDCAP_OT_assemble_material(BaseOperator, bpy.types.Operator):
     bl_label = "Assemble Material"
     bl_options = {'REGISTER', 'UNDO'}
 
+    unless_edited: bpy.props.BoolProperty(description="Leave a material alone that somebody changed", options={'HIDDEN', 'SKIP_SAVE'})
+
     @classmethod
     def poll(cls, context):
         return cls.in_object_mode(context) and cls.with_capture(context)
 
     def work(self, context):
-        skin = material.assemble(context, captures.require(context))
+        item = captures.require(context)
+        if self.unless_edited and material.is_edited(captures.require_head(context, item)):
+            return
+        skin = material.assemble(context, item)
         self.warn(colours.missing(skin.node_tree.nodes[material.IMAGES[0][0]].image))
 
 

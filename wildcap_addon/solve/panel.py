@@ -19,7 +19,7 @@ class WILDCAP_PT_preview(WildcapPanel, bpy.types.Panel):
     @classmethod
     def poll(cls, context):
         job = jobs.of(captures.root(captures.active(context)))
-        return job is not None and job.goal == "solve" and job.previews > 0
+        return job is not None and job.goal in ("solve", "make") and job.previews > 0
 
     def draw(self, context):
         preview.draw(self.layout, captures.folder(captures.active(context)))

@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A delivery as a word of the terminal."""
+
+import time
+from pathlib import Path
+
+import bpy
+
+from ...core.contract import delivery_presets
+from .. import captures, head, jobs, problems
+from ..terminal import Command
+from . import waiting
+
+POLL_S = 0.1
+
+
+def _deliver(asked) -> list[Path]:
+    """The delivery's folder. Empties the open file first. Raises Problem as the buttons do."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    item = captures.add(bpy.context, asked.capture.absolute())
+    obj = head.bring_in(bpy.context, item)
+    if asked.what == "head":
+        head.complete(obj, captures.folder(item))
+        if delivery_presets.PRESETS[asked.preset].open_eyes and not obj.data.shape_keys:
+            bpy.ops.wildcap.add_face_units()
+    chosen = item.deliver
+    chosen.what, chosen.preset, chosen.format, chosen.folder = asked.what, asked.preset, asked.format, str(asked.folder or "")
+    root = captures.root(item)
+    bpy.ops.wildcap.deliver('EXEC_DEFAULT')
+    while jobs.poll():
+        time.sleep(POLL_S)
+    if waiting.ready(root) is None:
+        raise problems.of(root)
+    return [waiting.finish(bpy.context, item)]
+
+
+def _of_deliver(kind) -> None:
+    kind.add_argument("capture", type=Path)
+    kind.add_argument("--preset", choices=tuple(delivery_presets.PRESETS), default="blender")
+    kind.add_argument("--format", choices=("preset", *delivery_presets.FORMATS), default="preset")
+    kind.add_argument("--what", choices=tuple(delivery_presets.WHAT), default="head")
+    kind.add_argument("--folder", type=Path, help="where to; default: exports in the capture")
+
+
+COMMANDS = (Command("deliver", "the head with its maps as another program wants them", _of_deliver, _deliver),)

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators: from the video to a relit head in one go, and from the proposed mask on."""
+
+import bpy
+
+from ...core.contract.messages import Problem
+from .. import captures, jobs
+from ..base_operator import BaseOperator
+from . import results
+
+
+class _Making(BaseOperator):
+    @classmethod
+    def poll(cls, context):
+        return jobs.can_start(cls, context)
+
+
+class WILDCAP_OT_make_my_head(_Making, bpy.types.Operator):
+    """Do all from the video or the photographs to a relit head: reconstruct, solve with the proposed shadow mask, put the maps on the head, render it"""
+
+    bl_idname = "wildcap.make_my_head"
+    bl_label = "Make My Head"
+
+    def work(self, context):
+        item = captures.require(context)
+        capture = captures.folder(item)
+        if not capture.source and not capture.texture.is_file():
+            raise Problem("This capture has no video: there is nothing to make a head of.", "Choose the video of your own face.")
+        results.begin(item)
+
+
+class WILDCAP_OT_accept_proposal(_Making, bpy.types.Operator):
+    """Solve with the shadow mask that was found by itself, or as it was painted, and go on to a relit head; painting it and solving again stays possible"""
+
+    bl_idname = "wildcap.accept_proposal"
+    bl_label = "Accept Proposal"
+
+    def work(self, context):
+        item = captures.require(context)
+        capture = captures.folder(item)
+        if not (capture.texture.is_file() and (capture.shadow_mask.is_file() or capture.shadow_mask_auto.is_file())):
+            raise Problem("There is no proposed mask yet.", "Click Make My Head, or Reconstruct, first.")
+        results.begin(item, first="solve")
+
+
+CLASSES = (WILDCAP_OT_make_my_head, WILDCAP_OT_accept_proposal)

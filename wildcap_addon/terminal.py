@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on from a terminal, without a window:
+
+    blender --command wildcap run me.mp4 me.wildcap --quality high
+    blender --command wildcap solve me.wildcap
+    blender --command wildcap relight me.wildcap three_point sunset --resolution 1024
+    blender --command wildcap turntable me.wildcap --light overcast --turns light --film
+    blender --command wildcap deliver me.wildcap --preset metahuman
+"""
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import bpy
+
+from ..core.contract.messages import Problem
+
+NAME = "wildcap"
+
+
+@dataclass(frozen=True)
+class Command:
+    """One word after `wildcap`: `options` adds its arguments to a parser, `carry_out` does it and returns the files it made, or an exit code."""
+
+    name: str
+    help: str
+    options: Callable[[argparse.ArgumentParser], None]
+    carry_out: Callable[[argparse.Namespace], list | int]
+
+
+commands: list[Command] = []
+"""Rooms add theirs as they register."""
+_handle = None
+
+
+def forget(gone: tuple[Command, ...]) -> None:
+    """A room leaves, and its words with it."""
+    commands[:] = [command for command in commands if command not in gone]
+
+
+def execute(words: list[str]) -> int:
+    """Does what the words ask for and prints the files. Returns an exit code: 0, or 1 after telling what is wrong."""
+    asked = parser().parse_args(words)
+    try:
+        made = asked.carry_out(asked)
+    except Problem as problem:
+        print(f"{problem.problem} {problem.remedy}", file=sys.stderr)
+        return 1
+    if isinstance(made, int):
+        return made
+    print(*made, sep="\n")
+    return 0
+
+
+def parser() -> argparse.ArgumentParser:
+    """What can be asked for."""
+    whole = argparse.ArgumentParser(prog=f"blender --command {NAME}", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    kinds = whole.add_subparsers(dest="what", required=True)
+    for command in commands:
+        one = kinds.add_parser(command.name, help=command.help)
+        command.options(one)
+        one.set_defaults(carry_out=command.carry_out)
+    return whole
+
+
+def register():
+    global _handle
+    _handle = bpy.utils.register_cli_command(NAME, execute)
+
+
+def unregister():
+    bpy.utils.unregister_cli_command(_handle)
