@@ -15,6 +15,7 @@ import numpy as np
 from ..geometry.meshes import Mesh
 from . import template
 
+DATA_FILES = ("assets/face_units.npz",)
 SOFT = 0
 """Kind of an inner vertex that goes with the rim before it; 1 and 2 are the left and the right eyeball."""
 CORNEA_BULGE, CORNEA_ANGLE = 0.06, 0.52  # of the asset's eyeballs: share of the radius, radians
@@ -174,7 +175,7 @@ class _Asset:
 
 @cache
 def _asset() -> _Asset:
-    with np.load(template.ASSETS / "face_units.npz", allow_pickle=False) as stored:
+    with np.load(template.ASSETS.parent / DATA_FILES[0], allow_pickle=False) as stored:
         z = {name: stored[name] for name in stored.files}
     step, count, copies = float(z["step"]), int(z["head_vertices"]), z["copies"].astype(int)
     lids = z["seam"] > 0
