@@ -292,3 +292,12 @@ def test_a_head_with_face_units_keeps_their_names_their_moves_and_its_eyes(captu
     assert np.allclose(stored, span[[0, 2, 1]], atol=1e-6), "metres, Y up"
     eyes = np.array([i for polygon in head.data.polygons if polygon.material_index == 1 for i in polygon.vertices])
     assert np.abs(moved - basis)[eyes].max() == 0 and not np.any([found[1]["min"], found[1]["max"]]), "eyes stay when the jaw opens"
+
+
+def test_the_terminal_delivers_too(addon, capture, capsys):
+    root = bpy.context.scene.wildcap.captures[0].path
+    assert addon("terminal").execute(["deliver", root, "--preset", "unreal"]) == 0
+    made = Path(capsys.readouterr().out.strip().splitlines()[-1])
+    assert (made / "face.fbx").is_file() and (made / "textures" / "T_face_BaseColor.png").is_file()
+    assert addon("terminal").execute(["deliver", root, "--what", "own_mesh"]) == 1
+    assert "no fitted mesh of yours" in capsys.readouterr().err

@@ -97,7 +97,7 @@ def test_a_folder_that_cannot_be_written_to_a_name_in_other_letters_and_decimal_
     finally:
         subprocess.run(["chmod", "-R", "u+w", str(folder)], check=True)
     assert seen["decimal_point"] == ("," if environment else ".")
-    assert seen["capture"] == str(profile / "Documents" / "WildCap" / "sample_head.wildcap")
+    assert seen["capture"] == str(profile / "WildCap" / "sample_head.wildcap")
     assert 0.2 < seen["height_m"] < 0.5 and seen["mask"] == 0.5 and seen["render"]
     assert seen["problem"] == "" and all(0.1 < c < 1 for c in seen["tone"]) and seen["tone"] != [0.69, 0.54, 0.45]
     assert seen["spaces"] == {"WildCap Albedo": "sRGB", "WildCap Specular": "Non-Color", "WildCap Normal": "Non-Color"}

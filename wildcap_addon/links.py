@@ -34,11 +34,11 @@ def move(item, path: Path) -> None:
 
 
 def find(item) -> Path | None:
-    """A missing capture where it is likely to be: beside the .blend or one folder further down, among the captures of the preferences, or
-    beside another one of the scene. None where there is none of its name."""
+    """A missing capture where it is likely to be: beside the .blend or one folder further down, among the captures of the preferences,
+    where 0.1.0 put them, or beside another one of the scene. None where there is none of its name."""
     name = Path(item.path).name
     parents = [captures.folder(other).root.parent for scene in bpy.data.scenes for other in scene.wildcap.captures]
-    parents += [preferences.captures_folder(saved=False)]
+    parents += [preferences.captures_folder(saved=False), preferences.CAPTURES_0_1]
     if bpy.data.filepath:
         blend = Path(bpy.data.filepath).parent
         parents = [blend, *sorted(p for p in blend.iterdir() if p.is_dir()), *parents]

@@ -25,6 +25,9 @@ SOURCES = [('pytorch', "PyTorch and PyPI", "PyTorch from its own package index w
 DEVICES = {"cpu": "CPU", "cuda": "CUDA", "mps": "Metal", "": ""}
 _aside: set[str] = set()  # Pythons that were found not to answer, in this session
 
+CAPTURES_0_1 = Path.home() / "Documents" / "WildCap"
+"""Where version 0.1.0 put captures."""
+
 
 class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
     bl_idname = extension.NAME
@@ -44,7 +47,7 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
     device_reason: bpy.props.StringProperty(name="Why This Device", description="What was found when the solver's devices were tried")
     captures: bpy.props.StringProperty(
         name="Captures Folder", subtype='DIR_PATH',
-        description="Where new captures go while the .blend is not saved; empty: WildCap in the documents folder",
+        description="Where new captures go while the .blend is not saved; empty: WildCap in your home folder, which no cloud copies",
     )
 
     switchlight_key: bpy.props.StringProperty(
@@ -165,11 +168,16 @@ def wheels_folder() -> Path | None:
 
 
 def captures_folder(saved: bool = True) -> Path:
-    """Beside the .blend; while it is unsaved (or with saved=False), the preferences' folder or WildCap in the user's documents."""
+    """Beside the .blend; while it is unsaved (or with saved=False), the preferences' folder or WildCap in the user's home: clouds copy Documents and Desktop,
+    and a capture holds gigabytes of a person's face."""
     if bpy.data.filepath and saved:
         return Path(bpy.data.filepath).parent
     chosen = get().captures
-    return Path(bpy.path.abspath(chosen)) if chosen else Path.home() / "Documents" / "WildCap"
+    return Path(bpy.path.abspath(chosen)) if chosen else captures_default()
+
+
+def captures_default() -> Path:
+    return Path.home() / "WildCap"
 
 
 register, unregister = bpy.utils.register_classes_factory((WILDCAP_AP_preferences,))

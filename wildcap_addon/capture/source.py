@@ -6,16 +6,19 @@ import re
 from pathlib import Path
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
-from .. import captures, preferences
+from .. import captures, preferences, problems
 from ..base_operator import BaseOperator
 from ..base_panel import WildcapPanel
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm")
 PHOTOGRAPHS = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr", ".heic", ".heif", ".avif", ".dng")
 """What the stage frames reads, and what it explains how to convert."""
+WIDTH = 240
+"""Of the file browser's sidebar, pixels."""
 
 
 class WILDCAP_OT_choose_video(BaseOperator, bpy.types.Operator):
@@ -35,6 +38,14 @@ class WILDCAP_OT_choose_video(BaseOperator, bpy.types.Operator):
             return self.execute(context)
         context.window_manager.fileselect_add(self)
         return {'RUNNING_MODAL'}
+
+    def draw(self, context):
+        """Beside the file browser."""
+        folder = preferences.captures_folder()
+        problems.draw_text(self.layout, iface_("The capture goes to {}.").format(folder), WIDTH)
+        if not bpy.data.filepath and folder == preferences.captures_default():
+            told = "No cloud copies that folder. Another one is chosen in the preferences, and a saved .blend has its captures beside it."
+            problems.draw_text(self.layout, told, WIDTH)
 
     def work(self, context):
         folder = Path(bpy.path.abspath(self.directory))

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A delivery as a word of the terminal."""
 
+import contextlib
 import time
 from pathlib import Path
 
@@ -27,12 +28,16 @@ def _deliver(asked) -> list[Path]:
     chosen = item.deliver
     chosen.what, chosen.preset, chosen.format, chosen.folder = asked.what, asked.preset, asked.format, str(asked.folder or "")
     root = captures.root(item)
-    bpy.ops.wildcap.deliver('EXEC_DEFAULT')
+    with contextlib.suppress(RuntimeError):  # what the button refuses, it has told
+        bpy.ops.wildcap.deliver('EXEC_DEFAULT')
     while jobs.poll():
         time.sleep(POLL_S)
-    if waiting.ready(root) is None:
-        raise problems.of(root)
-    return [waiting.finish(bpy.context, item)]
+    if waiting.ready(root) is not None:  # no window, no click: the mesh is added here
+        return [waiting.finish(bpy.context, item)]
+    told = problems.of(root)
+    if told is not None and not isinstance(told, problems.Notice):
+        raise told
+    return [waiting.last(root)]
 
 
 def _of_deliver(kind) -> None:

@@ -18,7 +18,7 @@ STEPS, TURNS, TABS_PX = 14, 4, 22
 
 
 def flow():
-    capture = Path.home() / "Documents" / "WildCap" / "sample.wildcap"
+    capture = Path.home() / "WildCap" / "sample.wildcap"
     shutil.copytree(addon.CHECKOUT / ".demo" / "sample.wildcap", capture)
     addon.unfold(*(f"WILDCAP_PT_{name}" for name in PANELS))
     yield from d.open_tab("WildCap")

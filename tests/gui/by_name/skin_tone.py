@@ -19,7 +19,7 @@ GREY = 117 / 255  # sRGB of 18 percent under a light of 1
 
 
 def flow():
-    capture = Path.home() / "Documents" / "WildCap" / "sample.wildcap"
+    capture = Path.home() / "WildCap" / "sample.wildcap"
     shutil.copytree(addon.CHECKOUT / ".demo" / "sample.wildcap", capture)
     draw_card(capture / "frames")
     addon.unfold("WILDCAP_PT_solve")

@@ -40,7 +40,7 @@ def drop(home: Path):
     d.screenshot("first_1_drop_menu")
     yield from d.key('C')  # Blender asks: a reference, or Choose Video
     yield from d.until(lambda: len(items()) == 1, "the dropped video's capture", 10)
-    assert Path(items()[0].path) == home / "WildCap" / "Mein Gesicht é.wildcap"
+    assert Path(items()[0].path) == Path.home() / "WildCap" / "Mein Gesicht é.wildcap"
     addon.use_solver()
     yield 1.5
     assert addon.next_step().operator == "wildcap.reconstruct", addon.next_step()

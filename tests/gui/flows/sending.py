@@ -33,7 +33,7 @@ def artist(server: Service):
     yield from d.open_tab("WildCap")
     yield from d.park()
     addon.use_solver()
-    root = Path.home() / "Documents" / "WildCap" / "Zoë.wildcap"
+    root = Path.home() / "WildCap" / "Zoë.wildcap"
     make(root)
     bpy.ops.wildcap.open_capture(directory=str(root))
     item = addon.settings()
