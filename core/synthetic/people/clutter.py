@@ -109,13 +109,11 @@ def _glasses(radiance: np.ndarray, landmarks: np.ndarray, light: float, rng: np.
     size = len(radiance)
     over = np.zeros((size, size), np.uint8)
     thick, round_ = int(rng.integers(1, 4)), rng.uniform(0.55, 1.0)
-    middles = []
     for eye in EYES:
         one, other = landmarks[list(eye)]
         reach = 0.85 * np.linalg.norm(other - one)
-        middles.append((one + other) / 2)
-        turn = float(np.degrees(np.arctan2(*(other - one)[::-1])))
-        cv2.ellipse(over, tuple(np.round(middles[-1]).astype(int).tolist()), (max(2, int(reach)), max(2, int(reach * round_))), turn, 0, 360, 255, thick, cv2.LINE_AA)
+        turn, axes = float(np.degrees(np.arctan2(*(other - one)[::-1]))), (max(2, int(reach)), max(2, int(reach * round_)))
+        cv2.ellipse(over, np.round((one + other) / 2).astype(int).tolist(), axes, turn, 0, 360, 255, thick, cv2.LINE_AA)
     where = over.astype(np.float32) / 255
     colour = np.float32(rng.uniform(0.005, 0.3) * light) * np.exp(rng.normal(0, 0.2, 3)).astype(np.float32)
     return radiance * (1 - where[..., None]) + colour * where[..., None], where

@@ -24,7 +24,7 @@ from .figure import Figure
 from .truth import Scene
 
 SIZE, OVER = 288, 2  # of the square in pixels; rays along a pixel's side
-WIDER = 1.15  # than the crop in which a parser looks: what shifts and turns of it may show
+WIDER = 1.33  # than the crop in which a parser looks: what shifts and turns of it may show
 LAMPS = 2
 OF_TRUTH = {"skin": "skin", "lips": "lips", "brows": "brows", "lashes": "eyes", "beard": "beard", "hair": "hair", "eyes": "eyes", "clothes": "clothes"}
 """The part of face/parts.py that each part of the truth belongs to."""
