@@ -39,6 +39,7 @@ from .likenesses import LIKENESSES
 VIEWS, SIZE, TEXELS = 8, 400, 1024
 SPARSE = 4.0
 HAIRS = ("brows", "beard", "hair")
+ENDINGS = (".png", ".jpg", ".jpeg")
 COLOURS = np.array([[255, 190, 150], [230, 0, 80], [120, 60, 0], [255, 150, 0], [70, 70, 230], [255, 255, 255], [0, 160, 80], [0, 0, 0]], np.float32) / 255
 """Of the parts in a sheet."""
 
@@ -127,9 +128,8 @@ def _share(some: int, whole: int) -> float | None:
 
 def write_sheet(out: Path, pictures: list[Path], network: parser.ParseNet, brighter: float) -> None:
     """The crops of photographs, and beside each its parts: in colours, and laid over it."""
-    paths = [path for each in pictures for path in (sorted(p for p in each.iterdir() if p.suffix.lower() in (".png", ".jpg", ".jpeg")) if each.is_dir() else [each])]
     rows = []
-    for path in paths:
+    for path in [path for each in pictures for path in (sorted(each.iterdir()) if each.is_dir() else [each]) if path.suffix.lower() in ENDINGS]:
         srgb = np.clip(images.read_srgb(path)[..., :3] * brighter, 0, 1)
         face = faces.detect(srgb)
         if face is None:

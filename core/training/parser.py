@@ -33,8 +33,8 @@ from .snapshots import Batch, Snapshots, is_prepared, prepare
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "parser.safetensors"
 _MODEL = {"widths": [40, 64, 112, 144], "depths": [1, 1, 1, 2]}
 CONFIGS = {
-    "cpu": {"model": _MODEL, "training": {"batch": 8, "echo": 4, "rate": 2e-3, "minutes": 60, "figures": 360, "views": 10, "held_out": 6, "seed": 0,
-                                          "workers": 0}},
+    "cpu": {"model": _MODEL, "training": {"batch": 8, "echo": 3, "rate": 8e-4, "minutes": 60, "figures": 360, "views": 10, "held_out": 6, "seed": 0,
+                                          "workers": 1}},
     "gpu": {"model": _MODEL, "training": {"batch": 32, "echo": 1, "rate": 2e-3, "minutes": 30, "figures": 720, "views": 10, "held_out": 6, "seed": 0,
                                           "workers": 14}},
 }
