@@ -29,11 +29,17 @@ def add_skins(options: argparse.ArgumentParser) -> None:
     options.add_argument("--held-out", nargs="+", default=[], metavar="NAME", help="skins of FOLDER that are kept from training, each with its cluster")
 
 
-def carry_out(options: argparse.ArgumentParser, arguments: list[str] | None, train: Callable[..., dict], export: Callable[[Path, Path], dict]) -> int:
-    """Trains, or exports an earlier training: the options are `train`'s keyword arguments. Returns the exit code."""
+def carry_out(options: argparse.ArgumentParser, arguments: list[str] | None, train: Callable[..., dict], export: Callable[[Path, Path], dict],
+              prepare: Callable[[str, Path, Reporter], None] | None = None) -> int:
+    """Trains, or exports an earlier training: the options are `train`'s keyword arguments. Returns the exit code. `prepare` answers to --prepare, where a
+    training has that option."""
     asked = vars(options.parse_args(arguments))
-    if asked.pop("export"):
+    report = Reporter("train", emit=lambda message: print(message.text, flush=True) if isinstance(message, Log) else None)
+    exports, prepares = asked.pop("export"), asked.pop("prepare", False)
+    if exports:
         export(asked["work"], asked["out"])
+    elif prepares:
+        prepare(asked["config"], asked["work"], report)
     else:
-        train(report=Reporter("train", emit=lambda message: print(message.text, flush=True) if isinstance(message, Log) else None), **asked)
+        train(report=report, **asked)
     return 0

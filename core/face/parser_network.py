@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The parsing network: a small U-Net from the crop of a face to the parts' logits at the crop's resolution.
+
+Its trunk begins at a quarter of the resolution; beside it runs one thin layer at half, from which the finest pixels are shuffled.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import nn
+from torch.nn import functional
+
+from .parts import PARTS
+
+CHANNELS = 4  # sRGB in [-1, 1], 0 beyond the picture, and where the picture is
+FINE = 16  # features at half the crop's resolution
+MULTIPLE = 32  # of pixels, to be halved so often
+
+
+def network_input(srgb: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """[CHANNELS, S, S] of a crop sRGB [S, S, 3] and of where it shows the picture [S, S].
+
+    Stretched to the contrast that most pictures have, so that dark ones are not another world.
+    """
+    there = known > 0.5
+    level = srgb.mean(-1)[there]
+    bright = float(np.quantile(level, 0.9)) if level.size else 1.0
+    gain = np.clip(0.75 / max(bright, 1e-3), 0.8, 6.0)
+    layers = np.zeros((CHANNELS, *known.shape), np.float32)
+    layers[:3] = ((2 * np.clip(srgb * gain, 0, 1) - 1) * there[..., None]).transpose(2, 0, 1)
+    layers[3] = there
+    return layers
+
+
+class ParseNet(nn.Module):
+    """[N, CHANNELS, S, S] -> logits [N, len(PARTS), S, S]. S is a multiple of MULTIPLE."""
+
+    def __init__(self, widths: list[int], depths: list[int]):
+        super().__init__()
+        self.stem, self.enter = nn.Conv2d(CHANNELS, FINE, 4, stride=2, padding=1), nn.Conv2d(FINE, widths[0], 2, stride=2)
+        self.down, self.up, self.halve, self.narrow = nn.ModuleList(), nn.ModuleList(), nn.ModuleList(), nn.ModuleList()
+        for level, (width, depth) in enumerate(zip(widths, depths, strict=True)):
+            self.down.append(nn.Sequential(*(_Block(width) for _ in range(depth))))
+            if level + 1 < len(widths):
+                self.halve.append(nn.Conv2d(width, widths[level + 1], 2, stride=2))
+                self.narrow.append(nn.Conv2d(widths[level + 1], width, 1))
+                self.up.append(nn.Sequential(*(_Block(width) for _ in range(depth))))
+        self.leave = nn.Conv2d(widths[0], 4 * FINE, 1)
+        self.last, self.out = nn.Conv2d(2 * FINE, 2 * FINE, 3, padding=1), nn.Conv2d(2 * FINE, 4 * len(PARTS), 3, padding=1)
+        nn.init.zeros_(self.out.weight)
+        nn.init.zeros_(self.out.bias)
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        fine = functional.gelu(self.stem(x))
+        x, kept = self.enter(fine), []
+        for level, blocks in enumerate(self.down):
+            x = blocks(x)
+            if level < len(self.halve):
+                kept.append(x)
+                x = self.halve[level](x)
+        for level in reversed(range(len(self.halve))):
+            x = kept[level] + functional.interpolate(self.narrow[level](x), scale_factor=2, mode="bilinear", align_corners=False)
+            x = self.up[level](x)
+        x = torch.cat([fine, functional.pixel_shuffle(self.leave(x), 2)], 1)
+        return functional.pixel_shuffle(self.out(functional.gelu(self.last(x))), 2).float()
+
+
+class _Block(nn.Module):
+    """x + conv(gelu(conv(norm(x)))), and a gate per channel from the whole map's mean: light and exposure are matters of the whole picture."""
+
+    def __init__(self, width: int):
+        super().__init__()
+        self.norm = nn.GroupNorm(max(1, width // 16), width)
+        self.first, self.second = nn.Conv2d(width, width, 3, padding=1), nn.Conv2d(width, width, 3, padding=1)
+        self.gate = nn.Linear(width, width)
+        nn.init.zeros_(self.second.weight)
+        nn.init.zeros_(self.second.bias)
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        inner = functional.gelu(self.first(self.norm(x)))
+        inner = inner * (2 * torch.sigmoid(self.gate(inner.mean((2, 3)))))[:, :, None, None]
+        return x + self.second(inner)

@@ -1,0 +1,135 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The pictures a parser learns from: figures seen from many sides, lit, recoloured, covered and photographed anew for every step.
+
+What light does not change is made once per figure and kept in a work folder (some ten seconds and one per view).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+
+from ..contract.messages import Reporter
+from ..face.parser_network import network_input
+from ..face.parts import SIDE, cut, inside, to_crop
+from ..synthetic.environments import read_panoramas
+from ..synthetic.people import unlit
+from ..synthetic.people.figure import make_figure
+from ..synthetic.people.snapshot import photograph
+
+TEXELS = 512  # of a figure's maps: pixels of a crop are larger than theirs
+SHIFT, SCALE, TURN = 0.04, 0.09, 6.0
+"""Deviations of where the landmarks put the crop: in crops, as a logarithm, in degrees."""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """layers [N, CHANNELS, SIDE, SIDE]; shares [N, len(PARTS), SIDE, SIDE] add up to one wherever known [N, 1, SIDE, SIDE] is 1."""
+
+    layers: torch.Tensor
+    shares: torch.Tensor
+    known: torch.Tensor
+
+
+def prepare(seeds: list[int], views: int, work: Path, report: Reporter) -> None:
+    """Makes the sights of these figures that the work folder lacks."""
+    missing = [seed for seed in seeds if not is_prepared(seed, views, work)]
+    for i, seed in enumerate(missing):
+        report.progress(i, len(missing), f"figure {i + 1} of {len(missing)}")
+        _prepare_one(seed, views, work)
+
+
+def is_prepared(seed: int, views: int, work: Path) -> bool:
+    return _path(work, seed, views - 1).is_file()  # the last one is written last
+
+
+class Snapshots:
+    """Draws batches of the figures that are prepared; what is prepared later is drawn from then on."""
+
+    def __init__(self, seeds: list[int], views: int, work: Path, panoramas: Path | None):
+        self.seeds, self.views, self.work = seeds, views, work
+        self.panoramas = read_panoramas(panoramas)
+
+    def draw(self, count: int, echo: int, rng: np.random.Generator, augment: bool = True) -> list[Batch]:
+        """`echo` batches of `count` crops each: the same photographs, cropped and spoilt in other ways."""
+        ready = [seed for seed in self.seeds if is_prepared(seed, self.views, self.work)]
+        batches: list[list[tuple]] = [[] for _ in range(echo)]
+        for _ in range(count):
+            sight = unlit.load(_path(self.work, ready[rng.integers(len(ready))], int(rng.integers(self.views))))
+            srgb, shares = photograph(sight, rng, self.panoramas)
+            for batch in batches:
+                batch.append(example(srgb, shares, sight.landmarks, rng, augment))
+        return [Batch(*(torch.from_numpy(np.stack(part)) for part in zip(*batch, strict=True))) for batch in batches]
+
+
+def example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np.random.Generator, augment: bool = True) -> tuple[np.ndarray, ...]:
+    """A photograph as the network sees it, the shares of its parts, and where they are known."""
+    if augment and rng.random() < 0.5:
+        srgb, shares = srgb[:, ::-1], shares[:, ::-1]
+        landmarks = landmarks * [-1, 1] + [srgb.shape[1], 0]
+    move = to_crop(landmarks)  # of the bridge, the chin and the box, which a mirror leaves what they are
+    if augment:
+        move = _jittered(move, rng)
+    known = inside(srgb.shape, move)
+    if augment and rng.random() < 0.35:
+        known = known * _ended(rng)
+    picture, parts = cut(srgb, move), cut(shares, move)
+    if augment:
+        picture = _spoilt(picture, rng)
+    total = parts.sum(-1, keepdims=True)
+    known = known * (total[..., 0] > 0.99)
+    parts = parts / np.maximum(total, 1e-3)
+    return network_input(picture, known), np.ascontiguousarray(parts.transpose(2, 0, 1)), known[None].astype(np.float32)
+
+
+def _jittered(move: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    turn, scale = np.radians(rng.normal(0, TURN)), np.exp(rng.normal(0, SCALE))
+    c, s = scale * np.cos(turn), scale * np.sin(turn)
+    about = np.array([[c, s], [-s, c]])
+    middle = np.full(2, SIDE / 2)
+    shift = middle - about @ middle + rng.normal(0, SHIFT * SIDE, 2)
+    return np.concatenate([about @ move[:, :2], (about @ move[:, 2] + shift)[:, None]], 1)
+
+
+def _ended(rng: np.random.Generator) -> np.ndarray:
+    """A picture that ends within the crop [SIDE, SIDE], as that of a close face does."""
+    known = np.ones((SIDE, SIDE), np.float32)
+    for turn in range(4):
+        if rng.random() < 0.4:
+            known = np.rot90(known, turn).copy()
+            known[:int(rng.uniform(0, 0.25) * SIDE)] = 0
+            known = np.rot90(known, -turn).copy()
+    return known
+
+
+def _spoilt(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Another white balance and gamma, less resolution, no colour, now and then."""
+    if rng.random() < 0.6:
+        picture = np.clip(picture, 0, 1) ** np.float32(np.exp(rng.normal(0, 0.2))) * np.exp(rng.normal(0, 0.1, 3) + rng.normal(0, 0.15)).astype(np.float32)
+    if rng.random() < 0.35:
+        small = int(SIDE / np.exp(rng.uniform(np.log(1.2), np.log(4.0))))
+        picture = cv2.resize(cv2.resize(picture, (small, small), interpolation=cv2.INTER_AREA), (SIDE, SIDE), interpolation=cv2.INTER_LINEAR)
+    if rng.random() < 0.3:
+        picture = picture + rng.normal(0, np.exp(rng.uniform(np.log(0.004), np.log(0.05))), picture.shape).astype(np.float32)
+    if rng.random() < 0.06:
+        picture = np.repeat(picture.mean(-1, keepdims=True), 3, 2)
+    return np.clip(picture, 0, 1).astype(np.float32)
+
+
+def _path(work: Path, seed: int, view: int) -> Path:
+    return Path(work) / f"figure_{seed}" / f"{view}.npz"
+
+
+def _prepare_one(seed: int, views: int, work: Path) -> None:
+    cv2.setNumThreads(1)
+    figure = make_figure(seed, TEXELS)
+    scene = unlit.scene_of(figure, np.random.default_rng([seed, 90]))
+    _path(work, seed, 0).parent.mkdir(parents=True, exist_ok=True)
+    for view in range(views):
+        rng = np.random.default_rng([seed, 91, view])
+        unlit.save(_path(work, seed, view), unlit.see(scene, unlit.random_view(figure, rng), rng))
