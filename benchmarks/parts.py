@@ -99,7 +99,7 @@ def _crops(pictures: Iterator[tuple[np.ndarray, np.ndarray]], network: parser.Pa
     for srgb, shares in pictures:
         face = faces.detect(srgb)
         if face is not None:
-            parts = parser.parse(srgb, face, network)
+            parts = parser.parse(srgb, face.landmarks, network)
             yield cut(shares, parts.move).argmax(-1), parts.crop.argmax(-1), inside(srgb.shape, parts.move) > 0.5
 
 
@@ -136,7 +136,7 @@ def write_sheet(out: Path, pictures: list[Path], network: parser.ParseNet, brigh
             print(f"{path.name}: no face was found")
             continue
         crop = cut(srgb, to_crop(face.landmarks))
-        drawn = (parser.parse(srgb, face, network).crop @ COLOURS).astype(np.float32)
+        drawn = (parser.parse(srgb, face.landmarks, network).crop @ COLOURS).astype(np.float32)
         rows.append(np.hstack([crop, drawn, 0.55 * crop + 0.45 * drawn]))
     rows += [np.zeros((SIDE, 3 * SIDE, 3), np.float32)] * (-len(rows) % 2)
     sheet = np.vstack([np.hstack(pair) for pair in zip(rows[0::2], rows[1::2], strict=True)])

@@ -96,7 +96,7 @@ def test_a_face_at_the_crops_own_scale_comes_back_exactly():
 
 def test_shares_add_up_to_one_and_beyond_the_crop_is_background():
     rng, points = np.random.default_rng(2), landmarks(20.0, 60.0)
-    found = parser.parse(rng.random((240, 300, 3)).astype(np.float32), face_of(points), randomly(ParseNet(**TINY)))
+    found = parser.parse(rng.random((240, 300, 3)).astype(np.float32), points, randomly(ParseNet(**TINY)))
     whole = found.picture()
     assert whole.shape == (240, 300, len(PARTS)) and whole.dtype == np.float32 and whole.min() >= 0
     assert np.abs(whole.sum(-1) - 1).max() < 1e-4 and found.crop[..., 0].std() > 0.01
@@ -108,7 +108,7 @@ def test_a_mirrored_picture_has_mirrored_parts():
     rng, points = np.random.default_rng(3), landmarks(0.0, SIDE / 1.9, (120.0, 110.0))
     picture, network = rng.random((220, 240, 3)).astype(np.float32), randomly(ParseNet(**TINY))
     mirrored = points * [-1, 1, 1] + [240, 0, 0]
-    one, other = parser.parse(picture, face_of(points), network), parser.parse(picture[:, ::-1], face_of(mirrored), network)
+    one, other = parser.parse(picture, points, network), parser.parse(picture[:, ::-1], mirrored, network)
     assert np.abs(one.picture() - other.picture()[:, ::-1]).max() < 0.02
 
 
@@ -149,6 +149,21 @@ def test_a_photograph_keeps_its_parts_whatever_its_colours(sight):
         assert lost.min() > -0.02, "what covers a person is background: no part grows beyond its owner"
     tones = np.array([srgb[plain[..., PARTS.index("skin")] > 0.95].mean(0) for srgb, _ in pictures])
     assert tones.std(0).min() > 0.03
+
+
+def test_the_shipped_network_knows_the_parts_of_somebody_it_never_saw(work):
+    """A bearded man with cropped hair, by other lights than its own, from two sides."""
+    hit = np.zeros((len(PARTS), 2))
+    for view in range(VIEWS):
+        sight = unlit.load(work / "figure_9000" / f"{view}.npz")
+        srgb, shares = snapshot.photograph(sight, np.random.default_rng([5, view]))
+        found = parser.parse(srgb, sight.landmarks)
+        true, known = cut(shares, found.move).argmax(-1), inside(srgb.shape, found.move) > 0.5
+        for k in range(len(PARTS)):
+            hit[k] += [((true == k) & (found.crop.argmax(-1) == k) & known).sum(), ((true == k) & known).sum()]
+    right = dict(zip(PARTS, hit[:, 0] / np.maximum(hit[:, 1], 1), strict=True))
+    assert all(right[name] > 0.6 for name in ("skin", "hair", "background")), right
+    assert hit[:, 0].sum() / hit[:, 1].sum() > 0.75, right
 
 
 def test_nothing_is_learnt_from_people_that_are_measured():

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The face parser: which part of a person each pixel of a picture shows, by our own small network on the upright crop of a face.
 
-    parts = parse(srgb, face)
+    parts = parse(srgb, face.landmarks)
     hairy = parts.of("hair", "beard")          float32 [H, W]
 
 `core train parser` makes the weights, on synthetic people only. PyTorch is loaded when the first picture is parsed: who only asks where faces are does without.
@@ -20,7 +20,6 @@ import numpy as np
 
 from ..contract import shipped_files
 from ..contract.messages import Problem
-from .faces import Face
 from .parts import PARTS, cut, inside, put_back, to_crop
 
 if TYPE_CHECKING:
@@ -45,13 +44,18 @@ class Parts:
         chosen = [PARTS.index(name) for name in names]
         return put_back(self.crop[..., chosen].sum(-1), self.move, self.size, float(BACKGROUND in chosen))
 
+    def known(self) -> np.ndarray:
+        """Where the picture lies in the crop, float32 [H, W] in [0, 1]: beyond, nothing was looked for."""
+        return put_back(np.ones(self.crop.shape[:2], np.float32), self.move, self.size, 0.0)
+
     def picture(self) -> np.ndarray:
         """All shares at the picture's pixels, float32 [H, W, len(PARTS)], of sum one."""
         return np.stack([self.of(name) for name in PARTS], -1)
 
 
-def parse(srgb: np.ndarray, face: Face, network: ParseNet | None = None) -> Parts:
-    """The parts of the person whose `face` was found in an sRGB picture [H, W, 3]; `network` in place of the shipped one.
+def parse(srgb: np.ndarray, landmarks: np.ndarray, network: ParseNet | None = None) -> Parts:
+    """The parts of the person whose face's landmarks [468, 2 or 3] lie there in an sRGB picture [H, W, 3], in pixels: as they were found, or where a head that
+    is known projects them, hidden ones included; `network` in place of the shipped one.
 
     The mean of what the network says of the crop and of its mirror image. Raises Problem where the weights are missing or damaged.
     """
@@ -60,7 +64,7 @@ def parse(srgb: np.ndarray, face: Face, network: ParseNet | None = None) -> Part
     from .parser_network import network_input
 
     network = network or load()
-    move = to_crop(face.landmarks)
+    move = to_crop(landmarks)
     layers = network_input(cut(srgb, move), inside(srgb.shape, move))
     with torch.inference_mode():
         both = torch.from_numpy(np.stack([layers, layers[:, :, ::-1]]))

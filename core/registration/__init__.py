@@ -23,7 +23,7 @@ from ..face import template
 from ..geometry import meshes, raster
 from ..geometry.views import View, read_points, read_views
 from ..imaging import images
-from . import alignment, drawing, eyeballs, eyes, intersections, landmarks, nonrigid, own_template, quality, unscanned
+from . import alignment, drawing, eyeballs, eyes, hair, intersections, landmarks, nonrigid, own_template, quality, unscanned
 from .correspondence import Scan
 
 STEPS = 100.0
@@ -89,7 +89,7 @@ def _subject(found: landmarks.Landmarks, report: Reporter) -> Subject:
 def _by_views(capture: Capture, settings: Settings, views: list[View], subject: Subject, report: Reporter) -> None:
     model, found = subject.model, subject.found
     seen = np.max([subject.follow, *(strength * _per_vertex(model.mesh, template.mask(name, 512)) for name, strength in SEEN.items())], axis=0)
-    points = unscanned.Points(*read_points(capture))
+    points = _on_skin(unscanned.Points(*read_points(capture)), views, subject, report)
     fitted = unscanned.fit(model, views, found, subject.trust, points, seen, report, 10, 0.9 * STEPS)
     placed = model.mesh.moved(fitted.pose.apply(model.mesh.vertices))
     vertices = intersections.mended(placed, fitted.vertices, lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
@@ -100,12 +100,22 @@ def _by_views(capture: Capture, settings: Settings, views: list[View], subject: 
     _finish(capture, settings, views, head, subject, report)
 
 
+def _on_skin(points: unscanned.Points, views: list[View], subject: Subject, report: Reporter) -> unscanned.Points:
+    """The matched points that most views show as skin, or do not show."""
+    pose, coefficients = alignment.fit_landmarks(subject.model, subject.found.points, subject.trust)
+    head = subject.model.mesh.moved(pose.apply(subject.model.shape(coefficients)))
+    share = np.nan_to_num(hair.hidden_share(points.places, points.towards, views, head, report))
+    return unscanned.Points(points.places[share <= hair.HAIR], points.towards[share <= hair.HAIR])
+
+
 def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: meshes.Mesh, subject: Subject, least_share: float,
              report: Reporter) -> None:
-    scan, found, model = Scan(surface), subject.found, subject.model
+    found, model = subject.found, subject.model
     follow, shaped, hold, trust = subject.follow, subject.shaped, subject.hold, subject.trust
     report.progress(10, STEPS, "placing the head")
     pose, coefficients = alignment.fit_landmarks(model, found.points, trust)
+    report.progress(12, STEPS, "telling hair from skin")
+    scan = Scan(hair.without_hair(surface, views, model.mesh.moved(pose.apply(model.shape(coefficients))), report))
     report.progress(15, STEPS, "finding the nearest head")
     pose, coefficients = alignment.fit_scan(model, pose, coefficients, found.points, trust, scan, shaped)
     start = pose.apply(model.shape(coefficients))

@@ -30,7 +30,7 @@ from .blinks import leave_out_blinks
 from .detail import fine_detail
 from .fill import fill
 from .filmed import filmed
-from .foreign import clothes, leave_out_background
+from .foreign import clothes, leave_out_background, leave_out_hair
 from .projection import Observation, observe
 
 
@@ -91,6 +91,8 @@ def observe_all(capture: Capture, head: Head, size: int, report: Reporter) -> tu
         report.progress(i, len(views) + 6, f"projecting {view.name}")
         observations.append(observe(view, _delit(path, view), surface, frames[view.name].sharpness / best))
     report.figure("blinks", len(leave_out_blinks(capture, observations, surface, report)))
+    hair = leave_out_hair(observations, surface, report)
+    report.figure("hair_percent", round(100 * float(hair[surface.covered].mean()), 1))
     return observations, surface
 
 
