@@ -12,7 +12,7 @@ pytest.importorskip("OpenImageIO")
 
 from core.contract.eyes_record import Eyeball  # noqa: E402
 from core.contract.messages import Reporter  # noqa: E402
-from core.face import lids  # noqa: E402
+from core.face import faces, lids  # noqa: E402
 from core.face.head import Head  # noqa: E402
 from core.geometry import meshes, raster  # noqa: E402
 from core.imaging import images  # noqa: E402
@@ -73,7 +73,7 @@ class Painted:
         return Eyeball(tuple(ball.centre), ball.radius, tuple(ball.gaze), 0.9, eyes.IRIS_MM / 1000, 5)
 
     def found(self, side: int):
-        return iris.iris_colour(self.views, self.head, self.opened.balls[side], self.eyeball(side), self.albedo, Reporter("solve"))
+        return iris.iris_colour(self.views, self.head, side, self.eyeball(side), self.albedo, Reporter("solve"))
 
     def true(self) -> np.ndarray:
         """The median of the picture between pupil and rim."""
@@ -101,7 +101,15 @@ def test_a_blink_and_another_skin_change_little(tmp_path):
 
 def test_an_iris_that_no_frame_faces_has_no_colour(tmp_path):
     person = Painted(tmp_path, (0.05, 0.06, 0.07))
-    behind = replace(person.opened.balls[0], gaze=np.array([0, 1.0, 0]))
-    assert iris.iris_colour(person.views, person.head, behind, person.eyeball(0), person.albedo, Reporter("solve")) is None
-    unseen = replace(person.eyeball(0), iris_radius=0.0)
-    assert iris.iris_colour(person.views, person.head, person.opened.balls[0], unseen, person.albedo, Reporter("solve")) is None
+    behind = replace(person.eyeball(0), gaze=(0.0, 1.0, 0.0))
+    assert iris.iris_colour(person.views, person.head, 0, behind, person.albedo, Reporter("solve")) is None
+
+
+def test_the_iris_is_what_lids_and_pupil_leave_of_it():
+    edge = np.linspace(10, 50, 9)
+    lid = 12 * np.sin(np.linspace(0, np.pi, 9))
+    eye = faces.Eye(np.stack([edge, 30 - lid], 1), np.stack([edge, 30 + lid], 1), np.array([30.0, 30.0]), 14.0)
+    ring = iris.iris_pixels((60, 60), eye)
+    assert not ring[30, 30] and ring[30, 40] and not ring[30, 45] and not ring[30 - 13, 30] and ring[30, 20]
+    shut = replace(eye, upper=eye.lower)
+    assert not iris.iris_pixels((60, 60), shut).any()

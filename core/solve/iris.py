@@ -2,19 +2,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The colour of eyes that were open: what a frame shows of an iris, over what it shows of the skin around that eye, whose albedo the solve has found.
 
-So the white point, the exposure and most of the light divide out, frame by frame. What is a highlight, a lash's shadow or a blink in some frames, or in a part
-of the iris, the median leaves out.
+So the white point, the exposure and most of the light divide out, frame by frame. Where the iris lies in a frame the eye network says. What is a highlight, a
+lash's shadow or a blink in some frames, or in a part of the iris, the median leaves out.
 """
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from ..contract.capture import Capture
 from ..contract.eyes_record import SIDES, Colour, Eyeball, read_eyes, write_irises
 from ..contract.files import remove_file
 from ..contract.messages import Reporter
-from ..face import lids
+from ..face import faces
 from ..face.head import Head
 from ..geometry import raster
 from ..geometry.views import View, read_views
@@ -22,16 +23,15 @@ from ..imaging import images
 from .look import BURNT, skin_weight
 from .witnesses import visible
 
-RING = np.linspace(0.55, 0.85, 6)
-"""Shares of the iris' radius where it is iris: a pupil is seldom wider than half, and the rim is darker."""
-AROUND = 96
+RING = 0.55, 0.85
+"""Shares of the iris' radius between which it is iris: a pupil is seldom wider than half, and the rim is darker."""
 FACING = 0.75
 """Least cosine between the gaze and the way to the camera: beyond 40 degrees the cornea's edge bends what is behind it."""
 REACH = 2.6
 """Radii of the eyeball within which skin is lit as the eye is."""
 TURNED = 0.5
 """Least cosine between the normals of such skin and the gaze."""
-FEWEST = 12  # points of skin or iris that a frame must show
+FEWEST = 12  # points of skin, or pixels of the iris, that a frame must show
 MOST_VIEWS = 10
 
 
@@ -45,8 +45,7 @@ def measure(capture: Capture, head: Head, albedo: np.ndarray, report: Reporter) 
         return
     eyes = read_eyes(capture)
     views = [view for view in read_views(capture) if view.path.is_file()]
-    colours = [iris_colour(views, head, lids.place_ball(side, np.array(eye.centre), eye.radius, np.array(eye.gaze)), eye, albedo, report)
-               for side, eye in enumerate(eyes)]
+    colours = [iris_colour(views, head, side, eye, albedo, report) for side, eye in enumerate(eyes)]
     known = [colour for colour in colours if colour is not None]
     if not known:
         return
@@ -56,57 +55,60 @@ def measure(capture: Capture, head: Head, albedo: np.ndarray, report: Reporter) 
         report.figure(f"{side}_iris_srgb", [round(float(v), 3) for v in images.linear_to_srgb(np.array(colour))])
 
 
-def iris_colour(views: list[View], head: Head, ball: lids.Ball, eye: Eyeball, albedo: np.ndarray, report: Reporter) -> Colour | None:
-    """Linear albedo of an iris, by the median over its ring and the frames that face it most; None where none shows it."""
-    if eye.iris_radius <= 0:
-        return None
-    ring = iris_ring(ball, eye.iris_radius)
-    skin, known = _skin_around(head, ball, albedo)
+def iris_colour(views: list[View], head: Head, side: int, eye: Eyeball, albedo: np.ndarray, report: Reporter) -> Colour | None:
+    """Linear albedo of the left (0) or the right iris, by the median over it and the frames that face it most; None where none shows it."""
+    skin, known = _skin_around(head, eye, albedo)
     if len(skin) < FEWEST:
         return None
-    facing = np.array([(view.centre - ball.centre) @ ball.gaze / np.linalg.norm(view.centre - ball.centre) for view in views])
+    towards = np.array([view.centre for view in views]) - eye.centre
+    facing = towards @ np.array(eye.gaze) / np.linalg.norm(towards, axis=1)
     found = []
     for i in np.argsort(-facing, kind="stable")[:MOST_VIEWS]:
         report.check()
         if facing[i] < FACING:
             break
-        found.append(_in_frame(views[i], head, ball, ring, skin, known))
+        found.append(_in_frame(views[i], head, side, skin, known))
     found = [colour for colour in found if colour is not None]
     return tuple(round(float(v), 4) for v in np.clip(np.median(found, 0), 0.001, 1)) if found else None
 
 
-def iris_ring(ball: lids.Ball, radius: float) -> np.ndarray:
-    """Points [N, 3] on the iris between the pupil and the rim, where the cornea shows them: in the plane that its edge lies in."""
-    side = np.cross(ball.gaze, [0, 0, 1.0])
-    side /= np.linalg.norm(side)
-    up = np.cross(side, ball.gaze)
-    turn = np.arange(AROUND) * 2 * np.pi / AROUND
-    flat = np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * up
-    return ball.centre + (1 + lids.CORNEA_BULGE) * ball.radius * ball.gaze + (radius * RING[:, None, None] * flat).reshape(-1, 3)
+def iris_pixels(shape: tuple[int, ...], eye: faces.Eye) -> np.ndarray:
+    """bool [H, W]: the iris between pupil and rim, as far as the lids leave it free, in a picture of that shape."""
+    height, width = shape[:2]
+    y, x = np.mgrid[0:height, 0:width] + 0.5
+    away = np.hypot(x - eye.iris[0], y - eye.iris[1]) / max(eye.iris_radius, 1e-6)
+    between = np.zeros((height, width), np.uint8)
+    outline = np.concatenate([eye.upper, eye.lower[::-1]])
+    cv2.fillPoly(between, [np.round((outline - 0.5) * 16).astype(np.int32)], 1, shift=4)
+    return (cv2.erode(between, np.ones((3, 3))) > 0) & (away > RING[0]) & (away < RING[1])
 
 
-def _skin_around(head: Head, ball: lids.Ball, albedo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _skin_around(head: Head, eye: Eyeball, albedo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The vertices [N] of plain skin about an eye that are turned as it is, and their linear albedo [N, 3]."""
     mesh, size = head.mesh, len(albedo)
     uv = np.zeros((len(mesh.vertices), 2))
     uv[mesh.faces] = mesh.uvs[mesh.face_uvs]
     pixels = np.stack([uv[:, 0], 1 - uv[:, 1]], 1)
     plain = raster.sample(skin_weight(512, np.zeros((8, 8))), pixels * 512) > 0.5
-    near = np.linalg.norm(mesh.vertices - ball.centre, axis=1) < REACH * ball.radius
-    rows = np.flatnonzero(plain & near & (head.normals @ ball.gaze > TURNED))
+    near = np.linalg.norm(mesh.vertices - eye.centre, axis=1) < REACH * eye.radius
+    rows = np.flatnonzero(plain & near & (head.normals @ np.array(eye.gaze) > TURNED))
     return rows, np.maximum(raster.sample(albedo, pixels[rows] * size), 1e-3)
 
 
-def _in_frame(view: View, head: Head, ball: lids.Ball, ring: np.ndarray, skin: np.ndarray, known: np.ndarray) -> np.ndarray | None:
+def _in_frame(view: View, head: Head, side: int, skin: np.ndarray, known: np.ndarray) -> np.ndarray | None:
+    """The iris' albedo [3] by one frame; None where that does not show it, or not enough of the skin around."""
     frame = images.read_srgb(view.path)
+    face = faces.detect(frame)
+    if face is None or not faces.shows_eye(face.yaw_deg, side):
+        return None
     linear, whole = images.srgb_to_linear(frame), frame.max(-1)
+    ring = iris_pixels(frame.shape, faces.find_eyes(frame, face)[1 - side])  # the right eye stands first there
     at = np.flatnonzero(visible(view, head.caster, head.mesh.vertices[skin], head.normals[skin]))
-    open_to = raster.visible_from(head.caster, ring, np.repeat(ball.gaze[None], len(ring), 0), view.centre)
-    if len(at) < FEWEST or open_to.sum() < FEWEST:
+    if len(at) < FEWEST or ring.sum() < FEWEST:
         return None
-    skin_at, iris_at = view.project(head.mesh.vertices[skin[at]])[0], view.project(ring[open_to])[0]
-    kept = raster.sample(whole, skin_at) < BURNT
-    if kept.sum() < FEWEST or (iris_at < 0).any() or (iris_at > [view.width, view.height]).any():
+    pixels = view.project(head.mesh.vertices[skin[at]])[0] * [frame.shape[1] / view.width, frame.shape[0] / view.height]
+    kept = raster.sample(whole, pixels) < BURNT
+    if kept.sum() < FEWEST:
         return None
-    light = np.median(raster.sample(linear, skin_at[kept]) / known[at][kept], axis=0)
-    return np.median(raster.sample(linear, iris_at), axis=0) / np.maximum(light, 1e-6)
+    light = np.median(raster.sample(linear, pixels[kept]) / known[at][kept], axis=0)
+    return np.median(linear[ring], axis=0) / np.maximum(light, 1e-6)
