@@ -135,15 +135,12 @@ def test_a_metahuman_gets_open_eyes_and_no_shape_keys(capture):
     bpy.context.scene.wildcap.captures[0].deliver.preset = 'metahuman'
     with pytest.raises(RuntimeError, match="MetaHuman from Mesh wants a head with open eyes, and this one's lids are closed"):
         bpy.ops.wildcap.deliver()
-    head = bpy.data.objects["face"]
-    moved = truth()
+    head, moved = bpy.data.objects["face"], truth()
     for name, rows in (("eyesOpenLeft", slice(200, 210)), ("eyesOpenRight", slice(300, 310))):
-        key = head.shape_key_add(name=name, from_mix=False)
-        for i in range(len(key.data))[rows]:
-            key.data[i].co += Vector((0, 0.001, 0.004))
+        for point in head.shape_key_add(name=name, from_mix=False).data[rows]:
+            point.co += Vector((0, 0.001, 0.004))
         moved[rows] += (0, 0.001, 0.004)
-    folder = deliver(capture, preset="metahuman")
-    read = by_another_reader(folder / "face.fbx")
+    read = by_another_reader(deliver(capture, preset="metahuman") / "face.fbx")
     assert not read["shapes"] and np.allclose(read["points"], 100 * y_up(moved), atol=1e-4)
     assert len(head.data.shape_keys.key_blocks) == 5 and np.abs(truth() - moved).max() > 0.003, "the artist's head is as it was"
 
@@ -295,9 +292,9 @@ def test_a_head_with_face_units_keeps_their_names_their_moves_and_its_eyes(captu
 
 
 def test_the_terminal_delivers_too(addon, capture, capsys):
-    root = bpy.context.scene.wildcap.captures[0].path
-    assert addon("terminal").execute(["deliver", root, "--preset", "unreal"]) == 0
+    root, execute = bpy.context.scene.wildcap.captures[0].path, addon("terminal").execute
+    assert execute(["deliver", root, "--preset", "unreal"]) == 0
     made = Path(capsys.readouterr().out.strip().splitlines()[-1])
     assert (made / "face.fbx").is_file() and (made / "textures" / "T_face_BaseColor.png").is_file()
-    assert addon("terminal").execute(["deliver", root, "--what", "own_mesh"]) == 1
+    assert execute(["deliver", root, "--what", "own_mesh"]) == 1
     assert "no fitted mesh of yours" in capsys.readouterr().err
