@@ -34,6 +34,7 @@ def flow():
     settings = bpy.context.scene.wildcap.captures[0]
     root = module("captures").root(settings)
     quick(settings)
+    bpy.context.scene.wildcap.resolution, bpy.context.scene.wildcap.samples = 512, 16
     yield 1.5
     d.screenshot("walk_2_video")
     started = time.monotonic()
