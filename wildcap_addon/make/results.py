@@ -8,7 +8,6 @@ Nothing of it happens while somebody paints, edits or moves something: it then w
 from dataclasses import dataclass, field
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from .. import captures, head, jobs, problems, status
 
@@ -80,14 +79,8 @@ def _show(context, item, made: _Made) -> None:
 
 
 def _finish(context, item) -> None:
-    """A picture, where the head has its maps, and a word that it is there."""
+    """A picture, in Blender's render window, where the head has its maps; and a word that it is there."""
     status.refresh(context)
     if captures.head(context, item) is not None and bpy.ops.wildcap.render.poll():
         bpy.ops.wildcap.render('EXEC_DEFAULT')
     problems.show(captures.root(item), problems.Notice("Your head is ready.", "Choose another light under Relight, or paint its shadow mask and solve again."))
-    if not bpy.app.background:
-        context.window_manager.popup_menu(_told, title=iface_("{} is ready").format(item.name), icon='CHECKMARK')
-
-
-def _told(menu, context) -> None:
-    menu.layout.label(text="The head has its maps, and is rendered under the chosen light.")
