@@ -43,7 +43,7 @@ def drop(home: Path):
     assert Path(items()[0].path) == Path.home() / "WildCap" / "Mein Gesicht é.wildcap"
     addon.use_solver()
     yield 1.5
-    assert addon.next_step().operator == "wildcap.reconstruct", addon.next_step()
+    assert addon.next_step().operator == "wildcap.make_my_head", addon.next_step()
     yield from d.park()
     d.screenshot("first_2_dropped")
     d.say("a dropped video became a capture")
