@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The face parser: its crop maps back, its shares add up, it learns from synthetic people that nothing is measured on, and goes on where it was killed."""
 
-import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,8 +17,8 @@ from core.face.parser_network import ParseNet, network_input
 from core.face.parts import BRIDGE, CHIN, PARTS, SIDE, cut, inside, put_back, to_crop
 from core.synthetic.identities import reserved_seeds
 from core.synthetic.people import figure, snapshot, unlit
+from core.training import descent, snapshots
 from core.training import parser as training
-from core.training import snapshots
 
 QUIET = Reporter("train", emit=lambda message: None)
 SEED, VIEWS = 3, 2  # a man with cropped hair, a full beard and open eyes
@@ -196,7 +196,7 @@ def test_a_killed_training_goes_on_to_the_same_weights(work, tmp_path, monkeypat
     options = training.CONFIGS["cpu"]["training"] | {"batch": 1, "echo": 2, "figures": 1, "held_out": 1, "views": VIEWS}
     monkeypatch.setitem(training.CONFIGS, "cpu", {"model": TINY, "training": options})
     ticks = iter(range(10**6))
-    monkeypatch.setattr(time, "monotonic", lambda: 40.0 * next(ticks))  # a step takes 40 s by this clock
+    monkeypatch.setattr(descent, "time", SimpleNamespace(monotonic=lambda: 40.0 * next(ticks)))  # a step takes 40 s by the training's clock
     weights = []
     for kill in (None, 12):
         folder = tmp_path / str(kill)
