@@ -81,7 +81,7 @@ PRESETS = {
             Picture("{name}_specular_level", ("level",)),
         )),
     "metahuman": Preset(
-        "MetaHuman from Mesh", "Import it as a static mesh for a MetaHuman Identity: the head's eyes are open, as that wants them, and it has no shape keys.",
+        "MetaHuman from Mesh", "Import it as a static mesh for a MetaHuman Identity, which wants open eyes: the head has them, and no shape keys.",
         "fbx", "cm", "directx", "png8", False, (
             Picture("T_{name}_Color", ALBEDO, COLOUR, "base_color"),
         ), open_eyes=True),

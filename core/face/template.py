@@ -41,6 +41,12 @@ def landmarks() -> tuple[np.ndarray, np.ndarray]:
     return np.array(record["face"]), np.array(record["bary"])
 
 
+def landmark_points(head: Mesh) -> np.ndarray:
+    """The 468 landmarks [468, 3] on a head of the built-in topology."""
+    face, bary = landmarks()
+    return (head.vertices[head.faces[face]] * bary[..., None]).sum(1)
+
+
 @cache
 def landmark_weights() -> np.ndarray:
     """How far each landmark can be trusted, 0 to 1 [468]; 0 where the net places it elsewhere from every side."""

@@ -36,8 +36,7 @@ def without_hair(scan: Mesh, views: list[View], head: Mesh, report: Reporter) ->
 
 def hidden_share(points: np.ndarray, normals: np.ndarray, views: list[View], head: Mesh, report: Reporter, visible=None) -> np.ndarray:
     """Of points [N, 3] with unit normals: the mean share of hair and cloth over the views that face them and, by visible(view) [N], see them; nan else."""
-    triangle, bary = template.landmarks()
-    marks = (head.vertices[head.faces[triangle]] * bary[..., None]).sum(1)
+    marks = template.landmark_points(head)
     total, votes = np.zeros(len(points)), np.zeros(len(points))
     for view in spread(views, MOST_VIEWS):
         report.check()

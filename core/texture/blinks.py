@@ -33,11 +33,10 @@ def leave_out_blinks(capture: Capture, observations: list[Observation], surface:
     left_out = set()
     for side, ball in enumerate(eyes):
         unlike = differing({o.name: _opening(seen[o.name], o.view, surface.mesh.vertices, side) for o in observations if o.name in seen})
-        unlike = [o for o in observations if o.name in unlike]
         zone = surface.spread(_around(surface, ball)) > 0
-        if not unlike or not sum((o.weight[zone] > 0).any() for o in observations if o not in unlike):
+        if not any((o.weight[zone] > 0).any() for o in observations if o.name not in unlike):
             continue
-        for observation in unlike:
+        for observation in (o for o in observations if o.name in unlike):
             observation.quality, observation.weight = np.where(zone, 0, observation.quality), np.where(zone, 0, observation.weight)
             left_out.add(observation.name)
     if left_out:

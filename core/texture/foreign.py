@@ -81,8 +81,7 @@ def _landmarks(srgb: np.ndarray, view: View, head: Head) -> np.ndarray | None:
     if not head.built_in:
         face = faces.detect(srgb)
         return None if face is None else face.landmarks
-    triangle, bary = template.landmarks()
-    pixels, _ = view.project((head.mesh.vertices[head.mesh.faces[triangle]] * bary[..., None]).sum(1))
+    pixels, _ = view.project(template.landmark_points(head.mesh))
     return pixels * [srgb.shape[1] / view.width, srgb.shape[0] / view.height] if np.isfinite(pixels).all() else None
 
 

@@ -58,8 +58,7 @@ def scene_of(figure: Figure, rng: np.random.Generator) -> Scene:
 
 def landmarks_of(figure: Figure) -> np.ndarray:
     """MediaPipe's landmarks on the figure [468, 3] in metres."""
-    face, bary = template.landmarks()
-    return (figure.head.vertices[figure.head.faces[face]] * bary[..., None]).sum(1)
+    return template.landmark_points(figure.head)
 
 
 def random_view(figure: Figure, rng: np.random.Generator, size: int = SIZE) -> View:
