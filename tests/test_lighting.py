@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 import torch
 
-from core.solve.light_fit import BAND_OF, SIDEWAYS, uneven, update_lights
+from core.light.spherical_harmonics import GAMMA_BANDS, per_function
+from core.solve.light_fit import uneven, update_lights
 from core.solve.lighting import Lights, Shader, constant_light, fit_global, interpolation, shading_basis
 from core.solve.problem import Observation, State
 from core.solve.recipes import OURS
+
+BAND_OF = torch.tensor(per_function(GAMMA_BANDS))
+SIDEWAYS = torch.tensor([0, 0, 0, 1, 1, 0, 0, 1, 0])  # of 1, y, z, x, xy, yz, 3 z^2 - 1, xz, x^2 - y^2 those that change their sign with x
 
 
 def sphere(rows: int = 200, columns: int = 400):

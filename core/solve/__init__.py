@@ -79,7 +79,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     denoiser = prior.of_tone(start.tone)
     report.figure("marks_kept_from_light", len(start.marks))
     images.write_srgb(capture.picture("solve", "edges_and_marks"), drawing.edges_and_marks(evidence, start.alpha, start.marks))
-    state, seen = start.state, start.observations
+    state, seen = start.state, {factor: o.to(denoiser.device) for factor, o in start.observations.items()}
     stored, key = capture.checkpoints / "solve.safetensors", _key(evidence, settings, start.tone)
     stopped = checkpoint.read(stored, key)
     if stopped is not None:
@@ -97,14 +97,15 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             images.write_srgb(capture.preview / "loss.png", drawing.loss_curve(losses, steps))
             report.preview("preview/loss.png")
 
-    state = sample_within_memory(denoiser, seen, state, recipe, seeded(settings.seed), on_step, report.log)
+    state = sample_within_memory(denoiser, seen, state.to(denoiser.device), recipe, seeded(settings.seed, denoiser.device), on_step, report.log)
     state.denoised = restored(denoiser, state.denoised, seen[1].coords, recipe, settings.seed)
+    state = state.to("cpu")
     result, found = _finished(denoiser, state, evidence, start, recipe, settings.seed, report)
     delivered = result if elsewhere is None else elsewhere.returned(result, known, state.lights, start.exposure, start.tone)
     maps.write(capture, delivered, found, conditions)
     iris.measure(capture, head, delivered.diffuse, report)
     comparison.write(capture, known, delivered.diffuse)
-    maps.write_preview(capture, state, seen, report)
+    maps.write_preview(capture, state, start.observations, report)
     _leave_figures(capture, evidence, result, start.tone, report)
     stored.unlink(missing_ok=True)
 

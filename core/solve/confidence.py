@@ -14,6 +14,7 @@ import torch
 from torch.nn import functional
 
 from .lighting import Lights
+from .prior import ConditionedPrior
 from .problem import Observation, State, albedo
 from .recipes import Recipe
 from .sampler import sample, seeded
@@ -39,15 +40,16 @@ def confidence(seen: torch.Tensor, explained: torch.Tensor, found: torch.Tensor,
     return (seen / (1 + expected / ERROR)).clamp(0, 1)
 
 
-def spread(prior: Callable, o: Observation, reference: torch.Tensor, lights: Lights, recipe: Recipe, seed: int,
+def spread(prior: ConditionedPrior, o: Observation, reference: torch.Tensor, lights: Lights, recipe: Recipe, seed: int,
            check: Callable[[], None] = lambda: None) -> torch.Tensor:
     """Deviation [H, W] of the albedo's lightness over short runs on a coarse map `o`, which begin at the reference face [1, 7, H, W], each with a seed of its
     own, under the light that was solved. `check` may raise to cancel."""
     short = replace(recipe, steps=STEPS, guidance="proximal", coarse=(), candidates=1, phases=())
-    runs = []
+    device, runs = prior.device, []
     for run in range(RUNS):
-        state = sample(prior, {1: o}, State(0, None, reference.clone(), lights), short, seeded(seed + 7919 * (run + 1)), lambda state, steps: check())
-        runs.append(shown(albedo(state.denoised)).mean(0))
+        begun = State(0, None, reference.clone(), lights).to(device)
+        state = sample(prior, {1: o.to(device)}, begun, short, seeded(seed + 7919 * (run + 1), device), lambda state, steps: check())
+        runs.append(shown(albedo(state.denoised)).mean(0).cpu())
     return torch.stack(runs).std(0)
 
 

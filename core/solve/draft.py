@@ -19,5 +19,5 @@ def restored(prior: ConditionedPrior, denoised: torch.Tensor, coords: torch.Tens
     was the closed form; as it is where not. coords [1, 2, S, S] are the whole map's; a part gets the noise that it would get in the whole map."""
     if recipe.guidance != "proximal":
         return denoised
-    noise = torch.randn(1, denoised.shape[1], *coords.shape[-2:], generator=torch.Generator().manual_seed(seed))
+    noise = torch.randn(1, denoised.shape[1], *coords.shape[-2:], generator=torch.Generator().manual_seed(seed)).to(denoised.device)
     return prior.respond(denoised, coords[(..., *part)], noise[(..., *part)])

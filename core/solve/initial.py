@@ -115,7 +115,7 @@ def reference(prior: Prior, tone: SkinTone, evidence: Evidence, kind: str) -> to
 def face_of_tone(face: torch.Tensor, tone: torch.Tensor, skin: torch.Tensor) -> torch.Tensor:
     """A face [7, R, R] in the form of the prior's mean face as x [1, 7, S, S], the mean of its skin [S, S] brought to the tone, linear [3]."""
     size = skin.shape[0]
-    out = mean_at(face, coordinates(size, slice(0, size), slice(0, size)), tone[None])
+    out = mean_at(face.to(tone.device), coordinates(size, slice(0, size), slice(0, size)), tone[None])
     albedo = albedo_of(out)
     out[0, :3] = 2 * albedo * (tone / mean_tone(albedo, skin))[:, None, None] - 1
     return out

@@ -8,14 +8,12 @@ from collections.abc import Callable
 
 import torch
 
-from ..light.spherical_harmonics import GAMMA_BANDS, per_function
+from ..light.spherical_harmonics import GAMMA_BANDS
 from .lighting import Lights, fit_around_constant
 from .problem import Observation, State, albedo, photometric
 from .recipes import Recipe
 
 BETAS = 0.9, 0.999
-BAND_OF = torch.tensor(per_function(GAMMA_BANDS))
-SIDEWAYS = torch.tensor([0.0, 0, 0, 1, 1, 0, 0, 1, 0])  # coefficients whose shading changes its sign from the head's left to its right (x, xy and xz)
 MOVING = {"both": (0, 1, 2), "main": (0,), "grid": (1, 2), "cells": (1,)}
 """Which of Lights.parameters() a phase moves."""
 
@@ -40,8 +38,8 @@ def _refit(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe)
     """gamma^g in closed form from what is seen outside of M under \\hat x_t. While there is much noise that map is what the prior expects, and no light but
     the true one makes it fit; later it would agree with whatever light there is."""
     weight = o.weight * (1 - o.shader.alpha) * (1.0 if recipe.trusting else o.trust)
-    if weight.sum() >= 1:
-        state.lights.glob = fit_around_constant(o.texture, albedo(denoised), o.shader.basis, weight, max(recipe.even, 0.01))
+    fitted = fit_around_constant(o.texture, albedo(denoised), o.shader.basis, weight, max(recipe.even, 0.01))
+    state.lights.glob = torch.where(weight.sum() >= 1, fitted, state.lights.glob)
 
 
 def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> torch.Tensor:
@@ -72,9 +70,12 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
 def uneven(glob: torch.Tensor, o: Observation, recipe: Recipe) -> torch.Tensor:
     """How far gamma^g [3, 9] is from an even light: the sum of squares of its directed parts, `o.even` of their brightness and of their colours, `recipe.sides`
     of those that tell left from right. The world is the head's own, x across it."""
-    cost, directed = 1 + (recipe.sides - 1) * SIDEWAYS[1:], (glob * BAND_OF)[:, 1:]
+    _, first, second = GAMMA_BANDS
+    directed = torch.cat([first * glob[:, 1:4], second * glob[:, 4:]], 1)
     mean = directed.mean(0)
-    return (cost * (o.even[0] * len(glob) * mean**2 + o.even[1] * ((directed - mean) ** 2).sum(0))).sum()
+    cost = o.even[0] * len(glob) * mean**2 + o.even[1] * ((directed - mean) ** 2).sum(0)  # of y, z, x, xy, yz, 3 z^2 - 1, xz, x^2 - y^2
+    sideways = cost[2:4].sum() + cost[6]  # x, xy and xz change their sign from the head's left to its right
+    return cost.sum() + (recipe.sides - 1) * sideways
 
 
 def variation(image: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:

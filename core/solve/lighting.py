@@ -7,6 +7,7 @@ Shading is linear and multiplies the albedo. Coefficients are those of the autho
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +41,10 @@ class Lights:
             parameter.requires_grad_(wanted)
         return self
 
+    def to(self, device: torch.device | str) -> Lights:
+        """The same lights on another device; these themselves where they are there."""
+        return Lights(*(parameter.to(device) for parameter in self.parameters()))
+
 
 class Shader:
     """Gamma_theta for one map: the fixed parts of the shading of every texel, prepared once.
@@ -61,6 +66,12 @@ class Shader:
         self.up_columns = interpolation(cells[1], width, bilinear).to(normal)[self.box[1]]  # [w', w]
         self.box_basis = self.basis[(slice(None), *self.box)]
         self.box_alpha = alpha[self.box]
+
+    def to(self, device: torch.device | str) -> Shader:
+        """The same shader on another device."""
+        moved = copy.copy(self)
+        moved.__dict__.update({name: value.to(device) for name, value in vars(self).items() if isinstance(value, torch.Tensor)})
+        return moved
 
     def part(self, rows: slice, columns: slice, cells: tuple[slice, slice]) -> Shader:
         """The shader of a part of the map, whose own grid are these cells of V."""
@@ -116,13 +127,14 @@ def fit_global(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor,
 
     texture, albedo linear [3, H, W]; basis [9, H, W]; weight [H, W]. `ridge` times the mean diagonal keeps coefficients that no normal sees at zero.
     """
-    columns = basis.reshape(9, -1).double()
-    w2 = weight.reshape(-1).double() ** 2
+    exact = torch.float32 if basis.device.type == "mps" else torch.float64  # Apple's GPUs have no float64
+    columns = basis.reshape(9, -1).to(exact)
+    w2 = weight.reshape(-1).to(exact) ** 2
     out = []
-    for t, a in zip(texture.reshape(3, -1).double(), albedo.reshape(3, -1).double(), strict=True):
+    for t, a in zip(texture.reshape(3, -1).to(exact), albedo.reshape(3, -1).to(exact), strict=True):
         normal_matrix = (columns * (w2 * a * a)) @ columns.T
-        damping = ridge * normal_matrix.diagonal().mean().clamp_min(1e-12) * torch.eye(9, dtype=torch.float64, device=basis.device)
-        out.append(torch.linalg.solve(normal_matrix + damping, (columns * (w2 * a)) @ t))
+        damping = ridge * normal_matrix.diagonal().mean().clamp_min(1e-12) * torch.eye(9, dtype=exact, device=basis.device)
+        out.append(torch.linalg.solve_ex(normal_matrix + damping, (columns * (w2 * a)) @ t)[0])  # `solve` asks the device whether it went well
     return torch.stack(out).float()
 
 
@@ -135,7 +147,7 @@ def fit_around_constant(texture: torch.Tensor, albedo: torch.Tensor, basis: torc
 
 def constant_light(shade: torch.Tensor) -> torch.Tensor:
     """gamma^g [3, 9] whose shading is `shade` [3] for every normal."""
-    glob = torch.zeros(3, 9)
+    glob = shade.new_zeros(3, 9)
     glob[:, 0] = shade / GAMMA_BANDS[0]
     return glob
 

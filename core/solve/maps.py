@@ -95,9 +95,9 @@ def write_preview(capture: Capture, state: State, seen: dict[int, Observation], 
     """preview/albedo.png and shading.png of a running solve, at the size it works at just now."""
     o = next(o for o in seen.values() if o.weight.shape == state.denoised.shape[-2:])
     with torch.no_grad():
-        shading = o.shader.total(state.lights).clamp_min(0)
+        shading = o.shader.total(state.lights).clamp_min(0).cpu()
     scale = 0.6 / max(float(np.percentile(shading.numpy(), 95)), 1e-6)
-    for name, image in (("albedo", albedo(state.denoised)), ("shading", scale * shading)):
+    for name, image in (("albedo", albedo(state.denoised).cpu()), ("shading", scale * shading)):
         images.write_srgb(capture.preview / f"{name}.png", images.linear_to_srgb(_picture(image)))
         report.preview(f"preview/{name}.png")
 

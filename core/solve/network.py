@@ -189,7 +189,7 @@ class _Down(nn.Module):
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=LAYOUT)
-        kernel = torch.tensor([1.0, 3.0, 3.0, 1.0], device=x.device, dtype=x.dtype) / 8
+        kernel = (2 - (torch.arange(4, device=x.device) - 1.5).abs()).to(x.dtype) / 4
         return functional.conv2d(x, torch.outer(kernel, kernel).expand(x.shape[1], 1, 4, 4), stride=2, groups=x.shape[1])
 
 

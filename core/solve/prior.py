@@ -45,29 +45,38 @@ class Prior:
         self.octaves, self.mean_face, self.spread, self.tones, self.references = octaves, mean_face, spread, tones or [], references
         self.multiple = network.multiple
 
+    @property
+    def device(self) -> torch.device:
+        """Where it computes: maps, coordinates and tone have to be there."""
+        return self.network.proj_in.weight.device
+
+    def to(self, device: torch.device | str) -> Prior:
+        """Moves the network, in place, and all that `condition_at` reads."""
+        self.network.to(device)
+        self.mean_face, self.spread = (None if part is None else part.to(device) for part in (self.mean_face, self.spread))
+        return self
+
     def of_tone(self, tone: SkinTone) -> ConditionedPrior:
         """The prior of a person with this skin tone."""
-        return ConditionedPrior(self, tone.tensor[None])
+        return ConditionedPrior(self, tone.tensor[None].to(self.device))
 
     def with_face(self, mean_face: torch.Tensor, tones: list) -> Prior:
         """The prior with a mean face and tones to start from."""
         given = copy.copy(self)
-        given.mean_face, given.tones = mean_face, tones
+        given.mean_face, given.tones = mean_face.to(self.device), tones
         return given
 
     def condition_at(self, coords: torch.Tensor, tone: torch.Tensor | None) -> dict[str, torch.Tensor]:
         """`denoise`'s arguments by name for maps at coords [N, 2, H, W] of skins of tone [1, 3]."""
-        blind = torch.zeros(1) if self.network.mapping_cond.in_features == 5 else None
+        blind = torch.zeros(1, device=self.device) if self.network.mapping_cond.in_features == 5 else None
         return condition(coords, self.octaves, self.mean_face, self.spread, tone, blind)
 
     def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor, tone: torch.Tensor | None) -> torch.Tensor:
         """`ConditionedPrior.respond` for a skin of tone [1, 3]."""
-        device = self.network.proj_in.weight.device
-        known = condition(coords, self.octaves, self.mean_face, self.spread, tone, blind=torch.ones(1))
-        levels = torch.tensor([CLEAR] * 3 + [BLIND] * 4)[None, :, None, None]
+        known = condition(coords, self.octaves, self.mean_face, self.spread, tone, blind=torch.ones(1, device=self.device))
+        levels = torch.tensor([CLEAR] * 3 + [BLIND] * 4, device=self.device)[None, :, None, None]
         x = torch.where(levels < BLIND, maps, known["mean"]) + levels * noise
-        told = {name: value.to(device) for name, value in known.items()}
-        out = denoise(self.network, x.to(device), torch.full((1,), CLEAR, device=device), levels=levels.to(device), **told).to(maps.device)
+        out = denoise(self.network, x, torch.full((1,), CLEAR, device=self.device), levels=levels, **known)
         return torch.cat([maps[:, :3], out[:, 3:]], 1)
 
 
@@ -75,19 +84,18 @@ class ConditionedPrior:
     """What the sampler denoises with: a prior, which stays as it is, and the tone [1, 3], linear RGB, of the skin it is to expect (None: it takes none)."""
 
     def __init__(self, prior: Prior, tone: torch.Tensor | None):
-        self.prior, self.tone, self.network = prior, tone, prior.network
+        self.prior, self.tone, self.network, self.device = prior, tone, prior.network, prior.device
         self._known: dict[str, torch.Tensor] = {}  # the last map's condition: it is the same at every noise level
 
     def __call__(self, x: torch.Tensor, sigma: float, coords: torch.Tensor) -> torch.Tensor:
         """The expected clean map given x at noise level sigma. coords [N, 2, H, W] from `coordinates`, one texel apart in the map's own scale."""
-        device = self.network.proj_in.weight.device  # the map may live elsewhere: the network is all that is slow
         if self._known.get("coords") is not coords:
             known = self.prior.condition_at(coords, self.tone)
             if "mean" in known:  # it goes in as it is: kept as the network takes it, at half the memory
                 known["condition"] = known["condition"].to(self.network.proj_in.weight.dtype)
-            self._known = {"coords": coords, **{name: value.to(device) for name, value in known.items()}}
-        sigmas = torch.full((len(x),), float(sigma), device=device)
-        return denoise(self.network, x.to(device), sigmas, **{k: v for k, v in self._known.items() if k != "coords"}).to(x.device)
+            self._known = {"coords": coords, **known}
+        sigmas = torch.full((len(x),), float(sigma), device=self.device)
+        return denoise(self.network, x, sigmas, **{k: v for k, v in self._known.items() if k != "coords"})
 
     def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor) -> torch.Tensor:
         """Maps [1, 7, H, W] with the normals and specular that are expected of their diffuse albedo; noise [1, 7, H, W] is standard normal.
@@ -106,6 +114,12 @@ class ReleasedPrior(Prior):
     def __init__(self, network: UNet, kind: str, octaves: int, sigmas: tuple[float, float] | None, noise: torch.Tensor | None):
         super().__init__(network, octaves)
         self.kind, self.sigmas, self.noise = kind, sigmas, noise
+
+    def to(self, device: torch.device | str) -> ReleasedPrior:
+        """`Prior.to`, with the random map."""
+        super().to(device)
+        self.noise = None if self.noise is None else self.noise.to(device)
+        return self
 
     def check(self) -> None:
         """Raises Problem where it loads but cannot sample."""
@@ -175,8 +189,8 @@ def load(path: Path = WEIGHTS, device: str = "cpu", dtype: torch.dtype | None = 
             prior = _load_ours(path)
         except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
             raise Problem(f"The prior {path} cannot be loaded ({type(error).__name__}: {error}).", "Reinstall the extension.") from error
-    prior.network.to(device).lower(dtype or fast_dtype(device))
-    return prior
+    prior.network.lower(dtype or fast_dtype(device))
+    return prior.to(device)
 
 
 def fast_dtype(device: str) -> torch.dtype:

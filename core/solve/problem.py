@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 
 import torch
 from torch.nn import functional
@@ -35,6 +35,10 @@ class Observation:
     missing: torch.Tensor | float = 0.0
     even: tuple[float, float] = (1.0, 1.0)
 
+    def to(self, device: torch.device | str) -> Observation:
+        """The same observation on another device."""
+        return replace(self, **{f.name: value.to(device) for f in fields(self) if isinstance(value := getattr(self, f.name), torch.Tensor | Shader)})
+
 
 @dataclass
 class State:
@@ -45,6 +49,11 @@ class State:
     denoised: torch.Tensor
     lights: Lights
     moments: list[torch.Tensor] = field(default_factory=list)
+
+    def to(self, device: torch.device | str) -> State:
+        """The same state on another device."""
+        x = None if self.x is None else self.x.to(device)
+        return State(self.step, x, self.denoised.to(device), self.lights.to(device), [moment.to(device) for moment in self.moments])
 
 
 def albedo(denoised: torch.Tensor) -> torch.Tensor:
@@ -68,7 +77,7 @@ def unexplained(state: State, observations: dict[int, Observation]) -> float:
 
 def blurred(image: torch.Tensor, sigma: float = 0.8) -> torch.Tensor:
     """[3, H, W] under a 3 x 3 Gaussian, reflected at the border: the released code compares textures through it."""
-    line = torch.exp(-torch.tensor([-1.0, 0.0, 1.0]) ** 2 / (2 * sigma**2))
+    line = torch.exp(-torch.arange(-1.0, 2.0, device=image.device) ** 2 / (2 * sigma**2))
     line = line / line.sum()
     padded = functional.pad(image[:, None], (1, 1, 1, 1), mode="reflect")
-    return functional.conv2d(padded, torch.outer(line, line)[None, None].to(image))[:, 0]
+    return functional.conv2d(padded, torch.outer(line, line)[None, None])[:, 0]

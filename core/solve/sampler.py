@@ -4,6 +4,8 @@
 
 The paper writes DDPM; here the same process stands in the variance-exploding form of EDM: x = x_0 + sigma z, one ancestral step of which is the DDPM
 posterior step (equation 5), and the denoiser's output is \\hat x_t (equation 6). Everything is float32 and linear light; x is [1, 7, H, W].
+
+A step stays on the device that the state, the observations and the prior lie on: it neither asks that device for a number nor sends it one.
 """
 
 from __future__ import annotations
@@ -19,12 +21,12 @@ from .problem import Observation, State, albedo, blurred, photometric
 from .recipes import Recipe
 
 
-def seeded(seed: int) -> Callable[[int], Callable]:
-    """The noise of a run: step -> draw(*shape), standard normal. It depends on (seed, step) alone, so a run continued from a stored state
-    gives the same bytes."""
+def seeded(seed: int, device: torch.device | str = "cpu") -> Callable[[int], Callable]:
+    """The noise of a run: step -> draw(*shape), standard normal, drawn on the device. It depends on (seed, step, device) alone, so a run continued from a
+    stored state gives the same bytes."""
     def of_step(step: int) -> Callable:
-        generator = torch.Generator().manual_seed(1_000_003 * seed + step)
-        return lambda *shape: torch.randn(shape, generator=generator)
+        generator = torch.Generator(device).manual_seed(1_000_003 * seed + step)
+        return lambda *shape: torch.randn(shape, generator=generator, device=device)
     return of_step
 
 
@@ -33,45 +35,51 @@ def sample(prior: Callable, observations: dict[int, Observation], state: State, 
            known: Callable[[torch.Tensor, float, Callable], torch.Tensor] = lambda x, sigma, draw: x, fit: Callable[..., None] = update_lights) -> State:
     """Runs the sampler from `state` to its end and returns the final state; `denoised` is the solved map, `lights` theta.
 
-    prior(x, sigma, coords) is the denoiser; `observations` maps a coarsening factor to what is known at that size; `noise` is `seeded`'s;
+    prior(x, sigma, coords) is the denoiser; `observations` maps a coarsening factor to what is known at that size; `noise` is `seeded`'s, of their device;
     `known` puts what is known of the map for sure into x_t (window.py); `fit` moves theta after each step (light_fit.update_lights, or another light model's).
     Raises Problem when the numbers leave all bounds.
     """
     sigmas = schedule(recipe)
     steps = len(sigmas) - 1
     for i in range(state.step, steps):
-        s, s_next = sigmas[i], sigmas[i + 1]
+        s = sigmas[i]
         draw = noise(i)
         o = observations[_factor(s, recipe, observations)]
         if state.x is None or state.x.shape[-2:] != o.weight.shape:  # the start, or a finer map from here on
             clean = _resized(state.denoised, *o.weight.shape)
             state.x = clean + s * draw(*clean.shape)
-
-        x = known(state.x, s, draw).requires_grad_(recipe.guidance == "dps")
-        denoised = prior(x, s, o.coords)  # equation 6
-        with torch.no_grad():
-            shading = o.shader.total(state.lights)
-        guided, gradient = denoised.detach(), torch.zeros(())
-        if recipe.guidance == "dps":
-            loss = photometric(denoised, shading, o, o.weight, recipe.blur)  # equation 1
-            scale = recipe.zeta * (1 + s * s if recipe.preserving else 1.0)
-            gradient = clipped(torch.autograd.grad(loss, x)[0] * o.weight * scale, recipe)
-        else:
-            guided = proximal(guided, shading, o, s, recipe.residual)
-        fit(state, denoised.detach(), o, recipe, i, steps)  # equation 9
-
-        with torch.no_grad():
-            s_down, s_up = ancestral(s, s_next)
-            x = x.detach()
-            x_prime = x + (x - guided) / s * (s_down - s)  # equation 7, its mean
-            x_prime = x_prime - gradient  # equation 8
-            state.x = x_prime if s_up == 0 else _noised(x_prime, x, s_up, s_down / s, o, state, recipe, draw)
-        state.denoised, state.step = guided, i + 1
-        if not torch.isfinite(state.x).all() or state.x.abs().max() > 1e3 * (1 + s):
+        step(prior, o, state, recipe, (s, sigmas[i + 1]), steps, draw, known, fit)
+        if not state.x.abs().max() <= 1e3 * (1 + s):  # nor where it is no number
             raise Problem(f"The solver diverged at step {i + 1} of {steps}.",
                           "Check that the texture and the mask are those of this head, or choose the proximal guidance.")
         on_step(state, steps)
     return state
+
+
+def step(prior: Callable, o: Observation, state: State, recipe: Recipe, levels: tuple[float, float], steps: int, draw: Callable,
+         known: Callable[[torch.Tensor, float, Callable], torch.Tensor], fit: Callable[..., None]) -> None:
+    """One step of `sample`, in place, between two noise levels: x_t becomes x_{t-1}, theta follows, all on their device."""
+    s, s_next = levels
+    x = known(state.x, s, draw).requires_grad_(recipe.guidance == "dps")
+    denoised = prior(x, s, o.coords)  # equation 6
+    with torch.no_grad():
+        shading = o.shader.total(state.lights)
+    guided, gradient = denoised.detach(), 0.0
+    if recipe.guidance == "dps":
+        loss = photometric(denoised, shading, o, o.weight, recipe.blur)  # equation 1
+        scale = recipe.zeta * (1 + s * s if recipe.preserving else 1.0)
+        gradient = clipped(torch.autograd.grad(loss, x)[0] * o.weight * scale, recipe)
+    else:
+        guided = proximal(guided, shading, o, s, recipe.residual)
+    fit(state, denoised.detach(), o, recipe, state.step, steps)  # equation 9
+
+    with torch.no_grad():
+        s_down, s_up = ancestral(s, s_next)
+        x = x.detach()
+        x_prime = x + (x - guided) / s * (s_down - s)  # equation 7, its mean
+        x_prime = x_prime - gradient  # equation 8
+        state.x = x_prime if s_up == 0 else _noised(x_prime, x, s_up, s_down / s, o, state, recipe, draw)
+    state.denoised, state.step = guided, state.step + 1
 
 
 def schedule(recipe: Recipe) -> list[float]:
@@ -98,9 +106,8 @@ def clipped(gradient: torch.Tensor, recipe: Recipe) -> torch.Tensor:
     if recipe.clip == "texel":
         return gradient * (recipe.limit / gradient.abs().amax(1, keepdim=True).clamp_min(recipe.limit))
     if recipe.clip == "decade":
-        largest = float(gradient.abs().max())
-        while largest > recipe.limit:
-            gradient, largest = 0.1 * gradient, 0.1 * largest
+        tenths = (gradient.abs().max() / recipe.limit).log10().ceil().clamp_min(0)
+        return gradient * 0.1**tenths
     return gradient
 
 
@@ -121,8 +128,12 @@ def _noised(mean: torch.Tensor, x: torch.Tensor, s_up: float, kept: float, o: Ob
         return mean + s_up * draw(*mean.shape)
     shading = o.shader.total(state.lights)
     target = kept * blurred(albedo(x) * shading) + (1 - kept) * o.texture
-    candidates = (mean + s_up * draw(*mean.shape) for _ in range(recipe.candidates))
-    return min(candidates, key=lambda c: float(((o.weight * (shading * albedo(c) - target)) ** 2).sum()))
+    best, least = mean, torch.full((), torch.inf, device=mean.device)
+    for _ in range(recipe.candidates):
+        candidate = mean + s_up * draw(*mean.shape)
+        error = ((o.weight * (shading * albedo(candidate) - target)) ** 2).sum()
+        best, least = torch.where(error < least, candidate, best), torch.minimum(error, least)
+    return best
 
 
 def _factor(s: float, recipe: Recipe, observations: dict[int, Observation]) -> int:

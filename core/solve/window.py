@@ -80,11 +80,12 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
                  on_step: Callable[[State, int], None] = lambda state, steps: None,
                  log: Callable[[str], None] = lambda text: None) -> tuple[torch.Tensor, Lights]:
     """The map [1, 7, S, S] and the lights of an earlier solve with the window sampled anew under `observations` of the whole map, by coarsening factor."""
-    here = {factor: cropped(o, part, factor) for factor, o in observations.items()}
-    known = denoised[(..., *part.seen)]
-    grid = lights.grid[(..., *part.cells)].clone()
-    state = State(0, None, known.clone(), Lights(lights.glob.clone(), grid.clone(), lights.chroma.clone()))
-    inside = torch.zeros(known.shape[-2:])
+    device = prior.device
+    here = {factor: cropped(o, part, factor).to(device) for factor, o in observations.items()}
+    known = denoised[(..., *part.seen)].to(device)
+    grid = lights.grid[(..., *part.cells)].to(device)
+    state = State(0, None, known.clone(), Lights(lights.glob.clone().to(device), grid.clone(), lights.chroma.clone().to(device)))
+    moving, inside = part.moving.to(device), torch.zeros(known.shape[-2:], device=device)
     inside[tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(part.inside, part.seen, strict=True))] = 1
 
     def with_known(x: torch.Tensor, s: float, draw: Callable) -> torch.Tensor:
@@ -93,16 +94,16 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
         return torch.where(within > 0.5, x, clean + s * draw(*x.shape))
 
     def keep_frozen(state: State, steps: int) -> None:
-        state.lights.grid = torch.where(part.moving, state.lights.grid, grid)
+        state.lights.grid = torch.where(moving, state.lights.grid, grid)
         on_step(state, steps)
 
     last = max(end for _, _, end in recipe.phases)
     local = replace(recipe, steps=min(recipe.steps, STEPS), phases=(("cells", 0.0, last),), refit=0.0)
-    state = sample_within_memory(prior, here, state, local, seeded(seed), keep_frozen, log, known=with_known)
-    found = restored(prior, state.denoised, observations[1].coords, recipe, seed, part.seen)
+    state = sample_within_memory(prior, here, state, local, seeded(seed, device), keep_frozen, log, known=with_known)
+    found = restored(prior, state.denoised, observations[1].coords.to(device), recipe, seed, part.seen)
     solved, moved = denoised.clone(), lights.grid.clone()
-    moved[(..., *part.cells)] = state.lights.grid
-    solved[(..., *part.seen)] = torch.where(inside > 0, found, known)
+    moved[(..., *part.cells)] = state.lights.grid.cpu()
+    solved[(..., *part.seen)] = torch.where(inside > 0, found, known).cpu()
     return solved, Lights(lights.glob, moved, lights.chroma)
 
 
