@@ -57,10 +57,11 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     with replacing_folder(capture.cameras) as folder:
         write_model(folder, model)
         report.check()
-    images.write_srgb(capture.picture("cameras", "world"), draw_cameras(model, frames.records, capture.frames))
-    _findings(solved, frames.records, centres, report)
+    records = solved.asked or frames.records
+    images.write_srgb(capture.picture("cameras", "world"), draw_cameras(model, records, capture.frames))
+    _findings(solved, records, centres, report)
     registered, azimuth = model.num_reg_images(), coverage.angles(centres)[0]
-    for name, value in (("frames_registered", registered), ("share_registered", round(registered / len(frames.records), 3)),
+    for name, value in (("frames_registered", registered), ("share_registered", round(registered / len(records), 3)),
                         ("reprojection_error_px", round(model.compute_mean_reprojection_error(), 3) if model.num_points3D() else None),
                         ("sparse_points", model.num_points3D()), ("angular_coverage_deg", round(widest, 1)),
                         ("from_person_right_deg", round(float(-azimuth.min()), 1)), ("to_person_left_deg", round(float(azimuth.max()), 1)),

@@ -25,6 +25,7 @@ from .motion import camera_stood_still, head_masks
 from .resection import resect
 from .settled import settle
 from .structure import ALL_PAIRS, camera_groups, solve_structure
+from .surroundings import spread_over, surroundings_stay
 from .world import HeadFrame, find_head
 
 LEAST_SHARE = 0.6
@@ -45,7 +46,8 @@ class Solved:
     """A model in a world of its own; how it was found: plain, skin or face; the head in it; the faces it was found by; whether the head moved
     before its background, and whether the camera stood still then; mirrored frames that were left out; tracks that refined a model from the face,
     and whether they are enough to trust it; the matches it comes from, where more is to be made of them; whether
-    after that every frame is held by what matches; swayed: the share of the error of the head's matches that went when the room had no say."""
+    after that every frame is held by what matches; swayed: the share of the error of the head's matches that went when the room had no say;
+    asked: the frames that were to be placed, where those are not all."""
 
     model: pycolmap.Reconstruction
     way: str
@@ -59,15 +61,27 @@ class Solved:
     matches: Matches = field(default_factory=Matches)
     held: bool = False
     swayed: float = 0.0
+    asked: tuple[FrameRecord, ...] = ()
 
 
 def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
     """Raises Problem with what is wrong, as precisely as can be told."""
     records = frames.records
     few = len(records) <= FEW
+    if frames.kind == VIDEO and not few and surroundings_stay(find_landmarks(_spread(records), capture.frames, report), capture.frames):
+        asked = spread_over(records)
+        report.log(f"All but the head stays where it is: the camera stood still. Only the head's own matches count, in {len(asked)} of {len(records)} frames.")
+        return replace(_solve(Frames(asked, frames.kind), capture, settings, report, stood=True), asked=asked)
+    return _solve(frames, capture, settings, report)
+
+
+def _solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter, stood: bool = False) -> Solved:
+    """`solve` with these frames alone; `stood`: it is known that the camera stood still while the head turned."""
+    records = frames.records
+    few = len(records) <= FEW
     ways = {"auto": ("plain", "face", "skin", "face") if few else ("plain", "skin", "face")}.get(settings.cameras.features, (settings.cameras.features,))
     found = find_landmarks(records if few else _spread(records), capture.frames, report)
-    matches, faults, moved, stood, partial = Matches(), [], False, False, None
+    matches, faults, moved, partial = Matches(), [], stood, None
     for turn, way in enumerate(ways):
         if way == "face":
             if len(found) < len(records) <= 5 * MOST_FACES and not few:
@@ -77,13 +91,12 @@ def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter
                 report.log("The face gives cameras, but too little else matches to refine them; features that hold on skin are tried.")
                 continue
         else:
-            solved, matches, fault = _by_features(way == "skin", frames, capture, found, settings, report)
+            skin, alone = way == "skin", stood
+            solved, matches, fault = _by_features(skin, frames, capture, found, settings, report, alone)
             stood = stood or bool(camera_stood_still(matches, found))
-            if stood or (fault and solved):  # what matches is not one motion: the head's alone
+            if not alone and (stood or (fault and solved)):  # what matches is not one motion: the head's alone
                 moved = True
-                alone, head_matches, alone_fault = _by_features(way == "skin", frames, capture, found, settings, report, alone=True)
-                matches = head_matches
-                solved, fault = alone, alone_fault
+                solved, matches, fault = _by_features(skin, frames, capture, found, settings, report, alone=True)
         if solved and not fault:
             if partial and worth(partial) > worth(solved):
                 solved, matches = partial, partial.matches

@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A film of a head that turns before a fixed camera is known for what it is in seconds, and nothing else is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.cameras import solving
+from core.cameras.surroundings import MOST, spread_over, surroundings_stay
+from core.contract.capture import Capture
+from core.contract.frame_records import PHOTOGRAPHS, VIDEO, FrameRecord, Frames
+from core.contract.messages import Problem, Reporter
+from core.contract.settings import Settings
+from core.face import faces
+from core.imaging import images
+from core.synthetic.painted_head import camera, photograph
+
+TURNS = -28, -14, 0, 14, 28
+
+
+def film(folder, pictures) -> dict[str, faces.Face]:
+    """Writes the pictures as frames; the faces in them."""
+    found = {}
+    for i, picture in enumerate(pictures):
+        name = f"{i:05d}.jpg"
+        images.write_srgb(folder / name, picture, quality=95)
+        found[name] = faces.detect(images.read_srgb(folder / name))
+    return found
+
+
+@pytest.mark.parametrize(("pictures", "stays"), [
+    pytest.param(lambda: [photograph(camera(0, 0.03), turned_deg=turn) for turn in TURNS], True, id="the head turns"),
+    pytest.param(lambda: [photograph(camera(turn, 0.03)) for turn in TURNS], False, id="the camera goes round"),
+    pytest.param(lambda: [photograph(camera(turn, 0.03), wall=False) for turn in TURNS], False, id="a bare wall, which does not tell"),
+    pytest.param(lambda: [photograph(camera(0, 0.03), turned_deg=turn) for turn in (-3, 0, 3)], False, id="nobody turns")])
+def test_a_camera_that_stood_still_is_seen_in_a_few_pictures(tmp_path, pictures, stays):
+    found = film(tmp_path, pictures())
+    assert all(face is not None for face in found.values())
+    assert surroundings_stay(found, tmp_path) is stays
+
+
+def records(count: int) -> list[FrameRecord]:
+    return [FrameRecord(name=f"{i:05d}.jpg", sharpness=1.0, selected=i % 31 == 7, yaw_deg=float(i % 40)) for i in range(count)]
+
+
+def test_the_frames_asked_are_spread_over_the_film_and_hold_those_of_the_texture():
+    asked = spread_over(records(400))
+    numbers = [int(record.name[:5]) for record in asked]
+    assert numbers == sorted(numbers) and numbers[0] == 0 and numbers[-1] == 399 and max(np.diff(numbers)) <= 6
+    assert {record for record in records(400) if record.selected} <= set(asked) and MOST <= len(asked) <= MOST + 13
+    assert spread_over(records(30)) == tuple(records(30))
+
+
+@pytest.mark.parametrize(("kind", "count", "stays", "asked", "alone"), [
+    (VIDEO, 400, True, None, [True, True]), (VIDEO, 400, False, 400, [False, False]), (PHOTOGRAPHS, 400, True, 400, [False, False])])
+def test_then_only_the_head_is_matched_and_in_fewer_frames(tmp_path, monkeypatch, kind, count, stays, asked, alone):
+    """Where neither kind of features gives cameras, nor the face: the words stay those of a head that turned."""
+    tried = []
+
+    def by_features(skin, frames, capture, found, settings, report, alone=False):
+        tried.append((len(frames.records), alone))
+        return None, solving.Matches(), "nothing"
+
+    monkeypatch.setattr(solving, "_by_features", by_features)
+    monkeypatch.setattr(solving, "_by_face", lambda *given: (None, "no face"))
+    monkeypatch.setattr(solving, "surroundings_stay", lambda found, folder: stays)
+    monkeypatch.setattr(solving, "find_landmarks", lambda records, folder, report: {})
+    film = Frames(tuple(replace(record, yaw_deg=None) for record in records(count)), kind)
+    with pytest.raises(Problem) as problem:
+        solving.solve(film, Capture(tmp_path), Settings(), Reporter("cameras"))
+    assert [was for _, was in tried] == alone and {number for number, _ in tried} == {asked or len(spread_over(film.records))}
+    assert ("camera that stood still" in problem.value.problem) == (alone[0])
