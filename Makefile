@@ -11,8 +11,15 @@ EXTENSION_TOOL = $(wildcard $(VENV)/lib/python3*/site-packages/bpy/*/scripts/add
 
 RELEASE := $(shell sed -n 's/^version = "\(.*\)"/\1/p' blender_manifest.toml)
 
-# The oldest Blender that the add-on supports, and the newest whose module installs beside Python 3.11.
-BLENDERS ?= 4.2.0 5.0.1
+# The oldest Blender that the add-on supports, the long-term releases since, and the newest with Python 3.11; each beside the NumPy that it ships.
+BLENDERS ?= 4.2.0 4.5.15 5.0.1 5.2.3
+.blenders/4.2.%: SHIPS = numpy==1.24.3
+.blenders/4.5.% .blenders/5.0.%: SHIPS = numpy==1.26.4
+.blenders/5.1.% .blenders/5.2.%: SHIPS = numpy==2.3.4
+
+# Blender 5.1 and newer have Python 3.13, which a version manager may keep where no command leads to it.
+PYTHON3.13 ?= $(firstword $(shell python3.13 -c 'import sys; print(sys.executable)' 2>/dev/null) $(wildcard ~/.pyenv/versions/3.13.*/bin/python) python3.13)
+.blenders/5.1.% .blenders/5.2.%: OWN_PYTHON = $(PYTHON3.13)
 
 # What of the tests needs Blender.
 IN_BLENDER = addon captures setup evidence choices eyedropper white_card paint paint_session operators job_life relight skin_material skin_kept reel make next_step refusals draw translations sending acting updates delete_face save_report
@@ -34,12 +41,12 @@ results: $(VENV)/installed
 
 test-blenders: $(BLENDERS:%=.blenders/%/installed)
 	for version in $(BLENDERS); do \
-	    .blenders/$$version/bin/python -m pytest -W ignore::DeprecationWarning $(IN_BLENDER:%=tests/test_%.py) || exit 1; \
+	    .blenders/$$version/bin/python -m pytest $(IN_BLENDER:%=tests/test_%.py) || exit 1; \
 	done
 
 .blenders/%/installed: Makefile
-	$(PYTHON) -m venv .blenders/$*
-	.blenders/$*/bin/python -m pip install --quiet --disable-pip-version-check bpy==$* numpy==1.26.4 pytest==9.0.3
+	$(or $(OWN_PYTHON),$(PYTHON)) -m venv .blenders/$*
+	.blenders/$*/bin/python -m pip install --quiet --disable-pip-version-check bpy==$* $(SHIPS) pytest==9.0.3
 	touch $@
 
 test-gui: $(VENV)/installed zip

@@ -20,6 +20,8 @@ import time
 from importlib import import_module
 from pathlib import Path
 
+from .render_capture import without_numpy_1
+
 ROOT = Path(__file__).resolve().parent.parent
 MODULE = "bl_ext.user_default.wildcap"
 MASK = 4096
@@ -37,7 +39,8 @@ def main() -> None:
         os.environ["BLENDER_USER_RESOURCES"] = folder
         capture = Path(folder) / "face.wildcap"
         shutil.copytree(options.capture, capture, ignore=shutil.ignore_patterns("delit", "checkpoints", "logs"))
-        import bpy  # noqa: F401, I001  (makes addon_utils importable)
+        with without_numpy_1():
+            import bpy  # noqa: F401  (makes addon_utils importable)
         import addon_utils
 
         addon_utils.enable(MODULE, default_set=True)

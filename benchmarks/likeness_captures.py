@@ -8,7 +8,7 @@ latter smears a picture. Cameras and normals are in the head's own axes, since t
 
 from __future__ import annotations
 
-import resource
+import os
 import time
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -64,7 +64,8 @@ def film(folder: Path, name: str, figure: Figure, light: scene.Light, said: str,
 
 def _spent() -> float:
     """Seconds that the finished child processes computed, on all cores together."""
-    return sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
+    times = os.times()
+    return times.children_user + times.children_system
 
 
 def _write_truth(target: Path, figure: Figure, light: scene.Light, views: list, poses: np.ndarray) -> dict[int, tuple[np.ndarray, np.ndarray]]:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import resource
 import tempfile
 import time
 from pathlib import Path
@@ -121,7 +120,11 @@ def _seconds(work, device: str) -> float:
 
 def _peak(device: str) -> float:
     """Megabytes: of the process, or of the graphics card."""
-    return torch.cuda.max_memory_allocated() / 1e6 if device == "cuda" else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+    if device == "cuda":
+        return torch.cuda.max_memory_allocated() / 1e6
+    import resource  # Windows has none
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
 
 
 if __name__ == "__main__":

@@ -80,7 +80,8 @@ def _render_mask(thing, scene, mask: str, path: Path) -> None:
     import bpy
 
     material = bpy.data.materials.new("mask")
-    material.use_nodes = True
+    if material.node_tree is None:  # before Blender 5
+        material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
     image, emission, output = (nodes.new(kind) for kind in ("ShaderNodeTexImage", "ShaderNodeEmission", "ShaderNodeOutputMaterial"))

@@ -13,7 +13,9 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import io
 import os
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -47,7 +49,8 @@ def extension() -> Iterator[None]:
         repository.mkdir()
         (repository / "wildcap").symlink_to(ROOT, target_is_directory=True)
         os.environ["BLENDER_USER_EXTENSIONS"] = extensions
-        import bpy  # noqa: F401, I001  (makes addon_utils importable)
+        with without_numpy_1():
+            import bpy  # noqa: F401  (makes addon_utils importable)
         import addon_utils
 
         if addon_utils.enable("bl_ext.user_default.wildcap") is None:
@@ -56,6 +59,19 @@ def extension() -> Iterator[None]:
             yield
         finally:
             addon_utils.disable("bl_ext.user_default.wildcap")  # a class left registered crashes the wheel at exit
+
+
+@contextlib.contextmanager
+def without_numpy_1() -> Iterator[None]:
+    """While Blender's module is imported: keeps back NumPy 2's pages on its audio module, which is made for NumPy 1 in every module for Python 3.11, and
+    not used here. Anything else that is said comes out."""
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            yield
+    finally:
+        if "compiled using NumPy 1.x" not in said.getvalue():
+            sys.stderr.write(said.getvalue())
 
 
 if __name__ == "__main__":

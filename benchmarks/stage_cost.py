@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -104,6 +103,8 @@ def over(settings: Settings, values: dict) -> Settings:
 
 def peak_mb() -> int:
     """The largest memory this process or one of its children held, in MB."""
+    import resource  # Windows has none
+
     peak = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return round(peak / (1024 ** 2 if sys.platform == "darwin" else 1024))  # macOS counts bytes, Linux KiB
 

@@ -19,7 +19,7 @@ import pytest
 import core.contract.messages
 from core.worker.client import SPINS
 
-from . import message_sites
+from . import deprecations, message_sites
 
 ROOT = Path(__file__).resolve().parent.parent
 MODULE = "bl_ext.user_default.wildcap"
@@ -49,6 +49,7 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    config.pluginmanager.register(deprecations.Watch(ROOT))
     message_sites.watch_problems(core.contract.messages.Problem)
     if config.option.reached:
         message_sites.take_in(config.option.reached)
@@ -82,8 +83,8 @@ def pytest_unconfigure(config):
         os._exit(int(config.stash.get(STATUS, 1)))
 
 
-def pytest_sessionfinish(session, exitstatus):
-    session.config.stash[STATUS] = exitstatus
+def pytest_sessionfinish(session):
+    session.config.stash[STATUS] = session.exitstatus
     if session.config.option.reached:
         message_sites.keep(session.config.option.reached)
 

@@ -59,7 +59,8 @@ def seen(path, elevation: float = 0.0, side: int = 8, samples: int = 16, width: 
 
 def white_world(strength: float = 1.0):
     world = bpy.data.worlds.new("white")
-    world.use_nodes = True
+    if world.node_tree is None:  # before Blender 5
+        world.use_nodes = True
     background = next(n for n in world.node_tree.nodes if n.type == 'BACKGROUND')
     background.inputs["Color"].default_value, background.inputs["Strength"].default_value = (1, 1, 1, 1), strength
     bpy.context.scene.world = world

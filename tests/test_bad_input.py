@@ -8,7 +8,6 @@ Where kill -9 strikes: here in the real frames and cameras stages; test_worker.p
 import json
 import os
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -178,7 +177,7 @@ def working(stage: str):
 def test_kill_in_the_frames_stage_and_resume(capture, face):
     worker = start(face, capture, last="frames")
     follow(worker, until=working("frames"), timeout_s=60)
-    worker._process.send_signal(signal.SIGKILL)
+    worker._process.kill()
     assert isinstance(follow(worker)[-1], Failed)
     assert not capture.frames.exists()
     result = run("-", capture)
@@ -193,7 +192,7 @@ def test_kill_and_cancel_in_the_cameras_stage_keep_the_frames(capture):
     worker = start(SAMPLE, capture, **job)
     follow(worker, until=working("cameras"), timeout_s=120)
     kept = {path.name: path.read_bytes() for path in capture.frames.iterdir()}
-    worker._process.send_signal(signal.SIGKILL)
+    worker._process.kill()
     assert isinstance(follow(worker)[-1], Failed)
     worker = start(SAMPLE, capture, **job)
     messages = follow(worker, until=working("cameras"), timeout_s=120)

@@ -4,7 +4,6 @@
 
 import json
 import os
-import resource
 import shutil
 import signal
 import subprocess
@@ -18,6 +17,8 @@ pytest.importorskip("OpenImageIO")
 pycolmap = pytest.importorskip("pycolmap")
 if not sys.platform.startswith("linux"):
     pytest.skip("kills are tried on Linux", allow_module_level=True)
+
+import resource  # noqa: E402
 
 import numpy as np  # noqa: E402
 import torch  # noqa: E402

@@ -5,7 +5,6 @@
 import json
 import os
 import shutil
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -176,7 +175,7 @@ with Capture({str(capture.root)!r}).workspace() as work:
     left = Path(other.stdout.readline().strip())
     with capture.locked():
         assert left.exists(), "in use"
-    other.send_signal(signal.SIGKILL)
+    other.kill()
     other.wait()
     with capture.locked():
         assert not left.exists()

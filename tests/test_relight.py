@@ -24,7 +24,7 @@ def test_somebody_elses_material_is_replaced_but_not_changed(addon, capture):
     bpy.ops.wildcap.bring_in_head()
     head = bpy.context.view_layer.objects.active
     other = bpy.data.materials.new("Mine")
-    other.use_nodes = True
+    addon("node_trees").of(other)
     head.data.materials[0] = other
     bpy.ops.wildcap.assemble_material()
     assert head.data.materials[0] != other

@@ -4,7 +4,6 @@
 
 import random
 import shutil
-import signal
 import sys
 from pathlib import Path
 
@@ -44,7 +43,7 @@ def test_killed_at_any_step_it_continues_to_the_same_bytes(tmp_path):
     assert isinstance(follow(start(unbroken), timeout_s=400)[-1], Done)
     worker = start(killed)
     follow(worker, until=lambda m: isinstance(m, Progress) and f"step {step} of" in m.text, timeout_s=400)
-    worker._process.send_signal(signal.SIGKILL)
+    worker._process.kill()
     assert isinstance(follow(worker)[-1], Failed)
     assert not killed.maps.exists()
     messages = follow(start(killed), timeout_s=400)

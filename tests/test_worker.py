@@ -9,7 +9,6 @@ test_bad_input.py does the same to the real frames stage.
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
 import time
@@ -83,7 +82,7 @@ def test_killed_in_stage_after_stage_the_chain_loses_that_stage_at_most(root, ca
         # all but the stage that was killed before this one are there, and that one is done again
         assert finished(messages) == {done: done != stages.NAMES[i - 1] for done in stages.NAMES[:i]}, name
         if name is not None:
-            worker._process.send_signal(signal.SIGKILL)
+            worker._process.kill()
             final = follow(worker)[-1]
             assert isinstance(final, Failed) and final.stage == name and str(capture.logs) in final.remedy
     assert isinstance(messages[-1], Done) and not leftovers(capture)

@@ -8,7 +8,7 @@ import bpy
 
 from ..core.contract.capture import Capture
 from ..core.contract.messages import Problem
-from . import captures, colours
+from . import captures, colours, node_trees
 
 PREVIEW = "WildCap Preview"
 """Name of the image node by which a running solve is shown on the head."""
@@ -119,8 +119,8 @@ def _show_texture(head, capture: Capture) -> None:
     if head.data.materials and head.data.materials[0] is not None:
         return
     material = bpy.data.materials.new(f"{head.name} Skin")
-    material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
+    tree = node_trees.of(material)
+    nodes, links = tree.nodes, tree.links
     node = nodes.new('ShaderNodeTexImage')
     node.name = node.label = "Texture"
     node.location = (-320, 280)

@@ -147,9 +147,15 @@ def patterned(name: str, rng: np.random.Generator, scale: float) -> bpy.types.Ma
 
 def principled(name: str):
     material = bpy.data.materials.new(name)
-    material.use_nodes = True
-    nodes = material.node_tree.nodes
-    return material, nodes, material.node_tree.links, nodes["Principled BSDF"]
+    tree = _tree(material)
+    return material, tree.nodes, tree.links, tree.nodes["Principled BSDF"]
+
+
+def _tree(block: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree:
+    """The nodes of a new material or world, which it has from its start in Blender 5."""
+    if block.node_tree is None:
+        block.use_nodes = True
+    return block.node_tree
 
 
 def add_lights(scene: bpy.types.Scene, job: dict) -> None:
@@ -162,12 +168,12 @@ def add_lights(scene: bpy.types.Scene, job: dict) -> None:
         area.energy, area.size, area.color = lamp["power"], lamp["size"], lamp["colour"]
         _hang(scene, area, Vector(lamp["position"]), Vector(lamp["position"]))
     scene.world = bpy.data.worlds.new("sky")
-    scene.world.use_nodes = True
-    nodes = scene.world.node_tree.nodes
+    tree = _tree(scene.world)
+    nodes = tree.nodes
     if isinstance(job["sky"], str):
         panorama = nodes.new("ShaderNodeTexEnvironment")
         panorama.image = bpy.data.images.load(job["sky"])
-        scene.world.node_tree.links.new(panorama.outputs["Color"], nodes["Background"].inputs["Color"])
+        tree.links.new(panorama.outputs["Color"], nodes["Background"].inputs["Color"])
     else:
         nodes["Background"].inputs["Color"].default_value = (*job["sky"], 1)
 

@@ -5,6 +5,8 @@
 import bpy
 import numpy as np
 
+from .. import node_trees
+
 SIZE = 512
 IRIS_ANGLE = 0.42  # radians from the pupil's middle to the iris' rim, seen from the eye's centre
 PUPIL_ANGLE = 0.15
@@ -33,9 +35,8 @@ def _material(name: str, kind: str, colour: tuple, roughness: float, coat: float
     if found is not None and found.get(KEY) == kind:
         return found
     material = bpy.data.materials.new(name)
-    material.use_nodes = True
     material[KEY] = kind
-    shader = next(n for n in material.node_tree.nodes if n.type == 'BSDF_PRINCIPLED')
+    shader = next(n for n in node_trees.of(material).nodes if n.type == 'BSDF_PRINCIPLED')
     shader.inputs["Base Color"].default_value = (*colour, 1)
     shader.inputs["Roughness"].default_value = roughness
     shader.inputs["IOR"].default_value = 1.376  # the cornea's, and nearly saliva's

@@ -17,7 +17,7 @@ from mathutils import Matrix
 
 from ...core.contract.delivery_plan import PACKING, Plan
 from ...core.contract.messages import Problem
-from .. import colours, head
+from .. import colours, head, node_trees
 
 SCENE = "WildCap Delivery"
 HEAD_TILE = 1001
@@ -171,5 +171,4 @@ def _packed(other) -> bpy.types.Image | None:
 
 def _new(name: str):
     material = bpy.data.materials.new(name)
-    material.use_nodes = True
-    return material, next(node for node in material.node_tree.nodes if node.type == 'BSDF_PRINCIPLED')
+    return material, next(node for node in node_trees.of(material).nodes if node.type == 'BSDF_PRINCIPLED')

@@ -9,6 +9,8 @@ import json
 
 import bpy
 
+from .. import node_trees
+
 SIDE_M = 0.4
 NAME = "WildCap Mask Sheet"
 HIDDEN_KEY = "wildcap_hidden"
@@ -30,10 +32,10 @@ def make(context, image: bpy.types.Image, head: bpy.types.Object) -> bpy.types.O
     layer = mesh.uv_layers.new(name="UVMap")
     layer.uv.foreach_set("vector", (0, 0, 1, 0, 1, 1, 0, 1))
     material = bpy.data.materials.new(NAME)
-    material.use_nodes = True
-    node = material.node_tree.nodes.new('ShaderNodeTexImage')
+    nodes = node_trees.of(material).nodes
+    node = nodes.new('ShaderNodeTexImage')
     node.image = image
-    material.node_tree.nodes.active = node
+    nodes.active = node
     mesh.materials.append(material)
     sheet = bpy.data.objects.new(NAME, mesh)
     context.scene.collection.objects.link(sheet)

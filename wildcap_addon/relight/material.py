@@ -14,7 +14,7 @@ import bpy
 
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
-from .. import captures, head, status
+from .. import captures, head, node_trees, status
 from . import asset, node_group, regions
 
 KEY = "wildcap_skin"
@@ -85,7 +85,7 @@ def _material(obj) -> bpy.types.Material:
     if current is not None and (KEY in current or current.get("wildcap_texture")):
         return current
     material = bpy.data.materials.new(f"{obj.name} Skin")
-    material.use_nodes = True
+    node_trees.of(material)  # for _build, which leaves a material that the artist switched to plain colours as it is
     if slots:
         slots[0] = material
     else:

@@ -11,6 +11,8 @@ from dataclasses import astuple, dataclass
 import bpy
 from mathutils import Matrix
 
+from .. import node_trees
+
 WORLD = "WildCap Relight"
 HORIZON_BLEND = 0.04
 """Sine of the elevation above and below the horizon over which ground and sky meet."""
@@ -35,14 +37,14 @@ def even(colour: tuple[float, float, float]) -> Sky:
 def world() -> bpy.types.World:
     """The relight scene's world, with a background at strength 1 and nothing before it."""
     found = bpy.data.worlds.get(WORLD) or bpy.data.worlds.new(WORLD)
-    found.use_nodes = True
-    action = found.node_tree.animation_data.action if found.node_tree.animation_data else None
-    found.node_tree.animation_data_clear()
+    tree = node_trees.of(found)
+    action = tree.animation_data.action if tree.animation_data else None
+    tree.animation_data_clear()
     if action is not None and action.users == 0:
         bpy.data.actions.remove(action)
-    for node in [n for n in found.node_tree.nodes if n.type not in ('BACKGROUND', 'OUTPUT_WORLD')]:
-        found.node_tree.nodes.remove(node)
-    background = next(n for n in found.node_tree.nodes if n.type == 'BACKGROUND')
+    for node in [n for n in tree.nodes if n.type not in ('BACKGROUND', 'OUTPUT_WORLD')]:
+        tree.nodes.remove(node)
+    background = next(n for n in tree.nodes if n.type == 'BACKGROUND')
     background.inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
     background.inputs["Strength"].default_value = 1.0
     found.cycles.sampling_method = 'AUTOMATIC'
