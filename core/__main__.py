@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 """python -m core: run, deliver, settings, stages, delighters, presets, status, delete, mask, landmarks,
-doctor, install, wheels, report-problem, train.
+doctor, self-test, install, wheels, report-problem, train.
 
 The command line is one more host of the worker: it writes a job, starts the worker with this same Python and prints
 what it says. Failures are two lines, a problem and its remedy, and exit code 2; Ctrl-C ends with 130.
@@ -14,13 +14,14 @@ import contextlib
 import importlib.util
 import signal
 import sys
+import tempfile
 from pathlib import Path
 
 from . import __version__
 from .contract import artist_landmarks, consent, deletion, delighter_cards, delivery_plan, delivery_presets, report, settings, stages, unforeseen
 from .contract.capture import Capture
 from .contract.messages import Problem
-from .worker import command_settings, read_only, setup_commands, terminal
+from .worker import command_settings, read_only, self_test, setup_commands, terminal
 from .worker.job import read_job, write_job
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -117,6 +118,9 @@ def _parser() -> argparse.ArgumentParser:
     white.add_argument("--card", choices=settings.CARDS, default="grey")
     white.set_defaults(command=_white)
     commands.add_parser("doctor", help="say what is installed, what is missing and what to do").set_defaults(command=_doctor)
+    test = commands.add_parser("self-test", help="solve the sample head again on this machine, and compare it with what it should be")
+    test.add_argument("--device", choices=("auto", "cpu", "cuda", "mps"), default="auto")
+    test.set_defaults(command=_self_test)
     setup_commands.add_commands(commands)
     commands.add_parser("train", help="train a network, or bring other skins in for it (developers): train prior --help, train carry --help")
     return parser
@@ -256,6 +260,13 @@ def _doctor(options: argparse.Namespace) -> int:
     found = examine(ROOT, Path(sys.executable))
     print(found.text)
     return 2 if found.problems else 0
+
+
+def _self_test(options: argparse.Namespace) -> int:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    with tempfile.TemporaryDirectory(prefix="wildcap_self_test_") as folder:
+        capture = self_test.prepare(Path(folder), device=options.device)
+        return terminal.follow(ROOT, capture, capture.job, {})
 
 
 def _train(arguments: list[str]) -> int:

@@ -6,23 +6,35 @@ import bpy
 
 
 class Layout:
-    """Notes the texts that panels draw; `translate` says whether Blender would look them up itself."""
+    """Notes the texts that panels draw, where `translate` says whether Blender would look them up itself, and the operators of their buttons."""
 
-    def __init__(self, drawn: list):
-        self.drawn = drawn
+    def __init__(self, drawn: list, buttons: list):
+        self.drawn, self.buttons = drawn, buttons
 
     def __getattr__(self, name):
         def call(*arguments, text="", translate=True, **options):
             if text:
                 self.drawn.append((text, translate))
-            return (Layout(self.drawn), Layout(self.drawn)) if name == "panel" else Layout(self.drawn)
+            if name == "operator":
+                self.buttons.append(arguments[0])
+            inner = Layout(self.drawn, self.buttons)
+            return (inner, inner) if name == "panel" else inner
 
         return call
 
 
 def drawn(kind) -> list[tuple[str, bool]]:
     """(text, whether Blender translates it) of all that a panel draws."""
-    found: list = []
-    panel = type("Drawn", (), {"layout": Layout(found), "bl_label": kind.bl_label})()
+    return _notes(kind)[0]
+
+
+def buttons(kind) -> list[str]:
+    """The operators that a panel has buttons for."""
+    return _notes(kind)[1]
+
+
+def _notes(kind) -> tuple[list, list]:
+    found: tuple[list, list] = [], []
+    panel = type("Drawn", (), {"layout": Layout(*found), "bl_label": kind.bl_label})()
     kind.draw(panel, bpy.context)
     return found

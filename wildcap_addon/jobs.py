@@ -31,7 +31,7 @@ ROOT = Path(__file__).resolve().parent.parent  # the folder that holds core/, wh
 class Job:
     """A worker at a capture, and the last thing it said. `previews` counts the preview pictures so far."""
 
-    goal: str  # 'make', 'reconstruct', 'solve', 'install', or 'ask' for what is found out or tidied up in seconds
+    goal: str  # 'make', 'reconstruct', 'solve', 'install', 'test', or 'ask' for what is found out or tidied up in seconds
     worker: Worker | Task
     then: Callable[[], None] | None = None  # called when it ended well
     ended: Callable[[], None] | None = None  # called before that, however it ended

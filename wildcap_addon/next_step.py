@@ -21,7 +21,7 @@ class Facts:
 
     has_capture: bool = False
     has_python: bool = False
-    running: str = ""  # what the capture's job is doing: '', 'reconstruct', 'solve', 'install' or 'ask'
+    running: str = ""  # what the capture's job is doing: '', 'reconstruct', 'solve', 'install', 'test' or 'ask'
     painting: bool = False
     head_time: float = -1.0  # modification time of the head.obj that is in the scene; -1: none
     maps_time: float = -1.0  # of the maps that the material shows; -1: none assembled
@@ -45,7 +45,7 @@ ASK = Step("SwitchLight waits for your consent. Nothing was sent.", "Allow Sendi
 MAKE = ("Make My Head", "wildcap.make_my_head", 'USER')
 WORDS = {"make": "Making your head ...", "reconstruct": "Reconstructing ...", "solve": "Solving ...",
          "tool": "Looking at the texture ...", "deliver": "Writing the maps ...", "wait": "Waiting for the job of another face ...",
-         "install": "Installing the solver ...", "ask": "One moment ..."}
+         "install": "Installing the solver ...", "ask": "One moment ...", "test": "Testing the solver ..."}
 
 
 def next_step(facts: Facts, translated: Callable[[str], str] = str) -> Step:

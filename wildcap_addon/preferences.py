@@ -45,6 +45,7 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
     wheels: bpy.props.StringProperty(name="Wheels", subtype='DIR_PATH', description="The folder of wheels that Install Solver takes all packages from")
     device: bpy.props.StringProperty(name="Device", description="What the solver's Python was found to compute on")
     device_reason: bpy.props.StringProperty(name="Why This Device", description="What was found when the solver's devices were tried")
+    tested: bpy.props.StringProperty(name="Self-Test", description="How the last self-test ended")
     captures: bpy.props.StringProperty(
         name="Captures Folder", subtype='DIR_PATH',
         description="Where new captures go while the .blend is not saved; empty: WildCap in your home folder, which no cloud copies",
@@ -73,6 +74,8 @@ def draw_solver(layout, preferences) -> None:
         layout.label(text=iface_("The solver is ready ({})").format(device), translate=False, icon='CHECKMARK')
         if preferences.device_reason:
             layout.label(text=preferences.device_reason, translate=False)
+        if preferences.tested:
+            layout.label(text=preferences.tested, translate=False, icon='CHECKMARK')
     else:
         layout.label(text="The solver is ready" if ready else "There is no solver yet", icon='CHECKMARK' if ready else 'INFO')
     column = layout.column()
@@ -83,6 +86,8 @@ def draw_solver(layout, preferences) -> None:
         column.prop(preferences, "wheels")
     column.prop(preferences, "environment", text="Folder")
     column = layout.column(align=True)
+    if ready:
+        column.operator("wildcap.self_test", icon='PLAY')
     column.operator("wildcap.install_solver", icon='IMPORT')
     column.operator("wildcap.use_python", icon='FILE_FOLDER')
     column.operator("wildcap.remove_solver", icon='TRASH')
@@ -143,6 +148,8 @@ def set_aside(path: Path) -> None:
 def set_python(path: Path | None, device: str = "", reason: str = "") -> None:
     """Makes `path` the solver's Python; `device` is what it was found to compute on, `reason` why."""
     _aside.discard(str(path))
+    if get().python != str(path or ""):
+        get().tested = ""
     get().python, get().device, get().device_reason = str(path or ""), device, reason
     bpy.context.preferences.is_dirty = True  # Blender saves preferences on exit
 

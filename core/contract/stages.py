@@ -60,6 +60,7 @@ TOOLS = (
           "core.solve.snapping", on_device=True),
     Stage("skin_tone", "Skin Tone", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"), (), "core.solve.tone", on_device=True),
     Stage("white_point", "White Point", ("frames/",), (), "core.solve.white_point"),
+    Stage("self_test", "Self-Test", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"), (), "core.solve.self_test", on_device=True),
     Stage("deliver", "Deliver", ("head.obj", *(f"maps/{name}" for name in MAPS if name.endswith(".png"))), (), "core.deliver"),
 )
 """What a worker does for one button: no stage of the chain depends on it, and nothing of it is recorded."""

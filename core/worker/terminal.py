@@ -51,7 +51,8 @@ def _show(message: Message, capture: Capture, line: _Line) -> int:
         case StageDone():
             line.keep(f"{stages.LABELS[message.stage]:12} " + ("unchanged" if message.skipped else f"done in {_duration(message.seconds)}"))
         case Done():
-            line.keep(f"Finished in {_duration(message.seconds)}. {capture.report} has the pictures and figures.")
+            told = f" {capture.report} has the pictures and figures." if capture.report.is_file() else ""
+            line.keep(f"Finished in {_duration(message.seconds)}.{told}")
             return 0
         case Cancelled():
             line.keep("Cancelled; finished stages are kept, the same command continues.")

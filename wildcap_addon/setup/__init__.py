@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""First steps: the solver, in an environment of its own or in an existing Python."""
+"""The solver: in an environment of its own or in an existing Python; whether it answers, and whether it solves as it should."""
 
 import bpy
 
-from . import checking, install, operators, panel, report
+from . import checking, install, operators, panel, report, self_test
 
-_register, _unregister = bpy.utils.register_classes_factory((*install.CLASSES, *operators.CLASSES, *report.CLASSES, *panel.CLASSES))
+_register, _unregister = bpy.utils.register_classes_factory((*install.CLASSES, *operators.CLASSES, *report.CLASSES, *self_test.CLASSES, *panel.CLASSES))
 
 
 def register():

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel: the first steps, until a solver answers; from then on the same is in the extension's preferences."""
+"""Panel: the first steps, and later whether the solver works. The same is in the extension's preferences."""
 
 import bpy
 
@@ -12,13 +12,10 @@ class WILDCAP_PT_setup(FoldedPanel, bpy.types.Panel):
     bl_label = "Setup"
     bl_order = 90
 
-    @classmethod
-    def poll(cls, context):
-        return preferences.python() is None
-
     def draw(self, context):
         preferences.draw_solver(self.layout, preferences.get())
-        problems.draw_text(self.layout, "Masks, materials and renders work without it.", region_width(context))
+        if preferences.python() is None:
+            problems.draw_text(self.layout, "Masks, materials and renders work without it.", region_width(context))
 
 
 CLASSES = (WILDCAP_PT_setup,)

@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Self-Test expects: python -m benchmarks.self_test [SEEDS], after the sample head, the prior or the solver has changed.
+
+Another device draws other noise and rounds otherwise, so what is expected is measured over seeds, in bfloat16 and in float32.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+import torch
+
+from core.contract.files import write_json
+from core.contract.messages import Reporter
+from core.solve import prior
+from core.solve.self_test import EXPECTED, measure
+from core.worker import self_test
+from core.worker.job import read_job
+
+SEEDS = 4
+PRECISIONS = {"bfloat16": torch.bfloat16, "float32": torch.float32}
+
+
+def main() -> None:
+    scores = {name: [score(seed, dtype) for seed in range(1, 1 + int(sys.argv[1] if sys.argv[1:] else SEEDS))] for name, dtype in PRECISIONS.items()}
+    every = np.concatenate(list(scores.values()))
+    write_json(EXPECTED, {"mean_db": round(float(every.mean()), 3), "deviation_db": round(float(every.std(ddof=1)), 3), "scores_db": scores})
+
+
+def score(seed: int, dtype: torch.dtype) -> float:
+    """PSNR in dB of the sample head solved with this seed in this precision."""
+    with tempfile.TemporaryDirectory() as folder, mock.patch.object(prior, "fast_dtype", lambda device: dtype):
+        capture = self_test.prepare(Path(folder), seed, "cpu")
+        found, seconds = measure(capture, read_job(capture.job).settings, Reporter("self_test", lambda message: None))
+    print(f"{dtype} seed {seed}: {found:.3f} dB in {seconds:.0f} s", flush=True)
+    return round(found, 3)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,42 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sample head: a finished capture that is shipped, and copied to where one may write."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from . import ownership
+from .capture import Capture
+from .files import replacing_folder, storage_problem, write_json
+from .messages import Problem
+
+SHIPPED = Path(__file__).resolve().parents[1] / "assets" / "sample_head"
+VERTICES = "head_vertices.obj"
+"""In place of head.obj: where its vertices are. The rest of it is the built-in head's."""
+
+
+def copy_to(folder: Path) -> Capture:
+    """A writable copy of the sample head in `folder`; one that is there already is kept with the artist's work in it. Raises Problem where it is missing from
+    the installation, or cannot be written."""
+    if not (SHIPPED / VERTICES).is_file():
+        raise Problem("The sample head is missing from this installation.", "Install the extension's zip again.")
+    capture = Capture(folder / "sample_head.wildcap")
+    if not capture.head.is_file():
+        capture.refuse_strangers()
+        try:
+            with replacing_folder(capture.root) as temporary:
+                shutil.copytree(SHIPPED, temporary, dirs_exist_ok=True, copy_function=shutil.copyfile)
+                moved = (temporary / VERTICES).read_text(encoding="ascii")
+                built_in = (SHIPPED.parent / "head.obj").read_text(encoding="ascii").splitlines(keepends=True)
+                (temporary / capture.head.name).write_text(moved + "".join(line for line in built_in if not line.startswith("v ")), encoding="ascii")
+                (temporary / VERTICES).unlink()
+                write_json(temporary / capture.json.name, capture.read())
+                ownership.claim_all(temporary)
+        except shutil.Error as error:  # a list of (source, target, reason)
+            raise storage_problem(OSError(0, str(error.args[0][0][2])), capture.root) from error
+    elif not capture.json.is_file():  # by WildCap 0.1.0
+        ownership.adopt_first_format(capture.root)
+        write_json(capture.json, capture.read())
+    return capture
