@@ -7,14 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core import cameras, frames
+from core import cameras, frames, registration, scan
 from core.cameras import coverage
 from core.cameras.mirrored import find_mirrored
 from core.cameras.motion import expression_changes
 from core.contract.capture import Capture
 from core.contract.messages import Problem, Reporter
-from core.contract.settings import from_json
-from core.face import faces
+from core.contract.settings import Settings, from_json
+from core.face import faces, template
+from core.face.head import read_head
+from core.geometry.views import read_views
 from core.imaging import images
 from core.synthetic import painted_head
 from core.synthetic.painted_head import camera
@@ -105,3 +107,24 @@ def test_an_open_mouth_in_some_frames_is_told():
     wide[list(range(14, 15)), 1] += 0.3 * np.linalg.norm(wide[33] - wide[263])  # the lower lip goes down
     found["7"] = replace(face, landmarks=wide)
     assert expression_changes(found) == ["7"]
+
+
+@pytest.mark.parametrize("azimuths", [(8,), (-25, 25), (2, 10)])
+def test_one_photograph_or_two_make_a_draft(tmp_path, azimuths):
+    """Nothing matches, and where a single side is seen the depths are those of other heads: the face lies on the picture, and the report says what it is."""
+    for i, azimuth in enumerate(azimuths):
+        images.write_srgb(tmp_path / "photos" / f"{i}.png", painted_head.photograph(camera(azimuth, 0.02), wall=False))
+    capture = Capture(tmp_path / "face.wildcap")
+    report = solve(tmp_path / "photos", capture)
+    assert report.figures["frames_registered"] == len(azimuths) and "overlap" not in problems(report)
+    scan.run(capture, Settings(), Reporter("scan"))
+    report = Reporter("registration")
+    registration.run(capture, Settings(), report)
+    sides = "2 sides that are" if azimuths == (-25, 25) else "one side only"
+    assert f"This head is a draft: the photographs show the face from {sides}" in problems(report)
+    head, truth = read_head(capture).mesh, painted_head.person()[0].mesh
+    assert np.ptp(head.vertices[:, 0]) == pytest.approx(np.ptp(truth.vertices[:, 0]), rel=0.08), "metres, by the distance of the pupils"
+    for view, azimuth in zip(read_views(capture), azimuths, strict=True):
+        there, here = (seen.project(template.landmark_points(mesh))[0] for seen, mesh in ((camera(azimuth, 0.02), truth), (view, head)))
+        miss = np.linalg.norm(there - here, axis=1)[template.landmark_weights() > 0.2]
+        assert np.median(miss) < 0.04 * np.ptp(there[:, 0]), "of the face's width"

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..contract.capture import Capture
 from ..contract.files import replacing_folder
-from ..contract.frame_records import FrameRecord, Frames, read_frames
+from ..contract.frame_records import PHOTOGRAPHS, FrameRecord, Frames, read_frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..geometry.models import write_model
@@ -25,7 +25,7 @@ from .drawing import draw_cameras
 from .joint import AGREE, WIDE, refine
 from .landmarks import find_landmarks
 from .motion import expression_changes
-from .solving import MOST_FACES, Solved, solve
+from .solving import LEAST_VIEWS, MOST_FACES, Solved, solve
 from .structure import ALL_PAIRS, solve_structure
 from .world import HeadFrame, find_head
 
@@ -51,13 +51,13 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     model.transform(solved.head.world_from_model)
     centres = np.array([image.projection_center() for image in model.images.values() if image.has_pose])
     widest = coverage.widest_deg(centres)
-    if widest < LEAST_COVERAGE_DEG:
+    records = solved.asked or frames.records
+    if widest < LEAST_COVERAGE_DEG and frames.kind != PHOTOGRAPHS:
         raise Problem(f"The camera moved only {widest:.0f} degrees around the head; {LEAST_COVERAGE_DEG:.0f} are the least.",
                       "Film again while you walk around the face from one ear to the other.")
     with replacing_folder(capture.cameras) as folder:
         write_model(folder, model)
         report.check()
-    records = solved.asked or frames.records
     images.write_srgb(capture.picture("cameras", "world"), draw_cameras(model, records, capture.frames))
     _findings(solved, records, centres, report)
     registered, azimuth = model.num_reg_images(), coverage.angles(centres)[0]
@@ -108,7 +108,7 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
 def _findings(solved: Solved, records: Sequence[FrameRecord], centres: np.ndarray, report: Reporter) -> None:
     """What is wrong with a capture that can be used, and how to shoot it again."""
     shown = {record.name: record.shown for record in records}
-    if solved.way == "face" and not solved.held:
+    if solved.way == "face" and not solved.held and len(records) >= LEAST_VIEWS:
         rough = "refined by what little matches" if solved.refined else "to ten degrees or so"
         report.finding(f"The frames do not overlap enough to be matched: the cameras come from the face's landmarks, {rough}. Expect a rough head.",
                        "Take a photograph every ten degrees around the face, from ear to ear, with a busy background.")

@@ -39,7 +39,8 @@ LEAST_MATCHES = 12
 @dataclass(frozen=True)
 class Resection:
     """A model in the head's world (metres); landmark_px, how far the landmarks miss [median px], and that as a share of the face's width; the
-    number of tracks that refined it, whether they are enough to trust it, and the names of frames that came in through matches alone."""
+    number of tracks that refined it, whether they are enough to trust it, the names of frames that came in through matches alone, and the identity
+    coefficients [K] of the head."""
 
     model: pycolmap.Reconstruction
     landmark_px: float
@@ -47,14 +48,15 @@ class Resection:
     tracks: int
     refined: bool
     by_matches: list[str]
+    coefficients: np.ndarray
 
 
 def resect(groups: list[dict], found: dict[str, faces.Face], matches: Matches, report: Reporter) -> Resection | None:
     """Cameras of the frames with a face, and of those that match them. groups: [{names, width, height, focal_px or null}] of one camera each;
-    `found`: name -> face. None where fewer than two frames show a face."""
+    `found`: name -> face. None where no frame shows a face, or one of several."""
     group_of = {name: number for number, group in enumerate(groups) for name in group["names"]}
     names = sorted(name for name in found if name in group_of)
-    if len(names) < 2:
+    if len(names) < min(2, len(group_of)):
         return None
     model = template_landmarks()
     pixels = {name: found[name].landmarks[:, :2].astype(np.float64) for name in names}
@@ -73,7 +75,8 @@ def resect(groups: list[dict], found: dict[str, faces.Face], matches: Matches, r
     late = place_by_matches(bundle, groups, group_of, names, used, matches)
     miss = np.linalg.norm(bundle.project(landmarks.camera, landmarks.point) - landmarks.pixel, axis=1)
     error = float(np.median(miss[model.trust[landmarks.point] > 0.2]))
-    return Resection(_model(bundle, groups, group_of, names, seen, late), error, error / width, len(used), _trusted(names, matches, used), sorted(late))
+    return Resection(_model(bundle, groups, group_of, names, seen, late), error, error / width, len(used), _trusted(names, matches, used), sorted(late),
+                      bundle.coefficients)
 
 
 def _trusted(names: list[str], matches: Matches, used: list) -> bool:

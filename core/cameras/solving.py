@@ -26,7 +26,7 @@ from .resection import resect
 from .settled import settle
 from .structure import ALL_PAIRS, camera_groups, solve_structure
 from .surroundings import spread_over, surroundings_stay
-from .world import HeadFrame, find_head
+from .world import HeadFrame, find_head, head_of_one
 
 LEAST_SHARE = 0.6
 LEAST_VIEWS = 3
@@ -80,6 +80,8 @@ def _solve(frames: Frames, capture: Capture, settings: Settings, report: Reporte
     records = frames.records
     few = len(records) <= FEW
     ways = {"auto": ("plain", "face", "skin", "face") if few else ("plain", "skin", "face")}.get(settings.cameras.features, (settings.cameras.features,))
+    if len(records) < LEAST_VIEWS:  # a draft
+        ways = ("face",)
     found = find_landmarks(records if few else _spread(records), capture.frames, report)
     matches, faults, moved, partial = Matches(), [], stood, None
     for turn, way in enumerate(ways):
@@ -176,12 +178,13 @@ def _by_face(records: Sequence[FrameRecord], capture: Capture, found: dict, matc
     mirrored = find_mirrored(sorted(found), [], capture.frames, report, found) if len(records) <= FEW else []
     result = resect(camera_groups(records, capture.frames), {name: face for name, face in found.items() if name not in mirrored}, matches, report)
     registered = result.model.num_reg_images() if result else 0
-    if registered < LEAST_VIEWS:
+    if registered < min(LEAST_VIEWS, len(records)):
         without = f"A face is found in only {len(found)} of {len(records)} frames" + (f", and {', '.join(mirrored)} is mirrored" if mirrored else "")
         return None, f"{without}; the landmarks of three could have placed the cameras."
     if result.landmark_miss > MOST_LANDMARK_MISS:
         return None, f"The face does not look like one still face in these frames: its landmarks miss by {100 * result.landmark_miss:.0f} % of its width."
-    head = find_head(result.model, found, settings.cameras.interpupillary_mm / 1000)
+    apart = settings.cameras.interpupillary_mm / 1000
+    head = find_head(result.model, found, apart) if registered > 1 else head_of_one(result.coefficients, result.landmark_px, result.landmark_miss, apart)
     return Solved(result.model, "face", head, found, mirrored=tuple(mirrored), tracks=result.tracks,
                   refined=result.refined), None
 

@@ -73,6 +73,14 @@ def find_head(model: pycolmap.Reconstruction, found: dict[str, faces.Face], inte
     return HeadFrame(similarity, float(np.median(errors)), float(np.percentile(errors, 75) / width), apart, float(np.median(miss)) * size)
 
 
+def head_of_one(coefficients: np.ndarray, error_px: float, miss: float, interpupillary_m: float) -> HeadFrame:
+    """The head in the one camera that was placed by it, which is in the template's metres: no rays meet, and its landmarks miss by what the fit says."""
+    right, left = pupils(coefficients)
+    apart = float(np.linalg.norm(left - right))
+    size = interpupillary_m / apart
+    return HeadFrame(pycolmap.Sim3d(size, pycolmap.Rotation3d(np.eye(3)), -size * (left + right) / 2), error_px, miss, apart, 0.0)
+
+
 def agreeing_faces(model: pycolmap.Reconstruction, found: dict[str, faces.Face]) -> dict[str, faces.Face]:
     """Those of the faces found in registered frames whose landmarks meet those of the other frames."""
     seen = _sure(model, found)

@@ -29,6 +29,7 @@ from .source import Picture
 from .video import read_video
 
 FEWEST = 3
+"""Of a video, frames that a head can be built from; of photographs one will do, for a draft."""
 STILL = 0.004
 """Mean difference of two small frames, in [0, 1], below which the camera has not moved: above compression noise, far below a step aside."""
 RIVAL = 1.5
@@ -38,7 +39,7 @@ READING = 0.9
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Writes capture.frames. Raises Problem where there are fewer than three readable frames, no face, two equal ones, or no motion."""
+    """Writes capture.frames. Raises Problem where a video has fewer than three readable frames, where there is no face, or no motion."""
     path = capture.source
     if path is None or not (path.is_dir() or path.is_file()):
         raise Problem(f"There is no video or folder of photographs at {str(path)!r}." if path else "No video was chosen.",
@@ -140,14 +141,15 @@ def _select(records: list[FrameRecord], count: int) -> list[FrameRecord]:
 
 
 def _check(path: Path, records: list[FrameRecord], thumbnails: np.ndarray, photographs: bool) -> None:
-    if len(records) < FEWEST:
-        what, remedy = ("photographs", "Take 30 or more photographs around the face.") if photographs else (
-            "frames", "Film the face for 5 to 30 seconds while you walk half around it; a damaged file may be whole once copied again.")
-        raise Problem(f"Only {len(records)} {what} of {path.name} could be read; three are the least a head can be built from.", remedy)
+    if not records:
+        raise Problem(f"None of the photographs in {path.name} could be read.", "Save them again as JPEG, PNG or TIFF.")
+    if len(records) < FEWEST and not photographs:
+        raise Problem(f"Only {len(records)} frames of {path.name} could be read; three are the least a head can be built from.",
+                      "Film the face for 5 to 30 seconds while you walk half around it; a damaged file may be whole once copied again.")
     if not any(r.face_box for r in records):
         raise Problem("No face was found in any frame.",
                       "Film one face, upright, filling a third of the picture or more, and lit well enough to see the eyes.")
-    if np.abs(thumbnails - thumbnails[0]).mean((1, 2)).max() < STILL:
+    if len(records) > 1 and np.abs(thumbnails - thumbnails[0]).mean((1, 2)).max() < STILL:
         raise Problem("All frames show the same picture: the camera did not move.",
                       "Let the person sit still and move the camera from one ear around the face to the other.")
 

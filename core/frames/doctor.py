@@ -66,7 +66,8 @@ def diagnose(records: list[FrameRecord], dropped: list[str], photographs: bool, 
     count, shots = len(records), "photographs" if photographs else "frames"
     _other_faces(found, report)
     if count < FEW:
-        report.finding(f"There are only {count} {shots}: expect a rough head with holes at the sides and a texture from few directions.",
+        there = f"There are only {count} {shots}" if count > 1 else f"There is only one {shots[:-1]}"
+        report.finding(f"{there}: expect a rough head with holes at the sides and a texture from few directions.",
                        "Take 60 or more around the face for a full one.")
     lost = [r.name for r in records if not r.face_box]
     if len(lost) > 0.4 * count:

@@ -53,7 +53,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     subject = _subject(landmarks.with_artists(landmarks.onto_surface(found, views, surface), given), report)
     photographs = read_frames(capture).kind == PHOTOGRAPHS
     try:
-        _by_scan(capture, settings, views, surface, subject, quality.ENOUGH_SHARE if photographs else quality.LEAST_SHARE, report)
+        head = _by_scan(capture, settings, views, surface, subject, quality.ENOUGH_SHARE if photographs else quality.LEAST_SHARE, report)
+        if photographs:
+            quality.tell_draft(report, views, head)
     except quality.Unlike as problem:
         if not photographs:
             raise
@@ -97,11 +99,14 @@ def _by_views(capture: Capture, settings: Settings, views: list[View], subject: 
     quality.figures(report, model, aligned, head, found, fitted.coefficients, np.zeros(0), subject.follow)
     quality.figures_of_views(report, fitted, views, head)
     quality.judge_views(report, views, head, fitted)
+    quality.tell_draft(report, views, head)
     _finish(capture, settings, views, head, subject, report)
 
 
 def _on_skin(points: unscanned.Points, views: list[View], subject: Subject, report: Reporter) -> unscanned.Points:
     """The matched points that most views show as skin, or do not show."""
+    if not len(points.places):
+        return points
     pose, coefficients = alignment.fit_landmarks(subject.model, subject.found.points, subject.trust)
     head = subject.model.mesh.moved(pose.apply(subject.model.shape(coefficients)))
     share = np.nan_to_num(hair.hidden_share(points.places, points.towards, views, head, report))
@@ -109,7 +114,7 @@ def _on_skin(points: unscanned.Points, views: list[View], subject: Subject, repo
 
 
 def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: meshes.Mesh, subject: Subject, least_share: float,
-             report: Reporter) -> None:
+             report: Reporter) -> meshes.Mesh:
     found, model = subject.found, subject.model
     follow, shaped, hold, trust = subject.follow, subject.shaped, subject.hold, subject.trust
     report.progress(10, STEPS, "placing the head")
@@ -128,6 +133,7 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
     quality.figures(report, model, aligned, head, found, coefficients, distances, follow)
     quality.judge(report, head, scan, distances, follow, least_share)
     _finish(capture, settings, views, head, subject, report)
+    return head
 
 
 def _finish(capture: Capture, settings: Settings, views: list[View], head: meshes.Mesh, subject: Subject, report: Reporter) -> None:

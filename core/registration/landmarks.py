@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..contract.messages import Problem, Reporter
-from ..face import faces
+from ..face import faces, template
 from ..geometry.meshes import Mesh
 from ..geometry.raster import RayCaster
 from ..geometry.views import View
@@ -40,7 +40,7 @@ class Landmarks:
 
 
 def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
-    """Landmarks of the face all views look at. Raises Problem when fewer than three frames show one, or of a few views two.
+    """Landmarks of the face all views look at. Raises Problem when fewer than three frames show one, or of a few views two; a single view will do.
 
     `steps` is the stage's total for the progress bar, of which detection is the first tenth.
     """
@@ -53,10 +53,12 @@ def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
             scale = np.array([view.width / srgb.shape[1], view.height / srgb.shape[0]])
             found.append((view, face.landmarks[:, :2] * scale))
             seen[view.name] = (face.yaw_deg, *(eye.scaled(scale) for eye in faces.find_eyes(srgb, face)))
-    if len(found) < (3 if len(chosen) > FEW else 2):
+    if len(found) < min(3 if len(chosen) > FEW else 2, len(chosen)):
         raise Problem(f"A face was found in only {len(found)} of the {len(chosen)} frames that were looked at.",
                       "Film the face larger, in better light and from the front too, then start again from the video.")
     lifted = triangulate([view for view, _ in found], np.stack([pixels for _, pixels in found]))
+    if not np.isfinite(lifted.points).any():  # a single view, or several from one side
+        lifted = lift_alone(*min(found, key=lambda pair: abs(seen[pair[0].name][0])))
     return replace(lifted, opening=eyes.opening([(yaw, (right.opening, left.opening)) for yaw, right, left in seen.values()]), eyes=seen)
 
 
@@ -98,6 +100,16 @@ def triangulate(views: list[View], pixels: np.ndarray, rounds: int = 12) -> Land
     points[~lifted] = np.nan
     median = float(np.median(errors[used])) if used.any() else float("nan")
     return Landmarks(points, trust, median, {v.name: (p, used[:, i]) for i, (v, p) in enumerate(zip(views, pixels, strict=True))})
+
+
+def lift_alone(view: View, pixels: np.ndarray) -> Landmarks:
+    """Lifts the pixels [468, 2] of a single view to where their rays pass nearest to the mean head's landmarks: across the view they are the person's, along it
+    the mean's. The mean head stands as the world has it, its pupils about the origin."""
+    mean = template.landmark_points(template.load())
+    rays = view.rays(pixels)
+    points = view.centre + rays * ((mean - view.centre) * rays).sum(1, keepdims=True)
+    used = _facing(points, np.repeat(view.centre[None, None], len(points), 0))[:, 0] > 0
+    return Landmarks(points, np.where(used, 0.25, 0.0), 0.0, {view.name: (pixels, used)})
 
 
 def onto_surface(found: Landmarks, views: list[View], mesh: Mesh, farthest: float = 0.02) -> Landmarks:

@@ -82,15 +82,19 @@ def figures_of_views(report: Reporter, fitted, views: list[View], head: Mesh) ->
 
 
 def judge_views(report: Reporter, views: list[View], head: Mesh, fitted) -> None:
-    """Raises Problem where a head does not fit what the views show; tells where it is a draft."""
+    """Raises Problem where a head does not fit what the views show."""
     x = head.vertices[:, 0]
     if not fitted.miss_m["landmarks"] < MOST_MISS * np.ptp(x):
         raise Problem(f"The head could not be laid over the face in these pictures: its features miss by {1e3 * fitted.miss_m['landmarks']:.0f} mm.",
                       "Use pictures of one still face, neither cropped nor mirrored; or give the cameras of a program that can solve them.")
+
+
+def tell_draft(report: Reporter, views: list[View], head: Mesh) -> None:
+    """Tells where photographs show too few sides of a head to make more than a draft."""
     apart = views_apart(views, head)
     if apart < WANTED_VIEWS:
-        report.finding(f"This head is a draft: {'only ' if apart else ''}{apart} of the photographs show the face from sides at least {APART_DEG:.0f} degrees "
-                       "apart, and its depth is mostly guessed.",
+        sides = "one side" if apart < 2 else f"{apart} sides that are at least {APART_DEG:.0f} degrees apart"
+        report.finding(f"This head is a draft: the photographs show the face from {sides} only, and its depth is mostly guessed.",
                        "Add photographs: one from the front and one from each side, about 40 degrees around, are the least for a likeness.")
 
 

@@ -17,7 +17,7 @@ from ..face import faces
 from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.views import View
 from ..imaging import images
-from .constraints import Constraints
+from .constraints import Constraints, none
 
 BINS = 12
 """Of the colour histograms, per channel."""
@@ -66,6 +66,8 @@ def compare(outline: Outline, mesh: Mesh, edges: np.ndarray, follow: np.ndarray,
     normals = vertex_normals(mesh)
     vertices = _on_outline(outline, mesh, edges, np.nan_to_num(pixels * scale, nan=-1e4))
     vertices = vertices[(follow[vertices] > 0.3) & np.isfinite(pixels[vertices]).all(1)]
+    if not len(vertices):
+        return none()
     towards = view.centre - mesh.vertices[vertices]
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
     direction = normals[vertices] - (normals[vertices] * towards).sum(1, keepdims=True) * towards
@@ -73,7 +75,7 @@ def compare(outline: Outline, mesh: Mesh, edges: np.ndarray, follow: np.ndarray,
     outward = view.project(mesh.vertices[vertices] + 1e-3 * direction)[0] - pixels[vertices]
     length = np.linalg.norm(outward, axis=1, keepdims=True)
     per_px = 1e-3 / np.maximum(length[:, 0], 1e-9) / scale  # metres
-    reach = reach_m / float(np.median(per_px)) if len(vertices) else 1.0
+    reach = reach_m / float(np.median(per_px))
     away, step = _borders(outline, pixels[vertices] * scale, outward / np.maximum(length, 1e-9), reach)
     good = np.isfinite(away) & (np.abs(away) * per_px < reach_m)
     corners = np.repeat(vertices[good, None], 3, 1)
