@@ -24,7 +24,7 @@ PYTHON3.13 ?= $(firstword $(shell python3.13 -c 'import sys; print(sys.executabl
 # What of the tests needs Blender.
 IN_BLENDER = addon captures setup evidence choices eyedropper white_card paint paint_session operators job_life relight skin_material skin_kept reel make next_step refusals draw translations sending acting updates delete_face save_report
 
-.PHONY: demo test results test-blenders test-gui zip site clean
+.PHONY: demo test results test-blenders test-gui test-gui-newest zip site clean
 
 demo: $(VENV)/installed
 	$(BIN)/python -m benchmarks.demo $(DEMO)
@@ -50,7 +50,11 @@ test-blenders: $(BLENDERS:%=.blenders/%/installed)
 	touch $@
 
 test-gui: $(VENV)/installed zip
-	$(BIN)/python -m pytest tests/gui -s
+	$(BIN)/python -m pytest tests/gui/test_window.py -s
+
+# Six of the same in the newest Blender that Debian has, or the reason why not.
+test-gui-newest: $(VENV)/installed zip
+	$(BIN)/python -m pytest tests/gui/test_newest_window.py -s -rs
 
 # Blender's own extension tool, from the bpy wheel.
 zip: $(VENV)/installed

@@ -113,6 +113,23 @@ def test_a_painting_whose_head_was_undone_or_deleted_still_ends_and_keeps_its_ma
     assert "WildCap Mask" not in bpy.data.brushes and not bpy.context.scene.tool_settings.image_paint.use_stencil_layer
 
 
+def test_a_brush_that_blenders_mask_tool_links_goes_and_others_of_a_library_stay(addon, capture, tmp_path):
+    """A window links its library's Mask when it turns to our brush; without one, the test does so."""
+    library = tmp_path / "brushes.blend"
+    made = {name: bpy.data.brushes.new(name, mode='TEXTURE_PAINT') for name in ("Mask", "Fill")}
+    for name, brush in made.items():
+        setattr(brush, "image_brush_type" if hasattr(brush, "image_brush_type") else "image_tool", name.upper())
+    bpy.data.libraries.write(str(library), set(made.values()))
+    for brush in made.values():
+        bpy.data.brushes.remove(brush)
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.paint_mask()
+    with bpy.data.libraries.load(str(library), link=True) as (there, wanted):
+        wanted.brushes = there.brushes
+    bpy.ops.wildcap.finish_mask()
+    assert [b.name for b in bpy.data.brushes if b.library is not None and bpy.path.abspath(b.library.filepath) == str(library)] == ["Fill"]
+
+
 def test_mirrored_strokes_go_with_the_artist_to_the_sheet_and_back_and_stay_with_the_painting(addon, capture):
     bpy.ops.wildcap.bring_in_head()
     head = bpy.context.object

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plays an artist in a real Blender window: moves the mouse, clicks, types, and looks at what the screen shows.
+"""Plays an artist in a real Blender window: moves the mouse, clicks, types, and looks at what the screen shows. What an artist would do with hands is counted.
 
 A flow is a generator that yields seconds to wait: between two events Blender must get its event loop back, so one
 application timer runs the generator. Positions are window pixels from the lower left.
@@ -19,6 +19,7 @@ import bpy
 OUT = Path(os.environ["WILDCAP_GUI_OUT"])
 TICK_S = 0.04
 STARTED = time.monotonic()
+_actions = 0
 
 
 def play(flow, limit_s: float = 600) -> None:
@@ -56,6 +57,17 @@ def survive_lost_contexts() -> None:
     xlib = ctypes.CDLL("libX11.so.6")
     xlib.XSetErrorHandler.argtypes, xlib.XSetErrorHandler.restype = [ctypes.c_void_p], ctypes.c_void_p
     xlib.XSetErrorHandler(passing)
+
+
+def act(times: int = 1) -> None:
+    """Counts clicks, keys, strokes, and things dropped: what flows do by themselves in place of an artist's hands, they count, too."""
+    global _actions
+    _actions += times
+
+
+def actions() -> int:
+    """How many there were until now."""
+    return _actions
 
 
 def leave(code: int) -> None:
@@ -101,6 +113,7 @@ def move(position):
 
 
 def click(position):
+    act()
     yield from move(position)
     yield from move((position[0] + 1, position[1]))
     event('LEFTMOUSE', 'PRESS', position)
@@ -111,6 +124,7 @@ def click(position):
 
 def key(kind: str, **keys):
     """A key pressed over the middle of the 3D view."""
+    act()
     event(kind, 'PRESS', middle(), **keys)
     event(kind, 'RELEASE', middle(), **keys)
     yield 0.4
@@ -118,6 +132,7 @@ def key(kind: str, **keys):
 
 def stroke(points, **keys):
     """The left button held down along the points."""
+    act()
     first, *others = points
     yield from move(first)
     event('LEFTMOUSE', 'PRESS', first, **keys)
@@ -158,7 +173,8 @@ def scroll(steps: int):
 
 
 def open_tab(name: str):
-    """Shows the sidebar on one tab; its tabs exist only after it was drawn once."""
+    """Shows the sidebar on one tab; its tabs exist only after it was drawn once. An artist presses N and clicks on the tab."""
+    act(2)
     view().spaces.active.show_region_ui = True
     for _ in range(100):
         yield
@@ -214,7 +230,9 @@ def lead(command: str):
 
 
 def browse(path: Path):
-    """Chooses a file or a folder in the file browser that a button has opened in place of the window's areas."""
+    """Chooses a file or a folder in the file browser that a button has opened in place of the window's areas. An artist clicks on it, and on the
+    button below: which folder is shown at first, and how far it is from there, depends on the machine."""
+    act(2)
     yield from until(lambda: any(area.type == 'FILE_BROWSER' for area in window().screen.areas), "the file browser", 10)
     area = next(area for area in window().screen.areas if area.type == 'FILE_BROWSER')
     yield 1.0

@@ -3,14 +3,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # The tests in a real Blender window: builds the chroot if need be, enters it with the checkout, the newest zip in dist/ and
 # the worker's Python mounted where they are outside, and runs suite.py. The mounts live in a namespace of their own.
-# Screenshots and logs: dist/gui/. Arguments: names of flows to run (default: all).
+# Screenshots and logs: dist/gui/. Arguments: names of flows to run (default: all); --newest before them takes Debian sid's
+# Blender, with dist/gui/newest/.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
 checkout=$PWD
-root=$(tests/gui/chroot.sh)
+release=trixie
+out=dist/gui
+if [ "${1:-}" = --newest ]; then
+    release=sid
+    out=dist/gui/newest
+    shift
+fi
+root=$(tests/gui/chroot.sh $release)
 zip=$(ls -t dist/wildcap-*.zip | head -n 1)
-mkdir -p dist/gui
+mkdir -p $out
 
 # What the venv's Python needs from outside: its standard library and executable, wherever the venv points to.
 mapfile -t mounts < <(.venv/bin/python - <<'PYTHON'
@@ -28,7 +36,7 @@ base=$(.venv/bin/python -c 'import sys; print(sys.base_prefix)')
 IFS=: read -ra named <<< "${WILDCAP_MOUNTS:-}"
 mounts+=("${named[@]}")
 
-export root checkout zip base
+export root checkout zip base out
 exec unshare --mount --pid --fork --kill-child --propagation private bash -c '
     set -euo pipefail
     mount -t proc proc "$root/proc"
@@ -46,5 +54,5 @@ exec unshare --mount --pid --fork --kill-child --propagation private bash -c '
     shift
     mapfile -t pip < <(env | grep -E "^(PIP_|SSL_CERT_)")
     exec chroot "$chroot" env -i "${pip[@]}" PATH="/usr/bin:/bin:$base/bin" HOME=/root LANG=C.UTF-8 LIBGL_ALWAYS_SOFTWARE=1 GALLIUM_DRIVER=llvmpipe \
-        python3 -B "$checkout/tests/gui/suite.py" "$checkout/$zip" "$@"
+        python3 -B "$checkout/tests/gui/suite.py" "$checkout/$zip" "$checkout/$out" "$@"
 ' run "${mounts[@]}" -- "$@"

@@ -16,7 +16,7 @@ RADIUS_PX = 40
 def activate(context) -> dict:
     """Makes the mask brush the active one in Texture Paint mode; returns what `restore` needs."""
     paint = context.scene.tool_settings.image_paint
-    before = {"brush": paint.brush.name if paint.brush else "", "reference": _reference(paint)}
+    before = {"brush": paint.brush.name if paint.brush else "", "reference": _reference(paint), "brushes": [b.name for b in bpy.data.brushes]}
     brush = bpy.data.brushes.get(NAME) or bpy.data.brushes.new(NAME, mode='TEXTURE_PAINT')
     setattr(brush, _type_property(brush), 'MASK')
     brush.weight = 1.0
@@ -31,7 +31,7 @@ def activate(context) -> dict:
 
 
 def restore(context, before: dict) -> None:
-    """The brush of before, in Texture Paint mode; ours is removed."""
+    """The brush of before, in Texture Paint mode; ours is removed, and so is the one that Blender links from its library for the mask tool."""
     unified = _unified(context.scene)
     for name, value in before["unified"].items():
         setattr(unified, name, value)
@@ -43,9 +43,13 @@ def restore(context, before: dict) -> None:
     if before["brush"] and (paint.brush is None or paint.brush.name != before["brush"]) and before["brush"] in bpy.data.brushes:
         with contextlib.suppress(AttributeError):  # read-only since 5.0
             paint.brush = bpy.data.brushes[before["brush"]]
-    ours = bpy.data.brushes.get(NAME)
-    if ours is not None:
-        bpy.data.brushes.remove(ours)
+    for each in list(bpy.data.brushes):
+        if each.name == NAME or each != paint.brush and _came_with_tool(each, before):
+            bpy.data.brushes.remove(each)
+
+
+def _came_with_tool(brush, before: dict) -> bool:
+    return brush.library is not None and getattr(brush, _type_property(brush)) == 'MASK' and brush.name not in before.get("brushes", [brush.name])
 
 
 def _use(context, brush) -> None:
