@@ -109,7 +109,7 @@ def test_an_open_mouth_in_some_frames_is_told():
     assert expression_changes(found) == ["7"]
 
 
-@pytest.mark.parametrize("azimuths", [(8,), (-25, 25), (2, 10)])
+@pytest.mark.parametrize("azimuths", [(8,), (2, 10)])
 def test_one_photograph_or_two_make_a_draft(tmp_path, azimuths):
     """Nothing matches, and where a single side is seen the depths are those of other heads: the face lies on the picture, and the report says what it is."""
     for i, azimuth in enumerate(azimuths):
@@ -120,8 +120,7 @@ def test_one_photograph_or_two_make_a_draft(tmp_path, azimuths):
     scan.run(capture, Settings(), Reporter("scan"))
     report = Reporter("registration")
     registration.run(capture, Settings(), report)
-    sides = "2 sides that are" if azimuths == (-25, 25) else "one side only"
-    assert f"This head is a draft: the photographs show the face from {sides}" in problems(report)
+    assert "This head is a draft: the photographs show the face from one side only" in problems(report)
     head, truth = read_head(capture).mesh, painted_head.person()[0].mesh
     assert np.ptp(head.vertices[:, 0]) == pytest.approx(np.ptp(truth.vertices[:, 0]), rel=0.08), "metres, by the distance of the pupils"
     for view, azimuth in zip(read_views(capture), azimuths, strict=True):

@@ -108,7 +108,7 @@ def test_the_same_capture_takes_a_good_video_after_a_bad_one(capture, face, tmp_
 def test_accents_and_spaces_in_every_path(face, tmp_path):
     """Also in the path of the code itself, as in C:/Users/Chloé Müller."""
     root = tmp_path / "Chloé Müller" / "wild cap"
-    shutil.copytree(ROOT / "core", root / "core", ignore=shutil.ignore_patterns("__pycache__", "sample*", "training", "synthetic"))
+    shutil.copytree(ROOT / "core", root / "core", ignore=shutil.ignore_patterns("__pycache__", "sample_head", "training", "synthetic"))
     capture = Capture(tmp_path / "mes visages" / "été 🙂.wildcap")
     command = [sys.executable, "-B", "-m", "core", "run", str(face), str(capture.root), "--until", "frames"]
     result = subprocess.run(command, cwd=root, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)

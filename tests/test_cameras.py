@@ -24,6 +24,7 @@ from core.contract.settings import from_json
 from core.face import faces
 from core.geometry.views import read_views
 from core.imaging import images
+from core.synthetic.sample import write_video
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 WIDTH, HEIGHT, FOCAL = 360, 480, 420.0
@@ -151,9 +152,10 @@ def test_frames_without_common_structure_are_refused(tmp_path):
 
 
 def test_a_camera_that_hardly_moved_is_refused(tmp_path):
-    film(tmp_path / "photos", np.linspace(-4, 4, 4))
+    film(tmp_path / "pictures", np.linspace(-4, 4, 6))
+    write_video(tmp_path / "film.mp4", (images.read_srgb(path) for path in sorted((tmp_path / "pictures").iterdir())))
     with pytest.raises(Problem, match="degrees around the head|fit together"):
-        solve(Capture(tmp_path / "face.wildcap"), tmp_path / "photos", features="plain")
+        solve(Capture(tmp_path / "face.wildcap"), tmp_path / "film.mp4", features="plain")
 
 
 def test_a_head_that_moves_before_a_still_background_is_refused(solved, tmp_path):

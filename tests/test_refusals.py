@@ -113,7 +113,7 @@ def test_a_folder_that_cannot_be_looked_at(addon, capture, monkeypatch):
 
 
 def test_an_installation_without_its_sample_head(addon, monkeypatch, tmp_path):
-    monkeypatch.setattr(addon("capture.sample_head"), "SHIPPED", tmp_path / "none")
+    monkeypatch.setattr(addon("capture.sample_head").sample_head, "SHIPPED", tmp_path / "none")
     addon("preferences").get().captures = str(tmp_path)
     refuses("sample head is missing", bpy.ops.wildcap.open_sample_head)
 

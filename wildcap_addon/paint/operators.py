@@ -83,7 +83,7 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
         mask = mask_image.values(image)
         files = {"PROPOSAL": capture.shadow_mask_auto, "SNAPPED": capture.shadow_mask_edges}
         changed = mask_image.proposal(image, files[self.kind]) if self.kind in files else EDITS[self.kind](mask)
-        if not image.is_dirty:  # the session's first change: the step that Ctrl-Z comes back to
+        if not image.is_dirty or bpy.app.version >= (5, 0, 0):  # what Ctrl-Z comes back to: Blender 5 keeps what was before a step, not what was after it
             session.push_undo(context)
         mask_image.set_values(image, changed)
         session.push_undo(context)
