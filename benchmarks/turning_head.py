@@ -4,7 +4,7 @@
 
     python -m benchmarks.turning_head FOLDER [--json docs/figures/turning_head.json]
 
-The film is that of core/synthetic/painted_head.py: 16 s, 300 frames of 384 x 512 pixels. FOLDER gets it and the capture; what is there is not made again.
+The film is that of core/synthetic/painted_head.py: 300 frames of 384 x 512 pixels. FOLDER gets it and the capture; what is there is not made again.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from core.synthetic.sample import write_video
 
 from . import figures
 
-FRAMES, SECONDS, SCALE = 300, 16.0, 1.28
+FRAMES, SCALE = 300, 1.28
 WIDEST_DEG = 40.0
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -74,10 +74,10 @@ def draw_solver(layout, preferences) -> None:
         layout.label(text=iface_("The solver is ready ({})").format(device), translate=False, icon='CHECKMARK')
         if preferences.device_reason:
             layout.label(text=preferences.device_reason, translate=False)
-        if preferences.tested:
-            layout.label(text=preferences.tested, translate=False, icon='CHECKMARK')
     else:
         layout.label(text="The solver is ready" if ready else "There is no solver yet", icon='CHECKMARK' if ready else 'INFO')
+    if ready and preferences.tested:
+        layout.label(text=preferences.tested, translate=False, icon='CHECKMARK')
     column = layout.column()
     column.use_property_split = True
     column.prop(preferences, "compute")

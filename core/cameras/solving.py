@@ -68,21 +68,22 @@ def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter
     """Raises Problem with what is wrong, as precisely as can be told."""
     records = frames.records
     few = len(records) <= FEW
-    if frames.kind == VIDEO and not few and surroundings_stay(find_landmarks(_spread(records), capture.frames, report), capture.frames):
+    found = find_landmarks(records if few else _spread(records), capture.frames, report)
+    if frames.kind == VIDEO and not few and surroundings_stay(found, capture.frames):
         asked = spread_over(records)
         report.log(f"All but the head stays where it is: the camera stood still. Only the head's own matches count, in {len(asked)} of {len(records)} frames.")
-        return replace(_solve(Frames(asked, frames.kind), capture, settings, report, stood=True), asked=asked)
-    return _solve(frames, capture, settings, report)
+        found = find_landmarks(_spread(asked), capture.frames, report)
+        return replace(_solve(Frames(asked, frames.kind), found, capture, settings, report, stood=True), asked=asked)
+    return _solve(frames, found, capture, settings, report)
 
 
-def _solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter, stood: bool = False) -> Solved:
-    """`solve` with these frames alone; `stood`: it is known that the camera stood still while the head turned."""
+def _solve(frames: Frames, found: dict[str, faces.Face], capture: Capture, settings: Settings, report: Reporter, stood: bool = False) -> Solved:
+    """`solve` with these frames alone and the faces in some of them; `stood`: it is known that the camera stood still while the head turned."""
     records = frames.records
     few = len(records) <= FEW
     ways = {"auto": ("plain", "face", "skin", "face") if few else ("plain", "skin", "face")}.get(settings.cameras.features, (settings.cameras.features,))
     if len(records) < LEAST_VIEWS:  # a draft
         ways = ("face",)
-    found = find_landmarks(records if few else _spread(records), capture.frames, report)
     matches, faults, moved, partial = Matches(), [], stood, None
     for turn, way in enumerate(ways):
         if way == "face":
