@@ -23,5 +23,5 @@ def newest():
 
 
 @pytest.mark.parametrize("flow", FLOWS)
-def test_flow(newest, flow):
-    assert subprocess.call([HERE / "run.sh", "--newest", flow]) == 0, f"the flow {flow} failed; its log and screenshots are in dist/gui/newest"
+def test_flow(newest, play, flow):
+    play("--newest", flow)
