@@ -39,7 +39,12 @@ test: $(VENV)/installed
 results: $(VENV)/installed
 	$(BIN)/python -m benchmarks.results
 
+# Two at a time; what one prints comes when it has ended.
 test-blenders: $(BLENDERS:%=.blenders/%/installed)
+	printf '%s\n' $(BLENDERS) | xargs --max-procs=2 --replace=VERSION sh -c \
+	    '.blenders/VERSION/bin/python -m pytest $(IN_BLENDER:%=tests/test_%.py) > .blenders/VERSION.log 2>&1; ended=$$?; cat .blenders/VERSION.log; exit $$ended'
+
+.blenders/%/installed)
 	for version in $(BLENDERS); do \
 	    .blenders/$$version/bin/python -m pytest $(IN_BLENDER:%=tests/test_%.py) || exit 1; \
 	done

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 import core.contract.messages
-from core.worker.client import SPINS
+from core.worker.client import SPINS, THREAD_VARIABLES
 
 from . import deprecations, message_sites
 
@@ -33,6 +33,11 @@ atexit.register(shutil.rmtree, os.environ["BLENDER_USER_RESOURCES"], ignore_erro
 # As the worker has it: what else the machine does would otherwise slow a test down tenfold. OpenMP reads it when torch is first imported.
 for name, value in SPINS.items():
     os.environ.setdefault(name, value)
+
+# A process of xdist has one core: with more threads than that the libraries wait for each other.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    for name in THREAD_VARIABLES:
+        os.environ.setdefault(name, "1")
 
 # Every file of a capture is flushed to the disk before it gets its name, which is most of a test's time; where memory serves as a disk it takes none.
 MEMORY_DISK, ROOM = Path("/dev/shm"), 6e9

@@ -35,7 +35,7 @@ from core.solve.lighting import Lights  # noqa: E402
 from core.solve.problem import State  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
-TRIALS = 8
+TRIALS = 5
 
 
 def test_a_handful_of_kills_loses_nothing_and_ends_in_the_same_bytes():

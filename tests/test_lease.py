@@ -19,7 +19,7 @@ from core.contract.messages import Problem
 
 from . import kept_capture
 
-RACES = int(os.environ.get("WILDCAP_RACES", 300))
+RACES = int(os.environ.get("WILDCAP_RACES", 160))
 
 
 @pytest.fixture

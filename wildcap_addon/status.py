@@ -129,7 +129,15 @@ def _interrupted(capture: Capture) -> bool:
 
 
 def _time(path: Path) -> float:
-    return path.stat().st_mtime if path.is_file() else 0.0
+    return _changed(path) / 1e9
+
+
+def _changed(path: Path) -> int:
+    """When a file or folder was last written, in nanoseconds; 0 where there is none, also where it has just been replaced or taken away."""
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return 0
 
 
 def _look(root: str, item) -> None:
@@ -145,7 +153,7 @@ def _stamp(item) -> tuple[Capture, tuple]:
     watched = (capture.json, capture.head, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved, capture.checkpoints,
                capture.frames_json, capture.consent, capture.switchlight,
                *delivered(capture), capture.renders)
-    stamp = (repr(values), *(p.stat().st_mtime_ns if p.exists() else 0 for p in watched))
+    stamp = (repr(values), *map(_changed, watched))
     return capture, stamp
 
 

@@ -60,7 +60,7 @@ def train_parser(config: str, out: Path, report: Reporter, minutes: float | None
         prepare_figures(config, work, report)
     if not all(any(is_prepared(seed, t["views"], work) for seed in data[kind]) for kind in ("seeds", "held_out_seeds")):
         raise Problem(f"There are no figures in {work} yet.", "Wait for `train parser --prepare`, or train without --growing.")
-    unseen = Snapshots(data["held_out_seeds"], t["views"], work, hdri).draw(48, 1, np.random.default_rng(1), augment=False)[0]
+    unseen = Snapshots(data["held_out_seeds"], t["views"], work, hdri).draw(8 * t["held_out"], 1, np.random.default_rng(1), augment=False)[0]
     torch.manual_seed(t["seed"])
     network = ParseNet(**CONFIGS[config]["model"])
     state = descent.resumed(work, descent.beginning(config, data, network))

@@ -59,7 +59,7 @@ def choose_video():
 def quick(settings) -> None:
     """Minutes matter here, detail does not; an artist leaves these folded away."""
     settings.quality = "draft"
-    settings.frames.max_frames, settings.frames.long_side, settings.frames.views = 72, 640, 8
+    settings.frames.max_frames, settings.frames.long_side, settings.frames.views = 40, 640, 8
     settings.scan.pairs, settings.scan.voxel_mm = 8, 2.0
     settings.texture.size = 512
     settings.solve.size, settings.solve.steps, settings.solve.checkpoint_every = 128, 12, 3

@@ -73,4 +73,8 @@ def forget() -> None:
 
 
 def _stamp(path: Path) -> tuple:
-    return (path.stat().st_size, path.stat().st_mtime_ns) if path.is_file() else ()
+    try:
+        info = path.stat()
+    except OSError:
+        return ()
+    return info.st_size, info.st_mtime_ns
