@@ -44,11 +44,6 @@ test-blenders: $(BLENDERS:%=.blenders/%/installed)
 	printf '%s\n' $(BLENDERS) | xargs --max-procs=2 --replace=VERSION sh -c \
 	    '.blenders/VERSION/bin/python -m pytest $(IN_BLENDER:%=tests/test_%.py) > .blenders/VERSION.log 2>&1; ended=$$?; cat .blenders/VERSION.log; exit $$ended'
 
-.blenders/%/installed)
-	for version in $(BLENDERS); do \
-	    .blenders/$$version/bin/python -m pytest $(IN_BLENDER:%=tests/test_%.py) || exit 1; \
-	done
-
 .blenders/%/installed: Makefile
 	$(or $(OWN_PYTHON),$(PYTHON)) -m venv .blenders/$*
 	.blenders/$*/bin/python -m pip install --quiet --disable-pip-version-check bpy==$* $(SHIPS) pytest==9.0.3

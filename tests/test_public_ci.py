@@ -3,11 +3,16 @@
 """The definition for a public CI, which nobody runs for us: it names what the locks serve, and its commands are the Makefile's."""
 
 import re
+import shutil
+import subprocess
+
+import pytest
 
 from core.worker import locks
 
 from .conftest import ROOT
 
+MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 WORKFLOW = (ROOT / ".github" / "workflows" / "tests.yml").read_text(encoding="utf-8")
 SYSTEMS = {"win_amd64": "windows", "macosx_arm64": "macos", "manylinux_x86_64": "ubuntu"}
 """A lock's platform, and the first word of the runners that have it."""
@@ -36,7 +41,13 @@ def test_every_platform_and_python_that_has_a_lock_is_tested():
 
 
 def test_its_commands_are_those_of_the_makefile():
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    ours = commands(makefile[makefile.index("\ntest:"):makefile.index("\n# docs/results.md")] + makefile[makefile.index("$(VENV)/installed: "):], "$(BIN)")
+    ours = commands(MAKEFILE[MAKEFILE.index("\ntest:"):MAKEFILE.index("\n# docs/results.md")] + MAKEFILE[MAKEFILE.index("$(VENV)/installed: "):], "$(BIN)")
     assert len(ours) == 5 and sorted(ours) == sorted(commands(WORKFLOW, '"$PYTHON"'))
-    assert "-m core install $(VENV) --compute cpu" in makefile and "python -m core install .venv --compute cpu\n" in WORKFLOW
+    assert "-m core install $(VENV) --compute cpu" in MAKEFILE and "python -m core install .venv --compute cpu\n" in WORKFLOW
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="no make")
+@pytest.mark.parametrize("target", re.findall(r"^([a-z][a-z-]+):", MAKEFILE, flags=re.MULTILINE))
+def test_make_reads_every_target(target):
+    asked = subprocess.run(["make", "--dry-run", target], cwd=ROOT, capture_output=True, text=True)
+    assert asked.returncode == 0, asked.stderr
