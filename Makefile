@@ -24,7 +24,7 @@ PYTHON3.13 ?= $(firstword $(shell python3.13 -c 'import sys; print(sys.executabl
 # What of the tests needs Blender.
 IN_BLENDER = addon captures setup evidence choices eyedropper white_card paint paint_session operators job_life relight skin_material skin_kept reel make next_step refusals draw translations sending acting updates delete_face save_report
 
-.PHONY: demo test results test-blenders test-gui test-gui-newest zip site clean
+.PHONY: demo test test-failed results test-blenders test-gui test-gui-newest zip site clean
 
 demo: $(VENV)/installed
 	$(BIN)/python -m benchmarks.demo $(DEMO)
@@ -38,6 +38,11 @@ test: $(VENV)/installed
 # docs/results.md and the README's figures, out of the records that the benchmarks left in docs/figures.
 results: $(VENV)/installed
 	$(BIN)/python -m benchmarks.results
+
+# What failed in `make test`, once more by itself: a shared machine may stand still for as long as a test waits.
+test-failed: $(VENV)/installed
+	$(BIN)/python -m pytest tests --ignore=tests/gui --ignore=tests/test_messages_reached.py --last-failed --last-failed-no-failures none --reached .reached
+	$(BIN)/python -m pytest tests/test_messages_reached.py --messages --reached .reached
 
 # Two at a time; what one prints comes when it has ended.
 test-blenders: $(BLENDERS:%=.blenders/%/installed)

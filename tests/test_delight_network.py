@@ -25,7 +25,7 @@ from core.geometry.raster import render_view
 from core.imaging import images
 from core.synthetic.identities import reserved_seeds
 from core.synthetic.sight import random_camera
-from core.training import delighter
+from core.training import delighter, people
 
 QUIET = Reporter("train", emit=lambda message: None)
 
@@ -184,15 +184,26 @@ def test_two_answers_are_weighed_where_they_agree_and_the_network_wins_where_the
 
 def test_a_training_goes_on_where_it_stopped(monkeypatch, tmp_path):
     small = {"model": {"widths": [16, 16, 16, 16], "depths": [1, 1, 1, 1]},
-             "training": {"pairs": 1, "echo": 2, "rate": 1e-3, "minutes": 1, "skins": 1, "views": 1, "held_out": 1, "seed": 0, "workers": 0}}
+             "training": {"pairs": 1, "echo": 2, "rate": 1e-3, "minutes": 1, "skins": 1, "people": 1, "views": 1, "held_out": 1, "seed": 0, "workers": 0}}
     monkeypatch.setitem(delighter.CONFIGS, "cpu", small)
     monkeypatch.setattr(delighter, "prepare", lambda seeds, views, work, *rest: _prepared(seeds, work))
+    monkeypatch.setattr(delighter, "prepare_people", lambda seeds, views, work, *rest: people.prepare_people(seeds, views, work, QUIET, processes=2))
+    with pytest.raises(Problem, match="There are no people in"):
+        delighter.train_delighter("cpu", tmp_path / "out.safetensors", QUIET, growing=True, work=tmp_path / "work")
     out = tmp_path / "out.safetensors"
     first = delighter.train_delighter("cpu", out, QUIET, minutes=0.01, work=tmp_path / "work")
     second = delighter.train_delighter("cpu", out, QUIET, minutes=0.02, work=tmp_path / "work")
-    assert second["steps"] > first["steps"] > 0
+    assert second["steps"] > first["steps"] > 0 and second["started"] == "random weights" and len(second["people"]) == 1
+    begun = delighter.train_delighter("cpu", tmp_path / "third.safetensors", QUIET, minutes=0.01, start=out, work=_emptied(tmp_path / "work"))
+    assert begun["started"] == "the weights before"
     assert json.loads(out.with_suffix(".json").read_text(encoding="utf-8"))["held_out"]["none"] > 0
     assert not set(second["seeds"]) & set(second["held_out_seeds"])
+
+
+def _emptied(work):
+    """A folder with what was prepared and no training."""
+    (work / "state.pt").unlink()
+    return work
 
 
 def _prepared(seeds, work):

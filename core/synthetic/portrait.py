@@ -40,12 +40,14 @@ class Fitted:
 @dataclass(frozen=True)
 class Portrait:
     """float32 pictures of side S. srgb [S, S, 3]: the file; albedo [S, S, 3]: linear, 0 off the head; shading [S, S, 3]: what the albedo was multiplied
-    by, highlights and clipping included; shadow [S, S] in [0, 1]: the share of the main light that is blocked or turned away, 0 where no light is
+    by, highlights and clipping included; even [S, S, 3]: the same for skin of one tone, so that nothing of the pigment is in it, through what the camera's
+    curve does to pigment either; shadow [S, S] in [0, 1]: the share of the main light that is blocked or turned away, 0 where no light is
     main; strong: that light's irradiance facing it over all other light's, as a share in [0, 1]; head, face and skin [S, S] in [0, 1]; fitted [P]."""
 
     srgb: np.ndarray
     albedo: np.ndarray
     shading: np.ndarray
+    even: np.ndarray
     shadow: np.ndarray
     strong: float
     head: np.ndarray
@@ -85,13 +87,16 @@ def relit(sight: Sight, stage: LightStage, rng: np.random.Generator, panoramas: 
     radiance = np.where(head[..., None] > 0, radiance, _background(environment, sight, light, rng))
     face = sight.picture(sight.masks[:, MASKS.index("face")])
     linear, gains = expose(radiance, face > 0.5 if (face > 0.5).any() else head > 0, rng)
-    clean = _haired(curve(linear, rng), sight, rng) if rng.random() < 0.35 else (curve(linear, rng), np.zeros_like(head))
-    picture, hair = clean
+    haired, tone = rng.random() < 0.35, _tone(sight, albedo)
+    even = np.clip(sight.picture(tone * diffuse + specular) * gains, 0, 1).astype(np.float32)
+    picture, even = np.split(curve(np.concatenate([linear, even]), rng), 2)
+    picture, hair = _haired(picture, sight, rng) if haired else (picture, np.zeros_like(head))
     truth = sight.picture(albedo)
     shading = images.srgb_to_linear(picture) / np.maximum(truth, 0.004)
     shadow, strong = _shadow(sight, lamps, colours, blocked, ambient)
     bare = 1 - hair
-    return Portrait(develop(picture, rng), truth, shading * (head * bare)[..., None], sight.picture(shadow), strong, head * bare, face * bare,
+    return Portrait(develop(picture, rng), truth, shading * (head * bare)[..., None], (images.srgb_to_linear(even) / tone).astype(np.float32),
+                    sight.picture(shadow), strong, head * bare, face * bare,
                     sight.picture(sight.masks[:, MASKS.index("skin")] * (1 - sight.masks[:, MASKS.index("eyes")])) * bare,
                     _fitted(sight, carried, environment, lamps, colours, albedo, gains, rng))
 
@@ -121,18 +126,18 @@ def _lamps(environment: Environment, sight: Sight, rng: np.random.Generator) -> 
         lamp = sight.lamps[k]
         lamps.append(lamp)
         colours.append(colour.astype(np.float32))
-        reach.append(sight.reach[k] * (1 - _gobo(sight, lamp, float(sight.radius[k]), str(rng.choice(GOBOS)), rng)))
+        reach.append(sight.reach[k] * (1 - gobo(sight.position, lamp, float(sight.radius[k]), str(rng.choice(GOBOS)), rng)))
     return lamps, colours, reach
 
 
-def _gobo(sight: Sight, lamp: np.ndarray, radius: float, kind: str, rng: np.random.Generator) -> np.ndarray | float:
-    """The share [P] of a lamp's light that leaves, blinds or an edge before it take away."""
+def gobo(position: np.ndarray, lamp: np.ndarray, radius: float, kind: str, rng: np.random.Generator) -> np.ndarray | float:
+    """The share [P] of a lamp's light that leaves, blinds or an edge before it take away from places [P, 3] in metres."""
     if kind == "none":
         return 0.0
     right = np.cross(lamp, [0.0, 0.0, 1.0] if abs(lamp[2]) < 0.9 else [1.0, 0.0, 0.0])
     right /= np.linalg.norm(right)
     away = rng.uniform(0.1, 0.8)
-    return in_the_way(sight.position @ right, sight.position @ np.cross(right, lamp), max(2 * away * min(radius, 0.03), 4e-4), kind, rng)
+    return in_the_way(position @ right, position @ np.cross(right, lamp), max(2 * away * min(radius, 0.03), 4e-4), kind, rng)
 
 
 def _fresnel(sight: Sight) -> np.ndarray:
@@ -219,8 +224,23 @@ def _shadow(sight: Sight, lamps: list, colours: list, reach: list, ambient: np.n
 
 def _fitted(sight: Sight, carried: np.ndarray, environment: Environment, lamps: list, colours: list, albedo: np.ndarray, gains: np.ndarray,
             rng: np.random.Generator) -> Fitted:
-    """What core/light/sunlight.py would find, without its search: the second-order sky and the strongest lamp, each a little off."""
-    transfer = carried @ BASIS.astype(np.float32)  # [N, 9]
+    transfer = sight.at_pixels(carried @ BASIS.astype(np.float32))
+    reach = [sight.reach[np.argmax(sight.lamps @ lamp)] for lamp in lamps]
+    return fitted_light(transfer, sight.smooth, reach, environment, lamps, colours, _tone(sight, albedo) * gains, rng)
+
+
+def _tone(sight: Sight, albedo: np.ndarray) -> np.ndarray:
+    """The mean albedo [3] of what skin is seen."""
+    skin = sight.masks[:, MASKS.index("skin")] * (1 - sight.masks[:, MASKS.index("eyes")]) > 0.5
+    return (albedo[skin] if skin.any() else albedo).mean(0)
+
+
+def fitted_light(transfer: np.ndarray, smooth: np.ndarray, reach: list[np.ndarray], environment: Environment, lamps: list, colours: list, tone: np.ndarray,
+                 rng: np.random.Generator) -> Fitted:
+    """What core/light/sunlight.py would find, without its search: the second-order sky and the strongest lamp, each a little off.
+
+    transfer [P, 9] and smooth normals [P, 3] of the head; reach: of each lamp what the head itself lets through [P]; tone [3]: of the exposed skin.
+    """
     main = int(np.argmax([c.mean() for c in colours])) if lamps else -1
     sky = BASIS.T @ environment.radiance * (4 * np.pi / LIGHTS)
     for k, (lamp, colour) in enumerate(zip(lamps, colours, strict=True)):
@@ -230,18 +250,16 @@ def _fitted(sight: Sight, carried: np.ndarray, environment: Environment, lamps: 
     if main >= 0 and not found:
         sky = sky + sh_basis(lamps[main])[:, None] * colours[main] * np.pi
     sky = sky * np.exp(rng.normal(0, 0.1, 3)) + rng.normal(0, 0.08, sky.shape) * np.abs(sky[:1])
-    lit = sight.at_pixels(transfer @ sky)
+    lit = transfer @ sky
     lit = np.maximum(lit, 0.15 * np.median(lit, 0))
-    normal = sight.smooth + rng.normal(0, 0.05, 3)
+    normal = smooth + rng.normal(0, 0.05, 3)
     normal = (normal / np.sqrt(_dot(normal, normal))[:, None]).astype(np.float32)
-    skin = sight.masks[:, MASKS.index("skin")] * (1 - sight.masks[:, MASKS.index("eyes")]) > 0.5
-    tone = (albedo[skin] if skin.any() else albedo).mean(0) * np.exp(rng.normal(0, 0.08) + rng.normal(0, 0.03, 3)) * gains
+    tone = tone * np.exp(rng.normal(0, 0.08) + rng.normal(0, 0.03, 3))
     sunlit = lit
     if found:
         towards = lamps[main] + rng.normal(0, 0.06, 3)
         towards /= np.linalg.norm(towards)
-        reach = sight.reach[np.argmax(sight.lamps @ lamps[main])]
-        sunlit = lit + (np.maximum(normal @ towards, 0) * reach)[:, None] * colours[main] * np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.05, 3))
+        sunlit = lit + (np.maximum(normal @ towards, 0) * reach[main])[:, None] * colours[main] * np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.05, 3))
     return Fitted((lit * tone).astype(np.float32), (sunlit * tone).astype(np.float32), normal.astype(np.float32))
 
 

@@ -32,6 +32,7 @@ from .skins import Skins, carried_skins, synthetic_skins
 
 WITH_GEOMETRY = 0.55
 """Share of the pictures whose geometry the network is told; single photographs have none."""
+LEAST = 0.01  # shading of which the logarithm is learnt; below is noise
 CARRIED = 0.35
 """Share of the subjects that wear a carried skin, where there are any."""
 
@@ -72,8 +73,7 @@ class Portraits:
 
     def draw(self, pairs: int, rng: np.random.Generator, augment: bool = True) -> Batch:
         """`pairs` sights under two lights each."""
-        drawn = [_example(portrait, seen, rng, augment) for portrait, seen in self.portraits(pairs, rng, augment)]
-        return Batch(*(torch.from_numpy(np.stack(part)) for part in zip(*drawn, strict=True)))
+        return stacked([example(portrait, geometry, rng) for portrait, geometry in self.portraits(pairs, rng, augment)])
 
     def portraits(self, pairs: int, rng: np.random.Generator, augment: bool):
         for _ in range(pairs):
@@ -83,7 +83,9 @@ class Portraits:
             if augment:  # other tones than the subjects' own
                 albedo = np.clip(albedo * np.exp(rng.normal(0, 0.12) + rng.normal(0, 0.04, 3)), 0.003, 0.9).astype(np.float32)
             for _ in range(2):
-                yield relit(seen, self._stage(seed), rng, self.panoramas, albedo), seen
+                lit = relit(seen, self._stage(seed), rng, self.panoramas, albedo)
+                parts = lit.fitted.ambient, lit.fitted.sunlit, lit.fitted.normal @ seen.rotation.T.astype(np.float32), np.ones(len(seen.pixel), np.float32)
+                yield lit, tuple(seen.picture(part) for part in parts)
 
     def _stage(self, seed: int) -> LightStage:
         if seed not in self.heads:
@@ -93,22 +95,23 @@ class Portraits:
         return self.heads[seed]
 
 
-def _example(portrait: Portrait, seen: sight.Sight, rng: np.random.Generator, augment: bool) -> tuple[np.ndarray, ...]:
+def stacked(examples: list[tuple[np.ndarray, ...]]) -> Batch:
+    return Batch(*(torch.from_numpy(np.stack(part)) for part in zip(*examples, strict=True)))
+
+
+def example(portrait: Portrait, known: tuple[np.ndarray, ...], rng: np.random.Generator) -> tuple[np.ndarray, ...]:
+    """What a Batch holds of a portrait. known: ambient, sunlit and normal [S, S, 3] (camera coordinates) of the registered head, and where it is [S, S]."""
     geometry = ()
     if rng.random() < WITH_GEOMETRY:
-        fitted, here = portrait.fitted, seen.picture(np.ones(len(seen.pixel), np.float32))
-        parts = [seen.picture(fitted.ambient), seen.picture(fitted.sunlit), seen.picture(fitted.normal @ seen.rotation.T.astype(np.float32)), here]
         slip = np.float32([[1, 0, rng.normal(0, 0.8)], [0, 1, rng.normal(0, 0.8)]])  # a registered head lies a pixel off
-        geometry = [cv2.warpAffine(part, slip, (seen.size, seen.size)) for part in parts]
+        geometry = [cv2.warpAffine(np.ascontiguousarray(part, np.float32), slip, (len(part), len(part))) for part in known]
     layers, middle = network_input(portrait.srgb, *geometry)
-    lit, albedo = _half(portrait.shading * portrait.albedo), _half(portrait.albedo * portrait.head[..., None])
-    whole = _half(portrait.head)
-    known = (whole > 0.99) & (albedo.min(-1) > 0.002)
-    shading = np.log(np.maximum(lit, 0.001)) - np.log(np.maximum(albedo, 0.001)) - middle
-    weight = known * (0.25 + 0.75 * _half(portrait.skin))
+    sure = (_half(portrait.head) > 0.99) & (_half(portrait.albedo).min(-1) > 0.002)
+    shading = np.log(np.maximum(_half(portrait.even), LEAST)) - middle
+    weight = sure * (0.25 + 0.75 * _half(portrait.skin))
     strong = portrait.strong
-    sure = 1.0 if strong > 0.4 or strong < 0.1 else 0.3  # in between it is a matter of taste what is a shadow
-    parts = (layers, shading.transpose(2, 0, 1), weight[None], _half(portrait.shadow)[None] * (strong > 0.2), (known * sure)[None])
+    trust = 1.0 if strong > 0.4 or strong < 0.1 else 0.3  # in between it is a matter of taste what is a shadow
+    parts = (layers, shading.transpose(2, 0, 1), weight[None], _half(portrait.shadow)[None] * (strong > 0.2), (sure * trust)[None])
     parts = [np.ascontiguousarray(part, np.float32) for part in parts]
     return tuple(parts)
 

@@ -35,7 +35,7 @@ def photograph(sight: Unlit, rng: np.random.Generator, panoramas: list[np.ndarra
     environment = panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas) and rng.random() < 0.6 else made_environment(rng)
     radiance, light = _lit(sight, albedo, shares, environment, rng)
     behind = shares[..., -1:]
-    radiance = radiance * (1 - behind) + backdrop(_directions(sight), environment, light, rng) * behind
+    radiance = radiance * (1 - behind) + backdrop(directions(sight), environment, light, rng) * behind
     radiance, shares = cover(radiance, shares, sight.landmarks, light, rng)
     face = shares[..., SKIN] > 0.5
     linear, _ = expose(radiance, face if face.sum() > 50 else behind[..., 0] < 0.5, rng)
@@ -67,11 +67,11 @@ def recoloured(albedo: np.ndarray, shares: np.ndarray, rng: np.random.Generator)
     cloth = np.exp(rng.uniform(np.log(0.01), np.log(0.8))) * np.exp(rng.normal(0, 0.45, 3))
     move(CLOTHES, towards(CLOTHES, np.clip(cloth, 0.005, 0.85)) if rng.random() < 0.8 else np.ones(3))
     if rng.random() < 0.5:
-        log += shares[..., CLOTHES:CLOTHES + 1] * _weave(albedo.shape[0], rng)
+        log += shares[..., CLOTHES:CLOTHES + 1] * weave(albedo.shape[0], rng)
     return np.clip(albedo * np.exp(log), 0.002, 0.92).astype(np.float32)
 
 
-def _weave(size: int, rng: np.random.Generator) -> np.ndarray:
+def weave(size: int, rng: np.random.Generator) -> np.ndarray:
     """Stripes, checks or blotches [S, S, 1 or 3] as logarithms."""
     y, x = np.mgrid[0:size, 0:size].astype(np.float32)
     turn, wave, strength = rng.uniform(0, np.pi), rng.uniform(3, 30), rng.uniform(0.1, 1.2)
@@ -87,7 +87,7 @@ def _weave(size: int, rng: np.random.Generator) -> np.ndarray:
 def _lit(sight: Unlit, albedo: np.ndarray, shares: np.ndarray, environment: Environment, rng: np.random.Generator) -> tuple[np.ndarray, float]:
     """The person's radiance [S, S, 3] and how bright the light is."""
     normal = sight.normal.astype(np.float32) / 127
-    towards = -_directions(sight)
+    towards = -directions(sight)
     sky = (BASIS.T @ environment.radiance * (4 * np.pi / LIGHTS)).astype(np.float32)
     lambert = np.float32(per_function(LAMBERT))
     free = cv2.GaussianBlur(sight.free.astype(np.float32) / 255, (0, 0), 1.2)[..., None]
@@ -107,12 +107,12 @@ def _lit(sight: Unlit, albedo: np.ndarray, shares: np.ndarray, environment: Envi
         arrives = cv2.GaussianBlur(sight.reach[..., k].astype(np.float32) / 255, (0, 0), softness)
         facing = np.maximum(normal @ lamp, 0)
         diffuse = diffuse + (facing * arrives)[..., None] * colour
-        shine = shine + (_highlight(normal, towards, lamp, rough) * arrives)[..., None] * reflectance * colour
+        shine = shine + (highlight(normal, towards, lamp, rough) * arrives)[..., None] * reflectance * colour
         light += 0.4 * float(colour.mean())
     return albedo * diffuse + shine, light
 
 
-def _highlight(normal: np.ndarray, towards: np.ndarray, lamp: np.ndarray, rough: np.ndarray) -> np.ndarray:
+def highlight(normal: np.ndarray, towards: np.ndarray, lamp: np.ndarray, rough: np.ndarray) -> np.ndarray:
     """GGX over the reflectance [S, S], times the cosine and pi (Walter et al. 2007)."""
     half = towards + lamp
     half /= np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), 1e-6)
@@ -123,7 +123,7 @@ def _highlight(normal: np.ndarray, towards: np.ndarray, lamp: np.ndarray, rough:
     return np.minimum(spread * masked * cosine, 60)
 
 
-def _directions(sight: Unlit) -> np.ndarray:
+def directions(sight: Unlit) -> np.ndarray:
     """Unit directions [S, S, 3] from the camera through the pixels, in the head's axes; the principal point lies next to the middle and counts as that."""
     size = len(sight.albedo)
     y, x = (np.mgrid[0:size, 0:size] + 0.5 - size / 2).astype(np.float32) / sight.focal

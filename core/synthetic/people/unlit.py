@@ -61,8 +61,9 @@ def landmarks_of(figure: Figure) -> np.ndarray:
     return template.landmark_points(figure.head)
 
 
-def random_view(figure: Figure, rng: np.random.Generator, size: int = SIZE) -> View:
-    """A square picture around the head, from the front to beyond the profile, from above and below, near and far, held askew."""
+def random_view(figure: Figure, rng: np.random.Generator, size: int = SIZE, margin: float = WIDER * MARGIN) -> View:
+    """A square picture around the head, `margin` times as large as the face's landmarks, from the front to beyond the profile, from above and below, near and
+    far, held askew."""
     yaw, pitch, roll = np.radians([rng.uniform(-100, 100) if rng.random() < 0.45 else rng.normal(0, 25), rng.normal(0, 13), rng.normal(0, 6)])
     back = np.array([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)])
     right = np.cross([0, 0, 1.0], back)
@@ -76,7 +77,7 @@ def random_view(figure: Figure, rng: np.random.Generator, size: int = SIZE) -> V
     local = (landmarks - middle) @ rotation.T + [0, 0, distance]
     plane = local[:, :2] / local[:, 2:]
     low, high = plane.min(0), plane.max(0)
-    focal = size / (WIDER * MARGIN * (high - low).max())
+    focal = size / (margin * (high - low).max())
     at = size / 2 - focal * (low + high) / 2
     camera = pycolmap.Camera(model="PINHOLE", width=size, height=size, params=[focal, focal, *at])
     return View("", Path(), camera, rotation, np.array([0, 0, distance]) - rotation @ middle, True)
