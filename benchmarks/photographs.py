@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far a delighter of single photographs keeps the face and takes the light: features kept, agreement across lights, and the two slopes.
 
-    python -m benchmarks.photographs [--data DIR] [--delighter NAME] [--sets NAME ...] [--subjects N] [--page PATH] [--json PATH] [--pictures FOLDER]
+    python -m benchmarks.photographs [--data DIR] [--delighter NAME] [--weights FILE] [--sets NAME ...] [--subjects N] [--page PATH] [--json PATH]
+        [--pictures FOLDER]
 
 Sets: faceolat (two people under twelve lights each, with their albedo and landmarks.json), lamps (DIR/near_ps_human1: a man with brows and a beard under seven
 lamps, ambient light subtracted; the merge of what each lamp lights stands for the truth), pairs (benchmarks/pairs.py, --subjects of each group of skin
@@ -12,6 +13,7 @@ tone). Rows: the four references of benchmarks/measures/references.py, and the d
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import sys
 from collections.abc import Callable, Iterator
@@ -78,12 +80,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=SHARED)
     parser.add_argument("--delighter", choices=[name for name in delight.PHOTOGRAPHERS if name != "none"], default="network")
+    parser.add_argument("--weights", type=Path, help="weights of our network, with their card beside them, instead of those that are shipped")
     parser.add_argument("--sets", nargs="+", choices=TITLES, default=list(TITLES))
     parser.add_argument("--subjects", type=int, default=2, help="of each group of skin tone")
     parser.add_argument("--page", type=Path, help="where the page goes, docs/results/photographs.md")
     parser.add_argument("--json", type=Path, help="where the record goes, docs/figures/photographs.json")
     parser.add_argument("--pictures", type=Path, help="folder for PERSON.png: three lights, and a row per answer; of real people")
     asked = parser.parse_args()
+    if asked.weights:
+        importlib.import_module("core.delight.network").WEIGHTS = asked.weights
     text, record = [("", WORDS)], {}
     for name in asked.sets:
         try:

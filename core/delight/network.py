@@ -4,7 +4,8 @@
 
 It sees a square around the face at SIDE pixels and answers at half of that; the answer is lifted to the picture's pixels along its edges (lift.py), and the
 picture is divided by it, so pores are kept and none can be invented. In a capture the frames' answers are evened out over the head (evening.py) and brought
-together with the light that was fitted to all frames (second_opinion.py).
+together with the light that was fitted to all frames (second_opinion.py); in a single photograph the skin around brows and eyes answers for them
+(below_hair.py).
 `core train delighter` makes the weights.
 """
 
@@ -24,11 +25,12 @@ from ..contract import shipped_files
 from ..contract.capture import Capture
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import DelightSettings, Settings
-from ..face import faces, template
+from ..face import faces, parser, template
 from ..face.head import read_head
 from ..geometry.raster import interpolate, sample
 from ..geometry.views import View, read_views
 from ..imaging import images
+from .below_hair import FEATURES, without_features
 from .casts import without_casts
 from .contract import Delit
 from .evening import Look, even_out
@@ -71,6 +73,8 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
         raise Problem("No face was found in the photograph.", "Choose a photograph that shows the face from the front or half from the side.")
     box = face_box(face.landmarks[:, :2])
     look = _look(load("cpu"), box, crop(srgb, box, SIDE))
+    share = crop(parser.parse(srgb, face.landmarks).of(*FEATURES), box, len(look.shading))
+    look = replace(look, shading=without_features(look.shading, share))
     return _divided(srgb, without_casts([look], [_hull(face.landmarks[:, :2], look)])[0])
 
 

@@ -119,6 +119,8 @@ def colours_of(stage: Stage, rng: np.random.Generator) -> Colours:
         log += _moles(len(albedo), rng)
     if rng.random() < 0.15:
         log += 0.35 * weave(len(albedo), rng)
+    if rng.random() < 0.6:
+        log += _tufts(len(albedo), stage.unlit.landmarks, rng)
     albedo = np.clip(albedo * np.exp(on_skin * log), 0.003, 0.92).astype(np.float32)
     return Colours(*with_open_mouth(albedo, shares, stage.unlit.landmarks, rng))
 
@@ -148,9 +150,9 @@ def portray(stage: Stage, colours: Colours, rng: np.random.Generator, panoramas:
     even = (images.srgb_to_linear(below) / np.maximum(tone, 0.004)).astype(np.float32)
     head = (1 - shares[..., -1]).astype(np.float32)
     shading = images.srgb_to_linear(picture) / np.maximum(albedo, 0.004) * head[..., None]
-    skin = head - shares[..., PARTS.index("hair")] - shares[..., PARTS.index("clothes")]
+    skin = np.clip(head - shares[..., PARTS.index("hair")] - shares[..., PARTS.index("clothes")], 0, 1)  # what nobody can tell is not asked for
     shadow, strong = _shadow(stage, lamps, tints, before, grown, diffuse)
-    return Portrait(develop(picture, rng), albedo * head[..., None], shading.astype(np.float32), even, shadow, strong, head, skin, np.clip(skin, 0, 1),
+    return Portrait(develop(picture, rng), albedo * head[..., None], shading.astype(np.float32), even, shadow, strong, skin, skin, skin,
                     _fitted(stage, environment, lamps, tints, tone * gains, rng))
 
 
@@ -275,3 +277,25 @@ def _moles(side: int, rng: np.random.Generator) -> np.ndarray:
         cv2.ellipse(spot, (at * 16).astype(int).tolist(), axes.tolist(), float(rng.uniform(0, 180)), 0, 360, 255, -1, cv2.LINE_AA, 4)
         log += (spot.astype(np.float32) / 255)[..., None] * (rng.normal(-0.5, 0.4) + rng.normal(0, 0.1, 3)).astype(np.float32)
     return np.clip(log, -1.6, 1.0)
+
+
+def _tufts(side: int, landmarks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Tufts of short hairs anywhere on a face [S, S, 3] as logarithms, dense or sparse, dark or fair: what a brow is, where no brow is."""
+    log = np.zeros((side, side, 3), np.float32)
+    low, high = landmarks.min(0), landmarks.max(0)
+    face = float((high - low).max())
+    for _ in range(int(rng.integers(1, 6))):
+        middle, turn = rng.uniform(low, high), rng.uniform(0, np.pi)
+        half = face * np.exp(rng.uniform(np.log(0.03), np.log(0.16))) * np.array([1.0, rng.uniform(0.12, 0.7)])
+        strands, width = np.zeros((side, side), np.uint8), max(1, round(side / 256))
+        comb, length = rng.uniform(0, np.pi), face * rng.uniform(0.015, 0.05)
+        count = int(np.clip(4 * half[0] * half[1] * rng.uniform(0.15, 1.2), 6, 1500))
+        axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+        roots = middle + (rng.normal(0, 0.5, (count, 2)).clip(-1, 1) * half) @ axes
+        ways = comb + rng.normal(0, 0.3, count)
+        ends = roots + length * np.stack([np.cos(ways), np.sin(ways)], 1)
+        lines = [np.round(16 * np.stack(pair)).astype(np.int32) for pair in zip(roots, ends, strict=True)]
+        cv2.polylines(strands, lines, False, 255, width, cv2.LINE_AA, 4)
+        colour = rng.normal(-0.9, 0.5) + rng.normal(0, 0.12, 3)
+        log += (cv2.GaussianBlur(strands, (0, 0), rng.uniform(0.3, 1.2)).astype(np.float32) / 255)[..., None] * colour.astype(np.float32)
+    return np.clip(log, -2.2, 1.2)

@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light knows no brows: below them, and on the eyes, a single photograph's shading is what the skin around them says, so that none of their colour is
+taken for light. What a shadow does that crosses a brow is lost there.
+
+A beard covers too much of a face for that: what is light on it is left to the network.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import scipy.sparse as sparse
+from scipy.sparse.linalg import spsolve
+
+FEATURES = ("brows", "eyes")
+SURE = 0.3  # share of a cell from which it is not asked what its shading is
+REACH = 1  # cells around them: the network's answer is as coarse as that
+
+
+def without_features(shading: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Log-shading [h, h, C] with that of cells whose `share` [h, h] of FEATURES is SURE, and of those around them, carried over from the skin."""
+    unknown = cv2.dilate((share > SURE).astype(np.uint8), np.ones((2 * REACH + 1,) * 2, np.uint8)) > 0
+    return completed(shading, unknown).astype(np.float32)
+
+
+def completed(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
+    """Values [H, W, C] with those where `unknown` bool [H, W] replaced by the smoothest surface that meets the others (a harmonic one)."""
+    if not unknown.any() or unknown.all():
+        return values
+    height, width = unknown.shape
+    number = np.full(unknown.shape, -1)
+    number[unknown] = np.arange(unknown.sum())
+    y, x = np.nonzero(unknown)
+    rows, columns, degree = [], [], np.zeros(len(y))
+    fixed = np.zeros((len(y), values.shape[-1]))
+    for dy, dx in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+        ny, nx = y + dy, x + dx
+        inside = (ny >= 0) & (ny < height) & (nx >= 0) & (nx < width)
+        degree += inside
+        near = number[np.clip(ny, 0, height - 1), np.clip(nx, 0, width - 1)]
+        free = inside & (near >= 0)
+        rows.append(np.flatnonzero(free))
+        columns.append(near[free])
+        known = inside & (near < 0)
+        fixed[known] += values[ny[known], nx[known]]
+    rows, columns = np.concatenate(rows), np.concatenate(columns)
+    laplacian = sparse.diags(degree) - sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), (len(y), len(y)))
+    out = values.copy()
+    out[unknown] = np.stack([spsolve(laplacian.tocsc(), fixed[:, k]) for k in range(fixed.shape[1])], -1)
+    return out

@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light knows no brows: what the network says of them is replaced by what it says of the skin around."""
+
+import importlib
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from core.delight.below_hair import completed, without_features
+from core.delight.evening import Look
+from core.imaging import images
+
+network = importlib.import_module("core.delight.network")
+
+
+def slope(side: int = 40) -> np.ndarray:
+    """A shading [S, S, 3] that is harmonic: it rises evenly, another way in each channel."""
+    y, x = np.mgrid[0:side, 0:side] / side
+    return np.stack([x - y, 0.3 * y + 0.1, 0.5 * x * y], -1)
+
+
+def test_a_hole_in_a_harmonic_shading_comes_back_exactly():
+    hole = np.zeros((40, 40), bool)
+    hole[10:20, 5:30], hole[30:34, 12:16] = True, True
+    assert completed(np.where(hole[..., None], 9.0, slope()), hole) == pytest.approx(slope(), abs=1e-9)
+
+
+def test_a_hole_at_the_border_and_no_hole_at_all():
+    hole = np.zeros((40, 40), bool)
+    hole[:6, :6] = True
+    found = completed(np.where(hole[..., None], 9.0, np.float64(0.4) + 0 * slope()), hole)
+    assert found == pytest.approx(0.4, abs=1e-9)
+    assert completed(slope(), np.zeros((40, 40), bool)) is not None and np.array_equal(completed(slope(), np.ones((40, 40), bool)), slope())
+
+
+def test_the_cells_of_a_brow_and_those_beside_it_take_the_skins_shading():
+    share = np.zeros((40, 40), np.float32)
+    share[18:21, 10:30] = 0.9
+    leaky = slope() - 2.0 * (share > 0)[..., None]
+    leaky[17, 10:30] -= 1.0  # the answer is coarse: the row beside has a part of it
+    assert without_features(leaky, share) == pytest.approx(slope(), abs=0.02)
+    assert np.array_equal(without_features(leaky, np.full_like(share, 0.2)), leaky.astype(np.float32))
+
+
+def test_a_photograph_keeps_a_brow_where_the_parser_sees_one(monkeypatch):
+    """A network that takes two dark bars for shadow: the one that is a brow stays dark in the albedo, the other leaves."""
+    picture = np.full((256, 256, 3), 0.5, np.float32)
+    brow, shadow = (slice(90, 102), slice(80, 120)), (slice(160, 172), slice(80, 120))
+    picture[brow] = picture[shadow] = 0.25
+    landmarks = np.array([[x, y, 0] for x in (60, 200) for y in (60, 200)] * 117, np.float32)
+    parts = SimpleNamespace(of=lambda *names: np.where(np.indices(picture.shape[:2])[0] < 128, picture[..., 0] < 0.4, False).astype(np.float32))
+    monkeypatch.setattr(network.faces, "detect", lambda srgb: SimpleNamespace(landmarks=landmarks))
+    monkeypatch.setattr(network, "parser", SimpleNamespace(parse=lambda srgb, found: parts))
+    monkeypatch.setattr(network, "load", lambda device: None)
+
+    def look(net, box, crop):
+        log = np.log(images.srgb_to_linear(network.cv2.resize(crop, (128, 128), interpolation=network.cv2.INTER_AREA)))
+        return Look(box, log, 0 * log[..., 0], log)
+    monkeypatch.setattr(network, "_look", look)
+    albedo = images.srgb_to_linear(network.delight_photograph(picture, None)[0])
+    skin = albedo[130, 100].mean()
+    assert albedo[96, 100].mean() / skin == pytest.approx(float(images.srgb_to_linear(0.25) / images.srgb_to_linear(0.5)), rel=0.1)
+    assert albedo[166, 100].mean() / skin == pytest.approx(1, rel=0.1)
