@@ -27,6 +27,7 @@ from ..portrait import GOBOS, Fitted, Portrait, fitted_light, gobo
 from ..response import curve, develop, expose
 from .clutter import backdrop, cover, with_open_mouth
 from .figure import Figure
+from .markings import moles, stains, tufts
 from .snapshot import GLOSS, SKIN, directions, highlight, recoloured, weave
 from .truth import Scene
 from .unlit import Unlit, random_view, scene_of, see
@@ -114,13 +115,13 @@ def colours_of(stage: Stage, rng: np.random.Generator) -> Colours:
     on_skin = shares[..., :2].sum(-1, keepdims=True)
     log = np.zeros_like(albedo)
     if rng.random() < 0.35:
-        log += _stains(len(albedo), rng)
+        log += stains(len(albedo), rng)
     if rng.random() < 0.4:
-        log += _moles(len(albedo), rng)
+        log += moles(len(albedo), rng)
     if rng.random() < 0.15:
         log += 0.35 * weave(len(albedo), rng)
     if rng.random() < 0.6:
-        log += _tufts(len(albedo), stage.unlit.landmarks, rng)
+        log += tufts(len(albedo), stage.unlit.landmarks, rng)
     albedo = np.clip(albedo * np.exp(on_skin * log), 0.003, 0.92).astype(np.float32)
     return Colours(*with_open_mouth(albedo, shares, stage.unlit.landmarks, rng))
 
@@ -256,46 +257,3 @@ def _fitted(stage: Stage, environment: Environment, lamps: list[int], tints: lis
     for target, values in zip(whole, (found.ambient, found.sunlit, found.normal), strict=True):
         target[here] = values
     return Fitted(*whole)
-
-
-def _stains(side: int, rng: np.random.Generator) -> np.ndarray:
-    """Patches of another colour [S, S, 3] as logarithms: port-wine stains, vitiligo, paint; some with a hard edge."""
-    count = int(rng.integers(3, 14))
-    field = cv2.resize(rng.normal(0, 1, (count, count)).astype(np.float32), (side, side), interpolation=cv2.INTER_CUBIC)
-    where = np.clip(0.5 + (field - rng.uniform(0.0, 1.2)) / np.exp(rng.uniform(np.log(0.02), np.log(1.0))), 0, 1)
-    colour = rng.normal(-0.25, 0.45) + rng.normal(0, 0.25, 3)
-    return where[..., None] * colour.astype(np.float32)
-
-
-def _moles(side: int, rng: np.random.Generator) -> np.ndarray:
-    """Dark and light spots [S, S, 3] of all sizes as logarithms."""
-    log = np.zeros((side, side, 3), np.float32)
-    for _ in range(int(rng.integers(2, 40))):
-        spot = np.zeros((side, side), np.uint8)
-        at, radius = rng.uniform(0.1, 0.9, 2) * side, np.exp(rng.uniform(np.log(0.5), np.log(6.0)))
-        axes = (radius * np.exp(rng.normal(0, 0.2, 2)) * 16).astype(int)
-        cv2.ellipse(spot, (at * 16).astype(int).tolist(), axes.tolist(), float(rng.uniform(0, 180)), 0, 360, 255, -1, cv2.LINE_AA, 4)
-        log += (spot.astype(np.float32) / 255)[..., None] * (rng.normal(-0.5, 0.4) + rng.normal(0, 0.1, 3)).astype(np.float32)
-    return np.clip(log, -1.6, 1.0)
-
-
-def _tufts(side: int, landmarks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Tufts of short hairs anywhere on a face [S, S, 3] as logarithms, dense or sparse, dark or fair: what a brow is, where no brow is."""
-    log = np.zeros((side, side, 3), np.float32)
-    low, high = landmarks.min(0), landmarks.max(0)
-    face = float((high - low).max())
-    for _ in range(int(rng.integers(1, 6))):
-        middle, turn = rng.uniform(low, high), rng.uniform(0, np.pi)
-        half = face * np.exp(rng.uniform(np.log(0.03), np.log(0.16))) * np.array([1.0, rng.uniform(0.12, 0.7)])
-        strands, width = np.zeros((side, side), np.uint8), max(1, round(side / 256))
-        comb, length = rng.uniform(0, np.pi), face * rng.uniform(0.015, 0.05)
-        count = int(np.clip(4 * half[0] * half[1] * rng.uniform(0.15, 1.2), 6, 1500))
-        axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
-        roots = middle + (rng.normal(0, 0.5, (count, 2)).clip(-1, 1) * half) @ axes
-        ways = comb + rng.normal(0, 0.3, count)
-        ends = roots + length * np.stack([np.cos(ways), np.sin(ways)], 1)
-        lines = [np.round(16 * np.stack(pair)).astype(np.int32) for pair in zip(roots, ends, strict=True)]
-        cv2.polylines(strands, lines, False, 255, width, cv2.LINE_AA, 4)
-        colour = rng.normal(-0.9, 0.5) + rng.normal(0, 0.12, 3)
-        log += (cv2.GaussianBlur(strands, (0, 0), rng.uniform(0.3, 1.2)).astype(np.float32) / 255)[..., None] * colour.astype(np.float32)
-    return np.clip(log, -2.2, 1.2)
