@@ -96,6 +96,7 @@ class Portraits:
 
 
 def stacked(examples: list[tuple[np.ndarray, ...]]) -> Batch:
+    """Examples as one batch, in their order."""
     return Batch(*(torch.from_numpy(np.stack(part)) for part in zip(*examples, strict=True)))
 
 

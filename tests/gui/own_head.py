@@ -45,10 +45,10 @@ def choose_python():
     yield 1.0
 
 
-def choose_video(source: Path = VIDEO):
-    """The sample video, or another one or a photograph, and settings by which all takes minutes; returns the capture's folder."""
+def choose_video():
+    """The sample video, and settings by which all takes minutes; returns the capture's folder."""
     yield from d.lead("wildcap.choose_video")
-    yield from d.browse(source)
+    yield from d.browse(VIDEO)
     quick(addon.settings())
     bpy.context.scene.wildcap.resolution, bpy.context.scene.wildcap.samples = 512, 16
     yield 1.5

@@ -17,7 +17,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 SIZE = (1280, 800)
 LIMIT_S = 1800
-WITHOUT = {"one_button", "button_by_button", "photographs"}
+WITHOUT = {"one_button", "button_by_button"}
 """Flows that begin without the add-on: they drag its zip into the window."""
 
 
