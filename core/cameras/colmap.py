@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import statistics
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor, wait
@@ -17,22 +18,38 @@ from pathlib import Path
 
 import pycolmap
 
-OVERLAP = 10
+from . import skeleton
+
 PHONE = 1.0
 FOCALS = (PHONE, 2.0, 3.5)
 """Focal lengths that photographs whose files tell none are tried with, as shares of the longer side: 53, 28 and 16 degrees of view."""
 CHUNK = 24
 """Pictures handed to COLMAP at once: enough to keep its threads busy, few enough to show progress."""
+FILM_FEATURES, LEAST_FEATURES = 2000, 400
+"""Of each frame of a film, whose neighbours share plenty; and below which (in the median frame) features are looked for at twice the frames' size."""
+CARRIED = 0.9
+"""Share of the frames chosen to carry a film's structure that must fit together; else more are chosen."""
 
 
 def reconstruct(job: dict) -> bool:
-    """Runs a job: images (folder), groups [{names, width, height, focal_px or null}] of one camera each, skin (feature settings), sequential,
-    photographs (few, of straight lenses whose focal length may be any), seed, masks (folder or null), database and output (paths). Writes the largest
-    model to output; False where there is none."""
+    """Runs a job: images (folder), groups [{names, width, height, focal_px or null}] of one camera each, skin (feature settings), film (what skeleton.Film
+    says of the frames; null: all pairs are matched), photographs (few, of straight lenses whose focal length may be any), finer (features from twice the
+    pictures' size on), seed, masks (folder or null), database and output (paths; null: matches are all that is wanted). Writes the largest model to
+    output; False where there is none."""
     pycolmap.set_random_seed(job["seed"])
-    _extract(job)
-    _match(job)
-    models = _map_photographs(job) if job["photographs"] else _map(job)
+    _extract(job, job["finer"])
+    if not job["finer"] and _features(job) < LEAST_FEATURES:
+        Path(job["database"]).unlink()
+        _extract(job, True)
+    if not job["output"]:
+        chosen = skeleton.choose(job["film"], skeleton.size(job["film"]))
+        _match(job, skeleton.pairs_within(job["film"], chosen) + skeleton.pairs_between(job["film"], chosen))
+        return True
+    if job["film"]:
+        models = _map_film(job)
+    else:
+        _match(job)
+        models = _map_photographs(job) if job["photographs"] else _map(job)
     if not models:
         return False
     best = max(models, key=_worth)
@@ -41,17 +58,20 @@ def reconstruct(job: dict) -> bool:
     return True
 
 
-def _extract(job: dict) -> None:
+def _extract(job: dict, finer: bool) -> None:
+    """Features of all pictures; of those of a long film that are only placed by others, at half their size."""
     options = pycolmap.FeatureExtractionOptions()
     options.use_gpu = False
-    options.sift.max_num_features = 4000  # half of COLMAP's own, so a quarter of the matching: neighbours in a video share plenty
+    options.sift.first_octave = -1 if finer else 0
+    options.sift.max_num_features = FILM_FEATURES if not finer else 4000
     if job["skin"]:  # what holds on low-contrast skin, at ten times the cost
         options.sift.estimate_affine_shape = True
         options.sift.domain_size_pooling = True
         options.sift.peak_threshold = 0.002
         options.sift.max_num_features = 8000
     total = sum(len(group["names"]) for group in job["groups"])
-    done = 0
+    carrying = set(skeleton.choose(job["film"], skeleton.size(job["film"]))) if job["film"] else {name for group in job["groups"] for name in group["names"]}
+    done, most = 0, options.sift.max_num_features
     pycolmap.Database.open(job["database"]).close()  # makes the file
     for camera_id, group in enumerate(job["groups"], 1):
         reader = pycolmap.ImageReaderOptions()
@@ -64,27 +84,57 @@ def _extract(job: dict) -> None:
         # Entered in order: extraction would number the pictures as its threads finish, and the mapper's path depends on the numbers.
         pycolmap.import_images(job["database"], job["images"], pycolmap.CameraMode.SINGLE, group["names"], reader)
         reader.existing_camera_id = camera_id
-        for start in range(0, len(group["names"]), CHUNK):
-            names = group["names"][start:start + CHUNK]
+        chunks = [(carry, [name for name in group["names"] if (name in carrying) == carry]) for carry in (True, False)]
+        for carry, names in [(carry, part[start:start + CHUNK]) for carry, part in chunks for start in range(0, len(part), CHUNK)]:
+            options.max_image_size = -1 if carry else max(group["width"], group["height"]) // 2
+            options.sift.max_num_features = most if carry else most // 2
             _aside(pycolmap.extract_features, job["database"], job["images"], names, pycolmap.CameraMode.SINGLE, reader, options, pycolmap.Device.cpu)
             done += len(names)
             _say("finding features", done, total)
 
 
-def _match(job: dict) -> None:
+def _features(job: dict) -> float:
+    """Of the median picture."""
+    with pycolmap.Database.open(job["database"]) as stored:
+        return statistics.median(stored.num_keypoints_for_image(image.image_id) for image in stored.read_all_images())
+
+
+def _match(job: dict, pairs: list[tuple[str, str]] | None = None) -> None:
+    """All pairs of pictures, or those named that are not matched yet."""
     _say("matching features", 0, 1)
     options = pycolmap.FeatureMatchingOptions()
     options.use_gpu = False
     options.guided_matching = job["skin"]
     verification = pycolmap.TwoViewGeometryOptions()
     verification.ransac.random_seed = job["seed"]
-    if job["sequential"]:
-        pairing = pycolmap.SequentialPairingOptions()
-        pairing.overlap = OVERLAP
-        _aside(pycolmap.match_sequential, job["database"], options, pairing, verification, pycolmap.Device.cpu)
+    if pairs is not None:
+        pairing = pycolmap.ImportedPairingOptions()
+        pairing.match_list_path = Path(job["database"]).with_name("pairs.txt")
+        pairing.match_list_path.write_text("".join(f"{first} {second}\n" for first, second in pairs), encoding="utf-8")
+        _aside(pycolmap.match_image_pairs, job["database"], options, pairing, verification, pycolmap.Device.cpu)
     else:
         _aside(pycolmap.match_exhaustive, job["database"], options, pycolmap.ExhaustivePairingOptions(), verification, pycolmap.Device.cpu)
     _say("matching features", 1, 1)
+
+
+def _map_film(job: dict) -> list[pycolmap.Reconstruction]:
+    """The models of a film; of a long one, of the frames that carry it, and the others placed by those."""
+    film, size = job["film"], skeleton.size(job["film"])
+    while True:
+        chosen = skeleton.choose(film, size)
+        _match(job, skeleton.pairs_within(film, chosen))
+        models = _map(job, chosen)
+        best = max(models, key=_worth, default=None)
+        if len(chosen) == len(film):
+            return models
+        if best is not None and best.num_reg_images() >= CARRIED * len(chosen):
+            break
+        size *= 2
+    _match(job, skeleton.pairs_between(film, chosen))
+    mapped = {image.name for image in best.images.values() if image.has_pose}
+    others = [name for name, _, _ in film if name not in mapped]
+    skeleton.place_others(best, Path(job["database"]), others, job["seed"], lambda done, of: _say("placing cameras", len(mapped) + done, len(mapped) + of))
+    return [best]
 
 
 def _map_photographs(job: dict) -> list[pycolmap.Reconstruction]:
@@ -106,7 +156,7 @@ def _worth(model: pycolmap.Reconstruction) -> tuple[int, int]:
     return model.num_reg_images(), model.compute_num_observations()
 
 
-def _map(job: dict) -> list[pycolmap.Reconstruction]:
+def _map(job: dict, names: list[str] | None = None) -> list[pycolmap.Reconstruction]:
     options = pycolmap.IncrementalPipelineOptions()
     options.random_seed = job["seed"]
     options.mapper.random_seed = job["seed"]
@@ -116,6 +166,9 @@ def _map(job: dict) -> list[pycolmap.Reconstruction]:
     options.extract_colors = True
     options.ba_refine_extra_params = not job["photographs"]  # a few pictures of a face do not tell a lens's distortion from its focal length
     total = sum(len(group["names"]) for group in job["groups"])
+    if names is not None:
+        options.image_names = names
+        options.ba_global_frames_ratio = options.ba_global_points_ratio = 1.3  # a film grows evenly: the whole need not be adjusted at every tenth more
     if job["skin"] or total < 12:
         options.min_num_matches = 12
         options.mapper.abs_pose_min_num_inliers = 12

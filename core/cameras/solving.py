@@ -17,14 +17,15 @@ from ..contract.frame_records import PHOTOGRAPHS, VIDEO, FrameRecord, Frames
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import faces
+from . import skeleton
 from .joint import held, refine
 from .landmarks import find_landmarks
 from .matches import Matches
 from .mirrored import find_mirrored
 from .motion import camera_stood_still, head_masks
 from .resection import resect
-from .settled import settle
-from .structure import ALL_PAIRS, camera_groups, solve_structure
+from .settled import head_boxes, settle
+from .structure import ALL_PAIRS, camera_groups, film_of, match_crops, solve_structure
 from .surroundings import spread_over, surroundings_stay
 from .world import HeadFrame, find_head, head_of_one
 
@@ -128,7 +129,11 @@ def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Setting
     face, and those that only then find a place."""
     apart = settings.cameras.interpupillary_mm / 1000
     if frames.kind == VIDEO and solved.way != "face" and not solved.head_moved:
-        model, left = settle(solved.model, solved.head, solved.matches, report)
+        film = film_of(frames.records)
+        model, left = settle(solved.model, solved.head, solved.matches, report, only=skeleton.choose(film, skeleton.size(film)))
+        if left is None or model is not solved.model:  # a room's features are too coarse for a head
+            fine = match_crops(head_boxes(solved.model, solved.head), frames, capture, settings.seed, report)
+            model, left = settle(solved.model, solved.head, fine, report)
         if model is solved.model:
             return solved
         report.log(f"The head swayed before its surroundings: what matches on it misses by {100 * (1 - left):.0f} % less on its own; its cameras are taken.")

@@ -21,6 +21,7 @@ from ..contract.frame_records import FULL, PHOTOGRAPHS, VIDEO, FrameRecord, Fram
 from ..contract.messages import Problem, Reporter
 from ..geometry.models import read_model
 from ..imaging import images
+from . import skeleton
 from .matches import Matches, read_matches
 
 ALL_PAIRS = 40
@@ -39,9 +40,12 @@ def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str,
     with capture.workspace() as work:
         groups = camera_groups(records, folder)
         few = frames.kind == PHOTOGRAPHS and len(records) <= ALL_PAIRS
-        job = {"images": str(folder.resolve()), "groups": groups if masks else _enlarged(groups, folder), "skin": skin,
-               "sequential": sequential, "photographs": few,
-               "masks": str(masks) if masks else None, "seed": seed, "database": str(work / "database.db"), "output": str(work / "model")}
+        looked_at = groups if masks else _enlarged(groups, folder)
+        name_of = {PurePosixPath(name).name: name for group in looked_at for name in group["names"]}
+        job = {"images": str(folder.resolve()), "groups": looked_at, "skin": skin,
+               "film": [(name_of[name], *told) for name, *told in film_of(records)] if sequential else None, "photographs": few,
+               "finer": skin or not sequential, "masks": str(masks) if masks else None, "seed": seed,
+               "database": str(work / "database.db"), "output": str(work / "model")}
         path = work / "job.json"
         path.write_text(json.dumps(job), encoding="utf-8")
         try:
@@ -55,6 +59,32 @@ def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str,
         if model is not None:
             _reduce(model, sizes)
         return model, matches.scaled(scales)
+
+
+def match_crops(boxes: dict[str, tuple[int, int, int, int]], frames: Frames, capture: Capture, seed: int, report: Reporter) -> Matches:
+    """Matches of fine features within a part of each frame of a film, in the frames' pixels. boxes: name -> left, top, right and bottom of that part."""
+    with capture.workspace() as work:
+        (work / "parts").mkdir()
+        names = {}
+        for record in frames.records:
+            if record.name in boxes:
+                left, top, right, bottom = boxes[record.name]
+                images.write_srgb(work / "parts" / record.name, images.read_srgb(capture.frames / record.name)[top:bottom, left:right], quality=100)
+                names.setdefault((right - left, bottom - top), []).append(record.name)
+                report.check()
+        groups = [{"names": same, "width": width, "height": height, "focal_px": None} for (width, height), same in names.items()]
+        job = {"images": str(work / "parts"), "groups": groups, "skin": False, "photographs": False, "finer": True, "masks": None, "seed": seed,
+               "film": [frame for frame in film_of(frames.records) if frame[0] in boxes], "database": str(work / "parts.db"), "output": None}
+        path = work / "parts.json"
+        path.write_text(json.dumps(job), encoding="utf-8")
+        _follow(path, report)
+        matches = read_matches(Path(job["database"]))
+    return Matches({name: pixels + boxes[name][:2] for name, pixels in matches.keypoints.items()}, matches.pairs)
+
+
+def film_of(records: Sequence[FrameRecord]) -> skeleton.Film:
+    """What is chosen by which frames carry a film."""
+    return [(record.name, record.sharpness, record.yaw_deg) for record in records]
 
 
 def camera_groups(records: Sequence[FrameRecord], folder: Path) -> list[dict]:

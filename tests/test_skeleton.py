@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which frames carry a film's structure, what is matched, and the poses of the frames that are placed by them, against known ones."""
+
+import numpy as np
+import pycolmap
+import pytest
+
+from core.cameras import skeleton
+from core.geometry.models import pose_of
+
+
+def film(turns):
+    return [(f"{i:05d}.jpg", float((7 * i) % 11), turn) for i, turn in enumerate(turns)]
+
+
+def test_the_sharpest_frame_of_each_part_is_chosen_in_order():
+    frames = film([0.0] * 100)
+    chosen = skeleton.choose(frames, 10)
+    assert len(chosen) == 10 and chosen == sorted(chosen)
+    for part, name in enumerate(chosen):
+        there = frames[10 * part:10 * part + 10]
+        assert name == max(there, key=lambda frame: frame[1])[0]
+    assert skeleton.choose(frames, 100) == [name for name, _, _ in frames]
+    assert skeleton.size(frames[:60]) == 60 and skeleton.size(frames) == skeleton.SIZE
+
+
+def test_every_chosen_frame_is_matched_with_its_neighbours_and_far_ones_at_powers_of_two():
+    frames = film([None] * 50)
+    names = [name for name, _, _ in frames]
+    pairs = skeleton.pairs_within(frames, names)
+    assert len(pairs) == len(set(pairs)) and all(first < second for first, second in pairs)
+    with_first = {names.index(second) for first, second in pairs if first == names[0]}
+    assert with_first == {*range(1, skeleton.NEIGHBOURS + 1), 8, 16, 32}
+
+
+def test_a_film_that_comes_back_closes_its_loop():
+    there = np.linspace(-40, 40, 30)
+    frames = film([*there, *there[::-1]])
+    names = [name for name, _, _ in frames]
+    pairs = set(skeleton.pairs_within(frames, names))
+    assert (names[5], names[54]) in pairs  # the same side, 49 frames later
+    apart = [abs(frames[names.index(a)][2] - frames[names.index(b)][2]) for a, b in pairs - set(skeleton.pairs_within(film([None] * 60), names))]
+    assert apart and max(apart) < skeleton.SAME_SIDE_DEG
+
+
+def test_every_other_frame_is_matched_with_the_chosen_ones_around_it():
+    frames = film([None] * 40)
+    chosen = [name for name, _, _ in frames][::10]
+    around = {}
+    for one, other in skeleton.pairs_between(frames, chosen):
+        around.setdefault(other, []).append(one)
+    assert set(around) == {name for name, _, _ in frames} - set(chosen)
+    assert around["00015.jpg"] == [chosen[0], chosen[1], chosen[2], chosen[3]] and around["00035.jpg"] == [chosen[2], chosen[3]]
+
+
+@pytest.fixture(scope="module")
+def synthesized(tmp_path_factory):
+    """A database with matches and the model that it shows, 14 frames."""
+    path = tmp_path_factory.mktemp("skeleton") / "database.db"
+    options = pycolmap.SyntheticDatasetOptions()
+    options.num_rigs, options.num_cameras_per_rig, options.num_frames_per_rig, options.num_points3D = 1, 1, 14, 400
+    pycolmap.set_random_seed(3)
+    with pycolmap.Database.open(str(path)) as stored:
+        model = pycolmap.synthesize_dataset(options, stored)
+    return path, model
+
+
+def test_frames_that_are_placed_by_the_others_lie_where_they_were(synthesized):
+    path, true = synthesized
+    images = sorted((image for image in true.images.values()), key=lambda image: image.name)
+    left_out = images[1::3]
+    names = {image.name for image in left_out}
+    kept = pycolmap.Reconstruction()
+    for camera in true.cameras.values():
+        kept.add_camera_with_trivial_rig(pycolmap.Camera(camera.todict()))
+    for image in images:
+        if image.name not in names:
+            pixels = np.array([point.xy for point in image.points2D])
+            kept.add_image_with_trivial_frame(pycolmap.Image(name=image.name, camera_id=image.camera_id, image_id=image.image_id, keypoints=pixels),
+                                              true.images[image.image_id].cam_from_world())
+    for point in true.points3D.values():
+        track = pycolmap.Track([pycolmap.TrackElement(e.image_id, e.point2D_idx) for e in point.track.elements if e.image_id in kept.images])
+        if track.length() > 1:
+            kept.add_point3D(point.xyz, track, point.color)
+    before, said = kept.num_reg_images(), []
+    skeleton.place_others(kept, path, [image.name for image in left_out], 0, lambda done, of: said.append((done, of)))
+    assert kept.num_reg_images() == before + len(left_out) and said[-1] == (len(left_out), len(left_out))
+    placed = {image.name: pose_of(image) for image in kept.images.values()}
+    for image in left_out:
+        pose = pose_of(true.images[image.image_id])
+        assert np.degrees((placed[image.name].rotation.inverse() * pose.rotation).angle()) < 0.01
+        assert np.linalg.norm(placed[image.name].translation - pose.translation) < 1e-3
+    assert kept.compute_mean_reprojection_error() < 0.1
+
+
+def test_a_frame_that_shares_too_little_is_left_out(synthesized):
+    path, true = synthesized
+    empty = pycolmap.Reconstruction()
+    for camera in true.cameras.values():
+        empty.add_camera_with_trivial_rig(pycolmap.Camera(camera.todict()))
+    names = sorted(image.name for image in true.images.values())
+    skeleton.place_others(empty, path, names, 0, lambda done, of: None)
+    assert empty.num_reg_images() == 0
