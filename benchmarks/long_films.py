@@ -30,7 +30,8 @@ def main() -> None:
     options.add_argument("--frames", type=int, nargs="+", default=FRAMES, metavar="N")
     chosen = options.parse_args()
     rows = [row(chosen.folder, count) for count in chosen.frames]
-    print("\n| frames | cameras, s | registered | centre error, median and most, % of the distance | rotation, degrees | found by |\n| --- | --- | --- | --- | --- | --- |")
+    print("\n| frames | cameras, s | registered | centre error, median and most, % of the distance | rotation, degrees | found by |")
+    print("| --- | --- | --- | --- | --- | --- |")
     print("\n".join(rows))
 
 
@@ -43,8 +44,8 @@ def row(folder: Path, count: int) -> str:
     core(["run", str(video), str(capture.root), "--until", "frames", "--set", f"frames.max_frames={count}"])
     core(["run", str(video), str(capture.root), "--from", "cameras", "--until", "cameras", "--set", f"frames.max_frames={count}"])
     figures, stage = compare(capture, truth), json.loads((capture.root / "capture.json").read_text(encoding="utf-8"))["stages"]["cameras"]
-    return (f"| {count} | {stage['seconds']:.0f} | {figures['registered']} | {figures['centre_error_median_percent']:.3f}, {figures['centre_error_max_percent']:.3f} "
-            f"| {figures['rotation_error_median_deg']:.3f} | {stage['figures']['features']} |")
+    median, most, turned = (figures[name] for name in ("centre_error_median_percent", "centre_error_max_percent", "rotation_error_median_deg"))
+    return (f"| {count} | {stage['seconds']:.0f} | {figures['registered']} | {median:.3f}, {most:.3f} | {turned:.3f} | {stage['figures']['features']} |")
 
 
 def film(video: Path, count: int) -> None:
