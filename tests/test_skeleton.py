@@ -25,6 +25,14 @@ def test_the_sharpest_frame_of_each_part_is_chosen_in_order():
     assert skeleton.size(frames[:60]) == 60 and skeleton.size(frames) == skeleton.SIZE
 
 
+def test_more_frames_carry_a_film_that_shows_little_and_those_of_fewer_stay():
+    frames = [(f"{i:05d}.jpg", float((37 * i) % 101), None) for i in range(333)]
+    sizes = [skeleton.size(frames, richness) for richness in (1.0, 0.5, 0.4, 0.2, 0.05, 0.0)]
+    assert sizes == [40, 40, 80, 160, 333, 333]
+    for few, many in zip(sizes, sizes[1:], strict=False):
+        assert set(skeleton.choose(frames, few)) <= set(skeleton.choose(frames, many))
+
+
 def test_every_chosen_frame_is_matched_with_its_neighbours_and_far_ones_at_powers_of_two():
     frames = film([None] * 50)
     names = [name for name, _, _ in frames]

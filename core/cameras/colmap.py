@@ -37,16 +37,12 @@ def reconstruct(job: dict) -> bool:
     pictures' size on), seed, masks (folder or null), database and output (paths; null: matches are all that is wanted). Writes the largest model to
     output; False where there is none."""
     pycolmap.set_random_seed(job["seed"])
-    _extract(job, job["finer"])
-    if not job["finer"] and _features(job) < LEAST_FEATURES:
-        Path(job["database"]).unlink()
-        _extract(job, True)
+    chosen = _extract_film(job) if job["film"] else _extract(job, [name for group in job["groups"] for name in group["names"]], job["finer"])
     if not job["output"]:
-        chosen = skeleton.choose(job["film"], skeleton.size(job["film"]))
         _match(job, skeleton.pairs_within(job["film"], chosen) + skeleton.pairs_between(job["film"], chosen))
         return True
     if job["film"]:
-        models = _map_film(job)
+        models = _map_film(job, chosen)
     else:
         _match(job)
         models = _map_photographs(job) if job["photographs"] else _map(job)
@@ -58,8 +54,22 @@ def reconstruct(job: dict) -> bool:
     return True
 
 
-def _extract(job: dict, finer: bool) -> None:
-    """Features of all pictures; of those of a long film that are only placed by others, at half their size."""
+def _extract_film(job: dict) -> list[str]:
+    """Features of a film's frames, at half their size of those that are only placed by others; and the frames that carry it."""
+    film, finer = job["film"], job["finer"]
+    chosen = _extract(job, skeleton.choose(film, skeleton.size(film)), finer)
+    if not finer and _features(job) < LEAST_FEATURES:
+        Path(job["database"]).unlink()
+        finer = True
+        _extract(job, chosen, finer)
+    chosen = skeleton.choose(film, skeleton.size(film, _features(job) / FILM_FEATURES))
+    _extract(job, chosen, finer)
+    _extract(job, [name for name, _, _ in film], finer, part=2)
+    return chosen
+
+
+def _extract(job: dict, names: list[str], finer: bool, part: int = 1) -> list[str]:
+    """Features of those pictures `names` that have none yet, looked for in 1/part of their size; gives `names` back."""
     options = pycolmap.FeatureExtractionOptions()
     options.use_gpu = False
     options.sift.first_octave = -1 if finer else 0
@@ -69,34 +79,53 @@ def _extract(job: dict, finer: bool) -> None:
         options.sift.domain_size_pooling = True
         options.sift.peak_threshold = 0.002
         options.sift.max_num_features = 8000
+    options.sift.max_num_features //= part
+    if not Path(job["database"]).exists():
+        _enter(job)
     total = sum(len(group["names"]) for group in job["groups"])
-    carrying = set(skeleton.choose(job["film"], skeleton.size(job["film"]))) if job["film"] else {name for group in job["groups"] for name in group["names"]}
-    done, most = 0, options.sift.max_num_features
-    pycolmap.Database.open(job["database"]).close()  # makes the file
+    missing, wanted = _without_features(job), set(names)
+    done = total - len(missing)
     for camera_id, group in enumerate(job["groups"], 1):
-        reader = pycolmap.ImageReaderOptions()
-        reader.camera_model = "SIMPLE_RADIAL"
-        reader.default_focal_length_factor = PHONE  # between a phone's wide (0.8) and its portrait lens (1.4)
-        if group["focal_px"]:
-            reader.camera_params = f"{group['focal_px']},{group['width'] / 2},{group['height'] / 2},0"
-        if job["masks"]:
-            reader.mask_path = job["masks"]
-        # Entered in order: extraction would number the pictures as its threads finish, and the mapper's path depends on the numbers.
-        pycolmap.import_images(job["database"], job["images"], pycolmap.CameraMode.SINGLE, group["names"], reader)
+        reader = _reader(job, group)
         reader.existing_camera_id = camera_id
-        chunks = [(carry, [name for name in group["names"] if (name in carrying) == carry]) for carry in (True, False)]
-        for carry, names in [(carry, part[start:start + CHUNK]) for carry, part in chunks for start in range(0, len(part), CHUNK)]:
-            options.max_image_size = -1 if carry else max(group["width"], group["height"]) // 2
-            options.sift.max_num_features = most if carry else most // 2
-            _aside(pycolmap.extract_features, job["database"], job["images"], names, pycolmap.CameraMode.SINGLE, reader, options, pycolmap.Device.cpu)
-            done += len(names)
+        options.max_image_size = -1 if part == 1 else max(group["width"], group["height"]) // part
+        these = [name for name in group["names"] if name in missing and name in wanted]
+        for chunk in [these[start:start + CHUNK] for start in range(0, len(these), CHUNK)]:
+            _aside(pycolmap.extract_features, job["database"], job["images"], chunk, pycolmap.CameraMode.SINGLE, reader, options, pycolmap.Device.cpu)
+            done += len(chunk)
             _say("finding features", done, total)
+    return names
+
+
+def _enter(job: dict) -> None:
+    """The pictures in their order, a camera for each group: extraction would number them as its threads finish, and the mapper's path depends on the
+    numbers."""
+    pycolmap.Database.open(job["database"]).close()  # makes the file
+    for group in job["groups"]:
+        pycolmap.import_images(job["database"], job["images"], pycolmap.CameraMode.SINGLE, group["names"], _reader(job, group))
+
+
+def _reader(job: dict, group: dict) -> pycolmap.ImageReaderOptions:
+    reader = pycolmap.ImageReaderOptions()
+    reader.camera_model = "SIMPLE_RADIAL"
+    reader.default_focal_length_factor = PHONE  # between a phone's wide (0.8) and its portrait lens (1.4)
+    if group["focal_px"]:
+        reader.camera_params = f"{group['focal_px']},{group['width'] / 2},{group['height'] / 2},0"
+    if job["masks"]:
+        reader.mask_path = job["masks"]
+    return reader
+
+
+def _without_features(job: dict) -> set[str]:
+    with pycolmap.Database.open(job["database"]) as stored:
+        return {image.name for image in stored.read_all_images() if not stored.exists_keypoints(image.image_id)}
 
 
 def _features(job: dict) -> float:
-    """Of the median picture."""
+    """Of the median picture among those looked at."""
     with pycolmap.Database.open(job["database"]) as stored:
-        return statistics.median(stored.num_keypoints_for_image(image.image_id) for image in stored.read_all_images())
+        looked_at = [image.image_id for image in stored.read_all_images() if stored.exists_keypoints(image.image_id)]
+        return statistics.median(stored.num_keypoints_for_image(image) for image in looked_at)
 
 
 def _match(job: dict, pairs: list[tuple[str, str]] | None = None) -> None:
@@ -117,11 +146,10 @@ def _match(job: dict, pairs: list[tuple[str, str]] | None = None) -> None:
     _say("matching features", 1, 1)
 
 
-def _map_film(job: dict) -> list[pycolmap.Reconstruction]:
-    """The models of a film; of a long one, of the frames that carry it, and the others placed by those."""
-    film, size = job["film"], skeleton.size(job["film"])
+def _map_film(job: dict, chosen: list[str]) -> list[pycolmap.Reconstruction]:
+    """The models of a film; of a long one, of the frames chosen to carry it, and the others placed by those."""
+    film = job["film"]
     while True:
-        chosen = skeleton.choose(film, size)
         _match(job, skeleton.pairs_within(film, chosen))
         models = _map(job, chosen)
         best = max(models, key=_worth, default=None)
@@ -129,7 +157,7 @@ def _map_film(job: dict) -> list[pycolmap.Reconstruction]:
             return models
         if best is not None and best.num_reg_images() >= CARRIED * len(chosen):
             break
-        size *= 2
+        chosen = skeleton.choose(film, 2 * len(chosen))
     _match(job, skeleton.pairs_between(film, chosen))
     mapped = {image.name for image in best.images.values() if image.has_pose}
     others = [name for name, _, _ in film if name not in mapped]

@@ -8,6 +8,7 @@ others is resected from the points of those around it (Schoenberger and Frahm, S
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -16,6 +17,7 @@ import pycolmap
 
 SIZE = 40
 """Frames that carry an arc around a face: some four degrees from one to the next."""
+ENOUGH = 0.5
 NEIGHBOURS = 6
 SAME_SIDE_DEG, SAME_SIDE = 8.0, 3
 """A film that comes back to a side of the face: how near the head's turn must be, and so many frames of that side are matched beside the neighbours."""
@@ -26,13 +28,15 @@ Film = Sequence[tuple[str, float, float | None]]
 """In the film's order: name, sharpness, and the head's turn in degrees where a face was found."""
 
 
-def size(film: Film) -> int:
-    """How many frames carry a film: all of a short one."""
-    return len(film) if len(film) <= 1.5 * SIZE else SIZE
+def size(film: Film, richness: float = 1.0) -> int:
+    """How many frames carry a film: all of a short one, and of a long one twice as many, as often as needed, where each shows little. richness: the median
+    frame's features as a share of what a frame may have, of which ENOUGH will do. A plain head's frames cost less, and it takes more of them."""
+    count = SIZE * 2 ** max(0, math.ceil(math.log2(ENOUGH / max(richness, 1e-3))))
+    return len(film) if len(film) <= 1.5 * count else count
 
 
 def choose(film: Film, count: int) -> list[str]:
-    """The sharpest frame of each of `count` equal parts of the film, in order; all of them where there are no more."""
+    """The sharpest frame of each of `count` equal parts of the film, in order; all of them where there are no more. Twice as many hold these, too."""
     if len(film) <= count:
         return [name for name, _, _ in film]
     bounds = np.linspace(0, len(film), count + 1).round().astype(int)
