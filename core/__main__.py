@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m core: run, deliver, settings, stages, delighters, presets, status, delete, mask, landmarks,
+"""python -m core: run, batch, deliver, settings, stages, delighters, presets, status, delete, mask, landmarks,
 doctor, self-test, install, wheels, report-problem, train.
 
 The command line is one more host of the worker: it writes a job, starts the worker with this same Python and prints
@@ -18,6 +18,7 @@ import tempfile
 from pathlib import Path
 
 from . import __version__
+from .batch import command_line as batch_commands
 from .contract import artist_landmarks, consent, deletion, delighter_cards, delivery_plan, delivery_presets, report, settings, stages, unforeseen
 from .contract.capture import Capture
 from .contract.messages import Problem
@@ -121,6 +122,7 @@ def _parser() -> argparse.ArgumentParser:
     test = commands.add_parser("self-test", help="solve the sample head again on this machine, and compare it with what it should be")
     test.add_argument("--device", choices=("auto", "cpu", "cuda", "mps"), default="auto")
     test.set_defaults(command=_self_test)
+    batch_commands.add_commands(commands)
     setup_commands.add_commands(commands)
     commands.add_parser("train", help="train a network, or bring other skins in for it (developers): train prior --help, train carry --help")
     return parser

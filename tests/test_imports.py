@@ -12,7 +12,7 @@ import pytest
 from core.contract import stages
 
 ROOT = Path(__file__).resolve().parent.parent
-GROUND = ("contract", "worker")
+GROUND = ("contract", "worker", "batch")
 """Rooms that stand on the standard library: what Blender imports of core."""
 FLOORS = (("contract",), ("imaging",), ("geometry",), ("face", "light"))
 """Rooms that the stages share, from the bottom up: each imports the floors below its own, and itself."""
@@ -121,7 +121,8 @@ def test_other_rooms_import_no_stage():
 
 
 def test_only_the_worker_and_its_hosts_know_it():
-    _none(i for i in INSIDE if own_room(i.file) not in ("worker", "") and room(i.target) == "worker")
+    _none(i for i in INSIDE if own_room(i.file) not in ("worker", "batch", "") and room(i.target) == "worker")
+    _none(i for i in INSIDE if own_room(i.file) not in ("batch", "") and room(i.target) == "batch")
 
 
 def test_no_module_imports_itself_in_a_circle():

@@ -19,7 +19,7 @@ from core.worker.client import Worker
 from core.worker.job import write_job
 
 ROOT = Path(__file__).resolve().parent.parent
-GROUND = ("__init__.py", "__main__.py", "contract", "worker")
+GROUND = ("__init__.py", "__main__.py", "batch", "contract", "worker")
 
 ROOM = '''
 import errno, hashlib, json, os, sys, time

@@ -18,7 +18,8 @@ from .delivery_plan import PROVENANCE, is_as_delivered, read_delivered
 from .files import storage_problem
 from .messages import Problem
 
-LOGS = frozenset({"logs/worker.log", f"logs/{unforeseen.LOG}", *(f"logs/{stage.name}.log" for stage in (*stages.STAGES, *stages.TOOLS))})
+LOGS = frozenset({"logs/worker.log", "logs/contact_sheet.log", f"logs/{unforeseen.LOG}",
+                  *(f"logs/{stage.name}.log" for stage in (*stages.STAGES, *stages.TOOLS))})
 GROUPS = {
     "frames": "Frames", "cameras": "Cameras", "scan.ply": "Scan", "head.obj": "Head", "own_head.obj": "Head", "own_head.json": "Head",
     "landmarks.json": "Landmarks", "landmarks_artist.json": "Landmarks", "delit": "Delit frames", "switchlight": "SwitchLight's answers",

@@ -61,11 +61,11 @@ def holder(path: Path) -> dict | None:
     return None if found is None or found and is_gone(found) else found
 
 
-def refuse(found: dict, path: Path) -> Problem:
-    """The Problem of a capture that is worked on."""
+def refuse(found: dict, path: Path, what: str = "capture") -> Problem:
+    """The Problem of a capture, or a batch, that is worked on."""
     if not found:
-        return Problem("Another worker is just beginning to work on this capture.", f"Wait a moment and try again; if nobody works on it, delete {path}.")
-    return Problem(f"Another worker (process {found['pid']} on {str(found['host']).partition('/')[0]}, since {found['since']}) is working on this capture.",
+        return Problem(f"Another worker is just beginning to work on this {what}.", f"Wait a moment and try again; if nobody works on it, delete {path}.")
+    return Problem(f"Another worker (process {found['pid']} on {str(found['host']).partition('/')[0]}, since {found['since']}) is working on this {what}.",
                    f"Wait for it or cancel it there; if it is gone, delete {path}.")
 
 
@@ -76,15 +76,15 @@ def _refuse_stranger(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def hold(root: Path, tell: Callable[[str], None] = lambda text: None) -> Iterator[Lease]:
-    """Holds the lease of a capture folder, which must be there. Raises Problem naming who works there.
+def hold(root: Path, tell: Callable[[str], None] = lambda text: None, what: str = "capture") -> Iterator[Lease]:
+    """Holds the lease of a capture's folder, or a batch's, which must be there. Raises Problem naming who works there.
 
     A process of this machine that is at work is refused at once, and one that has ended is replaced at once. For one that was stopped, or that lives on
     another machine, a term is waited for a refresh; `tell` hears of that.
     """
     lease = Lease(root / "lock", secrets.token_hex(8))
     while not _make(lease):
-        expired = _wait_out(lease.path, tell)
+        expired = _wait_out(lease.path, tell, what)
         if expired is not None:
             _take_over(lease, *expired)
     _held[_key(root)] = lease
@@ -114,7 +114,7 @@ def _make(lease: Lease) -> bool:
     return True
 
 
-def _wait_out(path: Path, tell: Callable[[str], None]) -> tuple[dict, tuple | None] | None:
+def _wait_out(path: Path, tell: Callable[[str], None], what: str) -> tuple[dict, tuple | None] | None:
     """What the lease says that can be taken over, and its stamp: its holder has ended, or a term went by without a refresh. None where it was given back.
     Raises Problem when it is held."""
     _refuse_stranger(path)
@@ -124,12 +124,12 @@ def _wait_out(path: Path, tell: Callable[[str], None]) -> tuple[dict, tuple | No
         if found is None or found and is_gone(found):
             return None if found is None else (found, first)
         if _stamp(path) != first or found and is_at_work(found):
-            raise refuse(_read(path) or found, path)
+            raise refuse(_read(path) or found, path, what)
         waited = time.monotonic() - began
         if waited > TERM_S:
             return found, first
         if waited > 1 and not told:
-            tell("Looking whether the worker that holds this capture is still at work ...")
+            tell(f"Looking whether the worker that holds this {what} is still at work ...")
             told = True
         time.sleep(LOOK_S)
 

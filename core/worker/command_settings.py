@@ -28,14 +28,19 @@ def add_options(parser: argparse.ArgumentParser, command: str) -> None:
 
     What is not given leaves nothing in the parsed options but `settings_file` None and `assignments` [].
     """
+    add_assignments(parser, command)
+    for name, field in known_settings().items():
+        if "flag" in field.metadata and COMMANDS[name] == command:
+            parser.add_argument(field.metadata["flag"], dest=name, default=argparse.SUPPRESS, **_argument(name, field))
+
+
+def add_assignments(parser: argparse.ArgumentParser, command: str) -> None:
+    """Gives the parser --settings and --set alone."""
     example = '{"solve": {"steps": 30}, "seed": 1}; its values replace those of the quality' if command == "run" else '{"deliver": {"preset": "unreal"}}'
     parser.add_argument("--settings", dest="settings_file", metavar="FILE", type=Path,
                         help=f"a JSON file like {example}; relative paths in it begin at its folder")
     parser.add_argument("--set", dest="assignments", metavar="STAGE.NAME=VALUE", action="append", default=[],
-                        help="any setting that `settings` lists; may be given again for another; replaces the file's value, as the options below do")
-    for name, field in known_settings().items():
-        if "flag" in field.metadata and COMMANDS[name] == command:
-            parser.add_argument(field.metadata["flag"], dest=name, default=argparse.SUPPRESS, **_argument(name, field))
+                        help="any setting that `settings` lists; may be given again for another; replaces the file's value, as flags do")
 
 
 def read_options(options: argparse.Namespace, command: str) -> dict:

@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""python -m core batch: plan, run, status, retry, accept, review, commands, task. Standard library only; Ray is imported where a batch runs on it."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import signal
+import sys
+from pathlib import Path
+
+from ..contract import lease, settings
+from ..contract.files import storage_problem
+from ..contract.messages import Cancelled, Failed, Problem
+from ..worker import command_settings
+from ..worker.terminal import Line, show
+from .gate import accept_mask
+from .groups import GROUPS, group_named
+from .lines import list_tasks
+from .local import Tally, run_local
+from .record import GATES, NAME, Batch, read_batch, write_batch
+from .shots import HEADINGS, read_faces
+from .state import DONE, STOPPED, WAITING, look
+from .task import run_task
+
+
+def add_commands(commands) -> None:
+    """Adds `batch` to the subparsers of `python -m core`."""
+    many = commands.add_parser("batch", help="many faces: plan them from a table, run them here or on a farm, review them")
+    many = many.add_subparsers(required=True, metavar="plan|run|status|retry|accept|review|commands|task")
+    plan = many.add_parser("plan", help="make a batch of a table of videos, or of a folder of them; made again, it takes in what is new")
+    plan.add_argument("shots", metavar="SHOTS", type=Path, help=f"a CSV with the columns {', '.join(HEADINGS)}, of which video alone is needed; or a folder")
+    plan.add_argument("batch", metavar="BATCH", type=Path, help="the batch's folder, with a capture for each face")
+    plan.add_argument("--quality", choices=settings.QUALITIES, default="standard")
+    plan.add_argument("--gate", choices=GATES, default=GATES[0], help="artist: no face is solved before somebody has looked at its shadow mask")
+    plan.add_argument("--deliver", metavar="PRESET", help="deliver each head for that program as well (`presets` lists them)")
+    plan.add_argument("--to", metavar="FOLDER", type=Path, help="folder of the deliveries; without it they lie in the captures")
+    plan.add_argument("--blender", metavar="PROGRAM", default="", help="a Blender with the extension, which renders a contact sheet of each face")
+    command_settings.add_assignments(plan, "run")
+    plan.set_defaults(command=_plan)
+    for word, words in (("run", "do what is left; what has stopped with a problem stays"), ("retry", "the same, and what has stopped is tried again")):
+        run = many.add_parser(word, help=words)
+        run.add_argument("batch", metavar="BATCH", type=Path)
+        run.add_argument("names", metavar="NAME", nargs="*", help="faces; without one, all")
+        run.add_argument("--on", choices=("local", "ray"), default="local", help="this machine, or a cluster of Ray's")
+        run.add_argument("--address", help="Ray's head node, as `ray start` tells it; without it, this machine becomes a cluster of one")
+        run.add_argument("--at-once", metavar="N", type=int, default=1, help="faces that this machine works on at the same time")
+        run.add_argument("--until", choices=[group.name for group in GROUPS], help="end each face with this task")
+        run.set_defaults(command=_run, retry=word == "retry")
+    status = many.add_parser("status", help="say how far each face is")
+    status.add_argument("batch", metavar="BATCH", type=Path)
+    status.set_defaults(command=_status)
+    accept = many.add_parser("accept", help="solve with the shadow mask as it is, where the batch waits for that")
+    accept.add_argument("batch", metavar="BATCH", type=Path)
+    accept.add_argument("names", metavar="NAME", nargs="+")
+    accept.set_defaults(command=_accept)
+    lines = many.add_parser("commands", help="one line for each task that is left: its name, the task it waits for, and the command")
+    lines.add_argument("batch", metavar="BATCH", type=Path)
+    lines.add_argument("--python", default=sys.executable, help="the solver's Python on the machines that will run them")
+    lines.set_defaults(command=_commands)
+    task = many.add_parser("task", help="do one task of one face, as a scheduler asks for it")
+    task.add_argument("batch", metavar="BATCH", type=Path)
+    task.add_argument("name", metavar="NAME")
+    task.add_argument("group", metavar="TASK", help=", ".join(group.name for group in GROUPS))
+    task.set_defaults(command=_task)
+
+
+def _plan(options: argparse.Namespace) -> int:
+    root = options.batch.absolute()
+    before = read_batch(root).faces if (root / NAME).is_file() else ()
+    _refuse_strangers(root)
+    faces, faults = read_faces(options.shots, root, options.quality, command_settings.read_options(options, "run"))
+    deliver = None
+    if options.deliver:
+        deliver = {"preset": options.deliver, **({"folder": str(options.to.absolute())} if options.to else {})}
+        settings.from_json({"deliver": deliver})
+    elif options.to:
+        raise Problem("--to goes with --deliver only.", "Add --deliver PRESET, or leave --to out.")
+    kept = [face for face in before if face.name not in {new.name for new in faces}]
+    if faces or kept:
+        write_batch(Batch(root, (*kept, *faces), options.gate, deliver, options.blender))
+    for fault in faults:
+        print(f"{fault.problem} {fault.remedy}", file=sys.stderr)
+    said = f"{len(faces)} face{'' if len(faces) == 1 else 's'} planned in {root}"
+    print(said + (f", {len(kept)} of before kept" if kept else "") + (f", {len(faults)} left out" if faults else ""))
+    return 2 if faults else 0
+
+
+def _refuse_strangers(root: Path) -> None:
+    """Raises Problem for a folder that holds something and is no batch."""
+    try:
+        strangers = sorted(path.name for path in root.iterdir()) if root.is_dir() and not (root / NAME).is_file() else []
+    except OSError as error:
+        raise storage_problem(error, root) from error
+    if strangers:
+        raise Problem(f"{root} is no batch: it holds {strangers[0]}.", "Name a new folder, and it will be made.")
+
+
+def _run(options: argparse.Namespace) -> int:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    batch = read_batch(options.batch)
+    faces = [batch.face(name) for name in dict.fromkeys(options.names)] or list(batch.faces)
+    if options.at_once < 1:
+        raise Problem("--at-once is less than one.", "Leave it out, or give the number of faces at the same time.")
+    if options.address and options.on != "ray":
+        raise Problem("--address goes with --on ray only.", "Add --on ray, or leave --address out.")
+    with lease.hold(batch.root, _tell, "batch"):
+        if options.on == "ray":
+            from .ray_cluster import run_on_ray
+
+            tally = run_on_ray(batch, faces, options.retry, _tell, options.until, options.address)
+        else:
+            tally = run_local(batch, faces, options.at_once, options.retry, _tell, options.until)
+    return _sum_up(tally, len(faces))
+
+
+def _sum_up(tally: Tally, of: int) -> int:
+    counts = [(tally.count(DONE), "done"), (tally.count(WAITING), "waiting for the artist"), (tally.count(STOPPED), "stopped"),
+              (of - len(tally.ended) + tally.count("cancelled"), "not reached")]
+    print(f"{of} face{'' if of == 1 else 's'}: " + ", ".join(f"{count} {words}" for count, words in counts if count))
+    return 2 if tally.count(STOPPED) else 130 if counts[-1][0] else 0
+
+
+def _tell(text: str) -> None:
+    print(text, flush=True)
+
+
+def _status(options: argparse.Namespace) -> int:
+    batch = read_batch(options.batch)
+    counts: dict[str, int] = {}
+    for face in batch.faces:
+        state = look(batch, face)
+        counts[state.state] = counts.get(state.state, 0) + 1
+        print(f"{face.name:20} {state.words()}", flush=True)
+    print(", ".join(f"{count} {state}" for state, count in counts.items()))
+    with contextlib.suppress(Problem):
+        holder = lease.holder(batch.root / "lock")
+        if holder:
+            print(f"The batch is being run on {str(holder['host']).partition('/')[0]} (process {holder['pid']}, since {holder['since']}).")
+    return 0
+
+
+def _accept(options: argparse.Namespace) -> int:
+    batch = read_batch(options.batch)
+    faces = [batch.face(name) for name in options.names]
+    for face in faces:
+        accept_mask(face.capture)
+        print(f"{face.name} is solved with its mask next.")
+    return 0
+
+
+def _commands(options: argparse.Namespace) -> int:
+    for task in list_tasks(read_batch(options.batch), options.python):
+        print(task.line())
+    return 0
+
+
+def _task(options: argparse.Namespace) -> int:
+    """Exit codes as for `run`: 0, 2 for a problem, 130 after Ctrl-C."""
+    batch, stopped = read_batch(options.batch), []
+    face, group, line = batch.face(options.name), group_named(options.group), Line()
+
+    def stop(number, frame) -> None:
+        stopped.append(number)
+
+    for each in (signal.SIGINT, signal.SIGTERM):  # a scheduler ends a task by either
+        signal.signal(each, stop)
+    final = run_task(batch, face, group, lambda message: show(message, face.capture, line), lambda: bool(stopped))
+    if isinstance(final, Failed):
+        line.clear()
+        raise Problem(final.problem, final.remedy)
+    line.keep("Cancelled; finished stages are kept." if isinstance(final, Cancelled) else f"{face.name}: {group.label.lower()} done")
+    return 130 if isinstance(final, Cancelled) else 0
+

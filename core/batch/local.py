@@ -1,0 +1,147 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A batch on this machine: some faces at a time, each through its tasks. What one face lacks does not keep the others. Standard library only.
+
+Who runs a batch holds its lease. BATCH/progress.json is what a panel may show of it meanwhile; the file BATCH/stop asks it to end, as Ctrl-C does.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+
+from ..contract.files import write_json
+from ..contract.messages import Cancelled, Done, Failed, Message, Progress
+from ..contract.stages import LABELS
+from .groups import GROUPS, Group
+from .record import Batch, Face
+from .state import DONE, STOPPED, TO_DO, WAITING, look
+from .task import run_task
+
+PROGRESS, STOP = "progress.json", "stop"
+EVERY_S = 1.0
+"""How often progress.json is written at most."""
+
+
+@dataclass
+class Tally:
+    """How a run went: faces by how they ended, and what every finished task took, for the time that is left."""
+
+    ended: dict[str, str] = field(default_factory=dict)  # face -> DONE, WAITING, STOPPED or 'cancelled'
+    seconds: list[float] = field(default_factory=list)
+
+    def count(self, state: str) -> int:
+        return sum(ended == state for ended in self.ended.values())
+
+
+class Board:
+    """What a run has to say: lines for whoever reads along, and progress.json. Used by several threads."""
+
+    def __init__(self, batch: Batch, faces: int, tell: Callable[[str], None]):
+        self._batch, self._faces, self._tell = batch, faces, tell
+        self._working: dict[str, dict] = {}
+        self._lock = threading.Lock()
+        self._written = 0.0
+        self._began = time.monotonic()
+        self.tally = Tally()
+
+    def say(self, face: Face, words: str) -> None:
+        with self._lock:
+            self._tell(f"{face.name}: {words}")
+
+    def hear(self, face: Face, message: Message) -> None:
+        """Keeps what a face's worker says of its progress."""
+        if isinstance(message, Progress):
+            share = message.done / message.of if message.of else 0.0
+            self._working[face.name] = {"stage": LABELS[message.stage], "share": round(share, 3), "eta_s": message.eta_s}
+            self.write()
+
+    def end(self, face: Face, state: str, words: str) -> None:
+        self._working.pop(face.name, None)
+        self.tally.ended[face.name] = state
+        left = self.left_s()
+        self.say(face, f"{words} ({len(self.tally.ended)} of {self._faces}{f', about {max(1, round(left / 60))} min left' if left else ''})")
+        self.write(now=True)
+
+    def left_s(self) -> float | None:
+        """At the pace of the faces that ended in this run."""
+        ended = self.tally.count(DONE) + self.tally.count(WAITING)
+        return (time.monotonic() - self._began) / ended * (self._faces - len(self.tally.ended)) if ended else None
+
+    def write(self, now: bool = False) -> None:
+        """progress.json, once in a while."""
+        with self._lock:
+            if not now and time.monotonic() - self._written < EVERY_S:
+                return
+            self._written = time.monotonic()
+            write_json(self._batch.root / PROGRESS, {"ended": len(self.tally.ended), "of": self._faces, "left_s": self.left_s(),
+                                                     "working": dict(self._working)})
+
+
+def run_local(batch: Batch, faces: Iterable[Face], at_once: int, retry: bool, tell: Callable[[str], None],
+              until: str | None = None) -> Tally:
+    """Runs what is to be done of these faces, `at_once` at a time, up to the task `until` (None: all). A face that has stopped is left alone unless `retry`.
+    The caller holds the batch's lease. Ends early by KeyboardInterrupt or the file `stop`; what was finished is kept."""
+    faces = list(faces)
+    board, ended, stop = Board(batch, len(faces), tell), threading.Event(), batch.root / STOP
+    stop.unlink(missing_ok=True)
+    board.write(now=True)
+    with ThreadPoolExecutor(at_once) as pool:
+        waiting = {pool.submit(run_face, batch, face, board, retry, ended.is_set, until) for face in faces}
+        try:
+            while waiting:
+                done, waiting = wait(waiting, timeout=0.3, return_when=FIRST_COMPLETED)
+                for each in done:
+                    each.result()  # an error of ours is told as one
+                if stop.exists():
+                    ended.set()
+        except BaseException:
+            ended.set()
+            raise
+        finally:
+            for each in waiting:
+                each.cancel()
+    stop.unlink(missing_ok=True)
+    board.write(now=True)
+    return board.tally
+
+
+def run_face(batch: Batch, face: Face, board: Board, retry: bool, cancelled: Callable[[], bool], until: str | None = None) -> None:
+    """One face's tasks, one after the other, as far as they go."""
+    names = [group.name for group in GROUPS]
+    last = names.index(until) if until else len(names) - 1
+    while not cancelled():
+        state = look(batch, face)
+        if state.state == STOPPED and retry and state.group is not None:
+            state, retry = type(state)(TO_DO, state.group), False
+        if state.state == DONE or (state.group is not None and names.index(state.group.name) > last and state.state != STOPPED):
+            return board.end(face, DONE, "done")
+        if state.state != TO_DO:
+            return board.end(face, WAITING if state.state == WAITING else STOPPED, state.words())
+        final = _run(batch, face, state.group, board, cancelled)
+        if isinstance(final, Failed):
+            return board.end(face, STOPPED, f"{state.group.label.lower()} stopped: {final.problem} {final.remedy}")
+        if isinstance(final, Cancelled):
+            break
+    board.end(face, "cancelled", "cancelled; what was finished is kept")
+
+
+def _run(batch: Batch, face: Face, group: Group, board: Board, cancelled: Callable[[], bool]) -> Message:
+    began = time.monotonic()
+    final = run_task(batch, face, group, lambda message: board.hear(face, message), cancelled)
+    if isinstance(final, Done):
+        board.tally.seconds.append(time.monotonic() - began)
+        if not is_left(batch, face, group):
+            board.say(face, f"{group.label.lower()} done in {time.monotonic() - began:.0f} s")
+        else:  # the next look would send it here again, for ever
+            final = Failed("", f"The task {group.name} ended well, and its result is not what was asked for.", "Look whether another program writes there.")
+    return final
+
+
+def is_left(batch: Batch, face: Face, group: Group) -> bool:
+    """Whether the task that has just ended well is still, or again, to be done."""
+    state = look(batch, face)
+    return state.state == TO_DO and state.group is group

@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a table of shots, or a folder of videos, to the faces of a batch. A row that cannot be used is told by its line; the others go on.
+
+The table is CSV with a line of headings: video, and any of name, tone, white, template, quality, settings; as a spreadsheet writes it, with commas, semicolons
+or tabs. Relative paths begin at the table's folder. Standard library only.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+from ..contract import settings as known
+from ..contract.delivery_plan import safe_name
+from ..contract.files import storage_problem
+from ..contract.json_files import plain_name
+from ..contract.messages import Problem
+from ..contract.setting_values import absolute_path
+from ..worker.command_settings import read_file
+from .record import NAME, Face
+
+COLUMNS = {"tone": ("solve", "skin_tone"), "white": ("solve", "white_point"), "template": ("registration", "template")}
+"""Columns that are settings of their own: (stage, name)."""
+HEADINGS = ("video", "name", *COLUMNS, "quality", "settings")
+VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm", ".mts", ".3gp")
+"""What counts as a video in a folder of them; a table may name any file."""
+MOST_BYTES = 16 << 20
+"""Of a table: some hundred thousand rows."""
+
+
+def read_faces(shots: Path, root: Path, quality: str, shared: dict) -> tuple[list[Face], list[Problem]]:
+    """The faces of a table or a folder, captures in the batch's folder `root`, and what is wrong with the rows that were left out. `shared` settings lie
+    under each row's own. Raises Problem for a table that cannot be read, or has no usable row."""
+    rows = _rows_of_folder(shots, root) if shots.is_dir() else _rows_of_table(shots)
+    faces, faults, taken = [], [], {}
+    for place, row in rows:
+        try:
+            face = _face(row, shots if shots.is_dir() else shots.parent, root, quality, shared)
+            other = taken.setdefault(face.root.name.casefold(), place)  # some disks do not tell ANNA from Anna
+            if other != place:
+                raise Problem(f"{face.name} is the name of {other}, too.", "Give each face a name of its own in the column name.")
+            faces.append(face)
+        except Problem as problem:
+            faults.append(Problem(f"{place}: {problem.problem}", problem.remedy))
+    if not rows:
+        raise Problem(f"{shots} names no video.", f"A folder holds videos or folders of photographs; a table has a line of headings: {', '.join(HEADINGS)}.")
+    return faces, faults
+
+
+def _rows_of_folder(folder: Path, root: Path) -> list[tuple[str, dict[str, str]]]:
+    """Every video of a folder, and every folder in it that is not the batch's or a capture: photographs of one face."""
+    try:
+        inside = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+    except OSError as error:
+        raise storage_problem(error, folder) from error
+    stems = [path.stem for path in inside]
+    found = []
+    for path in inside:
+        if path.is_dir() and path.absolute() != root and not any((path / name).exists() for name in (NAME, "capture.json")) and any(path.iterdir()):
+            found.append((path.name, {"video": path.name}))
+        elif path.is_file() and path.suffix.lower() in VIDEOS:
+            found.append((path.name, {"video": path.name, "name": path.stem if stems.count(path.stem) == 1 else path.name}))
+    return found
+
+
+def _rows_of_table(table: Path) -> list[tuple[str, dict[str, str]]]:
+    try:
+        with open(table, "rb") as file:
+            content = file.read(MOST_BYTES + 1)
+    except FileNotFoundError:
+        raise Problem(f"There is no table or folder at {table}.", "Check its name.") from None
+    except OSError as error:
+        raise Problem(f"{table} cannot be read ({error.strerror or error}).", "Check the disk and the file's permissions.") from error
+    try:
+        text = content.decode("utf-8-sig")
+        if len(content) > MOST_BYTES or "\0" in text:
+            raise UnicodeError
+    except UnicodeError:
+        raise Problem(f"{table} is no table of text in UTF-8.", "Save it from the spreadsheet as CSV, UTF-8.") from None
+    heading = next((line for line in text.splitlines() if line.strip()), "")
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=max(",;\t", key=heading.count))
+    rows: list[tuple[str, dict[str, str]]] = []
+    names: list[str] | None = None
+    try:
+        for cells in reader:
+            cells = [cell.strip() for cell in cells]
+            if not any(cells):
+                continue
+            if names is None:
+                names = [cell.lower() for cell in cells]
+                _check_headings(table, names)
+            else:
+                rows.append((f"Line {reader.line_num}", dict(zip(names, cells, strict=False)) | {"": "more" if len(cells) > len(names) else ""}))
+    except csv.Error as error:
+        raise Problem(f"{table} cannot be read as a table (line {reader.line_num}: {error}).", "Save it from the spreadsheet as CSV, UTF-8.") from error
+    return rows
+
+
+def _check_headings(table: Path, names: list[str]) -> None:
+    unknown = [name for name in names if name and name not in HEADINGS]
+    if "video" not in names or unknown or any(names.count(name) > 1 for name in names if name):
+        wrong = f"a column {unknown[0]!r} that means nothing" if unknown else "no column video" if "video" not in names else "a column twice"
+        raise Problem(f"{table} has {wrong}.", f"Its first line names the columns: video, and any of {', '.join(HEADINGS[1:])}.")
+
+
+def _face(row: dict[str, str], folder: Path, root: Path, quality: str, shared: dict) -> Face:
+    """One row's face. Raises Problem."""
+    if row.get(""):
+        raise Problem("It has more cells than there are columns.", "A cell that holds the separator is put in quotation marks, as a tone is: \"0.8,0.6,0.5\".")
+    if not row.get("video"):
+        raise Problem("It names no video.", "Name a video or a folder of photographs in the column video.")
+    source = Path(absolute_path(row["video"], folder.absolute()))
+    if not source.exists():
+        raise Problem(f"There is no video or folder at {source}.", "Check its name and whether the disk it is on is connected.")
+    name = row.get("name") or source.stem
+    if not plain_name(name) or not safe_name(name).strip("_-"):
+        raise Problem(f"{name!r} cannot be the name of a folder.", "Use letters, digits, spaces, hyphens and underscores.")
+    values = {stage: dict(own) if isinstance(own, dict) else own for stage, own in shared.items()}
+    if row.get("settings"):
+        for stage, own in read_file(Path(absolute_path(row["settings"], folder.absolute()))).items():
+            values[stage] = {**values.get(stage, {}), **own} if isinstance(own, dict) else own
+    for column, (stage, setting) in COLUMNS.items():
+        if row.get(column):
+            value = absolute_path(row[column], folder.absolute()) if column == "template" else row[column]
+            if column != "template":
+                _check_colour(column, value)
+            values[stage] = {**values.get(stage, {}), setting: value}
+    template = values.get("registration", {}).get("template")
+    if template and not Path(template).exists():
+        raise Problem(f"There is no head mesh at {template}.", "Check its name, or leave the cell empty for the built-in head.")
+    chosen = row.get("quality") or quality
+    known.from_json(values, known.preset(chosen))
+    return Face(name, source, root / f"{name}.wildcap", chosen, values)
+
+
+def _check_colour(column: str, text: str) -> None:
+    """Raises Problem for what is neither auto nor three numbers: the stage that reads it would find out only after minutes."""
+    try:
+        parts = [float(part) for part in text.split(",")] if text != "auto" else [0.5] * 3
+    except ValueError:
+        parts = []
+    if len(parts) != 3 or not all(0 <= part <= (1 if column == "tone" else 1e3) for part in parts):
+        raise Problem(f"The {column} {text!r} is no R,G,B.", "Write three numbers as \"0.8,0.6,0.5\", or auto.")

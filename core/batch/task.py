@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One task of one face, run on this machine by a worker in a process of its own: what every kind of batch comes down to. Standard library only.
+
+Asked for what is done already, it ends well within seconds. The worker ends with the process that asked for it, however that ends.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from ..contract.capture import Capture
+from ..contract.messages import Cancelled, Done, Failed, Log, Message, Problem
+from ..worker.client import Worker
+from ..worker.job import write_job
+from .groups import DELIVER, GROUPS, Group
+from .record import Batch, Face
+from .state import deliver_settings, has_sheet, is_delivered, waits
+
+ROOT = Path(__file__).resolve().parents[2]
+POLL_S = 0.1
+
+
+def run_task(batch: Batch, face: Face, group: Group, hear: Callable[[Message], None] = lambda message: None,
+             cancelled: Callable[[], bool] = lambda: False) -> Message:
+    """Runs a task, sends what its worker says through `hear`, and returns the final message: Done, Cancelled or Failed."""
+    began, capture = time.monotonic(), face.capture
+    try:
+        if waits(batch, face, group):
+            raise Problem(f"The shadow mask of {face.name} waits to be looked at.",
+                          f"Open the batch in Blender, or accept it as it is: `python -m core batch accept {batch.root} {face.name}`.")
+        _wait_for_lease(capture, hear)
+        job = write_job(capture, source=face.source if group is GROUPS[0] else "", last=group.last, settings=face.settings, quality=face.quality)
+        final = _follow(capture, job, hear, cancelled)
+        if group.name == DELIVER and isinstance(final, Done):
+            final = _deliver(batch, face, hear, cancelled)
+    except Problem as problem:
+        return Failed("", problem.problem, problem.remedy)
+    return Done(round(time.monotonic() - began, 2)) if isinstance(final, Done) else final
+
+
+def _wait_for_lease(capture: Capture, hear: Callable[[Message], None]) -> None:
+    """Sees to it that nobody holds the capture: one that is left by a machine that has gone is taken over when its term is out. Raises Problem where
+    somebody works there."""
+    if capture.json.is_file() and capture.lock.exists():
+        with capture.locked(lambda text: hear(Log(text))):
+            pass
+
+
+def _follow(capture: Capture, job: Path, hear: Callable[[Message], None], cancelled: Callable[[], bool]) -> Message:
+    worker = Worker(Path(sys.executable), ROOT, job, capture.logs / "worker.log")
+    worker.start()
+    try:
+        while True:
+            for message in worker.poll():
+                if not worker.running and isinstance(message, Done | Cancelled | Failed):
+                    return message
+                hear(message)
+            if cancelled():
+                worker.cancel()
+            time.sleep(POLL_S)
+    finally:
+        worker.terminate()  # where it was left by an exception
+
+
+def _deliver(batch: Batch, face: Face, hear: Callable[[Message], None], cancelled: Callable[[], bool]) -> Message:
+    """What comes after the last stage: the delivery, and the contact sheet. Raises Problem."""
+    capture, final = face.capture, Done(0.0)
+    if batch.deliver is not None and not is_delivered(batch, face):
+        final = _follow(capture, write_job(capture, tool="deliver", settings=deliver_settings(batch, face)), hear, cancelled)
+        # job.json is what the stages are judged by in `status` and in Blender
+        write_job(capture, last=GROUPS[-1].last, settings=face.settings, quality=face.quality)
+    if isinstance(final, Done) and batch.blender and not has_sheet(capture):
+        final = _render_sheet(batch.blender, capture, hear, cancelled)
+    return final
+
+
+def _render_sheet(blender: str, capture: Capture, hear: Callable[[Message], None], cancelled: Callable[[], bool]) -> Message:
+    """The contact sheet, by a Blender that has the extension. Raises Problem where it cannot be started, or gives none."""
+    hear(Log("Rendering the contact sheet"))
+    capture.logs.mkdir(parents=True, exist_ok=True)
+    log = capture.logs / "contact_sheet.log"
+    with open(log, "wb") as told:
+        try:
+            process = subprocess.Popen([blender, "--command", "wildcap", "contact_sheet", str(capture.root)], stdin=subprocess.DEVNULL, stdout=told,
+                                       stderr=told)
+        except OSError as error:
+            raise Problem(f"Blender could not be started as {blender} ({error.strerror or error}).", "Plan the batch with --blender and its path.") from error
+        try:
+            while process.poll() is None:
+                if cancelled():
+                    return Cancelled(DELIVER)
+                time.sleep(POLL_S)
+        finally:
+            with contextlib.suppress(OSError):
+                process.kill()
+            process.wait()
+    if process.returncode or not has_sheet(capture):
+        raise Problem(f"Blender rendered no contact sheet of {capture.root.stem}.", f"Read {log}; the extension must be installed in that Blender.")
+    return Done(0.0)
+
