@@ -20,17 +20,17 @@ TAGS = SCRIPTS / "modules" / "_bpy_internal" / "extensions" / "tags.py"
 
 # Every file of the zip matches one of these.
 WANTED = (
-    r"__init__\.py", r"blender_manifest\.toml", r"LICENSE", r"README\.md", r"requirements/(worker|perceptual|cuda)\.txt",
+    r"__(init|main)__\.py", r"farm/flamenco/wildcap\.js", r"blender_manifest\.toml", r"LICENSE", r"README\.md", r"requirements/(worker|perceptual|cuda)\.txt",
     r"requirements/locks/([a-z0-9_]+-3\.[0-9]+(-cpu|-cuda)?|pip)\.txt",
     r"wildcap_addon/([a-z_]+/)?[a-z_]+\.py",
-    r"core/README\.md", r"core/[a-z_]+\.py", r"core/(contract|worker|imaging|geometry|face|light)/[a-z0-9_]+\.py",
+    r"core/README\.md", r"core/[a-z_]+\.py", r"core/(batch|contract|worker|imaging|geometry|face|light)/[a-z0-9_]+\.py",
     r"core/(frames|cameras|scan|registration|delight|texture|shadow_mask|solve|transfer|upscale|deliver)/(importers/)?[a-z0-9_]+\.py",
     r"core/weights/[a-z0-9_]+\.(safetensors|json)", r"core/weights/face_nets/([a-z_]+\.tflite|NOTICE\.md|LICENSE\.txt)",
     r"core/assets/([A-Z]+\.md|head\.obj|head\.json|identity\.npz|masks/[a-z_]+\.png)",
     r"core/assets/[a-z_]+\.(png|json|npz|md)", r"core/assets/sample_head/.+\.(obj|png|exr|json)",
     r"core/[a-z_]+/(README\.md|[a-z0-9_]+\.(npz|json))",
 )
-NEEDED = ("__init__.py", "blender_manifest.toml", "LICENSE", "requirements/worker.txt", "requirements/locks/pip.txt",
+NEEDED = ("__init__.py", "__main__.py", "farm/flamenco/wildcap.js", "blender_manifest.toml", "LICENSE", "requirements/worker.txt", "requirements/locks/pip.txt",
           "core/weights/face_nets/face_landmark.tflite", "core/weights/face_nets/NOTICE.md", "wildcap_addon/__init__.py",
           "wildcap_addon/relight/headless.py", "core/contract/settings.py", "core/worker/__main__.py", "core/worker/client.py", "core/solve/__init__.py",
           "core/assets/head.obj")

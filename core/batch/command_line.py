@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import signal
 import sys
 from pathlib import Path
@@ -17,12 +18,12 @@ from ..worker import command_settings
 from ..worker.terminal import Line, show
 from .gate import accept_mask
 from .groups import GROUPS, group_named
-from .lines import list_tasks
+from .lines import list_flamenco_jobs, list_tasks
 from .local import Tally, run_local
 from .record import GATES, NAME, Batch, read_batch, write_batch
 from .shots import HEADINGS, read_faces
 from .state import DONE, STOPPED, WAITING, look
-from .task import run_task
+from .task import ROOT, run_task
 
 
 def add_commands(commands) -> None:
@@ -58,6 +59,8 @@ def add_commands(commands) -> None:
     lines = many.add_parser("commands", help="one line for each task that is left: its name, the task it waits for, and the command")
     lines.add_argument("batch", metavar="BATCH", type=Path)
     lines.add_argument("--python", default=sys.executable, help="the solver's Python on the machines that will run them")
+    lines.add_argument("--wildcap", metavar="FOLDER", default=ROOT, help="WildCap's folder on those machines, the one that holds core")
+    lines.add_argument("--flamenco", action="store_true", help="a line of JSON for each face instead: a job to submit to Flamenco (docs/farm.md)")
     lines.set_defaults(command=_commands)
     task = many.add_parser("task", help="do one task of one face, as a scheduler asks for it")
     task.add_argument("batch", metavar="BATCH", type=Path)
@@ -151,7 +154,10 @@ def _accept(options: argparse.Namespace) -> int:
 
 
 def _commands(options: argparse.Namespace) -> int:
-    for task in list_tasks(read_batch(options.batch), options.python):
+    batch = read_batch(options.batch)
+    for job in list_flamenco_jobs(batch) if options.flamenco else ():
+        print(json.dumps(job))
+    for task in list_tasks(batch, options.python, options.wildcap) if not options.flamenco else ():
         print(task.line())
     return 0
 
