@@ -257,9 +257,10 @@ def _measured(found: dict) -> str:
     disk, command, torch = found["disk_mb"], found["starts"]["command"], found["starts"]["torch"]
     gone = sum(disk[name] for name in SLIMMED)
     return (f"A capture weighs {sum(disk.values()):.0f} MB: {disk['maps_4k']:.0f} MB of maps at 4K, {disk['frames']:.0f} MB of frames, which grow with their "
-            f"number. `core slim` takes {gone:.0f} MB off, for maps stay. What a task reads is counted once, its film with it: a second time the machine may "
-            f"have it in memory. Before its first stage a task starts a command ({command['seconds']:.1f} s, {command['processor_s']:.1f} s of processor) and a "
-            f"worker that loads its libraries (PyTorch {torch['seconds']:.1f} s, {torch['processor_s']:.1f} s of processor: in the stages' times already).")
+            f"number. `core slim` takes {gone:.0f} MB off, for maps stay. What a task reads is counted once, its film with it: a second time the machine "
+            f"may have it in memory. Before its first stage a task starts a command ({command['seconds']:.1f} s, {command['processor_s']:.1f} s of processor) "
+            f"and a worker that loads its libraries (PyTorch {torch['seconds']:.1f} s, {torch['processor_s']:.1f} s of processor: in the stages' times "
+            "already).")
 
 
 def _totals(found: dict) -> list[list]:
