@@ -5,7 +5,6 @@
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 
@@ -49,7 +48,6 @@ def test_the_tables_are_those_of_the_code():
 
 def test_the_loop_for_slurm_submits_and_chains_every_task(tmp_path):
     program, films, batch, log = tiny_chain.build(tmp_path / "pro gram"), tmp_path / "films", tmp_path / "bat ch", tmp_path / "log"
-    shutil.copyfile(ROOT / "__main__.py", program / "__main__.py")
     films.mkdir()
     for name in ("Zoë d'Arc", "Bert"):
         (films / f"{name}.mp4").write_text(name, encoding="utf-8")

@@ -9,7 +9,6 @@ become the worker's values. The Manager itself is not run.
 import json
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 from itertools import pairwise
@@ -127,7 +126,6 @@ def sent(argument: str, values: dict[str, str]) -> str:
 def farm(tmp_path):
     """WildCap over tiny rooms, and videos of two faces on storage that the workers see under another name than the submitter."""
     program, storage = tiny_chain.build(tmp_path / "pro gram"), tmp_path / "st örage"
-    shutil.copyfile(ROOT / "__main__.py", program / "__main__.py")
     (storage / "films").mkdir(parents=True)
     for name in ("Zoë d'Arc", "Anna"):
         (storage / "films" / f"{name}.mp4").write_text(name, encoding="utf-8")

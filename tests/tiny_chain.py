@@ -94,6 +94,7 @@ def build(folder: Path) -> Path:
     for stage in stages.STAGES:
         (core / stage.name).mkdir()
         (core / stage.name / "__init__.py").write_text(ROOM, encoding="utf-8")
+    shutil.copyfile(ROOT / "__main__.py", folder / "__main__.py")
     (core / "solve" / "device.py").write_text(DEVICE, encoding="utf-8")
     return folder
 

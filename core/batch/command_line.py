@@ -19,7 +19,7 @@ from ..worker.terminal import Line, show
 from .gate import accept_mask
 from .groups import GROUPS, group_named
 from .lines import list_flamenco_jobs, list_tasks
-from .local import Tally, run_local
+from .local import CANCELLED, Tally, run_local
 from .record import GATES, NAME, Batch, read_batch, write_batch
 from .shots import HEADINGS, read_faces
 from .state import DONE, STOPPED, WAITING, look
@@ -120,7 +120,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _sum_up(tally: Tally, of: int) -> int:
     counts = [(tally.count(DONE), "done"), (tally.count(WAITING), "waiting for the artist"), (tally.count(STOPPED), "stopped"),
-              (of - len(tally.ended) + tally.count("cancelled"), "not reached")]
+              (of - len(tally.ended) + tally.count(CANCELLED), "not reached")]
     print(f"{of} face{'' if of == 1 else 's'}: " + ", ".join(f"{count} {words}" for count, words in counts if count))
     return 2 if tally.count(STOPPED) else 130 if counts[-1][0] else 0
 

@@ -7,6 +7,8 @@ Who runs a batch holds its lease. BATCH/progress.json is what a panel may show o
 
 from __future__ import annotations
 
+import contextlib
+import os
 import threading
 import time
 from collections.abc import Callable, Iterable
@@ -14,24 +16,25 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 
 from ..contract.files import write_json
-from ..contract.messages import Cancelled, Done, Failed, Message, Progress
+from ..contract.messages import Cancelled, Done, Failed, Message, Problem, Progress
 from ..contract.stages import LABELS
 from .groups import GROUPS, Group
 from .record import Batch, Face
-from .state import DONE, STOPPED, TO_DO, WAITING, look
+from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, State, look
 from .task import run_task
 
 PROGRESS, STOP = "progress.json", "stop"
+CANCELLED = "cancelled"
 EVERY_S = 1.0
 """How often progress.json is written at most."""
 
 
 @dataclass
 class Tally:
-    """How a run went: faces by how they ended, and what every finished task took, for the time that is left."""
+    """How a run went."""
 
-    ended: dict[str, str] = field(default_factory=dict)  # face -> DONE, WAITING, STOPPED or 'cancelled'
-    seconds: list[float] = field(default_factory=list)
+    ended: dict[str, str] = field(default_factory=dict)  # face -> DONE, WAITING, STOPPED or CANCELLED
+    worked: set[str] = field(default_factory=set)  # faces for which a task was run
 
     def count(self, state: str) -> int:
         return sum(ended == state for ended in self.ended.values())
@@ -67,9 +70,9 @@ class Board:
         self.write(now=True)
 
     def left_s(self) -> float | None:
-        """At the pace of the faces that ended in this run."""
-        ended = self.tally.count(DONE) + self.tally.count(WAITING)
-        return (time.monotonic() - self._began) / ended * (self._faces - len(self.tally.ended)) if ended else None
+        """At the pace of the faces that this run had something to do for."""
+        paced = len(self.tally.worked & self.tally.ended.keys())
+        return (time.monotonic() - self._began) / paced * (self._faces - len(self.tally.ended)) if paced else None
 
     def write(self, now: bool = False) -> None:
         """progress.json, once in a while."""
@@ -77,8 +80,9 @@ class Board:
             if not now and time.monotonic() - self._written < EVERY_S:
                 return
             self._written = time.monotonic()
-            write_json(self._batch.root / PROGRESS, {"ended": len(self.tally.ended), "of": self._faces, "left_s": self.left_s(),
-                                                     "working": dict(self._working)})
+            with contextlib.suppress(Problem):  # a full disk keeps nobody from working on a capture that lies elsewhere
+                write_json(self._batch.root / PROGRESS, {"ended": len(self.tally.ended), "of": self._faces, "left_s": self.left_s(),
+                                                         "working": dict(self._working)})
 
 
 def run_local(batch: Batch, faces: Iterable[Face], at_once: int, retry: bool, tell: Callable[[str], None],
@@ -87,10 +91,11 @@ def run_local(batch: Batch, faces: Iterable[Face], at_once: int, retry: bool, te
     The caller holds the batch's lease. Ends early by KeyboardInterrupt or the file `stop`; what was finished is kept."""
     faces = list(faces)
     board, ended, stop = Board(batch, len(faces), tell), threading.Event(), batch.root / STOP
+    threads = max(1, (os.cpu_count() or 1) // at_once) if at_once > 1 else None
     stop.unlink(missing_ok=True)
     board.write(now=True)
     with ThreadPoolExecutor(at_once) as pool:
-        waiting = {pool.submit(run_face, batch, face, board, retry, ended.is_set, until) for face in faces}
+        waiting = {pool.submit(run_face, batch, face, board, retry, ended.is_set, until, threads) for face in faces}
         try:
             while waiting:
                 done, waiting = wait(waiting, timeout=0.3, return_when=FIRST_COMPLETED)
@@ -109,31 +114,32 @@ def run_local(batch: Batch, faces: Iterable[Face], at_once: int, retry: bool, te
     return board.tally
 
 
-def run_face(batch: Batch, face: Face, board: Board, retry: bool, cancelled: Callable[[], bool], until: str | None = None) -> None:
+def run_face(batch: Batch, face: Face, board: Board, retry: bool, cancelled: Callable[[], bool], until: str | None = None,
+             threads: int | None = None) -> None:
     """One face's tasks, one after the other, as far as they go."""
     names = [group.name for group in GROUPS]
     last = names.index(until) if until else len(names) - 1
     while not cancelled():
         state = look(batch, face)
         if state.state == STOPPED and retry and state.group is not None:
-            state, retry = type(state)(TO_DO, state.group), False
+            state, retry = State(TO_DO, state.group), False
         if state.state == DONE or (state.group is not None and names.index(state.group.name) > last and state.state != STOPPED):
             return board.end(face, DONE, "done")
-        if state.state != TO_DO:
+        if state.state not in (TO_DO, WORKING):  # who works there may be a machine that has gone: the task finds out
             return board.end(face, WAITING if state.state == WAITING else STOPPED, state.words())
-        final = _run(batch, face, state.group, board, cancelled)
+        final = _run(batch, face, state.group, board, cancelled, threads)
         if isinstance(final, Failed):
             return board.end(face, STOPPED, f"{state.group.label.lower()} stopped: {final.problem} {final.remedy}")
         if isinstance(final, Cancelled):
             break
-    board.end(face, "cancelled", "cancelled; what was finished is kept")
+    board.end(face, CANCELLED, "cancelled; what was finished is kept")
 
 
-def _run(batch: Batch, face: Face, group: Group, board: Board, cancelled: Callable[[], bool]) -> Message:
+def _run(batch: Batch, face: Face, group: Group, board: Board, cancelled: Callable[[], bool], threads: int | None) -> Message:
     began = time.monotonic()
-    final = run_task(batch, face, group, lambda message: board.hear(face, message), cancelled)
+    board.tally.worked.add(face.name)
+    final = run_task(batch, face, group, lambda message: board.hear(face, message), cancelled, threads)
     if isinstance(final, Done):
-        board.tally.seconds.append(time.monotonic() - began)
         if not is_left(batch, face, group):
             board.say(face, f"{group.label.lower()} done in {time.monotonic() - began:.0f} s")
         else:  # the next look would send it here again, for ever

@@ -13,7 +13,6 @@ import io
 from pathlib import Path
 
 from ..contract import settings as known
-from ..contract.delivery_plan import safe_name
 from ..contract.files import storage_problem
 from ..contract.json_files import plain_name
 from ..contract.messages import Problem
@@ -115,7 +114,7 @@ def _face(row: dict[str, str], folder: Path, root: Path, quality: str, shared: d
     if not source.exists():
         raise Problem(f"There is no video or folder at {source}.", "Check its name and whether the disk it is on is connected.")
     name = row.get("name") or source.stem
-    if not plain_name(name) or not safe_name(name).strip("_-") or name.startswith("-") or not name.isprintable():  # it becomes a word of commands
+    if not plain_name(name) or name.startswith("-") or not name.isprintable():  # it becomes a word of commands, and of lists
         raise Problem(f"{name!r} cannot be the name of a folder.", "Use letters, digits, spaces, hyphens and underscores.")
     values = {stage: dict(own) if isinstance(own, dict) else own for stage, own in shared.items()}
     if row.get("settings"):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..contract import delivery_plan, lease
 from ..contract.capture import Capture
+from ..contract.files import storage_problem
 from ..contract.freshness import FINISHED
 from ..contract.json_files import read_json
 from ..contract.messages import Problem
@@ -55,7 +56,8 @@ def look(batch: Batch, face: Face) -> State:
         if stopped and stopped["stage"] in {stage.name for stage in group.stages}:
             return State(STOPPED, group, stopped["problem"], stopped["remedy"])
         return State(WAITING if waits(batch, face, group) else TO_DO, group)
-    except Problem as problem:
+    except (Problem, OSError) as error:
+        problem = error if isinstance(error, Problem) else storage_problem(error, face.root)
         return State(STOPPED, GROUPS[0], problem.problem, problem.remedy)
 
 
@@ -73,8 +75,11 @@ def is_done(batch: Batch, face: Face, group: Group) -> bool:
 
 
 def deliver_settings(batch: Batch, face: Face) -> dict:
-    """The settings of a face with those of the delivery, as a job has them: with its mesh, which is OBJ where no Blender writes it."""
-    return {**to_json(face.chosen()), "deliver": {"format": "obj", "whole": True, **(batch.deliver or {})}}
+    """The settings of a face with those of the delivery, as a job has them: with its mesh, which is OBJ where no Blender writes it. In a folder that all
+    deliver to each face has one of its own: plain names may be alike where names are not (delivery_plan.safe_name)."""
+    asked = {"format": "obj", "whole": True, **(batch.deliver or {})}
+    folder = {"folder": str(Path(asked["folder"]) / face.name)} if asked.get("folder") else {}
+    return {**to_json(face.chosen()), "deliver": {**asked, **folder}}
 
 
 def is_delivered(batch: Batch, face: Face) -> bool:

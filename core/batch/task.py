@@ -16,7 +16,7 @@ from pathlib import Path
 
 from ..contract.capture import Capture
 from ..contract.messages import Cancelled, Done, Failed, Log, Message, Problem
-from ..worker.client import Worker
+from ..worker.client import THREAD_VARIABLES, Worker
 from ..worker.job import write_job
 from .groups import DELIVER, GROUPS, Group
 from .record import Batch, Face
@@ -27,8 +27,10 @@ POLL_S = 0.1
 
 
 def run_task(batch: Batch, face: Face, group: Group, hear: Callable[[Message], None] = lambda message: None,
-             cancelled: Callable[[], bool] = lambda: False) -> Message:
-    """Runs a task, sends what its worker says through `hear`, and returns the final message: Done, Cancelled or Failed."""
+             cancelled: Callable[[], bool] = lambda: False, threads: int | None = None) -> Message:
+    """Runs a task, sends what its worker says through `hear`, and returns the final message: Done, Cancelled or Failed. `threads`: how many its libraries
+    may start, where other tasks run beside it; None: as many as the worker takes by itself."""
+    environment = {} if threads is None else {name: str(threads) for name in THREAD_VARIABLES}
     began, capture = time.monotonic(), face.capture
     try:
         if waits(batch, face, group):
@@ -36,9 +38,9 @@ def run_task(batch: Batch, face: Face, group: Group, hear: Callable[[Message], N
                           f"Open the batch in Blender, or accept it as it is: `python -m core batch accept {batch.root} {face.name}`.")
         _wait_for_lease(capture, hear)
         job = write_job(capture, source=face.source if group is GROUPS[0] else "", last=group.last, settings=face.settings, quality=face.quality)
-        final = _follow(capture, job, hear, cancelled)
+        final = _follow(capture, job, hear, cancelled, environment)
         if group.name == DELIVER and isinstance(final, Done):
-            final = _deliver(batch, face, hear, cancelled)
+            final = _deliver(batch, face, hear, cancelled, environment)
     except Problem as problem:
         return Failed("", problem.problem, problem.remedy)
     return Done(round(time.monotonic() - began, 2)) if isinstance(final, Done) else final
@@ -52,8 +54,8 @@ def _wait_for_lease(capture: Capture, hear: Callable[[Message], None]) -> None:
             pass
 
 
-def _follow(capture: Capture, job: Path, hear: Callable[[Message], None], cancelled: Callable[[], bool]) -> Message:
-    worker = Worker(Path(sys.executable), ROOT, job, capture.logs / "worker.log")
+def _follow(capture: Capture, job: Path, hear: Callable[[Message], None], cancelled: Callable[[], bool], environment: dict[str, str]) -> Message:
+    worker = Worker(Path(sys.executable), ROOT, job, capture.logs / "worker.log", environment)
     worker.start()
     try:
         while True:
@@ -68,11 +70,11 @@ def _follow(capture: Capture, job: Path, hear: Callable[[Message], None], cancel
         worker.terminate()  # where it was left by an exception
 
 
-def _deliver(batch: Batch, face: Face, hear: Callable[[Message], None], cancelled: Callable[[], bool]) -> Message:
+def _deliver(batch: Batch, face: Face, hear: Callable[[Message], None], cancelled: Callable[[], bool], environment: dict[str, str]) -> Message:
     """What comes after the last stage: the delivery, and the contact sheet. Raises Problem."""
     capture, final = face.capture, Done(0.0)
     if batch.deliver is not None and not is_delivered(batch, face):
-        final = _follow(capture, write_job(capture, tool="deliver", settings=deliver_settings(batch, face)), hear, cancelled)
+        final = _follow(capture, write_job(capture, tool="deliver", settings=deliver_settings(batch, face)), hear, cancelled, environment)
         # job.json is what the stages are judged by in `status` and in Blender
         write_job(capture, last=GROUPS[-1].last, settings=face.settings, quality=face.quality)
     if isinstance(final, Done) and batch.blender and not has_sheet(capture):
