@@ -121,7 +121,7 @@ def test_what_is_no_batch_is_left_alone(folder, capsys):
     (lambda told: {**told, "gate": "door"}, "not a batch record"), (lambda told: {**told, "faces": told["faces"] * 2}, "twice"),
     (lambda told: {**told, "faces": [{**told["faces"][0], "name": "../x"}]}, "not a batch record"),
     (lambda told: {**told, "faces": [{**told["faces"][0], "settings": {"solve": {"steps": "x"}}}]}, "steps"),
-    (lambda told: {**told, "faces": [{"name": "a"}]}, "not a batch record"), (lambda told: {**told, "deliver": 3}, "not a batch record"),
+    (lambda told: {**told, "faces": [{"name": "a"}]}, "not a batch record"), (lambda told: {**told, "deliver": 3}, "the stage deliver are no object"),
     (lambda told: {**told, "faces": [{**told["faces"][0], "source": 3}]}, "not a batch record")])
 def test_a_record_that_is_damaged_is_refused_and_kept(folder, change, said):
     main(["batch", "plan", str(folder), str(folder / "batch")])
