@@ -15,6 +15,7 @@ from ..contract.files import storage_problem
 from ..contract.messages import Cancelled, Failed, Problem
 from ..worker import command_settings
 from ..worker.terminal import Line, show
+from . import slim_command
 from .gate import accept_mask
 from .groups import GROUPS, group_named
 from .lines import list_tasks
@@ -26,7 +27,8 @@ from .task import run_task
 
 
 def add_commands(commands) -> None:
-    """Adds `batch` to the subparsers of `python -m core`."""
+    """Adds `batch` and `slim` to the subparsers of `python -m core`."""
+    slim_command.add_commands(commands)
     many = commands.add_parser("batch", help="many faces: plan them from a table, run them here or on a farm, review them")
     many = many.add_subparsers(required=True, metavar="plan|run|status|retry|accept|review|commands|task")
     plan = many.add_parser("plan", help="make a batch of a table of videos, or of a folder of them; made again, it takes in what is new")
