@@ -21,6 +21,7 @@ from .groups import GROUPS, group_named
 from .lines import list_tasks
 from .local import Tally, run_local
 from .record import GATES, NAME, Batch, read_batch, write_batch
+from .review import list_riskiest, write_review
 from .shots import HEADINGS, read_faces
 from .state import DONE, STOPPED, WAITING, look
 from .task import run_task
@@ -57,6 +58,9 @@ def add_commands(commands) -> None:
     accept.add_argument("batch", metavar="BATCH", type=Path)
     accept.add_argument("names", metavar="NAME", nargs="+")
     accept.set_defaults(command=_accept)
+    review = many.add_parser("review", help="write the page that shows all faces, those to look at first in front")
+    review.add_argument("batch", metavar="BATCH", type=Path)
+    review.set_defaults(command=_review)
     lines = many.add_parser("commands", help="one line for each task that is left: its name, the task it waits for, and the command")
     lines.add_argument("batch", metavar="BATCH", type=Path)
     lines.add_argument("--python", default=sys.executable, help="the solver's Python on the machines that will run them")
@@ -149,6 +153,12 @@ def _accept(options: argparse.Namespace) -> int:
     for face in faces:
         accept_mask(face.capture)
         print(f"{face.name} is solved with its mask next.")
+    return 0
+
+
+def _review(options: argparse.Namespace) -> int:
+    path, rows = write_review(read_batch(options.batch))
+    print(path, *list_riskiest(rows), sep="\n")
     return 0
 
 
