@@ -131,12 +131,14 @@ def test_killed_in_the_middle_nothing_is_lost_and_it_can_be_asked_for_again(root
     assert pictures(capture) == before and states(capture) == {"done"}
 
 
-def test_cancelled_or_failed_while_it_comes_back_it_still_counts_as_slimmed(root, capture):
+def test_cancelled_killed_or_failed_while_it_comes_back_it_still_counts_as_slimmed(root, capture):
     slimming.slim(capture, Settings())
     worker = start(root, capture, {"frames": "slow"}, first="solve", last="solve")
     follow(worker, lambda message: getattr(message, "text", "") == "half written")
     worker.cancel()
     assert isinstance(follow(worker)[-1], Cancelled)
+    assert {"frames/", "delit/"} == set(slimmed.hashes_of(capture.read()))
+    assert isinstance(follow(start(root, capture, {"frames": "die"}, first="solve", last="solve"))[-1], Failed)
     assert {"frames/", "delit/"} == set(slimmed.hashes_of(capture.read()))
     failed = follow(start(root, capture, {"delight": "full"}, first="solve", last="solve"))[-1]
     assert isinstance(failed, Failed) and "disk is full" in failed.problem

@@ -66,8 +66,12 @@ def test_of_a_batch_the_faces_that_are_done_are_slimmed_and_the_others_left_and_
     folder = capture.root.parent
     write_batch(Batch(folder, tuple(Face(name, folder / "film.mp4", folder / f"{name}.wildcap") for name in ("zoë", "new"))))
     said = command(root, "slim", folder)
-    assert "zoë" in said and "2 files" in said and "new" in said and "left: It is not done: head is next." in said and "1 of 2 faces" in said
+    assert "zoë" in said and "2 files" in said and "new" in said and "left, for it is not done: head is next" in said and "1 of 2 faces" in said
     assert len(pictures(capture)) == 2
+    (folder / "film.mp4").rename(folder / "away.mp4")
+    said = command(root, "slim", folder, "--yes")
+    assert "film.mp4 is not there any more" in said and "0 of 2 faces" in said and len(pictures(capture)) == 2
+    (folder / "away.mp4").rename(folder / "film.mp4")
     command(root, "slim", folder, "--yes")
     assert pictures(capture) == {} and "1 done" in command(root, "batch", "status", folder)
 

@@ -15,7 +15,7 @@ from ..contract.messages import Problem
 from ..contract.settings import Settings
 from ..worker import terminal
 from ..worker.job import read_job, write_job
-from .record import NAME, Batch, Face, read_batch
+from .record import NAME, Batch, read_batch
 from .state import DONE, look
 from .task import ROOT
 
@@ -50,8 +50,12 @@ def _slim_batch(batch: Batch, yes: bool) -> int:
     """Each face that is done; the others are left and said."""
     size = count = 0
     for face in batch.faces:
+        state = look(batch, face)
+        if state.state != DONE:
+            print(f"{face.name:20} left, for it is not done: {state.words()}", flush=True)
+            continue
         try:
-            found = _slim_face(batch, face, yes)
+            found = (slimming.slim if yes else slimming.plan)(face.capture, face.chosen())
         except Problem as problem:
             print(f"{face.name:20} left: {problem.problem} {problem.remedy}", flush=True)
             continue
@@ -59,14 +63,6 @@ def _slim_batch(batch: Batch, yes: bool) -> int:
         print(f"{face.name:20} {len(found.going)} files, {megabytes(found.size)}" + "".join(f"; {note}" for note in found.notes), flush=True)
     print(f"{count} of {len(batch.faces)} faces, {megabytes(size)}" + ("" if yes else ". Nothing was removed; --yes does it."))
     return 0
-
-
-def _slim_face(batch: Batch, face: Face, yes: bool) -> slimming.Slimming:
-    """Raises Problem for a face that is not done, beside what slimming itself refuses."""
-    state = look(batch, face)
-    if state.state != DONE:
-        raise Problem(f"It is not done: {state.words()}.", "")
-    return (slimming.slim if yes else slimming.plan)(face.capture, face.chosen())
 
 
 def _undo(captures: list[Capture]) -> int:

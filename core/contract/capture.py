@@ -173,10 +173,10 @@ class Capture:
         source = self.source
         if source is None or not source.exists():
             raise Problem(f"{source or 'The video'} is not there any more, and frames that are slimmed away can be made from it alone.",
-                          f"Connect the disk that it is on, or show where it is now: `python -m core run VIDEO {self.root}`.")
+                          f"Connect the disk that it is on, or choose it where it is now (`python -m core run VIDEO {self.root}`).")
         if not self.made_from(source):
             raise Problem(f"{source} is not the video that this capture was made from: the same frames could not be taken from it.",
-                          f"Show where the right one is: `python -m core run VIDEO {self.root}`.")
+                          f"Choose the right one where it is now (`python -m core run VIDEO {self.root}`).")
         return source
 
     def keep_hashes(self, trees: dict[str, dict]) -> None:
