@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m core: run, batch, deliver, settings, stages, delighters, presets, status, delete, mask, landmarks,
+"""python -m core: run, batch, deliver, settings, stages, delighters, presets, status, delete, slim, mask, landmarks,
 doctor, self-test, install, wheels, report-problem, train.
 
 The command line is one more host of the worker: it writes a job, starts the worker with this same Python and prints
@@ -190,7 +190,7 @@ def _status(options: argparse.Namespace) -> int:
     for stage in stages.STAGES:
         finished, verdict = record["stages"].get(stage.name), capture.verdict(stage, chosen)
         print(f"{stage.name:13} {verdict.state:6}" + (f" {finished['seconds']:8.1f} s  {finished.get('finished', '')}" if finished else "")
-              + (f"  {verdict.reason()}" if verdict.reason() else ""))
+              + (f"  {verdict.reason()}" if verdict.reason() else "") + ("  slimmed away" if (finished or {}).get("slimmed") else ""))
     if capture.shadow_mask.is_file():
         print("shadow mask   painted")
     for finding in report.findings(record):
@@ -244,10 +244,12 @@ def _white(options: argparse.Namespace) -> int:
         raise Problem("--frame and --at go together.", "Name a frame and a pixel of the card in it, or neither to look for a ColorChecker.")
     if options.frame:
         path = capture.frames / options.frame
+        capture.require("frames/")
         if not path.is_file():
             raise Problem(f"There is no frame {path}.", "Name one of the pictures in the capture's frames folder.")
         white = white_point.card_white(read_srgb(path), *options.at, options.card).tolist()
     else:
+        capture.require("frames/")
         report = Reporter("white_point")
         white_point.run(capture, settings.Settings(), report)
         white = report.figures["white_point"]

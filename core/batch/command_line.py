@@ -16,18 +16,21 @@ from ..contract.files import storage_problem
 from ..contract.messages import Cancelled, Failed, Problem
 from ..worker import command_settings
 from ..worker.terminal import Line, show
+from . import slim_command
 from .gate import accept_mask
 from .groups import GROUPS, group_named
 from .lines import list_flamenco_jobs, list_tasks
 from .local import CANCELLED, Tally, run_local
 from .record import GATES, NAME, Batch, read_batch, write_batch
+from .review import list_riskiest, write_review
 from .shots import HEADINGS, read_faces
 from .state import DONE, STOPPED, WAITING, look
 from .task import ROOT, run_task
 
 
 def add_commands(commands) -> None:
-    """Adds `batch` to the subparsers of `python -m core`."""
+    """Adds `batch` and `slim` to the subparsers of `python -m core`."""
+    slim_command.add_commands(commands)
     many = commands.add_parser("batch", help="many faces: plan them from a table, run them here or on a farm, review them")
     many = many.add_subparsers(required=True, metavar="plan|run|status|retry|accept|review|commands|task")
     plan = many.add_parser("plan", help="make a batch of a table of videos, or of a folder of them; made again, it takes in what is new")
@@ -56,6 +59,9 @@ def add_commands(commands) -> None:
     accept.add_argument("batch", metavar="BATCH", type=Path)
     accept.add_argument("names", metavar="NAME", nargs="+")
     accept.set_defaults(command=_accept)
+    review = many.add_parser("review", help="write the page that shows all faces, those to look at first in front")
+    review.add_argument("batch", metavar="BATCH", type=Path)
+    review.set_defaults(command=_review)
     lines = many.add_parser("commands", help="one line for each task that is left: its name, the task it waits for, and the command")
     lines.add_argument("batch", metavar="BATCH", type=Path)
     lines.add_argument("--python", default=sys.executable, help="the solver's Python on the machines that will run them")
@@ -150,6 +156,12 @@ def _accept(options: argparse.Namespace) -> int:
     for face in faces:
         accept_mask(face.capture)
         print(f"{face.name} is solved with its mask next.")
+    return 0
+
+
+def _review(options: argparse.Namespace) -> int:
+    path, rows = write_review(read_batch(options.batch))
+    print(path, *list_riskiest(rows), sep="\n")
     return 0
 
 

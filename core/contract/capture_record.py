@@ -30,7 +30,7 @@ def _is_entry(entry) -> bool:
     if not isinstance(entry, dict) or not is_number(entry.get("seconds"), 0):
         return False
     typed = all(isinstance(entry.get(field, kind()), kind) for field, kind in ENTRY.items())
-    return typed and ("inputs" not in entry or entry.keys() >= SINCE_2) and _are_findings(entry.get("findings", []))
+    return typed and ("inputs" not in entry or entry.keys() >= SINCE_2) and _are_findings(entry.get("findings", [])) and _are_hashes(entry.get("slimmed", {}))
 
 
 def _is_stop(stopped) -> bool:
@@ -42,6 +42,12 @@ def _is_stamp(value) -> bool:
     """Whether it is a source's stamp: [name, size, content hash, or time] of each file."""
     return isinstance(value, list) and all(isinstance(file, list) and len(file) == 3 and plain_name(file[0]) and is_number(file[1], 0)
                                            and (isinstance(file[2], str) or is_number(file[2])) for file in value)
+
+
+def _are_hashes(value) -> bool:
+    """Whether it tells what was slimmed away: name -> content hash, or {file: hash} of a folder."""
+    return isinstance(value, dict) and all(isinstance(tree, str) or isinstance(tree, dict) and all(isinstance(each, str) for each in tree.values())
+                                           for tree in value.values())
 
 
 def _are_findings(value) -> bool:

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from .hashes import hash_tree
 from .settings import Settings
+from .slimmed import hash_artefact
 from .stages import Stage
 
 INDIFFERENT = ("checkpoint_every", "low_memory")
@@ -45,7 +46,7 @@ def matches(root: Path, record: dict, stage: Stage, settings: Settings) -> bool:
         parts.append(hash_tree(Path(named).expanduser()))
         if stage.name == "solve":
             parts += [[name, hash_tree(root / name)] for name in ("own_head.obj", "own_head.json")]
-    parts += [[name, hash_tree(root / name)] for name in made["inputs"]]
+    parts += [[name, hash_artefact(root, record, name)] for name in made["inputs"]]
     parts += made["data"]
     return finished.get("key") == hashlib.blake2b(json.dumps(parts, sort_keys=True).encode(), digest_size=16).hexdigest()
 

@@ -19,6 +19,7 @@ from .code_key import code_key
 from .hashes import hash_source, hash_tree, same_source, sample_file
 from .portable_paths import read_portable
 from .settings import Settings, result_paths, result_settings
+from .slimmed import hash_artefact
 from .stages import Stage
 
 TO_DO, DONE, STALE, OLDER = "to do", "done", "stale", "older"
@@ -49,7 +50,7 @@ def describe_conditions(root: Path, record: dict, stage: Stage, settings: Settin
 
 
 def judge(root: Path, record: dict, stage: Stage, settings: Settings) -> Verdict:
-    """The state of a stage whose outputs are there. `record` is capture.json's content."""
+    """The state of a stage whose outputs are there, or were slimmed away. `record` is capture.json's content."""
     finished = record["stages"].get(stage.name)
     if finished is None:
         return Verdict(TO_DO)
@@ -66,7 +67,7 @@ def judge(root: Path, record: dict, stage: Stage, settings: Settings) -> Verdict
 def _hash_inputs(root: Path, record: dict, stage: Stage, settings: Settings) -> dict:
     """Content hash by name: of the capture's files that the stage reads, of what its settings name elsewhere, and of the source for the first stage."""
     names = (*stage.reads, *stage.wishes, *(("own_head.obj", "own_head.json") if stage.name == "solve" and settings.solve.prior else ()))
-    found = {name: _digest(hash_tree(root / name)) for name in names}
+    found = {name: _digest(hash_artefact(root, record, name)) for name in names}
     found |= {f"{stage.name}.{name}": _digest(hash_tree(Path(path), sample_file)) for name, path in result_paths(getattr(settings, stage.name)).items()}
     if not stage.reads:
         found[SOURCE] = record.get("source_stamp", [])

@@ -15,9 +15,9 @@ from pathlib import Path
 from . import stages
 from .capture import Capture
 from .code_key import code_key
-from .hashes import hash_tree
 from .regular_files import require_regular
 from .settings import Settings, result_settings
+from .slimmed import hash_artefact
 
 FIELD = "conditions"  # of the file's metadata
 
@@ -36,9 +36,9 @@ def obstacle(capture: Capture, settings: Settings) -> str:
 
 def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
     """All that a solve depends on beside its masks: name -> hash."""
-    stage = stages.by_name("solve")
+    stage, record = stages.by_name("solve"), capture.read()
     chosen = [result_settings(settings.solve), settings.seed, settings.compute_device, settings.delight.delighter]
-    files = {name: hash_tree(capture.root / name) for name in (*stage.reads, *stage.wishes) if "mask" not in name}
+    files = {name: hash_artefact(capture.root, record, name) for name in (*stage.reads, *stage.wishes) if "mask" not in name}
     found = {**files, "the solver's settings": chosen, "the solver's code": code_key(stage.module)}
     return {name: hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=8).hexdigest() for name, value in found.items()}
 

@@ -8,7 +8,7 @@ import bpy
 
 from ...core.contract.files import storage_problem
 from ...core.contract.messages import Problem
-from .. import captures
+from .. import bring_back, captures
 from ..base_operator import BaseOperator
 from . import delighters
 
@@ -103,6 +103,8 @@ class WILDCAP_OT_compare_delit(BaseOperator, bpy.types.Operator):
 
     def work(self, context):
         item = captures.require(context)
+        if bring_back.begin(self, item, "frames/", "delit/"):
+            return
         capture = captures.folder(item)
         names = delighters.frames(capture)
         before = delighters.shown(capture)

@@ -6,7 +6,7 @@ import bpy
 
 from ...core.contract import stages
 from ...core.contract.messages import Problem
-from .. import captures, head, jobs
+from .. import bring_back, captures, head, jobs
 from ..base_operator import BaseOperator
 from . import evidence, landmarks
 
@@ -91,7 +91,9 @@ class WILDCAP_OT_bring_in_cameras(BaseOperator, bpy.types.Operator):
         return cls.in_object_mode(context) and cls.with_capture(context)
 
     def work(self, context):
-        evidence.bring_in_cameras(context, captures.require(context), self.every)
+        item = captures.require(context)
+        if not bring_back.begin(self, item, "frames/"):
+            evidence.bring_in_cameras(context, item, self.every)
 
 
 class WILDCAP_OT_bring_in_scan(BaseOperator, bpy.types.Operator):

@@ -8,7 +8,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.contract.messages import Problem
 from ...core.contract.settings import CARDS
-from .. import captures, jobs
+from .. import bring_back, captures, jobs
 from ..base_operator import BaseOperator
 from .eyedropper import colour_at
 
@@ -75,6 +75,8 @@ class WILDCAP_OT_pick_white_point(BaseOperator, bpy.types.Operator):
 
     def work(self, context):
         item = captures.require(context)
+        if bring_back.begin(self, item, "frames/"):
+            return
         path = captures.folder(item).frames / self.frame
         if not self.frame or not path.is_file():
             raise Problem("There is no such frame in this capture.", "Click Reconstruct first: the frames come with it.")

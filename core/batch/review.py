@@ -1,0 +1,239 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""review.html: the faces of a batch on one page, in the order in which somebody should look at them.
+
+First those that stopped, then those that wait for the artist, then all others; within each, the riskiest first. Risk has no threshold, for nobody has measured
+at which residual a face is bad: each measure of a face is the share of the batch's other faces that are better in it, and a face is as risky as its worst
+measure, for one thing gone wrong spoils a head, and a mean of five would hide it; where that is equal, the mean decides. So a face at the top is the first to
+look at, and not by that a bad one.
+
+Pictures are embedded as thumbnails, so the page can be sent to somebody; it loads nothing.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import html
+import os
+import tempfile
+import time
+import urllib.parse
+from dataclasses import dataclass
+from pathlib import Path
+
+from .. import __version__
+from ..contract import report
+from ..contract.capture import Capture
+from ..contract.files import replacing
+from ..contract.messages import Problem
+from .groups import GROUPS
+from .record import Batch, Face
+from .review_page import PAGE, STYLE
+from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, State, look
+
+NAME = "review.html"
+
+
+@dataclass(frozen=True)
+class Measure:
+    """`figure` of `stage` in capture.json; `worse` is 1 where more is riskier, -1 where less is; `note` says what it is."""
+
+    label: str
+    stage: str
+    figure: str
+    unit: str
+    worse: int
+    note: str
+
+
+FINDINGS = "Findings"
+MEASURES = (
+    Measure(FINDINGS, "", "", "", 1, "What the stages found wrong with the film"),
+    Measure("Mask", "shadow_mask", "masked_percent", " %", 1, "Share of the face that the proposed mask covers: there the albedo is guessed from the rest"),
+    Measure("Landmarks", "registration", "landmark_residual_mm", " mm", 1, "How far the fitted head's landmarks lie from those seen in the frames: the median"),
+    Measure("Seen", "texture", "seen_percent", " %", -1, "Share of the head that the frames show with confidence"),
+    Measure("Explained", "solve", "residual_psnr_db", " dB", -1, "How well the solved maps and light give the texture again"),
+)
+PICTURES = (("registration", "registration_*.jpg", "The head over the frames"), ("shadow_mask", "shadow_mask_*.jpg", "As filmed, what was found, the mask"),
+            ("solve", "solve_texture*.jpg", "Texture, albedo, shading"))
+"""Stage, its picture in CAPTURE/report, and what it shows."""
+FIRST_PICTURE = ("frames", "frames_*.jpg", "Frames")
+"""Shown where there is none of the others yet."""
+THUMBNAIL_PX, QUALITY = 160, 80
+"""Height, and JPEG quality: some 40 KB for a face, so 200 faces make a page of about 10 MB."""
+TALLEST_REM = 10
+"""Height on the page at most: as many pixels as a thumbnail has."""
+ORDER = (STOPPED, WAITING)
+HEADINGS = {STOPPED: "Stopped", WAITING: "Waiting for the artist", "": "The others, the riskiest first"}
+STATES = {DONE: "done", TO_DO: "to do", WORKING: "being worked on", WAITING: "waiting", STOPPED: "stopped"}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One face: `values` by a measure's label, `ranks` the share of the others that are better, in [0, 1]; `findings` as `report.findings` gives them."""
+
+    face: Face
+    state: State
+    seconds: float
+    values: dict[str, float]
+    ranks: dict[str, float]
+    findings: list[dict]
+
+    @property
+    def risk(self) -> tuple[float, float]:
+        """Its worst rank, and the mean of all; of a face that nothing is known of, the least."""
+        return (max(self.ranks.values()), sum(self.ranks.values()) / len(self.ranks)) if self.ranks else (0.0, 0.0)
+
+    @property
+    def worst(self) -> str:
+        """The label of the measure that makes it risky; '' where nothing does."""
+        return max(self.ranks, key=self.ranks.__getitem__, default="") if self.risk[0] > 0 else ""
+
+    def words(self) -> str:
+        """That measure in a line: 'mask 43 %, worse than 98 % of the others'."""
+        if not self.worst:
+            return "nothing is worse than in the others"
+        others = "all others" if self.risk[0] == 1 else f"{self.risk[0]:.0%} of the others"
+        return f"{self.worst.lower()} {_shown(self, self.worst)}, worse than {others}"
+
+
+def write_review(batch: Batch) -> tuple[Path, list[Row]]:
+    """Writes BATCH/review.html; its path, and the faces in its order. Raises Problem where it cannot be written."""
+    rows = sort_rows(read_rows(batch))
+    sections = "".join(_section(state, [row for row in rows if row.state.state == state or not state and row.state.state not in ORDER], batch)
+                       for state in (*ORDER, ""))
+    counts = {state: sum(row.state.state == state for row in rows) for state in STATES}
+    page = PAGE.format(title=html.escape(batch.root.name), style=STYLE, sections=sections, version=__version__, written=time.strftime("%Y-%m-%d %H:%M"),
+                       counts="".join(f'<span class="badge {_kind(state)}">{count} {STATES[state]}</span>' for state, count in counts.items() if count),
+                       faces=f"{len(rows)} face{'' if len(rows) == 1 else 's'}", time=_duration(sum(row.seconds for row in rows)))
+    path = batch.root / NAME
+    with replacing(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    return path, rows
+
+
+def read_rows(batch: Batch) -> list[Row]:
+    """What the captures' own records say, in the batch's order; a record that cannot be read says nothing."""
+    told = []
+    for face in batch.faces:
+        record = {"stages": {}}
+        with contextlib.suppress(Problem):
+            record = face.capture.read()
+        stages = record["stages"]
+        found = [finding for finding in report.findings(record) if not finding["stopped"]]
+        values = {measure.label: stages[measure.stage]["figures"].get(measure.figure) for measure in MEASURES if measure.stage in stages}
+        values = {label: value for label, value in values.items() if isinstance(value, int | float) and value == value}  # NaN says nothing
+        told.append(({FINDINGS: len(found), **values} if stages else {}, sum(entry["seconds"] for entry in stages.values()), found))
+    ranks = rank([values for values, _, _ in told])
+    return [Row(face, look(batch, face), seconds, values, own, found)
+            for face, (values, seconds, found), own in zip(batch.faces, told, ranks, strict=True)]
+
+
+def rank(values: list[dict[str, float]]) -> list[dict[str, float]]:
+    """For each face and measure the share of the other faces with that measure that are better, in [0, 1]."""
+    ranks: list[dict[str, float]] = [{} for _ in values]
+    for measure in MEASURES:
+        known = [own[measure.label] * measure.worse for own in values if measure.label in own]
+        for own, found in zip(values, ranks, strict=True):
+            if measure.label in own:
+                found[measure.label] = sum(other < own[measure.label] * measure.worse for other in known) / max(len(known) - 1, 1)
+    return ranks
+
+
+def sort_rows(rows: list[Row]) -> list[Row]:
+    """Stopped, waiting, others; each the riskiest first, and by name where nothing tells them apart."""
+    def key(row: Row) -> tuple:
+        return ORDER.index(row.state.state) if row.state.state in ORDER else len(ORDER), *(-share for share in row.risk), row.face.name
+
+    return sorted(rows, key=key)
+
+
+def _section(state: str, rows: list[Row], batch: Batch) -> str:
+    if not rows:
+        return ""
+    return f"<section><h2>{HEADINGS[state]} <small>{len(rows)}</small></h2>{''.join(_card(row, batch) for row in rows)}</section>"
+
+
+def _card(row: Row, batch: Batch) -> str:
+    state, name = row.state, html.escape(row.face.name)
+    link = _link(row.face.capture.report, batch.root)
+    title = f'<a href="{link}">{name}</a>' if link else name
+    left = [group.label for group in GROUPS[GROUPS.index(state.group):]] if state.group else []
+    words = f"{_duration(row.seconds)} of work" + (f"; still to do: {', '.join(left).lower()}" if left else "") + (f"; on {state.who}" if state.who else "")
+    problem = f'<p class="problem">{html.escape(state.problem)} <b>{html.escape(state.remedy)}</b></p>' if state.state == STOPPED else ""
+    found = "".join(f"<li>{html.escape(finding['problem'])} <b>{html.escape(finding['remedy'])}</b></li>" for finding in row.findings)
+    told = f"<details><summary>{len(row.findings)} finding{'' if len(row.findings) == 1 else 's'}</summary><ul>{found}</ul></details>" if found else ""
+    return (f'<article><div class="told"><h3>{title} <span class="badge {_kind(state.state)}">{STATES[state.state]}</span></h3>'
+            f'<p class="when">{html.escape(words)}</p>{problem}{_bars(row)}{told}</div><div class="seen">{_thumbnails(row.face.capture, link)}</div></article>')
+
+
+def _kind(state: str) -> str:
+    return state.replace(" ", "-")
+
+
+def _bars(row: Row) -> str:
+    """A line for each measure: its value, and a bar as long as the share of the others that are better."""
+    lines = "".join(f'<tr title="{html.escape(measure.note)}"{" class=worst" if measure.label == row.worst else ""}><th>{measure.label}</th>'
+                    f'<td>{_shown(row, measure.label)}</td><td class="bar"><i style="width:{row.ranks[measure.label]:.0%}"></i></td></tr>'
+                    for measure in MEASURES if measure.label in row.values)
+    return f"<table>{lines}</table>" if len(row.values) > 1 else ""
+
+
+def _shown(row: Row, label: str) -> str:
+    return f"{row.values[label]:.4g}{next(measure.unit for measure in MEASURES if measure.label == label)}"
+
+
+def _thumbnails(capture: Capture, link: str) -> str:
+    found = [(stage, path, words) for stage, pattern, words in PICTURES for path in sorted(capture.pictures.glob(pattern))[:1]]
+    renders = [path for path in capture.renders.glob("[!.]*") if path.suffix.lower() in (".jpg", ".jpeg", ".png")]
+    found += [("", path, "Render") for path in sorted(renders, key=lambda path: path.stat().st_mtime)[-1:]]
+    if not found:
+        stage, pattern, words = FIRST_PICTURE
+        found = [(stage, path, words) for path in sorted(capture.pictures.glob(pattern))[:1]]
+    shown = ""
+    for stage, path, words in found:
+        with contextlib.suppress(Problem, OSError):  # a damaged picture is left out
+            content, aspect = shrink(path)
+            picture = (f'<img loading="lazy" alt="{html.escape(capture.root.stem)}: {words}" title="{words}" '
+                       f'src="data:image/jpeg;base64,{base64.b64encode(content).decode("ascii")}">')
+            picture = f'<a href="{link}{f"#{stage}" if stage else ""}">{picture}</a>' if link else picture
+            shown += f'<div style="flex:{aspect:.3f} 1 0;max-width:{aspect * TALLEST_REM:.2f}rem">{picture}</div>'
+    return shown
+
+
+def shrink(path: Path) -> tuple[bytes, float]:
+    """A picture as a JPEG of THUMBNAIL_PX rows, or of fewer where it has no more, and its width by its height. Raises Problem for one that cannot be read."""
+    from ..imaging import images  # needs OpenImageIO
+
+    picture = images.read_srgb(path)
+    height = min(THUMBNAIL_PX, len(picture))
+    with tempfile.TemporaryDirectory(prefix="wildcap_review_") as folder:
+        small = Path(folder) / "small.jpg"
+        images.write_srgb(small, images.resize(picture, max(1, round(picture.shape[1] * height / len(picture))), height), quality=QUALITY)
+        return small.read_bytes(), picture.shape[1] / len(picture)
+
+
+def _link(page: Path, root: Path) -> str:
+    """An address relative to the batch's folder, where the page is there; '' where it is not, or lies on another drive."""
+    if not page.is_file():
+        return ""
+    try:
+        return html.escape(urllib.parse.quote(Path(os.path.relpath(page, root)).as_posix()))
+    except ValueError:
+        return ""
+
+
+def _duration(seconds: float) -> str:
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 100 else f"{minutes / 60:.1f} h"
+
+
+def list_riskiest(rows: list[Row], most: int = 5) -> list[str]:
+    """Lines for the terminal: the first faces of the page, each with why it comes first."""
+    def why(row: Row) -> str:
+        return row.state.words() if row.state.state in ORDER else row.words()
+
+    return [f"{row.face.name:20} {why(row)}" for row in rows[:most]]
+
+

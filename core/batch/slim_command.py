@@ -1,0 +1,80 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""python -m core slim: a finished face, or those of a batch, without what their videos give again. Standard library only."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+from pathlib import Path
+
+from ..contract import settings, slimmed, slimming
+from ..contract.capture import Capture
+from ..contract.deletion import megabytes
+from ..contract.messages import Problem
+from ..contract.settings import Settings
+from ..worker import terminal
+from ..worker.job import read_job, write_job
+from .record import NAME, Batch, read_batch
+from .state import DONE, look
+from .task import ROOT
+
+
+def add_commands(commands) -> None:
+    """Adds `slim` to the subparsers of `python -m core`."""
+    slim = commands.add_parser("slim", help="remove what the video gives again in a minute, of a face that is done, or of a batch's; without --yes, list it")
+    slim.add_argument("folder", metavar="CAPTURE|BATCH", type=Path)
+    what = slim.add_mutually_exclusive_group()
+    what.add_argument("--yes", action="store_true", help="remove it; a stage that needs it later has it made again")
+    what.add_argument("--undo", action="store_true", help="have it made again now")
+    slim.set_defaults(command=_slim)
+
+
+def _slim(options: argparse.Namespace) -> int:
+    """Exit codes as for `run`."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    if (options.folder / NAME).is_file():
+        batch = read_batch(options.folder)
+        return _undo([face.capture for face in batch.faces]) if options.undo else _slim_batch(batch, options.yes)
+    capture = Capture(options.folder)
+    if options.undo:
+        return _undo([capture])
+    found = (slimming.slim if options.yes else slimming.plan)(capture, _chosen(capture))
+    print(*slimming.lines(found, capture), sep="\n")
+    if not options.yes:
+        print("Nothing was removed; --yes does it.")
+    return 0
+
+
+def _slim_batch(batch: Batch, yes: bool) -> int:
+    """Each face that is done; the others are left and said."""
+    size = count = 0
+    for face in batch.faces:
+        state = look(batch, face)
+        if state.state != DONE:
+            print(f"{face.name:20} left, for it is not done: {state.words()}", flush=True)
+            continue
+        try:
+            found = (slimming.slim if yes else slimming.plan)(face.capture, face.chosen())
+        except Problem as problem:
+            print(f"{face.name:20} left: {problem.problem} {problem.remedy}", flush=True)
+            continue
+        size, count = size + found.size, count + bool(found.going)
+        print(f"{face.name:20} {len(found.going)} files, {megabytes(found.size)}" + "".join(f"; {note}" for note in found.notes), flush=True)
+    print(f"{count} of {len(batch.faces)} faces, {megabytes(size)}" + ("" if yes else ". Nothing was removed; --yes does it."))
+    return 0
+
+
+def _undo(captures: list[Capture]) -> int:
+    """Brings back what was slimmed away; ends with the first capture where that fails."""
+    for capture in captures:
+        if not slimmed.hashes_of(capture.read()):
+            print(f"{capture.root.stem}: nothing was slimmed away.")
+        elif code := terminal.follow(ROOT, capture, write_job(capture, tool="bring_back", settings=settings.to_json(_chosen(capture))), {}):
+            return code
+    return 0
+
+
+def _chosen(capture: Capture) -> Settings:
+    """The settings of the capture's last job, by which its stages are judged."""
+    return read_job(capture.job).settings if capture.job.is_file() else Settings()
