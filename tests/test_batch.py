@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Batches over rooms of a few lines: what is done is done once, what fails is told in one line, and the rest goes on."""
 
+import hashlib
 import json
 import os
 import shlex
@@ -10,13 +11,15 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
 from core.batch import gate, lines, local
+from core.batch.known_hashes import known_hashes
 from core.batch.record import read_batch
 from core.batch.state import DONE, STOPPED, TO_DO, WAITING, WORKING, look
-from core.contract import lease
+from core.contract import hashes, lease
 from core.contract.messages import Problem
 
 from . import tiny_batch
@@ -209,3 +212,20 @@ def test_a_progress_file_that_cannot_be_written_keeps_nobody(code, tmp_path):
     batch = make(code, tmp_path, "a")
     (batch.root / local.PROGRESS).mkdir()
     assert core(code, "batch", "run", batch.root).returncode == 0 and states(batch) == {"a": DONE}
+
+
+def test_a_second_look_reads_only_what_has_changed(code, tmp_path, monkeypatch):
+    batch = make(code, tmp_path, "ab")
+    core(code, "batch", "run", batch.root)
+    core(code, "batch", "status", batch.root)
+    read = []
+    monkeypatch.setattr(hashes, "_hash_whole", lambda file, size: read.append(Path(file.name)) or hashlib.file_digest(file, hashes._hasher).hexdigest())
+    monkeypatch.setattr(hashes, "_hashes", {})
+    monkeypatch.setattr(hashes._hash_whole, "__name__", "_hash_whole")
+    (batch.faces[0].capture.texture).write_text("edited")
+    with known_hashes(batch.root):
+        assert states(batch) == {"a": TO_DO, "b": DONE}
+    assert [path for path in read if path.is_relative_to(batch.root)] == [batch.faces[0].capture.texture]
+    for damaged in ("{", "[1]", '[["_hash_whole", "x", 1, 2, 3]]', '{"a": 1}'):
+        (batch.root / "hashes.json").write_text(damaged)
+        assert core(code, "batch", "status", batch.root).stdout.splitlines()[-1] == "1 to do, 1 done"

@@ -19,6 +19,7 @@ from ..worker.terminal import Line, show
 from . import slim_command
 from .gate import accept_mask
 from .groups import GROUPS, group_named
+from .known_hashes import known_hashes
 from .lines import list_flamenco_jobs, list_tasks
 from .local import CANCELLED, Tally, run_local
 from .record import GATES, NAME, Batch, read_batch, write_batch
@@ -114,7 +115,7 @@ def _run(options: argparse.Namespace) -> int:
         raise Problem("--at-once is less than one.", "Leave it out, or give the number of faces at the same time.")
     if options.address and options.on != "ray":
         raise Problem("--address goes with --on ray only.", "Add --on ray, or leave --address out.")
-    with lease.hold(batch.root, _tell, "batch"):
+    with lease.hold(batch.root, _tell, "batch"), known_hashes(batch.root):
         if options.on == "ray":
             from .ray_cluster import run_on_ray
 
@@ -138,10 +139,11 @@ def _tell(text: str) -> None:
 def _status(options: argparse.Namespace) -> int:
     batch = read_batch(options.batch)
     counts: dict[str, int] = {}
-    for face in batch.faces:
-        state = look(batch, face)
-        counts[state.state] = counts.get(state.state, 0) + 1
-        print(f"{face.name:20} {state.words()}", flush=True)
+    with known_hashes(batch.root):
+        for face in batch.faces:
+            state = look(batch, face)
+            counts[state.state] = counts.get(state.state, 0) + 1
+            print(f"{face.name:20} {state.words()}", flush=True)
     print(", ".join(f"{count} {state}" for state, count in counts.items()))
     with contextlib.suppress(Problem):
         holder = lease.holder(batch.root / "lock")
@@ -160,17 +162,19 @@ def _accept(options: argparse.Namespace) -> int:
 
 
 def _review(options: argparse.Namespace) -> int:
-    path, rows = write_review(read_batch(options.batch))
+    batch = read_batch(options.batch)
+    with known_hashes(batch.root):
+        path, rows = write_review(batch)
     print(path, *list_riskiest(rows), sep="\n")
     return 0
 
 
 def _commands(options: argparse.Namespace) -> int:
     batch = read_batch(options.batch)
-    for job in list_flamenco_jobs(batch) if options.flamenco else ():
-        print(json.dumps(job))
-    for task in list_tasks(batch, options.python, options.wildcap) if not options.flamenco else ():
-        print(task.line())
+    with known_hashes(batch.root):
+        found = list_flamenco_jobs(batch) if options.flamenco else list_tasks(batch, options.python, options.wildcap)
+    for each in found:
+        print(json.dumps(each) if options.flamenco else each.line())
     return 0
 
 

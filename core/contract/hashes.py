@@ -8,6 +8,7 @@ Standard library only.
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
@@ -68,6 +69,21 @@ def same_source(recorded: list, present: list) -> bool:
 
     hashed = all(isinstance(digest, str) for _, _, digest in (*recorded, *present))
     return told(recorded) == told(present)
+
+
+def tell_known(root: Path) -> list:
+    """What this process knows of the files below a folder: [[kind, path in the folder, size, time in nanoseconds, hash]], for `take_known` of another one."""
+    inside = str(root) + os.sep
+    return [[kind, path.removeprefix(inside), size, when, digest] for (kind, path, size, when), digest in _hashes.items() if path.startswith(inside)]
+
+
+def take_known(root: Path, known: list) -> None:
+    """Takes in what `tell_known` told. Raises ValueError or TypeError for what it did not tell."""
+    told = [((kind, os.path.join(root, path), size, when), digest) for kind, path, size, when, digest in known]
+    if not all(isinstance(digest, str) for _, digest in told):
+        raise ValueError("a hash is no text")
+    for key, digest in told:
+        _hashes.setdefault(key, digest)
 
 
 def _remember(path: Path, digest: Callable[[BinaryIO, int], str]) -> str:
