@@ -161,6 +161,18 @@ def values(item: WILDCAP_PG_capture) -> dict:
     return {**found, "seed": item.seed, "device": device(item)}
 
 
+def take(item: WILDCAP_PG_capture, quality: str, chosen: core_settings.Settings) -> None:
+    """Has the fields say what a job of that quality with these settings would be told."""
+    item.quality = quality
+    for stage, kind in STAGE_KINDS.items():
+        for f in fields(kind):
+            setattr(getattr(item, stage), f.name, getattr(getattr(chosen, stage), f.name))
+    item.use_skin_tone = chosen.solve.skin_tone != "auto"
+    if item.use_skin_tone:
+        item.skin_tone = [float(part) for part in chosen.solve.skin_tone.split(",")]
+    item.seed, item.device = chosen.seed, chosen.device
+
+
 def _value(group, field):
     value = getattr(group, field.name)
     return absolute_path(bpy.path.abspath(value)) if "path" in field.metadata else value
