@@ -76,3 +76,11 @@ def ended(addon, **counts: int) -> None:
 def seen(module) -> bool:
     """Whether each face was looked at."""
     return module.view().batch is not None and len(module.view().states) == len(module.view().batch.faces)
+
+
+def alive(pid: int) -> bool:
+    """Whether the process runs; one that nobody has asked after yet has ended all the same."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][0] != "Z"
+    except (ProcessLookupError, FileNotFoundError):
+        return False

@@ -153,7 +153,7 @@ def batches(addon, monkeypatch, tmp_path):
         batch_faces.wait(addon, lambda: not running.running() or running.cancel())
         module.close()
     addon("paint.session").forget()
-    preferences.python = ""
+    addon("preferences").get().python = ""  # looked up again: where the add-on was disabled meanwhile, those of before are gone
 
 
 @pytest.fixture(scope="session")

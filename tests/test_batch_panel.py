@@ -26,13 +26,6 @@ def open_captures(*captures: Capture) -> None:
         bpy.ops.wildcap.open_capture(directory=str(capture.root))
 
 
-def alive(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][0] != "Z"
-    except (ProcessLookupError, FileNotFoundError):
-        return False
-
-
 def test_a_batch_goes_on_without_blender_is_found_again_and_stops_within_two_seconds(addon, batches, wildcap, tmp_path):
     import addon_utils
 
@@ -65,14 +58,14 @@ def test_a_batch_goes_on_without_blender_is_found_again_and_stops_within_two_sec
     addon_utils.disable(wildcap, default_set=True)
     addon_utils.enable(wildcap, default_set=True)
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert alive(pid) and addon("batches").current() is None
+    assert batch_faces.alive(pid) and addon("batches").current() is None
     preferences = addon("preferences").get()
     preferences.python, preferences.captures = sys.executable, kept
     batch_faces.wait(addon, lambda: addon("batches").current() == folder and "anna" in batches.line(batches.view()))
     other = batch_faces.planned(tmp_path / "other", batch_faces.filmed(tmp_path / "other", "cleo"))
     began = time.monotonic()
     bpy.ops.wildcap.cancel_batch()
-    batch_faces.wait(addon, lambda: not addon("batch.running").running() and not alive(pid))
+    batch_faces.wait(addon, lambda: not addon("batch.running").running() and not batch_faces.alive(pid))
     assert time.monotonic() - began < 2.5
     assert first.read()["stages"].keys() == {"frames"} and not second.read()["stages"]
     refuses("No batch is running", bpy.ops.wildcap.cancel_batch)

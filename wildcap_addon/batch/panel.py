@@ -14,7 +14,7 @@ from . import running
 
 class WILDCAP_PT_batch(WildcapPanel, bpy.types.Panel):
     bl_label = "Batch"
-    bl_order = 3
+    bl_order = 0  # above the brush: an artist goes from mask to mask
     bl_parent_id = "WILDCAP_PT_main"
 
     @classmethod
