@@ -106,9 +106,13 @@ def test_a_folder_that_goes_away_while_it_is_looked_at(addon, batches, monkeypat
     folder = batch_faces.planned(tmp_path / "batch", batch_faces.filmed(tmp_path / "batch", "anna"))
     monkeypatch.setattr(batches.state, "look", lambda *_: (_ for _ in ()).throw(OSError(5, "Input/output error")))
     bpy.ops.wildcap.open_batch(directory=str(folder))
+    batch_faces.wait(addon, lambda: batches.view().count(state.STOPPED) == 1)
+    assert "anna.wildcap cannot be read (Input/output error)" in batches.view().states["anna"].problem
+    monkeypatch.setattr(batches.state, "look", lambda *_: 1 / 0)
     batch_faces.wait(addon, lambda: batches.view().problem is not None)
-    assert "cannot be read (Input/output error)" in batches.view().problem.problem
+    assert "ZeroDivisionError" in str(batches.view().problem)
     monkeypatch.undo()
+    batch_faces.wait(addon, lambda: batches.view().count(state.TO_DO) == 1)
     (folder / "lock").write_text(json.dumps({"host": f"{socket.gethostname()}", "pid": os.getpid(), "since": "now"}))
     (folder / "progress.json").write_text('{"ended": 1, "of": 2, "left_s": "soon", "working": {}}')
     batch_faces.wait(addon, lambda: batches.view().runner == socket.gethostname())

@@ -7,9 +7,12 @@ what it saw. Panels only read that. Which batch it is, the extension's user fold
 """
 
 import contextlib
+import os
 import threading
+import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import bpy
@@ -19,14 +22,17 @@ from ..core.batch import gate, local, state
 from ..core.batch.groups import GATE, group_named
 from ..core.batch.record import NAME, Batch, Face, read_batch
 from ..core.batch.state import DONE, STOPPED, TO_DO, WAITING, WORKING, State
-from ..core.contract import lease
+from ..core.contract import lease, unforeseen
 from ..core.contract.files import write_json
 from ..core.contract.json_files import is_number, read_json
 from ..core.contract.messages import Problem
 from . import captures, extension
 
 EVERY_S = 0.5
-"""Between two looks."""
+"""Between two looks at who runs the batch, and how far that is."""
+REST, LONGEST_REST_S = 10, 5.0
+"""A look at all faces is followed by a rest of so many times its length: Python runs one thread at a time, and Blender's own is to be held up by a tenth at
+most. In the longest rest an artist would begin to wonder."""
 MOST = 10
 """Batches that are remembered."""
 ICONS = {DONE: 'CHECKMARK', TO_DO: 'RADIOBUT_OFF', WORKING: 'PLAY', WAITING: 'BRUSH_DATA', STOPPED: 'ERROR'}
@@ -46,9 +52,13 @@ class View:
     def count(self, which: str) -> int:
         return sum(each.state == which for each in self.states.values())
 
+    @cached_property
+    def _faces(self) -> dict[str, Face]:
+        return {str(face.root): face for face in self.batch.faces} if self.batch else {}
+
     def face(self, root: str) -> Face | None:
         """The face whose capture lies in that folder."""
-        return next((face for face in self.batch.faces if str(face.root) == root), None) if self.batch else None
+        return self._faces.get(root)
 
 
 class _Watch(threading.Thread):
@@ -58,7 +68,9 @@ class _Watch(threading.Thread):
         super().__init__(name="wildcap-batch", daemon=True)
         self.root, self._memory = root, memory
         self.view, self.found, self.listed = View(), None, frozenset()
+        self._read: tuple[int, Batch | None] = 0, None  # when the record was changed that was read last, and what it said
         self._stamps: dict[str, tuple] = {}  # face -> what its state was derived from
+        self._due = 0.0  # when all faces are looked at again (time.monotonic)
         self._searched: tuple = ()
         self._ended = threading.Event()
         self.start()
@@ -72,31 +84,41 @@ class _Watch(threading.Thread):
                 if self.root is None:
                     self._search()
                 else:
-                    self._look()
+                    self._look_at(self._read_batch())
             except Problem as problem:
                 self.view = View(problem=problem)
-            except OSError as error:
-                self.view = View(problem=Problem(f"The batch {self.root} cannot be read ({error.strerror or error}).", "It is looked at again in a second."))
+            except Exception as error:  # nobody is above a thread
+                self.view = View(problem=unforeseen.explain(error, "looking at the batch"))
             self._ended.wait(EVERY_S)
 
-    def _look(self) -> None:
-        batch = read_batch(self.root)
+    def _read_batch(self) -> Batch:
+        changed = _changed(self.root / NAME)
+        if self._read[1] is None or self._read[0] != changed:
+            self._read = changed, read_batch(self.root)
+            self._stamps.clear()  # each is asked anew: other settings may have been asked for
+            self._due = 0.0
+        return self._read[1]
+
+    def _look_at(self, batch: Batch) -> None:
         self._tell(batch)
+        began = time.monotonic()
+        if began < self._due:
+            return
         for face in batch.faces:
             if self._ended.is_set():
                 return
             stamp = _stamp(face)
             if stamp[0] or self._stamps.get(face.name) != stamp or face.name not in self.view.states:  # who holds a lock may have ended
-                self.view = replace(self.view, states={**self.view.states, face.name: state.look(batch, face)})
-                self._stamps[face.name] = stamp
+                found = _ask(batch, face)
+                self.view = replace(self.view, states={**self.view.states, face.name: found})
+                self._stamps[face.name] = () if found.state == STOPPED and found.group is None else stamp
                 self._tell(batch)
+        self._due = time.monotonic() + min(LONGEST_REST_S, REST * (time.monotonic() - began))
 
     def _tell(self, batch: Batch) -> None:
         """Who runs it and how far that is, also while a face takes long to look at."""
         runner, names = _runner(batch.root), {face.name for face in batch.faces}
         states = {name: each for name, each in self.view.states.items() if name in names}
-        if self.view.batch is not None and self.view.batch != batch:  # planned again: each is asked anew
-            self._stamps.clear()
         self.view = View(batch, states, runner, _read_progress(batch.root) if runner else {})
 
     def _search(self) -> None:
@@ -212,7 +234,15 @@ def _stamp(face: Face) -> tuple:
     capture = face.capture
     watched = (capture.json, capture.root / gate.NAME, capture.shadow_mask_auto, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved,
                capture.renders / state.SHEET)
-    return (capture.lock.exists(), *(_changed(path) for path in watched))
+    return (os.path.lexists(capture.lock), *(_changed(path) for path in watched))
+
+
+def _ask(batch: Batch, face: Face) -> State:
+    """Where a face is; without a group where its folder does not answer, or changes under the look."""
+    try:
+        return state.look(batch, face)
+    except OSError as error:
+        return State(STOPPED, None, f"The capture folder {face.root} cannot be read ({error.strerror or error}).", "See that its disk or server is connected.")
 
 
 def _changed(path: Path) -> int:
