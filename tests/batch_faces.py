@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from core.batch import record
-from core.contract import stages
+from core.contract import processes, stages
 from core.contract.capture import Capture
 from core.contract.settings import Settings
 
@@ -79,8 +79,5 @@ def seen(module) -> bool:
 
 
 def alive(pid: int) -> bool:
-    """Whether the process runs; one that nobody has asked after yet has ended all the same."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][0] != "Z"
-    except (ProcessLookupError, FileNotFoundError):
-        return False
+    """Whether the process runs; on Linux, one that nobody has asked after yet has ended all the same."""
+    return not processes.is_gone({"host": processes.name_host(), "pid": pid})

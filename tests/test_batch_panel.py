@@ -52,7 +52,9 @@ def test_a_batch_goes_on_without_blender_is_found_again_and_stops_within_two_sec
     assert bpy.ops.wildcap.reconstruct.poll(), "one that waits in line may be worked on by hand"
     refuses("one of a batch that is running", bpy.ops.wildcap.delete_face)
     pid = json.loads((folder / "lock").read_text())["pid"]
-    assert pid != os.getpid() and os.getpriority(os.PRIO_PROCESS, pid) >= 10 and os.getsid(pid) == pid
+    assert pid != os.getpid()
+    if os.name == "posix":
+        assert os.getpriority(os.PRIO_PROCESS, pid) >= 10 and os.getsid(pid) == pid
     preferences = addon("preferences").get()
     kept = preferences.captures
     addon_utils.disable(wildcap, default_set=True)
@@ -65,7 +67,7 @@ def test_a_batch_goes_on_without_blender_is_found_again_and_stops_within_two_sec
     other = batch_faces.planned(tmp_path / "other", batch_faces.filmed(tmp_path / "other", "cleo"))
     began = time.monotonic()
     bpy.ops.wildcap.cancel_batch()
-    batch_faces.wait(addon, lambda: not addon("batch.running").running() and not batch_faces.alive(pid))
+    batch_faces.wait(addon, lambda: not addon("batch.running").running() and not (folder / "lock").exists())
     assert time.monotonic() - began < 2.5
     assert first.read()["stages"].keys() == {"frames"} and not second.read()["stages"]
     refuses("No batch is running", bpy.ops.wildcap.cancel_batch)
@@ -170,7 +172,7 @@ def test_why_a_batch_cannot_be_started(addon, batches, monkeypatch, tmp_path):
     batch_faces.wait(addon, lambda: "anna" in batches.line(batches.view()))
     os.kill(json.loads((folder / "lock").read_text())["pid"], 9)
     batch_faces.wait(addon, lambda: not running.running())
-    assert "ended unexpectedly (exit code -9)" in addon("problems").of("").problem
+    assert "ended unexpectedly (exit code" in addon("problems").of("").problem
     (folder / "stop").mkdir()
     monkeypatch.setattr(running, "running", lambda: True)
     monkeypatch.setattr(Path, "touch", lambda self: (_ for _ in ()).throw(OSError(30, "Read-only file system")))
