@@ -138,6 +138,24 @@ def capture(tmp_path, wildcap):
     return root
 
 
+@pytest.fixture
+def batches(addon, monkeypatch, tmp_path):
+    """The add-on's view of batches, over a chain of tiny rooms; no batch of a test is left running, or known to the next one."""
+    from . import batch_faces, tiny_chain
+
+    module, running = addon("batches"), addon("batch.running")
+    monkeypatch.setattr(addon("jobs"), "ROOT", tiny_chain.build(tmp_path / "code"))
+    addon("problems").clear("")
+    preferences = addon("preferences").get()
+    preferences.python, preferences.captures = sys.executable, str(tmp_path / "captures")
+    yield module
+    while module.current() is not None:
+        batch_faces.wait(addon, lambda: not running.running() or running.cancel())
+        module.close()
+    addon("paint.session").forget()
+    addon("preferences").get().python = ""  # looked up again: where the add-on was disabled meanwhile, those of before are gone
+
+
 @pytest.fixture(scope="session")
 def ict_fitted(tmp_path_factory):
     """ICT-FaceKit's head laid over a built-in head of one person: the capture that holds it, and what was reported. Two tests look at it."""

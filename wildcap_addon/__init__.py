@@ -7,6 +7,8 @@ Rooms, in the order in which they register; each has `register` and `unregister`
 
 from . import (
     acting,
+    batch,
+    batches,
     capture,
     deliver,
     frame_icons,
@@ -27,7 +29,7 @@ from . import (
 )
 
 ROOMS = (frame_icons, preferences, properties, panel, setup, capture, reconstruct, paint, solve, relight, make, acting, deliver, links, status, timings, jobs,
-         terminal)
+         batches, batch, terminal)
 
 
 

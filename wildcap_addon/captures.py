@@ -11,6 +11,8 @@ from ..core.contract.messages import Problem
 
 HEAD_KEY = "wildcap_capture"
 """Custom property of a head object: its capture's folder."""
+ASIDE_KEY = "wildcap_aside"
+"""Custom property of a head that has made room for another one, until its row is clicked."""
 
 
 def active(context) -> bpy.types.PropertyGroup | None:
@@ -66,12 +68,26 @@ def choose(context) -> None:
     item, objects = props.captures[props.active_index], context.view_layer.objects
     wanted = head(context, item)
     if wanted is not None and wanted.name in objects:
+        show_again(wanted)
         for thing in objects:
             if thing == wanted or HEAD_KEY in thing:
                 thing.select_set(thing == wanted)
         objects.active = wanted
     elif objects.active is not None and objects.active.get(HEAD_KEY) not in (None, item.path):
         objects.active = None
+
+
+def put_aside(obj: bpy.types.Object) -> None:
+    """Hides a head; one that is hidden is the artist's own doing."""
+    if not obj.hide_get():
+        obj.hide_set(True)
+        obj[ASIDE_KEY] = True
+
+
+def show_again(obj: bpy.types.Object) -> None:
+    """Shows a head that was put aside."""
+    if obj.pop(ASIDE_KEY, None):
+        obj.hide_set(False)
 
 
 def head(context, item) -> bpy.types.Object | None:

@@ -21,7 +21,7 @@ from ..core.contract.settings import Settings
 from ..core.worker.background import Task
 from ..core.worker.client import Worker
 from ..core.worker.job import read_job, write_job
-from . import captures, preferences, problems, properties, status, timings
+from . import batches, captures, preferences, problems, properties, status, timings
 
 INTERVAL_S = 0.2
 ROOT = Path(__file__).resolve().parent.parent  # the folder that holds core/, where the worker starts; nothing is written there
@@ -74,9 +74,11 @@ def elsewhere(root: str) -> list[tuple[str, Job]]:
 
 
 def can_start(operator, context) -> bool:
-    """Whether there is a capture that no job works on; says in the tooltip of a greyed-out button why not."""
-    return operator.with_capture(context) and operator.allowed(of(captures.root(captures.active(context))) is None,
-                                                               "This capture is being worked on: wait for it, or click Cancel")
+    """Whether there is a capture that no job and no batch works on; says in the tooltip of a greyed-out button why not."""
+    root = captures.root(captures.active(context))
+    return (operator.with_capture(context)
+            and operator.allowed(of(root) is None, "This capture is being worked on: wait for it, or click Cancel")
+            and operator.allowed(not batches.works_on(root), "This capture is being worked on by a batch or another Blender: wait for it, or cancel it there"))
 
 
 def start(item, goal: str, *, first: str | None = None, last: str | None = None, tool: str = "", then: Callable[[], None] | None = None,
@@ -87,9 +89,7 @@ def start(item, goal: str, *, first: str | None = None, last: str | None = None,
     capture, root = at or captures.folder(item), captures.root(item)
     if root in _jobs:
         raise Problem("This capture is being worked on already.", "Wait for it, or click Cancel.")
-    python = preferences.python()
-    if python is None:
-        raise Problem("The solver is not set up on this machine.", "Click Install Solver in the Setup panel, or Use an Existing Python.")
+    python = preferences.require_python()
     for prepare in before_start:
         prepare()
     path = write_job(capture, first=first, last=last, tool=tool, settings={**properties.values(item), **shared})
@@ -206,7 +206,7 @@ def _tick() -> float | None:
         status.redraw()
     ended = bool(before - set(_jobs))
     if ended or _wanted():
-        _bring_in_results(ended)
+        bring_in_results(ended)
     return INTERVAL_S if running or _wanted() else None
 
 
@@ -220,7 +220,7 @@ def _shown() -> list[tuple]:
     return [(root, job.waiting, job.progress, job.previews) for root, job in _jobs.items()]
 
 
-def _bring_in_results(ended: bool) -> None:
+def bring_in_results(ended: bool) -> None:
     """What is new comes in at once if the artist is in Object Mode and not in the middle of a move: a new head when a job has ended, and what rooms do with
     results. Otherwise it waits."""
     window = next(iter(bpy.context.window_manager.windows), None)

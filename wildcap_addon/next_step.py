@@ -21,7 +21,7 @@ class Facts:
 
     has_capture: bool = False
     has_python: bool = False
-    running: str = ""  # what the capture's job is doing: '', 'reconstruct', 'solve', 'install', 'test' or 'ask'
+    running: str = ""  # what the capture's job is doing, a word of WORDS; '' for nothing
     painting: bool = False
     head_time: float = -1.0  # modification time of the head.obj that is in the scene; -1: none
     maps_time: float = -1.0  # of the maps that the material shows; -1: none assembled
@@ -45,7 +45,8 @@ ASK = Step("SwitchLight waits for your consent. Nothing was sent.", "Allow Sendi
 MAKE = ("Make My Head", "wildcap.make_my_head", 'USER')
 WORDS = {"make": "Making your head ...", "reconstruct": "Reconstructing ...", "solve": "Solving ...",
          "tool": "Looking at the texture ...", "deliver": "Writing the maps ...", "wait": "Waiting for the job of another face ...",
-         "install": "Installing the solver ...", "ask": "One moment ...", "test": "Testing the solver ..."}
+         "install": "Installing the solver ...", "ask": "One moment ...", "test": "Testing the solver ...",
+         "batch": "A batch or another Blender is working on this face ..."}
 
 
 def next_step(facts: Facts, translated: Callable[[str], str] = str) -> Step:
@@ -53,6 +54,8 @@ def next_step(facts: Facts, translated: Callable[[str], str] = str) -> Step:
     are put into; all others are translated as they are shown."""
     if facts.painting:
         return Step("Red is shadow, green is protected. Paint adds, Ctrl takes away.", "Save Mask and Leave", "wildcap.finish_mask", 'CHECKMARK')
+    if facts.running == "batch":
+        return Step(WORDS["batch"], "Cancel Batch", "wildcap.cancel_batch", 'CANCEL')
     if facts.running:
         return Step(WORDS[facts.running], "Cancel", "wildcap.cancel", 'CANCEL')
     if not facts.has_capture:

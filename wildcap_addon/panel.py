@@ -8,7 +8,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.contract import stages
-from . import captures, jobs, next_step, preferences, problems, status
+from . import batches, captures, jobs, next_step, preferences, problems, status
 from .base_panel import WildcapPanel, region_width
 from .paint import session
 
@@ -119,10 +119,17 @@ def gather(context, item) -> next_step.Facts:
     head = captures.head(context, item)
     job = jobs.of(captures.root(item)) or jobs.of("")
     return next_step.Facts(
-        has_capture=True, has_python=preferences.python() is not None, running=("wait" if job.waiting else job.goal) if job else "", painting=session.active(),
+        has_capture=True, has_python=preferences.python() is not None, running=_running(job, captures.root(item)), painting=session.active(),
         head_time=head.get("wildcap_head_time", 0.0) if head else -1.0, maps_time=head.get("wildcap_maps_time", -1.0) if head else -1.0,
         status=status.of(item),
     )
+
+
+def _running(job: jobs.Job | None, root: str) -> str:
+    """What is being done with a capture, as a word of next_step.WORDS; '' for nothing."""
+    if job is None:
+        return "batch" if batches.works_on(root) else ""
+    return "wait" if job.waiting else job.goal
 
 
 def draw_job(layout, job: jobs.Job, cancel: str = "") -> None:

@@ -140,6 +140,14 @@ def python() -> Path | None:
     return Path(path) if path and path not in _aside and Path(path).is_file() else None
 
 
+def require_python() -> Path:
+    """As `python`. Raises Problem where there is none."""
+    path = python()
+    if path is None:
+        raise Problem("The solver is not set up on this machine.", "Click Install Solver in the Setup panel, or Use an Existing Python.")
+    return path
+
+
 def set_aside(path: Path) -> None:
     """Takes a Python that does not answer for none, until it is chosen or installed again."""
     _aside.add(str(path))

@@ -157,8 +157,36 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
 def values(item: WILDCAP_PG_capture) -> dict:
     """The settings of a capture as a job file holds them: stage -> {name: value}, seed, device. Paths are absolute."""
     found = {stage: {f.name: _value(getattr(item, stage), f) for f in fields(kind)} for stage, kind in STAGE_KINDS.items()}
-    found["solve"]["skin_tone"] = ",".join(f"{c:.4f}" for c in item.skin_tone) if item.use_skin_tone else "auto"
+    found["solve"]["skin_tone"] = _tone(item) if item.use_skin_tone else "auto"
     return {**found, "seed": item.seed, "device": device(item)}
+
+
+def take(item: WILDCAP_PG_capture, quality: str, chosen: core_settings.Settings) -> None:
+    """Has the fields say what a job of that quality with these settings would be told."""
+    item.quality = quality
+    for stage, kind in STAGE_KINDS.items():
+        for f in fields(kind):
+            setattr(getattr(item, stage), f.name, getattr(getattr(chosen, stage), f.name))
+    tone = _colour(chosen.solve.skin_tone)
+    item.use_skin_tone = tone is not None
+    item.skin_tone = tone or item.skin_tone
+    item.seed, item.device = chosen.seed, chosen.device
+
+
+def _tone(item: WILDCAP_PG_capture) -> str:
+    """The skin tone as a job is told it: as the record wrote it from which the fields were taken, for as long as it is that tone."""
+    told = _colour(item.solve.skin_tone)
+    same = told is not None and max(abs(a - b) for a, b in zip(told, item.skin_tone, strict=True)) < 1e-4
+    return item.solve.skin_tone if same else ",".join(f"{c:.4f}" for c in item.skin_tone)
+
+
+def _colour(text: str) -> tuple[float, float, float] | None:
+    """R, G and B of a text; None where it has none."""
+    try:
+        red, green, blue = map(float, text.split(","))
+    except ValueError:
+        return None
+    return red, green, blue
 
 
 def _value(group, field):

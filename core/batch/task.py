@@ -8,16 +8,18 @@ Asked for what is done already, it ends well within seconds. The worker ends wit
 from __future__ import annotations
 
 import contextlib
+import os
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 
+from ..contract import switchlight_api
 from ..contract.capture import Capture
 from ..contract.messages import Cancelled, Done, Failed, Log, Message, Problem
 from ..worker.client import THREAD_VARIABLES, Worker
-from ..worker.job import write_job
+from ..worker.job import read_job, write_job
 from .groups import DELIVER, GROUPS, Group
 from .record import Batch, Face
 from .state import deliver_settings, has_sheet, is_delivered, waits
@@ -55,7 +57,7 @@ def _wait_for_lease(capture: Capture, hear: Callable[[Message], None]) -> None:
 
 
 def _follow(capture: Capture, job: Path, hear: Callable[[Message], None], cancelled: Callable[[], bool], environment: dict[str, str]) -> Message:
-    worker = Worker(Path(sys.executable), ROOT, job, capture.logs / "worker.log", environment)
+    worker = Worker(Path(sys.executable), ROOT, job, capture.logs / "worker.log", {**environment, **_paid_key(job)})
     worker.start()
     try:
         while True:
@@ -68,6 +70,12 @@ def _follow(capture: Capture, job: Path, hear: Callable[[Message], None], cancel
             time.sleep(POLL_S)
     finally:
         worker.terminate()  # where it was left by an exception
+
+
+def _paid_key(job: Path) -> dict[str, str]:
+    """The key of a paid service that this process was started with, for a job that asks for that service, and for no other."""
+    key = os.environ.get(switchlight_api.KEY_VARIABLE)
+    return {switchlight_api.KEY_VARIABLE: key} if key and read_job(job).settings.delight.delighter == "switchlight" else {}
 
 
 def _deliver(batch: Batch, face: Face, hear: Callable[[Message], None], cancelled: Callable[[], bool], environment: dict[str, str]) -> Message:

@@ -80,6 +80,34 @@ def refused_and_paint():
     yield 600.0
 
 
+def walk_and_quit():
+    """The folder's batch by the file browser, a stroke on the first of its masks, both accepted, all solved, and File > Quit at once."""
+    addon.unfold("WILDCAP_PT_capture")
+    batches, folder = addon.module("batches"), FOLDER / "batch"
+    yield from d.open_tab("WildCap")
+    addon.use_solver()
+    yield from d.park()
+    yield from d.press("wildcap.open_batch")
+    yield from d.browse(folder)
+    yield from d.until(lambda: len(batches.waiting()) == 2, "two masks that wait", 30)
+    yield from d.press("wildcap.next_mask")
+    yield from painting.in_hand()
+    yield from stroke(0, "stroke")
+    d.screenshot("batch_1_walk")
+    yield from d.press("wildcap.accept_mask")
+    yield from d.until(lambda: addon.module("paint.session").root() == str(folder / "bert.wildcap"), "the second mask", 20)
+    yield from painting.in_hand()
+    yield from d.press("wildcap.accept_mask")
+    yield from d.until(lambda: bpy.context.mode == 'OBJECT' and batches.ready() == 2, "all masks being looked at", 20)
+    yield 1.0
+    d.screenshot("batch_2_looked_at")
+    yield from d.press("wildcap.solve_all")
+    yield from d.until(lambda: batches.line(batches.view()) != "", "the batch's first word", 60)
+    tell("solving", batch=json.loads((folder / "lock").read_text())["pid"])
+    bpy.ops.wm.quit_blender()
+    yield 600.0
+
+
 def solving():
     """The sample head, and its solve under way."""
     root = yield from addon.open_sample_head()

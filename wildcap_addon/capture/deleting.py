@@ -8,7 +8,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from ...core.contract import deletion
 from ...core.contract.capture import Capture
 from ...core.worker.background import Task
-from .. import asking, captures, jobs
+from .. import asking, batches, captures, jobs
 from ..base_operator import Dialog
 
 
@@ -20,8 +20,10 @@ class WILDCAP_OT_delete_face(Dialog, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return cls.in_object_mode(context) and jobs.can_start(cls, context) and cls.allowed(
-            jobs.of("") is None, "The solver is being set up, or another face is looked at: wait for it, or click Cancel")
+        return (cls.in_object_mode(context) and jobs.can_start(cls, context)
+                and cls.allowed(jobs.of("") is None, "The solver is being set up, or another face is looked at: wait for it, or click Cancel")
+                and cls.allowed(not (batches.view().runner and batches.view().face(captures.root(captures.active(context)))),
+                                "This face is one of a batch that is running, which would make it again: wait for it, or cancel it"))
 
     @staticmethod
     def tell() -> tuple[str, ...] | None:

@@ -5,7 +5,7 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from .. import captures
+from .. import batches, captures
 from ..base_panel import CapturePanel, FoldedPanel
 from . import strip
 
@@ -13,6 +13,9 @@ from . import strip
 class WILDCAP_UL_captures(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_property):
         layout.prop(item, "name", text="", emboss=False, icon='CHECKMARK' if item == captures.active(context) else 'USER')  # the active head decides
+        found = batches.state_of(captures.root(item))
+        if found is not None:
+            layout.label(text="", icon=batches.ICONS[found.state])
 
 
 class WILDCAP_PT_capture(FoldedPanel, bpy.types.Panel):
@@ -37,6 +40,11 @@ class WILDCAP_PT_capture(FoldedPanel, bpy.types.Panel):
             row = layout.row(align=True)
             row.operator("wildcap.open_report", icon='URL')
             row.operator("wildcap.delete_face", icon='TRASH')
+        if len(props.captures) > 1:
+            column = layout.column(align=True)
+            column.operator("wildcap.reconstruct_all", icon='MESH_MONKEY')
+            column.operator("wildcap.solve_all", icon='LIGHT')
+        layout.operator("wildcap.open_batch", icon='COMMUNITY')
 
 
 class WILDCAP_PT_frames(CapturePanel, bpy.types.Panel):

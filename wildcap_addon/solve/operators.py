@@ -46,29 +46,6 @@ class WILDCAP_OT_solve_edited(BaseOperator, bpy.types.Operator):
         begin(context, captures.require(context), edited_part=True)
 
 
-class WILDCAP_OT_solve_all(BaseOperator, bpy.types.Operator):
-    """Solve every capture of the list that has a texture and is not solved yet, one after the other"""
-
-    bl_idname = "wildcap.solve_all"
-    bl_label = "Solve All"
-
-    @classmethod
-    def poll(cls, context):
-        return cls.allowed(len(context.scene.wildcap.captures) > 1, "There is only one capture: click Solve")
-
-    def work(self, context):
-        started = [item for item in context.scene.wildcap.captures if self._ready(item)]
-        if not started:
-            raise Problem("There is nothing to solve.", "Each capture is solved, is being worked on, or needs Reconstruct first.")
-        for item in started:
-            begin(context, item)
-
-    def _ready(self, item) -> bool:
-        capture = captures.folder(item)
-        solved = capture.read()["stages"].get("solve") is not None
-        return not solved and jobs.of(captures.root(item)) is None and capture.texture.is_file() and capture.shadow_mask_auto.is_file()
-
-
 class WILDCAP_OT_estimate_skin_tone(BaseOperator, bpy.types.Operator):
     """Look at the skin outside of the shadow mask in all frames, and set the skin tone from it, with how sure it is; a measured white point helps most"""
 
@@ -102,4 +79,4 @@ def set_tone(root: str, figures: dict) -> None:
                 item.tone_deviation = figures.get("skin_tone_deviation_l", 0.0)
 
 
-CLASSES = (WILDCAP_OT_solve, WILDCAP_OT_solve_edited, WILDCAP_OT_solve_all, WILDCAP_OT_estimate_skin_tone)
+CLASSES = (WILDCAP_OT_solve, WILDCAP_OT_solve_edited, WILDCAP_OT_estimate_skin_tone)

@@ -51,8 +51,6 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("wildcap.solve")
         row.operator("wildcap.solve_edited")
-        if len(context.scene.wildcap.captures) > 1:
-            layout.operator("wildcap.solve_all")
         for stage in stages.STAGES[stages.NAMES.index(stages.MASK_STAGE) + 1:]:
             if stage.name != "transfer":  # it stands under Deliver
                 draw_settings(layout, item, stage, without=("skin_tone", "white_point"))

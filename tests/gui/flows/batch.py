@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A batch of two faces: one Blender walks through their masks, starts Solve All and is closed; another finds the batch at work, gets the first result, and
+stops it."""
+
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+HERE = Path(__file__).resolve()
+sys.path[:0] = [str(HERE.parents[1]), str(HERE.parents[3])]
+import addon  # noqa: E402
+import driver as d  # noqa: E402
+import painting  # noqa: E402
+import second  # noqa: E402
+
+from core.batch import record  # noqa: E402
+from core.contract import sample_head  # noqa: E402
+from core.contract.settings import from_json, preset  # noqa: E402
+from tests import batch_faces  # noqa: E402
+
+NAMES = ("anna", "bert")
+QUICK = {"solve": {"size": 128, "steps": 4, "skin_tone": "0.69,0.54,0.45", "white_point": "1,1,1"}, "upscale": {"size": 1024}, "transfer": {"scan": False}}
+
+
+def flow():
+    folder = Path(tempfile.mkdtemp())
+    root = plan(folder / "batch")
+    yield from d.open_tab("WildCap")
+    blender = second.start("walk_and_quit", folder)
+    told = yield from second.heard(blender, folder, "solving", 240)
+    yield from d.until(lambda: blender.poll() is not None, "the end after File > Quit", 20)
+    assert blender.poll() == 0 and batch_faces.alive(told["batch"]), "the batch outlives its Blender"
+    yield from painting.kept(root / "anna.wildcap" / "shadow_mask.png", np.load(folder / "stroke.npy"), 1)
+    yield from found(root)
+    yield from result(root)
+    yield from stopped(told["batch"])
+
+
+def plan(root: Path) -> Path:
+    """Two copies of the sample head, finished up to their masks, in a batch that waits for its artist."""
+    faces, settings = [], from_json(QUICK, preset("draft"))
+    for name in NAMES:
+        sample_head.copy_to(root.parent).root.rename(root.parent / f"{name}.part")
+        root.mkdir(exist_ok=True)
+        shutil.move(root.parent / f"{name}.part", root / f"{name}.wildcap")
+        addon.unsolved(root / f"{name}.wildcap")
+        capture = batch_faces.filmed(root, name)
+        batch_faces.finish_up_to_mask(capture, settings)
+        faces.append(record.Face(name, capture.source, capture.root, "draft", QUICK))
+    record.write_batch(record.Batch(root, tuple(faces), "artist"))
+    return root
+
+
+def found(root: Path):
+    """By itself, though no .blend knows of it; a click lists its faces."""
+    batches = addon.module("batches")
+    yield from d.until(lambda: batches.current() == root and batches.line(batches.view()), "finding the batch at work", 30)
+    d.say("found:", batches.line(batches.view()))
+    yield from d.park()
+    yield from d.press("wildcap.open_batch")
+    yield from d.until(lambda: len(bpy.context.scene.wildcap.captures) == 2, "the list of its faces", 10)
+    bpy.context.scene.wildcap.active_index = 0
+    yield 2.0
+    d.screenshot("batch_3_found")
+    assert addon.next_step().operator == "wildcap.cancel_batch", addon.next_step()
+
+
+def result(root: Path):
+    """The head comes in when its face is done, the maps by the next click."""
+    yield from d.until(lambda: "anna" in bpy.data.objects, "the first face's head", addon.START_LIMIT_S)
+    yield from d.until(lambda: addon.next_step().operator == "wildcap.assemble_material", f"its maps instead of {addon.next_step()}", 20)
+    yield from d.lead("wildcap.assemble_material")
+    yield 1.0
+    assert "WildCap Skin" in bpy.data.objects["anna"].data.materials[0].node_tree.nodes
+    d.screenshot("batch_4_result")
+
+
+def stopped(pid: int):
+    """The second face is in the solver's hands, and let go within two seconds of a click."""
+    position = yield from d.find("wildcap.cancel_batch")
+    clicked = time.monotonic()
+    yield from d.click(position)
+    yield from d.until(lambda: not batch_faces.alive(pid), "the end of the batch", 10, every_s=d.TICK_S)
+    d.say(f"cancelled {time.monotonic() - clicked:.1f} s after the click")
+    assert time.monotonic() - clicked < 4, "2 s on a machine of its own"
+
+
+d.play(flow(), limit_s=900)

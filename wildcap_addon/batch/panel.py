@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panel: the open batch: how far its faces are and its run is, and the way through the masks that wait."""
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+
+from ...core.batch.state import DONE, STOPPED, TO_DO, WAITING, WORKING
+from ...core.contract.messages import Problem
+from .. import batches, captures, problems
+from ..base_panel import WildcapPanel, region_width
+from . import running
+
+
+class WILDCAP_PT_batch(WildcapPanel, bpy.types.Panel):
+    bl_label = "Batch"
+    bl_order = 0  # above the brush: an artist goes from mask to mask
+    bl_parent_id = "WILDCAP_PT_main"
+
+    @classmethod
+    def poll(cls, context):
+        return batches.current() is not None
+
+    def draw(self, context):
+        layout, known, width = self.layout, batches.view(), region_width(context)
+        row = layout.row(align=True)
+        row.label(text=batches.current().name, translate=False, icon='COMMUNITY')
+        row.operator("wildcap.open_batch", text="", icon='FILE_REFRESH').directory = str(batches.current())
+        row.operator("wildcap.close_batch", text="", icon='X')
+        problems.draw(layout, known.problem, width)
+        if running.running():
+            row = layout.row(align=True)
+            words = iface_("{} of {} faces").format(known.progress["ended"], known.progress["of"]) if known.progress else iface_("Starting")
+            row.progress(text=words, translate=False, factor=batches.share(known))
+            row.operator("wildcap.cancel_batch", text="", icon='CANCEL')
+            if batches.line(known):
+                problems.draw_text(layout, batches.line(known), width)
+        if known.batch is None:
+            return
+        problems.draw_text(layout, count_words(known), width)
+        if not batches.waiting() and batches.ready() and not running.running():
+            layout.label(text="All masks are looked at", icon='CHECKMARK')
+            layout.operator("wildcap.solve_all", icon='LIGHT')
+        else:
+            column = layout.column(align=True)
+            column.operator("wildcap.accept_mask", icon='CHECKMARK')
+            column.operator("wildcap.next_mask", icon='FORWARD')
+        face = known.face(captures.root(captures.active(context)))
+        found = known.states.get(face.name) if face else None
+        if found is not None and found.state == STOPPED:
+            problems.draw(layout, Problem(found.problem, found.remedy), width)
+
+
+def count_words(known: batches.View) -> str:
+    """How far the faces are: 'Masks waiting: 5, done: 3, to do: 4'."""
+    of, seen = len(known.batch.faces), len(known.states)
+    waiting = len(batches.waiting())
+    accepted = known.count(WAITING) - waiting  # and not looked at since
+    counts = [(waiting, iface_("masks waiting: {}")), (known.count(DONE), iface_("done: {}")), (known.count(WORKING), iface_("in work: {}")),
+              (known.count(STOPPED), iface_("stopped: {}")), (known.count(TO_DO) + accepted, iface_("to do: {}")),
+              (of - seen, iface_("not looked at yet: {}"))]
+    text = ", ".join(words.format(count) for count, words in counts if count)
+    return text[:1].upper() + text[1:]
+
+
+CLASSES = (WILDCAP_PT_batch,)

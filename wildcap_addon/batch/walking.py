@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The walk through a batch's masks: which comes next, and how its face comes into the scene and the one before steps aside."""
+
+from pathlib import Path
+
+import bpy
+
+from ...core.batch.record import Face
+from .. import batches, captures, head, local_view, problems, properties
+
+
+def painting() -> bool:
+    return bpy.ops.wildcap.finish_mask.poll()
+
+
+def following(root: str) -> Face | None:
+    """The face whose mask waits next after that of the capture `root`, round the batch; None where no other waits."""
+    waiting, known = batches.waiting(), batches.view()
+    others = [face for face in waiting if str(face.root) != root]
+    order = [str(face.root) for face in known.batch.faces] if known.batch else []
+    here = order.index(root) if root in order else -1
+    return next((face for face in others if order.index(str(face.root)) > here), others[0] if others else None)
+
+
+def leave(root: str) -> None:
+    """Saves a mask that is being painted, and ends the painting. Raises Problem."""
+    if painting():
+        _click(bpy.ops.wildcap.finish_mask, root)
+
+
+def go(context, face: Face) -> None:
+    """Brings a face in, alone, and begins to paint its mask. Raises Problem, as the clicks do that an artist would do it by."""
+    before = captures.active(context)
+    leave(captures.root(before))
+    if before is not None and captures.root(before) != str(face.root):
+        _put_aside(context, before)
+    item = list_face(context, face)
+    _click(bpy.ops.wildcap.bring_in_head, str(face.root))
+    obj = captures.require_head(context, item)
+    captures.show_again(obj)
+    local_view.join(context, [obj])
+    head.look_at(context, obj)
+    _click(bpy.ops.wildcap.paint_mask, str(face.root))
+
+
+def list_face(context, face: Face):
+    """The face's item of the scene's list, now the active one; one that is new to it has the batch's settings."""
+    known = {captures.root(item) for item in context.scene.wildcap.captures}
+    item = captures.add(context, face.root)
+    if str(face.root) not in known:
+        item.name = face.name
+        properties.take(item, face.quality, face.chosen())
+    return item
+
+
+def _put_aside(context, item) -> None:
+    """Hides a face's head until its row is clicked, and gives the memory of its pictures back: two hundred faces are more than a machine holds."""
+    obj = captures.head(context, item)
+    if obj is None or obj.name not in context.view_layer.objects:
+        return
+    captures.put_aside(obj)
+    folder = captures.folder(item).root
+    for image in bpy.data.images:
+        if image.source == 'FILE' and not image.is_dirty and not image.packed_file and Path(bpy.path.abspath(image.filepath)).is_relative_to(folder):
+            image.buffers_free()
+
+
+def _click(operator, root: str) -> None:
+    """Runs another room's operator. Raises the Problem that it tells of."""
+    problems.clear(root)
+    try:
+        operator()
+    except RuntimeError as error:
+        raise problems.of(root) or error from None
