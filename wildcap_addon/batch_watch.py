@@ -3,6 +3,7 @@
 """The thread that looks at a batch: who runs it and how far that is, and where its faces are. A face that is seen for the first time costs the reading of all
 its files, later a few file times. Nothing here touches Blender."""
 
+import contextlib
 import os
 import threading
 import time
@@ -11,6 +12,7 @@ from functools import cached_property
 from pathlib import Path
 
 from ..core.batch import gate, local, state
+from ..core.batch.known_hashes import known_hashes
 from ..core.batch.record import NAME, Batch, Face, read_batch
 from ..core.batch.state import STOPPED, State
 from ..core.contract import lease, unforeseen
@@ -91,16 +93,20 @@ class Watch(threading.Thread):
         began = time.monotonic()
         if began < self._due:
             return
-        for face in batch.faces:
-            if self._ended.is_set():
-                return
-            stamp = _stamp(face)
-            if stamp[0] or self._stamps.get(face.name) != stamp or face.name not in self.view.states:  # who holds a lock may have ended
-                found = _ask(batch, face)
-                self.view = replace(self.view, states={**self.view.states, face.name: found})
-                self._stamps[face.name] = () if found.state == STOPPED and found.group is None else stamp
-                self._tell(batch)
+        with contextlib.nullcontext() if self._stamps else known_hashes(batch.root):
+            for face in batch.faces:
+                if self._ended.is_set():
+                    return
+                self._look_at_face(batch, face)
         self._due = time.monotonic() + min(LONGEST_REST_S, REST * (time.monotonic() - began))
+
+    def _look_at_face(self, batch: Batch, face: Face) -> None:
+        stamp = _stamp(face)
+        if stamp[0] or self._stamps.get(face.name) != stamp or face.name not in self.view.states:  # who holds a lock may have ended
+            found = _ask(batch, face)
+            self.view = replace(self.view, states={**self.view.states, face.name: found})
+            self._stamps[face.name] = () if found.state == STOPPED and found.group is None else stamp
+            self._tell(batch)
 
     def _tell(self, batch: Batch) -> None:
         """Who runs it and how far that is, also while a face takes long to look at."""

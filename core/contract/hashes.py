@@ -74,7 +74,7 @@ def same_source(recorded: list, present: list) -> bool:
 def tell_known(root: Path) -> list:
     """What this process knows of the files below a folder: [[kind, path in the folder, size, time in nanoseconds, hash]], for `take_known` of another one."""
     inside = str(root) + os.sep
-    return [[kind, path.removeprefix(inside), size, when, digest] for (kind, path, size, when), digest in _hashes.items() if path.startswith(inside)]
+    return [[kind, path.removeprefix(inside), size, when, digest] for (kind, path, size, when), digest in list(_hashes.items()) if path.startswith(inside)]
 
 
 def take_known(root: Path, known: list) -> None:
