@@ -6,8 +6,9 @@
 
 Captures: `sample` (part of this repository), `lps_sun` and `bust` (in --data). FOLDER gets NAME.wildcap, NAME.json, pictures/NAME.jpg (scan, wireframe and
 texture beside the frame) and geometry.json. What is finished is not done again without --fresh: stages that are fresh, captures that came through.
-The perceptual row needs `pip install --no-deps -r requirements/perceptual.txt`; without it the table says so. Every stage
-runs in a process of its own, so its peak memory (of the largest of its processes, as getrusage tells) is its own.
+Captures that are in --json's record and were not measured here stay there. The perceptual row needs `pip install --no-deps -r
+requirements/perceptual.txt`; without it the table says so. Every stage runs in a process of its own, so its peak memory (of the largest of its processes,
+as getrusage tells) is its own.
 docs/pictures/geometry.jpg is FOLDER/pictures/sample.jpg: pictures of people never go into the documentation.
 """
 
@@ -29,7 +30,7 @@ from core.contract.settings import Settings
 from core.imaging import images
 
 from . import stage_cost
-from .figures import write
+from .figures import read, write
 from .geometry_table import published, table
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -151,7 +152,8 @@ def main() -> None:
     everything = {name: json.loads((folder / f"{name}.json").read_text(encoding="utf-8")) for name in known if (folder / f"{name}.json").is_file()}
     write_json(folder / "geometry.json", everything)
     if options.json:
-        write(options.json, "geometry", "python -m benchmarks.geometry FOLDER", published(everything))
+        others = read(options.json.stem, options.json.parent)["figures"] if options.json.is_file() else {}
+        write(options.json, "geometry", "python -m benchmarks.geometry FOLDER", {**others, **published(everything)})
     print(table(everything))
 
 

@@ -1,62 +1,184 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cameras of long films: the sample video played to and fro with noise of its own, `python -m benchmarks.long_films FOLDER [--frames 60 120 300 1000]`.
+"""Cameras of long films, beside plain pycolmap on the same frames:
 
-For each length: seconds of the stage cameras, frames registered, and the camera centres' error against the true ones (cameras_against_truth.py). What is
-in FOLDER already is measured anew, but not filmed anew.
+    python -m benchmarks.long_films FOLDER [--frames 60 120 300 1000] [--again] [--plain-times 4] [--json docs/figures/long_films.json]
+
+The film: a person with hair and clothes before a cluttered room, filmed once by a hand from ear to ear, up and down on the way, 1,000 frames of 720 x 960
+pixels (benchmarks/long_films_render.py), with a phone's noise, smear and compression. Each row takes so many frames of it, as the stage frames
+does: seconds and processor seconds of the stage cameras, frames registered, the camera centres' error against the true ones (cameras_against_truth.py).
+Plain: pycolmap with its defaults, sequential matching and incremental mapping, ended after --plain-times as long. FOLDER/film gets the film, FOLDER/N.wildcap
+and FOLDER/N_plain.wildcap the cameras. Rows that are in the record are kept without --again.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
+import math
+import os
+import signal
+import subprocess
 import sys
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import numpy as np
 
-from benchmarks.cameras_against_truth import compare  # noqa: E402
-from benchmarks.costs import VIDEO, decoded, length, to_and_fro  # noqa: E402
-from core.__main__ import main as core  # noqa: E402
-from core.contract.capture import Capture  # noqa: E402
-from core.synthetic.sample import write_video  # noqa: E402
+from core.contract.capture import Capture
+from core.contract.files import replacing_folder, write_json
+from core.contract.frame_records import read_frames
+from core.geometry import raster
+from core.imaging import images
+from core.synthetic import sample, scene
+from core.synthetic.people import filmed, motion, phone
 
-FRAMES = (60, 120, 300, 1000)
+from . import figures, stage_cost
+from .cameras_against_truth import compare
+from .people_lights import KINDS
+
+ROOT = Path(__file__).resolve().parent.parent
+COUNTS = (60, 120, 300, 1000)
+FRAMES, SEED, LIGHT = 1000, 910004, "hazy sun"
+"""Of the film; of the person, "stubbled" in benchmarks/likenesses.py, whose hair and beard are short; and what they sit in."""
+DEGREES, SAMPLES = 72, 2
+"""How far the camera goes to either side; rays per pixel, which smooth edges."""
+METERED, TO = 90, 0.5
+"""The percentile of the middle of the first frame that is exposed to this."""
 
 
 def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("folder", type=Path)
-    options.add_argument("--frames", type=int, nargs="+", default=FRAMES, metavar="N")
-    chosen = options.parse_args()
-    rows = [row(chosen.folder, count) for count in chosen.frames]
-    print("\n| frames | cameras, s | registered | centre error, median and most, % of the distance | rotation, degrees | found by |")
-    print("| --- | --- | --- | --- | --- | --- |")
-    print("\n".join(rows))
+    options.add_argument("--frames", type=int, nargs="+", default=COUNTS, metavar="N")
+    options.add_argument("--again", action="store_true", help="measure rows anew that the record has")
+    options.add_argument("--plain-times", type=float, default=4, help="how many times as long plain pycolmap may take; 0: it is left out")
+    options.add_argument("--json", type=Path)
+    asked = options.parse_args()
+    folder = asked.folder.resolve()
+    path = asked.json or folder / "long_films.json"
+    film(folder / "film")
+    for count in asked.frames:
+        known = figures.read(path.stem, path.parent)["figures"] if path.is_file() else {}
+        if asked.again or str(count) not in known.get("frames", {}):
+            found = {"frames": {**known.get("frames", {}), str(count): row(folder, count, asked.plain_times)}}
+            found["frames"] = dict(sorted(found["frames"].items(), key=lambda item: int(item[0])))
+            figures.write(path, "long_films", "python -m benchmarks.long_films FOLDER", {**found, "growth": growth(found["frames"])})
+    print(table(figures.read(path.stem, path.parent)["figures"]))
 
 
-def row(folder: Path, count: int) -> str:
-    """A line of the table."""
-    truth, capture = folder / f"film_{count}", Capture(folder / f"film_{count}.wildcap")
-    video = truth / "film.mp4"
-    if not video.is_file():
-        film(video, count)
-    core(["run", str(video), str(capture.root), "--until", "frames", "--set", f"frames.max_frames={count}"])
-    core(["run", str(video), str(capture.root), "--from", "cameras", "--until", "cameras", "--set", f"frames.max_frames={count}"])
-    figures, stage = compare(capture, truth), json.loads((capture.root / "capture.json").read_text(encoding="utf-8"))["stages"]["cameras"]
-    median, most, turned = (figures[name] for name in ("centre_error_median_percent", "centre_error_max_percent", "rotation_error_median_deg"))
-    return (f"| {count} | {stage['seconds']:.0f} | {figures['registered']} | {median:.3f}, {most:.3f} | {turned:.3f} | {stage['figures']['features']} |")
+def film(folder: Path) -> None:
+    """FOLDER/film.mp4 and cameras.json, if they are not there; rendered frames are kept until then."""
+    if (folder / "film.mp4").is_file():
+        return
+    from core.synthetic.people.figure import make_figure
+
+    figure, cameras = make_figure(SEED), scene.camera_path(SEED, FRAMES, DEGREES)
+    filmed.render(folder / "rendered", figure, KINDS[LIGHT](SEED), cameras, range(FRAMES), SAMPLES, module="benchmarks.long_films_render")
+    write_json(folder / "cameras.json", {"name": "film", "light": LIGHT, "focal_px": scene.FOCAL, "width": scene.WIDTH, "height": scene.HEIGHT,
+                                         "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
+    taken = phone.sample_phone(SEED)
+    sample.write_video(folder / "film.mp4", _developed(folder / "rendered", raster.RayCaster(figure.head), cameras, taken), taken.crf)
 
 
-def film(video: Path, count: int) -> None:
-    """The film and, beside it, its true cameras."""
-    video.parent.mkdir(parents=True, exist_ok=True)
-    true = json.loads(VIDEO.with_name("cameras.json").read_text(encoding="utf-8"))
-    whole = length(VIDEO)
-    turn = [min(at, 2 * whole - 2 - at) for at in (number % (2 * whole - 2) for number in range(count))]
-    cameras = [{**true["cameras"][at], "frame": number} for number, at in enumerate(turn)]
-    video.with_name("cameras.json").write_text(json.dumps({**true, "cameras": cameras}), encoding="utf-8")
-    write_video(video, to_and_fro(decoded(VIDEO), count))
+def _developed(work: Path, head: raster.RayCaster, cameras: np.ndarray, taken: phone.Phone) -> Iterator[np.ndarray]:
+    """The frames as the phone shows them, sRGB [H, W, 3]. Its rows are read at once: a rolling shutter has no one true camera."""
+    views, still = [sample.view_of(matrix) for matrix in cameras], np.tile(np.eye(4), (3, 1, 1))
+    first = images.read_linear(work / f"{0:05d}.exr")
+    gain = TO / np.percentile(first[first.shape[0] // 4:-first.shape[0] // 4, first.shape[1] // 4:-first.shape[1] // 4].max(-1), METERED)
+    for k in range(len(views)):
+        around = max(k - 1, 0), k, min(k + 1, len(views) - 1)
+        flow = motion.image_motion(head, tuple(views[i] for i in around), still) * 2 / (around[2] - around[0])
+        linear = motion.motion_blur(images.read_linear(work / f"{k:05d}.exr").astype(np.float32), flow, taken.shutter)
+        yield phone.develop(linear, taken, np.full(3, gain), np.random.default_rng([SEED, 72, k]))
+
+
+def row(folder: Path, count: int, plain_times: float) -> dict:
+    """{"ours": {...}, "plain": {...}, "times", "processor_times": how many times as long plain pycolmap took, None where it was left out or ended}."""
+    capture = Capture(folder / f"{count}.wildcap")
+    settings = {"frames": {"max_frames": count}}
+    if not capture.has("frames"):
+        cost = stage_cost.measure(capture.root, "frames", folder / "film" / "film.mp4", settings=settings)
+        if "problem" in cost:
+            raise SystemExit(f"{cost['problem']} {cost['remedy']}")
+    ours = stage_cost.measure(capture.root, "cameras", settings=settings)
+    if "problem" not in ours:
+        ours |= _against_truth(capture, folder / "film", count) | {"found_by": capture.read()["stages"]["cameras"]["figures"]["features"]}
+    print(count, ours, flush=True)
+    found = {"ours": ours, "plain": None, "times": None, "processor_times": None}
+    if plain_times and "problem" not in ours:
+        plain = found["plain"] = plain_cost(capture, Capture(folder / f"{count}_plain.wildcap"), folder / "film", count, plain_times * ours["seconds"])
+        if "over_s" not in plain:
+            found |= {"times": plain["seconds"] / ours["seconds"], "processor_times": plain["processor_s"] / ours["processor_s"]}
+        print(count, plain, flush=True)
+    return found
+
+
+def _against_truth(capture: Capture, truth: Path, frames: int) -> dict:
+    found = compare(capture, truth)
+    return {"frames": frames, "registered": found["registered"], "centre_median_percent": found["centre_error_median_percent"],
+            "centre_max_percent": found["centre_error_max_percent"], "rotation_deg": found["rotation_error_median_deg"], "focal_px": found["focal_px"]}
+
+
+def plain_cost(capture: Capture, beside: Capture, truth: Path, count: int, limit_s: float) -> dict:
+    """Plain pycolmap on a capture's frames, in a process of its own; its cameras are left in `beside`. {"over_s"} where it was ended."""
+    with replacing_folder(beside.root) as copy:
+        (copy / "cameras").mkdir()
+        (copy / "frames").symlink_to(capture.frames)
+    names = [record.name for record in read_frames(capture).records]
+    own, began = stage_cost.own_s(), time.monotonic()
+    child = subprocess.Popen([sys.executable, "-c", f"from {__spec__.name} import plain; plain()", str(capture.frames), str(beside.root), *names], cwd=ROOT,
+                             start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        child.wait(limit_s)
+    except subprocess.TimeoutExpired:
+        return {"over_s": round(limit_s)}
+    finally:
+        if child.poll() is None:
+            os.killpg(child.pid, signal.SIGKILL)
+            child.wait()
+    seconds = time.monotonic() - began
+    cost = {"seconds": round(seconds, 1), "processor_s": round(stage_cost.own_s()[1] - own[1], 1)}
+    return {**cost, **_against_truth(beside, truth, count)} if child.returncode == 0 else {**cost, "frames": count, "registered": 0}
+
+
+def plain() -> None:
+    """What a few lines of pycolmap do with a film, one camera for all frames: the largest model goes to FOLDER/cameras."""
+    import pycolmap
+
+    pictures, folder, *names = sys.argv[1:]
+    database, models = Path(folder) / "database.db", Path(folder) / "models"
+    pycolmap.extract_features(database, pictures, names, camera_mode=pycolmap.CameraMode.SINGLE)
+    pycolmap.match_sequential(database)
+    found = pycolmap.incremental_mapping(database, pictures, models)
+    max(found.values(), key=lambda model: model.num_reg_images()).write_binary(Path(folder) / "cameras")
+
+
+def growth(rows: dict) -> float | None:
+    """With which power of the frames the stage's processor seconds grow, from the shortest to the longest film."""
+    known = sorted((int(count), of["ours"]["processor_s"]) for count, of in rows.items() if "processor_s" in of["ours"])
+    return math.log(known[-1][1] / known[0][1]) / math.log(known[-1][0] / known[0][0]) if len(known) > 1 else None
+
+
+def table(found: dict) -> str:
+    """The record's table."""
+    head = ["frames", "cameras: seconds (of processor)", "registered", "centre error, median and most, % of the distance", "rotation, degrees", "found by",
+            "plain pycolmap: seconds (of processor)", "its registered, centre error", "times as long (of processor)"]
+    return figures.markdown(head, [[count, *_cells(of)] for count, of in found["frames"].items()])
+
+
+def _cells(of: dict) -> list:
+    ours, plain = of["ours"], of["plain"]
+    if "problem" in ours:
+        return [ours["problem"], *[None] * 7]
+    own = [f"{ours['seconds']:.0f} ({ours['processor_s']:.0f})", ours["registered"], f"{ours['centre_median_percent']:.3f}, {ours['centre_max_percent']:.2f}",
+           f"{ours['rotation_deg']:.3f}", ours["found_by"]]
+    if plain is None:
+        return [*own, None, None, None]
+    if "over_s" in plain:
+        return [*own, f"over {plain['over_s']:.0f}", None, None]
+    error = f", {plain['centre_median_percent']:.3f} %" if "centre_median_percent" in plain else ""
+    return [*own, f"{plain['seconds']:.0f} ({plain['processor_s']:.0f})", f"{plain['registered']}{error}", f"{of['times']:.1f} ({of['processor_times']:.1f})"]
 
 
 if __name__ == "__main__":

@@ -6,8 +6,10 @@ import numpy as np
 import pycolmap
 import pytest
 
-from core.cameras import skeleton
+from core.cameras import colmap, skeleton
 from core.geometry.models import pose_of
+from core.imaging import images
+from core.synthetic.painted_head import camera, photograph
 
 
 def film(turns):
@@ -110,3 +112,42 @@ def test_a_frame_that_shares_too_little_is_left_out(synthesized):
     names = sorted(image.name for image in true.images.values())
     skeleton.place_others(empty, path, names, 0, lambda done, of: None)
     assert empty.num_reg_images() == 0
+
+
+@pytest.fixture(scope="module")
+def filmed(tmp_path_factory):
+    """Eleven pictures of a person before a wall, five degrees from one to the next."""
+    folder = tmp_path_factory.mktemp("filmed")
+    for i in range(11):
+        images.write_srgb(folder / f"{i:05d}.jpg", photograph(camera(5 * i - 25, 0.05 * np.sin(i), scale=1.6)), quality=95)
+    return folder
+
+
+def solved(folder, work):
+    """The bytes of the model that COLMAP's process leaves of a film, by the names of its files, and the names of the frames in it."""
+    work.mkdir()
+    names = sorted(path.name for path in folder.iterdir())
+    job = {"images": str(folder), "groups": [{"names": names, "width": 480, "height": 640, "focal_px": None}], "skin": False, "photographs": False,
+           "film": [(name, float(len(names) - i), None) for i, name in enumerate(names)], "finer": True, "masks": None, "seed": 0,
+           "database": str(work / "database.db"), "output": str(work / "model")}
+    assert colmap.reconstruct(job)
+    model = pycolmap.Reconstruction(job["output"])
+    return {path.name: path.read_bytes() for path in (work / "model").iterdir()}, sorted(image.name for image in model.images.values() if image.has_pose)
+
+
+def test_the_order_in_which_features_are_found_changes_no_byte(filmed, tmp_path, monkeypatch):
+    """Threads end in any order; here, once as they do, and once from the last picture to the first."""
+    monkeypatch.setattr(skeleton, "SIZE", 7)
+    monkeypatch.setattr(colmap, "FILM_FEATURES", 400)  # of which these small pictures have half
+    extract, order = pycolmap.extract_features, []
+
+    def backwards(database, folder, names, *more):
+        for name in names[::-1]:
+            order.append(name)
+            extract(database, folder, [name], *more)
+
+    straight, registered = solved(filmed, tmp_path / "straight")
+    monkeypatch.setattr(pycolmap, "extract_features", backwards)
+    reversed_, _ = solved(filmed, tmp_path / "reversed")
+    assert len(registered) == 11 and set(order) == set(registered) and order != sorted(order)
+    assert reversed_ == straight

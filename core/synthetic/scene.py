@@ -81,12 +81,12 @@ def leaves(seed: int, sun: Sun, distance: float = 0.40, count: int = 28, reach: 
     return Mesh(np.array(vertices), np.array(faces))
 
 
-def camera_path(seed: int, frames: int) -> np.ndarray:
-    """Camera-to-world matrices [frames, 4, 4] (the camera looks along its -z, y up): from one ear past the nose to the other, up and down on the way,
-    with the slow drift and the tremble of a hand."""
+def camera_path(seed: int, frames: int, degrees: float = 46) -> np.ndarray:
+    """Camera-to-world matrices [frames, 4, 4] (the camera looks along its -z, y up): past the nose from so many degrees at one side to as many at the other,
+    up and down on the way, with the slow drift and the tremble of a hand."""
     rng = np.random.default_rng([seed, 22])
     t = np.linspace(0, 1, frames)
-    azimuth = np.radians(46) * (0.8 * (2 * t - 1) + 0.2 * np.sin(np.pi * (t - 0.5))) * rng.choice([-1, 1])
+    azimuth = np.radians(degrees) * (0.8 * (2 * t - 1) + 0.2 * np.sin(np.pi * (t - 0.5))) * rng.choice([-1, 1])
     height = np.radians(7 + 13 * np.sin(2 * np.pi * (1.5 * t + 0.1)))
     distance = DISTANCE * (1 + 0.05 * np.sin(2 * np.pi * (1.2 * t + rng.uniform())))
     position = distance[:, None] * np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)

@@ -19,13 +19,16 @@ from ...imaging import images
 from .. import scene
 from .figure import Figure
 
+TRACED = f"{__package__}.render"
+"""The module that traces every frame's light anew."""
+
 
 def render(work: Path, figure: Figure, light: scene.Light, cameras: np.ndarray, frames: Iterable[int], samples: int, scale: float = 1.0,
-           poses: np.ndarray | None = None, room: bool = True, bare: bool = False, focal: float = 1.0) -> None:
+           poses: np.ndarray | None = None, room: bool = True, bare: bool = False, focal: float = 1.0, module: str = TRACED) -> None:
     """work/NNNNN.exr, linear, of these frames (numbers into cameras [N, 4, 4], camera to world); files that exist are kept.
 
     poses: where the head is in each frame, head to world [N, 4, 4], or still; scale: of the pictures' size; room: whether there is anything behind the person;
-    bare: without hair, lashes and clothes; focal: factor on the focal length, for close-ups.
+    bare: without hair, lashes and clothes; focal: factor on the focal length, for close-ups; module: what is run to do the job.
     """
     parts = {"skin": skin_part(work, figure.opened.skin, figure.skin.diffuse if bare else figure.seen, figure.skin.specular, figure.skin.normal)}
     for side, ball in zip(("left", "right"), figure.opened.balls, strict=True):
@@ -34,11 +37,11 @@ def render(work: Path, figure: Figure, light: scene.Light, cameras: np.ndarray, 
     if not bare:
         parts["shirt"] = _written(work, "shirt", figure.shirt, "cloth", np.full((2, 2, 3), figure.person.clothes, np.float32))
         strands = [_write_strands(work, growth) for growth in figure.strands]
-    render_parts(work, figure.person.seed, parts, strands, light, cameras, frames, samples, scale, poses, room, focal)
+    render_parts(work, figure.person.seed, parts, strands, light, cameras, frames, samples, scale, poses, room, focal, module)
 
 
 def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Path], light: scene.Light, cameras: np.ndarray, frames: Iterable[int],
-                 samples: int, scale: float = 1.0, poses: np.ndarray | None = None, room: bool = True, focal: float = 1.0) -> None:
+                 samples: int, scale: float = 1.0, poses: np.ndarray | None = None, room: bool = True, focal: float = 1.0, module: str = TRACED) -> None:
     """As `render`, of meshes and strands that are files already."""
     work.mkdir(parents=True, exist_ok=True)
     if light.blockers:
@@ -55,7 +58,7 @@ def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Pa
         "sun": asdict(light.sun) | {"direction": light.sun.direction.tolist()} if light.sun else None, "sky": sky,
         "lamps": [asdict(lamp) for lamp in light.lamps], "flash": light.flash,
         "width": round(scene.WIDTH * scale), "height": round(scene.HEIGHT * scale), "focal_px": scene.FOCAL * scale * focal})
-    subprocess.run([sys.executable, "-m", "core.synthetic.people.render", str(work / "job.json")], cwd=Path(__file__).parents[3], check=True,
+    subprocess.run([sys.executable, "-m", module, str(work / "job.json")], cwd=Path(__file__).parents[3], check=True,
                    stdout=subprocess.DEVNULL)
 
 

@@ -26,6 +26,16 @@ GLOSS = {"skin": None, "eyes": (0.06, 0.5), "cloth": (0.9, 0.2)}
 
 def main() -> None:
     job = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
+    scene, body = build(job)
+
+    def place(number: int) -> None:
+        body.matrix_world = Matrix(job["poses"][number])
+
+    render_frames(scene, add_camera(scene, job), job, place)
+
+
+def build(job: dict) -> tuple[bpy.types.Scene, bpy.types.Object]:
+    """The person, the light and the room; and what the head hangs on."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     apply_settings(scene, job)
@@ -41,11 +51,7 @@ def main() -> None:
     add_lights(scene, job)
     if job["room"]:
         add_room(job["seed"])
-
-    def place(number: int) -> None:
-        body.matrix_world = Matrix(job["poses"][number])
-
-    render_frames(scene, add_camera(scene, job), job, place)
+    return scene, body
 
 
 def _add(name: str, part: dict) -> bpy.types.Object:
