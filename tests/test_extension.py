@@ -20,10 +20,10 @@ TAGS = SCRIPTS / "modules" / "_bpy_internal" / "extensions" / "tags.py"
 
 # Every file of the zip matches one of these.
 WANTED = (
-    r"__init__\.py", r"blender_manifest\.toml", r"LICENSE", r"README\.md", r"requirements/(worker|perceptual|cuda)\.txt",
+    r"__init__\.py", r"blender_manifest\.toml", r"LICENSE", r"README\.md", r"requirements/(worker|perceptual|cuda|farm)\.txt",
     r"requirements/locks/([a-z0-9_]+-3\.[0-9]+(-cpu|-cuda)?|pip)\.txt",
     r"wildcap_addon/([a-z_]+/)?[a-z_]+\.py",
-    r"core/README\.md", r"core/[a-z_]+\.py", r"core/(contract|worker|imaging|geometry|face|light)/[a-z0-9_]+\.py",
+    r"core/README\.md", r"core/[a-z_]+\.py", r"core/(contract|worker|batch|imaging|geometry|face|light)/[a-z0-9_]+\.py",
     r"core/(frames|cameras|scan|registration|delight|texture|shadow_mask|solve|transfer|upscale|deliver)/(importers/)?[a-z0-9_]+\.py",
     r"core/weights/[a-z0-9_]+\.(safetensors|json)", r"core/weights/face_nets/([a-z_]+\.tflite|NOTICE\.md|LICENSE\.txt)",
     r"core/assets/([A-Z]+\.md|head\.obj|head\.json|identity\.npz|masks/[a-z_]+\.png)",

@@ -46,7 +46,7 @@ def add_commands(commands) -> None:
         run.add_argument("--on", choices=("local", "ray"), default="local", help="this machine, or a cluster of Ray's")
         run.add_argument("--address", help="Ray's head node, as `ray start` tells it; without it, this machine becomes a cluster of one")
         run.add_argument("--at-once", metavar="N", type=int, default=1, help="faces that this machine works on at the same time")
-        run.add_argument("--cores", metavar="N", type=int, default=2, help="cores that each task takes of a node of Ray's: the same number gives the same bytes")
+        run.add_argument("--cores", metavar="N", type=int, default=2, help="cores that each task takes of Ray's nodes: the same number gives the same bytes")
         run.add_argument("--until", choices=[group.name for group in GROUPS], help="end each face with this task")
         run.set_defaults(command=_run, retry=word == "retry")
     status = many.add_parser("status", help="say how far each face is")

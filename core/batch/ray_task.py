@@ -98,10 +98,11 @@ def _listener(batch: Batch, name: str, say: Callable[[str], None]) -> Callable[[
     account = batch.root / LOGS / f"{socket.gethostname()}.jsonl"
 
     def hear(message: Message) -> None:
-        if isinstance(message, Progress) and time.monotonic() - said[0] > EVERY_S:
+        begins = isinstance(message, Progress) and (message.done, message.text) == (0, "Starting")
+        if begins or isinstance(message, Progress) and time.monotonic() - said[0] > EVERY_S:
             said[0] = time.monotonic()
             say(to_line(message))
-        if isinstance(message, Progress) and message.text == "Starting" or isinstance(message, StageDone) and not message.skipped:
+        if begins or isinstance(message, StageDone) and not message.skipped:
             line = {"at": round(time.time(), 2), "face": name, "stage": message.stage, "finished": isinstance(message, StageDone), "pid": os.getpid()}
             with contextlib.suppress(OSError):
                 account.parent.mkdir(exist_ok=True)
