@@ -77,6 +77,7 @@ def test_a_killed_task_is_done_again_and_nothing_that_was_done(code, tmp_path):
         out, err = process.communicate(timeout=WAIT_S)
     said = {line.partition(":")[0]: line for line in out.splitlines()}
     assert process.returncode == 2 and err == "" and out.splitlines()[-1] == "8 faces: 5 done, 3 stopped", out + err
+    assert set(said) == {*"abcdefgh", "8 faces"}, "nothing of Ray's own"
     assert "head stopped: The face is not there. Film it." in said["b"] and "There is no video" in said["c"]
     assert f"Another worker (process {os.getpid()}" in said["d"]
     assert states(batch) == dict.fromkeys("aefgh", DONE) | {"b": STOPPED, "c": TO_DO, "d": TO_DO} and finished(batch)["h"] == once

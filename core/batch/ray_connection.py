@@ -15,7 +15,7 @@ from pathlib import Path
 
 from ..contract.messages import Problem
 
-QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_BACKEND_LOG_LEVEL": "fatal", "RAY_DEDUP_LOGS": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
+QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_BACKEND_LOG_LEVEL": "fatal", "RAY_DEDUP_LOGS_SKIP_REGEX": "^", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
 """Ray tells nobody of its use, and nothing on our terminal."""
 REACH_S, JOIN_S = 3.0, 12.0
 """How long a head node may take to answer at all, and then to take us in: Ray itself would try for minutes."""
