@@ -75,7 +75,7 @@ site: zip
 
 # The worker's packages by the lock of this platform and Python, as Install Solver brings them. The tests need Blender's module besides, which asks for another
 # NumPy than ours and works with it.
-$(VENV)/installed: requirements/worker.txt requirements/test.txt requirements/blender.txt $(wildcard requirements/locks/*.txt)
+$(VENV)/installed: requirements/worker.txt requirements/test.txt requirements/farm.txt requirements/blender.txt $(wildcard requirements/locks/*.txt)
 	test ! -f $(VENV)/installed || touch $(VENV)/wildcap_compute.txt  # one that an older Makefile made is ours, too
 	$(PYTHON) -m core install $(VENV) --compute cpu --packages pip $(if $(WHEELS),--wheels $(WHEELS))
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/test.txt

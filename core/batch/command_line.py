@@ -51,6 +51,7 @@ def add_commands(commands) -> None:
         run.add_argument("--on", choices=("local", "ray"), default="local", help="this machine, or a cluster of Ray's")
         run.add_argument("--address", help="Ray's head node, as `ray start` tells it; without it, this machine becomes a cluster of one")
         run.add_argument("--at-once", metavar="N", type=int, default=1, help="faces that this machine works on at the same time")
+        run.add_argument("--cores", metavar="N", type=int, default=2, help="cores that each task takes of Ray's nodes: the same number gives the same bytes")
         run.add_argument("--until", choices=[group.name for group in GROUPS], help="end each face with this task")
         run.set_defaults(command=_run, retry=word == "retry")
     status = many.add_parser("status", help="say how far each face is")
@@ -113,13 +114,15 @@ def _run(options: argparse.Namespace) -> int:
     faces = [batch.face(name) for name in dict.fromkeys(options.names)] or list(batch.faces)
     if options.at_once < 1:
         raise Problem("--at-once is less than one.", "Leave it out, or give the number of faces at the same time.")
+    if options.cores < 1:
+        raise Problem("--cores is less than one.", "Leave it out, or give the number of cores that each task takes of a node of Ray's.")
     if options.address and options.on != "ray":
         raise Problem("--address goes with --on ray only.", "Add --on ray, or leave --address out.")
     with lease.hold(batch.root, _tell, "batch"), known_hashes(batch.root):
         if options.on == "ray":
             from .ray_cluster import run_on_ray
 
-            tally = run_on_ray(batch, faces, options.retry, _tell, options.until, options.address)
+            tally = run_on_ray(batch, faces, options.retry, _tell, options.until, options.address, options.cores)
         else:
             tally = run_local(batch, faces, options.at_once, options.retry, _tell, options.until)
     return _sum_up(tally, len(faces))

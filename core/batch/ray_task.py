@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a node of Ray's does of a batch: shows that it can, and runs the tasks it is given. Ray itself is not needed here. Standard library only.
+
+What goes back and forth are plain values: an outcome is {"state", "words", "seconds", "host"}. BATCH/logs/HOST.jsonl says, stage by stage, what a node began
+and what it finished; nothing is ever derived from it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import json
+import os
+import signal
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from .. import __version__
+from ..contract.capture import Capture
+from ..contract.hashes import hash_file
+from ..contract.lease import TERM_S
+from ..contract.messages import Cancelled, Done, Failed, Message, Problem, Progress, StageDone, to_line
+from .groups import group_named
+from .local import CANCELLED, EVERY_S, is_left
+from .record import NAME, Batch, read_batch
+from .state import DONE, STOPPED, WAITING, State, waits
+from .task import run_task
+
+BATCHES = "WILDCAP_BATCHES"
+"""Environment variable of a node: the folder in which the batches lie there, where that is another one than where they are run from."""
+LOGS = "logs"
+
+
+def find_batch(root: str) -> Batch:
+    """The batch whose folder is `root` on the machine that runs it, as this node sees it. Raises Problem."""
+    folder = os.environ.get(BATCHES)
+    return read_batch(Path(folder) / Path(root).name if folder else root)
+
+
+def examine(root: str, version: str, record: str) -> str:
+    """What keeps this node from working on the batch, '' for nothing. `version` is WildCap's where the batch is run from, `record` the hash of batch.json."""
+    host = socket.gethostname()
+    if __version__ != version:
+        return f"The node {host} has WildCap {__version__}, and this is {version}."
+    if importlib.util.find_spec("torch") is None:
+        return f"The Python of Ray's node {host} has no torch."
+    try:
+        if hash_file(find_batch(root).root / NAME) != record:
+            return f"The node {host} sees another batch at {find_batch(root).root}."
+    except (Problem, OSError) as error:
+        return f"The node {host} does not see the batch: {error.problem if isinstance(error, Problem) else error}"
+    return ""
+
+
+def do_task(root: str, name: str, group_name: str, threads: int, ours: bool, say: Callable[[str], None]) -> dict:
+    """Runs a task of a face and returns how it ended. `say` hears of its progress, as lines of JSON. `ours`: nobody else worked on the capture when the batch
+    was run, so who holds it can only be a task of ours whose node or process has died, and is waited for."""
+    began, stopped, outcome = time.monotonic(), [], {"state": STOPPED, "words": "", "host": socket.gethostname()}
+    before = signal.signal(signal.SIGINT, lambda number, frame: stopped.append(number))  # as which Ray's cancel arrives
+    try:
+        batch, group = find_batch(root), group_named(group_name)
+        face = batch.face(name)
+        if waits(batch, face, group):
+            return {**outcome, "state": WAITING, "words": State(WAITING, group).words(), "seconds": 0.0}
+        if ours:
+            _outlast(face.capture, stopped)
+        final = run_task(batch, face, group, _listener(batch, name, say), lambda: bool(stopped), threads)
+        if isinstance(final, Done) and is_left(batch, face, group):
+            final = Failed("", f"The task {group.name} ended well, and its result is not what was asked for.", "Look whether another program writes there.")
+    except Problem as problem:
+        final = Failed("", problem.problem, problem.remedy)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    outcome["state"] = {Done: DONE, Cancelled: CANCELLED, Failed: STOPPED}[type(final)]
+    outcome["words"] = f"{final.problem} {final.remedy}" if isinstance(final, Failed) else ""
+    return {**outcome, "seconds": round(time.monotonic() - began, 2)}
+
+
+def _outlast(capture: Capture, stopped: list) -> None:
+    """Waits until the worker of a Ray process that was killed beside us has ended, too, or that of a node that has gone has not been heard of for a term."""
+    deadline = time.monotonic() + 2 * TERM_S
+    while capture.lock.exists() and not stopped:
+        try:
+            with capture.locked():
+                return
+        except Problem:
+            if time.monotonic() > deadline:
+                raise
+            time.sleep(0.5)
+
+
+def _listener(batch: Batch, name: str, say: Callable[[str], None]) -> Callable[[Message], None]:
+    """Passes a worker's progress on, once in a while, and keeps the account of the stages."""
+    said = [0.0]
+    account = batch.root / LOGS / f"{socket.gethostname()}.jsonl"
+
+    def hear(message: Message) -> None:
+        begins = isinstance(message, Progress) and (message.done, message.text) == (0, "Starting")
+        if begins or isinstance(message, Progress) and time.monotonic() - said[0] > EVERY_S:
+            said[0] = time.monotonic()
+            say(to_line(message))
+        if begins or isinstance(message, StageDone) and not message.skipped:
+            line = {"at": round(time.time(), 2), "face": name, "stage": message.stage, "finished": isinstance(message, StageDone), "pid": os.getpid()}
+            with contextlib.suppress(OSError):
+                account.parent.mkdir(exist_ok=True)
+                with open(account, "a", encoding="utf-8") as file:
+                    file.write(json.dumps(line) + "\n")
+
+    return hear
