@@ -157,7 +157,8 @@ class _Shaped(torch.autograd.Function):
         with torch.enable_grad():
             x = x.detach().requires_grad_()
             inner = functional.gelu(norm(x, mapped))
-        gradient = torch.nn.grad.conv2d_input(inner.shape, convolution.weight, gradient, padding=convolution.padding)
+        gradient, _, _ = torch.ops.aten.convolution_backward(gradient, inner.detach(), convolution.weight, None, convolution.stride, convolution.padding,
+                                                             convolution.dilation, False, [0, 0], 1, [True, False, False])
         return torch.autograd.grad(inner, x, gradient)[0], None, None, None
 
 
