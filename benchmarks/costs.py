@@ -2,12 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Time and memory of the whole chain on the sample video, stage by stage, and how they grow with resolution, grid, views and frames.
 
-    python -m benchmarks.costs WORK --json OUT.json [--rows standard draft solve-2048 ...] [--capture CAPTURE] [--limit-s 600] [--again]
+    python -m benchmarks.costs WORK --json OUT.json [--rows standard draft solve-2048 ...] [--capture CAPTURE] [--film VIDEO] [--limit-s 600] [--again]
 
 Every stage runs in a process of its own (benchmarks/stage_cost.py). "standard" goes from the video to the delivery; the other rows start from a copy of what
 it made in WORK, or of --capture. OUT.json is written after each stage: the same command goes on where it was stopped. A stage that takes longer than --limit-s
-is ended and told as "over"; one beside which other processes took more than 0.2 cores is told with that, and is measured once more with --again. 30 frames are
-taken from the sample's 60; 120 and 300 are the sample's played to and fro, with new noise in every frame: more pictures to work on, not more to see.
+is ended and told as "over"; one beside which other processes took more than 0.2 cores is told with that, and is measured once more with --again. "float32" is
+the standard solve and 4K stage with the networks as a processor without bfloat16 runs them. The rows frames-N are the whole chain on N frames of --film, such as
+that of benchmarks.long_films; without it, of the sample's 60 played to and fro, with new noise in every frame: more pictures to work on, not more to see.
+Exponents are fits of the logarithm of the processor's seconds to that of the size, over as many points as are told: for a map's side 2 is linear in texels.
 """
 
 from __future__ import annotations
@@ -44,32 +46,36 @@ LEFT_OUT = shutil.ignore_patterns("maps*", "checkpoints", "comparison", "deliver
 @dataclass(frozen=True)
 class Row:
     """What is run: these stages in order, with the settings {stage: {name: value}} over the preset `quality`. frames: of a video of so many frames, from
-    nothing; views: so many of the frames are selected (V)."""
+    nothing; views: so many of the frames are selected (V); float32: whatever the processor can do, the networks compute in that."""
 
     stages: tuple[str, ...]
     settings: dict = field(default_factory=dict)
     quality: str = "standard"
     frames: int = 0
     views: int = 0
+    float32: bool = False
 
 
+LENGTHS = (60, 120, 300, 1000)
 ROWS = {
     "standard": Row(stages.NAMES),
     "draft": Row(stages.NAMES[stages.NAMES.index("scan"):], quality="draft"),  # frames and cameras have the same settings in both
+    "float32": Row(("solve", "upscale"), float32=True),
     **{f"solve-{size}": Row(("solve",), {"solve": {"size": size}}) for size in (512, 2048)},
     **{f"texture-{size}": Row(("texture",), {"texture": {"size": size}}) for size in (512, 2048)},
     **{f"grid-{cells}": Row(("solve",), {"solve": {"grid_cells": cells}}) for cells in (384, 1, 24)},
-    "frames-30": Row(("frames", "cameras", "scan"), {"frames": {"max_frames": 30}}, frames=30),
     **{f"views-{count}": Row(("delight", "texture"), views=count) for count in (8, 32)},
-    **{f"frames-{count}": Row(("frames", "cameras", "scan"), {"frames": {"max_frames": count}}, frames=count) for count in (120, 300)},
+    **{f"frames-{count}": Row(stages.NAMES, {"frames": {"max_frames": count}}, frames=count) for count in LENGTHS},
 }
 """In the order of what matters most."""
+WHOLES = ("standard", "float32", "draft", *(f"frames-{count}" for count in LENGTHS))
+"""Rows that are a whole chain, with the standard row's costs of the stages they do not measure."""
 GROWTH = (
     ("side of the map", (512, 1024, 2048), {"texture": ("texture-512", "standard", "texture-2048"), "solve": ("solve-512", "standard", "solve-2048"),
                                             "upscale": ("draft", "standard", "")}),
     ("cells of the light grid", (1, 24, 96, 384), {"solve": ("grid-1", "grid-24", "standard", "grid-384")}),
     ("views", (8, 16, 32), dict.fromkeys(("delight", "texture"), ("views-8", "standard", "views-32"))),
-    ("frames", (30, 60, 120, 300), dict.fromkeys(("frames", "cameras", "scan"), ("frames-30", "standard", "frames-120", "frames-300"))),
+    ("frames", LENGTHS, dict.fromkeys(stages.NAMES, tuple(f"frames-{count}" for count in LENGTHS))),
 )
 """What the tables of growth show: a setting, its values, and for each stage the rows that measured it there."""
 
@@ -80,6 +86,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, required=True)
     parser.add_argument("--rows", nargs="+", choices=tuple(ROWS), default=list(ROWS))
     parser.add_argument("--capture", type=Path, help="a finished capture of the sample to copy, for rows without the row standard")
+    parser.add_argument("--film", type=Path, help="a long video, for the rows frames-N")
     parser.add_argument("--limit-s", type=float, default=600, help="seconds that a stage may take")
     parser.add_argument("--again", action="store_true", help="measure once more what other processes disturbed")
     options = parser.parse_args()
@@ -111,7 +118,7 @@ def measured(name: str, options: argparse.Namespace) -> bool:
     source = prepare(row, capture, options)
     for stage in left if begun else row.stages:
         print(f"{name}: {stage} ...", end=" ", flush=True)
-        cost = stage_cost.measure(capture, stage, source, row.quality, row.settings, options.limit_s)
+        cost = stage_cost.measure(capture, stage, source, row.quality, row.settings, options.limit_s, row.float32)
         if "problem" in cost:
             print(cost["problem"], cost["remedy"])
             return False
@@ -119,7 +126,8 @@ def measured(name: str, options: argparse.Namespace) -> bool:
         if known is None or "over_s" not in cost and (cost["others"] or 0) <= (known["others"] or 0):
             costs[stage] = cost
         print(cell(cost), flush=True)
-        found["together"] = {quality: whole for quality in ("standard", "draft") if (whole := together(found, quality))}
+        found["together"] = {whole: costs_of for whole in WHOLES if (costs_of := together(found, whole))}
+        found["growth"] = {title: exponents for title, values, grown in GROWTH if (exponents := growth(found, values, grown))}
         figures.write(options.json, "costs", "python -m benchmarks.costs WORK --json OUT.json", found)
         if "over_s" in cost:
             break
@@ -143,6 +151,8 @@ def prepare(row: Row, capture: Path, options: argparse.Namespace) -> Path:
             shutil.copytree(base, folder, ignore=LEFT_OUT, dirs_exist_ok=True)
             if row.views:
                 select(Capture(folder), row.views)
+    if row.frames and options.film:
+        return options.film
     if row.frames <= length(VIDEO):
         return VIDEO
     video = options.work / f"frames-{row.frames}.mp4"
@@ -193,33 +203,51 @@ def machine() -> dict:
             "networks": str(fast_dtype("cpu")).removeprefix("torch.")}
 
 
-def together(found: dict, quality: str) -> dict | None:
-    """Minutes, peak memory and the most that others took, over all stages of a quality; None where one was not measured."""
-    costs = [stage_of(found, quality, stage) for stage in stages.NAMES]
+def together(found: dict, whole: str) -> dict | None:
+    """Minutes, the processor's minutes, peak memory and the most that others took, over all stages of a row of WHOLES; None where one was not measured."""
+    costs = [stage_of(found, whole, stage) for stage in stages.NAMES]
     if any(cost is None or "over_s" in cost for cost in costs):
         return None
     others = [cost["others"] for cost in costs if cost["others"] is not None]
-    return {"minutes": round(sum(cost["seconds"] for cost in costs) / 60, 1), "peak_mb": max(cost["peak_mb"] for cost in costs),
-            "others": max(others) if others else None}
+    return {"minutes": round(sum(cost["seconds"] for cost in costs) / 60, 1), "processor_minutes": round(sum(cost["processor_s"] for cost in costs) / 60, 1),
+            "peak_mb": max(cost["peak_mb"] for cost in costs), "others": max(others) if others else None}
 
 
-def stage_of(found: dict, quality: str, stage: str) -> dict | None:
-    """A stage's cost in a quality; the standard one's where the draft does the same."""
-    given = "standard" if stage not in ROWS[quality].stages else quality
-    return found.get(given, {}).get(stage)
+def stage_of(found: dict, whole: str, stage: str) -> dict | None:
+    """A stage's cost in a row of WHOLES; the standard one's where it does the same."""
+    return found.get(whole if stage in ROWS[whole].stages else "standard", {}).get(stage)
+
+
+def growth(found: dict, values: tuple[int, ...], grown: dict[str, tuple[str, ...]]) -> dict[str, dict]:
+    """Stage -> the power of the size with which its processor seconds grow, and the number of sizes it was fitted to; stages with fewer than two are left out."""
+    exponents = {}
+    for stage, rows in grown.items():
+        known = [(value, cost["processor_s"]) for value, row in zip(values, rows, strict=True) if "processor_s" in (cost := found.get(row, {}).get(stage, {}))]
+        if len(known) > 1:
+            exponents[stage] = {"exponent": round(float(np.polyfit(*np.log(known).T, 1)[0]), 2), "points": len(known)}
+    return exponents
 
 
 def table(found: dict) -> str:
     """The Markdown tables: the chain stage by stage, then what grows with what."""
-    chain = [[stage, *(cell(stage_of(found, quality, stage)) for quality in ("standard", "draft"))] for stage in stages.NAMES]
-    wholes = [found.get("together", {}).get(quality) for quality in ("standard", "draft")]
-    chain.append(["**together**", *(whole and f"**{whole['minutes']:.1f} min, {whole['peak_mb'] / 1000:.1f} GB**" for whole in wholes)])
-    tables = [figures.markdown(["stage: seconds, peak memory", "standard", "draft"], chain)]
+    shown = WHOLES[:3]
+    chain = [[stage, *(cell(stage_of(found, whole, stage)) for whole in shown)] for stage in stages.NAMES]
+    tables = [figures.markdown(["stage: seconds, peak memory", *shown], [*chain, ["**together**", *(whole_cell(found, whole) for whole in shown)]])]
     for title, values, grown in GROWTH:
-        known = {stage: [cell(found.get(row, {}).get(stage)) for row in rows] for stage, rows in grown.items()}
-        if any(sum(text is not None for text in cells) > 1 for cells in known.values()):  # one value alone tells of no growth
-            tables.append(figures.markdown([title, *map(str, values)], [[stage, *cells] for stage, cells in known.items()]))
+        exponents = found.get("growth", {}).get(title, {})
+        if exponents:  # one value alone tells of no growth
+            rows = [[stage, *(cell(found.get(row, {}).get(stage)) for row in rows), exponents.get(stage) and "{exponent:.2f} ({points})".format(**exponents[stage])]
+                    for stage, rows in grown.items()]
+            if title == "frames":
+                rows.append(["**together**", *(whole_cell(found, f"frames-{count}") for count in values), None])
+            tables.append(figures.markdown([title, *map(str, values), "exponent (points)"], rows))
     return "\n\n".join(tables)
+
+
+def whole_cell(found: dict, whole: str) -> str | None:
+    """What a table says of a whole chain."""
+    known = found.get("together", {}).get(whole)
+    return known and f"**{known['minutes']:.1f} min, {known['peak_mb'] / 1000:.1f} GB**"
 
 
 def cell(cost: dict | None) -> str | None:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What one stage of the chain costs, run in a process of its own: `python -m benchmarks.stage_cost CAPTURE STAGE [JOB]`.
 
-Runs it even where it is fresh, and no other. JOB is JSON: {"source", "quality", "settings"}, none of it needed. The last line of the output is JSON:
+Runs it even where it is fresh, and no other. JOB is JSON: {"source", "quality", "settings", "float32"}, none of it needed. The last line of the output is JSON:
 {"seconds", "peak_mb"}, or {"problem", "remedy"} where it could not end well. `measure` starts that process and adds what else the machine did.
 """
 
@@ -29,15 +29,16 @@ COUNTERS = Path("/proc/stat")
 """Linux's counters of what its processors did (proc(5))."""
 
 
-def measure(capture: Path, stage: str, source: Path | str = "", quality: str = "standard", settings: dict | None = None, limit_s: float | None = None) -> dict:
+def measure(capture: Path, stage: str, source: Path | str = "", quality: str = "standard", settings: dict | None = None, limit_s: float | None = None,
+            float32: bool = False) -> dict:
     """Runs a stage of a capture: {"seconds", "processor_s", "peak_mb", "load", "others"}; {"problem", "remedy"} where it failed; {"over_s", "load"}
     where it was ended after `limit_s` seconds.
 
     seconds: of the stage, the import of its libraries included; processor_s: summed over the threads of its processes; peak_mb: of the largest of them;
     load: the machine's load average (one minute) before; others: cores that all other processes took meanwhile (the hypervisor's share included),
-    None where the system does not count them. `settings` ({stage: {name: value}}) lie over the preset `quality`, and may lie out of their ranges.
+    None where the system does not count them. float32: the networks compute in that though the processor multiplies bfloat16. `settings` ({stage: {name: value}}) lie over the preset `quality`, and may lie out of their ranges.
     """
-    job = json.dumps({"source": str(source), "quality": quality, "settings": settings or {}})
+    job = json.dumps({"source": str(source), "quality": quality, "settings": settings or {}, "float32": float32})
     load, busy, own, began = round(os.getloadavg()[0], 2), busy_s(), own_s(), time.monotonic()
     child = subprocess.Popen([sys.executable, "-m", "benchmarks.stage_cost", str(capture), stage, job], cwd=ROOT, stdout=subprocess.PIPE, text=True,
                              encoding="utf-8", start_new_session=True)
@@ -82,6 +83,10 @@ def own_s() -> tuple[float, float]:
 def run(capture: str, stage: str, job: str = "{}") -> dict:
     """Runs a stage in this very process: {"seconds", "peak_mb"}, or {"problem", "remedy"}."""
     finished, asked, capture = [], json.loads(job), Capture(Path(capture))
+    if asked.get("float32"):
+        import torch
+
+        torch.cpu._is_avx512_bf16_supported = lambda: False
     try:
         step, settings = by_name(stage), over(preset(asked.get("quality", "standard")), asked.get("settings", {}))
         with capture.locked():

@@ -25,23 +25,31 @@ def lines(text):
 
 def test_table_says_what_was_measured_what_not_and_what_was_disturbed():
     found = {"machine": {}, "standard": {**dict.fromkeys(stages.NAMES, DONE), "solve": {**DONE, "others": 0.74}}, "draft": {"solve": {**DONE, "seconds": 3.6}},
-             "solve-2048": {"solve": {"over_s": 600.0, "load": 0.0}}, "frames-30": {"frames": {**DONE, "others": None}}}
-    found["together"] = {"standard": costs.together(found, "standard")}
+             "solve-2048": {"solve": {"over_s": 600.0, "load": 0.0}}, "solve-512": {"solve": {**DONE, "processor_s": 5.0}},
+             "frames-60": {"frames": {**DONE, "others": None}}}
+    found["together"] = {whole: costs.together(found, whole) for whole in ("standard", "float32")}
     assert costs.together(found, "draft") is None, "a stage of it was not measured"
-    assert found["together"]["standard"] == {"minutes": 2.1, "peak_mb": 1640, "others": 0.74}
+    assert found["together"]["standard"] == {"minutes": 2.1, "processor_minutes": 3.3, "peak_mb": 1640, "others": 0.74}
+    found["growth"] = {title: costs.growth(found, values, grown) for title, values, grown in costs.GROWTH}
     text = costs.table(found)
-    chain, sides, frames = map(lines, text.split("\n\n"))
-    assert chain["frames"] == ["12 s, 1.6 GB", "12 s, 1.6 GB"], "the draft's frames are the standard's"
-    assert chain["upscale"] == ["12 s, 1.6 GB", "-"] and chain["together"] == ["**2.1 min, 1.6 GB**", "-"]
-    assert chain["solve"] == ["12 s, 1.6 GB (20 s of processor; others took 0.7 cores)", "4 s, 1.6 GB"]
-    assert sides["solve"] == ["-", chain["solve"][0], "over 600 s"] and sides["upscale"] == ["-", "12 s, 1.6 GB", "-"]
-    assert frames["frames"] == ["12 s, 1.6 GB", "12 s, 1.6 GB", "-", "-"]
-    assert "cells" not in text and "views" not in text, "where only the standard was measured nothing is seen to grow"
+    chain, sides = map(lines, text.split("\n\n"))
+    assert chain["frames"] == ["12 s, 1.6 GB"] * 3, "those of float32 and of the draft are the standard's"
+    assert chain["scan"] == ["12 s, 1.6 GB", "12 s, 1.6 GB", "-"] and chain["together"] == ["**2.1 min, 1.6 GB**", "-", "-"]
+    assert chain["solve"] == ["12 s, 1.6 GB (20 s of processor; others took 0.7 cores)", "-", "4 s, 1.6 GB"]
+    assert sides["solve"] == ["12 s, 1.6 GB", chain["solve"][0], "over 600 s", "2.00 (2)"] and sides["upscale"] == ["-", "12 s, 1.6 GB", "-", "-"]
+    assert "cells" not in text and "views" not in text, "where only one size was measured nothing is seen to grow"
+
+
+@pytest.mark.parametrize("power", [0.0, 1.0, 2.5])
+def test_the_exponent_is_that_of_the_growth(power):
+    found = {f"frames-{count}": {"cameras": {**DONE, "processor_s": 3 * count**power}} for count in (60, 120, 1000)}
+    _, values, grown = next(entry for entry in costs.GROWTH if entry[0] == "frames")
+    assert costs.growth(found, values, grown) == {"cameras": {"exponent": power, "points": 3}}
 
 
 def test_every_row_is_in_a_table():
     shown = {(row, stage) for _, _, grown in costs.GROWTH for stage, rows in grown.items() for row in rows}
-    assert {(name, stage) for name, row in costs.ROWS.items() if name not in ("standard", "draft") for stage in row.stages} <= shown
+    assert {(name, stage) for name, row in costs.ROWS.items() if name not in costs.WHOLES[:3] for stage in row.stages} <= shown
     assert all(len(rows) == len(values) and set(rows) <= {*costs.ROWS, ""} for _, values, grown in costs.GROWTH for rows in grown.values())
 
 
@@ -75,7 +83,7 @@ def test_stage_that_fails_and_stage_that_takes_too_long_are_told(tmp_path):
 
 
 def test_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
-    asked, options = [], costs.argparse.Namespace(work=tmp_path, json=tmp_path / "costs.json", capture=None, limit_s=600, again=False)
+    asked, options = [], costs.argparse.Namespace(work=tmp_path, json=tmp_path / "costs.json", capture=None, film=costs.VIDEO, limit_s=600, again=False)
     found_on = costs.machine()
 
     def measure(capture, stage, *given):
@@ -84,12 +92,14 @@ def test_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
         return {"problem": "The disk is full.", "remedy": "Free some space."} if stage == "scan" and asked.count("scan") == 1 else DONE
 
     monkeypatch.setattr(stage_cost, "measure", measure)
-    assert not costs.measured("frames-30", options), "the scan failed"
-    assert costs.measured("frames-30", options) and asked == ["frames", "cameras", "scan", "scan"]
-    assert costs.measured("frames-30", options) and len(asked) == 4, "all is there"
-    assert figures.read("costs", tmp_path)["figures"]["frames-30"] == dict.fromkeys(("frames", "cameras", "scan"), DONE)
+    chain = list(stages.NAMES)
+    assert not costs.measured("frames-120", options), "the scan failed"
+    assert costs.measured("frames-120", options) and asked == [*chain[:3], *chain[2:]]
+    assert costs.measured("frames-120", options) and len(asked) == len(chain) + 1, "all is there"
+    record = figures.read("costs", tmp_path)["figures"]
+    assert record["frames-120"] == dict.fromkeys(chain, DONE) and record["together"]["frames-120"]["minutes"] == 2.1
     options.again = True
-    assert costs.measured("frames-30", options) and len(asked) == 4, "nothing disturbed it"
+    assert costs.measured("frames-120", options) and len(asked) == len(chain) + 1, "nothing disturbed it"
     with pytest.raises(costs.Problem, match="row standard first"):
         costs.measured("solve-512", options)
     monkeypatch.setattr(costs, "machine", lambda: {**found_on, "cores": 1000})
@@ -98,7 +108,7 @@ def test_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
 
 
 def test_what_was_disturbed_is_measured_once_more_and_the_better_one_kept(tmp_path, monkeypatch):
-    options = costs.argparse.Namespace(work=tmp_path, json=tmp_path / "costs.json", capture=None, limit_s=600, again=True)
+    options = costs.argparse.Namespace(work=tmp_path, json=tmp_path / "costs.json", capture=None, film=None, limit_s=600, again=True)
     busy = {"frames": [0.1], "cameras": [0.9, 1.5, 0.3, 0.0], "scan": [0.0]}
     capture = tmp_path / "standard.wildcap"
     monkeypatch.setitem(costs.ROWS, "standard", costs.Row(("frames", "cameras", "scan")))

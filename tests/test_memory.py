@@ -107,6 +107,26 @@ def test_other_errors_are_not_taken_for_a_lack_of_memory():
     assert prior.calls == 2 and not prior.network.low_memory
 
 
+@pytest.mark.parametrize("norm", ["pixel", "group"])
+def test_a_network_that_does_not_learn_keeps_less_for_the_same_gradient(norm, monkeypatch):
+    torch.manual_seed(0)
+    network = UNet(3, 2, 32, [1, 2], [32, 32], [False, True], norm=norm)
+    for parameter in network.parameters():
+        torch.nn.init.normal_(parameter, std=0.1)
+    network.requires_grad_(False)
+    found = []
+    for sparing in (True, False):
+        if not sparing:
+            monkeypatch.setattr("core.solve.network._Shaped.of", lambda norm, convolution, x, mapped: convolution(torch.nn.functional.gelu(norm(x, mapped))))
+        x, kept = torch.linspace(-1, 1, 5 * 32 * 32).reshape(1, 5, 32, 32).requires_grad_(), {}
+        with torch.autograd.graph.saved_tensors_hooks(lambda saved, kept=kept: (kept.update({saved.data_ptr(): saved.nbytes}), saved)[1], lambda saved: saved):
+            out = network(x, torch.tensor([0.5]))
+        maps = sum(size for size in kept.values() if size >= 32 * 16 * 16 * 4)
+        found.append((out.detach(), torch.autograd.grad(out.square().sum(), x)[0], maps))
+    assert torch.equal(found[0][0], found[1][0]) and torch.equal(found[0][1], found[1][1]) and found[0][1].abs().max() > 0
+    assert found[0][2] < 0.6 * found[1][2]
+
+
 def test_the_stage_falls_back_and_its_maps_are_the_same(tmp_path, monkeypatch):
     """The shipped network: plain, failing once, and with the setting."""
     options = {"guidance": "dps", "steps": 4}

@@ -182,6 +182,29 @@ def test_the_network_ends_at_any_size(busy, monkeypatch, size):
     assert 0 <= large[..., :3].min() and large[..., :3].max() <= 1
 
 
+def test_a_cancel_ends_the_writing_and_leaves_nothing(tmp_path):
+    """Between two strips of rows of whatever is being written."""
+    asked = []
+
+    def cancelled():
+        asked.append(1)
+        if len(asked) > 2:
+            raise CancelledError("upscale")
+
+    with pytest.raises(CancelledError):
+        upscale._write_together([lambda: images.write_data(tmp_path / f"{i}.png", np.zeros((4 * images.ROWS, 8)), check=cancelled) for i in range(3)],
+                                lambda done: None)
+    assert not list(tmp_path.iterdir()) and len(asked) <= 5, "what had not begun did not begin"
+
+
+def test_a_map_of_many_strips_is_whole(tmp_path):
+    for rows in (images.ROWS - 1, images.ROWS, 2 * images.ROWS + 7):
+        truth = np.linspace(0, 1, 3 * rows * 5, dtype=np.float32).reshape(rows, 5, 3)
+        images.write_data(tmp_path / "a.png", truth, bits=16)
+        images.write_data(tmp_path / "a.exr", truth)
+        assert np.abs(images.read_data(tmp_path / "a.png") - truth).max() < 1e-5 and np.abs(images.read_data(tmp_path / "a.exr") - truth).max() < 1e-3
+
+
 def test_missing_weights_are_told(tmp_path):
     with pytest.raises(Problem, match="weights are missing"):
         load_network(tmp_path / "upscaler.safetensors")

@@ -49,7 +49,7 @@ def interpolate(values: np.ndarray, corners: np.ndarray, face: np.ndarray, bary:
 
 def bleed(image: np.ndarray, known: np.ndarray) -> np.ndarray:
     """[H, W(, C)] with every unknown texel given its nearest known one's value, so that filtering meets no black seam."""
-    if not known.any():
+    if known.all() or not known.any():
         return image
     _, labels = cv2.distanceTransformWithLabels((~known).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
     nearest = np.zeros(labels.max() + 1, np.int64)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import errno
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -27,6 +28,17 @@ EXIF = {heif.FOCAL_LENGTH: "FocalLength", heif.FOCAL_35MM: "FocalLengthIn35mmFil
 """EXIF's tags -> what OpenImageIO calls them."""
 TURNS = {1: (False, 1, 1), 2: (False, 1, -1), 3: (False, -1, -1), 4: (False, -1, 1), 5: (True, 1, 1), 6: (True, 1, -1), 7: (True, -1, -1), 8: (True, -1, 1)}
 """EXIF orientation -> how it comes upright: whether rows become columns, then the order of rows and of columns. (OpenImageIO's reorient mistakes 5 for 7.)"""
+
+QUICK = {"level": 1, "filter": 0x20}
+"""zlib's level and libpng's filter (each row less the one above it) of pictures that are not shipped: of what was tried on the solved maps
+(`python -m benchmarks.png_levels`) the quickest that is hardly larger than libpng's own choice of filters."""
+
+ROWS = 256
+"""Rows that are encoded between two looks at a cancel: 0.3 s of a map of 4096; a multiple of what EXR packs together (16)."""
+
+
+def _never() -> None:
+    """Nobody cancels."""
 
 
 def srgb_to_linear(srgb: np.ndarray) -> np.ndarray:
@@ -119,23 +131,24 @@ def write_packed(path: Path, channels: np.ndarray, bits: int = 8, srgb: bool = F
     _write(path, channels, "half" if _is_linear(path) else f"uint{bits}", "sRGB" if srgb else "raw", straight=True)
 
 
-def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8, quality: int = 92, small: bool = False) -> None:
+def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8, quality: int = 92, small: bool = False, check: Callable[[], None] = _never) -> None:
     """sRGB [H, W, 3 or 4] (alpha stays as it is) to PNG (8 or 16 bit) or JPEG (8 bit, of that quality), atomically.
 
     `small`, here and below: what is shipped is packed as tightly as it goes, at ten times the time; an EXR loses what the eye does not see (DWAA).
+    `check` may raise to cancel, every few rows; then nothing is written.
     """
     check_written(Path(path), np.asarray(srgb), half=False)  # clipped, infinity would be white
-    _write(path, np.clip(srgb, 0, 1), f"uint{bits}", "sRGB", quality, small=small)
+    _write(path, np.clip(srgb, 0, 1), f"uint{bits}", "sRGB", quality, small=small, check=check)
 
 
-def write_linear(path: Path, linear: np.ndarray, small: bool = False) -> None:
+def write_linear(path: Path, linear: np.ndarray, small: bool = False, check: Callable[[], None] = _never) -> None:
     """Linear [H, W, C] to a half-float ZIP EXR, or in [0, 1] to a 16 bit PNG, atomically."""
-    _write(path, linear, "half" if _is_linear(path) else "uint16", "lin_srgb", small=small)
+    _write(path, linear, "half" if _is_linear(path) else "uint16", "lin_srgb", small=small, check=check)
 
 
-def write_data(path: Path, data: np.ndarray, bits: int = 8, small: bool = False) -> None:
+def write_data(path: Path, data: np.ndarray, bits: int = 8, small: bool = False, check: Callable[[], None] = _never) -> None:
     """Data [H, W] or [H, W, C] in [0, 1] to PNG (8 or 16 bit), or to a half-float EXR, atomically; no colour space."""
-    _write(path, data, "half" if _is_linear(path) else f"uint{bits}", "raw", small=small)
+    _write(path, data, "half" if _is_linear(path) else f"uint{bits}", "raw", small=small, check=check)
 
 
 def resize(image: np.ndarray, width: int, height: int) -> np.ndarray:
@@ -160,7 +173,8 @@ def _read(path: Path) -> np.ndarray:
     return np.ascontiguousarray((pixels.swapaxes(0, 1) if lying else pixels)[::rows, ::columns])
 
 
-def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str, quality: int = 92, straight: bool = False, small: bool = False) -> None:
+def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str, quality: int = 92, straight: bool = False, small: bool = False,
+           check: Callable[[], None] = _never) -> None:
     path = Path(path)
     pixels = np.ascontiguousarray(pixels if pixels.ndim == 3 else pixels[..., None], np.float32)
     check_written(path, pixels, kind == "half")
@@ -175,11 +189,13 @@ def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str, quality
     elif path.suffix.lower() in (".jpg", ".jpeg"):
         spec.attribute("Compression", f"jpeg:{quality}")
     else:
-        spec.attribute("png:compressionLevel", 9 if small else 3)
+        spec.attribute("png:compressionLevel", 9 if small else QUICK["level"])
+        if not small:
+            spec.attribute("png:filter", QUICK["filter"])
     with replacing(path) as temporary:
         _need_space(temporary.parent, pixels.size * (1 if kind == "uint8" else 2))
         output = oiio.ImageOutput.create(str(temporary))
-        if output is None or not output.open(str(temporary), spec) or not output.write_image(pixels) or not output.close():
+        if output is None or not output.open(str(temporary), spec) or not _write_rows(output, pixels, check) or not output.close():
             error = (output.geterror() if output else oiio.geterror()) or "unknown error"
             # OpenImageIO gives text only: touching the folder ourselves turns a full or read-only disk into its OSError
             with open(temporary, "ab") as file:
@@ -188,6 +204,15 @@ def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str, quality
             raise OSError(0, error.strip())
         if path.suffix.lower() == ".png" and not _has_end(temporary):
             raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def _write_rows(output: oiio.ImageOutput, pixels: np.ndarray, check: Callable[[], None]) -> bool:
+    """Whether all rows could be written. A map of 4096 takes seconds, so `check` is asked in between."""
+    for row in range(0, len(pixels), ROWS):
+        check()
+        if not output.write_scanlines(row, min(row + ROWS, len(pixels)), 0, pixels[row:row + ROWS]):
+            return False
+    return True
 
 
 def _need_space(folder: Path, size: int) -> None:

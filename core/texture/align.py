@@ -29,20 +29,23 @@ def align(observations: list[Observation], surface: Unfolded, report: Reporter) 
     if len(observations) < 2:
         return 0.0
     size = len(surface.covered)
-    start = [raster.bleed(o.pixels, surface.covered) for o in observations]
+    for observation in observations:
+        observation.pixels = raster.bleed(observation.pixels, surface.covered)
     warps = [np.zeros((size, size, 2), np.float32) for _ in observations]
     total = len(observations) + 6
     for step in range(ROUNDS):
         details = [_detail(o) for o in observations]
-        consensus = weighted_mean(details, [o.weight ** 3 for o in observations])
+        consensus = weighted_mean(details, (o.weight ** 3 for o in observations))
         for i, observation in enumerate(observations):
             report.progress(total - 6 + (step * len(observations) + i) / len(observations), total, f"aligning {observation.name}")
             warps[i] += _flow(consensus, details[i], observation.weight)
-        drift = weighted_mean(warps, [o.weight for o in observations])
-        for warp, pixels, observation in zip(warps, start, observations, strict=True):
+        del details
+        drift = weighted_mean(warps, (o.weight for o in observations))
+        for warp, observation in zip(warps, observations, strict=True):
+            report.check()
             warp -= drift  # the views may move against each other, not the texture over the surface
             _limit(warp, LARGEST * size)
-            observation.resample(_moved(pixels, warp), warp)
+            observation.resample(_moved(observation.pixels, warp), warp if step == ROUNDS - 1 else None)
     lengths = [np.linalg.norm(warp, axis=-1)[o.weight > 0.25 * o.weight.max()] for warp, o in zip(warps, observations, strict=True)]
     return float(np.concatenate(lengths).mean())
 

@@ -7,6 +7,8 @@ All in the logarithm of linear colour: a gain is an offset there, and a band of 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import cv2
 import numpy as np
 
@@ -65,19 +67,30 @@ def robust_weights(observations: list[Observation], tolerance: float = 0.10) -> 
 def blend(observations: list[Observation], report: Reporter, what: str = "delit", done: int = 2) -> np.ndarray:
     """One log texture [S, S, 3]; zero weight everywhere leaves zeros. `what` is blended, and how much was
     `done` before, are for the progress."""
-    sums, norms = [0.0] * len(BANDS), [0.0] * len(BANDS)
-    largest = np.maximum(np.max([o.weight for o in observations], axis=0), 1e-12)
+    largest = np.full_like(observations[0].weight, 1e-12)
+    for o in observations:
+        np.maximum(largest, o.weight, out=largest)
+    sums, norms = ([np.zeros((*largest.shape, channels), np.float32) for _ in BANDS] for channels in (3, 1))
     scale = len(largest) / 1024
     for i, o in enumerate(observations):
         report.progress(len(observations) + done + 2 * i / len(observations), len(observations) + 6, f"blending {o.name}, {what}")
-        seen = o.weight > 0
+        seen, share = o.weight > 0, o.weight / largest
         for band, (values, (reach, exponent)) in enumerate(zip(bands_of(o.log_colour, seen), BANDS, strict=True)):
-            weight = (o.weight / largest) ** exponent
+            weight = share ** exponent
             if np.isfinite(reach):  # feathered where the best view changes, but nothing taken from where the view is blind
-                weight = cv2.GaussianBlur(weight, (0, 0), max(reach * scale, 1)) * np.minimum(1, 4 * o.weight / largest)
-            sums[band] = sums[band] + values * weight[..., None]
-            norms[band] = norms[band] + weight[..., None]
+                weight = _feathered(weight, reach, scale) * np.minimum(1, 4 * share)
+            sums[band] += values * weight[..., None]
+            norms[band] += weight[..., None]
     return sum(s / np.maximum(n, 1e-12) for s, n in zip(sums, norms, strict=True)).astype(np.float32)
+
+
+def _feathered(weight: np.ndarray, reach: float, scale: float) -> np.ndarray:
+    """Gaussian mean of weights [S, S] over `reach` texels of a 1024 map. Of a larger map it is taken at 1024: it is as soft there, and the cost of a
+    Gaussian grows with its width."""
+    if scale <= 1:
+        return cv2.GaussianBlur(weight, (0, 0), max(reach * scale, 1))
+    small = cv2.GaussianBlur(cv2.resize(weight, (1024, 1024), interpolation=cv2.INTER_AREA), (0, 0), reach)
+    return cv2.resize(small, weight.shape[::-1], interpolation=cv2.INTER_LINEAR)
 
 
 def bands_of(log_colour: np.ndarray, seen: np.ndarray) -> list[np.ndarray]:
@@ -105,7 +118,7 @@ def blurred(image: np.ndarray, weight: np.ndarray, sigma: float) -> np.ndarray:
     return cv2.resize(mean, (width, height), interpolation=cv2.INTER_LINEAR) if factor > 1 else mean
 
 
-def weighted_mean(images: list[np.ndarray], weights: list[np.ndarray]) -> np.ndarray:
+def weighted_mean(images: Iterable[np.ndarray], weights: Iterable[np.ndarray]) -> np.ndarray:
     """Mean over views of [S, S(, C)] with weights [S, S]; zero where all weights are."""
     top, bottom = 0.0, 1e-12
     for image, weight in zip(images, weights, strict=True):

@@ -19,6 +19,8 @@ MARGIN_PX = (1.5, 12.0)
 """Pixels from a silhouette at which a texel starts to count, and counts in full."""
 GRAZING = 0.15
 """Cosine of the steepest viewing angle that counts."""
+POINTS = 1 << 18
+"""Points of the surface that are looked at at once: of a whole map the numbers on the way would take a gigabyte."""
 
 
 @dataclass
@@ -37,32 +39,44 @@ class Observation:
     def name(self) -> str:
         return self.view.name
 
-    def resample(self, pixels: np.ndarray, warp: np.ndarray) -> None:
-        """Reads the picture anew, at other pixels [S, S, 2]; one resampling from the original, never two."""
-        self.pixels, self.warp = pixels, warp
+    def resample(self, pixels: np.ndarray, warp: np.ndarray | None) -> None:
+        """Reads the picture anew, at other pixels [S, S, 2]; one resampling from the original, never two. They are kept with the warp that led to them,
+        where that is the last one."""
+        if warp is not None:
+            self.pixels, self.warp = pixels, warp
         self.log_colour = log_colours(self.picture, pixels)
 
 
 def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float) -> Observation:
     """Projects every texel into a linear picture [H, W, 3] of any size of that view. sharpness in [0, 1] scales its weight."""
-    xy, depth = view.project(surface.points)
-    inside = (depth > 0) & (xy[:, 0] > 1) & (xy[:, 1] > 1) & (xy[:, 0] < view.width - 1) & (xy[:, 1] < view.height - 1)
-    towards = view.centre - surface.points
-    distance = np.linalg.norm(towards, axis=1)
-    cosine = (towards * surface.normals).sum(1) / distance
-    seen = inside & (cosine > GRAZING)
-    seen[seen] = raster.visible_from(surface.caster, surface.points[seen], surface.normals[seen], view.centre)
-
-    margin = np.zeros(len(xy))
-    margin[seen] = raster.sample(_silhouette_distance(surface.caster, view), xy[seen])
-    near, far = MARGIN_PX
-    ramp = np.clip((margin - near) / (far - near), 0, 1)
-    quality = np.where(seen, np.clip((cosine - GRAZING) / (1 - GRAZING), 0, 1) * ramp, 0)
-    scale = [picture.shape[1] / view.width, picture.shape[0] / view.height]
-    pixels = surface.spread(np.nan_to_num(xy, nan=-1) * scale)
+    count, scale = len(surface.points), [picture.shape[1] / view.width, picture.shape[0] / view.height]
+    pixels, quality, distance = np.empty((count, 2), np.float32), np.empty(count), np.empty(count)
+    seen, silhouette = np.empty(count, bool), _silhouette_distance(surface.caster, view)
+    for first in range(0, count, POINTS):
+        part = slice(first, first + POINTS)
+        xy, quality[part], distance[part], seen[part] = _look(view, surface, part, silhouette)
+        pixels[part] = np.nan_to_num(xy, nan=-1) * scale
+    pixels = surface.spread(pixels)
     reference = np.median(distance[seen]) if seen.any() else 1.0
     weight = quality ** 2 * sharpness * (reference / distance) ** 2
     return Observation(view, picture, pixels, log_colours(picture, pixels), surface.spread(quality), surface.spread(weight))
+
+
+def _look(view: View, surface: Unfolded, part: slice, silhouette: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Of a part of the surface's points: pixels [N, 2] (nan behind the camera), quality [N], distance [N], and whether they are seen [N]."""
+    points, normals = surface.points[part], surface.normals[part]
+    xy, depth = view.project(points)
+    inside = (depth > 0) & (xy[:, 0] > 1) & (xy[:, 1] > 1) & (xy[:, 0] < view.width - 1) & (xy[:, 1] < view.height - 1)
+    towards = view.centre - points
+    distance = np.linalg.norm(towards, axis=1)
+    cosine = (towards * normals).sum(1) / distance
+    seen = inside & (cosine > GRAZING)
+    seen[seen] = raster.visible_from(surface.caster, points[seen], normals[seen], view.centre)
+    margin = np.zeros(len(xy))
+    margin[seen] = raster.sample(silhouette, xy[seen])
+    near, far = MARGIN_PX
+    ramp = np.clip((margin - near) / (far - near), 0, 1)
+    return xy, np.where(seen, np.clip((cosine - GRAZING) / (1 - GRAZING), 0, 1) * ramp, 0), distance, seen
 
 
 def log_colours(picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:

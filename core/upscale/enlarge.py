@@ -24,6 +24,8 @@ DATA_FILES = ("weights/upscaler.safetensors", "weights/upscaler.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
 STRIP = 64
 """Rows of the small map whose tail is worked out at once."""
+DEPTH = 3
+"""Blocks used of each group's ten: training began with two and added the others as the identity, and they changed little (docs/results.md)."""
 
 
 @torch.no_grad()
@@ -35,7 +37,7 @@ def enlarge(maps: Maps, progress: Callable[[float], None], device: str = "cpu", 
     height, width = small.shape[2:]
     large = np.empty((FACTOR * height, FACTOR * width, CHANNELS), np.float32)
     with torch.autocast(device, torch.bfloat16, enabled=device == "cuda" or torch.cpu._is_avx512_bf16_supported()):
-        features = network.features(small, tick=lambda share: progress(0.75 * share))
+        features = network.features(small, DEPTH, lambda share: progress(0.75 * share))
         for row in range(0, height, STRIP):
             rows = slice(row, min(row + STRIP, height))
             large[FACTOR * rows.start:FACTOR * rows.stop] = _strip(network, small, features, rows).permute(1, 2, 0).cpu().numpy()

@@ -81,17 +81,17 @@ def clean(maps: Maps, hair: Hair, surface: HeadSurface, seed: int = 0, check: Ca
     return cleaned, share * surface.covered
 
 
-def write(folder: Path, albedo: np.ndarray, hair: Hair, cleaned: np.ndarray, share: np.ndarray) -> None:
+def write(folder: Path, albedo: np.ndarray, hair: Hair, cleaned: np.ndarray, share: np.ndarray, check: Callable[[], None] = lambda: None) -> None:
     """The masks at the size of `albedo` (sRGB [L, L, 3]), and that albedo where `clean`'s share is 0, the cleaned one elsewhere."""
     size = len(albedo)
     for name in ("brows", "lashes", "beard"):
-        images.write_data(folder / f"{name}.png", _enlarged(getattr(hair, name), size))
+        images.write_data(folder / f"{name}.png", _enlarged(getattr(hair, name), size), check=check)
     below, share = images.linear_to_srgb(cleaned), _enlarged(share, size)[..., None]
     large = _enlarged(below, size)
     large -= albedo
     large *= share
     large += albedo
-    images.write_srgb(folder / "clean_albedo.png", large, bits=16)
+    images.write_srgb(folder / "clean_albedo.png", large, bits=16, check=check)
 
 
 def _enlarged(picture: np.ndarray, size: int) -> np.ndarray:

@@ -21,8 +21,8 @@ SPREAD = (0.2, 0.2, 0.2, 0.15, 0.15, 0.05, 0.15)
 """Of a channel's values, about: what the network reads is centred and scaled by them."""
 MISSED = (0.012, 0.012, 0.012, 0.05, 0.05, 0.015, 0.012)
 """How far bicubic resampling is off in a channel, about: the unit of what the network answers, and of its loss."""
-HALO = 4
-"""Texels of the small map that the tail reads around a strip: three 3 x 3 convolutions on ever finer grids, and the bicubic kernel's two."""
+HALO = 2
+"""Texels of the small map that the tail reads around a strip: 1 + 1/2 + 1/4 by three 3 x 3 convolutions on ever finer grids, two by the bicubic kernel."""
 
 
 class Attention(nn.Module):
@@ -77,7 +77,7 @@ class Rcan(nn.Module):
             y = x
             for k, block in enumerate(group[:depth]):
                 y = block(y)
-                tick((i + (k + 1) / (len(group) + 1)) / len(self.groups))
+                tick((i + (k + 1) / (len(group[:depth]) + 1)) / len(self.groups))
             x = x + join(y)
         tick(1.0)
         return begun + self.join(x)
