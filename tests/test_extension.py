@@ -20,7 +20,8 @@ TAGS = SCRIPTS / "modules" / "_bpy_internal" / "extensions" / "tags.py"
 
 # Every file of the zip matches one of these.
 WANTED = (
-    r"__(init|main)__\.py", r"farm/flamenco/wildcap\.js", r"blender_manifest\.toml", r"LICENSE", r"README\.md", r"requirements/(worker|perceptual|cuda)\.txt",
+    r"__(init|main)__\.py", r"farm/flamenco/wildcap\.js", r"blender_manifest\.toml", r"LICENSE", r"README\.md",
+    r"requirements/(worker|perceptual|cuda|farm)\.txt",
     r"requirements/locks/([a-z0-9_]+-3\.[0-9]+(-cpu|-cuda)?|pip)\.txt",
     r"wildcap_addon/([a-z_]+/)?[a-z_]+\.py",
     r"core/README\.md", r"core/[a-z_]+\.py", r"core/(batch|contract|worker|imaging|geometry|face|light)/[a-z0-9_]+\.py",
