@@ -4,11 +4,11 @@
 
     python -m benchmarks.long_films FOLDER [--frames 60 120 300 1000] [--again] [--plain-times 4] [--json docs/figures/long_films.json]
 
-The film: a person with hair and clothes before a cluttered room, filmed once by a hand from ear to ear, up and down on the way, 1,000 frames of 720 x 960
-pixels (benchmarks/long_films_render.py), with a phone's noise, smear and compression. Each row takes so many frames of it, as the stage frames
-does: seconds and processor seconds of the stage cameras, frames registered, the camera centres' error against the true ones (cameras_against_truth.py).
-Plain: pycolmap with its defaults, sequential matching and incremental mapping, ended after --plain-times as long. FOLDER/film gets the film, FOLDER/N.wildcap
-and FOLDER/N_plain.wildcap the cameras. Rows that are in the record are kept without --again.
+The film: a person with hair and clothes before a cluttered room, filmed by a hand from ear to ear, up and down on the way, 1,000 frames of 720 x 960
+pixels (benchmarks/long_films_render.py), with a phone's noise, smear and compression. Shorter films are every so manyth frame of it, along the whole arc.
+Of each: seconds and processor seconds of the stage cameras, frames registered, the camera centres' error against the true ones (cameras_against_truth.py).
+Plain: pycolmap with its defaults, sequential matching and incremental mapping, ended after --plain-times as long. FOLDER/N gets a film, FOLDER/N.wildcap
+and FOLDER/N_plain.wildcap its cameras. Rows that are in the record are kept without --again.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from core.geometry import raster
 from core.imaging import images
 from core.synthetic import sample, scene
 from core.synthetic.people import filmed, motion, phone
+from core.synthetic.people.shape import person_mesh
 
 from . import figures, stage_cost
 from .cameras_against_truth import compare
@@ -39,8 +40,10 @@ from .people_lights import KINDS
 
 ROOT = Path(__file__).resolve().parent.parent
 COUNTS = (60, 120, 300, 1000)
-FRAMES, SEED, LIGHT = 1000, 910004, "hazy sun"
-"""Of the film; of the person, "stubbled" in benchmarks/likenesses.py, whose hair and beard are short; and what they sit in."""
+FRAMES, SHARED = 1000, 300
+"""Of the longest film; and of the one that shorter ones are taken from, so that few frames are rendered where it is not asked for."""
+SEED, LIGHT = 910004, "hazy sun"
+"""Of the person, "stubbled" in benchmarks/likenesses.py, whose hair and beard are short; and what they sit in."""
 DEGREES, SAMPLES = 72, 2
 """How far the camera goes to either side; rays per pixel, which smooth edges."""
 METERED, TO = 90, 0.5
@@ -57,7 +60,6 @@ def main() -> None:
     asked = options.parse_args()
     folder = asked.folder.resolve()
     path = asked.json or folder / "long_films.json"
-    film(folder / "film")
     for count in asked.frames:
         known = figures.read(path.stem, path.parent)["figures"] if path.is_file() else {}
         if asked.again or str(count) not in known.get("frames", {}):
@@ -67,26 +69,35 @@ def main() -> None:
     print(table(figures.read(path.stem, path.parent)["figures"]))
 
 
-def film(folder: Path) -> None:
-    """FOLDER/film.mp4 and cameras.json, if they are not there; rendered frames are kept until then."""
-    if (folder / "film.mp4").is_file():
-        return
-    from core.synthetic.people.figure import make_figure
+def film(folder: Path, count: int) -> Path:
+    """The folder of the film of so many frames, film.mp4 and cameras.json, made if it is not there; rendered frames stay in FOLDER/rendered."""
+    out = folder / str(count)
+    if (out / "film.mp4").is_file():
+        return out
+    cameras, numbers, work, taken = scene.camera_path(SEED, FRAMES, DEGREES), chosen(count), folder / "rendered", phone.sample_phone(SEED)
+    if not all((work / f"{number:05d}.exr").is_file() for number in numbers):
+        from core.synthetic.people.figure import make_figure
 
-    figure, cameras = make_figure(SEED), scene.camera_path(SEED, FRAMES, DEGREES)
-    filmed.render(folder / "rendered", figure, KINDS[LIGHT](SEED), cameras, range(FRAMES), SAMPLES, module="benchmarks.long_films_render")
-    write_json(folder / "cameras.json", {"name": "film", "light": LIGHT, "focal_px": scene.FOCAL, "width": scene.WIDTH, "height": scene.HEIGHT,
-                                         "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
-    taken = phone.sample_phone(SEED)
-    sample.write_video(folder / "film.mp4", _developed(folder / "rendered", raster.RayCaster(figure.head), cameras, taken), taken.crf)
+        filmed.render(work, make_figure(SEED), KINDS[LIGHT](SEED), cameras, numbers, SAMPLES, module="benchmarks.long_films_render")
+    out.mkdir(exist_ok=True)
+    write_json(out / "cameras.json", {"name": "film", "light": LIGHT, "focal_px": scene.FOCAL, "width": scene.WIDTH, "height": scene.HEIGHT,
+                                      "cameras": [{"frame": k, "matrix_world": cameras[number].tolist()} for k, number in enumerate(numbers)]})
+    sample.write_video(out / "film.mp4", _developed(work, numbers, raster.RayCaster(person_mesh(SEED)), cameras, taken), taken.crf)
+    return out
 
 
-def _developed(work: Path, head: raster.RayCaster, cameras: np.ndarray, taken: phone.Phone) -> Iterator[np.ndarray]:
+def chosen(count: int) -> list[int]:
+    """Which frames of the longest film make up one of so many, from its first to its last."""
+    whole = np.linspace(0, FRAMES - 1, SHARED if count <= SHARED else FRAMES).round().astype(int)
+    return whole[np.linspace(0, len(whole) - 1, count).round().astype(int)].tolist()
+
+
+def _developed(work: Path, numbers: list[int], head: raster.RayCaster, cameras: np.ndarray, taken: phone.Phone) -> Iterator[np.ndarray]:
     """The frames as the phone shows them, sRGB [H, W, 3]. Its rows are read at once: a rolling shutter has no one true camera."""
     views, still = [sample.view_of(matrix) for matrix in cameras], np.tile(np.eye(4), (3, 1, 1))
-    first = images.read_linear(work / f"{0:05d}.exr")
+    first = images.read_linear(work / f"{numbers[0]:05d}.exr")
     gain = TO / np.percentile(first[first.shape[0] // 4:-first.shape[0] // 4, first.shape[1] // 4:-first.shape[1] // 4].max(-1), METERED)
-    for k in range(len(views)):
+    for k in numbers:
         around = max(k - 1, 0), k, min(k + 1, len(views) - 1)
         flow = motion.image_motion(head, tuple(views[i] for i in around), still) * 2 / (around[2] - around[0])
         linear = motion.motion_blur(images.read_linear(work / f"{k:05d}.exr").astype(np.float32), flow, taken.shutter)
@@ -95,19 +106,19 @@ def _developed(work: Path, head: raster.RayCaster, cameras: np.ndarray, taken: p
 
 def row(folder: Path, count: int, plain_times: float) -> dict:
     """{"ours": {...}, "plain": {...}, "times", "processor_times": how many times as long plain pycolmap took, None where it was left out or ended}."""
-    capture = Capture(folder / f"{count}.wildcap")
+    capture, truth = Capture(folder / f"{count}.wildcap"), film(folder, count)
     settings = {"frames": {"max_frames": count}}
     if not capture.has("frames"):
-        cost = stage_cost.measure(capture.root, "frames", folder / "film" / "film.mp4", settings=settings)
+        cost = stage_cost.measure(capture.root, "frames", truth / "film.mp4", settings=settings)
         if "problem" in cost:
             raise SystemExit(f"{cost['problem']} {cost['remedy']}")
     ours = stage_cost.measure(capture.root, "cameras", settings=settings)
     if "problem" not in ours:
-        ours |= _against_truth(capture, folder / "film", count) | {"found_by": capture.read()["stages"]["cameras"]["figures"]["features"]}
+        ours |= _against_truth(capture, truth, count) | {"found_by": capture.read()["stages"]["cameras"]["figures"]["features"]}
     print(count, ours, flush=True)
     found = {"ours": ours, "plain": None, "times": None, "processor_times": None}
     if plain_times and "problem" not in ours:
-        plain = found["plain"] = plain_cost(capture, Capture(folder / f"{count}_plain.wildcap"), folder / "film", count, plain_times * ours["seconds"])
+        plain = found["plain"] = plain_cost(capture, Capture(folder / f"{count}_plain.wildcap"), truth, count, plain_times * ours["seconds"])
         if "over_s" not in plain:
             found |= {"times": plain["seconds"] / ours["seconds"], "processor_times": plain["processor_s"] / ours["processor_s"]}
         print(count, plain, flush=True)

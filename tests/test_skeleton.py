@@ -24,7 +24,7 @@ def test_the_sharpest_frame_of_each_part_is_chosen_in_order():
         there = frames[10 * part:10 * part + 10]
         assert name == max(there, key=lambda frame: frame[1])[0]
     assert skeleton.choose(frames, 100) == [name for name, _, _ in frames]
-    assert skeleton.size(frames[:60]) == 60 and skeleton.size(frames) == skeleton.SIZE
+    assert skeleton.size(frames[:40]) == 40 and skeleton.size(frames) == skeleton.SIZE
 
 
 def test_more_frames_carry_a_film_that_shows_little_and_those_of_fewer_stay():

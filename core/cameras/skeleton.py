@@ -32,7 +32,7 @@ def size(film: Film, richness: float = 1.0) -> int:
     """How many frames carry a film: all of a short one, and of a long one twice as many, as often as needed, where each shows little. richness: the median
     frame's features as a share of what a frame may have, of which ENOUGH will do. A plain head's frames cost less, and it takes more of them."""
     count = SIZE * 2 ** max(0, math.ceil(math.log2(ENOUGH / max(richness, 1e-3))))
-    return len(film) if len(film) <= 1.5 * count else count
+    return min(len(film), count)
 
 
 def choose(film: Film, count: int) -> list[str]:

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import pycolmap
 
+from ..face import template
 from ..geometry import meshes, raster
 from ..geometry.views import View
 from ..imaging import images
@@ -29,6 +30,26 @@ def person(seed: int = SEED, texels: int = 256) -> tuple[raster.RayCaster, np.nd
     """The head's mesh, ready for rays, its vertex normals, and its diffuse albedo, linear [texels, texels, 3]."""
     mesh = subject_mesh(seed)
     return raster.RayCaster(mesh), meshes.vertex_normals(mesh), make_skin(sample_parameters(seed), texels).diffuse
+
+
+@cache
+def jaw_drop() -> tuple[np.ndarray, np.ndarray]:
+    """The vertices of the head that an opening jaw moves, and how far, [N] and [N, 3] in metres; the lips, which are one here, stretch."""
+    with np.load(template.ASSETS / "face_units.npz", allow_pickle=False) as stored:
+        rows, moves = np.cumsum(stored["rows_jawOpen"].astype(int)), stored["moves_jawOpen"].T * float(stored["step"])
+        mirrored, count = stored["mirror"].astype(int)[rows], int(stored["head_vertices"])
+    other = mirrored != rows  # one half is stored, and what lies in the middle
+    rows, moves = np.concatenate([rows, mirrored[other]]), np.concatenate([moves, moves[other] * [-1, 1, 1]])
+    return rows[rows < count], moves[rows < count]
+
+
+def speaking(seed: int, jaw: float) -> tuple[raster.RayCaster, np.ndarray]:
+    """The head of a seed with its jaw open by that share of how far it goes: for rays, and its vertex normals."""
+    mesh, (rows, moves) = subject_mesh(seed), jaw_drop()
+    vertices = mesh.vertices.copy()
+    vertices[rows] += jaw * moves
+    mesh = mesh.moved(vertices)
+    return raster.RayCaster(mesh), meshes.vertex_normals(mesh)
 
 
 def camera(azimuth_deg: float, height: float = 0.0, distance: float = 0.55, target=(0, -0.01, -0.035), scale: float = 1.0) -> View:
@@ -49,10 +70,13 @@ def studio(scale: float = 1.0) -> list[View]:
     return [camera(azimuth, height, 1.0, scale=scale) for height in (-0.15, 0.25) for azimuth in np.linspace(-50, 50, 8)]
 
 
-def photograph(view: View, turned_deg: float = 0.0, wall: bool = True, even: bool = False, seed: int = SEED, texels: int = 256) -> np.ndarray:
+def photograph(view: View, turned_deg: float = 0.0, wall: bool = True, even: bool = False, seed: int = SEED, texels: int = 256,
+               jaw: float = 0.0) -> np.ndarray:
     """sRGB [H, W, 3]. `even`: light from everywhere. `turned_deg`: how far the person has turned the head to their left; light and wall stay.
-    Without `wall` the background is plain grey."""
+    `jaw`: how far it is open, in [0, 1]. Without `wall` the background is plain grey."""
     caster, normals, albedo = person(seed, texels)
+    if jaw:
+        caster, normals = speaking(seed, jaw)
     turn = np.radians(turned_deg)
     rotation = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
     seen = View(view.name, view.path, view.camera, view.rotation @ rotation, view.translation, True)  # the camera as the head sees it
