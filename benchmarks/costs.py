@@ -234,12 +234,11 @@ def table(found: dict) -> str:
     chain = [[stage, *(cell(stage_of(found, whole, stage)) for whole in shown)] for stage in stages.NAMES]
     tables = [figures.markdown(["stage: seconds, peak memory", *shown], [*chain, ["**together**", *(whole_cell(found, whole) for whole in shown)]])]
     for title, values, grown in GROWTH:
-        exponents = found.get("growth", {}).get(title, {})
-        if exponents:  # one value alone tells of no growth
-            powers = {stage: "{exponent:.2f} ({points})".format(**fitted) for stage, fitted in exponents.items()}
-            rows = [[stage, *(cell(found.get(row, {}).get(stage)) for row in rows), powers.get(stage)] for stage, rows in grown.items()]
-            if title == "frames":
-                rows.append(["**together**", *(whole_cell(found, f"frames-{count}") for count in values), None])
+        powers = {stage: "{exponent:.2f} ({points})".format(**fitted) for stage, fitted in found.get("growth", {}).get(title, {}).items()}
+        rows = [[stage, *(cell(found.get(row, {}).get(stage)) for row in rows), powers.get(stage)] for stage, rows in grown.items() if stage in powers]
+        if title == "frames":
+            rows.append(["**together**", *(whole_cell(found, f"frames-{count}") for count in values), None])
+        if powers:  # one value alone tells of no growth
             tables.append(figures.markdown([title, *map(str, values), "exponent (points)"], rows))
     return "\n\n".join(tables)
 
