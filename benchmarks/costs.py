@@ -6,9 +6,9 @@
 
 Every stage runs in a process of its own (benchmarks/stage_cost.py). "standard" goes from the video to the delivery; the other rows start from a copy of what
 it made in WORK, or of --capture. OUT.json is written after each stage: the same command goes on where it was stopped. A stage that takes longer than --limit-s
-is ended and told as "over"; one beside which other processes took more than 0.2 cores is told with that, and is measured once more with --again. "float32" is
-the standard solve and 4K stage with the networks as a processor without bfloat16 runs them. The rows frames-N are the whole chain on N frames of --film, such as
-that of benchmarks.long_films; without it, of the sample's 60 played to and fro, with new noise in every frame: more pictures to work on, not more to see.
+is ended and told as "over"; one beside which other processes took more than 0.2 cores is told with that, and is measured once more with --again. "float32"
+is the standard solve and 4K stage with the networks as a processor without bfloat16 runs them. The rows frames-N are the whole chain on N frames of --film,
+such as that of benchmarks.long_films; without it, of the sample's 60 played to and fro, with new noise in every frame: more pictures, not more to see.
 Exponents are fits of the logarithm of the processor's seconds to that of the size, over as many points as are told: for a map's side 2 is linear in texels.
 """
 
@@ -219,7 +219,7 @@ def stage_of(found: dict, whole: str, stage: str) -> dict | None:
 
 
 def growth(found: dict, values: tuple[int, ...], grown: dict[str, tuple[str, ...]]) -> dict[str, dict]:
-    """Stage -> the power of the size with which its processor seconds grow, and the number of sizes it was fitted to; stages with fewer than two are left out."""
+    """Stage -> the power of the size with which its processor seconds grow, and the number of sizes it was fitted to; without stages with fewer than two."""
     exponents = {}
     for stage, rows in grown.items():
         known = [(value, cost["processor_s"]) for value, row in zip(values, rows, strict=True) if "processor_s" in (cost := found.get(row, {}).get(stage, {}))]
@@ -234,12 +234,11 @@ def table(found: dict) -> str:
     chain = [[stage, *(cell(stage_of(found, whole, stage)) for whole in shown)] for stage in stages.NAMES]
     tables = [figures.markdown(["stage: seconds, peak memory", *shown], [*chain, ["**together**", *(whole_cell(found, whole) for whole in shown)]])]
     for title, values, grown in GROWTH:
-        exponents = found.get("growth", {}).get(title, {})
-        if exponents:  # one value alone tells of no growth
-            rows = [[stage, *(cell(found.get(row, {}).get(stage)) for row in rows), exponents.get(stage) and "{exponent:.2f} ({points})".format(**exponents[stage])]
-                    for stage, rows in grown.items()]
-            if title == "frames":
-                rows.append(["**together**", *(whole_cell(found, f"frames-{count}") for count in values), None])
+        powers = {stage: "{exponent:.2f} ({points})".format(**fitted) for stage, fitted in found.get("growth", {}).get(title, {}).items()}
+        rows = [[stage, *(cell(found.get(row, {}).get(stage)) for row in rows), powers.get(stage)] for stage, rows in grown.items() if stage in powers]
+        if title == "frames":
+            rows.append(["**together**", *(whole_cell(found, f"frames-{count}") for count in values), None])
+        if powers:  # one value alone tells of no growth
             tables.append(figures.markdown([title, *map(str, values), "exponent (points)"], rows))
     return "\n\n".join(tables)
 

@@ -23,8 +23,8 @@ from core.imaging import images
 from . import figures
 
 PICTURES = {"albedo": ("maps_4k/diffuse_albedo.png", 16), "normals": ("maps_4k/normal.png", 16), "specular": ("maps_4k/specular_albedo.png", 16),
-            "confidence": ("maps_4k/confidence.png", 8), "solved albedo": ("maps/diffuse_albedo.png", 16), "delit frame": ("delit", 16)}
-LEVELS = (1, 3, 6)
+            "confidence": ("maps_4k/confidence.png", 8), "delit frame": ("delit", 16)}
+LEVELS = (1, 3)
 FILTERS = {"none": 0x08, "up": 0x20, "paeth": 0x80, "chosen": None}
 """libpng's flags."""
 

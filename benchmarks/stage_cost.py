@@ -36,7 +36,8 @@ def measure(capture: Path, stage: str, source: Path | str = "", quality: str = "
 
     seconds: of the stage, the import of its libraries included; processor_s: summed over the threads of its processes; peak_mb: of the largest of them;
     load: the machine's load average (one minute) before; others: cores that all other processes took meanwhile (the hypervisor's share included),
-    None where the system does not count them. float32: the networks compute in that though the processor multiplies bfloat16. `settings` ({stage: {name: value}}) lie over the preset `quality`, and may lie out of their ranges.
+    None where the system does not count them. float32: the networks compute in that though the processor multiplies bfloat16. `settings`
+    ({stage: {name: value}}) lie over the preset `quality`, and may lie out of their ranges.
     """
     job = json.dumps({"source": str(source), "quality": quality, "settings": settings or {}, "float32": float32})
     load, busy, own, began = round(os.getloadavg()[0], 2), busy_s(), own_s(), time.monotonic()

@@ -41,6 +41,7 @@ from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
 from core.training.fine_windows import CHANNELS, FACTOR, Degradation, degraded, prepare
 from core.upscale import detail, enlarged
+from core.upscale.enlarge import enlarge
 from core.upscale.maps import Maps
 
 from .ablation_measures import feature_distance
@@ -54,6 +55,8 @@ VIEWS = 2
 """Windows of each subject."""
 KINDS = {"plain": Degradation(0.0, 0.0, 0.0, 1.0), "soft": Degradation(0.5, 0.8, 0.003, 0.9)}
 METHODS = ("lanczos", "network")
+WHOLE = "network, all blocks"
+"""The network with all blocks of its groups, in the place of enlarge.DEPTH of them."""
 BORDER = 16
 CLOSE = 9.0
 """Scale of the frames: 2700 x 3600 pixels, about a 4K video's."""
@@ -87,17 +90,17 @@ def enlarging(work: Path, sheet: Path | None = None) -> dict[str, dict[str, floa
     prepare(list(SEEDS), VIEWS, work, Reporter("upscale"), 1)
     found, shots = {}, []
     for kind, how in KINDS.items():
-        scores = {method: [] for method in METHODS}
+        scores = {method: [] for method in (*METHODS, WHOLE)}
         for seed in SEEDS:
             for view in range(VIEWS):
                 large = np.load(work / f"window_{seed}_{view}.npy").astype(np.float32)
                 small = degraded(large, how, np.random.default_rng([seed, view]))
                 true = np.moveaxis(large, 0, -1)
-                results = {method: _enlarged(small, method) for method in METHODS}
+                results = {method: _enlarged(small, method) for method in scores}
                 for method, result in results.items():
                     scores[method].append(compare(result, true))
                 if view == 0 and kind == "soft":
-                    shots.append(_closeup(small, results, true))
+                    shots.append(_closeup(small, {method: results[method] for method in METHODS}, true))
         found |= {f"{kind}, {method}": {name: round(float(np.mean([s[name] for s in rows])), 4) for name in rows[0]} for method, rows in scores.items()}
     if sheet:
         images.write_srgb(sheet, np.vstack([np.hstack(shots[:2]), np.hstack(shots[2:4])]), quality=86)
@@ -135,7 +138,10 @@ def _enlarged(small: np.ndarray, method: str) -> np.ndarray:
     """Maps [7, H, W] in the network's channels, four times as large: [4H, 4W, 7]."""
     diffuse, normal = images.srgb_to_linear(np.moveaxis(small[:3], 0, -1)), np.moveaxis(small[3:6], 0, -1)
     blank = np.ones_like(diffuse)
-    return enlarged(Maps(diffuse, normal, small[6], blank[..., 0], blank), FACTOR * len(diffuse), method, "cpu", lambda done: None)
+    maps = Maps(diffuse, normal, small[6], blank[..., 0], blank)
+    if method == WHOLE:
+        return enlarge(maps, lambda done: None, depth=None)
+    return enlarged(maps, FACTOR * len(diffuse), method, "cpu", lambda done: None)
 
 
 def _closeup(small: np.ndarray, results: dict[str, np.ndarray], true: np.ndarray, side: int = 176) -> np.ndarray:

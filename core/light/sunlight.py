@@ -86,9 +86,10 @@ def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray, re
 
 def log_likelihood(residual: np.ndarray) -> np.ndarray:
     """Log density of a skin point's deviation [N, 3] (natural log units) from its expected colour."""
-    common = residual.mean(-1)
-    chroma = residual - common[..., None]
-    return (-0.5 * (3 * common ** 2 / SIGMA_LUMINANCE ** 2 + (chroma ** 2).sum(-1) / SIGMA_CHROMA ** 2)
+    red, green, blue = (residual[..., k] for k in range(3))  # a mean over an axis of three takes several times as long
+    common = (red + green + blue) / 3
+    chroma = (red - common) ** 2 + (green - common) ** 2 + (blue - common) ** 2
+    return (-0.5 * (3 * common ** 2 / SIGMA_LUMINANCE ** 2 + chroma / SIGMA_CHROMA ** 2)
             - np.log(SIGMA_LUMINANCE * SIGMA_CHROMA ** 2 * (2 * np.pi) ** 1.5))
 
 

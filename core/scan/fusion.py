@@ -17,6 +17,7 @@ from scipy.ndimage import binary_dilation
 from skimage.measure import marching_cubes
 
 from ..geometry.meshes import Mesh
+from ..geometry.views import lengths
 from .stereo import DepthMap
 
 SIDE = 8
@@ -28,6 +29,8 @@ LEAST_WEIGHT, LEAST_SHARE = 2.0, 0.15
 MOST_SPREAD = 0.6
 """Deviation of the maps' distances, in truncations, beyond which they do not speak of one surface: hair, a hand that moved, a highlight that wandered."""
 
+VOXELS = 1 << 18
+"""Voxels to which a map is added at once: what is worked out on the way stays in the processor's caches."""
 LEAST_PIECE = 0.05
 """Pieces of fewer triangles, as a share of the largest one's, float: background seen through hair, a flap of a collar."""
 
@@ -56,7 +59,7 @@ def fuse(maps: list[DepthMap], box: np.ndarray, voxel: float, tick: Callable[[in
     corner = np.stack(np.meshgrid(*[np.arange(SIDE)] * 3, indexing="ij"), -1).reshape(-1, 3)
     voxels = (base[:, None] + corner[None]).reshape(-1, 3)
     sums = np.zeros((4, len(voxels)), np.float32)  # facing, weight, weight x distance, weight x distance squared
-    points = (low + voxels * voxel).astype(np.float32)
+    points = np.ascontiguousarray((low + voxels * voxel).astype(np.float32).T)
     usual = np.median([seen.baseline for seen in maps])
     for done, seen in enumerate(maps):
         _integrate(seen, points, voxel, float(np.clip(seen.baseline / usual, 0.25, 2) ** 2), sums)
@@ -90,16 +93,22 @@ def _blocks_seen(maps: list[DepthMap], low: np.ndarray, shape: np.ndarray, voxel
 
 
 def _integrate(seen: DepthMap, points: np.ndarray, voxel: float, precision: float, sums: np.ndarray) -> None:
-    """Adds one map's signed distances (in truncations, positive in front of the surface) to sums [4, N] where it sees the voxels or just behind."""
-    local = (points - seen.centre.astype(np.float32)) @ seen.rotation.T.astype(np.float32)
-    u = np.floor(seen.focal * local[:, 0] / local[:, 2] - seen.origin[0]).astype(np.int32)
-    v = np.floor(seen.focal * local[:, 1] / local[:, 2] - seen.origin[1]).astype(np.int32)
+    """Adds one map's signed distances (in truncations, positive in front of the surface) to sums [4, N] where it sees the voxels [3, N] or just behind."""
+    cosine = _cosine(seen)
+    for first in range(0, points.shape[1], VOXELS):
+        part = np.s_[:, first:first + VOXELS]
+        _integrate_part(seen, cosine, points[part], voxel, precision, sums[part])
+
+
+def _integrate_part(seen: DepthMap, cosine: np.ndarray, points: np.ndarray, voxel: float, precision: float, sums: np.ndarray) -> None:
+    local = seen.rotation.astype(np.float32) @ (points - seen.centre.astype(np.float32)[:, None])
+    u = np.floor(seen.focal * local[0] / local[2] - seen.origin[0]).astype(np.int32)
+    v = np.floor(seen.focal * local[1] / local[2] - seen.origin[1]).astype(np.int32)
     height, width = seen.depth.shape
     inside = np.flatnonzero((u >= 0) & (u < width) & (v >= 0) & (v < height))
-    cosine = _cosine(seen)
     depth, facing = seen.depth[v[inside], u[inside]], cosine[v[inside], u[inside]]
     reach = TRUNCATION * voxel
-    gap = (depth - local[inside, 2]) * facing  # along the surface's normal
+    gap = (depth - local[2, inside]) * facing  # along the surface's normal
     near = np.isfinite(gap) & (gap > -reach) & (facing > 0.2)
     index, value = inside[near], np.minimum(gap[near] / reach, 1)
     share = facing[near] ** 2
@@ -122,7 +131,7 @@ def _cosine(seen: DepthMap) -> np.ndarray:
     across[:, 1:-1], down[1:-1] = points[:, 2:] - points[:, :-2], points[2:] - points[:-2]
     normal = np.cross(across, down)
     with np.errstate(invalid="ignore", divide="ignore"):
-        cosine = np.abs((normal * rays).sum(-1)) / (np.linalg.norm(normal, axis=-1) * np.linalg.norm(rays, axis=-1))
+        cosine = np.abs(normal[..., 0] * rays[..., 0] + normal[..., 1] * rays[..., 1] + normal[..., 2] * rays[..., 2]) / (lengths(normal) * lengths(rays))
     return np.nan_to_num(cosine, nan=0.0)
 
 

@@ -18,6 +18,9 @@ from torch.utils.checkpoint import checkpoint
 LAYOUT = torch.channels_last
 """Of all maps inside the network: channels first takes longer, in convolutions and in this normalisation (benchmarks/solver_speed.py)."""
 
+STRIP = 64
+"""Rows of a map inside the network that are shaped at once where that can be done in pieces."""
+
 
 def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: torch.Tensor, mapping_condition: torch.Tensor | None = None,
             mean: torch.Tensor | None = None, spread: torch.Tensor | None = None, levels: torch.Tensor | None = None) -> torch.Tensor:
@@ -136,8 +139,9 @@ class _Residual(nn.Module):
 
 
 class _Shaped(torch.autograd.Function):
-    """convolution(gelu(norm(x))) of a network that does not learn: of all it works out only x is kept for the gradient, the convolution's own input is not
-    needed and the rest, which is cheap, is worked out a second time. The same numbers at a quarter of the memory."""
+    """convolution(gelu(norm(x))) of a network that does not learn: of all that is worked out only x is kept for the gradient, for the convolution's own input
+    is not needed and the rest, which is cheap, is worked out a second time, in strips where texels do not depend on each other. The same numbers in less
+    than half the memory."""
 
     @staticmethod
     def of(norm: _Norm, convolution: nn.Conv2d, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
@@ -149,17 +153,22 @@ class _Shaped(torch.autograd.Function):
     def forward(ctx, x: torch.Tensor, mapped: torch.Tensor, norm: _Norm, convolution: nn.Conv2d) -> torch.Tensor:
         ctx.save_for_backward(x, mapped)
         ctx.layers = norm, convolution
-        return convolution(functional.gelu(norm(x, mapped)))
+        inner = torch.empty_like(x)
+        for rows in norm.strips(x):
+            inner[:, :, rows] = functional.gelu(norm(x[:, :, rows], mapped))
+        return convolution(inner)
 
     @staticmethod
     def backward(ctx, gradient: torch.Tensor) -> tuple:
         (x, mapped), (norm, convolution) = ctx.saved_tensors, ctx.layers
-        with torch.enable_grad():
-            x = x.detach().requires_grad_()
-            inner = functional.gelu(norm(x, mapped))
-        gradient, _, _ = torch.ops.aten.convolution_backward(gradient, inner.detach(), convolution.weight, None, convolution.stride, convolution.padding,
-                                                             convolution.dilation, False, [0, 0], 1, [True, False, False])
-        return torch.autograd.grad(inner, x, gradient)[0], None, None, None
+        found = torch.ops.aten.convolution_backward(gradient, x, convolution.weight, None, convolution.stride, convolution.padding, convolution.dilation,
+                                                    False, [0, 0], 1, [True, False, False])[0]  # of its input only the shape counts, which is x's
+        for rows in norm.strips(x):
+            with torch.enable_grad():
+                part = x[:, :, rows].detach().requires_grad_()
+                inner = functional.gelu(norm(part, mapped))
+            found[:, :, rows] = torch.autograd.grad(inner, part, found[:, :, rows])[0]
+        return found, None, None, None
 
 
 class _Norm(nn.Module):
@@ -179,6 +188,11 @@ class _Norm(nn.Module):
         else:
             x = functional.group_norm(x, self.groups, eps=1e-5)
         return torch.addcmul(bias, x, 1 + weight)
+
+    def strips(self, x: torch.Tensor) -> list[slice]:
+        """The rows of x that can be normalised at once without the others."""
+        step = STRIP if self.kind == "pixel" else x.shape[2]
+        return [slice(row, row + step) for row in range(0, x.shape[2], step)]
 
 
 class _Attention(nn.Module):

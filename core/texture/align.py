@@ -14,6 +14,7 @@ import numpy as np
 from ..contract.messages import Reporter
 from ..face.head import Unfolded
 from ..geometry import raster
+from ..geometry.views import lengths
 from .blend import blurred, weighted_mean
 from .projection import Observation
 
@@ -46,8 +47,8 @@ def align(observations: list[Observation], surface: Unfolded, report: Reporter) 
             warp -= drift  # the views may move against each other, not the texture over the surface
             _limit(warp, LARGEST * size)
             observation.resample(_moved(observation.pixels, warp), warp if step == ROUNDS - 1 else None)
-    lengths = [np.linalg.norm(warp, axis=-1)[o.weight > 0.25 * o.weight.max()] for warp, o in zip(warps, observations, strict=True)]
-    return float(np.concatenate(lengths).mean())
+    moved = [lengths(warp)[o.weight > 0.25 * o.weight.max()] for warp, o in zip(warps, observations, strict=True)]
+    return float(np.concatenate(moved).mean())
 
 
 def _detail(observation: Observation) -> np.ndarray:
@@ -73,7 +74,7 @@ def _flow(consensus: np.ndarray, detail: np.ndarray, weight: np.ndarray) -> np.n
 
 
 def _limit(warp: np.ndarray, longest: float) -> None:
-    length = np.linalg.norm(warp, axis=-1, keepdims=True)
+    length = lengths(warp)[..., None]
     warp *= np.minimum(1, longest / np.maximum(length, 1e-6))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..face.head import Unfolded
 from ..geometry import raster
-from ..geometry.views import View
+from ..geometry.views import View, lengths
 
 DARKEST = 2e-3
 """Linear values below this are noise to a logarithm."""
@@ -68,7 +68,7 @@ def _look(view: View, surface: Unfolded, part: slice, silhouette: np.ndarray) ->
     xy, depth = view.project(points)
     inside = (depth > 0) & (xy[:, 0] > 1) & (xy[:, 1] > 1) & (xy[:, 0] < view.width - 1) & (xy[:, 1] < view.height - 1)
     towards = view.centre - points
-    distance = np.linalg.norm(towards, axis=1)
+    distance = lengths(towards)
     cosine = (towards * normals).sum(1) / distance
     seen = inside & (cosine > GRAZING)
     seen[seen] = raster.visible_from(surface.caster, points[seen], normals[seen], view.centre)
