@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A head that swayed while it was filmed: cameras that were found from the whole picture, found anew with respect to the head, by what matches on it.
 
-Structure from motion follows the room, which shows more; a person who sits still sways before it by millimetres. Whether they did is measured: by how much
-better the head's own matches fit together once the room has no say.
+Structure from motion follows the room, which shows more; a person who sits still sways before it by millimetres. Whether they did is measured: poses that half
+of the head's matches give must tell better than the room's where the other half lies. (That all of them fit better by poses of their own says nothing: more
+freedom always fits better.)
 """
 
 from __future__ import annotations
@@ -28,9 +29,9 @@ from .world import HeadFrame
 
 REACH = (0.025, 0.0125, 0.006)
 """Shares of the face's width by which matches may miss, round by round."""
-SWAYED = 0.8
-"""Share of the error that is left of the head's matches without the room, below which the head moved before it. A head at rest leaves 0.89 by the room's
-features and 0.97 by fine ones (the sample), in tests/test_swaying_head.py above 0.8; two filmed heads that sway leave 0.47 and 0.58, and 0.58 and 0.74."""
+SWAYED = 0.9
+"""Share of the head's error that is left by cameras of its own, in tracks that had no say in these, below which the head moved before the room. Poses that fit
+one half of the tracks predict the other half no better where it kept still; a tenth is left to the scatter of the two medians."""
 LEAST_TRACKS = 200
 """Points on the head that several frames show, for poses of its own."""
 CHEST_M = -0.12
@@ -42,26 +43,50 @@ LEAST_PX = 64
 
 def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, report: Reporter,
            only: Collection[str] | None = None) -> tuple[pycolmap.Reconstruction, float | None]:
-    """The model with its cameras placed with respect to the head, in the head's world (metres), and the share of the error that is left of the head's matches;
-    `model` itself where the head kept still, or where too little matches on it to tell (None). `only`: the frames
+    """The model with its cameras placed with respect to the head, in the head's world (metres), and the share of the error that is left of the head's matches
+    (SWAYED); `model` itself where the head kept still, or where too little matches on it to tell (None). `only`: the frames
     to look at, and those of the model that comes back; all of them if not given."""
     room = pycolmap.Reconstruction(model)
     room.transform(head.world_from_model)
     registered = sorted((image for image in room.images.values() if image.has_pose and (only is None or image.name in only)), key=lambda image: image.name)
     names, own, width = [image.name for image in registered], on_head(room, registered, matches), _face_width(room, registered)
-    straight, bundle = straightened(room, registered, own), as_bundle(room, registered, False)
-    _, tracks, still = agreeing(bundle, names, straight, REACH[0] * width)
+    straight, bundle, reach = straightened(room, registered, own), as_bundle(room, registered, False), REACH[0] * width
+    _, tracks, still = agreeing(bundle, names, straight, reach)
     if len(tracks) < LEAST_TRACKS:
         return model, None
-    before = _error(rebuilt(room, still, registered, tracks, own))
+    fitted, held_out = _halves(straight, tracks)
+    followed, _ = _follow(room, registered, names, own, fitted, still, width, report)
+    left = _miss(followed, names, held_out, reach) / max(_miss(bundle, names, held_out, reach), 1e-9)
+    if left > SWAYED:
+        return model, left
+    _, alone = _follow(room, registered, names, own, straight, still, width, report)
+    return (alone, left) if alone.num_points3D() >= LEAST_TRACKS else (model, left)
+
+
+def _follow(room: pycolmap.Reconstruction, registered: list, names: list[str], own: Matches, straight: Matches, bundle: Bundle, width: float,
+            report: Reporter) -> tuple[Bundle, pycolmap.Reconstruction]:
+    """The cameras with respect to the head, by these of its matches (`straight`: of their pixels without the lens), and the model that has them."""
     for step, share in enumerate(REACH):
         report.progress(step, len(REACH), "finding the cameras with respect to the head")
         _, tracks, bundle = agreeing(bundle, names, straight, share * width)
         alone = rebuilt(room, bundle, registered, tracks, own)
         _adjust(alone)
         bundle = _with_poses(bundle, alone, names, tracks)
-    left = _error(alone) / max(before, 1e-9)
-    return (alone, left) if left < SWAYED and len(tracks) >= LEAST_TRACKS else (model, left)
+    return bundle, alone
+
+
+def _halves(matches: Matches, tracks: list) -> tuple[Matches, Matches]:
+    """The matches of every other track, and those of the rest."""
+    half = {seen: number % 2 for number, track in enumerate(tracks) for seen in track}
+    sides = {pair: np.array([[half.get((name, int(k)), -1) for k in index[:, i]] for i, name in enumerate(pair)]) for pair, index in matches.pairs.items()}
+    first, second = (matches.kept({pair: (side == each).all(0) for pair, side in sides.items()}) for each in (0, 1))
+    return first, second
+
+
+def _miss(bundle: Bundle, names: list[str], matches: Matches, reach_px: float) -> float:
+    """By how many pixels the median observation misses the point that its track's rays meet nearest."""
+    (camera, point, pixel), _, placed = agreeing(bundle, names, matches, reach_px)
+    return float(np.median(np.linalg.norm(placed.project(camera, point) - pixel, axis=1))) if len(pixel) else np.inf
 
 
 def head_boxes(model: pycolmap.Reconstruction, head: HeadFrame) -> dict[str, tuple[int, int, int, int]]:
@@ -117,12 +142,6 @@ def _face_width(model: pycolmap.Reconstruction, registered: list) -> float:
     across = np.ptp(template_landmarks().mean[:, 0])
     depth = [(pose_of(image).rotation.matrix() @ np.zeros(3) + pose_of(image).translation)[2] for image in registered]
     return float(np.median([model.cameras[image.camera_id].mean_focal_length() * across / z for image, z in zip(registered, depth, strict=True)]))
-
-
-def _error(model: pycolmap.Reconstruction) -> float:
-    """Median reprojection error of the points, in pixels."""
-    model.update_point_3d_errors()
-    return float(np.median([point.error for point in model.points3D.values()]))
 
 
 def _adjust(model: pycolmap.Reconstruction) -> None:
