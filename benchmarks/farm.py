@@ -36,8 +36,10 @@ from . import farm_batch, farm_nodes, figures
 from .farm_nodes import ADDRESSES, HEAD, PORT, WORKING, Node
 from .stage_cost import busy_s
 
-EVERY_FACES = 3
-"""Faces for each process that is killed."""
+EVERY_TASKS = 8
+"""Tasks that end for each process that is killed, in the mean."""
+SPREAD = 0.02
+"""Of a task, for each look: a kill comes at any moment of one, and not where one has just ended."""
 FACES_PER_NODE = 100
 """Faces for each node that is killed; one at least."""
 AWAY_S = 45.0
@@ -103,9 +105,13 @@ class Trial:
             began, counted = time.monotonic(), farm_nodes.counted_s() or 0.0
             environment = {key: value for key, value in os.environ.items() if key not in farm_nodes.THREAD_VARIABLES}
             command = [*farm_nodes.on_core(farm_nodes.cores()[0]), *farm_batch.core(), "run", str(self.folder / "serial"), name]
-            done = subprocess.run(command, capture_output=True, text=True, cwd=farm_batch.ROOT, env=environment, preexec_fn=farm_nodes.join_account)
-            if done.returncode:
-                raise Problem(f"The capture {name} did not end well: {done.stdout.strip()} {done.stderr.strip()}", "Look into its logs.")
+            with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=farm_batch.ROOT, env=environment,
+                                  preexec_fn=farm_nodes.join_account) as process:
+                while process.poll() is None:
+                    farm_nodes.keep_pace()
+                    time.sleep(0.1)
+                if process.returncode:
+                    raise Problem(f"The capture {name} did not end well: {process.stdout.read().strip()}", "Look into its logs.")
             self.state["serial"][name] = {"wall_s": time.monotonic() - began, "processor_s": (farm_nodes.counted_s() or 0.0) - counted}
             self.save()
             print(f"{name}: {self.state['serial'][name]['wall_s']:.0f} s", flush=True)
@@ -134,11 +140,10 @@ class Trial:
     def _follow(self, nodes: dict[str, Node]) -> None:
         """Runs the batch from the head node, and kills meanwhile."""
         chance = random.Random(f"{self.state['seed']}.{self.state['sessions']}")
-        pace = EVERY_FACES * self._serial_s() / len(WORKING)
-        next_kill, back, done = time.monotonic() + chance.uniform(0.3, 1.0) * pace, {}, self.captures - self._left()
+        tasks, next_kill, back, done = 0, chance.uniform(0.2, 1.0) * EVERY_TASKS, {}, self.captures - self._left()
         turns = [self.captures * (turn + chance.uniform(0.2, 0.6)) / self._nodes_to_kill() for turn in range(self._nodes_to_kill())]
-        driver = [*nodes[HEAD].enter(farm_batch.ROOT), *farm_batch.core(), "run", str(self.folder / "farm"), "--on", "ray", "--address", f"{ADDRESSES[HEAD]}:{PORT}",
-                  "--cores", "1"]
+        driver = [*nodes[HEAD].enter(farm_batch.ROOT), *farm_batch.core(), "run", str(self.folder / "farm"), "--on", "ray",
+                  "--address", f"{ADDRESSES[HEAD]}:{PORT}", "--cores", "1"]
         with subprocess.Popen(driver, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=nodes[HEAD].environment,
                               start_new_session=True) as process:
             try:
@@ -146,10 +151,11 @@ class Trial:
                 threading.Thread(target=lambda: [lines.put(line) for line in process.stdout], daemon=True).start()
                 last, counted, busy = time.monotonic(), farm_nodes.counted_s() or 0.0, busy_s() or 0.0
                 while process.poll() is None or not lines.empty():
-                    done += self._show(lines)
-                    now = time.monotonic()
-                    if now > next_kill:
-                        next_kill = now + chance.uniform(0.5, 1.5) * pace
+                    farm_nodes.keep_pace()
+                    ended = self._show(lines)
+                    done, tasks, now = done + ended[0], tasks + ended[1] + chance.uniform(0, SPREAD), time.monotonic()
+                    if tasks > next_kill:
+                        next_kill += chance.uniform(0.5, 1.5) * EVERY_TASKS
                         self._kill_process(nodes, chance)
                     killed = sum(each["what"] == "node" for each in self.state["kills"])
                     if killed < len(turns) and done >= turns[killed] and not back:
@@ -174,14 +180,14 @@ class Trial:
                     time.sleep(3)
                     os.killpg(process.pid, signal.SIGKILL)
 
-    def _show(self, lines: queue.Queue) -> int:
-        """Prints what the batch says; returns how many faces have ended."""
-        ended = 0
+    def _show(self, lines: queue.Queue) -> tuple[int, int]:
+        """Prints what the batch says; returns how many faces and tasks have ended."""
+        faces = tasks = 0
         while not lines.empty():
             line = lines.get()
             self._say(line.rstrip())
-            ended += f" of {self.captures}" in line
-        return ended
+            faces, tasks = faces + (f" of {self.captures}" in line), tasks + (" done in " in line)
+        return faces, tasks
 
     def _say(self, text: str) -> None:
         print(f"{self.state['wall_s']:6.0f} s  {text}", flush=True)

@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 
 from .. import __version__
+from ..contract import lease
 from ..contract.hashes import hash_file
 from ..contract.messages import Problem, from_line
 from .groups import GROUPS, Group
@@ -63,7 +64,7 @@ class _Run:
         self._left = deque(faces)
         self._tasks: dict = {}  # Ray's reference -> (face, group, whether it is the face's last)
         self._call, self._post = _define_call(ray), _define_post(ray)
-        self._heard = 0.0
+        self._asked, self._heard = None, 0.0
         board.write(now=True)
 
     def is_under_way(self) -> bool:
@@ -80,9 +81,7 @@ class _Run:
         for ref in self._ray.wait(list(self._tasks), timeout=0.3)[0] if self._tasks else ():
             if ref in self._tasks:
                 self._take(ref, *self._tasks.pop(ref))
-        if time.monotonic() - self._heard > EVERY_S:
-            self._heard = time.monotonic()
-            self._hear()
+        self._hear()
 
     def _begin(self, face: Face) -> bool:
         """Submits what is left of a face; False where that is nothing."""
@@ -96,13 +95,13 @@ class _Run:
             self.board.end(face, WAITING if state.state == WAITING else STOPPED, state.words())
             return False
         has_gpu = self._ray.cluster_resources().get("GPU", 0) > 0 and face.chosen().device != "cpu"
-        before, ours = None, state.state == TO_DO
+        before, found = None, lease.holder(face.capture.lock) if state.state == WORKING else None
+        stranger = str((found or {}).get("token", ""))
         for group in self._groups[self._groups.index(state.group):]:
             task = self._call.options(name=f"{face.name}.{group.name}", num_cpus=self._cores, memory=_bytes(group),
                                       num_gpus=int(has_gpu and group.on_device), max_retries=-1, retry_exceptions=False)
-            before = task.remote(before, str(ROOT), "do_task", self._post, str(self._batch.root), face.name, group.name, self._cores, ours)
+            before = task.remote(before, str(ROOT), "do_task", self._post, str(self._batch.root), face.name, group.name, self._cores, stranger)
             self._tasks[before] = face, group, group is self._groups[-1]
-            ours = True  # the task before it had the capture
         return True
 
     def _take(self, ref, face: Face, group: Group, is_last: bool) -> None:
@@ -122,10 +121,15 @@ class _Run:
         self.board.end(face, outcome["state"], f"{group.label.lower()} stopped: {outcome['words']}" if outcome["state"] == STOPPED else outcome["words"])
 
     def _hear(self) -> None:
-        """What the workers say of their progress; nothing is lost where that cannot be had."""
+        """What the workers say of their progress, asked for once in a while and not waited for; nothing is lost where that cannot be had."""
+        if self._asked is None and time.monotonic() - self._heard > EVERY_S:
+            self._asked, self._heard = self._post.take.remote(), time.monotonic()
+        if self._asked is None or not self._ray.wait([self._asked], timeout=0)[0]:
+            return
+        asked, self._asked = self._asked, None
         working = {face.name: face for face, _, _ in self._tasks.values()}
         with contextlib.suppress(self._ray.exceptions.RayError):
-            for name, line in self._ray.get(self._post.take.remote(), timeout=EVERY_S).items():
+            for name, line in self._ray.get(asked).items():
                 if name in working:
                     self.board.hear(working[name], from_line(line))
 

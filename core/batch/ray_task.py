@@ -19,9 +19,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from .. import __version__
+from ..contract import lease
 from ..contract.capture import Capture
 from ..contract.hashes import hash_file
-from ..contract.lease import TERM_S
 from ..contract.messages import Cancelled, Done, Failed, Message, Problem, Progress, StageDone, to_line
 from .groups import group_named
 from .local import CANCELLED, EVERY_S, is_left
@@ -55,9 +55,9 @@ def examine(root: str, version: str, record: str) -> str:
     return ""
 
 
-def do_task(root: str, name: str, group_name: str, threads: int, ours: bool, say: Callable[[str], None]) -> dict:
-    """Runs a task of a face and returns how it ended. `say` hears of its progress, as lines of JSON. `ours`: nobody else worked on the capture when the batch
-    was run, so who holds it can only be a task of ours whose node or process has died, and is waited for."""
+def do_task(root: str, name: str, group_name: str, threads: int, stranger: str, say: Callable[[str], None]) -> dict:
+    """Runs a task of a face and returns how it ended. `say` hears of its progress, as lines of JSON. `stranger` is the token of the lease that somebody had on
+    the capture when the batch came to it, '' for nobody: whoever else has it is a task of ours whose process or node has died, and is waited for."""
     began, stopped, outcome = time.monotonic(), [], {"state": STOPPED, "words": "", "host": socket.gethostname()}
     before = signal.signal(signal.SIGINT, lambda number, frame: stopped.append(number))  # as which Ray's cancel arrives
     try:
@@ -65,8 +65,7 @@ def do_task(root: str, name: str, group_name: str, threads: int, ours: bool, say
         face = batch.face(name)
         if waits(batch, face, group):
             return {**outcome, "state": WAITING, "words": State(WAITING, group).words(), "seconds": 0.0}
-        if ours:
-            _outlast(face.capture, stopped)
+        _outlast(face.capture, stranger, stopped)
         final = run_task(batch, face, group, _listener(batch, name, say), lambda: bool(stopped), threads)
         if isinstance(final, Done) and is_left(batch, face, group):
             final = Failed("", f"The task {group.name} ended well, and its result is not what was asked for.", "Look whether another program writes there.")
@@ -79,10 +78,13 @@ def do_task(root: str, name: str, group_name: str, threads: int, ours: bool, say
     return {**outcome, "seconds": round(time.monotonic() - began, 2)}
 
 
-def _outlast(capture: Capture, stopped: list) -> None:
+def _outlast(capture: Capture, stranger: str, stopped: list) -> None:
     """Waits until the worker of a Ray process that was killed beside us has ended, too, or that of a node that has gone has not been heard of for a term."""
-    deadline = time.monotonic() + 2 * TERM_S
-    while capture.lock.exists() and not stopped:
+    deadline = time.monotonic() + 2 * lease.TERM_S
+    while not stopped:
+        found = lease.holder(capture.lock)
+        if found is None or found.get("token") == stranger:
+            return
         try:
             with capture.locked():
                 return
