@@ -82,8 +82,8 @@ def test_frames_that_are_placed_by_the_others_lie_where_they_were(synthesized):
     left_out = images[1::3]
     names = {image.name for image in left_out}
     kept = pycolmap.Reconstruction()
-    for camera in true.cameras.values():
-        kept.add_camera_with_trivial_rig(pycolmap.Camera(camera.todict()))
+    for lens in true.cameras.values():
+        kept.add_camera_with_trivial_rig(pycolmap.Camera(lens.todict()))
     for image in images:
         if image.name not in names:
             pixels = np.array([point.xy for point in image.points2D])
@@ -107,8 +107,8 @@ def test_frames_that_are_placed_by_the_others_lie_where_they_were(synthesized):
 def test_a_frame_that_shares_too_little_is_left_out(synthesized):
     path, true = synthesized
     empty = pycolmap.Reconstruction()
-    for camera in true.cameras.values():
-        empty.add_camera_with_trivial_rig(pycolmap.Camera(camera.todict()))
+    for lens in true.cameras.values():
+        empty.add_camera_with_trivial_rig(pycolmap.Camera(lens.todict()))
     names = sorted(image.name for image in true.images.values())
     skeleton.place_others(empty, path, names, 0, lambda done, of: None)
     assert empty.num_reg_images() == 0
