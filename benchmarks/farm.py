@@ -27,6 +27,7 @@ import threading
 import time
 from pathlib import Path
 
+from core.batch.groups import GROUPS
 from core.batch.record import read_batch
 from core.batch.state import DONE, look
 from core.contract.files import write_json
@@ -38,8 +39,6 @@ from .stage_cost import busy_s
 
 EVERY_TASKS = 8
 """Tasks that end for each process that is killed, in the mean."""
-SPREAD = 0.02
-"""Of a task, for each look: a kill comes at any moment of one, and not where one has just ended."""
 FACES_PER_NODE = 100
 """Faces for each node that is killed; one at least."""
 AWAY_S = 45.0
@@ -140,7 +139,7 @@ class Trial:
     def _follow(self, nodes: dict[str, Node]) -> None:
         """Runs the batch from the head node, and kills meanwhile."""
         chance = random.Random(f"{self.state['seed']}.{self.state['sessions']}")
-        tasks, next_kill, back, done = 0, chance.uniform(0.2, 1.0) * EVERY_TASKS, {}, self.captures - self._left()
+        tasks, next_kill, moments, back, done = 0, chance.uniform(0.2, 1.0) * EVERY_TASKS, [], {}, self.captures - self._left()
         turns = [self.captures * (turn + chance.uniform(0.2, 0.6)) / self._nodes_to_kill() for turn in range(self._nodes_to_kill())]
         driver = [*nodes[HEAD].enter(farm_batch.ROOT), *farm_batch.core(), "run", str(self.folder / "farm"), "--on", "ray",
                   "--address", f"{ADDRESSES[HEAD]}:{PORT}", "--cores", "1"]
@@ -153,9 +152,12 @@ class Trial:
                 while process.poll() is None or not lines.empty():
                     farm_nodes.keep_pace()
                     ended = self._show(lines)
-                    done, tasks, now = done + ended[0], tasks + ended[1] + chance.uniform(0, SPREAD), time.monotonic()
-                    if tasks > next_kill:
+                    done, tasks, now = done + ended[0], tasks + ended[1], time.monotonic()
+                    if tasks > next_kill:  # not at once: most tasks have just begun where one has ended
                         next_kill += chance.uniform(0.5, 1.5) * EVERY_TASKS
+                        moments.append(now + chance.uniform(0, self._serial_s() / len(GROUPS)))
+                    for moment in [moment for moment in moments if now > moment]:
+                        moments.remove(moment)
                         self._kill_process(nodes, chance)
                     killed = sum(each["what"] == "node" for each in self.state["kills"])
                     if killed < len(turns) and done >= turns[killed] and not back:

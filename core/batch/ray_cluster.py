@@ -64,6 +64,7 @@ class _Run:
         self._left = deque(faces)
         self._tasks: dict = {}  # Ray's reference -> (face, group, whether it is the face's last)
         self._call, self._post = _define_call(ray), _define_post(ray)
+        self._places: dict[str, str] = {}  # face -> the node that said that it works on it
         self._asked, self._heard = None, 0.0
         board.write(now=True)
 
@@ -83,8 +84,8 @@ class _Run:
                 self._take(ref, *self._tasks.pop(ref))
         self._hear()
 
-    def _begin(self, face: Face) -> bool:
-        """Submits what is left of a face; False where that is nothing."""
+    def _begin(self, face: Face, again: bool = False) -> bool:
+        """Submits what is left of a face, `again` where we had it before; False where that is nothing."""
         state = look(self._batch, face)
         if state.state == STOPPED and self._retry and state.group is not None:
             state = State(TO_DO, state.group)
@@ -95,7 +96,7 @@ class _Run:
             self.board.end(face, WAITING if state.state == WAITING else STOPPED, state.words())
             return False
         has_gpu = self._ray.cluster_resources().get("GPU", 0) > 0 and face.chosen().device != "cpu"
-        before, found = None, lease.holder(face.capture.lock) if state.state == WORKING else None
+        before, found = None, lease.holder(face.capture.lock) if state.state == WORKING and not again else None
         stranger = str((found or {}).get("token", ""))
         for group in self._groups[self._groups.index(state.group):]:
             task = self._call.options(name=f"{face.name}.{group.name}", num_cpus=self._cores, memory=_bytes(group),
@@ -112,6 +113,7 @@ class _Run:
         except self._ray.exceptions.RayError as error:
             outcome = {"state": STOPPED, "words": f"Ray has given the task up ({type(error).__name__}). Run the batch again: finished stages are kept."}
         self.board.tally.worked.add(face.name)
+        self._places.pop(face.name, None)
         if outcome["state"] == DONE:
             self.board.say(face, f"{group.label.lower()} done in {outcome['seconds']:.0f} s on {outcome['host']}")
             if is_last:
@@ -121,7 +123,7 @@ class _Run:
         self.board.end(face, outcome["state"], f"{group.label.lower()} stopped: {outcome['words']}" if outcome["state"] == STOPPED else outcome["words"])
 
     def _hear(self) -> None:
-        """What the workers say of their progress, asked for once in a while and not waited for; nothing is lost where that cannot be had."""
+        """What tasks say of where they are and how far, asked for once in a while and not waited for; nothing is lost where that cannot be had."""
         if self._asked is None and time.monotonic() - self._heard > EVERY_S:
             self._asked, self._heard = self._post.take.remote(), time.monotonic()
         if self._asked is None or not self._ray.wait([self._asked], timeout=0)[0]:
@@ -129,9 +131,23 @@ class _Run:
         asked, self._asked = self._asked, None
         working = {face.name: face for face, _, _ in self._tasks.values()}
         with contextlib.suppress(self._ray.exceptions.RayError):
-            for name, line in self._ray.get(asked).items():
-                if name in working:
-                    self.board.hear(working[name], from_line(line))
+            places, lines = self._ray.get(asked)
+            self._places |= {name: node for name, node in places.items() if name in working}
+            for name in lines.keys() & working.keys():
+                self.board.hear(working[name], from_line(lines[name]))
+            self._leave_dead_nodes(working)
+
+    def _leave_dead_nodes(self, working: dict[str, Face]) -> None:
+        """Has faces done elsewhere whose node has been given up. Ray does so by itself where a connection breaks; where one only falls silent, as at a power
+        cut, it waits for five minutes, and its setting for that (RAY_grpc_client_keepalive_time_ms) has the other side take us for an attack."""
+        alive = {node["NodeID"] for node in self._ray.nodes() if node["Alive"]}
+        for name in [name for name, node in self._places.items() if node not in alive]:
+            del self._places[name]
+            for ref in [ref for ref, task in self._tasks.items() if task[0].name == name]:
+                del self._tasks[ref]
+                self._ray.cancel(ref)
+            if name in working:
+                self._begin(working[name], again=True)
 
     def end(self) -> None:
         """Cancels what is under way, wherever it is, and waits a moment for it."""
@@ -161,6 +177,8 @@ def _define_call(ray):
         import socket
         import sys
 
+        import ray
+
         if before is not None and before["state"] != "done":
             return before
         code = os.environ.get(variable, code)
@@ -171,24 +189,28 @@ def _define_call(ray):
             return {"state": "stopped", "words": f"The node {socket.gethostname()} has no WildCap at {code} ({error}). Set {variable} there."}
         if post is None:
             return {"state": "done", "words": getattr(module, function)(*words)}
+        post.be_at.remote(words[1], ray.get_runtime_context().get_node_id())
         return getattr(module, function)(*words, lambda line: post.put.remote(words[1], line))
 
     return call
 
 
 def _define_post(ray):
-    """An actor beside us, for what workers say of their progress: the last line of each face."""
+    """An actor beside us, for what tasks say: of each face the node that works on it, and the last line of progress."""
     @ray.remote(num_cpus=0, max_restarts=-1)
     class Post:
         def __init__(self):
-            self.lines = {}
+            self.places, self.lines = {}, {}
+
+        def be_at(self, name, node):
+            self.places[name] = node
 
         def put(self, name, line):
             self.lines[name] = line
 
         def take(self):
-            lines, self.lines = self.lines, {}
-            return lines
+            taken, (self.places, self.lines) = (self.places, self.lines), ({}, {})
+            return taken
 
     here = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(ray.get_runtime_context().get_node_id(), soft=False)
     return Post.options(scheduling_strategy=here).remote()
