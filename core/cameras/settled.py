@@ -23,7 +23,7 @@ from .bundle import Bundle
 from .joint import as_bundle, rebuilt, straightened
 from .landmarks import similarity, template_landmarks
 from .matches import Matches
-from .resection import LEAST_MATCHES, agreeing
+from .resection import LEAST_MATCHES, agreeing, place_by_matches
 from .world import HeadFrame
 
 REACH = (0.025, 0.0125, 0.006)
@@ -41,15 +41,16 @@ LEAST_PX = 64
 
 
 def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, report: Reporter,
-           only: Collection[str] | None = None) -> tuple[pycolmap.Reconstruction, float | None]:
+           by: Collection[str] | None = None) -> tuple[pycolmap.Reconstruction, float | None]:
     """The model with its cameras placed with respect to the head, in the head's world (metres), and the share of the error that is left of the head's matches;
-    `model` itself where the head kept still, or where too little matches on it to tell (None). `only`: the frames
-    to look at, and those of the model that comes back; all of them if not given."""
+    `model` itself where the head kept still, or where too little matches on it to tell (None). `by`: the frames that tell, all if not given; each of the
+    others is placed by the points of those."""
     room = pycolmap.Reconstruction(model)
     room.transform(head.world_from_model)
-    registered = sorted((image for image in room.images.values() if image.has_pose and (only is None or image.name in only)), key=lambda image: image.name)
-    names, own, width = [image.name for image in registered], on_head(room, registered, matches), _face_width(room, registered)
-    straight, still = straightened(room, registered, own), as_bundle(room, registered, False)
+    everything = sorted((image for image in room.images.values() if image.has_pose), key=lambda image: image.name)
+    registered = [image for image in everything if by is None or image.name in by]
+    names, own, width = [image.name for image in registered], on_head(room, everything, matches), _face_width(room, registered)
+    straight, still = straightened(room, everything, own), as_bundle(room, registered, False)
     bundle = still
     for step, share in enumerate(REACH):
         report.progress(step, len(REACH), "finding the cameras with respect to the head")
@@ -62,7 +63,26 @@ def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, re
     by_room = rebuilt(room, replace(bundle, rotations=still.rotations, translations=still.translations), registered, tracks, own)
     _adjust(by_room, poses=False)  # the same matches: hair and outlines miss either way, and those that the rounds left out would tell of a motion
     left = _error(alone) / max(_error(by_room), 1e-9)
-    return (alone, left) if left < SWAYED and len(tracks) >= LEAST_TRACKS else (model, left)
+    if left >= SWAYED or len(tracks) < LEAST_TRACKS:
+        return model, left
+    return (_with_others(alone, room, everything, registered, bundle, tracks, own, straight) if len(everything) > len(registered) else alone), left
+
+
+def _with_others(alone: pycolmap.Reconstruction, room: pycolmap.Reconstruction, everything: list, registered: list, bundle: Bundle, tracks: list,
+                 own: Matches, straight: Matches) -> pycolmap.Reconstruction:
+    """The model of the frames `registered` with the others of `everything`: placed by its points, or where they were in the room if they show too few."""
+    names = [image.name for image in registered]
+    found = {image.name: pose_of(image) for image in alone.images.values()}
+    points = np.array([alone.points3D[number].xyz for number in sorted(alone.points3D)])
+    bundle = replace(bundle, rotations=np.array([found[name].rotation.matrix() for name in names]),
+                     translations=np.array([found[name].translation for name in names]),
+                     points=np.concatenate([bundle.points[:len(bundle.points) - len(points)], points]))
+    others = [image for image in everything if image.name not in found]
+    groups = [{"names": [image.name for image in others if image.camera_id == number], "width": camera.width, "height": camera.height, "lens": number}
+              for number, camera in sorted(room.cameras.items())]
+    group_of = {name: i for i, group in enumerate(groups) for name in group["names"]}
+    poses = {image.name: (pose_of(image).rotation.matrix(), pose_of(image).translation) for image in others}
+    return rebuilt(room, bundle, registered, tracks, own, poses | place_by_matches(bundle, groups, group_of, names, tracks, straight), groups)
 
 
 def head_boxes(model: pycolmap.Reconstruction, head: HeadFrame) -> dict[str, tuple[int, int, int, int]]:
