@@ -20,6 +20,8 @@ import pycolmap
 
 from . import skeleton
 
+CHOSEN = "chosen.json"
+"""Beside the database: the frames that carry a film of which matches are all that is wanted."""
 PHONE = 1.0
 FOCALS = (PHONE, 2.0, 3.5)
 """Focal lengths that photographs whose files tell none are tried with, as shares of the longer side: 53, 28 and 16 degrees of view."""
@@ -40,6 +42,7 @@ def reconstruct(job: dict) -> bool:
     chosen = _extract_film(job) if job["film"] else _extract(job, [name for group in job["groups"] for name in group["names"]], job["finer"])
     if not job["output"]:
         _match(job, skeleton.pairs_within(job["film"], chosen) + skeleton.pairs_between(job["film"], chosen))
+        Path(job["database"]).with_name(CHOSEN).write_text(json.dumps(chosen), encoding="utf-8")
         return True
     if job["film"]:
         models = _map_film(job, chosen)

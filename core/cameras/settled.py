@@ -24,7 +24,7 @@ from .bundle import Bundle
 from .joint import as_bundle, rebuilt, straightened
 from .landmarks import similarity, template_landmarks
 from .matches import Matches
-from .resection import LEAST_MATCHES, agreeing
+from .resection import LEAST_MATCHES, agreeing, place_by_matches
 from .world import HeadFrame
 
 REACH = (0.025, 0.0125, 0.006)
@@ -42,37 +42,41 @@ LEAST_PX = 64
 
 
 def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, report: Reporter,
-           only: Collection[str] | None = None) -> tuple[pycolmap.Reconstruction, float | None]:
+           by: Collection[str] | None = None) -> tuple[pycolmap.Reconstruction, float | None]:
     """The model with its cameras placed with respect to the head, in the head's world (metres), and the share of the error that is left of the head's matches
-    (SWAYED); `model` itself where the head kept still, or where too little matches on it to tell (None). `only`: the frames
-    to look at, and those of the model that comes back; all of them if not given."""
+    (SWAYED); `model` itself where the head kept still, or where too little matches on it to tell (None). `by`: the frames that tell, all if not given; each of
+    the others is placed by the points of those."""
     room = pycolmap.Reconstruction(model)
     room.transform(head.world_from_model)
-    registered = sorted((image for image in room.images.values() if image.has_pose and (only is None or image.name in only)), key=lambda image: image.name)
-    names, own, width = [image.name for image in registered], on_head(room, registered, matches), _face_width(room, registered)
-    straight, bundle, reach = straightened(room, registered, own), as_bundle(room, registered, False), REACH[0] * width
+    everything = sorted((image for image in room.images.values() if image.has_pose), key=lambda image: image.name)
+    registered = [image for image in everything if by is None or image.name in by]
+    names, own, width = [image.name for image in registered], on_head(room, everything, matches), _face_width(room, registered)
+    straight, bundle, reach = straightened(room, everything, own), as_bundle(room, registered, False), REACH[0] * width
     _, tracks, still = agreeing(bundle, names, straight, reach)
     if len(tracks) < LEAST_TRACKS:
         return model, None
     fitted, held_out = _halves(straight, tracks)
-    followed, _ = _follow(room, registered, names, own, fitted, still, width, report)
+    followed, _, _ = _follow(room, registered, own, fitted, still, width, report)
     left = _miss(followed, names, held_out, reach) / max(_miss(bundle, names, held_out, reach), 1e-9)
     if left > SWAYED:
         return model, left
-    _, alone = _follow(room, registered, names, own, straight, still, width, report)
-    return (alone, left) if alone.num_points3D() >= LEAST_TRACKS else (model, left)
+    bundle, alone, tracks = _follow(room, registered, own, straight, still, width, report)
+    if len(tracks) < LEAST_TRACKS:
+        return model, left
+    return (_with_others(alone, room, everything, registered, bundle, tracks, own, straight) if len(everything) > len(registered) else alone), left
 
 
-def _follow(room: pycolmap.Reconstruction, registered: list, names: list[str], own: Matches, straight: Matches, bundle: Bundle, width: float,
-            report: Reporter) -> tuple[Bundle, pycolmap.Reconstruction]:
-    """The cameras with respect to the head, by these of its matches (`straight`: of their pixels without the lens), and the model that has them."""
+def _follow(room: pycolmap.Reconstruction, registered: list, own: Matches, straight: Matches, bundle: Bundle, width: float,
+            report: Reporter) -> tuple[Bundle, pycolmap.Reconstruction, list]:
+    """The cameras with respect to the head, by these of its matches (`straight`: of their pixels without the lens), the model that has them, and its tracks."""
+    names = [image.name for image in registered]
     for step, share in enumerate(REACH):
         report.progress(step, len(REACH), "finding the cameras with respect to the head")
         _, tracks, bundle = agreeing(bundle, names, straight, share * width)
         alone = rebuilt(room, bundle, registered, tracks, own)
         _adjust(alone)
         bundle = _with_poses(bundle, alone, names, tracks)
-    return bundle, alone
+    return bundle, alone, tracks
 
 
 def _halves(matches: Matches, tracks: list) -> tuple[Matches, Matches]:
@@ -87,6 +91,23 @@ def _miss(bundle: Bundle, names: list[str], matches: Matches, reach_px: float) -
     """By how many pixels the median observation misses the point that its track's rays meet nearest."""
     (camera, point, pixel), _, placed = agreeing(bundle, names, matches, reach_px)
     return float(np.median(np.linalg.norm(placed.project(camera, point) - pixel, axis=1))) if len(pixel) else np.inf
+
+
+def _with_others(alone: pycolmap.Reconstruction, room: pycolmap.Reconstruction, everything: list, registered: list, bundle: Bundle, tracks: list,
+                 own: Matches, straight: Matches) -> pycolmap.Reconstruction:
+    """The model of the frames `registered` with the others of `everything`: placed by its points, or where they were in the room if they show too few."""
+    names = [image.name for image in registered]
+    found = {image.name: pose_of(image) for image in alone.images.values()}
+    points = np.array([alone.points3D[number].xyz for number in sorted(alone.points3D)])
+    bundle = replace(bundle, rotations=np.array([found[name].rotation.matrix() for name in names]),
+                     translations=np.array([found[name].translation for name in names]),
+                     points=np.concatenate([bundle.points[:len(bundle.points) - len(points)], points]))
+    others = [image for image in everything if image.name not in found]
+    groups = [{"names": [image.name for image in others if image.camera_id == number], "width": camera.width, "height": camera.height, "lens": number}
+              for number, camera in sorted(room.cameras.items())]
+    group_of = {name: i for i, group in enumerate(groups) for name in group["names"]}
+    poses = {image.name: (pose_of(image).rotation.matrix(), pose_of(image).translation) for image in others}
+    return rebuilt(room, bundle, registered, tracks, own, poses | place_by_matches(bundle, groups, group_of, names, tracks, straight), groups)
 
 
 def head_boxes(model: pycolmap.Reconstruction, head: HeadFrame) -> dict[str, tuple[int, int, int, int]]:

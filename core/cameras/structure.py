@@ -22,6 +22,7 @@ from ..contract.messages import Problem, Reporter
 from ..geometry.models import read_model
 from ..imaging import images
 from . import skeleton
+from .colmap import CHOSEN
 from .matches import Matches, read_matches
 
 ALL_PAIRS = 40
@@ -61,8 +62,9 @@ def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str,
         return model, matches.scaled(scales)
 
 
-def match_crops(boxes: dict[str, tuple[int, int, int, int]], frames: Frames, capture: Capture, seed: int, report: Reporter) -> Matches:
-    """Matches of fine features within a part of each frame of a film, in the frames' pixels. boxes: name -> left, top, right and bottom of that part."""
+def match_crops(boxes: dict[str, tuple[int, int, int, int]], frames: Frames, capture: Capture, seed: int, report: Reporter) -> tuple[Matches, list[str]]:
+    """Matches of fine features within a part of each frame of a film, in the frames' pixels, and the frames that carry the film there. boxes: name -> left,
+    top, right and bottom of that part."""
     with capture.workspace() as work:
         (work / "parts").mkdir()
         names = {}
@@ -78,8 +80,8 @@ def match_crops(boxes: dict[str, tuple[int, int, int, int]], frames: Frames, cap
         path = work / "parts.json"
         path.write_text(json.dumps(job), encoding="utf-8")
         _follow(path, report)
-        matches = read_matches(Path(job["database"]))
-    return Matches({name: pixels + boxes[name][:2] for name, pixels in matches.keypoints.items()}, matches.pairs)
+        matches, chosen = read_matches(Path(job["database"])), json.loads((work / CHOSEN).read_text(encoding="utf-8"))
+    return Matches({name: pixels + boxes[name][:2] for name, pixels in matches.keypoints.items()}, matches.pairs), chosen
 
 
 def film_of(records: Sequence[FrameRecord]) -> skeleton.Film:
