@@ -31,6 +31,7 @@ def run(capture, settings, report):
 def build(folder: Path) -> Path:
     """The worker's root, as tiny_chain.build makes it."""
     root = tiny_chain.build(folder)
+    tiny_chain.keep_pace(root)
     (root / "core" / "deliver").mkdir()
     (root / "core" / "deliver" / "__init__.py").write_text(DELIVER, encoding="utf-8")
     return root
