@@ -104,7 +104,7 @@ class Trial:
             began, counted = time.monotonic(), farm_nodes.counted_s() or 0.0
             environment = {key: value for key, value in os.environ.items() if key not in farm_nodes.THREAD_VARIABLES}
             command = [*farm_nodes.on_core(farm_nodes.cores()[0]), *farm_batch.core(), "run", str(self.folder / "serial"), name]
-            with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=farm_batch.ROOT, env=environment,
+            with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=farm_batch.code(self.folder), env=environment,
                                   preexec_fn=farm_nodes.join_account) as process:
                 while process.poll() is None:
                     farm_nodes.keep_pace()
@@ -141,7 +141,7 @@ class Trial:
         chance = random.Random(f"{self.state['seed']}.{self.state['sessions']}")
         tasks, next_kill, moments, back, done = 0, chance.uniform(0.2, 1.0) * EVERY_TASKS, [], {}, self.captures - self._left()
         turns = [self.captures * (turn + chance.uniform(0.2, 0.6)) / self._nodes_to_kill() for turn in range(self._nodes_to_kill())]
-        driver = [*nodes[HEAD].enter(farm_batch.ROOT), *farm_batch.core(), "run", str(self.folder / "farm"), "--on", "ray",
+        driver = [*nodes[HEAD].enter(farm_batch.code(self.folder)), *farm_batch.core(), "run", str(self.folder / "farm"), "--on", "ray",
                   "--address", f"{ADDRESSES[HEAD]}:{PORT}", "--cores", "1"]
         with subprocess.Popen(driver, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=nodes[HEAD].environment,
                               start_new_session=True) as process:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import collections
 import json
+import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ import av
 from core.batch.ray_task import LOGS
 from core.contract import stages
 from core.contract.capture import Capture
-from core.contract.files import replacing
+from core.contract.files import replacing, replacing_folder
 
 from . import same_maps
 
@@ -47,7 +48,11 @@ class Begun:
 
 
 def lay_out(folder: Path, count: int) -> None:
-    """FOLDER/films, and FOLDER/serial with each kind once and FOLDER/farm with `count` faces, planned; made again, it leaves what is there."""
+    """FOLDER/code with WildCap as it is now, FOLDER/films, and FOLDER/serial with each kind once and FOLDER/farm with `count` faces, planned; made again, it
+    leaves what is there, the code among it: a trial of hours is one of one version."""
+    if not code(folder).is_dir():
+        with replacing_folder(code(folder)) as copied:
+            shutil.copytree(ROOT / "core", copied / "core", ignore=shutil.ignore_patterns("__pycache__", "training"))
     films = folder / "films"
     films.mkdir(parents=True, exist_ok=True)
     for kind in range(KINDS):
@@ -58,7 +63,12 @@ def lay_out(folder: Path, count: int) -> None:
     for batch, names in (("serial", twin_names()), ("farm", face_names(count))):
         rows = [f"{film(folder, number % KINDS).name},{name},{number % KINDS}.json" for number, name in enumerate(names)]
         (films / f"{batch}.csv").write_text("\n".join(["video,name,settings", *rows]) + "\n", encoding="utf-8")
-        subprocess.run([*core(), "plan", str(films / f"{batch}.csv"), str(folder / batch)], check=True, stdout=subprocess.DEVNULL, cwd=ROOT)
+        subprocess.run([*core(), "plan", str(films / f"{batch}.csv"), str(folder / batch)], check=True, stdout=subprocess.DEVNULL, cwd=code(folder))
+
+
+def code(folder: Path) -> Path:
+    """Where the commands of `core` are run."""
+    return folder / "code"
 
 
 def core() -> list[str]:

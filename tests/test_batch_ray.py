@@ -38,9 +38,7 @@ WAIT_S = 90  # for what takes seconds where nothing else is computed
 
 @pytest.fixture(scope="module")
 def code(tmp_path_factory):
-    code = tiny_batch.build(tmp_path_factory.mktemp("tiny"))
-    tiny_chain.keep_pace(code)
-    return code
+    return tiny_batch.build(tmp_path_factory.mktemp("tiny"))
 
 
 @pytest.fixture(autouse=True)

@@ -17,7 +17,7 @@ import pytest
 from core.batch import ray_task
 from core.batch.state import DONE
 
-from . import tiny_batch, tiny_chain
+from . import tiny_batch
 from .tiny_batch import core, make, states
 
 WAIT_S = 90
@@ -28,7 +28,6 @@ pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="th
 def code(tmp_path):
     """Rooms of a few lines, and leases that are soon out."""
     code = tiny_batch.build(tmp_path / "code")
-    tiny_chain.keep_pace(code)
     lease = code / "core" / "contract" / "lease.py"
     text = lease.read_text(encoding="utf-8")
     assert "TERM_S = 30.0\n" in text
