@@ -98,7 +98,7 @@ def test_what_is_no_batch_is_refused_and_one_that_is_damaged_meanwhile_says_so(a
     (folder / "batch.json").write_text("{")
     batch_faces.wait(addon, lambda: batches.view().problem is not None)
     texts = " ".join(text for text, _ in drawn(addon("batch.panel").WILDCAP_PT_batch))
-    assert "batch.json cannot be read" in texts and "Masks" not in texts
+    assert "batch.json cannot be read".replace(" ", "") in texts.replace(" ", "") and "Masks" not in texts  # a long path is broken anywhere
     refuses("batch.json cannot be read", bpy.ops.wildcap.solve_all)
 
 
