@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PLACES = ("wildcap_addon", "core/worker", "core/batch", "core/contract/capture.py", "core/contract/settings.py", "core/contract/setting_values.py")
+PLACES = ("wildcap_addon", "core/worker", "core/contract/capture.py", "core/contract/settings.py", "core/contract/setting_values.py")
 REASONS = "wildcap_addon/base_operator.py"  # the one file that hands a reason to Blender
 _reached: set[tuple[str, int]] = set()  # (file relative to the root, line that is being carried out)
 
