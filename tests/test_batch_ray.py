@@ -132,8 +132,8 @@ def test_the_gate_waits(code, tmp_path, monkeypatch, own_environment):
     batch = make(code, tmp_path, "ab", None, "--gate", "artist")
     monkeypatch.setattr(ray_cluster, "ROOT", code)
     heard = []
-    with monkeypatch.context() as older, pytest.raises(Problem, match=f"has WildCap {__version__}, and this is 0.0"):
-        older.setattr(ray_cluster, "__version__", "0.0")
+    with monkeypatch.context() as elsewhere, pytest.raises(Problem, match=f"has no WildCap at {tmp_path / 'none'}. Set WILDCAP_CODE there"):
+        elsewhere.setattr(ray_cluster, "ROOT", tmp_path / "none")
         ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1)
     with pytest.raises(Problem, match="No node of the cluster has 1000 cores and 5 GB"):
         ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1000)
@@ -146,7 +146,7 @@ def test_what_a_node_lacks(code, tmp_path, monkeypatch):
     batch = make(code, tmp_path, "a")
     record = hash_file(batch.root / NAME)
     assert ray_task.examine(str(batch.root), __version__, record) == ""
-    assert "has WildCap" in ray_task.examine(str(batch.root), "0.0", record)
+    assert f"has WildCap {__version__}, and this is 0.0" in ray_task.examine(str(batch.root), "0.0", record)
     assert "another batch" in ray_task.examine(str(batch.root), __version__, "0" * 64)
     assert "There is no batch at" in ray_task.examine(str(tmp_path / "none"), __version__, record)
     monkeypatch.setenv(ray_task.BATCHES, str(tmp_path))

@@ -182,11 +182,10 @@ def _define_call(ray):
         if before is not None and before["state"] != "done":
             return before
         code = os.environ.get(variable, code)
+        if not os.path.isfile(os.path.join(code, *package.split(".")) + ".py"):  # another one may lie where this Python looks as well
+            return {"state": "stopped", "words": f"The node {socket.gethostname()} has no WildCap at {code}. Set {variable} there."}
         sys.path[:] = [code, *(place for place in sys.path if place != code)]
-        try:
-            module = importlib.import_module(package)
-        except ImportError as error:
-            return {"state": "stopped", "words": f"The node {socket.gethostname()} has no WildCap at {code} ({error}). Set {variable} there."}
+        module = importlib.import_module(package)
         if post is None:
             return {"state": "done", "words": getattr(module, function)(*words)}
         post.be_at.remote(words[1], ray.get_runtime_context().get_node_id())
