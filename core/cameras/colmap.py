@@ -200,7 +200,7 @@ def _map(job: dict, names: list[str] | None = None) -> list[pycolmap.Reconstruct
     if names is not None:
         options.image_names = names
         options.ba_global_frames_ratio = options.ba_global_points_ratio = 1.3  # a film grows evenly: the whole need not be adjusted at every tenth more
-    if job["skin"] or job["masks"] or total < 12:  # little is shown
+    if job["skin"] or total < 12:
         options.min_num_matches = 12
         options.mapper.abs_pose_min_num_inliers = 12
         options.mapper.init_min_num_inliers = 40
