@@ -127,6 +127,10 @@ def at_work(captures) -> list:
     return [capture for capture in captures if list(capture.root.glob(".scan*"))]
 
 
+def busy_machine(*words, **options) -> None:
+    raise Exception("It took too long.\nMore of it.")
+
+
 def test_the_gate_waits(code, tmp_path, monkeypatch, own_environment):
     """Run by this process, whose sentences are counted: the two refusals of a whole cluster, then the batch."""
     batch = make(code, tmp_path, "ab", None, "--gate", "artist")
@@ -137,6 +141,9 @@ def test_the_gate_waits(code, tmp_path, monkeypatch, own_environment):
         ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1)
     with pytest.raises(Problem, match="No node of the cluster has 1000 cores and 5 GB"):
         ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1000)
+    with monkeypatch.context() as busy, pytest.raises(Problem, match="could not be started on this machine: It took too long."):
+        busy.setattr("ray.init", busy_machine)
+        ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1)
     assert states(batch) == dict.fromkeys("ab", TO_DO) and not heard
     tally = ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1)
     assert tally.ended == dict.fromkeys("ab", WAITING) and states(batch) == dict.fromkeys("ab", WAITING), heard

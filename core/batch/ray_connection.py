@@ -43,7 +43,7 @@ def connect(address: str | None) -> Iterator:
     with _mute():
         try:
             if address is None:
-                ray.init("local", include_dashboard=False, object_store_memory=STORE_BYTES, _node_ip_address="127.0.0.1", **quiet)
+                _begin(lambda: ray.init("local", include_dashboard=False, object_store_memory=STORE_BYTES, _node_ip_address="127.0.0.1", **quiet))
             else:
                 _reach(address)
                 _join(lambda: ray.init(address, **quiet), address)
@@ -64,6 +64,15 @@ def _mute() -> Iterator[None]:
         os.dup2(kept, 2)
         os.close(kept)
         os.close(nowhere)
+
+
+def _begin(begin: Callable[[], object]) -> None:
+    """Raises Problem where Ray does not come up, as within the 30 seconds that it gives itself on a machine that is busy with something else."""
+    try:
+        begin()
+    except Exception as error:  # it has no class of its own for that
+        said = str(error).strip().partition("\n")[0]
+        raise Problem(f"Ray could not be started on this machine: {said}", "Try again when it is less busy, or run the batch with --on local.") from error
 
 
 def _reach(address: str) -> None:
