@@ -7,6 +7,7 @@ import pycolmap
 import pytest
 
 from core.cameras import colmap, skeleton
+from core.cameras.matches import read_matches
 from core.geometry.models import pose_of
 from core.imaging import images
 from core.synthetic.painted_head import camera, photograph
@@ -123,12 +124,12 @@ def filmed(tmp_path_factory):
     return folder
 
 
-def solved(folder, work):
+def solved(folder, work, sharpest_first=True):
     """The bytes of the model that COLMAP's process leaves of a film, by the names of its files, and the names of the frames in it."""
     work.mkdir()
     names = sorted(path.name for path in folder.iterdir())
     job = {"images": str(folder), "groups": [{"names": names, "width": 480, "height": 640, "focal_px": None}], "skin": False, "photographs": False,
-           "film": [(name, float(len(names) - i), None) for i, name in enumerate(names)], "finer": True, "masks": None, "seed": 0,
+           "film": [(name, float(-i if sharpest_first else i), None) for i, name in enumerate(names)], "finer": True, "masks": None, "seed": 0,
            "database": str(work / "database.db"), "output": str(work / "model")}
     assert colmap.reconstruct(job)
     model = pycolmap.Reconstruction(job["output"])
@@ -151,3 +152,16 @@ def test_the_order_in_which_features_are_found_changes_no_byte(filmed, tmp_path,
     reversed_, _ = solved(filmed, tmp_path / "reversed")
     assert len(registered) == 11 and set(order) == set(registered) and order != sorted(order)
     assert reversed_ == straight
+
+
+def test_what_lies_beyond_a_chosen_frame_that_is_not_mapped_is_placed_by_those_that_are(filmed, tmp_path, monkeypatch):
+    """As at the end of a long film, whose outermost chosen frame shows too little to be mapped."""
+    monkeypatch.setattr(skeleton, "SIZE", 7)
+    monkeypatch.setattr(colmap, "FILM_FEATURES", 400)
+    monkeypatch.setattr(colmap, "CARRIED", 0.8)
+    map_, chosen = colmap._map, []
+    monkeypatch.setattr(colmap, "_map", lambda job, names: chosen.extend(names) or map_(job, names[1:]))
+    _, registered = solved(filmed, tmp_path / "work", sharpest_first=False)
+    assert chosen[0] == "00001.jpg" and len(registered) == 11
+    pairs = read_matches(tmp_path / "work" / "database.db").pairs
+    assert {two for one, two in pairs if one == "00000.jpg"} == set(chosen[1:3])

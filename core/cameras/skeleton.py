@@ -58,7 +58,7 @@ def pairs_within(film: Film, chosen: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def pairs_between(film: Film, chosen: Sequence[str]) -> list[tuple[str, str]]:
-    """Each other frame with the two chosen ones before it and the two after it."""
+    """Each other frame with the two of `chosen`, which are mapped, before it and the two after it."""
     place = {name: i for i, (name, _, _) in enumerate(film)}
     at = np.array([place[name] for name in chosen])
     rest = [name for name, _, _ in film if name not in set(chosen)]
