@@ -5,6 +5,7 @@
 import struct
 import time
 import zipfile
+from unittest.mock import Mock
 
 import pytest
 
@@ -58,10 +59,16 @@ def test_the_button_stands_beside_a_problem_and_not_beside_a_notice(addon):
 
 
 def test_a_timer_that_fails_tells_it_and_goes_on(addon, monkeypatch):
-    jobs = addon("jobs")
+    jobs, problems = addon("jobs"), addon("problems")
     monkeypatch.setattr(jobs, "poll", lambda: 1 / 0)
     assert jobs._tick() is None
-    assert "An error inside WildCap stopped listening" in addon("problems").of("").problem
+    assert "An error inside WildCap stopped listening" in problems.of("").problem
+    problems.clear("")
+    monkeypatch.undo()
+    monkeypatch.setattr(jobs, "_wanted", lambda: True)
+    for failure, said in ((ZeroDivisionError(), "An error inside WildCap stopped"), (jobs.Problem("The head is damaged.", "Run it again."), "is damaged")):
+        monkeypatch.setattr(jobs, "bring_in_results", Mock(side_effect=failure))
+        assert jobs._tick() == jobs.INTERVAL_S and said in problems.of("").problem
 
 
 def cameras(folder, name: bytes = b"00000.jpg", focal: float = 900.0, width: int = 720, count: int = 1) -> None:

@@ -7,6 +7,7 @@ belongs to its capture: opening another .blend, a new scene or an undo past its 
 and what was finished is kept.
 """
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -198,16 +199,15 @@ def _hear(root: str, job: Job, message: messages.Message) -> None:
 def _tick() -> float | None:
     before, shown = set(_jobs), _shown()
     try:
-        running = poll()
+        poll()
+        ended = bool(before - set(_jobs))
+        if ended or _wanted():
+            bring_in_results(ended)
     except Exception as error:  # nobody is above a timer: without this, Blender would drop it and the tab stand still
-        problems.show("", unforeseen.explain(error, "listening to the solver"))
-        running = bool(_jobs)
+        problems.show("", error if isinstance(error, Problem) else unforeseen.explain(error, "listening to the solver"))
     if shown != _shown():  # a redraw of the tab takes time from the worker, and from whoever paints
         status.redraw()
-    ended = bool(before - set(_jobs))
-    if ended or _wanted():
-        bring_in_results(ended)
-    return INTERVAL_S if running or _wanted() else None
+    return INTERVAL_S if _jobs or _wanted() else None
 
 
 def _wanted() -> bool:
@@ -235,7 +235,8 @@ def bring_in_results(ended: bool) -> None:
         for results in on_results:
             results.take(bpy.context, item)
         if ended and captures.head(bpy.context, item) is None and captures.folder(item).head.is_file():
-            bpy.ops.wildcap.bring_in_head('EXEC_DEFAULT', True)
+            with contextlib.suppress(RuntimeError):  # the tab shows the problem of the click
+                bpy.ops.wildcap.bring_in_head('EXEC_DEFAULT', True)
 
 
 def eta(job: Job) -> str:

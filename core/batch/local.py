@@ -2,18 +2,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A batch on this machine: some faces at a time, each through its tasks. What one face lacks does not keep the others. Standard library only.
 
-Who runs a batch holds its lease. BATCH/progress.json is what a panel may show of it meanwhile; the file BATCH/stop asks it to end, as Ctrl-C does.
+Who runs a batch holds its lease. BATCH/progress.json is what a panel may show of it meanwhile; an empty file BATCH/stop asks it to end, as Ctrl-C does.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
+import stat
 import threading
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from ..contract.files import write_json
 from ..contract.messages import Cancelled, Done, Failed, Message, Problem, Progress
@@ -90,9 +92,9 @@ def run_local(batch: Batch, faces: Iterable[Face], at_once: int, retry: bool, te
     """Runs what is to be done of these faces, `at_once` at a time, up to the task `until` (None: all). A face that has stopped is left alone unless `retry`.
     The caller holds the batch's lease. Ends early by KeyboardInterrupt or the file `stop`; what was finished is kept."""
     faces = list(faces)
-    board, ended, stop = Board(batch, len(faces), tell), threading.Event(), batch.root / STOP
+    board, ended = Board(batch, len(faces), tell), threading.Event()
     threads = max(1, (os.cpu_count() or 1) // at_once) if at_once > 1 else None
-    stop.unlink(missing_ok=True)
+    forget_stop(batch.root)
     board.write(now=True)
     with ThreadPoolExecutor(at_once) as pool:
         waiting = {pool.submit(run_face, batch, face, board, retry, ended.is_set, until, threads) for face in faces}
@@ -101,7 +103,7 @@ def run_local(batch: Batch, faces: Iterable[Face], at_once: int, retry: bool, te
                 done, waiting = wait(waiting, timeout=0.3, return_when=FIRST_COMPLETED)
                 for each in done:
                     each.result()  # an error of ours is told as one
-                if stop.exists():
+                if is_asked_to_stop(batch.root):
                     ended.set()
         except BaseException:
             ended.set()
@@ -109,9 +111,29 @@ def run_local(batch: Batch, faces: Iterable[Face], at_once: int, retry: bool, te
         finally:
             for each in waiting:
                 each.cancel()
-    stop.unlink(missing_ok=True)
+    forget_stop(batch.root)
     board.write(now=True)
     return board.tally
+
+
+def ask_to_stop(root: Path) -> None:
+    """Asks whoever runs the batch in the folder `root` to stop. Raises OSError where nothing can be written there."""
+    (root / STOP).touch()
+
+
+def is_asked_to_stop(root: Path) -> bool:
+    """Whether the file `stop` is there; one that holds something was meant for something else."""
+    try:
+        found = (root / STOP).lstat()
+    except OSError:
+        return False
+    return stat.S_ISREG(found.st_mode) and found.st_size == 0
+
+
+def forget_stop(root: Path) -> None:
+    """Removes the file `stop`."""
+    if is_asked_to_stop(root):
+        (root / STOP).unlink(missing_ok=True)
 
 
 def run_face(batch: Batch, face: Face, board: Board, retry: bool, cancelled: Callable[[], bool], until: str | None = None,

@@ -18,7 +18,7 @@ from ..contract import lease
 from ..contract.hashes import hash_file
 from ..contract.messages import Problem, from_line
 from .groups import GROUPS, Group
-from .local import CANCELLED, EVERY_S, STOP, Board, Tally
+from .local import CANCELLED, EVERY_S, Board, Tally, forget_stop, is_asked_to_stop
 from .ray_connection import connect
 from .record import NAME, Batch, Face
 from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, State, look
@@ -39,17 +39,17 @@ def run_on_ray(batch: Batch, faces: Iterable[Face], retry: bool, tell: Callable[
     """Runs what is to be done of these faces on the cluster whose head node is at `address` (HOST:PORT or auto), or, without one, on a cluster of this machine
     alone, up to the task `until` (None: all). Each task takes `cores` cores. The caller holds the batch's lease. Ends early by KeyboardInterrupt or the file
     `stop`; what was finished is kept. Raises Problem where there is no Ray, no cluster, or no node that could work on the batch."""
-    faces, stop = list(faces), batch.root / STOP
-    stop.unlink(missing_ok=True)
+    faces = list(faces)
+    forget_stop(batch.root)
     with connect(address) as ray:
         _examine_nodes(ray, batch, cores)
         run = _Run(ray, batch, faces, retry, Board(batch, len(faces), tell), until, cores)
         try:
-            while run.is_under_way() and not stop.exists():
+            while run.is_under_way() and not is_asked_to_stop(batch.root):
                 run.advance()
         finally:
             run.end()
-            stop.unlink(missing_ok=True)
+            forget_stop(batch.root)
     return run.board.tally
 
 

@@ -9,7 +9,7 @@ import subprocess
 
 import bpy
 
-from ...core.batch.local import STOP
+from ...core.batch.local import ask_to_stop
 from ...core.batch.record import Batch
 from ...core.contract import switchlight_api, unforeseen
 from ...core.contract.files import storage_problem
@@ -83,11 +83,10 @@ def poll() -> None:
 
 
 def _ask_to_stop() -> None:
-    stop = batches.current() / STOP
     try:
-        stop.touch()
+        ask_to_stop(batches.current())
     except OSError as error:
-        raise storage_problem(error, stop) from error
+        raise storage_problem(error, batches.current()) from error
 
 
 def _problem_of(code: int) -> Problem | None:
@@ -123,16 +122,15 @@ def _tick() -> float:
     try:
         poll()
         changed = batches.poll()
+        root = captures.root(captures.active(bpy.context))
+        before, _worked = _worked, root if batches.works_on(root) else ""
+        if before and before == root != _worked:
+            jobs.bring_in_results(True)
     except Exception as error:  # nobody is above a timer: without this, Blender would drop it and the tab stand still
         problems.show("", unforeseen.explain(error, "listening to the batch"))
         changed = True
     if changed:
         status.redraw()
-    root = captures.root(captures.active(bpy.context))
-    before, _worked = _worked, root if batches.works_on(root) else ""
-    if before and before == root != _worked:
-        with contextlib.suppress(RuntimeError):  # of the click on Bring In Head, whose problem the tab shows
-            jobs.bring_in_results(True)
     return INTERVAL_S
 
 
