@@ -53,6 +53,9 @@ def run(capture, settings, report):
         import a_module_that_is_not_there
     if mood == "die":
         os._exit(9)
+    if mood == "die once" and not (capture.root / "died.txt").exists():
+        (capture.root / "died.txt").touch()
+        os._exit(9)
     if mood == "nothing":
         return
     for name in stage.writes:

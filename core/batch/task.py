@@ -57,7 +57,19 @@ def _wait_for_lease(capture: Capture, hear: Callable[[Message], None]) -> None:
 
 
 def _follow(capture: Capture, job: Path, hear: Callable[[Message], None], cancelled: Callable[[], bool], environment: dict[str, str]) -> Message:
-    worker = Worker(Path(sys.executable), ROOT, job, capture.logs / "worker.log", {**environment, **_paid_key(job)})
+    """Runs a job to its end and returns its final message. A worker that dies is started once more, for what killed it may have been the task beside it."""
+    for again in (False, True):
+        worker = Worker(Path(sys.executable), ROOT, job, capture.logs / "worker.log", {**environment, **_paid_key(job)})
+        final = _listen(worker, hear, cancelled)
+        if again or not worker.died:
+            return final
+        hear(Log(f"{final.problem} It is begun once more."))
+        _wait_for_lease(capture, hear)
+    raise AssertionError
+
+
+def _listen(worker: Worker, hear: Callable[[Message], None], cancelled: Callable[[], bool]) -> Message:
+    """Runs a worker to its end and returns its final message."""
     worker.start()
     try:
         while True:

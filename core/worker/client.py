@@ -44,6 +44,8 @@ class Worker:
         self._stage = ""
         self._cancelled_at: float | None = None
         self._ended = False
+        self.died = False
+        """Whether the process ended without a final message of its own, and nobody had asked it to."""
 
     @property
     def running(self) -> bool:
@@ -128,6 +130,7 @@ class Worker:
         """The final message of a process that ended without one."""
         if self._cancelled_at is not None:
             return Cancelled(self._stage)
+        self.died = True
         stage_log = self.log.parent / f"{self._stage}.log"
         log = stage_log if self._stage and stage_log.is_file() else self.log
         during = f" during the stage {self._stage}" if self._stage else " before its first stage"
