@@ -34,7 +34,7 @@ from .stage_cost import own_s
 
 PAGE = figures.ROOT / "docs" / "growth.md"
 COMMAND = "python -m benchmarks.farm_model --json docs/figures/farm_model.json --page docs/growth.md --capture CAPTURE --starts 5"
-SLIMMED = ("frames", "delit")
+SLIMMED = tuple(name.rstrip("/") for name in stages.SLIMMED)
 """What `core slim` removes of a finished face."""
 STARTS = {"command": (str(figures.ROOT), "--version"), "torch": ("-c", "import torch")}
 """What a task starts before its first stage: the command, and in the worker the largest library, which the stages' seconds hold already."""

@@ -63,6 +63,15 @@ def test_one_that_stops_keeps_nobody(code, tmp_path):
     assert finished(batch)["a"] == once["a"] and finished(batch)["b"]["frames"] == once["b"]["frames"]
 
 
+def test_a_worker_that_dies_is_started_once_more(code, tmp_path):
+    """It may have been killed for the memory that the one beside it took; one that dies again stops its face."""
+    batch = make(code, tmp_path, "ab", {"a": {"scan": "die once"}, "b": {"scan": "die"}})
+    ran = core(code, "batch", "run", batch.root)
+    said = {line.partition(":")[0]: line for line in ran.stdout.splitlines()}
+    assert states(batch) == {"a": DONE, "b": TO_DO} and "head stopped: The worker ended unexpectedly during the stage scan" in said["b"]
+    assert "scan" in batch.faces[0].capture.read()["stages"] and ran.stdout.splitlines()[-1] == "2 faces: 1 done, 1 stopped"
+
+
 def test_a_capture_that_is_worked_on_elsewhere_is_told_and_the_rest_goes_on(code, tmp_path):
     batch = make(code, tmp_path, "ab")
     with batch.faces[0].capture.locked():
@@ -124,7 +133,8 @@ def test_a_task_by_an_unknown_name_is_refused(code, tmp_path):
     batch = make(code, tmp_path, "a")
     for words, said in ((("z", "head"), "no face named 'z'"), (("a", "lunch"), "no task named 'lunch'")):
         assert said in core(code, "batch", "task", batch.root, *words).stderr
-    for words, said in ((("--at-once", 0), "less than one"), (("--address", "here"), "--on ray only"), (("z",), "no face named")):
+    for words, said in ((("--at-once", 0), "less than one"), (("--address", "here"), "--on ray only"),
+                        (("--cores", 2), "--on ray only"), (("--on", "ray", "--at-once", 2), "--on local only"), (("z",), "no face named")):
         assert said in core(code, "batch", "run", batch.root, *words).stderr
 
 
@@ -158,6 +168,15 @@ def test_whatever_ends_it_nothing_is_lost_and_it_goes_on(code, tmp_path, way):
     once = finished(batch)["a"]["cameras"]
     tiny_batch.set_mood(capture, {})
     assert core(code, "batch", "run", batch.root).returncode == 0 and states(batch) == {"a": DONE, "b": DONE} and finished(batch)["a"]["cameras"] == once
+
+
+def test_what_somebody_else_named_like_the_request_to_stop_is_no_request_and_stays(code, tmp_path):
+    batch = make(code, tmp_path, "a")
+    (batch.root / local.STOP).write_text("a list of bus stops")
+    assert core(code, "batch", "run", batch.root).returncode == 0 and (batch.root / local.STOP).read_text() == "a list of bus stops"
+    (batch.root / local.STOP).unlink()
+    (batch.root / local.STOP).mkdir()
+    assert core(code, "batch", "run", batch.root).returncode == 0 and (batch.root / local.STOP).is_dir()
 
 
 def test_until_ends_each_face_there(code, tmp_path):

@@ -107,6 +107,21 @@ def test_planned_again_it_takes_in_what_is_new(folder, capsys):
     assert (folder / "batch" / "batch.json").read_bytes() != before
 
 
+def test_planned_again_it_keeps_the_options_that_are_left_out(folder):
+    def plan(*options):
+        assert main(["batch", "plan", str(folder), str(folder / "batch"), *options]) == 0
+        batch = read_batch(folder / "batch")
+        return batch.gate, batch.deliver, batch.blender
+
+    out = str(folder / "out")
+    assert plan() == ("automatic", None, "")
+    wanted = ("artist", {"preset": "unreal", "folder": out}, "/opt/blender")
+    assert plan("--gate", "artist", "--deliver", "unreal", "--to", out, "--blender", "/opt/blender") == wanted and plan() == wanted
+    assert plan("--deliver", "unity_hdrp") == ("artist", {"preset": "unity_hdrp", "folder": out}, "/opt/blender")
+    assert plan("--to", str(folder / "in"))[1] == {"preset": "unity_hdrp", "folder": str(folder / "in")}
+    assert plan("--gate", "automatic", "--deliver", "none", "--blender", "none") == ("automatic", None, "")
+
+
 def test_what_is_no_batch_is_left_alone(folder, capsys):
     new = ["plan", str(folder), str(folder / "b")]
     for words, said in ((["plan", str(folder), str(folder)], "is no batch: it holds"), ([*new, "--to", "x"], "--deliver only"),

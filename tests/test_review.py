@@ -137,3 +137,12 @@ def test_a_page_that_cannot_be_written_is_told(batch):
     with pytest.raises(Problem, match="review.html"):
         review.write_review(batch)
     assert json.loads((batch.root / "batch.json").read_text(encoding="utf-8"))["faces"] and Capture(batch.faces[0].root).json.is_file()
+
+
+def test_what_somebody_else_has_put_in_the_pages_place_stays(batch):
+    path = review.write_review(batch)[0]
+    assert review.write_review(batch)[0] == path, "its own page is written anew"
+    path.write_text("<html>my own notes</html>")
+    with pytest.raises(Problem, match="not a page that WildCap wrote"):
+        review.write_review(batch)
+    assert path.read_text() == "<html>my own notes</html>"

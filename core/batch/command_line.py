@@ -9,6 +9,7 @@ import contextlib
 import json
 import signal
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from ..contract import lease, settings
@@ -28,20 +29,24 @@ from .shots import HEADINGS, read_faces
 from .state import DONE, STOPPED, WAITING, look
 from .task import ROOT, run_task
 
+CORES = 2
+"""That a task takes of a node of Ray's."""
+NONE = "none"
+
 
 def add_commands(commands) -> None:
     """Adds `batch` and `slim` to the subparsers of `python -m core`."""
     slim_command.add_commands(commands)
     many = commands.add_parser("batch", help="many faces: plan them from a table, run them here or on a farm, review them")
     many = many.add_subparsers(required=True, metavar="plan|run|status|retry|accept|review|commands|task")
-    plan = many.add_parser("plan", help="make a batch of a table of videos, or of a folder of them; made again, it takes in what is new")
+    plan = many.add_parser("plan", help="make a batch of a table of videos, or of a folder of them; planned again, it takes in what is new")
     plan.add_argument("shots", metavar="SHOTS", type=Path, help=f"a CSV with the columns {', '.join(HEADINGS)}, of which video alone is needed; or a folder")
     plan.add_argument("batch", metavar="BATCH", type=Path, help="the batch's folder, with a capture for each face")
     plan.add_argument("--quality", choices=settings.QUALITIES, default="standard")
-    plan.add_argument("--gate", choices=GATES, default=GATES[0], help="artist: no face is solved before somebody has looked at its shadow mask")
-    plan.add_argument("--deliver", metavar="PRESET", help="deliver each head for that program as well (`presets` lists them)")
+    plan.add_argument("--gate", choices=GATES, help="artist: no face is solved before somebody has looked at its shadow mask; automatic: at once")
+    plan.add_argument("--deliver", metavar="PRESET", help="deliver each head for that program as well (`presets` lists them); none: no more")
     plan.add_argument("--to", metavar="FOLDER", type=Path, help="folder of the deliveries; without it they lie in the captures")
-    plan.add_argument("--blender", metavar="PROGRAM", default="", help="a Blender with the extension, which renders a contact sheet of each face")
+    plan.add_argument("--blender", metavar="PROGRAM", help="a Blender with the extension, which renders a contact sheet of each face; none: no more")
     command_settings.add_assignments(plan, "run")
     plan.set_defaults(command=_plan)
     for word, words in (("run", "do what is left; what has stopped with a problem stays"), ("retry", "the same, and what has stopped is tried again")):
@@ -50,8 +55,8 @@ def add_commands(commands) -> None:
         run.add_argument("names", metavar="NAME", nargs="*", help="faces; without one, all")
         run.add_argument("--on", choices=("local", "ray"), default="local", help="this machine, or a cluster of Ray's")
         run.add_argument("--address", help="Ray's head node, as `ray start` tells it; without it, this machine becomes a cluster of one")
-        run.add_argument("--at-once", metavar="N", type=int, default=1, help="faces that this machine works on at the same time")
-        run.add_argument("--cores", metavar="N", type=int, default=2, help="cores that each task takes of Ray's nodes: the same number gives the same bytes")
+        run.add_argument("--at-once", metavar="N", type=int, help="faces that this machine works on at the same time, else 1")
+        run.add_argument("--cores", metavar="N", type=int, help="cores of a node of Ray's that a task takes, else 2: the same number gives the same bytes")
         run.add_argument("--until", choices=[group.name for group in GROUPS], help="end each face with this task")
         run.set_defaults(command=_run, retry=word == "retry")
     status = many.add_parser("status", help="say how far each face is")
@@ -79,23 +84,31 @@ def add_commands(commands) -> None:
 
 def _plan(options: argparse.Namespace) -> int:
     root = options.batch.absolute()
-    before = read_batch(root).faces if (root / NAME).is_file() else ()
+    before = read_batch(root) if (root / NAME).is_file() else Batch(root, ())
     _refuse_strangers(root)
+    asked = _with_options(before, options)
     faces, faults = read_faces(options.shots, root, options.quality, command_settings.read_options(options, "run"))
-    deliver = None
-    if options.deliver:
-        deliver = {"preset": options.deliver, **({"folder": str(options.to.absolute())} if options.to else {})}
-        settings.from_json({"deliver": deliver})
-    elif options.to:
-        raise Problem("--to goes with --deliver only.", "Add --deliver PRESET, or leave --to out.")
-    kept = [face for face in before if face.name not in {new.name for new in faces}]
+    kept = [face for face in before.faces if face.name not in {new.name for new in faces}]
     if faces or kept:
-        write_batch(Batch(root, (*kept, *faces), options.gate, deliver, options.blender))
+        write_batch(replace(asked, faces=(*kept, *faces)))
     for fault in faults:
         print(f"{fault.problem} {fault.remedy}", file=sys.stderr)
     said = f"{len(faces)} face{'' if len(faces) == 1 else 's'} planned in {root}"
     print(said + (f", {len(kept)} of before kept" if kept else "") + (f", {len(faults)} left out" if faults else ""))
     return 2 if faults else 0
+
+
+def _with_options(batch: Batch, options: argparse.Namespace) -> Batch:
+    """The batch with the options that are named; the others stay as they were planned. Raises Problem."""
+    deliver, folder = dict(batch.deliver or {}), {"folder": str(options.to.absolute())} if options.to else {}
+    if options.deliver:
+        deliver = {**deliver, "preset": options.deliver} if options.deliver != NONE else {}
+    if folder and not deliver:
+        raise Problem("--to goes with --deliver only.", "Add --deliver PRESET, or leave --to out.")
+    deliver |= folder
+    settings.from_json({"deliver": deliver})
+    blender = batch.blender if options.blender is None else "" if options.blender == NONE else options.blender
+    return replace(batch, gate=options.gate or batch.gate, deliver=deliver or None, blender=blender)
 
 
 def _refuse_strangers(root: Path) -> None:
@@ -112,19 +125,18 @@ def _run(options: argparse.Namespace) -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     batch = read_batch(options.batch)
     faces = [batch.face(name) for name in dict.fromkeys(options.names)] or list(batch.faces)
-    if options.at_once < 1:
-        raise Problem("--at-once is less than one.", "Leave it out, or give the number of faces at the same time.")
-    if options.cores < 1:
-        raise Problem("--cores is less than one.", "Leave it out, or give the number of cores that each task takes of a node of Ray's.")
-    if options.address and options.on != "ray":
-        raise Problem("--address goes with --on ray only.", "Add --on ray, or leave --address out.")
+    for flag, value, where in (("--at-once", options.at_once, "local"), ("--cores", options.cores, "ray"), ("--address", options.address, "ray")):
+        if value is not None and options.on != where:
+            raise Problem(f"{flag} goes with --on {where} only.", f"Add --on {where}, or leave {flag} out.")
+        if isinstance(value, int) and value < 1:
+            raise Problem(f"{flag} is less than one.", "Leave it out, or give a whole number from 1 on.")
     with lease.hold(batch.root, _tell, "batch"), known_hashes(batch.root):
         if options.on == "ray":
             from .ray_cluster import run_on_ray
 
-            tally = run_on_ray(batch, faces, options.retry, _tell, options.until, options.address, options.cores)
+            tally = run_on_ray(batch, faces, options.retry, _tell, options.until, options.address, options.cores or CORES)
         else:
-            tally = run_local(batch, faces, options.at_once, options.retry, _tell, options.until)
+            tally = run_local(batch, faces, options.at_once or 1, options.retry, _tell, options.until)
     return _sum_up(tally, len(faces))
 
 

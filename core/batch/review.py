@@ -25,11 +25,11 @@ from pathlib import Path
 from .. import __version__
 from ..contract import report
 from ..contract.capture import Capture
-from ..contract.files import replacing
+from ..contract.files import replacing, storage_problem
 from ..contract.messages import Problem
 from .groups import GROUPS
 from .record import Batch, Face
-from .review_page import PAGE, STYLE
+from .review_page import MARK, PAGE, STYLE
 from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, State, look
 
 NAME = "review.html"
@@ -99,18 +99,30 @@ class Row:
 
 
 def write_review(batch: Batch) -> tuple[Path, list[Row]]:
-    """Writes BATCH/review.html; its path, and the faces in its order. Raises Problem where it cannot be written."""
+    """Writes BATCH/review.html; its path, and the faces in its order. Raises Problem where it cannot be written, or something
+    else is in its place."""
+    path = batch.root / NAME
+    if os.path.lexists(path) and not _is_ours(path):
+        raise Problem(f"{path} is not a page that WildCap wrote.", "Move it away, then write the review again.")
     rows = sort_rows(read_rows(batch))
     sections = "".join(_section(state, [row for row in rows if row.state.state == state or not state and row.state.state not in ORDER], batch)
                        for state in (*ORDER, ""))
     counts = {state: sum(row.state.state == state for row in rows) for state in STATES}
-    page = PAGE.format(title=html.escape(batch.root.name), style=STYLE, sections=sections, version=__version__, written=time.strftime("%Y-%m-%d %H:%M"),
+    page = PAGE.format(mark=MARK, title=html.escape(batch.root.name), style=STYLE, sections=sections, version=__version__,
+                       written=time.strftime("%Y-%m-%d %H:%M"),
                        counts="".join(f'<span class="badge {_kind(state)}">{count} {STATES[state]}</span>' for state, count in counts.items() if count),
                        faces=f"{len(rows)} face{'' if len(rows) == 1 else 's'}", time=_duration(sum(row.seconds for row in rows)))
-    path = batch.root / NAME
     with replacing(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return path, rows
+
+
+def _is_ours(path: Path) -> bool:
+    """Raises Problem where it cannot be read."""
+    try:
+        return MARK in path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise storage_problem(error, path) from error
 
 
 def read_rows(batch: Batch) -> list[Row]:

@@ -30,8 +30,11 @@ details ul { margin: .3rem 0; padding-left: 1.1rem; } details li { margin: .3rem
 @media (max-width: 60rem) { article { grid-template-columns: 1fr; } }
 """
 
+MARK = '<meta name="generator" content="WildCap">'
+"""By which a page is told from what somebody else put in its place."""
+
 PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1"><title>{title} - WildCap</title>
+<html lang="en"><head><meta charset="utf-8">{mark}<meta name="viewport" content="width=device-width, initial-scale=1"><title>{title} - WildCap</title>
 <style>{style}</style></head>
 <body><header><h1>{title}</h1><p>{faces}, {time} of work, as of {written}</p><p>{counts}</p>
 <p>A bar is as long as the share of the batch's other faces that are better in that measure. A face is as risky as its longest bar: which to look at first,
