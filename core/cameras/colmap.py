@@ -199,6 +199,7 @@ def _map(job: dict, names: list[str] | None = None) -> list[pycolmap.Reconstruct
     total = sum(len(group["names"]) for group in job["groups"])
     if names is not None:
         options.image_names = names
+        options.max_model_overlap = len(names)  # where the first pair was a bad one, the next model may take all frames
         options.ba_global_frames_ratio = options.ba_global_points_ratio = 1.3  # a film grows evenly: the whole need not be adjusted at every tenth more
     if job["skin"] or total < 12:
         options.min_num_matches = 12
