@@ -51,12 +51,12 @@ class DelightNet(nn.Module):
         self.stem, self.enter = nn.Conv2d(CHANNELS, FINE, 4, stride=2, padding=1), nn.Conv2d(FINE, widths[0], 2, stride=2)
         self.down, self.up, self.halve, self.narrow = nn.ModuleList(), nn.ModuleList(), nn.ModuleList(), nn.ModuleList()
         for level, (width, depth) in enumerate(zip(widths, depths, strict=True)):
-            self.down.append(nn.Sequential(*(_Block(width) for _ in range(depth))))
+            self.down.append(nn.Sequential(*(Block(width) for _ in range(depth))))
             if level + 1 < len(widths):
                 self.halve.append(nn.Conv2d(width, widths[level + 1], 2, stride=2))
                 self.narrow.append(nn.Conv2d(widths[level + 1], width, 1))
-                self.up.append(nn.Sequential(*(_Block(width) for _ in range(depth))))
-        self.attention = _Attention(widths[-1])
+                self.up.append(nn.Sequential(*(Block(width) for _ in range(depth))))
+        self.attention = Attention(widths[-1])
         self.leave = nn.Conv2d(widths[0], 4 * FINE, 1)  # the finest level, where pictures are large, is kept thin
         self.last, self.out = nn.Conv2d(2 * FINE, 2 * FINE, 3, padding=1), nn.Conv2d(2 * FINE, 4, 3, padding=1)
         nn.init.zeros_(self.out.weight)
@@ -79,7 +79,7 @@ class DelightNet(nn.Module):
         return out[:, :3], out[:, 3:]
 
 
-class _Block(nn.Module):
+class Block(nn.Module):
     """x + conv(gelu(conv(norm(x)))), and a gate per channel from the whole map's mean: exposure and light are matters of the whole picture."""
 
     def __init__(self, width: int):
@@ -96,7 +96,7 @@ class _Block(nn.Module):
         return x + self.second(inner)
 
 
-class _Attention(nn.Module):
+class Attention(nn.Module):
     """Self-attention over the coarsest map: one side of a face tells the colour of the other."""
 
     def __init__(self, width: int, heads: int = 4):

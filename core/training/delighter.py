@@ -32,6 +32,7 @@ from .people import People, is_prepared, prepare_people
 from .portraits import Batch, Portraits, mirrored, prepare
 from .prior import FIRST_SEED, HELD_OUT_SEED, named_data
 from .release import again, release
+from .shading_errors import disagreement, mean_deviation, mean_size, slope_error, split_tone
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "delighter.safetensors"
 _MODEL = {"widths": [64, 128, 192, 224], "depths": [2, 2, 2, 2]}
@@ -104,22 +105,9 @@ def losses(network: DelightNet, batch: Batch, device: str) -> dict[str, torch.Te
     with torch.autocast(device, torch.bfloat16, enabled=low):
         shading, shadow = network(batch.layers.to(device, memory_format=torch.channels_last))
     weight = batch.weight.to(device)
-    error = shading - batch.shading.to(device)
-    tone = (error * weight).sum((2, 3), keepdim=True) / weight.sum((2, 3), keepdim=True).clamp_min(1)
-    error = error - tone
-    total = weight.sum().clamp_min(1)
-    terms = {"shading": (error.abs() * weight).sum() / total / 3, "tone": TONE * tone.abs().mean()}
-    slopes = 0.0
-    for step in (1, 2, 4):
-        for axis in (2, 3):
-            size = error.shape[axis]
-            here, there = (torch.narrow(error, axis, first, size - step) for first in (0, step))
-            both = torch.narrow(weight, axis, 0, size - step) * torch.narrow(weight, axis, step, size - step)
-            slopes = slopes + ((there - here).abs() * both).sum() / total / 6
-    terms["slope"] = SLOPE * slopes / 3
-    one, other = error[0::2], error[1::2]  # the same albedo: what differs in the error is light
-    both = weight[0::2] * weight[1::2]
-    terms["agreement"] = AGREEMENT * ((one - other).abs() * both).sum() / both.sum().clamp_min(1) / 3
+    tone, error = split_tone(shading - batch.shading.to(device), weight)
+    terms = {"shading": mean_size(error, weight), "tone": TONE * tone.abs().mean(), "slope": SLOPE * slope_error(error, weight),
+             "agreement": AGREEMENT * disagreement(error, weight)}
     lost = functional.binary_cross_entropy_with_logits(shadow, batch.shadow.to(device), reduction="none")
     sure = batch.shadow_weight.to(device)
     terms["shadow"] = SHADOW * (lost * sure).sum() / sure.sum().clamp_min(1)
@@ -140,17 +128,11 @@ def figures(average: dict, config: str, batch: Batch, device: str) -> dict[str, 
             layers[:, 6:] = 0
         chosen = batch.layers[:, 15].amax((1, 2)) > 0
         shading, shadow = (torch.cat([network(part.to(device))[k].cpu() for part in layers[chosen].split(8)]) for k in (0, 1))
-        told[name] = _deviation(shading - batch.shading[chosen], batch.weight[chosen])
+        told[name] = mean_deviation(shading - batch.shading[chosen], batch.weight[chosen])
         found, true, sure = shadow > 0, batch.shadow[chosen] > 0.5, batch.shadow_weight[chosen] > 0.9
         told[f"iou_{name}"] = ((found & true & sure).sum() / ((found | true) & sure).sum().clamp_min(1)).item()
-    told["none"] = _deviation(batch.shading[chosen], batch.weight[chosen])
+    told["none"] = mean_deviation(batch.shading[chosen], batch.weight[chosen])
     return {name: round(float(value), 4) for name, value in told.items()}
-
-
-def _deviation(error: torch.Tensor, weight: torch.Tensor) -> float:
-    total = weight.sum((2, 3), keepdim=True).clamp_min(1)
-    error = error - (error * weight).sum((2, 3), keepdim=True) / total
-    return ((error.abs() * weight).sum((2, 3), keepdim=True) / total).mean().item()
 
 
 def export(work: Path, out: Path = WEIGHTS) -> dict:

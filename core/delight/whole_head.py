@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A capture's frames without their light, by one shading of the whole head: a network tells it in the head's own UV space from what all views saw
+(texels.py), and every frame is divided by it where it shows the head. `core train texels` makes the weights."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from safetensors.torch import load_file
+
+from ..contract import shipped_files
+from ..contract.capture import Capture
+from ..contract.messages import Problem, Reporter
+from ..contract.settings import Settings
+from ..face import template
+from ..face.head import read_head
+from ..geometry.raster import bleed, interpolate, render_view, sample
+from ..geometry.views import View, read_views
+from ..imaging import images
+from .contract import Delit
+from .lit_head import BRIGHTEST, LitHead, lit_head
+from .texel_net import TexelNet
+from .texels import Texels, gather, network_input
+
+DATA_FILES = ("weights/texels.safetensors", "weights/texels.json")
+WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
+
+
+@dataclass(frozen=True)
+class Shading:
+    """What a network says of a head, in its UVs: log float32 [S, S, 3], natural log of what the albedo is multiplied by; shadow [S, S] in [0, 1]; spread
+    [3, S / 4, S / 4], the expected error of `log` in each of texel_net.BANDS, natural log units."""
+
+    log: np.ndarray
+    shadow: np.ndarray
+    spread: np.ndarray
+
+
+def whole_head(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
+    """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see the head."""
+    net, views = load(settings.compute_device), read_views(capture, selected_only=True)
+    head = lit_head(read_head(capture), views, report)
+    texels = gather(head, views, report)
+    found = tell_shading(net, texels)
+    found = Shading(found.log + np.log(_exposure(texels, found)), found.shadow, found.spread)
+    for i, view in enumerate(views):
+        report.progress(3 * len(views) + i, 4 * len(views), f"Delighting frame {i + 1} of {len(views)}")
+        yield _delit(view, head, found, texels.covered)
+
+
+def load(device: str, weights: Path = WEIGHTS) -> TexelNet:
+    """The shipped network. Raises Problem where its file or its card is missing."""
+    card = weights.with_suffix(".json")
+    if not (weights.is_file() and card.is_file()):
+        raise Problem("The weights of the delighting network are missing.", "Install the add-on again, or choose the delighter 'shading'.")
+    if weights == WEIGHTS:
+        shipped_files.require_whole(weights)
+    net = TexelNet(**json.loads(card.read_text(encoding="utf-8"))["model"])
+    net.load_state_dict({name: value.float() for name, value in load_file(weights).items()})
+    return net.eval().to(torch.device(device), memory_format=torch.channels_last)
+
+
+@torch.inference_mode()
+def tell_shading(net: TexelNet, texels: Texels) -> Shading:
+    """The mean of what the network says of a head and of its mirror image."""
+    layers, middle = network_input(texels)
+    turned = layers[:, :, ::-1].copy()
+    turned[5] *= -1
+    device = next(net.parameters()).device
+    parts = net(torch.from_numpy(np.stack([layers, turned])).to(device, memory_format=torch.channels_last))
+    shading, shadow, spread = ((part[0] + part[1].flip(-1)).cpu().numpy() / 2 for part in (parts[0], parts[1].sigmoid(), parts[2]))
+    return Shading(shading.transpose(1, 2, 0) + middle, shadow[0], np.exp(spread))
+
+
+def _exposure(texels: Texels, found: Shading) -> float:
+    """By what the albedo of all frames is divided: 1, or more where skin would be brighter than skin is."""
+    where = (template.mask("face", len(texels.seen)) > 0.5) & (texels.seen > 0.3)
+    if not where.any():
+        return 1.0
+    albedo = np.exp(texels.log[where] - found.log[where]).max(-1)
+    return max(1.0, float(np.quantile(albedo, 0.75)) / BRIGHTEST)
+
+
+def _delit(view: View, head: LitHead, found: Shading, covered: np.ndarray) -> Delit:
+    srgb = images.read_srgb(view.path)
+    face, bary, _ = render_view(head.caster, view)
+    here = face >= 0
+    uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, face[here], bary[here])
+    at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * len(found.log)
+    maps = bleed(np.concatenate([found.log, found.shadow[..., None]], -1).astype(np.float32), covered)
+    seen = np.zeros((*here.shape, 4), np.float32)
+    seen[here] = sample(maps, at)
+    seen = bleed(seen, here)
+    albedo = images.srgb_to_linear(srgb) / np.exp(seen[..., :3])
+    return Delit(view, images.linear_to_srgb(albedo).clip(0, 1), np.clip(seen[..., 3] * here, 0, 1))

@@ -1,0 +1,147 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""People in the head's UV space, ready for any light: skin, where hair grows, what each vertex sees of a light stage, and what reaches each texel of some
+lamps. All of that is made once per person; colours are varied far beyond the plausible each time, for a delighter must not take pigment for light.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from ..contract.files import replacing
+from ..face import template
+from ..geometry import raster
+from ..geometry.meshes import vertex_normals
+from ..imaging import images
+from .olat import LightStage, light_stage, sun_visibility
+from .people.figure import paint
+from .people.markings import moles, stains, tufts
+from .people.person import BROWS, sample_person
+from .people.shape import person_mesh
+
+SIDE = 512
+"""Of the maps."""
+LAMPS, RAYS = 8, 6
+"""Lamps that a person is prepared for, and rays to each from a texel."""
+GROWTH = ("brows", "beard", "hair")
+
+
+@dataclass(frozen=True)
+class Person:
+    """vertices float32 [V, 3] of the head; visible uint8 [V, LIGHTS / 8], bits: of the light stage; lamps float32 [LAMPS, 3] unit and radius [LAMPS] of each in
+    radians; reach uint8 [LAMPS, N] of 255: what of each lamp reaches the N covered texels of a map of SIDE; skin uint8 [S, S, 3] sRGB between the roots of
+    hair; growth uint8 [S, S, len(GROWTH)] of 255."""
+
+    vertices: np.ndarray
+    visible: np.ndarray
+    lamps: np.ndarray
+    radius: np.ndarray
+    reach: np.ndarray
+    skin: np.ndarray
+    growth: np.ndarray
+
+    @property
+    def stage(self) -> LightStage:
+        mesh = template.load().moved(self.vertices.astype(np.float64))
+        return LightStage(mesh, vertex_normals(mesh).astype(np.float32), np.unpackbits(self.visible, axis=1).astype(bool))
+
+
+def make_person(seed: int) -> Person:
+    """The person of a seed, some ten seconds' work."""
+    rng = np.random.default_rng([seed, 95])
+    mesh = person_mesh(seed)
+    stage, face, bary = light_stage(mesh), *template_raster(SIDE)
+    inside = face >= 0
+    points, normals = (raster.interpolate(values, mesh.faces, face[inside], bary[inside]) for values in (mesh.vertices, stage.normals))
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-6)
+    lamps, radius = _lamps(rng), np.exp(rng.uniform(np.log(0.004), np.log(0.1), LAMPS))
+    caster = raster.RayCaster(mesh)
+    reach = np.stack([sun_visibility(caster, points, normals, lamp, r, RAYS, rng) for lamp, r in zip(lamps, radius, strict=True)])
+    _, skin, growth = paint(sample_person(seed), SIDE)
+    blank = np.zeros((SIDE, SIDE), np.float32)
+    grown = np.stack([growth.get(name, blank) for name in GROWTH], -1)
+    return Person(mesh.vertices.astype(np.float32), np.packbits(stage.visible, axis=1), lamps.astype(np.float32), radius.astype(np.float32),
+                  np.round(255 * reach).astype(np.uint8), _bytes(images.linear_to_srgb(skin)), _bytes(grown))
+
+
+def save(path: Path, person: Person) -> None:
+    with replacing(path) as temporary, open(temporary, "wb") as file:
+        np.savez_compressed(file, **{field.name: getattr(person, field.name) for field in fields(Person)})
+
+
+def load(path: Path) -> Person:
+    with np.load(path, allow_pickle=False) as stored:
+        return Person(**{field.name: stored[field.name] for field in fields(Person)})
+
+
+def colours_of(person: Person, side: int, rng: np.random.Generator) -> np.ndarray:
+    """The person's linear albedo [S, S, 3] with other tones, hair of other colours, stains, moles and tufts."""
+    albedo = images.srgb_to_linear(_resized(person.skin.astype(np.float32) / 255, side))
+    growth = _resized(person.growth.astype(np.float32) / 255, side)
+    albedo = albedo * np.exp(rng.normal(0, 0.3) + rng.normal(0, 0.08, 3)).astype(np.float32)
+    log = np.zeros_like(albedo)
+    if rng.random() < 0.4:
+        log += stains(side, rng)
+    if rng.random() < 0.4:
+        log += moles(side, rng)
+    if rng.random() < 0.5:
+        log += tufts(side, _landmarks(side), rng)
+    albedo = albedo * np.exp(log)
+    common = BROWS[rng.integers(len(BROWS))]
+    for part in range(len(GROWTH)):
+        colour = (common if rng.random() < 0.6 else BROWS[rng.integers(len(BROWS))]) * np.exp(rng.normal(0, 0.35) + rng.normal(0, 0.08, 3))
+        strands = cv2.GaussianBlur(rng.standard_normal((side, side), np.float32), (0, 0), rng.uniform(0.5, 1.5) * side / SIDE)
+        share = growth[..., part] * rng.uniform(0.4, 1.2) * (1 + rng.uniform(0.1, 0.5) * strands / max(float(strands.std()), 1e-6))
+        share = np.clip(share, 0, 1)[..., None]
+        albedo = albedo * (1 - share) + colour.astype(np.float32) * share
+    return np.clip(albedo, 0.003, 0.92).astype(np.float32)
+
+
+def reach_of(person: Person, lamp: int, side: int) -> np.ndarray:
+    """What of a lamp the head itself lets through, float32 [S, S]."""
+    covered = template_raster(SIDE)[0] >= 0
+    picture = np.zeros((SIDE, SIDE), np.float32)
+    picture[covered] = person.reach[lamp].astype(np.float32) / 255
+    return _resized(raster.bleed(picture, covered), side)
+
+
+def _lamps(rng: np.random.Generator) -> np.ndarray:
+    """Unit directions [LAMPS, 3]: seldom from behind the person, seldom from below."""
+    found: list[np.ndarray] = []
+    while len(found) < LAMPS:
+        way = unit(rng.normal(size=3) + [0, -0.5, 0.35])
+        if way[1] < 0.5 and way[2] > -0.5:
+            found.append(way)
+    return np.stack(found)
+
+
+@cache
+def template_raster(side: int) -> tuple[np.ndarray, np.ndarray]:
+    """Which triangle of the built-in head covers each texel [S, S], and where in it [S, S, 3]."""
+    return raster.rasterize_uv(template.load(), side)
+
+
+@cache
+def _landmarks(side: int) -> np.ndarray:
+    """Where MediaPipe's landmarks lie in the map, [468, 2] in texels."""
+    face, bary = template.landmarks()
+    head = template.load()
+    uv = (head.uvs[head.face_uvs[face]] * bary[..., None]).sum(1)
+    return np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * side
+
+
+def _resized(picture: np.ndarray, side: int) -> np.ndarray:
+    return picture if len(picture) == side else cv2.resize(picture, (side, side), interpolation=cv2.INTER_AREA)
+
+
+def unit(vectors: np.ndarray) -> np.ndarray:
+    return (vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-6)).astype(np.float32)
+
+
+def _bytes(values: np.ndarray) -> np.ndarray:
+    return np.round(255 * np.clip(values, 0, 1)).astype(np.uint8)

@@ -1,0 +1,263 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Trains the delighting network of the head's own UV space on synthetic people whose light is known.
+
+    python -m core train texels --config cpu|gpu [--minutes 120] [--hdri FOLDER] [--start FILE] [--growing] [--work DIR]
+    python -m core train texels --prepare [--config cpu|gpu] [--work DIR]   make the people and stop
+    python -m core train texels --export [--work DIR] [--out FILE]          write the running training's averaged weights now
+
+Needs neither Blender nor the internet. A second run goes on where the first was killed. FOLDER: panoramas (.hdr, .exr) that may light people; without it all
+light is procedural. --start: weights to begin with. --growing trains on the people that are there while another process makes the others.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from multiprocessing import get_context
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from safetensors.torch import load_file
+from torch.nn import functional
+from torch.utils.data import Dataset
+
+from ..contract.messages import Problem, Reporter
+from ..delight.texel_net import BANDS, TexelNet
+from ..delight.texels import SIDE, network_input
+from ..face import template
+from ..solve.prior import fast_dtype
+from ..synthetic import unfolded
+from ..synthetic.environments import read_panoramas
+from ..synthetic.identities import reserved_seeds
+from . import command_line, descent
+from .prior import FIRST_SEED, HELD_OUT_SEED
+from .release import again, release
+from .shading_errors import disagreement, mean_deviation, mean_size, slope_error, split_tone
+from .unfolded import Unfolded, light_up
+
+WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "texels.safetensors"
+_MODEL = {"widths": [48, 96, 160, 224], "depths": [1, 2, 2, 2]}
+CONFIGS = {
+    "cpu": {"model": _MODEL, "training": {"pairs": 2, "fine_every": 3, "rate": 6e-4, "minutes": 120, "people": 96, "held_out": 6, "seed": 0, "workers": 1}},
+    "gpu": {"model": _MODEL, "training": {"pairs": 8, "fine_every": 2, "rate": 1e-3, "minutes": 24, "people": 320, "held_out": 6, "seed": 0, "workers": 14}},
+}
+"""A step shows `pairs` of the people under two lights each at half the maps' side, where four fit into the time of one; every `fine_every`th step shows a
+pair at the whole."""
+TONE, SLOPE, AGREEMENT, SHADOW, SPREAD = 0.25, 1.0, 0.25, 0.2, 0.05
+"""Weights beside the log-shading's error: its mean over the face, its slopes, the albedo of one person under two lights, the shadows, and how well the size
+of the error is foretold."""
+OFF_FACE = 0.3
+"""How much scalp, ears and neck count beside the face."""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """layers [N, CHANNELS, S, S]; shading [N, 3, S, S] the true log-shading less the face's mean log colour, weight [N, 1, S, S] of its error; shadow and
+    shadow_weight [N, 1, S, S]. 2 k and 2 k + 1 are the same person and colours under two lights."""
+
+    layers: torch.Tensor
+    shading: torch.Tensor
+    weight: torch.Tensor
+    shadow: torch.Tensor
+    shadow_weight: torch.Tensor
+
+
+class People:
+    """Draws batches of the people that are prepared in a work folder; what is prepared later is drawn from then on."""
+
+    def __init__(self, seeds: list[int], work: Path, panoramas: Path | None):
+        self.seeds, self.work, self.panoramas = seeds, work, read_panoramas(panoramas)
+
+    def draw(self, pairs: int, side: int, rng: np.random.Generator) -> Batch:
+        ready = [seed for seed in self.seeds if _path(self.work, seed).is_file()]
+        drawn = []
+        for _ in range(pairs):
+            person = unfolded.load(_path(self.work, ready[rng.integers(len(ready))]))
+            albedo = unfolded.colours_of(person, side, rng)
+            drawn += [example(light_up(person, albedo, rng, self.panoramas)) for _ in range(2)]
+        return Batch(*(torch.from_numpy(np.stack(part)) for part in zip(*drawn, strict=True)))
+
+
+def example(lit: Unfolded) -> tuple[np.ndarray, ...]:
+    """What a Batch holds of a person under a light."""
+    layers, middle = network_input(lit.texels)
+    side = len(lit.shading)
+    face = template.mask("face", side)
+    weight = np.clip(lit.texels.seen / 0.15, 0, 1) * lit.texels.covered * (OFF_FACE + (1 - OFF_FACE) * face)
+    trust = 1.0 if lit.strong > 0.4 or lit.strong < 0.1 else 0.3  # in between it is a matter of taste what is a shadow
+    parts = (layers, (lit.shading - middle).transpose(2, 0, 1), weight[None], (lit.shadow * (lit.strong > 0.2))[None], trust * weight[None])
+    return tuple(np.ascontiguousarray(part, np.float32) for part in parts)
+
+
+def mirrored(batch: Batch) -> Batch:
+    """Left and right exchanged; a normal's x changes its sign."""
+    layers = batch.layers.flip(-1)  # a copy
+    layers[:, 5] *= -1
+    return replace(batch, layers=layers, **{name: getattr(batch, name).flip(-1) for name in ("shading", "weight", "shadow", "shadow_weight")})
+
+
+def train_texels(config: str, out: Path, report: Reporter, minutes: float | None = None, hdri: Path | None = None, start: Path | None = None,
+                 growing: bool = False, work: Path | None = None) -> dict:
+    """Trains for `minutes` in all (those of earlier runs included, preparation not), writes `out` (safetensors, fp16) and its card, returns the card.
+
+    Raises Problem where the work folder holds a training on other data, or, growing, no people yet.
+    """
+    work = Path(work or Path(tempfile.gettempdir()) / "wildcap_texels")
+    work.mkdir(parents=True, exist_ok=True)
+    t = CONFIGS[config]["training"]
+    minutes = minutes or t["minutes"]
+    device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
+    data = {"seeds": _people(t), "held_out_seeds": _held_out(t), "panoramas": sorted(p.name for p in Path(hdri).glob("*.hdr")) if hdri else [],
+            "started": "the weights before" if start else "random weights", "from": "", "skins": [], "held_out_skins": [], "notices": []}
+    if not growing:
+        prepare(config, work, report)
+    if not all(any(_path(work, seed).is_file() for seed in data[kind]) for kind in ("seeds", "held_out_seeds")):
+        raise Problem(f"There are no people in {work} yet.", "Wait for `train texels --prepare`, or train without --growing.")
+    unseen = People(data["held_out_seeds"], work, hdri).draw(2 * t["held_out"], SIDE // 2, np.random.default_rng(1))
+    torch.manual_seed(t["seed"])
+    network = TexelNet(**CONFIGS[config]["model"])
+    if start:
+        network.load_state_dict({name: value.float() for name, value in load_file(start).items()})
+    state = descent.resumed(work, descent.beginning(config, data, network))
+    recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
+                            betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"], save_every=180)
+    descent.descend(network, state, _Steps(People(data["seeds"], work, hdri), t), lambda batch, step, share: sum(losses(network, batch, device).values()),
+                    lambda average: figures(average, config, unseen, device), recipe, minutes, work, device, report)
+    return export(work, out)
+
+
+def prepare(config: str, work: Path, report: Reporter, processes: int = 2) -> None:
+    """Makes the people that the work folder lacks, those held out first."""
+    t = CONFIGS[config]["training"]
+    Path(work).mkdir(parents=True, exist_ok=True)
+    jobs = [(seed, work) for seed in (*_held_out(t), *_people(t)) if not _path(work, seed).is_file()]
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        for i, _ in enumerate(pool.map(_prepare_one, jobs)):
+            report.progress(i + 1, len(jobs), f"person {i + 1} of {len(jobs)}")
+
+
+def losses(network: TexelNet, batch: Batch, device: str) -> dict[str, torch.Tensor]:
+    """The terms of the loss, each a scalar."""
+    low = device == "cuda" or fast_dtype("cpu") == torch.bfloat16
+    with torch.autocast(device, torch.bfloat16, enabled=low):
+        shading, shadow, spread = network(batch.layers.to(device, memory_format=torch.channels_last))
+    weight = batch.weight.to(device)
+    tone, error = split_tone(shading - batch.shading.to(device), weight)
+    terms = {"shading": mean_size(error, weight), "tone": TONE * tone.abs().mean(), "slope": SLOPE * slope_error(error, weight),
+             "agreement": AGREEMENT * disagreement(error, weight)}
+    lost = functional.binary_cross_entropy_with_logits(shadow, batch.shadow.to(device), reduction="none")
+    sure = batch.shadow_weight.to(device)
+    terms["shadow"] = SHADOW * (lost * sure).sum() / sure.sum().clamp_min(1)
+    terms["spread"] = SPREAD * sum(_surprise(band, weight_of, spread[:, k:k + 1]).mean()
+                                   for k, (band, weight_of) in enumerate(bands_of(error.detach(), weight)))
+    return terms
+
+
+def bands_of(error: torch.Tensor, weight: torch.Tensor) -> list[tuple[torch.Tensor, torch.Tensor]]:
+    """The luminance's part of an error [N, 3, S, S] in each of BANDS, fine to coarse, [N, 1, h, h] of S divided by the band's texels, and their weights."""
+    luminance, side, found = error.mean(1, keepdim=True), error.shape[-1], []
+    for k, texels in enumerate(BANDS):
+        here, base = _pooled(luminance, weight, max(1, texels * side // SIDE))
+        if k + 1 < len(BANDS):
+            coarse, _ = _pooled(luminance, weight, max(2, BANDS[k + 1] * side // SIDE))
+            here = here - functional.interpolate(coarse, size=here.shape[-2:], mode="bilinear", align_corners=False)
+        found.append((here, base))
+    return found
+
+
+def _pooled(values: torch.Tensor, weight: torch.Tensor, by: int) -> tuple[torch.Tensor, torch.Tensor]:
+    base = functional.avg_pool2d(weight, by)
+    return functional.avg_pool2d(values * weight, by) / base.clamp_min(1e-3), base
+
+
+def _surprise(error: torch.Tensor, weight: torch.Tensor, spread: torch.Tensor) -> torch.Tensor:
+    """Negative log-likelihood [.] of errors under a Laplace distribution whose log scale is told in maps of any size."""
+    log = functional.interpolate(spread, size=error.shape[-2:], mode="bilinear", align_corners=False)
+    return ((error.abs() * torch.exp(-log) + log) * weight).sum() / weight.sum().clamp_min(1)
+
+
+@torch.no_grad()
+def figures(average: dict, config: str, batch: Batch, device: str) -> dict[str, float]:
+    """The averaged network on held-out people: mean error of the log-albedo about its own mean over what was seen, beside that of the colours as they are
+    (natural log units); and by band how much better its own sizes of the error foretell it than the best constant does (nats)."""
+    network = TexelNet(**CONFIGS[config]["model"])
+    network.load_state_dict(average)
+    network.to(device, memory_format=torch.channels_last).eval()
+    found = [network(part.to(device)) for part in batch.layers.split(4)]
+    shading, spread = (torch.cat([each[k].cpu() for each in found]) for k in (0, 2))
+    told = {"network": mean_deviation(shading - batch.shading, batch.weight), "none": mean_deviation(batch.shading, batch.weight)}
+    _, error = split_tone(shading - batch.shading, batch.weight)
+    for k, (band, weight) in enumerate(bands_of(error, batch.weight)):
+        constant = ((band.abs() * weight).sum() / weight.sum()).clamp_min(1e-6).log()
+        told[f"gain_{BANDS[k]}"] = (_surprise(band, weight, constant.expand(len(band), 1, 4, 4)) - _surprise(band, weight, spread[:, k:k + 1])).item()
+    return {name: round(float(value), 4) for name, value in told.items()}
+
+
+def export(work: Path, out: Path = WEIGHTS) -> dict:
+    """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from."""
+    state = descent.read_state(work)
+    data = state["data"]
+    told = ("Synthetic people with brows, beards and hair (core/synthetic/unfolded.py) on heads of the built-in topology, which derives from the MakeHuman "
+            "base mesh (CC0), in the head's own UVs")
+    if data["panoramas"]:
+        told += f"; light from procedural environments, lamps and {len(data['panoramas'])} panoramas (CC0)"
+    what = ("held-out people at half the maps' side: mean error of the log-albedo about its own mean over what was seen (natural log), beside that of the "
+            "colours as they are; gain_N: nats by which its own sizes of the error in bands of N texels foretell it better than the best constant")
+    command = again("texels", state) + (" --hdri hdri" if data["panoramas"] else "")
+    ready = sum(_path(work, seed).is_file() for seed in data["seeds"])
+    return release(out, state, CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what}, panoramas=data["panoramas"],
+                   people=ready, started=data["started"])
+
+
+class _Steps(Dataset):
+    """`[step]` is the step's batch, whichever process asks for it; mirrored at every other one."""
+
+    def __init__(self, people: People, t: dict):
+        self.people, self.t = people, t
+
+    def __len__(self) -> int:
+        return 10**9
+
+    def __getitem__(self, step: int) -> Batch:
+        cv2.setNumThreads(1)
+        rng = np.random.default_rng([self.t["seed"], step])
+        fine = step % self.t["fine_every"] == self.t["fine_every"] - 1
+        batch = self.people.draw(max(1, self.t["pairs"] // 2) if fine else self.t["pairs"], SIDE if fine else SIDE // 2, rng)
+        return mirrored(batch) if step % 2 else batch
+
+
+def _people(t: dict) -> list[int]:
+    """Seeds of the people to learn from."""
+    return [seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * t["people"]) if seed not in reserved_seeds()][:t["people"]]
+
+
+def _held_out(t: dict) -> list[int]:
+    return list(range(HELD_OUT_SEED, HELD_OUT_SEED + t["held_out"]))
+
+
+def _path(work: Path, seed: int) -> Path:
+    return Path(work) / f"person_{seed}.npz"
+
+
+def _prepare_one(job: tuple[int, Path]) -> None:
+    seed, work = job
+    cv2.setNumThreads(1)
+    unfolded.save(_path(work, seed), unfolded.make_person(seed))
+
+
+def main(arguments: list[str] | None = None) -> int:
+    options = command_line.parser("texels", __doc__, CONFIGS, WEIGHTS)
+    options.add_argument("--hdri", type=Path, metavar="FOLDER", help="panoramas whose licence lets weights trained with them be shipped")
+    options.add_argument("--start", type=Path, metavar="FILE", help="weights to begin with, in place of random ones")
+    options.add_argument("--growing", action="store_true", help="train on the people that are there already")
+    options.add_argument("--prepare", action="store_true", help="make the people and stop")
+    return command_line.carry_out(options, arguments, train_texels, export, prepare)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
