@@ -165,3 +165,13 @@ def test_what_lies_beyond_a_chosen_frame_that_is_not_mapped_is_placed_by_those_t
     assert chosen[0] == "00001.jpg" and len(registered) == 11
     pairs = read_matches(tmp_path / "work" / "database.db").pairs
     assert {two for one, two in pairs if one == "00000.jpg"} == set(chosen[1:3])
+
+
+def test_a_second_model_may_take_every_frame_that_the_first_has(tmp_path, monkeypatch):
+    """COLMAP lets it take twenty: after a bad first pair the good model had 31 of 40 frames, and the film counted as one that needs more."""
+    given = []
+    monkeypatch.setattr(pycolmap, "incremental_mapping", lambda *arguments, **more: given.append(arguments[3]) or {})
+    names = [f"{i:05d}.jpg" for i in range(40)]
+    job = {"database": "", "images": "", "output": str(tmp_path / "model"), "groups": [{"names": names}], "skin": False, "photographs": False, "seed": 0}
+    colmap._map(job, names)
+    assert given[0].max_model_overlap >= len(names) and given[0].image_names == names

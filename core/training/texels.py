@@ -224,7 +224,7 @@ class _Steps(Dataset):
         return 10**9
 
     def __getitem__(self, step: int) -> Batch:
-        cv2.setNumThreads(1)
+        torch.set_num_threads(1)
         rng = np.random.default_rng([self.t["seed"], step])
         fine = step % self.t["fine_every"] == self.t["fine_every"] - 1
         batch = self.people.draw(max(1, self.t["pairs"] // 2) if fine else self.t["pairs"], SIDE if fine else SIDE // 2, rng)
