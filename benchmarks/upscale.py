@@ -41,7 +41,6 @@ from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
 from core.training.fine_windows import CHANNELS, FACTOR, Degradation, degraded, prepare
 from core.upscale import detail, enlarged
-from core.upscale.enlarge import enlarge
 from core.upscale.maps import Maps
 
 from .ablation_measures import feature_distance
@@ -55,8 +54,6 @@ VIEWS = 2
 """Windows of each subject."""
 KINDS = {"plain": Degradation(0.0, 0.0, 0.0, 1.0), "soft": Degradation(0.5, 0.8, 0.003, 0.9)}
 METHODS = ("lanczos", "network")
-WHOLE = "network, all blocks"
-"""The network with all blocks of its groups, in the place of enlarge.DEPTH of them."""
 BORDER = 16
 CLOSE = 9.0
 """Scale of the frames: 2700 x 3600 pixels, about a 4K video's."""
@@ -90,7 +87,7 @@ def enlarging(work: Path, sheet: Path | None = None) -> dict[str, dict[str, floa
     prepare(list(SEEDS), VIEWS, work, Reporter("upscale"), 1)
     found, shots = {}, []
     for kind, how in KINDS.items():
-        scores = {method: [] for method in (*METHODS, WHOLE)}
+        scores = {method: [] for method in METHODS}
         for seed in SEEDS:
             for view in range(VIEWS):
                 large = np.load(work / f"window_{seed}_{view}.npy").astype(np.float32)
@@ -139,8 +136,6 @@ def _enlarged(small: np.ndarray, method: str) -> np.ndarray:
     diffuse, normal = images.srgb_to_linear(np.moveaxis(small[:3], 0, -1)), np.moveaxis(small[3:6], 0, -1)
     blank = np.ones_like(diffuse)
     maps = Maps(diffuse, normal, small[6], blank[..., 0], blank)
-    if method == WHOLE:
-        return enlarge(maps, lambda done: None, depth=None)
     return enlarged(maps, FACTOR * len(diffuse), method, "cpu", lambda done: None)
 
 

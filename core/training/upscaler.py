@@ -41,6 +41,9 @@ GROWTH = ((0.0, 2), (0.3, 5), (0.6, None))
 """From which share of the time on how many blocks of each group take part: a shallow network learns most of what there is at a fraction of the cost, and
 new blocks begin as the identity (progressive stacking, Gong et al. 2019)."""
 
+KEPT = 3
+"""Blocks of each group that are shipped: the first two learn first, and those that were added as the identity change little."""
+
 
 def train_upscaler(config: str, out: Path, report: Reporter, minutes: float | None = None, work: Path | None = None) -> dict:
     """Trains for `minutes` in all (those of earlier runs included, preparation not), writes `out` (safetensors, fp16) and its card, returns the card.
@@ -93,9 +96,16 @@ def figures(average: dict, config: str, pairs: tuple[torch.Tensor, torch.Tensor]
 def export(work: Path, out: Path = WEIGHTS) -> dict:
     """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from."""
     state = descent.read_state(work)
+    config = CONFIGS[state["config"]]
+    state, config = state | {"average": shallow(state["average"], KEPT)}, config | {"model": config["model"] | {"blocks": min(KEPT, config["model"]["blocks"])}}
     told = "Windows of procedural skins of core/synthetic at 4096 on the built-in head, which derives from the MakeHuman base mesh (CC0)"
-    what = "mean absolute error on degraded patches of held-out skins, as a share of bicubic resampling's"
-    return release(out, state, CONFIGS[state["config"]], told, again("upscaler", state), {**state["history"][-1][2], "what": what}, growth=GROWTH)
+    what = "mean absolute error on degraded patches of held-out skins, as a share of bicubic resampling's, with all blocks that were trained"
+    return release(out, state, config, told, again("upscaler", state), {**state["history"][-1][2], "what": what}, growth=GROWTH)
+
+
+def shallow(weights: dict[str, torch.Tensor], blocks: int) -> dict[str, torch.Tensor]:
+    """A network's weights without the blocks of each group beyond the first `blocks`."""
+    return {name: value for name, value in weights.items() if not (name.startswith("groups.") and int(name.split(".")[2]) >= blocks)}
 
 
 class _Steps(Dataset):

@@ -24,22 +24,18 @@ DATA_FILES = ("weights/upscaler.safetensors", "weights/upscaler.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
 STRIP = 64
 """Rows of the small map whose tail is worked out at once."""
-DEPTH = 3
-"""Blocks used of each group's ten: training began with two and added the others as the identity, and they changed little (docs/results.md)."""
 
 
 @torch.no_grad()
-def enlarge(maps: Maps, progress: Callable[[float], None], device: str = "cpu", network: Rcan | None = None,
-            depth: int | None = DEPTH) -> np.ndarray:
-    """Diffuse (sRGB), unit normal and specular of `maps` [S, S], four times as large: float32 [4S, 4S, 7]. `progress` hears the share done. `depth`: blocks
-    used of each group; None: all."""
+def enlarge(maps: Maps, progress: Callable[[float], None], device: str = "cpu", network: Rcan | None = None) -> np.ndarray:
+    """Diffuse (sRGB), unit normal and specular of `maps` [S, S], four times as large: float32 [4S, 4S, 7]. `progress` hears the share done."""
     network = network or load_network()
     network = network.to(device, memory_format=torch.channels_last)
     small = channels_of(maps).to(device, memory_format=torch.channels_last)
     height, width = small.shape[2:]
     large = np.empty((FACTOR * height, FACTOR * width, CHANNELS), np.float32)
     with torch.autocast(device, torch.bfloat16, enabled=device == "cuda" or torch.cpu._is_avx512_bf16_supported()):
-        features = network.features(small, depth, lambda share: progress(0.75 * share))
+        features = network.features(small, tick=lambda share: progress(0.75 * share))
         for row in range(0, height, STRIP):
             rows = slice(row, min(row + STRIP, height))
             large[FACTOR * rows.start:FACTOR * rows.stop] = _strip(network, small, features, rows).permute(1, 2, 0).cpu().numpy()
