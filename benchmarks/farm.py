@@ -29,7 +29,7 @@ from pathlib import Path
 
 from core.batch.groups import GROUPS
 from core.batch.record import read_batch
-from core.batch.state import DONE, look
+from core.batch.state import DONE, derive_state
 from core.contract.files import write_json
 from core.contract.messages import Problem
 
@@ -121,7 +121,7 @@ class Trial:
 
     def _left(self) -> int:
         batch = read_batch(self.folder / "farm")
-        return sum(look(batch, face).state != DONE for face in batch.faces)
+        return sum(derive_state(batch, face).state != DONE for face in batch.faces)
 
     def _run_farm(self) -> None:
         with farm_nodes.farm(self.folder / "nodes") as nodes:

@@ -18,7 +18,7 @@ import pytest
 from core.batch import gate, lines, local
 from core.batch.known_hashes import known_hashes
 from core.batch.record import read_batch
-from core.batch.state import DONE, STOPPED, TO_DO, WAITING, WORKING, look
+from core.batch.state import DONE, STOPPED, TO_DO, WAITING, WORKING, derive_state
 from core.contract import hashes, lease
 from core.contract.messages import Problem
 
@@ -75,7 +75,7 @@ def test_a_worker_that_dies_is_started_once_more(code, tmp_path):
 def test_a_capture_that_is_worked_on_elsewhere_is_told_and_the_rest_goes_on(code, tmp_path):
     batch = make(code, tmp_path, "ab")
     with batch.faces[0].capture.locked():
-        assert look(batch, batch.faces[0]).state == WORKING
+        assert derive_state(batch, batch.faces[0]).state == WORKING
         ran = core(code, "batch", "run", batch.root)
         assert f"a: head stopped: Another worker (process {os.getpid()}" in ran.stdout and ran.stdout.splitlines()[-1] == "2 faces: 1 done, 1 stopped"
     assert states(batch) == {"a": TO_DO, "b": DONE}
@@ -86,7 +86,7 @@ def test_a_machine_that_has_gone_holds_nothing(code, tmp_path, monkeypatch):
     batch = make(code, tmp_path, "a")
     capture = batch.faces[0].capture
     capture.lock.write_text(json.dumps({"host": "gone/1/2", "pid": 1, "began": "", "since": "2026-11-24T00:00:00", "token": "x"}))
-    assert look(batch, batch.faces[0]).who == "gone"
+    assert derive_state(batch, batch.faces[0]).who == "gone"
     monkeypatch.setattr(lease, "TERM_S", 0.5)
     heard = []
     monkeypatch.setattr("core.batch.task.ROOT", code)

@@ -104,11 +104,11 @@ def test_what_is_no_batch_is_refused_and_one_that_is_damaged_meanwhile_says_so(a
 
 def test_a_folder_that_goes_away_while_it_is_looked_at(addon, batches, monkeypatch, tmp_path):
     folder = batch_faces.planned(tmp_path / "batch", batch_faces.filmed(tmp_path / "batch", "anna"))
-    monkeypatch.setattr(addon("batch_watch").state, "look", lambda *_: (_ for _ in ()).throw(OSError(5, "Input/output error")))
+    monkeypatch.setattr(addon("batch_watch").state, "derive_state", lambda *_: (_ for _ in ()).throw(OSError(5, "Input/output error")))
     bpy.ops.wildcap.open_batch(directory=str(folder))
     batch_faces.wait(addon, lambda: batches.view().count(state.STOPPED) == 1)
     assert "anna.wildcap cannot be read (Input/output error)" in batches.view().states["anna"].problem
-    monkeypatch.setattr(addon("batch_watch").state, "look", lambda *_: 1 / 0)
+    monkeypatch.setattr(addon("batch_watch").state, "derive_state", lambda *_: 1 / 0)
     batch_faces.wait(addon, lambda: batches.view().problem is not None)
     assert "ZeroDivisionError" in str(batches.view().problem)
     monkeypatch.undo()

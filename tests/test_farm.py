@@ -9,7 +9,7 @@ import av
 from benchmarks import farm_batch
 from benchmarks.farm_batch import Begun, judge_account
 from core.batch.record import read_batch
-from core.batch.state import TO_DO, look
+from core.batch.state import TO_DO, derive_state
 
 
 def test_a_farm_is_laid_out_with_twins_and_again(tmp_path):
@@ -20,7 +20,7 @@ def test_a_farm_is_laid_out_with_twins_and_again(tmp_path):
     assert [face.name for face in serial.faces] == ["kind0", "kind1", "kind2", "kind3"] and len(farm.faces) == 6
     assert farm.faces[5].source == serial.faces[1].source and farm.faces[5].settings == serial.faces[1].settings
     assert {(face.source, face.settings["seed"]) for face in serial.faces} == {(farm_batch.film(tmp_path, kind), kind) for kind in range(4)}
-    assert look(farm, farm.faces[0]).state == TO_DO
+    assert derive_state(farm, farm.faces[0]).state == TO_DO
     with av.open(str(serial.faces[2].source)) as film:
         assert sum(1 for _ in film.decode(video=0)) == farm_batch.FRAMES
     assert farm_batch.unequal(tmp_path, 6) == []

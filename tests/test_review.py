@@ -70,7 +70,7 @@ def test_the_worst_measure_decides_and_where_that_is_equal_their_mean(batch):
 def test_stopped_faces_come_first_then_those_that_wait(batch, monkeypatch):
     states = {"good": State(STOPPED, review.GROUPS[0], "It <broke>.", "Mend it."), "told": State(WAITING, review.GROUPS[2]), "half": State(DONE),
               "bad chin": State(TO_DO, review.GROUPS[1])}
-    monkeypatch.setattr(review, "look", lambda batch, face: states[face.name])
+    monkeypatch.setattr(review, "derive_state", lambda batch, face: states[face.name])
     assert order(batch) == ["good", "told", "half", "bad chin"]
     page = Page((batch.root / review.NAME).read_text(encoding="utf-8"))
     assert {"It <broke>.", "Mend it.", "1 min of work; still to do: head, mask, solve, deliver", "3 min of work"} <= {

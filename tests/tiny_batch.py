@@ -67,9 +67,9 @@ def set_mood(capture: Capture, mood: dict) -> None:
 
 
 def states(batch: Batch) -> dict[str, str]:
-    from core.batch.state import look
+    from core.batch.state import derive_state
 
-    return {face.name: look(batch, face).state for face in batch.faces}
+    return {face.name: derive_state(batch, face).state for face in batch.faces}
 
 
 def finished(batch: Batch) -> dict[str, dict]:

@@ -141,7 +141,7 @@ def _stamp(face: Face) -> tuple:
 def _ask(batch: Batch, face: Face) -> State:
     """Where a face is; without a group where its folder does not answer, or changes under the look."""
     try:
-        return state.look(batch, face)
+        return state.derive_state(batch, face)
     except OSError as error:
         return State(STOPPED, None, f"The capture folder {face.root} cannot be read ({error.strerror or error}).", "See that its disk or server is connected.")
 

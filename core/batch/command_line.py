@@ -16,7 +16,7 @@ from ..contract import lease, settings
 from ..contract.files import storage_problem
 from ..contract.messages import Cancelled, Failed, Problem
 from ..worker import command_settings
-from ..worker.terminal import Line, show
+from ..worker.terminal import ProgressLine, print_message
 from . import slim_command
 from .gate import accept_mask
 from .groups import GROUPS, group_named
@@ -26,7 +26,7 @@ from .local import CANCELLED, Tally, run_local
 from .record import GATES, NAME, Batch, read_batch, write_batch
 from .review import list_riskiest, write_review
 from .shots import HEADINGS, read_faces
-from .state import DONE, STOPPED, WAITING, look
+from .state import DONE, STOPPED, WAITING, derive_state
 from .task import ROOT, run_task
 
 CORES = 2
@@ -156,7 +156,7 @@ def _status(options: argparse.Namespace) -> int:
     counts: dict[str, int] = {}
     with known_hashes(batch.root):
         for face in batch.faces:
-            state = look(batch, face)
+            state = derive_state(batch, face)
             counts[state.state] = counts.get(state.state, 0) + 1
             print(f"{face.name:20} {state.words()}", flush=True)
     print(", ".join(f"{count} {state}" for state, count in counts.items()))
@@ -196,14 +196,14 @@ def _commands(options: argparse.Namespace) -> int:
 def _task(options: argparse.Namespace) -> int:
     """Exit codes as for `run`: 0, 2 for a problem, 130 after Ctrl-C."""
     batch, stopped = read_batch(options.batch), []
-    face, group, line = batch.face(options.name), group_named(options.group), Line()
+    face, group, line = batch.face(options.name), group_named(options.group), ProgressLine()
 
     def stop(number, frame) -> None:
         stopped.append(number)
 
     for each in (signal.SIGINT, signal.SIGTERM):  # a scheduler ends a task by either
         signal.signal(each, stop)
-    final = run_task(batch, face, group, lambda message: show(message, face.capture, line), lambda: bool(stopped))
+    final = run_task(batch, face, group, lambda message: print_message(message, face.capture, line), lambda: bool(stopped))
     if isinstance(final, Failed):
         line.clear()
         raise Problem(final.problem, final.remedy)

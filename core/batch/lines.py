@@ -11,7 +11,7 @@ from pathlib import Path
 
 from .groups import GATE, GROUPS, group_named
 from .record import Batch
-from .state import DONE, WAITING, State, look, waits
+from .state import DONE, WAITING, State, derive_state, waits
 from .task import ROOT
 
 PARTS = ("all", "to the masks", "from the masks")
@@ -39,7 +39,7 @@ class Task:
 def list_tasks(batch: Batch, python: str = sys.executable, root: Path = ROOT) -> list[Task]:
     """Every task that is left to do, in an order in which they could be done one by one; none beyond a mask that still has to be looked at. `python` and
     `root`, WildCap's folder, are those of the machines that will run them."""
-    return [task for face in batch.faces for task in _of_face(batch, face.name, look(batch, face), (python, str(root)))]
+    return [task for face in batch.faces for task in _of_face(batch, face.name, derive_state(batch, face), (python, str(root)))]
 
 
 def _of_face(batch: Batch, name: str, state: State, program: tuple[str, str]) -> list[Task]:

@@ -22,7 +22,7 @@ from ..contract.messages import Cancelled, Done, Failed, Message, Problem, Progr
 from ..contract.stages import LABELS
 from .groups import GROUPS, Group
 from .record import Batch, Face
-from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, State, look
+from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, State, derive_state
 from .task import run_task
 
 PROGRESS, STOP = "progress.json", "stop"
@@ -142,7 +142,7 @@ def run_face(batch: Batch, face: Face, board: Board, retry: bool, cancelled: Cal
     names = [group.name for group in GROUPS]
     last = names.index(until) if until else len(names) - 1
     while not cancelled():
-        state = look(batch, face)
+        state = derive_state(batch, face)
         if state.state == STOPPED and retry and state.group is not None:
             state, retry = State(TO_DO, state.group), False
         if state.state == DONE or (state.group is not None and names.index(state.group.name) > last and state.state != STOPPED):
@@ -171,5 +171,5 @@ def _run(batch: Batch, face: Face, group: Group, board: Board, cancelled: Callab
 
 def is_left(batch: Batch, face: Face, group: Group) -> bool:
     """Whether the task that has just ended well is still, or again, to be done."""
-    state = look(batch, face)
+    state = derive_state(batch, face)
     return state.state == TO_DO and state.group is group

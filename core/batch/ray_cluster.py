@@ -21,7 +21,7 @@ from .groups import GROUPS, Group
 from .local import CANCELLED, EVERY_S, Board, Tally, forget_stop, is_asked_to_stop
 from .ray_connection import connect
 from .record import NAME, Batch, Face
-from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, State, look
+from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, State, derive_state
 from .task import ROOT
 
 CODE = "WILDCAP_CODE"
@@ -86,7 +86,7 @@ class _Run:
 
     def _begin(self, face: Face, again: bool = False) -> bool:
         """Submits what is left of a face, `again` where we had it before; False where that is nothing."""
-        state = look(self._batch, face)
+        state = derive_state(self._batch, face)
         if state.state == STOPPED and self._retry and state.group is not None:
             state = State(TO_DO, state.group)
         if state.state == DONE or state.group not in self._groups and state.state != STOPPED:

@@ -30,7 +30,7 @@ from ..contract.messages import Problem
 from .groups import GROUPS
 from .record import Batch, Face
 from .review_page import MARK, PAGE, STYLE
-from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, State, look
+from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, State, derive_state
 
 NAME = "review.html"
 
@@ -138,7 +138,7 @@ def read_rows(batch: Batch) -> list[Row]:
         values = {label: value for label, value in values.items() if isinstance(value, int | float) and value == value}  # NaN says nothing
         told.append(({FINDINGS: len(found), **values} if stages else {}, sum(entry["seconds"] for entry in stages.values()), found))
     ranks = rank([values for values, _, _ in told])
-    return [Row(face, look(batch, face), seconds, values, own, found)
+    return [Row(face, derive_state(batch, face), seconds, values, own, found)
             for face, (values, seconds, found), own in zip(batch.faces, told, ranks, strict=True)]
 
 

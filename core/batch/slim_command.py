@@ -16,7 +16,7 @@ from ..contract.settings import Settings
 from ..worker import terminal
 from ..worker.job import read_job, write_job
 from .record import NAME, Batch, read_batch
-from .state import DONE, look
+from .state import DONE, derive_state
 from .task import ROOT
 
 
@@ -50,7 +50,7 @@ def _slim_batch(batch: Batch, yes: bool) -> int:
     """Each face that is done; the others are left and said."""
     size = count = 0
     for face in batch.faces:
-        state = look(batch, face)
+        state = derive_state(batch, face)
         if state.state != DONE:
             print(f"{face.name:20} left, for it is not done: {state.words()}", flush=True)
             continue

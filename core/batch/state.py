@@ -42,7 +42,7 @@ class State:
                 STOPPED: f"{label} stopped: {self.problem} {self.remedy}"}[self.state]
 
 
-def look(batch: Batch, face: Face) -> State:
+def derive_state(batch: Batch, face: Face) -> State:
     """Where a face is. A record that cannot be read counts as stopped."""
     try:
         capture = face.capture

@@ -25,12 +25,12 @@ def follow(root: Path, capture: Capture, job: Path, environment: dict[str, str])
     if read_job(job).settings.delight.delighter == "switchlight" and os.environ.get(switchlight_api.KEY_VARIABLE):
         environment = {**environment, switchlight_api.KEY_VARIABLE: os.environ[switchlight_api.KEY_VARIABLE]}
     worker = Worker(Path(sys.executable), root, job, capture.logs / "worker.log", environment)
-    line = Line()
+    line = ProgressLine()
     worker.start()
     while True:
         try:
             for message in worker.poll():
-                code = show(message, capture, line)
+                code = print_message(message, capture, line)
             if not worker.running:
                 return code
             time.sleep(POLL_S)
@@ -39,7 +39,7 @@ def follow(root: Path, capture: Capture, job: Path, environment: dict[str, str])
             worker.cancel()
 
 
-def show(message: Message, capture: Capture, line: Line) -> int:
+def print_message(message: Message, capture: Capture, line: ProgressLine) -> int:
     """Prints one message; returns the exit code if it is the last one."""
     match message:
         case Progress():
@@ -64,7 +64,7 @@ def show(message: Message, capture: Capture, line: Line) -> int:
     return 1
 
 
-class Line:
+class ProgressLine:
     """The line that is written over; where the output is no terminal, a new line per quarter of a stage."""
 
     def __init__(self):
