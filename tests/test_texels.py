@@ -64,8 +64,7 @@ def test_the_border_of_the_sun_is_a_signed_distance():
 def head_in_light(side=64) -> Texels:
     rng = np.random.default_rng(3)
     maps = {name: rng.random((side, side, *shape)).astype(np.float32) for name, shape in
-            (("log", (3,)), ("spread", ()), ("seen", ()), ("normal", (3,)), ("open", ()), ("ambient", (3,)), ("sunlit", (3,)))}
-    maps["sunlit"] = maps["ambient"] + (maps["sunlit"] > 0.5) * 0.5
+            (("log", (3,)), ("spread", ()), ("seen", ()), ("normal", (3,)), ("open", ()), ("ambient", (3,)), ("direct", (3,)), ("free", ()))}
     return Texels(**maps, covered=np.ones((side, side), bool))
 
 
@@ -73,17 +72,19 @@ def test_the_mirror_image_of_a_head_is_the_mirror_image_of_what_the_network_read
     known = head_in_light()
     turned = Texels(**{name: getattr(known, name)[:, ::-1].copy() for name in known.__dataclass_fields__})
     turned.normal[..., 0] *= -1
-    (layers, middle), (mirrored, other) = texels.network_input(known), texels.network_input(turned)
+    (layers, light, middle), (mirrored, other_light, other) = texels.network_input(known), texels.network_input(turned)
     layers = layers[:, :, ::-1].copy()
     layers[5] *= -1
     assert layers.shape == (CHANNELS, 64, 64) and np.abs(middle - other).max() < 0.02
+    assert np.abs(light[:, :, ::-1] - other_light).max() < 0.1
     assert np.abs(layers[3:] - mirrored[3:]).max() < 0.05, "the template's masks are alike on both sides but for a texel's share"
 
 
-def test_the_network_begins_with_the_mean_and_its_answer_has_the_size_of_the_map():
-    shading, shadow, spread = TexelNet(**MODEL)(torch.randn(2, CHANNELS, 128, 128))
+def test_the_network_begins_with_the_fitted_light_half_of_its_sun_blocked():
+    light = torch.rand(2, 6, 128, 128) + 0.1
+    shading, shadow, spread = TexelNet(**MODEL)(torch.randn(2, CHANNELS, 128, 128), light)
     assert shading.shape == (2, 3, 128, 128) and shadow.shape == (2, 1, 128, 128) and spread.shape == (2, 3, 32, 32)
-    assert not shading.any() and (spread == -2).all()
+    assert torch.allclose(shading, torch.log(light[:, :3] + 0.5 * light[:, 3:])) and not shadow.any() and (spread == -2).all()
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +164,7 @@ def test_what_the_views_of_a_head_agree_on_is_its_colour_whatever_their_exposure
     error = (found.log - truth)[where]
     error = error - np.median(error, 0)
     assert where.sum() > 10_000 and np.median(np.abs(error)) < 0.02 and found.spread[where].mean() < 0.05
-    assert (found.ambient[found.covered] > 0.2).all() and np.array_equal(found.sunlit, found.ambient)
+    assert (found.ambient[found.covered] > 0.2).all() and not found.direct.any()
 
 
 def test_every_frame_is_divided_by_the_head_s_shading_where_it_shows_the_head(evenly_lit):

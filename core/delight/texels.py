@@ -42,8 +42,8 @@ CHANNELS = 24
 class Texels:
     """float32 maps [S, S, ...] in the built-in head's UVs. log [3]: natural log of the linear colour in the views' mean; spread: how far the views' luminance
     lies from it, in log units; seen in [0, 1]; normal [3]: unit, in the head's axes; open in [0, 1]: the share of an even sky that reaches the surface;
-    ambient and sunlit [3]: the linear colour of the head's skin under the fitted sky, and with the fitted sun as far as the head itself lets it through;
-    covered bool: texels of the head."""
+    ambient [3]: the linear colour of the head's skin under the fitted sky; direct [3]: what the fitted sun adds where nothing blocks it; free in [0, 1]: where
+    the head itself lets the sun through; covered bool: texels of the head."""
 
     log: np.ndarray
     spread: np.ndarray
@@ -51,7 +51,8 @@ class Texels:
     normal: np.ndarray
     open: np.ndarray
     ambient: np.ndarray
-    sunlit: np.ndarray
+    direct: np.ndarray
+    free: np.ndarray
     covered: np.ndarray
 
 
@@ -70,7 +71,7 @@ def gather(head: LitHead, views: list[View], report: Reporter) -> Texels:
     ambient, direct, free, normal = head.at(surface.face, surface.bary)
     transfer = raster.interpolate(head.transfer, head.mesh.faces, surface.face, surface.bary)
     return Texels(surface.spread(mean), surface.spread(spread), surface.spread(weights[..., 0].max(0)), normal.astype(np.float32),
-                  ambient_occlusion(transfer).astype(np.float32), ambient.astype(np.float32), (ambient + free[..., None] * direct).astype(np.float32),
+                  ambient_occlusion(transfer).astype(np.float32), ambient.astype(np.float32), direct.astype(np.float32), free.astype(np.float32),
                   surface.covered)
 
 
@@ -111,18 +112,22 @@ def robust_mean(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return mean
 
 
-def network_input(texels: Texels) -> tuple[np.ndarray, np.ndarray]:
-    """[CHANNELS, S, S] for TexelNet, and the mean log colour [3] of the face that was seen, by which the log-shading that comes out is lower."""
+def network_input(texels: Texels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """[CHANNELS, S, S] and light [6, S, S] for TexelNet, and the mean log colour [3] of the face that was seen, by which the log-shading that comes out is
+    lower. light: what the fitted sky gives and the fitted sun would add, each channel over the mean of both on the face."""
     side = len(texels.log)
     seen, covered = (np.clip(texels.seen, 0, 1) * texels.covered)[..., None], texels.covered[..., None].astype(np.float32)
     known = np.minimum(seen[..., 0] / 0.2, 1) * template.mask("face", side)
     middle = np.average(texels.log.reshape(-1, 3), axis=0, weights=known.reshape(-1) + 1e-9).astype(np.float32)
-    sun = (texels.sunlit - texels.ambient).max(-1)
+    sun = texels.direct.max(-1) * texels.free
     lit = sun / np.maximum(texels.ambient.max(-1) + sun, 1e-6)
+    sunlit = texels.ambient + texels.direct * texels.free[..., None]
     layers = [(texels.log - middle) * (seen > 0), texels.spread[..., None], seen, texels.normal * covered, texels.open[..., None] * covered]
-    layers += [np.clip(texels.log - np.log(np.maximum(light, DARKEST / 4)), -MOST_LOG, MOST_LOG) * (seen > 0) for light in (texels.ambient, texels.sunlit)]
+    layers += [np.clip(texels.log - np.log(np.maximum(light, DARKEST / 4)), -MOST_LOG, MOST_LOG) * (seen > 0) for light in (texels.ambient, sunlit)]
     layers += [lit[..., None] * covered, border_distance(lit > 1e-3, texels.covered)[..., None], covered, _place(side)]
-    return np.concatenate(layers, -1).transpose(2, 0, 1).astype(np.float32), middle
+    whole = np.average((texels.ambient + texels.direct).reshape(-1, 3), axis=0, weights=known.reshape(-1) + 1e-9)
+    light = np.concatenate([texels.ambient / np.maximum(whole, 1e-6), texels.direct / np.maximum(whole, 1e-6)], -1)
+    return np.concatenate(layers, -1).transpose(2, 0, 1).astype(np.float32), light.transpose(2, 0, 1).astype(np.float32), middle
 
 
 def border_distance(lit: np.ndarray, covered: np.ndarray) -> np.ndarray:

@@ -69,11 +69,12 @@ def load(device: str, weights: Path = WEIGHTS) -> TexelNet:
 @torch.inference_mode()
 def tell_shading(net: TexelNet, texels: Texels) -> Shading:
     """The mean of what the network says of a head and of its mirror image."""
-    layers, middle = network_input(texels)
+    layers, light, middle = network_input(texels)
     turned = layers[:, :, ::-1].copy()
     turned[5] *= -1
     device = next(net.parameters()).device
-    parts = net(torch.from_numpy(np.stack([layers, turned])).to(device, memory_format=torch.channels_last))
+    both = (torch.from_numpy(np.stack(pair)).to(device, memory_format=torch.channels_last) for pair in ((layers, turned), (light, light[:, :, ::-1])))
+    parts = net(*both)
     shading, shadow, spread = ((part[0] + part[1].flip(-1)).cpu().numpy() / 2 for part in (parts[0], parts[1].sigmoid(), parts[2]))
     return Shading(shading.transpose(1, 2, 0) + middle, shadow[0], np.exp(spread))
 

@@ -30,11 +30,13 @@ GOBOS = ("none", "none", "none", "leaves", "leaves", "blinds", "edge")
 @dataclass(frozen=True)
 class Fitted:
     """The light as a fit to the registered head would find it, up to its usual errors, times the skin's tone: ambient [P, 3] of a second-order sky,
-    sunlit [P, 3] the same and a sun that only the head itself blocks; smooth normals [P, 3] of the registered head."""
+    sunlit [P, 3] the same and a sun that only the head itself blocks; smooth normals [P, 3] of the registered head; direct [P, 3]: what the sun would add
+    where nothing blocks it, None where nobody asks for it."""
 
     ambient: np.ndarray
     sunlit: np.ndarray
     normal: np.ndarray
+    direct: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -255,12 +257,13 @@ def fitted_light(transfer: np.ndarray, smooth: np.ndarray, reach: list[np.ndarra
     normal = smooth + rng.normal(0, 0.05, 3)
     normal = (normal / np.sqrt(_dot(normal, normal))[:, None]).astype(np.float32)
     tone = tone * np.exp(rng.normal(0, 0.08) + rng.normal(0, 0.03, 3))
-    sunlit = lit
+    direct = np.zeros_like(lit)
     if found:
         towards = lamps[main] + rng.normal(0, 0.06, 3)
         towards /= np.linalg.norm(towards)
-        sunlit = lit + (np.maximum(normal @ towards, 0) * reach[main])[:, None] * colours[main] * np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.05, 3))
-    return Fitted((lit * tone).astype(np.float32), (sunlit * tone).astype(np.float32), normal.astype(np.float32))
+        direct = np.maximum(normal @ towards, 0)[:, None] * colours[main] * np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.05, 3))
+    sunlit = lit + direct * reach[main][:, None] if found else lit
+    return Fitted(*((part * tone).astype(np.float32) for part in (lit, sunlit)), normal.astype(np.float32), (direct * tone).astype(np.float32))
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -57,10 +57,11 @@ OFF_FACE = 0.3
 
 @dataclass(frozen=True)
 class Batch:
-    """layers [N, CHANNELS, S, S]; shading [N, 3, S, S] the true log-shading less the face's mean log colour, weight [N, 1, S, S] of its error; shadow and
-    shadow_weight [N, 1, S, S]. 2 k and 2 k + 1 are the same person and colours under two lights."""
+    """layers [N, CHANNELS, S, S] and light [N, 6, S, S]; shading [N, 3, S, S] the true log-shading less the face's mean log colour, weight [N, 1, S, S] of its
+    error; shadow and shadow_weight [N, 1, S, S]. 2 k and 2 k + 1 are the same person and colours under two lights."""
 
     layers: torch.Tensor
+    light: torch.Tensor
     shading: torch.Tensor
     weight: torch.Tensor
     shadow: torch.Tensor
@@ -85,12 +86,12 @@ class People:
 
 def example(lit: Unfolded) -> tuple[np.ndarray, ...]:
     """What a Batch holds of a person under a light."""
-    layers, middle = network_input(lit.texels)
+    layers, light, middle = network_input(lit.texels)
     side = len(lit.shading)
     face = template.mask("face", side)
     weight = np.clip(lit.texels.seen / 0.15, 0, 1) * lit.texels.covered * (OFF_FACE + (1 - OFF_FACE) * face)
     trust = 1.0 if lit.strong > 0.4 or lit.strong < 0.1 else 0.3  # in between it is a matter of taste what is a shadow
-    parts = (layers, (lit.shading - middle).transpose(2, 0, 1), weight[None], (lit.shadow * (lit.strong > 0.2))[None], trust * weight[None])
+    parts = (layers, light, (lit.shading - middle).transpose(2, 0, 1), weight[None], (lit.shadow * (lit.strong > 0.2))[None], trust * weight[None])
     return tuple(np.ascontiguousarray(part, np.float32) for part in parts)
 
 
@@ -98,7 +99,7 @@ def mirrored(batch: Batch) -> Batch:
     """Left and right exchanged; a normal's x changes its sign."""
     layers = batch.layers.flip(-1)  # a copy
     layers[:, 5] *= -1
-    return replace(batch, layers=layers, **{name: getattr(batch, name).flip(-1) for name in ("shading", "weight", "shadow", "shadow_weight")})
+    return replace(batch, layers=layers, **{name: getattr(batch, name).flip(-1) for name in ("light", "shading", "weight", "shadow", "shadow_weight")})
 
 
 def train_texels(config: str, out: Path, report: Reporter, minutes: float | None = None, hdri: Path | None = None, start: Path | None = None,
@@ -145,7 +146,7 @@ def losses(network: TexelNet, batch: Batch, device: str) -> dict[str, torch.Tens
     """The terms of the loss, each a scalar."""
     low = device == "cuda" or fast_dtype("cpu") == torch.bfloat16
     with torch.autocast(device, torch.bfloat16, enabled=low):
-        shading, shadow, spread = network(batch.layers.to(device, memory_format=torch.channels_last))
+        shading, shadow, spread = network(*(part.to(device, memory_format=torch.channels_last) for part in (batch.layers, batch.light)))
     weight = batch.weight.to(device)
     tone, error = split_tone(shading - batch.shading.to(device), weight)
     terms = {"shading": mean_size(error, weight), "tone": TONE * tone.abs().mean(), "slope": SLOPE * slope_error(error, weight),
@@ -188,7 +189,7 @@ def figures(average: dict, config: str, batch: Batch, device: str) -> dict[str, 
     network = TexelNet(**CONFIGS[config]["model"])
     network.load_state_dict(average)
     network.to(device, memory_format=torch.channels_last).eval()
-    found = [network(part.to(device)) for part in batch.layers.split(4)]
+    found = [network(*(part.to(device) for part in pair)) for pair in zip(batch.layers.split(4), batch.light.split(4), strict=True)]
     shading, spread = (torch.cat([each[k].cpu() for each in found]) for k in (0, 2))
     told = {"network": mean_deviation(shading - batch.shading, batch.weight), "none": mean_deviation(batch.shading, batch.weight)}
     _, error = split_tone(shading - batch.shading, batch.weight)

@@ -94,6 +94,7 @@ def _as_captured(person: Person, stage: LightStage, carried: np.ndarray, environ
     smooth = raster.interpolate(stage.normals, stage.mesh.faces, face, bary)[covered]
     reach = [reach_of(person, k, side)[covered] for k in chosen]
     fitted = fitted_light(transfer, smooth, reach, environment, [person.lamps[k] for k in chosen], tints, tone, rng)
+    free = (fitted.sunlit - fitted.ambient).max(-1) / np.maximum(fitted.direct.max(-1), 1e-6)
     field = _displacement(side, np.exp(rng.uniform(np.log(0.4), np.log(2.5))), rng)
 
     def moved(values: np.ndarray) -> np.ndarray:
@@ -104,7 +105,7 @@ def _as_captured(person: Person, stage: LightStage, carried: np.ndarray, environ
 
     weight = weight * covered
     return Texels(log * (weight > 0.02)[..., None], apart * (weight > 0.02), weight.astype(np.float32), unit(moved(fitted.normal)),
-                  moved(ambient_occlusion(transfer)), moved(fitted.ambient), moved(fitted.sunlit), covered)
+                  moved(ambient_occlusion(transfer)), moved(fitted.ambient), moved(fitted.direct), moved(free), covered)
 
 
 def _shining(person: Person, environment: Environment, position: np.ndarray, side: int, rng: np.random.Generator) -> tuple[list[int], list, list]:
