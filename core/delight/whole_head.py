@@ -45,7 +45,10 @@ class Shading:
 def whole_head(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
     """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see the head."""
     net, views = load(settings.compute_device), read_views(capture, selected_only=True)
-    head = lit_head(read_head(capture), views, report)
+    filmed = read_head(capture)
+    if not filmed.built_in:
+        raise Problem("Whole Head knows the built-in head's UVs alone, and this capture's head has others.", "Choose Network or Shading to delight with.")
+    head = lit_head(filmed, views, report)
     texels = gather(head, views, report)
     found = tell_shading(net, texels)
     found = Shading(found.log + np.log(_exposure(texels, found)), found.shadow, found.spread)
