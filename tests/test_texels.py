@@ -115,7 +115,7 @@ def test_a_person_is_kept_byte_for_byte(person, tmp_path):
 
 def test_a_step_of_the_training_lessens_the_loss_and_its_errors_are_foretold(person, tmp_path):
     unfolded.save(training._path(tmp_path, 9100), person)
-    batch = training.People([9100], tmp_path, None).draw(1, 64, np.random.default_rng(2))
+    batch = training.UnfoldedPeople([9100], tmp_path, None).draw(1, 64, np.random.default_rng(2))
     assert batch.layers.shape == (2, CHANNELS, 64, 64) and torch.isfinite(batch.layers).all()
     torch.manual_seed(0)
     network = TexelNet(**MODEL)
@@ -132,7 +132,7 @@ def test_a_step_of_the_training_lessens_the_loss_and_its_errors_are_foretold(per
 
 def test_a_mirrored_batch_is_that_of_a_mirrored_person(person, tmp_path):
     unfolded.save(training._path(tmp_path, 9100), person)
-    batch = training.People([9100], tmp_path, None).draw(1, 64, np.random.default_rng(2))
+    batch = training.UnfoldedPeople([9100], tmp_path, None).draw(1, 64, np.random.default_rng(2))
     back = training.mirrored(training.mirrored(batch))
     assert torch.equal(back.layers, batch.layers) and torch.equal(back.shading, batch.shading)
     assert torch.equal(training.mirrored(batch).layers[:, 5], -batch.layers[:, 5].flip(-1))

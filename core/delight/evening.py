@@ -16,9 +16,9 @@ from ..face.head import Unfolded
 from ..geometry.raster import interpolate, sample, visible_from
 from ..geometry.views import View
 from .lit_head import LitHead
+from .texels import exposures, robust_mean
 
 UV_SIDE = 256
-SPREAD = 0.12  # natural log units from the others' opinion at which a frame's counts half
 COARSE = 3.0  # cells of the network's map below which nothing is moved
 LEAST = 0.05  # weight from which a texel is known
 
@@ -44,8 +44,8 @@ def even_out(head: LitHead, views: list[View], looks: list[Look]) -> list[Look]:
     texel = np.flatnonzero(surface.covered)
     found = [_opinion(surface, view, look) for view, look in zip(views, looks, strict=True)]
     opinions, weights = (np.stack(part) for part in zip(*found, strict=True))
-    level = _levels(opinions, weights)
-    mean = _robust_mean(opinions - level[:, None], weights)
+    level = exposures(opinions, weights)
+    mean = robust_mean(opinions - level[:, None], weights)
     known = np.zeros(UV_SIDE**2, np.float32)
     known[texel] = np.minimum(weights.sum(0) / LEAST, 1) * (weights.sum(0) > LEAST)
     albedo = np.zeros((UV_SIDE**2, 3), np.float32)
@@ -69,27 +69,6 @@ def _opinion(surface: Unfolded, view: View, look: Look) -> tuple[np.ndarray, np.
     values[seen] = sample(look.log - look.shading, at[seen])
     weight[seen] = cosine[seen] ** 2
     return values, weight
-
-
-def _levels(opinions: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """How much higher than the others each view's log-albedo is as a whole [V, 3], of mean 0; without it a place that one view sees would keep its level."""
-    level = np.zeros((len(opinions), 3), np.float32)
-    shared = (weights > 0) & ((weights > 0).sum(0) > 1)
-    for _ in range(20):
-        mean = _robust_mean(opinions - level[:, None], weights)
-        for view in np.flatnonzero(shared.any(1)):
-            level[view] += np.median((opinions[view] - level[view] - mean)[shared[view]], 0)
-        level -= level.mean(0)
-    return level
-
-
-def _robust_mean(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Over the first axis of [V, N, 3] with weights [V, N]: frames far from the others count less (highlights move, albedo does not)."""
-    mean = (values * weights[..., None]).sum(0) / np.maximum(weights.sum(0), 1e-6)[:, None]
-    for _ in range(4):
-        trust = weights / (1 + (((values - mean) ** 2).mean(-1) / SPREAD**2))
-        mean = (values * trust[..., None]).sum(0) / np.maximum(trust.sum(0), 1e-6)[:, None]
-    return mean
 
 
 def _agreeing(head: LitHead, look: Look, albedo: np.ndarray, known: np.ndarray) -> Look:

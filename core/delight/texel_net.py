@@ -14,7 +14,7 @@ from torch import nn
 from torch.nn import functional
 
 from .texels import CHANNELS
-from .unet import Attention, Block
+from .unet import Trunk
 
 BANDS = (1, 8, 40)
 """Texels of a map of 512 over which an error is alike: of each band the network says how large it is."""
@@ -24,23 +24,15 @@ FINE, FINEST = 24, 12
 """Features at half the map's size, and at its own."""
 
 
-class TexelNet(nn.Module):
+class TexelNet(Trunk):
     """[N, CHANNELS, S, S] and the fitted light [N, 6, S, S] (texels.network_input) -> log-shading less the face's mean log colour [N, 3, S, S], logits of
     shadow [N, 1, S, S], and the log of the expected error [N, 3, S / 4, S / 4], one for each of BANDS, in natural log units. S is a multiple of 32 that the
     widths can halve."""
 
     def __init__(self, widths: list[int], depths: list[int]):
-        super().__init__()
+        super().__init__(widths, depths)
         self.begin = nn.Conv2d(CHANNELS, FINEST, 3, padding=1)
         self.stem, self.enter = nn.Conv2d(CHANNELS, FINE, 4, stride=2, padding=1), nn.Conv2d(FINE, widths[0], 2, stride=2)
-        self.down, self.up, self.halve, self.narrow = nn.ModuleList(), nn.ModuleList(), nn.ModuleList(), nn.ModuleList()
-        for level, (width, depth) in enumerate(zip(widths, depths, strict=True)):
-            self.down.append(nn.Sequential(*(Block(width) for _ in range(depth))))
-            if level + 1 < len(widths):
-                self.halve.append(nn.Conv2d(width, widths[level + 1], 2, stride=2))
-                self.narrow.append(nn.Conv2d(widths[level + 1], width, 1))
-                self.up.append(nn.Sequential(*(Block(width) for _ in range(depth))))
-        self.attention = Attention(widths[-1])
         self.spread = nn.Conv2d(widths[0], len(BANDS), 1)
         self.leave, self.last = nn.Conv2d(widths[0], 4 * FINE, 1), nn.Conv2d(2 * FINE, 4 * FINEST, 3, padding=1)
         self.finish, self.out = nn.Conv2d(2 * FINEST, 2 * FINEST, 3, padding=1), nn.Conv2d(2 * FINEST, 4, 3, padding=1)
@@ -50,16 +42,7 @@ class TexelNet(nn.Module):
 
     def forward(self, x: torch.Tensor, light: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         finest, fine = functional.gelu(self.begin(x)), functional.gelu(self.stem(x))
-        x, kept = self.enter(fine), []
-        for level, blocks in enumerate(self.down):
-            x = blocks(x)
-            if level < len(self.halve):
-                kept.append(x)
-                x = self.halve[level](x)
-        x = self.attention(x)
-        for level in reversed(range(len(self.halve))):
-            x = kept[level] + functional.interpolate(self.narrow[level](x), scale_factor=2, mode="bilinear", align_corners=False)
-            x = self.up[level](x)
+        x = self.transform(self.enter(fine))
         spread = self.spread(x).float().clamp(-7, 1)
         x = torch.cat([fine, functional.pixel_shuffle(self.leave(x), 2)], 1)
         x = torch.cat([finest, functional.pixel_shuffle(functional.gelu(self.last(x)), 2)], 1)

@@ -95,7 +95,7 @@ def exposures(colours: np.ndarray, weights: np.ndarray) -> np.ndarray:
     that view's exposure. weights [V, N]."""
     level = np.zeros((len(colours), 3), np.float32)
     shared = (weights > 0) & ((weights > 0).sum(0) > 1)
-    for _ in range(8):
+    for _ in range(20):
         mean = robust_mean(colours - level[:, None], weights)
         for view in np.flatnonzero(shared.any(1)):
             level[view] += np.median((colours[view] - level[view] - mean)[shared[view]], 0)

@@ -43,12 +43,11 @@ def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: n
     return layers, middle
 
 
-class DelightNet(nn.Module):
-    """[N, CHANNELS, S, S] -> log-shading less the picture's middle [N, 3, S/2, S/2] and shadow logits [N, 1, S/2, S/2]. S is a multiple of MULTIPLE."""
+class Trunk(nn.Module):
+    """A U-Net over levels of these `widths`, each of `depths` blocks and half as fine as the one before; the coarsest attends to all of itself."""
 
     def __init__(self, widths: list[int], depths: list[int]):
         super().__init__()
-        self.stem, self.enter = nn.Conv2d(CHANNELS, FINE, 4, stride=2, padding=1), nn.Conv2d(FINE, widths[0], 2, stride=2)
         self.down, self.up, self.halve, self.narrow = nn.ModuleList(), nn.ModuleList(), nn.ModuleList(), nn.ModuleList()
         for level, (width, depth) in enumerate(zip(widths, depths, strict=True)):
             self.down.append(nn.Sequential(*(Block(width) for _ in range(depth))))
@@ -57,14 +56,10 @@ class DelightNet(nn.Module):
                 self.narrow.append(nn.Conv2d(widths[level + 1], width, 1))
                 self.up.append(nn.Sequential(*(Block(width) for _ in range(depth))))
         self.attention = Attention(widths[-1])
-        self.leave = nn.Conv2d(widths[0], 4 * FINE, 1)  # the finest level, where pictures are large, is kept thin
-        self.last, self.out = nn.Conv2d(2 * FINE, 2 * FINE, 3, padding=1), nn.Conv2d(2 * FINE, 4, 3, padding=1)
-        nn.init.zeros_(self.out.weight)
-        nn.init.zeros_(self.out.bias)
 
-    def forward(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        fine = functional.gelu(self.stem(x))
-        x, kept = self.enter(fine), []
+    def transform(self, x: torch.Tensor) -> torch.Tensor:
+        """[N, widths[0], H, W] down to the coarsest level and back."""
+        kept = []
         for level, blocks in enumerate(self.down):
             x = blocks(x)
             if level < len(self.halve):
@@ -74,6 +69,23 @@ class DelightNet(nn.Module):
         for level in reversed(range(len(self.halve))):
             x = kept[level] + functional.interpolate(self.narrow[level](x), scale_factor=2, mode="bilinear", align_corners=False)
             x = self.up[level](x)
+        return x
+
+
+class DelightNet(Trunk):
+    """[N, CHANNELS, S, S] -> log-shading less the picture's middle [N, 3, S/2, S/2] and shadow logits [N, 1, S/2, S/2]. S is a multiple of MULTIPLE."""
+
+    def __init__(self, widths: list[int], depths: list[int]):
+        super().__init__(widths, depths)
+        self.stem, self.enter = nn.Conv2d(CHANNELS, FINE, 4, stride=2, padding=1), nn.Conv2d(FINE, widths[0], 2, stride=2)
+        self.leave = nn.Conv2d(widths[0], 4 * FINE, 1)  # the finest level, where pictures are large, is kept thin
+        self.last, self.out = nn.Conv2d(2 * FINE, 2 * FINE, 3, padding=1), nn.Conv2d(2 * FINE, 4, 3, padding=1)
+        nn.init.zeros_(self.out.weight)
+        nn.init.zeros_(self.out.bias)
+
+    def forward(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        fine = functional.gelu(self.stem(x))
+        x = self.transform(self.enter(fine))
         x = torch.cat([fine, functional.pixel_shuffle(self.leave(x), 2)], 1)
         out = self.out(functional.gelu(self.last(x))).float()
         return out[:, :3], out[:, 3:]

@@ -32,7 +32,7 @@ GROWTH = ("brows", "beard", "hair")
 
 
 @dataclass(frozen=True)
-class Person:
+class UnlitPerson:
     """vertices float32 [V, 3] of the head; visible uint8 [V, LIGHTS / 8], bits: of the light stage; lamps float32 [LAMPS, 3] unit and radius [LAMPS] of each in
     radians; reach uint8 [LAMPS, N] of 255: what of each lamp reaches the N covered texels of a map of SIDE; skin uint8 [S, S, 3] sRGB between the roots of
     hair; growth uint8 [S, S, len(GROWTH)] of 255."""
@@ -51,7 +51,7 @@ class Person:
         return LightStage(mesh, vertex_normals(mesh).astype(np.float32), np.unpackbits(self.visible, axis=1).astype(bool))
 
 
-def make_person(seed: int) -> Person:
+def make_person(seed: int) -> UnlitPerson:
     """The person of a seed, some ten seconds' work."""
     rng = np.random.default_rng([seed, 95])
     mesh = person_mesh(seed)
@@ -65,21 +65,21 @@ def make_person(seed: int) -> Person:
     _, skin, growth = paint(sample_person(seed), SIDE)
     blank = np.zeros((SIDE, SIDE), np.float32)
     grown = np.stack([growth.get(name, blank) for name in GROWTH], -1)
-    return Person(mesh.vertices.astype(np.float32), np.packbits(stage.visible, axis=1), lamps.astype(np.float32), radius.astype(np.float32),
+    return UnlitPerson(mesh.vertices.astype(np.float32), np.packbits(stage.visible, axis=1), lamps.astype(np.float32), radius.astype(np.float32),
                   np.round(255 * reach).astype(np.uint8), _bytes(images.linear_to_srgb(skin)), _bytes(grown))
 
 
-def save(path: Path, person: Person) -> None:
+def save(path: Path, person: UnlitPerson) -> None:
     with replacing(path) as temporary, open(temporary, "wb") as file:
-        np.savez_compressed(file, **{field.name: getattr(person, field.name) for field in fields(Person)})
+        np.savez_compressed(file, **{field.name: getattr(person, field.name) for field in fields(UnlitPerson)})
 
 
-def load(path: Path) -> Person:
+def load(path: Path) -> UnlitPerson:
     with np.load(path, allow_pickle=False) as stored:
-        return Person(**{field.name: stored[field.name] for field in fields(Person)})
+        return UnlitPerson(**{field.name: stored[field.name] for field in fields(UnlitPerson)})
 
 
-def colours_of(person: Person, side: int, rng: np.random.Generator) -> np.ndarray:
+def colours_of(person: UnlitPerson, side: int, rng: np.random.Generator) -> np.ndarray:
     """The person's linear albedo [S, S, 3] with other tones, hair of other colours, stains, moles and tufts."""
     albedo = images.srgb_to_linear(_resized(person.skin.astype(np.float32) / 255, side))
     growth = _resized(person.growth.astype(np.float32) / 255, side)
@@ -102,7 +102,7 @@ def colours_of(person: Person, side: int, rng: np.random.Generator) -> np.ndarra
     return np.clip(albedo, 0.003, 0.92).astype(np.float32)
 
 
-def reach_of(person: Person, lamp: int, side: int) -> np.ndarray:
+def reach_of(person: UnlitPerson, lamp: int, side: int) -> np.ndarray:
     """What of a lamp the head itself lets through, float32 [S, S]."""
     covered = template_raster(SIDE)[0] >= 0
     picture = np.zeros((SIDE, SIDE), np.float32)

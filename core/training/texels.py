@@ -38,7 +38,7 @@ from . import command_line, descent
 from .prior import FIRST_SEED, HELD_OUT_SEED
 from .release import again, release
 from .shading_errors import disagreement, mean_deviation, mean_size, slope_error, split_tone
-from .unfolded import Unfolded, light_up
+from .unfolded import LitPerson, light_up
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "texels.safetensors"
 _MODEL = {"widths": [48, 96, 160, 224], "depths": [1, 2, 2, 2]}
@@ -56,7 +56,7 @@ OFF_FACE = 0.3
 
 
 @dataclass(frozen=True)
-class Batch:
+class TexelBatch:
     """layers [N, CHANNELS, S, S] and light [N, 6, S, S]; shading [N, 3, S, S] the true log-shading less the face's mean log colour, weight [N, 1, S, S] of its
     error; shadow and shadow_weight [N, 1, S, S]. 2 k and 2 k + 1 are the same person and colours under two lights."""
 
@@ -68,24 +68,24 @@ class Batch:
     shadow_weight: torch.Tensor
 
 
-class People:
+class UnfoldedPeople:
     """Draws batches of the people that are prepared in a work folder; what is prepared later is drawn from then on."""
 
     def __init__(self, seeds: list[int], work: Path, panoramas: Path | None):
         self.seeds, self.work, self.panoramas = seeds, work, read_panoramas(panoramas)
 
-    def draw(self, pairs: int, side: int, rng: np.random.Generator) -> Batch:
+    def draw(self, pairs: int, side: int, rng: np.random.Generator) -> TexelBatch:
         ready = [seed for seed in self.seeds if _path(self.work, seed).is_file()]
         drawn = []
         for _ in range(pairs):
             person = unfolded.load(_path(self.work, ready[rng.integers(len(ready))]))
             albedo = unfolded.colours_of(person, side, rng)
             drawn += [example(light_up(person, albedo, rng, self.panoramas)) for _ in range(2)]
-        return Batch(*(torch.from_numpy(np.stack(part)) for part in zip(*drawn, strict=True)))
+        return TexelBatch(*(torch.from_numpy(np.stack(part)) for part in zip(*drawn, strict=True)))
 
 
-def example(lit: Unfolded) -> tuple[np.ndarray, ...]:
-    """What a Batch holds of a person under a light."""
+def example(lit: LitPerson) -> tuple[np.ndarray, ...]:
+    """What a TexelBatch holds of a person under a light."""
     layers, light, middle = network_input(lit.texels)
     side = len(lit.shading)
     face = template.mask("face", side)
@@ -95,7 +95,7 @@ def example(lit: Unfolded) -> tuple[np.ndarray, ...]:
     return tuple(np.ascontiguousarray(part, np.float32) for part in parts)
 
 
-def mirrored(batch: Batch) -> Batch:
+def mirrored(batch: TexelBatch) -> TexelBatch:
     """Left and right exchanged; a normal's x changes its sign."""
     layers = batch.layers.flip(-1)  # a copy
     layers[:, 5] *= -1
@@ -119,7 +119,7 @@ def train_texels(config: str, out: Path, report: Reporter, minutes: float | None
         prepare(config, work, report)
     if not all(any(_path(work, seed).is_file() for seed in data[kind]) for kind in ("seeds", "held_out_seeds")):
         raise Problem(f"There are no people in {work} yet.", "Wait for `train texels --prepare`, or train without --growing.")
-    unseen = People(data["held_out_seeds"], work, hdri).draw(2 * t["held_out"], SIDE // 2, np.random.default_rng(1))
+    unseen = UnfoldedPeople(data["held_out_seeds"], work, hdri).draw(2 * t["held_out"], SIDE // 2, np.random.default_rng(1))
     torch.manual_seed(t["seed"])
     network = TexelNet(**CONFIGS[config]["model"])
     if start:
@@ -127,7 +127,8 @@ def train_texels(config: str, out: Path, report: Reporter, minutes: float | None
     state = descent.resumed(work, descent.beginning(config, data, network))
     recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
                             betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"], save_every=180)
-    descent.descend(network, state, _Steps(People(data["seeds"], work, hdri), t), lambda batch, step, share: sum(losses(network, batch, device).values()),
+    descent.descend(network, state, _Steps(UnfoldedPeople(data["seeds"], work, hdri), t),
+                    lambda batch, step, share: sum(losses(network, batch, device).values()),
                     lambda average: figures(average, config, unseen, device), recipe, minutes, work, device, report)
     return export(work, out)
 
@@ -142,7 +143,7 @@ def prepare(config: str, work: Path, report: Reporter, processes: int = 2) -> No
             report.progress(i + 1, len(jobs), f"person {i + 1} of {len(jobs)}")
 
 
-def losses(network: TexelNet, batch: Batch, device: str) -> dict[str, torch.Tensor]:
+def losses(network: TexelNet, batch: TexelBatch, device: str) -> dict[str, torch.Tensor]:
     """The terms of the loss, each a scalar."""
     low = device == "cuda" or fast_dtype("cpu") == torch.bfloat16
     with torch.autocast(device, torch.bfloat16, enabled=low):
@@ -183,7 +184,7 @@ def _surprise(error: torch.Tensor, weight: torch.Tensor, spread: torch.Tensor) -
 
 
 @torch.no_grad()
-def figures(average: dict, config: str, batch: Batch, device: str) -> dict[str, float]:
+def figures(average: dict, config: str, batch: TexelBatch, device: str) -> dict[str, float]:
     """The averaged network on held-out people: mean error of the log-albedo about its own mean over what was seen, beside that of the colours as they are
     (natural log units); and by band how much better its own sizes of the error foretell it than the best constant does (nats)."""
     network = TexelNet(**CONFIGS[config]["model"])
@@ -218,13 +219,13 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
 class _Steps(Dataset):
     """`[step]` is the step's batch, whichever process asks for it; mirrored at every other one."""
 
-    def __init__(self, people: People, t: dict):
+    def __init__(self, people: UnfoldedPeople, t: dict):
         self.people, self.t = people, t
 
     def __len__(self) -> int:
         return 10**9
 
-    def __getitem__(self, step: int) -> Batch:
+    def __getitem__(self, step: int) -> TexelBatch:
         torch.set_num_threads(1)
         rng = np.random.default_rng([self.t["seed"], step])
         fine = step % self.t["fine_every"] == self.t["fine_every"] - 1

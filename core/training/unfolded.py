@@ -23,7 +23,7 @@ from ..synthetic.olat import BASIS, DIRECTIONS, LightStage, mirrored, transport
 from ..synthetic.people.snapshot import highlight
 from ..synthetic.portrait import GOBOS, fitted_light, gobo
 from ..synthetic.response import curve, expose
-from ..synthetic.unfolded import LAMPS, SIDE, Person, reach_of, template_raster, unit
+from ..synthetic.unfolded import LAMPS, SIDE, UnlitPerson, reach_of, template_raster, unit
 
 TEXEL_MM = 0.8
 """Of a map of SIDE, in the face."""
@@ -34,7 +34,7 @@ GLOSS, SHARP = 0.03, (0.3, 0.5)
 
 
 @dataclass(frozen=True)
-class Unfolded:
+class LitPerson:
     """One person under one light at side S. texels: as a capture would give them; shading float32 [S, S, 3]: natural log of what the skin's mean colour is
     multiplied by; shadow [S, S] in [0, 1]: the lost share of the lamps' light, and strong, how much of all light they are; albedo [S, S, 3] linear."""
 
@@ -45,7 +45,7 @@ class Unfolded:
     albedo: np.ndarray
 
 
-def light_up(person: Person, albedo: np.ndarray, rng: np.random.Generator, panoramas: list[np.ndarray] = ()) -> Unfolded:
+def light_up(person: UnlitPerson, albedo: np.ndarray, rng: np.random.Generator, panoramas: list[np.ndarray] = ()) -> LitPerson:
     """A person of these colours [S, S, 3] under a random light, seen from a random sweep of views."""
     side, stage = len(albedo), person.stage
     face, bary = template_raster(side)
@@ -80,10 +80,10 @@ def light_up(person: Person, albedo: np.ndarray, rng: np.random.Generator, panor
     strong = sum(float(tint.mean()) for tint in tints)
     texels = _as_captured(person, stage, carried, environment, chosen, tints, tone * gains, (log, apart, seen), rng)
     light = float(diffuse[where].mean()) if strong else 1.0
-    return Unfolded(texels, even - np.log(np.maximum(tone, DARKEST)).astype(np.float32), lost, min(1.0, 0.6 * strong / max(light, 1e-6)), albedo)
+    return LitPerson(texels, even - np.log(np.maximum(tone, DARKEST)).astype(np.float32), lost, min(1.0, 0.6 * strong / max(light, 1e-6)), albedo)
 
 
-def _as_captured(person: Person, stage: LightStage, carried: np.ndarray, environment: Environment, chosen: list[int], tints: list, tone: np.ndarray,
+def _as_captured(person: UnlitPerson, stage: LightStage, carried: np.ndarray, environment: Environment, chosen: list[int], tints: list, tone: np.ndarray,
                  seen: tuple, rng: np.random.Generator) -> Texels:
     """What a capture would know: the light as a fit would find it, and all that comes from the head's shape moved by how far registration is off."""
     log, apart, weight = seen
@@ -108,7 +108,7 @@ def _as_captured(person: Person, stage: LightStage, carried: np.ndarray, environ
                   moved(ambient_occlusion(transfer)), moved(fitted.ambient), moved(fitted.direct), moved(free), covered)
 
 
-def _shining(person: Person, environment: Environment, position: np.ndarray, side: int, rng: np.random.Generator) -> tuple[list[int], list, list]:
+def _shining(person: UnlitPerson, environment: Environment, position: np.ndarray, side: int, rng: np.random.Generator) -> tuple[list[int], list, list]:
     """Up to two lamps: which, their colours [3] as irradiance over pi, and the share [S, S] of each that arrives past the head and what stands before it."""
     chosen, tints, arrives = [], [], []
     covered = template_raster(side)[0] >= 0
