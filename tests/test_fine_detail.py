@@ -35,13 +35,13 @@ def pattern(size: int, deviation: float, seed: int) -> np.ndarray:
 @pytest.mark.parametrize(("density", "factor"), [(0.5, 1), (1.2, 1), (1.5, 2), (2.0, 2), (3.0, 4)])
 def test_the_frames_tell_how_fine_a_map_they_fill(density, factor):
     flat = np.zeros((int(SIZE * density),) * 2, np.float32)
-    assert finer([seen_flat(flat, density)]) == factor
+    assert finer([seen_flat(flat, density)], SIZE) == factor
 
 
 def test_frames_without_more_detail_leave_none():
     flat = np.zeros((SIZE, SIZE), np.float32)
-    assert fine_detail([seen_flat(flat, 1.0)] * 3, HEAD, QUIET) is None
-    assert fine_detail([seen_flat(np.zeros((2 * SIZE, 2 * SIZE), np.float32), 2.0)], HEAD, QUIET) is None  # one view: nobody to agree with
+    assert fine_detail([seen_flat(flat, 1.0)] * 3, HEAD, SIZE, QUIET) is None
+    assert fine_detail([seen_flat(np.zeros((2 * SIZE, 2 * SIZE), np.float32), 2.0)], HEAD, SIZE, QUIET) is None  # one view: nobody to agree with
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.1, 0.3])
@@ -49,7 +49,7 @@ def test_what_views_agree_on_is_kept_and_what_they_do_not_is_shrunk(noise):
     """Wiener: of a band of power s^2 seen by V views with noise n^2 each, the share s^2 / (s^2 + n^2 / V)."""
     skin, views = pattern(2 * SIZE, 0.1, 0), 6
     observations = [seen_flat(skin + pattern(2 * SIZE, noise, 1 + i), 2.0) for i in range(views)]
-    band, agreed = np.moveaxis(fine_detail(observations, HEAD, QUIET), -1, 0)
+    band, agreed = np.moveaxis(fine_detail(observations, HEAD, SIZE, QUIET), -1, 0)
     inner = np.s_[16:-16, 16:-16]
     expected = 0.1**2 / (0.1**2 + noise**2 / views)
     assert abs(agreed[inner].mean() - expected) < 0.08

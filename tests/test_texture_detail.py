@@ -131,3 +131,20 @@ def test_moles_are_found_where_they_are_and_lines_are_none():
     cv2.line(log, (10, 100), (110, 100), -0.5, 2)
     band = cv2.GaussianBlur(log, (0, 0), 1.2) - cv2.GaussianBlur(log, (0, 0), 5.0)
     assert sorted(moles(band, np.ones((120, 120), bool))) == [(30, 40), (80, 70)]
+
+
+def test_a_texture_larger_than_its_views_maps_is_read_from_the_frames(tmp_path):
+    """Observed at half the side and read at the whole, a texture shows what it does where all is done at the whole, and not the small one enlarged."""
+    paint = skin(2 * SIZE)
+    capture = capture_of(tmp_path / "egg", paint, (-40, 0, 40))
+    head, report = read_head(capture), Reporter("texture")
+
+    def made(side: int, size: int) -> texture.Built:
+        return texture.build(*texture.observe_all(capture, head, side, report), from_json({}), report, size)
+
+    small, large, whole = made(SIZE, SIZE), made(SIZE, 2 * SIZE), made(2 * SIZE, 2 * SIZE)
+    inner = cv2.erode((whole.confidence > 0.6).astype(np.uint8), np.ones((9, 9))) > 0
+    enlarged = cv2.resize(small.log_texture, (2 * SIZE, 2 * SIZE), interpolation=cv2.INTER_CUBIC)
+    apart, lost = (np.abs(fine(each) - fine(whole.log_texture))[inner].mean() for each in (large.log_texture, enlarged))
+    assert large.log_texture.shape == whole.log_texture.shape and inner.sum() > 1000
+    assert apart < 0.3 * lost and np.abs(large.confidence - whole.confidence)[inner].mean() < 0.05

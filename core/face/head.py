@@ -92,6 +92,10 @@ class Unfolded:
         """bool [S, S]: texels of the head."""
         return _shared(self.face >= 0)
 
+    def covered_at(self, size: int) -> np.ndarray:
+        """The same of a map of another size, bool [size, size]."""
+        return self.covered if size == len(self.covered) else self.head.raster(size)[0] >= 0
+
     def spread(self, values: np.ndarray) -> np.ndarray:
         """Per covered texel [N(, C)] -> float32 [S, S(, C)], zero elsewhere."""
         out = np.zeros((*self.face.shape, *values.shape[1:]), np.float32)

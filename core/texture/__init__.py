@@ -33,6 +33,10 @@ from .filmed import filmed
 from .foreign import clothes, leave_out_background, leave_out_hair
 from .projection import Observation, observe
 
+LARGEST = 1024
+"""Side of the maps on which views are looked at, aligned and weighed: all of that is smooth, and all views are held at once. Of a larger texture one view
+after the other is read along it."""
+
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """delit/, cameras/, head.obj -> texture.exr (linear), texture.png (sRGB), texture_confidence.exr [S, S] in [0, 1],
@@ -43,25 +47,27 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     head = read_filmed_head(capture)
     if head.mesh.uvs is None:
         raise Problem("The registered head has no UVs.", "Run the stage registration again.")
-    observations, surface = observe_all(capture, head, settings.texture.size, report)
-    built = build(observations, surface, settings, report)
-    if built.confidence[surface.covered].max(initial=0) <= 0:
+    size = settings.texture.size
+    observations, surface = observe_all(capture, head, min(size, LARGEST), report)
+    covered = surface.covered_at(size)
+    built = build(observations, surface, settings, report, size)
+    if built.confidence[covered].max(initial=0) <= 0:
         raise Problem("No delit frame sees the head.", "Check the cameras' and the head's pictures in the report, and run those stages again.")
-    texture = fill(np.exp(built.log_texture), built.confidence, surface.covered)
+    texture = fill(np.exp(built.log_texture), built.confidence, covered)
 
     images.write_linear(capture.texture, texture)
     images.write_srgb(capture.texture_png, images.linear_to_srgb(texture))
     images.write_data(capture.texture_confidence, built.confidence)
-    _leave_figures(capture, report, observations, built, texture, surface.covered)
-    detail = fine_detail(observations, surface, report)
+    _leave_figures(capture, report, observations, built, texture, covered)
+    detail = fine_detail(observations, surface, size, report)
     remove_file(capture.texture_detail)
     if detail is not None:
         images.write_data(capture.texture_detail, detail)
         report.figure("fine_detail_size_px", len(detail))
         report.figure("fine_detail_agreed_percent", round(100 * float(detail[..., 1][detail[..., 1] > 0].mean()), 1) if detail[..., 1].any() else 0.0)
-    lit = filmed(observations, report)
+    lit = filmed(observations, surface.covered, size, report)
     if lit is not None:
-        images.write_srgb(capture.texture_filmed, images.linear_to_srgb(fill(lit, built.confidence, surface.covered)))
+        images.write_srgb(capture.texture_filmed, images.linear_to_srgb(fill(lit, built.confidence, covered)))
 
 
 @dataclass
@@ -103,8 +109,10 @@ def _delit(path: Path, view: View) -> np.ndarray:
     return linear
 
 
-def build(observations: list[Observation], surface: Unfolded, settings: Settings, report: Reporter, aligned: bool = True) -> Built:
-    """One map from what the views see; changes the observations (gains, warps, weights). `aligned`: off for measurements only."""
+def build(observations: list[Observation], surface: Unfolded, settings: Settings, report: Reporter, size: int | None = None,
+          aligned: bool = True) -> Built:
+    """One map from what the views see, of `size` or of the observations' own; changes the observations (gains, warps, weights). `aligned`: off for
+    measurements only."""
     built_in = surface.head.built_in
     if built_in:
         leave_out_background(observations, report)
@@ -112,11 +120,15 @@ def build(observations: list[Observation], surface: Unfolded, settings: Settings
     report.log("Exposure gains of the views: " + ", ".join(f"{gain:.2f}" for gain in np.exp(gains.mean(1))))
     shift = align(observations, surface, report) if aligned else 0.0
     robust_weights(observations)
-    log_texture, losses = blend(observations, report), {}
+    own, losses = len(surface.covered), {}
+    log_texture = blend(observations, surface.covered, own, report)
     seen = 1 - np.prod([1 - o.quality for o in observations], axis=0)
     confidence = np.where(surface.covered, seen, 0).astype(np.float32)
     if built_in:
         confidence = confidence * (1 - clothes(log_texture, confidence, surface))
+    if size and size > own:
+        log_texture = blend(observations, surface.covered, size, report)
+        confidence = np.clip(images.resize(confidence, size, size), 0, 1) * surface.covered_at(size)
     if settings.texture.perceptual > 0:
         from .features import load_features  # torch is only needed here
         from .perceptual import refine
@@ -133,7 +145,8 @@ def _leave_figures(capture, report, observations, built, texture, covered):
     height = min(512, len(texture))
     sheet = [images.resize(images.linear_to_srgb(texture), height, height), np.repeat(images.resize(confidence, height, height)[..., None], 3, 2)]
     images.write_srgb(capture.picture("texture", "map_and_confidence"), np.hstack(sheet))
-    residuals = [np.abs(o.log_colour - log_texture)[o.weight > 0.25 * o.weight.max()].ravel()[::16] for o in observations]
+    small = images.resize(log_texture, *observations[0].weight.shape)
+    residuals = [np.abs(o.log_colour - small)[o.weight > 0.25 * o.weight.max()].ravel()[::16] for o in observations]
     fine = bands_of(log_texture, confidence > 0)[0]
     report.figure("views", len(observations))
     report.figure("seen_percent", round(100 * float((confidence[covered] > 0.05).mean()), 1))

@@ -7,12 +7,11 @@ All in the logarithm of linear colour: a gain is an offset there, and a band of 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import cv2
 import numpy as np
 
 from ..contract.messages import Reporter
+from ..imaging.averages import blurred, weighted_mean
 from .projection import Observation
 
 BANDS = ((2.0, 12.0), (8.0, 5.0), (24.0, 2.0), (np.inf, 1.0))
@@ -64,16 +63,18 @@ def robust_weights(observations: list[Observation], tolerance: float = 0.10) -> 
         o.weight = o.weight * cv2.resize(factor, o.weight.shape[::-1], interpolation=cv2.INTER_LINEAR)
 
 
-def blend(observations: list[Observation], report: Reporter, what: str = "delit", done: int = 2) -> np.ndarray:
-    """One log texture [S, S, 3]; zero weight everywhere leaves zeros. `what` is blended, and how much was
-    `done` before, are for the progress."""
+def blend(observations: list[Observation], covered: np.ndarray, size: int, report: Reporter, what: str = "delit", done: int = 2) -> np.ndarray:
+    """One log texture [size, size, 3] of observations of the texels `covered` [S, S], each enlarged when its turn comes; zero weight everywhere leaves zeros.
+    `what` is blended, and how much was `done` before, are for the progress."""
     largest = np.full_like(observations[0].weight, 1e-12)
     for o in observations:
         np.maximum(largest, o.weight, out=largest)
+    largest = cv2.resize(largest, (size, size), interpolation=cv2.INTER_LINEAR)
     sums, norms = ([np.zeros((*largest.shape, channels), np.float32) for _ in BANDS] for channels in (3, 1))
     scale = len(largest) / 1024
     for i, o in enumerate(observations):
         report.progress(len(observations) + done + 2 * i / len(observations), len(observations) + 6, f"blending {o.name}, {what}")
+        o = o.enlarged(size, covered)
         seen, share = o.weight > 0, o.weight / largest
         for band, (values, (reach, exponent)) in enumerate(zip(bands_of(o.log_colour, seen), BANDS, strict=True)):
             weight = share ** exponent
@@ -103,28 +104,6 @@ def bands_of(log_colour: np.ndarray, seen: np.ndarray) -> list[np.ndarray]:
         bands.append(rest - low)
         rest = low
     return [*bands, rest]
-
-
-def blurred(image: np.ndarray, weight: np.ndarray, sigma: float) -> np.ndarray:
-    """Gaussian mean of [S, S(, C)] over where weight [S, S] >= 0 says there is something (normalised convolution); large sigmas at lower resolution."""
-    height, width = weight.shape
-    factor = max(1, int(sigma // 4))
-    weighted = image * (weight if image.ndim == 2 else weight[..., None])
-    if factor > 1:
-        small = max(1, width // factor), max(1, height // factor)
-        weighted, weight = (cv2.resize(x, small, interpolation=cv2.INTER_AREA) for x in (weighted, weight))
-    top, bottom = (cv2.GaussianBlur(x, (0, 0), sigma / factor) for x in (weighted, weight))
-    mean = top / np.maximum(bottom if image.ndim == 2 else bottom[..., None], 1e-8)
-    return cv2.resize(mean, (width, height), interpolation=cv2.INTER_LINEAR) if factor > 1 else mean
-
-
-def weighted_mean(images: Iterable[np.ndarray], weights: Iterable[np.ndarray]) -> np.ndarray:
-    """Mean over views of [S, S(, C)] with weights [S, S]; zero where all weights are."""
-    top, bottom = 0.0, 1e-12
-    for image, weight in zip(images, weights, strict=True):
-        weight = weight if image.ndim == 2 else weight[..., None]
-        top, bottom = top + image * weight, bottom + weight
-    return top / bottom
 
 
 def _weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:

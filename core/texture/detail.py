@@ -27,13 +27,13 @@ SHARP = 2.0
 """Exponent of the views' weights: near the best view's own detail, yet of several."""
 
 
-def fine_detail(observations: list[Observation], surface: Unfolded, report: Reporter) -> np.ndarray | None:
-    """Float32 [F S, F S, 2] for a texture of S texels: the band of log luminance (natural), and Wiener's factor in [0, 1] that it is already multiplied by.
+def fine_detail(observations: list[Observation], surface: Unfolded, texels: int, report: Reporter) -> np.ndarray | None:
+    """Float32 [F S, F S, 2] for a texture of S = `texels`: the band of log luminance (natural), and Wiener's factor in [0, 1] that it is already multiplied by.
     None where the frames hold nothing finer than the texture, or fewer than two views see the head."""
-    factor = finer(observations)
+    factor = finer(observations, texels)
     if factor == 1 or len(observations) < 2:
         return None
-    size = factor * len(surface.covered)
+    size = factor * texels
     total, squares, weights, weights2 = (np.zeros((size, size), np.float32) for _ in range(4))
     for observation in observations:
         report.progress(len(observations) + 5, len(observations) + 6, f"fine detail of {observation.name}")
@@ -58,8 +58,8 @@ def fine_detail(observations: list[Observation], surface: Unfolded, report: Repo
     return np.stack([mean * agreed, agreed], -1).astype(np.float32)
 
 
-def finer(observations: list[Observation]) -> int:
-    """1, 2 or 4: how many texels of a side the frames can fill where the texture has one, judged where each view sees the head best."""
+def finer(observations: list[Observation], texels: int) -> int:
+    """1, 2 or 4: how many texels of a side the frames can fill where a texture of `texels` has one, judged where each view sees the head best."""
     density = []
     for observation in observations:
         across, down = (np.gradient(observation.pixels, axis=axis) for axis in (1, 0))
@@ -67,6 +67,6 @@ def finer(observations: list[Observation]) -> int:
         best = observation.weight > 0.5 * observation.weight.max(initial=0)
         if best.any():
             density.append(np.sqrt(np.median(area[best])))
-    most = float(np.median(density)) if density else 0.0
+    most = float(np.median(density)) * len(observations[0].weight) / texels if density else 0.0
     factor = 1 if most < WORTH else 2 if most < 2 * WORTH else 4
-    return max(1, min(factor, LARGEST // len(observations[0].weight)))
+    return max(1, min(factor, LARGEST // texels))

@@ -12,13 +12,13 @@ from .blend import blend
 from .projection import Observation, log_colours
 
 
-def filmed(observations: list[Observation], report: Reporter) -> np.ndarray | None:
-    """Linear [S, S, 3] with the light in it, in the frames' exposure; 1 where no view sees anything. Changes the observations' colours.
-    None where a frame is gone: it is only looked at."""
+def filmed(observations: list[Observation], covered: np.ndarray, size: int, report: Reporter) -> np.ndarray | None:
+    """Linear [size, size, 3] with the light in it, in the frames' exposure; 1 where no view sees anything. The observations, of the texels `covered`, show the
+    frames from then on. None where a frame is gone: it is only looked at."""
     if not all(o.view.path.is_file() for o in observations):
         return None
     for o in observations:
         frame = images.read_linear(o.view.path)
-        scale = np.float32([frame.shape[1] / o.picture.shape[1], frame.shape[0] / o.picture.shape[0]])  # a delighter may give another size
-        o.log_colour = log_colours(frame, o.pixels * scale)
-    return np.exp(blend(observations, report, "as filmed", 4))
+        o.pixels = o.pixels * np.float32([frame.shape[1] / o.picture.shape[1], frame.shape[0] / o.picture.shape[0]])  # a delighter may give another size
+        o.picture, o.log_colour = frame, log_colours(frame, o.pixels)
+    return np.exp(blend(observations, covered, size, report, "as filmed", 4))

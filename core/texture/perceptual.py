@@ -20,7 +20,7 @@ from ..contract.messages import Reporter
 from ..face.head import Unfolded
 from ..geometry import raster
 from ..imaging import images
-from .blend import blurred
+from ..imaging.averages import blurred
 from .features import Features
 from .projection import DARKEST, Observation
 
@@ -55,12 +55,13 @@ def refine(log_texture: np.ndarray, observations: list[Observation], surface: Un
     targets = []
     for i, observation in enumerate(observations):
         report.progress(i, len(observations), f"perceptual step: looking through {observation.name}")
-        if (target := _target(observation, surface, wanted)) is not None:
+        if (target := _target(observation.enlarged(len(wanted), surface.covered), surface, wanted)) is not None:
             targets.append(target)
     if not targets or steps < 1:
         return log_texture, {}
     rng = np.random.default_rng(0)
-    start = _tensor(raster.bleed(log_texture, surface.covered), device)  # [1, 3, S, S]
+    covered = surface.covered_at(len(log_texture))
+    start = _tensor(raster.bleed(log_texture, covered), device)  # [1, 3, S, S]
     change = torch.zeros_like(start, requires_grad=True)
     optimiser = torch.optim.Adam([change], lr=RATE, betas=(0.8, 0.99))
     schedule = torch.optim.lr_scheduler.ExponentialLR(optimiser, 0.1 ** (1 / steps))
@@ -75,10 +76,10 @@ def refine(log_texture: np.ndarray, observations: list[Observation], surface: Un
         schedule.step()
     moved = change.detach()[0].cpu().numpy().transpose(1, 2, 0)
     scale = len(log_texture) / 1024
-    fine = moved - blurred(moved, surface.covered.astype(np.float32), KEPT * scale)
-    fine *= cv2.GaussianBlur(wanted.astype(np.float32), (0, 0), 4 * scale)[..., None] * surface.covered[..., None]
+    fine = moved - blurred(moved, covered.astype(np.float32), KEPT * scale)
+    fine *= cv2.GaussianBlur(wanted.astype(np.float32), (0, 0), 4 * scale)[..., None] * covered[..., None]
     result = log_texture + fine
-    after = _losses(_tensor(raster.bleed(result, surface.covered), device), checks, features, report)
+    after = _losses(_tensor(raster.bleed(result, covered), device), checks, features, report)
     return result.astype(np.float32), {"before": before, "after": after}
 
 

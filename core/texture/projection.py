@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -45,6 +45,19 @@ class Observation:
         if warp is not None:
             self.pixels, self.warp = pixels, warp
         self.log_colour = log_colours(self.picture, pixels)
+
+    def enlarged(self, size: int, covered: np.ndarray) -> Observation:
+        """The same on a map of `size`, `covered` [S, S] being the texels of this one: where each texel is seen, and how well, vary smoothly; the picture is
+        read anew."""
+        if size == len(self.weight):
+            return self
+
+        def larger(values: np.ndarray) -> np.ndarray:
+            return cv2.resize(values, (size, size), interpolation=cv2.INTER_LINEAR)
+
+        pixels = larger(raster.bleed(self.pixels, covered))
+        warp = None if self.warp is None else larger(self.warp) * np.float32(size / len(self.weight))
+        return replace(self, pixels=pixels, log_colour=log_colours(self.picture, pixels), quality=larger(self.quality), weight=larger(self.weight), warp=warp)
 
 
 def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float) -> Observation:
