@@ -185,3 +185,16 @@ def test_cameras_of_other_pictures_are_refused(tmp_path, shot):
     with pytest.raises(Problem, match="holds no COLMAP model"):
         read_cameras(turned_folder)
     assert len(read_cameras(written(tmp_path, "colmap_txt") / "images.txt")) == 4  # what a file selector gives
+
+
+def test_a_focal_length_of_next_to_nothing_is_no_camera(tmp_path):
+    """One damaged byte of cameras.bin makes a number of 1e-316: finite and positive, and no lens."""
+    path = tmp_path / "cameras.json"
+    path.write_text(blender_json().replace(f'"focal_px": {FOCAL}', '"focal_px": 8.3e-317'), encoding="utf-8")
+    with pytest.raises(Problem, match="focal length"):
+        read_cameras(path)
+    model = colmap_model()
+    model.cameras[1].params = [FOCAL, 1e-9, *model.cameras[1].params[2:]]
+    model.write_binary(str(tmp_path))
+    with pytest.raises(Problem, match="focal length"):
+        read_cameras(tmp_path)

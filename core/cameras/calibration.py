@@ -13,10 +13,12 @@ from ..contract.frame_records import VIDEO, FrameRecord, Frames
 from ..contract.messages import Problem, Reporter
 from ..geometry.mesh_checks import FARTHEST
 from ..imaging import images
-from .calibrated import Calibrated
+from .calibrated import PIXELS, Calibrated
 from .importers import blender_cameras, colmap_folder, metashape, realityscan
 
 FEWEST = 3
+SHORTEST_FOCAL = 1e-3
+"""Of the picture's longer side: with less, all of the half space before the camera would fall into one pixel."""
 MOST_BYTES = 256 << 20
 """Of another program's text file: a thousand cameras have one MB, and what Metashape writes of their points is left out by its export of cameras."""
 
@@ -66,7 +68,8 @@ def read_cameras(path: Path) -> list[Calibrated]:
     for camera in cameras:
         sized = (camera.width, camera.height) == (0, 0) or min(camera.width, camera.height) > 0
         finite = all((np.abs(values) <= FARTHEST).all() for values in (camera.params, camera.rotation, camera.translation))  # false for NaN, too
-        if not (sized and finite and camera.params[0] > 0
+        focal = min(camera.params[:PIXELS[camera.model] - 2], default=0.0)
+        if not (sized and finite and focal > SHORTEST_FOCAL * (max(camera.width, camera.height) or 1)
                 and np.allclose(camera.rotation @ camera.rotation.T, np.eye(3), atol=1e-4) and np.linalg.det(camera.rotation) > 0):
             raise Problem(f"The camera of {camera.name} in {path.name} is no camera: its rotation, focal length or size makes no sense.",
                           "Export the cameras again; a file that was edited by hand may be damaged.")
