@@ -36,7 +36,7 @@ from core.face.head import read_head
 from core.geometry import raster
 from core.geometry.views import read_views
 from core.imaging import images
-from core.imaging.averages import weighted_mean
+from core.texture.blend import weighted_mean
 
 from .albedo_score import compare, mean_scores, read_truth
 from .detail import Look, centre_rays, look, marks, mean_of

@@ -18,7 +18,7 @@ from .importers import blender_cameras, colmap_folder, metashape, realityscan
 
 FEWEST = 3
 SHORTEST_FOCAL = 1e-3
-"""Of the picture's longer side: with less, all of the half space before the camera would fall into one pixel."""
+"""Of the picture's longer side: with less, what lies 45 degrees to the side would be a pixel from the middle."""
 MOST_BYTES = 256 << 20
 """Of another program's text file: a thousand cameras have one MB, and what Metashape writes of their points is left out by its export of cameras."""
 

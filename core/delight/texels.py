@@ -15,11 +15,9 @@ import numpy as np
 
 from ..contract.messages import Reporter
 from ..face import template
-from ..face.head import Unfolded
 from ..geometry import raster
 from ..geometry.views import View, lengths
 from ..imaging import images
-from ..imaging.warps import find_warps, moved
 from ..light.skylight import ambient_occlusion
 from .lit_head import LitHead
 
@@ -58,24 +56,13 @@ class Texels:
     covered: np.ndarray
 
 
-def gather(head: LitHead, views: list[View], report: Reporter) -> tuple[Texels, list[np.ndarray]]:
-    """What these views say of the head, and for each the warp [S, S, 2] that brought it onto the others: texel x is what registration has at x + warp(x) in
-    it. The head has the built-in UVs; progress is reported in the third quarter of the stage's."""
+def gather(head: LitHead, views: list[View], report: Reporter) -> Texels:
+    """What these views say of the head. The head has the built-in UVs; progress is reported in the third quarter of the stage's."""
     surface = head.head.unfold(SIDE)
-    sights = []
+    colours, weights = (np.zeros((len(views), len(surface.points), n), np.float32) for n in (3, 1))
     for i, view in enumerate(views):
         report.progress(2 * len(views) + i, 4 * len(views), f"Reading frame {i + 1} of {len(views)}")
-        sights.append(_look(view, surface))
-
-    def read(view: int, warp: np.ndarray | None) -> np.ndarray:
-        report.check()
-        return surface.spread(_log_colours(sights[view], surface.covered, warp)[0])
-
-    warps = find_warps(read, [sight.weight for sight in sights])
-    colours, weights = (np.zeros((len(views), len(surface.points), n), np.float32) for n in (3, 1))
-    for i, (sight, warp) in enumerate(zip(sights, warps, strict=True)):
-        colours[i], dull = _log_colours(sight, surface.covered, warp)
-        weights[i, :, 0] = sight.weight[surface.covered] * dull
+        colours[i], weights[i, :, 0] = _colours_seen(surface.points, surface.normals, surface.caster, view)
     some = np.s_[:, ::EVERY]
     colours -= exposures(colours[some], weights[..., 0][some])[:, None]
     mean = robust_mean(colours, weights[..., 0])
@@ -83,40 +70,24 @@ def gather(head: LitHead, views: list[View], report: Reporter) -> tuple[Texels, 
     spread = np.sqrt((weights[..., 0] * (colours - mean).mean(-1) ** 2).sum(0) / total)
     ambient, direct, free, normal = head.at(surface.face, surface.bary)
     transfer = raster.interpolate(head.transfer, head.mesh.faces, surface.face, surface.bary)
-    texels = Texels(surface.spread(mean), surface.spread(spread), surface.spread(weights[..., 0].max(0)), normal.astype(np.float32),
-                    ambient_occlusion(transfer).astype(np.float32), ambient.astype(np.float32), direct.astype(np.float32), free.astype(np.float32),
-                    surface.covered)
-    return texels, warps
+    return Texels(surface.spread(mean), surface.spread(spread), surface.spread(weights[..., 0].max(0)), normal.astype(np.float32),
+                  ambient_occlusion(transfer).astype(np.float32), ambient.astype(np.float32), direct.astype(np.float32), free.astype(np.float32),
+                  surface.covered)
 
 
-@dataclass(frozen=True)
-class _Sight:
-    """A view's picture, sRGB [H, W, 3]; where in it each texel is, float32 [S, S, 2]; how well it is seen there [S, S], by the cosine of the angle."""
-
-    picture: np.ndarray
-    pixels: np.ndarray
-    weight: np.ndarray
-
-
-def _look(view: View, surface: Unfolded) -> _Sight:
-    points, normals = surface.points, surface.normals
+def _colours_seen(points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster, view: View) -> tuple[np.ndarray, np.ndarray]:
+    """Log linear colours [N, 3] of a surface's points in a view, and how far they count [N]: by the cosine of the angle, not at all where burnt out."""
     towards = view.centre - points
     cosine = (towards * normals).sum(1) / lengths(towards)
     pixels, _ = view.project(points)
     inside = ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)  # nan is not
     seen = np.flatnonzero((cosine > GRAZING) & inside)
-    seen = seen[raster.visible_from(surface.caster, points[seen], normals[seen], view.centre)]
-    weight = np.zeros(len(points), np.float32)
-    weight[seen] = (cosine[seen] - GRAZING) / (1 - GRAZING)
-    everywhere = raster.bleed(surface.spread(np.nan_to_num(pixels, nan=-1).astype(np.float32)), surface.covered)
-    return _Sight(images.read_srgb(view.path), everywhere, surface.spread(weight))
-
-
-def _log_colours(sight: _Sight, covered: np.ndarray, warp: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """Log linear colours [N, 3] of the covered texels along a warp, and [N] in [0, 1]: how little of them is burnt out."""
-    pixels = sight.pixels if warp is None else moved(sight.pixels, warp)
-    srgb = raster.sample(sight.picture, pixels[covered])
-    return np.log(np.maximum(images.srgb_to_linear(srgb), DARKEST)).astype(np.float32), np.clip((1 - srgb.max(1)) / 0.02, 0.01, 1)
+    seen = seen[raster.visible_from(caster, points[seen], normals[seen], view.centre)]
+    srgb = raster.sample(images.read_srgb(view.path), pixels[seen])
+    log, weight = np.zeros((len(points), 3), np.float32), np.zeros(len(points), np.float32)
+    log[seen] = np.log(np.maximum(images.srgb_to_linear(srgb), DARKEST))
+    weight[seen] = (cosine[seen] - GRAZING) / (1 - GRAZING) * np.clip((1 - srgb.max(1)) / 0.02, 0.01, 1)
+    return log, weight
 
 
 def exposures(colours: np.ndarray, weights: np.ndarray) -> np.ndarray:

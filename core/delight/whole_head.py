@@ -49,12 +49,12 @@ def whole_head(capture: Capture, settings: Settings, report: Reporter) -> Iterat
     if not filmed.built_in:
         raise Problem("Whole Head knows the built-in head's UVs alone, and this capture's head has others.", "Choose Network or Shading to delight with.")
     head = lit_head(filmed, views, report)
-    texels, warps = gather(head, views, report)
+    texels = gather(head, views, report)
     found = tell_shading(net, texels)
     found = Shading(found.log + np.log(_exposure(texels, found)), found.shadow, found.spread)
-    for i, (view, warp) in enumerate(zip(views, warps, strict=True)):
+    for i, view in enumerate(views):
         report.progress(3 * len(views) + i, 4 * len(views), f"Delighting frame {i + 1} of {len(views)}")
-        yield _delit(view, head, found, texels.covered, warp)
+        yield _delit(view, head, found, texels.covered)
 
 
 def load(device: str, weights: Path = WEIGHTS) -> TexelNet:
@@ -91,14 +91,12 @@ def _exposure(texels: Texels, found: Shading) -> float:
     return max(1.0, float(np.quantile(albedo, 0.75)) / BRIGHTEST)
 
 
-def _delit(view: View, head: LitHead, found: Shading, covered: np.ndarray, warp: np.ndarray) -> Delit:
-    """A frame divided by the shading, where the head is in it by registration and the view's warp [S, S, 2] (texels.gather)."""
+def _delit(view: View, head: LitHead, found: Shading, covered: np.ndarray) -> Delit:
     srgb = images.read_srgb(view.path)
     face, bary, _ = render_view(head.caster, view)
     here = face >= 0
     uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, face[here], bary[here])
     at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * len(found.log)
-    at -= sample(warp, at * len(warp) / len(found.log)) * len(found.log) / len(warp)
     maps = bleed(np.concatenate([found.log, found.shadow[..., None]], -1).astype(np.float32), covered)
     seen = np.zeros((*here.shape, 4), np.float32)
     seen[here] = sample(maps, at)

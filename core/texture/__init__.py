@@ -33,7 +33,7 @@ from .filmed import filmed
 from .foreign import clothes, leave_out_background, leave_out_hair
 from .projection import Observation, observe
 
-LARGEST = 1024
+OBSERVED = 1024
 """Side of the maps on which views are looked at, aligned and weighed: all of that is smooth, and all views are held at once. Of a larger texture one view
 after the other is read along it."""
 
@@ -48,7 +48,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     if head.mesh.uvs is None:
         raise Problem("The registered head has no UVs.", "Run the stage registration again.")
     size = settings.texture.size
-    observations, surface = observe_all(capture, head, min(size, LARGEST), report)
+    observations, surface = observe_all(capture, head, min(size, OBSERVED), report)
     covered = surface.covered_at(size)
     built = build(observations, surface, settings, report, size)
     if built.confidence[covered].max(initial=0) <= 0:

@@ -20,7 +20,7 @@ from ..contract.messages import Reporter
 from ..face.head import Unfolded
 from ..geometry import raster
 from ..imaging import images
-from ..imaging.averages import blurred
+from .blend import blurred
 from .features import Features
 from .projection import DARKEST, Observation
 
