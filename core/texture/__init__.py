@@ -128,7 +128,7 @@ def build(observations: list[Observation], surface: Unfolded, settings: Settings
         confidence = confidence * (1 - clothes(log_texture, confidence, surface))
     if size and size > own:
         log_texture = blend(observations, surface.covered, size, report)
-        confidence = np.clip(images.resize(confidence, size, size), 0, 1) * surface.covered_at(size)
+        confidence = cv2.resize(confidence, (size, size), interpolation=cv2.INTER_LINEAR) * surface.covered_at(size)  # as the weights: zero with them
     if settings.texture.perceptual > 0:
         from .features import load_features  # torch is only needed here
         from .perceptual import refine
