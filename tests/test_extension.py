@@ -28,7 +28,7 @@ WANTED = (
     r"core/(frames|cameras|scan|registration|delight|texture|shadow_mask|solve|transfer|upscale|deliver)/(importers/)?[a-z0-9_]+\.py",
     r"core/weights/[a-z0-9_]+\.(safetensors|json)", r"core/weights/face_nets/([a-z_]+\.tflite|NOTICE\.md|LICENSE\.txt)",
     r"core/assets/([A-Z]+\.md|head\.obj|head\.json|identity\.npz|masks/[a-z_]+\.png)",
-    r"core/assets/[a-z_]+\.(png|json|npz|md)", r"core/assets/sample_head/.+\.(obj|png|exr|json)",
+    r"core/assets/[a-z_]+\.(png|json|npz|md)", r"core/assets/sample_head/.+\.(obj|png|exr|json|npz)",
     r"core/[a-z_]+/(README\.md|[a-z0-9_]+\.(npz|json))",
 )
 NEEDED = ("__init__.py", "__main__.py", "farm/flamenco/wildcap.js", "blender_manifest.toml", "LICENSE", "requirements/worker.txt", "requirements/locks/pip.txt",

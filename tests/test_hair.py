@@ -88,6 +88,8 @@ def test_the_stage_writes_the_masks_and_the_clean_albedo(heads, tmp_path):
     albedo, cleaned = (images.read_data(capture.maps_4k / f"{name}.png") for name in ("diffuse_albedo", "clean_albedo"))
     brow = masks["brows"] > 0.5
     assert cleaned[brow].mean() > albedo[brow].mean() + 0.05 and np.array_equal(cleaned[:20], albedo[:20])
+    with np.load(capture.maps_4k / stages.STRANDS, allow_pickle=False) as stored:
+        assert sum(len(stored[f"{part}_points"]) for part in ("brows", "lashes", "beard")) == report.figures["hairs"] > 1000
     assert report.figures["beard_cm2"] > 1 and report.figures["completed_share_percent"] > 20
-    assert {path.name for path in capture.maps_4k.iterdir()} == {*stages.MAPS, "brows.png", "lashes.png", "beard.png", "clean_albedo.png"}
+    assert {path.name for path in capture.maps_4k.iterdir()} == {*stages.MAPS, "brows.png", "lashes.png", "beard.png", "clean_albedo.png", stages.STRANDS}
     assert all(capture.picture("upscale", name).is_file() for name in ("before_and_after_completion", "albedo_hair_skin_below"))

@@ -10,12 +10,12 @@ import pytest
 pytest.importorskip("OpenImageIO")
 pytest.importorskip("pycolmap")
 
-from core.face import lids, template  # noqa: E402
+from core.face import lids, strands, template  # noqa: E402
 from core.geometry.meshes import vertex_normals  # noqa: E402
 from core.synthetic import sample, scene  # noqa: E402
 from core.synthetic.canvas import canvas  # noqa: E402
 from core.synthetic.identities import reserved_seeds, subject_mesh  # noqa: E402
-from core.synthetic.people import clothes, eyes, facekit, figure, person, shape, strands, traits, truth  # noqa: E402
+from core.synthetic.people import clothes, eyes, facekit, figure, person, shape, traits, truth  # noqa: E402
 
 SEED = 3  # a man with cropped hair, a full beard and open eyes
 SIZE = 256

@@ -13,6 +13,11 @@ from . import captures, colours, node_trees
 PREVIEW = "WildCap Preview"
 """Name of the image node by which a running solve is shown on the head."""
 
+OUTER = "wildcap_outer_polygons"
+"""Custom property of a mesh that has more than the head's skin: how many polygons that has. They come first."""
+HAIR_UVS = "WildCap Hair"
+"""UV map of such a mesh in which those of the skin are alone, as hair that is rooted by them needs it: sockets continue the lids' maps."""
+
 FOLLOWERS = []
 """Functions (head object, new mesh) of rooms that made more of a head's mesh: whether it now has the new mesh's shape, which is then not needed."""
 

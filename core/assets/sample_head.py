@@ -9,12 +9,14 @@ faces are those of assets/head.obj.
 
 from __future__ import annotations
 
+import shutil
 import sys
 from pathlib import Path
 
 from ..contract.capture import Capture
 from ..contract.files import replacing_folder
 from ..contract.messages import Problem
+from ..contract.stages import STRANDS
 from ..face.template import ASSETS
 from ..imaging import images
 
@@ -37,6 +39,9 @@ def main() -> None:
         (folder / "maps").mkdir()
         albedo = images.resize(images.read_linear(capture.maps_4k / "diffuse_albedo.exr"), SIZE, SIZE)
         images.write_srgb(folder / "maps/diffuse_albedo.png", images.linear_to_srgb(albedo), small=True)
+        below = images.resize(images.srgb_to_linear(images.read_srgb(capture.maps_4k / "clean_albedo.png")), SIZE, SIZE)
+        images.write_srgb(folder / "maps/clean_albedo.png", images.linear_to_srgb(below), small=True)
+        shutil.copyfile(capture.maps_4k / STRANDS, folder / "maps" / STRANDS)
         for name in ("specular_albedo.png", "normal.png"):
             images.write_data(folder / "maps" / name, images.resize(images.read_data(capture.maps_4k / name), SIZE, SIZE), small=True)
         images.write_linear(folder / "texture.exr", images.read_linear(capture.texture), small=True)

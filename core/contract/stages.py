@@ -32,6 +32,8 @@ class Stage:
 
 
 MAPS = ("diffuse_albedo.png", "diffuse_albedo.exr", "specular_albedo.png", "normal.png", "shading.exr", "confidence.png")
+STRANDS = "strands.npz"
+"""Beside the delivered maps, where hair was found: the single hairs that Grow Hair brings in."""
 OPEN_EYES = ("head_open.obj", "eyes.json")
 
 STAGES = (

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..geometry.meshes import Mesh
 from . import template
@@ -114,8 +115,22 @@ def _shared_neighbour(faces: np.ndarray, upper: int, lower: int) -> int:
 
 def edges(vertices: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
     """The upper and the lower edge of the left (0) or the right lids of an open head's vertices, from the outer corner to the inner one [N, 3]."""
+    return _edge(vertices, side, 0), _edge(vertices, side, 1)
+
+
+def closed_edge(vertices: np.ndarray, side: int, lid: int, off: float) -> np.ndarray:
+    """Where the closed lids of the left (0) or the right eye of a head's vertices meet, from the outer corner to the inner one [N, 3], moved onto the upper
+    (0) or the lower (1) lid by `off` metres."""
+    edge = _edge(vertices, side, 0)  # its vertices are the head's own; the lower lid's are doubles of them
+    rows = rows_of_lid(side, lid)
+    skin = vertices[rows[(rows < len(vertices)) & ~np.isin(rows, _asset().rims[side][0])]]
+    away = skin[cKDTree(skin).query(edge, 3)[1]].mean(1) - edge
+    return edge + off * away / np.linalg.norm(away, axis=1, keepdims=True)
+
+
+def _edge(vertices: np.ndarray, side: int, lid: int) -> np.ndarray:
     outer, inner = corners()[side]
-    return tuple(vertices[[outer, *rim[::-1], inner]] for rim in _asset().rims[side])
+    return vertices[[outer, *_asset().rims[side][lid][::-1], inner]]
 
 
 def rows_of_lid(side: int, lid: int) -> np.ndarray:

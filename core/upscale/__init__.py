@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stage upscale: maps/ becomes maps_4k/, the same names at settings.upscale.size, the head completed; with masks of the hair and the skin below it.
+"""Stage upscale: maps/ becomes maps_4k/, the same names at settings.upscale.size, the head completed; with masks of hair, the skin
+below it, and single hairs.
 
 Albedo, normals and specular are enlarged by a network, or by Lanczos resampling, which adds no detail; light and confidence by resampling.
 """
@@ -16,9 +17,11 @@ from ..contract.capture import Capture
 from ..contract.files import replacing_folder
 from ..contract.messages import Reporter
 from ..contract.settings import Settings
+from ..contract.stages import STRANDS
 from ..face.head import read_head
+from ..face.strands import Strands
 from ..imaging import images
-from . import detail, drawing, gloss, hair
+from . import detail, drawing, gloss, grooming, hair
 from .maps import Maps, read_maps
 from .surface import lay_out
 from .whole_head import complete
@@ -42,7 +45,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.figure("size_px", size)
     report.figure("frames_detail", "used" if guided else "none")
     report.figure("specular_mean", round(gloss.on_cheeks_and_forehead(maps.specular, maps.confidence), 4))
-    maps, found = _whole(capture, maps, settings, report)
+    maps, found, hairs = _whole(capture, maps, settings, report)
     share = SHARES[method]
     large = enlarged(maps, size, method, settings.compute_device, lambda done: report.progress(share * done, 1, "enlarging"))
     with replacing_folder(capture.maps_4k) as folder:
@@ -54,7 +57,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         _write_together([
             lambda: images.write_srgb(folder / "diffuse_albedo.png", srgb, bits=16, check=report.check),
             lambda: images.write_data(folder / "normal.png", _mapped(large[..., 3:6], lambda vectors: vectors * 0.5 + 0.5), bits=16, check=report.check),
-            *([] if found is None else [lambda: hair.write(folder, srgb, *found, report.check)]),
+            *([] if found is None else [lambda: hair.write(folder, srgb, *found, report.check), lambda: grooming.write(folder / STRANDS, hairs)]),
             lambda: images.write_linear(folder / "diffuse_albedo.exr", _mapped(srgb, images.srgb_to_linear), check=report.check),
             lambda: images.write_data(folder / "specular_albedo.png", large[..., 6], bits=16, check=report.check),
             lambda: images.write_data(folder / "confidence.png", _resampled(maps.confidence, size), check=report.check),
@@ -63,11 +66,11 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.progress(1, 1)
 
 
-def _whole(capture: Capture, maps: Maps, settings: Settings, report: Reporter) -> tuple[Maps, tuple | None]:
-    """The maps of the whole head; the hair's masks, the albedo without it and where that differs, or None where they are not asked for."""
+def _whole(capture: Capture, maps: Maps, settings: Settings, report: Reporter) -> tuple[Maps, tuple | None, dict[str, Strands]]:
+    """The maps of the whole head; the hair's masks, the albedo without it and where that differs, or None where they are not asked for; single hairs."""
     options = settings.upscale
     if not (options.whole_head or options.hair):
-        return maps, None
+        return maps, None, {}
     report.progress(0, 1, "laying out the head")
     surface = lay_out(read_head(capture).mesh, len(maps.diffuse), report.check)
     if options.whole_head:
@@ -75,7 +78,7 @@ def _whole(capture: Capture, maps: Maps, settings: Settings, report: Reporter) -
         seen, maps = maps, complete(maps, surface, report, settings.seed)
         images.write_srgb(capture.picture("upscale", "before_and_after_completion"), drawing.turned(surface, [seen, maps]))
     if not options.hair:
-        return maps, None
+        return maps, None, {}
     report.progress(0, 1, "finding brows, lashes and beard")
     found = hair.find(maps, surface, report.check)
     report.check()
@@ -83,7 +86,10 @@ def _whole(capture: Capture, maps: Maps, settings: Settings, report: Reporter) -
     for name in ("brows", "lashes", "beard"):
         report.figure(f"{name}_cm2", round(float((getattr(found, name) * surface.texel**2).sum()) / 100, 2))
     images.write_srgb(capture.picture("upscale", "albedo_hair_skin_below"), drawing.masks(maps.diffuse, found, cleaned))
-    return maps, (found, cleaned, share)
+    report.progress(0, 1, "growing hair")
+    hairs = grooming.groom(maps, found, cleaned, surface, settings.seed, check=report.check)
+    report.figure("hairs", sum(len(strands.points) for strands in hairs.values()))
+    return maps, (found, cleaned, share), hairs
 
 
 def enlarged(maps: Maps, size: int, method: str, device: str, progress) -> np.ndarray:

@@ -15,6 +15,7 @@ import numpy as np
 from ...core.contract.capture import Capture
 from ...core.contract.messages import Problem
 from .. import captures
+from ..head import OUTER
 from . import carrying, filmed, materials
 from .asset import GAZE, SIDES, FaceUnits, load
 
@@ -57,6 +58,7 @@ def add(obj, iris: str = "") -> None:
         bpy.data.meshes.remove(old)
     new.name = name
     new[MARK] = 1
+    new[OUTER] = len(asset.triangles)
     obj.shape_key_add(name="Basis", from_mix=False)
     for unit in asset.units:
         obj.shape_key_add(name=unit, from_mix=False).value = 0  # Blender 5 begins with 1
@@ -87,6 +89,7 @@ def _filmed(obj, asset: FaceUnits) -> filmed.FilmedEyes | None:
 def follow(obj, head: np.ndarray, normals: np.ndarray) -> None:
     """Moves a head that has its units to another registered shape [V, 3]; values, animation, drivers and the artist's own keys stay."""
     asset = load()
+    obj.data[OUTER] = len(asset.triangles)  # a head of WildCap 0.1.0 did not say
     _shape(obj, *carrying.carried(asset, head, _filmed(obj, asset)), normals)
 
 

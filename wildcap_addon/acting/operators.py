@@ -5,7 +5,7 @@
 import bpy
 
 from ...core.contract.messages import Problem
-from .. import captures
+from .. import captures, head
 from ..base_operator import BaseOperator
 from . import materials, mesh
 
@@ -35,6 +35,7 @@ class WILDCAP_OT_add_face_units(_OnHead, bpy.types.Operator):
         if mesh.has(obj):
             raise Problem("This head has its face units already.", "Move their sliders, here or under Shape Keys in the mesh's properties.")
         mesh.add(obj, "" if self.iris == FILMED[0] else self.iris)
+        head.complete(obj, captures.folder(item))
         self.warn(filmed_open(captures.folder(item)))
 
 

@@ -42,6 +42,8 @@ def standing(context, plan: Plan, source: bpy.types.Object | Path) -> Iterator[b
         mesh = source.data.copy() if isinstance(source, bpy.types.Object) else head.read_mesh_file(context, source)
         obj = bpy.data.objects.new(plan.name, mesh)
         mesh.name = plan.name
+        if head.HAIR_UVS in mesh.uv_layers:
+            mesh.uv_layers.remove(mesh.uv_layers[head.HAIR_UVS])
         if plan.what == "head" and plan.preset.open_eyes:
             _open_eyes(obj)
         _at_rest(mesh)

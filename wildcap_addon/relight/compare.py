@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operator: the skin as it was filmed, as it was delit, or solved, in the same material under the same light and at the same exposure."""
+"""Operator: the skin as it was filmed, as it was delit, solved, or without its hair, in the same material under the same light and at the same exposure."""
 
 import bpy
 
@@ -14,11 +14,14 @@ SHOWN = {
     'FILMED': ("As Filmed", "filmed.png", "The texture with all of its light, as it was filmed"),
     'DELIT': ("Delit", "delit.png", "The texture that the delighter left, with the shadows that stayed in it"),
     'SOLVED': ("Albedo", "diffuse_albedo.png", "What the solver found"),
+    'SKIN': ("Skin Below Hair", "clean_albedo.png", "The albedo without brows, lashes and beard, for hair to grow over"),
 }
+REMEDIES = ("Click Solve: it leaves what is compared, as long as the frames are there.",
+            "Switch on Hair among the settings of 4K Maps, and run that stage.")
 
 
 class WILDCAP_OT_compare(BaseOperator, bpy.types.Operator):
-    """Show the head with its texture as filmed, as delit, or with the solved albedo; all at one exposure, renders included"""
+    """Show the head with its texture as filmed, as delit, with the solved albedo, or that of the skin below the hair; all at one exposure, renders included"""
 
     bl_idname = "wildcap.compare"
     bl_label = "Compare"
@@ -35,9 +38,10 @@ class WILDCAP_OT_compare(BaseOperator, bpy.types.Operator):
     def work(self, context):
         item = captures.require(context)
         name = SHOWN[self.show][1]
-        path = status.delivered(captures.folder(item))[0] if self.show == 'SOLVED' else captures.folder(item).comparison / name
+        maps = status.delivered(captures.folder(item))[0].parent
+        path = (maps if self.show in ('SOLVED', 'SKIN') else captures.folder(item).comparison) / name
         if not path.is_file():
-            raise Problem(f"This capture has no {name} to show.", "Click Solve: it leaves what is compared, as long as the frames are there.")
+            raise Problem(f"This capture has no {name} to show.", REMEDIES[self.show == 'SKIN'])
         skin(context).node_tree.nodes[ALBEDO].image = head.load_image(path)
 
 

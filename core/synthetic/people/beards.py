@@ -6,12 +6,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...face.strands import Strands, Surface, clumped, coloured, grow, waved
 from ...geometry.noise import octaves
 from ..canvas import Canvas
 from ..regions import regions
 from .ground import Ground, strewn, turned
 from .person import Person
-from .strands import Strands, Surface, clumped, coloured, grow, waved
 
 DENSITY = {"stubble": 0.75, "moustache": 1.3, "full": 0.85}  # hairs per mm^2 where it is densest
 SIDEBURNS = [[162, 127, 234, 93], [389, 356, 454, 323]]  # from the temples down before the ears

@@ -7,10 +7,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...face.lids import OpenHead
+from ...face.strands import Roots, Strands, Surface, coloured, grow
 from ..regions import regions
 from .ground import Ground, strewn, turned
 from .person import Person
-from .strands import Roots, Strands, Surface, coloured, grow
 
 RADIUS_M = 0.000045
 UPPER, LOWER = (110, 0.0085), (60, 0.0050)  # lashes on a lid, and their length in metres

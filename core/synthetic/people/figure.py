@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...face.lids import OpenHead, open_lids
+from ...face.strands import Strands, Surface
 from ...geometry.meshes import Mesh, joined
 from ..canvas import canvas
 from ..regions import regions
@@ -19,7 +20,6 @@ from .clothes import shirt
 from .ground import ground_of
 from .person import Person, sample_person
 from .shape import person_mesh
-from .strands import Strands, Surface
 
 PARTS = ("skin", "lips", "brows", "lashes", "beard", "hair", "eyes", "clothes")
 """What is told apart in the truth."""

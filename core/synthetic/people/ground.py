@@ -10,12 +10,12 @@ from functools import cache
 import numpy as np
 
 from ...face import template
+from ...face.strands import Roots
 from ...geometry import raster
 from ...geometry.meshes import Mesh, vertex_normals
 from ..canvas import Canvas, canvas
 from ..skin import GROUND
 from ..spots import strew
-from .strands import Roots
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...face.strands import Strands, Surface, clumped, coloured, grow, waved
 from ...geometry.noise import octaves
 from ..canvas import Canvas
 from ..regions import regions
 from .ground import Ground, strewn, turned
 from .person import Person
-from .strands import Strands, Surface, clumped, coloured, grow, waved
 
 COUNT = {"cropped": 34000, "short": 26000, "long": 24000}
 RADIUS_M = {"cropped": 0.00006, "short": 0.00008, "long": 0.00010}  # fewer hairs than people have, each a little thicker

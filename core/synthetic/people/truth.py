@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...face import template
+from ...face.strands import prisms
 from ...geometry import raster
 from ...geometry.meshes import Mesh, joined, vertex_normals
 from ...geometry.views import View
 from .figure import PARTS, Figure
-from .strands import prisms
 
 SKIN, LIPS, EYES, CLOTHES = (PARTS.index(name) for name in ("skin", "lips", "eyes", "clothes"))
 FACIAL = [PARTS.index(name) for name in ("brows", "lashes", "beard")]

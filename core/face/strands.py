@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...geometry.meshes import Mesh, vertex_normals
-from ...geometry.noise import noise
+from ..geometry.meshes import Mesh, vertex_normals
+from ..geometry.noise import noise
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,201 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair that is grown from pictures of people whose every hair is known: where it covers the face, and which way it lies.
+
+    python -m benchmarks.groomed FOLDER [--seeds 910001 ...] [--sheet OUT.jpg] [--json docs/figures/groomed.json]
+
+The people of core/synthetic/people seen by rays from nine sides, lit by one lamp and a sky without shadows, through a phone's pipeline; cameras, head and the
+albedo's texture are the true ones, so that nothing but finding hair, its strokes and its growth is judged. Coverage: pixels of the frames in which hair
+covers more than a tenth, by the true and by the grown hairs. Direction: each true hair against the nearest grown one within 3 mm, from root to tip, on the
+skin; beside it what the usual directions alone give. FOLDER keeps the pictures.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import cv2
+import numpy as np
+from scipy.spatial import cKDTree
+
+from core.contract.files import replacing
+from core.face.head import Head
+from core.face.strands import Strands, prisms
+from core.geometry import raster
+from core.geometry.meshes import joined, vertex_normals
+from core.geometry.views import View
+from core.imaging import images
+from core.synthetic import sample, scene
+from core.synthetic.people import phone
+from core.synthetic.people.figure import Figure, make_figure
+from core.synthetic.people.truth import Scene
+from core.texture.projection import observe
+from core.upscale import grooming, hair
+from core.upscale.maps import Maps
+from core.upscale.surface import lay_out
+
+from . import figures
+
+VIEWS, SCALE, OVER = 9, 2.0, 2
+"""Pictures of 1,440 x 1,920, as a phone's video has them: four pixels per millimetre."""
+SIZE = 1024
+JUDGED = (3, 5)
+"""Views in which coverage is compared: either side of the front."""
+COVERED, NEAR_MM = 0.1, 3.0
+USUAL_ALONE = 1e6
+"""Trust in the usual directions that no stroke outweighs."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", metavar="FOLDER", type=Path)
+    parser.add_argument("--seeds", type=int, nargs="+")
+    parser.add_argument("--sheet", type=Path, help="a picture of true and grown hair")
+    parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/groomed.json")
+    options = parser.parse_args()
+    rows, pictures = [], []
+    for seed in options.seeds:
+        row, picture = judge(options.folder, seed)
+        rows.append(row)
+        pictures.append(picture)
+        print(row, flush=True)
+    if options.sheet:
+        images.write_srgb(options.sheet, np.concatenate(pictures))
+    if options.json:
+        figures.write(options.json, "groomed", "FOLDER", {"people": rows})
+
+
+def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
+    """The figures of one person, and a picture [H, W, 3]: frame, true hair, grown hair."""
+    figure = make_figure(seed)
+    views, seen = photograph(folder / str(seed), figure)
+    surface = lay_out(figure.head, SIZE)
+    maps = _maps(figure, views, seen)
+    found = hair.find(maps, surface)
+    cleaned, _ = hair.clean(maps, found, surface, seed)
+    grown = grooming.groom(maps, found, cleaned, surface, seed)
+    usual = grooming.groom(maps, found, cleaned, surface, seed, trust=USUAL_ALONE)
+    row = {"seed": seed, "beard": figure.person.beard, "parts": {}}
+    true = {hairs.part: hairs for hairs in figure.strands}
+    for part in ("brows", "beard"):
+        if part in true or part in grown:
+            row["parts"][part] = {"true_hairs": _count(true.get(part)), "grown_hairs": _count(grown.get(part)),
+                                  "iou": _overlap(figure, views, true.get(part), grown.get(part))}
+            if part in true and part in grown:
+                row["parts"][part] |= {"degrees": _off(true[part], grown[part], figure), "usual_degrees": _off(true[part], usual[part], figure)}
+    return row, _picture(figure, views[VIEWS // 2], true, grown)
+
+
+def photograph(folder: Path, figure: Figure) -> tuple[list[View], list[np.ndarray]]:
+    """The views, with pictures in `folder`, and the albedo as each of them sees it, linear [H, W, 3]."""
+    world, seed = None, figure.person.seed
+    rng, taken = np.random.default_rng([seed, 91]), phone.sample_phone(seed)
+    lamp = np.array([rng.uniform(-1, 1), -1, rng.uniform(0.2, 1)])
+    lamp /= np.linalg.norm(lamp)
+    views, seen = [], []
+    for k, matrix in enumerate(scene.camera_path(seed, VIEWS)):
+        path, albedo = folder / f"{k:05d}.png", folder / f"albedo_{k:05d}.npz"
+        view = sample.view_of(matrix, SCALE)
+        views.append(View(path.name, path, view.camera, view.rotation, view.translation, True))
+        if not albedo.is_file():
+            folder.mkdir(parents=True, exist_ok=True)
+            world = world or Scene(figure)
+            colour, normal = _look(world, view)
+            lit = colour * (0.5 + 0.7 * np.clip(normal @ lamp, 0, None))[..., None]
+            gain = np.full(3, 0.6 / max(np.percentile(lit[normal.any(-1)], 95), 1e-6))
+            images.write_srgb(path, phone.develop(lit.astype(np.float32), taken, gain, np.random.default_rng([seed, 92, k])))
+            with replacing(albedo) as temporary, open(temporary, "wb") as file:
+                np.savez_compressed(file, colour=colour.astype(np.float16))
+        with np.load(albedo) as stored:
+            seen.append(stored["colour"].astype(np.float32))
+    return views, seen
+
+
+def _look(world: Scene, view: View) -> tuple[np.ndarray, np.ndarray]:
+    """Linear albedo and unit normals (of hair: the head's behind it) [H, W, 3]; 0 beside the person."""
+    face, bary, _ = raster.render_view(world.whole, view, OVER)
+    hit = face >= 0
+    colour = np.zeros((*hit.shape, 3), np.float32)
+    colour[hit] = world.albedo(face[hit], bary[hit], world.figure.seen)
+    below, at, _ = raster.render_view(world.body, view, 1)
+    normal = np.zeros((*below.shape, 3), np.float32)
+    normal[below >= 0] = raster.interpolate(world.normals, world.body.mesh.faces, below[below >= 0], at[below >= 0])
+    return _shrunk(colour), normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+
+
+def _maps(figure: Figure, views: list[View], seen: list[np.ndarray]) -> Maps:
+    """The texture that the true albedo of the views makes, as maps; what none of them sees has the bare skin's."""
+    surface = Head(figure.head).unfold(SIZE)
+    total, weights = np.zeros((SIZE, SIZE, 3)), np.zeros((SIZE, SIZE, 1))
+    for view, colour in zip(views, seen, strict=True):
+        look = observe(view, colour, surface, 1.0)
+        weight = look.weight[..., None] ** 2
+        total, weights = total + weight * look.log_colour, weights + weight
+    bare = images.resize(figure.skin.diffuse, SIZE, SIZE)
+    diffuse = np.where(weights > 1e-4, np.exp(total / np.maximum(weights, 1e-9)), bare).astype(np.float32)
+    one = np.ones((SIZE, SIZE), np.float32)
+    return Maps(diffuse, one[..., None] * [0, 0, 1], 0.35 * one, np.clip(weights[..., 0], 0, 1).astype(np.float32), np.repeat(one[..., None], 3, 2))
+
+
+def _count(hairs: Strands | None) -> int:
+    return 0 if hairs is None else len(hairs.points)
+
+
+def _off(true: Strands, grown: Strands, figure: Figure) -> float:
+    """Median angle in degrees on the skin."""
+    distance, nearest = cKDTree(grown.points[:, 0]).query(true.points[:, 0])
+    close = distance < NEAR_MM / 1000
+    normals = vertex_normals(figure.head)[cKDTree(figure.head.vertices).query(true.points[close, 0])[1]]
+    ways = [hairs.points[index, -1] - hairs.points[index, 0] for hairs, index in ((true, np.flatnonzero(close)), (grown, nearest[close]))]
+    ways = [way - (way * normals).sum(1, keepdims=True) * normals for way in ways]
+    cosine = (ways[0] * ways[1]).sum(1) / np.maximum(np.linalg.norm(ways[0], axis=1) * np.linalg.norm(ways[1], axis=1), 1e-12)
+    return round(float(np.median(np.degrees(np.arccos(np.clip(cosine, -1, 1))))), 1)
+
+
+def _overlap(figure: Figure, views: list[View], true: Strands | None, grown: Strands | None) -> float:
+    """Intersection over union of the pixels that hair covers, over JUDGED."""
+    both = either = 0
+    for view in (views[k] for k in JUDGED):
+        a, b = (_cover(figure, view, hairs) > COVERED for hairs in (true, grown))
+        both, either = both + (a & b).sum(), either + (a | b).sum()
+    return round(float(both / max(either, 1)), 3)
+
+
+def _cover(figure: Figure, view: View, hairs: Strands | None) -> np.ndarray:
+    """Share of each pixel [H, W] that hair covers, over a millimetre around it: single hairs are no shape."""
+    skin = figure.opened.skin
+    whole = joined([skin, prisms(hairs)]) if hairs is not None else skin
+    face, _, _ = raster.render_view(raster.RayCaster(whole), view, OVER)
+    return cv2.GaussianBlur(_shrunk((face >= len(skin.faces)).astype(np.float32)[..., None])[..., 0], (0, 0), 2 * SCALE)
+
+
+def _shrunk(image: np.ndarray) -> np.ndarray:
+    h, w = image.shape[0] // OVER, image.shape[1] // OVER
+    return image[:h * OVER, :w * OVER].reshape(h, OVER, w, OVER, -1).mean((1, 3))
+
+
+def _picture(figure: Figure, view: View, true: dict, grown: dict) -> np.ndarray:
+    """The frame, true hair and grown hair on the bare skin, seen from the front, [H, W, 3] sRGB."""
+    crop = slice(int(0.25 * view.height), int(0.8 * view.height)), slice(int(0.15 * view.width), int(0.85 * view.width))
+    shown = [images.read_srgb(view.path)[crop]]
+    for hairs in (true, grown):
+        chosen = [hairs[part] for part in ("brows", "lashes", "beard") if part in hairs]
+        meshes = [figure.opened.skin, *(prisms(h) for h in chosen)]
+        flat = np.concatenate([np.zeros((len(meshes[0].faces), 3)), *(np.repeat(h.colour, len(m.faces) // len(h.colour), 0)
+                                                                      for h, m in zip(chosen, meshes[1:], strict=True))])
+        whole = joined(meshes)
+        face, bary, _ = raster.render_view(raster.RayCaster(whole), view, OVER)
+        hit = face >= 0
+        normal = raster.interpolate(vertex_normals(whole), whole.faces, face[hit], bary[hit])
+        skin = face[hit] < len(meshes[0].faces)
+        colour = flat[face[hit]]
+        colour[skin] = 0.35 * (0.4 + 0.6 * np.clip(-normal[skin, 1:2] / np.linalg.norm(normal[skin], axis=1, keepdims=True), 0, 1))
+        picture = np.ones((*hit.shape, 3), np.float32)
+        picture[hit] = colour
+        shown.append(images.linear_to_srgb(_shrunk(picture))[crop])
+    return cv2.resize(np.concatenate(shown, 1).astype(np.float32), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+
+
+if __name__ == "__main__":
+    main()

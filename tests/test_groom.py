@@ -1,0 +1,150 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Grow Hair in Blender: hairs on the head's skin that go along with it, and what was combed stays."""
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from core.contract.files import replacing  # noqa: E402
+from core.face import lids  # noqa: E402
+from tests.test_acting import write_head  # noqa: E402
+
+
+def write_strands(folder, vertices: np.ndarray, count: int = 40) -> dict[str, np.ndarray]:
+    """Straight hairs of 6 mm off the skin above the eyes, and lashes before them; their points by part."""
+    rng = np.random.default_rng(1)
+    above = vertices[(np.abs(vertices[:, 0]) < 0.05) & (vertices[:, 2] > 0.012) & (vertices[:, 2] < 0.022) & (vertices[:, 1] < -0.02)]
+    edge = np.concatenate([lids.closed_edge(vertices, side, 0, 3e-4)[8:-8] for side in (0, 1)])
+    points, arrays = {}, {}
+    for part, places in (("brows", above), ("lashes", edge)):
+        roots = places[rng.choice(len(places), count)]
+        points[part] = (roots[:, None] + np.linspace(0, 0.006, 5)[None, :, None] * [0, -1.0, 0.2]).astype(np.float32)
+        arrays |= {f"{part}_points": points[part], f"{part}_radius": np.full((count, 5), 4e-5, np.float32),
+                   f"{part}_colour": np.full((count, 3), 0.03, np.float32)}
+    with replacing(folder / "strands.npz") as temporary, open(temporary, "wb") as file:
+        np.savez_compressed(file, **arrays)
+    return points
+
+
+@pytest.fixture
+def strands(capture):
+    """A capture with a head, its material and hair to grow; the hairs' points."""
+    vertices = write_head(capture, 1.0)
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.assemble_material()
+    return write_strands(capture / "maps", vertices)
+
+
+def places(hair) -> np.ndarray:
+    """All points [N, 3] as they are seen, in the head's axes."""
+    evaluated = hair.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    found = np.empty(3 * len(evaluated.data.points), np.float32)
+    evaluated.data.attributes["position"].data.foreach_get("vector", found)
+    return found.reshape(-1, 3)
+
+
+def head():
+    return bpy.context.view_layer.objects.active
+
+
+def test_hair_lies_where_the_worker_grew_it_and_in_its_thickness(strands, addon):
+    assert bpy.ops.wildcap.grow_hair() == {'FINISHED'}
+    hairs = {hair["wildcap_hair"]: hair for hair in addon("groom.curves").of(head())}
+    assert set(hairs) == {"brows", "lashes"}
+    for part, hair in hairs.items():
+        assert hair.parent == head() and hair.data.surface == head()
+        assert np.abs(places(hair) - strands[part].reshape(-1, 3)).max() < 1e-5, "at rest nothing bends it"
+        assert hair.data.attributes["radius"].data[0].value == pytest.approx(4e-5)
+    assert tuple(hairs["brows"].data.attributes["wildcap_colour"].data[0].color)[:3] == pytest.approx((0.03, 0.03, 0.03))
+
+
+def test_hair_goes_along_when_the_face_moves(strands, addon):
+    bpy.ops.wildcap.grow_hair()
+    bpy.ops.wildcap.add_face_units()
+    brows, lashes = addon("groom.curves").of(head())
+    rest = places(brows), places(lashes)
+    assert np.abs(rest[0] - strands["brows"].reshape(-1, 3)).max() < 1e-4, "cutting the head open moves no hair"
+    keys = head().data.shape_keys
+    keys.key_blocks["browInnerUp"].value = 1.0
+    raised = places(brows)[:, 2] - rest[0][:, 2]
+    assert raised.max() > 0.003 and np.median(np.abs(places(lashes) - rest[1])) < 0.3 * np.median(raised)
+    keys.key_blocks["browInnerUp"].value = 0.0
+    keys["eyesOpen"] = 1.0
+    keys.update_tag()
+    opened = (places(lashes) - rest[1]).reshape(40, 5, 3)[:, 0, 2]
+    assert opened.min() > 0.002, "each lash goes up with the upper lid"
+
+
+def test_what_was_combed_stays_and_the_rest_grows_anew(strands, addon):
+    bpy.ops.wildcap.grow_hair()
+    brows, lashes = addon("groom.curves").of(head())
+    combed = places(brows) + [0.002, 0, 0]
+    brows.data.attributes["position"].data.foreach_set("vector", combed.astype(np.float32).ravel())
+    assert bpy.ops.wildcap.grow_hair(length=0.5, share=0.5) == {'FINISHED'}
+    again = addon("groom.curves").of(head())
+    assert again == [brows, lashes], "the objects stay, whatever the artist made of them"
+    assert np.abs(places(brows) - combed).max() < 1e-5
+    assert len(lashes.data.curves) == 20
+    shorter = places(lashes).reshape(20, 5, 3)
+    assert np.linalg.norm(shorter[:, -1] - shorter[:, 0], axis=1) == pytest.approx(0.5 * 0.006 * np.hypot(1, 0.2), rel=1e-3)
+
+
+def test_combed_hair_follows_a_head_that_was_reconstructed_anew(capture, strands, addon):
+    bpy.ops.wildcap.grow_hair()
+    brows, _ = addon("groom.curves").of(head())
+    combed = places(brows) + [0, -0.001, 0]
+    brows.data.attributes["position"].data.foreach_set("vector", combed.astype(np.float32).ravel())
+    write_head(capture, 0.9)
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.assemble_material()
+    root = combed.reshape(-1, 5, 3)[:, 0]
+    moved = places(brows).reshape(-1, 5, 3)[:, 0] - root
+    assert np.abs(moved[:, 0] + 0.1 * root[:, 0]).max() < 5e-4, "a tenth nearer to the middle"
+    assert addon("groom.curves").is_combed(brows)
+
+
+def test_the_skin_below_is_shown(capture, strands, addon):
+    skin = head().data.materials[0].node_tree.nodes["WildCap Albedo"]
+    image = bpy.data.images.new("below", 4, 4)
+    image.filepath_raw, image.file_format = str(capture / "maps" / "clean_albedo.png"), 'PNG'
+    image.save()
+    bpy.ops.wildcap.grow_hair()
+    assert bpy.path.basename(skin.image.filepath) == "clean_albedo.png"
+    bpy.ops.wildcap.assemble_material()
+    assert bpy.path.basename(skin.image.filepath) == "clean_albedo.png", "as long as there is hair on it"
+    bpy.ops.wildcap.compare(show='SOLVED')
+    assert bpy.path.basename(skin.image.filepath) == "diffuse_albedo.png"
+
+
+def test_one_undo_takes_hair_and_the_skin_below_back(capture, strands, addon):
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.wildcap.grow_hair('EXEC_DEFAULT', True)
+    assert len(addon("groom.curves").of(head())) == 2
+    bpy.ops.ed.undo()
+    assert not addon("groom.curves").of(head()) and not [obj for obj in bpy.data.objects if obj.type == 'CURVES']
+
+
+@pytest.mark.parametrize("suffix", [".usdc", ".abc"])
+def test_hair_goes_out_and_comes_back_by_blenders_own_exporters(strands, addon, tmp_path, suffix):
+    bpy.ops.wildcap.grow_hair()
+    brows, lashes = addon("groom.curves").of(head())
+    path = str(tmp_path / f"hair{suffix}")
+    bpy.ops.wm.usd_export(filepath=path) if suffix == ".usdc" else bpy.ops.wm.alembic_export(filepath=path, as_background_job=False)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.wm.usd_import(filepath=path) if suffix == ".usdc" else bpy.ops.wm.alembic_import(filepath=path, as_background_job=False)
+    back = [obj for obj in bpy.data.objects if obj.type in ('CURVES', 'CURVE')]
+    counts = sorted(len(obj.data.curves if obj.type == 'CURVES' else obj.data.splines) for obj in back)
+    assert counts == [40, 40]
+
+
+@pytest.mark.parametrize("harm, told", [
+    (lambda path: path.unlink(), "no hair to grow yet"), (lambda path: path.write_bytes(b"PK no zip"), "is damaged"),
+    (lambda path: np.savez(path, brows_points=np.zeros((2, 3)), brows_radius=np.zeros(2), brows_colour=np.zeros((2, 3))), "is damaged"),
+    (lambda path: np.savez(path, nothing=np.zeros(1)), "No brows and no beard")])
+def test_hair_that_is_not_there_or_damaged_is_said(capture, strands, addon, harm, told):
+    harm(capture / "maps" / "strands.npz")
+    with pytest.raises(RuntimeError, match=told):
+        bpy.ops.wildcap.grow_hair()
+    assert not addon("groom.curves").of(head())

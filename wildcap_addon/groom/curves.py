@@ -1,0 +1,217 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair curves on a head: rooted in its UVs, so that they go along with its face units and can be combed with Blender's own brushes.
+
+One object for each part, a child of the head, marked by the custom property PART. A digest of the points tells whether somebody combed them since.
+"""
+
+import hashlib
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from mathutils.bvhtree import BVHTree
+from mathutils.interpolate import poly_3d_calc
+
+from .. import head, node_trees
+
+TITLES = {"brows": "Brows", "lashes": "Lashes", "beard": "Beard"}
+PART, GROWN = "wildcap_hair", "wildcap_grown"
+ROOT, COLOUR = "wildcap_root", "wildcap_colour"
+"""Attributes of each curve: the place of the skin, in the head's axes, to which it is rooted; its linear albedo."""
+UVS = "surface_uv_coordinate"
+INNER_TILE = 10
+"""Where the UVs of what is no skin go."""
+DEFORM = "WildCap Hair on Head"
+
+
+def of(obj) -> list[bpy.types.Object]:
+    """The hair of a head, by part."""
+    found = {child.get(PART): child for child in obj.children if child.type == 'CURVES'}
+    return [found[part] for part in TITLES if part in found]
+
+
+def grow(context, obj, part: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray) -> bool:
+    """The hairs of a part on the head: points [M, K, 3] in its axes, radius [M, K], colour [M, 3] linear. False where somebody combed the ones that are
+    there: then only their material is seen to."""
+    hair = next((child for child in of(obj) if child[PART] == part), None)
+    if hair is not None and is_combed(hair):
+        follow(hair, obj)
+        return False
+    data = _made(f"{obj.name} {TITLES[part]}", points, radius, colour)
+    if hair is None:
+        hair = bpy.data.objects.new(data.name, data)
+        for collection in obj.users_collection:
+            collection.objects.link(hair)
+        hair.parent = obj
+        hair[PART] = part
+    else:
+        old, hair.data = hair.data, data
+        for material in old.materials:
+            data.materials.append(material)
+        name = old.name
+        bpy.data.hair_curves.remove(old)
+        data.name = name
+    if not data.materials:
+        data.materials.append(_material(f"{obj.name} Hair"))
+    _root(hair, obj)
+    hair[GROWN] = _digest(data)
+    return True
+
+
+def is_combed(hair) -> bool:
+    """Whether somebody moved, cut or added hairs since they were grown."""
+    return hair.get(GROWN) != _digest(hair.data)
+
+
+def follow(hair, obj) -> None:
+    """Moves each hair as the skin under its root moved, where the head has another shape than when they were rooted, and keeps what was combed."""
+    data, combed = hair.data, is_combed(hair)
+    if ROOT not in data.attributes or UVS not in data.attributes:
+        return
+    data.surface_uv_map = _rooting_uvs(obj.data)
+    uv, before = _read(data.attributes[UVS], "vector", 2), _read(data.attributes[ROOT], "vector", 3)
+    moved = _places(obj.data, uv, before) - before
+    if np.abs(moved).max(initial=0) < 1e-6:
+        return
+    sizes = np.diff(_offsets(data))
+    position = _read(data.attributes["position"], "vector", 3) + np.repeat(moved, sizes, 0)
+    data.attributes["position"].data.foreach_set("vector", position.astype(np.float32).ravel())
+    data.attributes[ROOT].data.foreach_set("vector", (before + moved).astype(np.float32).ravel())
+    data.update_tag()
+    if not combed:
+        hair[GROWN] = _digest(data)
+
+
+def _made(name: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray) -> bpy.types.Curves:
+    count, knots = points.shape[:2]
+    data = bpy.data.hair_curves.new(name)
+    data.add_curves([knots] * count)
+    data.attributes["position"].data.foreach_set("vector", points.astype(np.float32).ravel())
+    _attribute(data, "radius", 'FLOAT', 'POINT').data.foreach_set("value", radius.astype(np.float32).ravel())
+    rgba = np.concatenate([colour, np.ones((count, 1))], 1)
+    _attribute(data, COLOUR, 'FLOAT_COLOR', 'CURVE').data.foreach_set("color", rgba.astype(np.float32).ravel())
+    return data
+
+
+def _root(hair, obj) -> None:
+    """Binds each hair to the nearest place of the head's skin at rest, by its UVs."""
+    data = hair.data
+    roots = _read(data.attributes["position"], "vector", 3)[_offsets(data)[:-1]]
+    uv, places = _nearest(obj.data, roots)
+    _attribute(data, UVS, 'FLOAT2', 'CURVE').data.foreach_set("vector", uv.astype(np.float32).ravel())
+    _attribute(data, ROOT, 'FLOAT_VECTOR', 'CURVE').data.foreach_set("vector", places.astype(np.float32).ravel())
+    data.surface, data.surface_uv_map = obj, _rooting_uvs(obj.data)
+    obj.add_rest_position_attribute = True  # what hair is bent against when the head moves
+    if DEFORM not in hair.modifiers:
+        modifier = hair.modifiers.new(DEFORM, 'NODES')
+        modifier.node_group = _deform_group()
+
+
+def _rooting_uvs(mesh) -> str:
+    """The name of the UV map in which each place of the skin is the only one with its UVs, made where there is none."""
+    if head.OUTER in mesh and head.HAIR_UVS not in mesh.uv_layers:
+        active = mesh.uv_layers.active_index
+        uv = np.empty(2 * len(mesh.loops), np.float32)
+        mesh.uv_layers[0].data.foreach_get("uv", uv)
+        uv[2 * mesh.polygons[mesh[head.OUTER]].loop_start:] += INNER_TILE
+        mesh.uv_layers.new(name=head.HAIR_UVS, do_init=False).data.foreach_set("uv", uv)
+        mesh.uv_layers.active_index = active
+    return head.HAIR_UVS if head.OUTER in mesh else mesh.uv_layers[0].name
+
+
+def _nearest(mesh, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """UVs [M, 2] and places [M, 3] of the skin nearest to roots [M, 3]; sockets, eyes and mouth are no skin."""
+    corners, places, uvs = _skin(mesh)
+    tree = BVHTree.FromPolygons(places.tolist(), corners.tolist())
+    uv, found = np.zeros((len(roots), 2)), np.zeros((len(roots), 3))
+    for k, root in enumerate(roots.tolist()):
+        place, _, face, _ = tree.find_nearest(root)
+        weights = np.array(poly_3d_calc([Vector(places[i]) for i in corners[face]], place))
+        uv[k], found[k] = weights @ uvs[face], place
+    return uv, found
+
+
+def _places(mesh, uv: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
+    """Where the skin has UVs [M, 2], [M, 3]; `otherwise` [M, 3] where no triangle has them."""
+    corners, places, uvs = _skin(mesh)
+    flat = np.concatenate([uvs.reshape(-1, 2), np.zeros((3 * len(corners), 1))], 1)
+    tree = BVHTree.FromPolygons(flat.tolist(), np.arange(len(flat)).reshape(-1, 3).tolist())
+    found = otherwise.copy()
+    for k, (u, v) in enumerate(uv.tolist()):
+        place, _, face, distance = tree.find_nearest((u, v, 0))
+        if place is not None and distance < 1e-3:
+            weights = np.array(poly_3d_calc([Vector(flat[3 * face + i]) for i in range(3)], place))
+            found[k] = weights @ places[corners[face]]
+    return found
+
+
+def _skin(mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangles [F, 3] of the head's own skin at rest, the places of all vertices [V, 3], and the triangles' UVs [F, 3, 2]."""
+    mesh.calc_loop_triangles()
+    triangles = mesh.loop_triangles
+    corners, loops, polygons = (np.empty(count, np.int32) for count in (3 * len(triangles), 3 * len(triangles), len(triangles)))
+    triangles.foreach_get("vertices", corners)
+    triangles.foreach_get("loops", loops)
+    triangles.foreach_get("polygon_index", polygons)
+    places, uvs = np.empty(3 * len(mesh.vertices), np.float32), np.empty(2 * len(mesh.loops), np.float32)
+    (mesh.shape_keys.reference_key.data if mesh.shape_keys else mesh.vertices).foreach_get("co", places)
+    mesh.uv_layers[0].data.foreach_get("uv", uvs)
+    skin = polygons < mesh.get(head.OUTER, len(mesh.polygons))
+    return corners.reshape(-1, 3)[skin], places.reshape(-1, 3).astype(np.float64), uvs.reshape(-1, 2)[loops.reshape(-1, 3)[skin]].astype(np.float64)
+
+
+def _deform_group() -> bpy.types.NodeTree:
+    """Curves go along with the surface that they are rooted in: made once per file."""
+    group = bpy.data.node_groups.get(DEFORM)
+    if group is None:
+        group = bpy.data.node_groups.new(DEFORM, 'GeometryNodeTree')
+        group.is_modifier = True
+        for side in ('INPUT', 'OUTPUT'):
+            group.interface.new_socket("Geometry", in_out=side, socket_type='NodeSocketGeometry')
+        source, deform, target = (group.nodes.new(kind) for kind in ('NodeGroupInput', 'GeometryNodeDeformCurvesOnSurface', 'NodeGroupOutput'))
+        deform.location, target.location = (200, 0), (420, 0)
+        group.links.new(source.outputs[0], deform.inputs["Curves"])
+        group.links.new(deform.outputs["Curves"], target.inputs[0])
+    return group
+
+
+def _material(name: str) -> bpy.types.Material:
+    """Hair in its own colour; one of that name keeps the artist's changes."""
+    found = bpy.data.materials.get(name)
+    if found is not None and PART in found:
+        return found
+    material = bpy.data.materials.new(name)
+    material[PART] = True
+    tree = node_trees.of(material)
+    tree.nodes.clear()
+    colour, shader, output = (tree.nodes.new(kind) for kind in ('ShaderNodeAttribute', 'ShaderNodeBsdfHairPrincipled', 'ShaderNodeOutputMaterial'))
+    colour.attribute_name = COLOUR
+    shader.parametrization = 'COLOR'
+    colour.location, output.location = (-260, 0), (320, 0)
+    tree.links.new(colour.outputs["Color"], shader.inputs["Color"])
+    tree.links.new(shader.outputs["BSDF"], output.inputs["Surface"])
+    return material
+
+
+def _attribute(data, name: str, kind: str, domain: str):
+    return data.attributes.get(name) or data.attributes.new(name, kind, domain)
+
+
+def _offsets(data) -> np.ndarray:
+    """Where each curve's points begin, and the end, [M + 1]."""
+    offsets = np.empty(len(data.curve_offset_data), np.int32)
+    data.curve_offset_data.foreach_get("value", offsets)
+    return offsets
+
+
+def _read(attribute, field: str, width: int) -> np.ndarray:
+    values = np.empty(width * len(attribute.data), np.float32)
+    attribute.data.foreach_get(field, values)
+    return values.reshape(-1, width).astype(np.float64)
+
+
+def _digest(data) -> str:
+    """Stands for how many curves and points there are, and where."""
+    told = _offsets(data).tobytes() + _read(data.attributes["position"], "vector", 3).astype(np.float32).tobytes()
+    return hashlib.blake2b(told, digest_size=16).hexdigest()

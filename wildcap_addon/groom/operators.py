@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operator: the hairs that the stage 4K Maps found come onto the head, and its skin shows what is below them."""
+
+import zipfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.contract.capture import Capture
+from ...core.contract.messages import Problem
+from ...core.contract.stages import STRANDS
+from .. import captures, status
+from ..base_operator import BaseOperator
+from . import curves
+
+BEARD_MM = 6.0
+"""Length to which the worker grows a beard; how long one is, its albedo does not tell."""
+AGAIN = "Run the stage 4K Maps again."
+
+
+class WILDCAP_OT_grow_hair(BaseOperator, bpy.types.Operator):
+    """Grow brows, lashes and beard as hair curves from the capture's masks, over the skin below them; what you combed since stays as it is"""
+
+    bl_idname = "wildcap.grow_hair"
+    bl_label = "Grow Hair"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    beard_mm: bpy.props.FloatProperty(name="Beard Length (mm)", description="How long a beard is, which its picture does not tell: stubble has 1 to 2 mm",
+                                      default=BEARD_MM, min=0.5, max=60.0)
+    length: bpy.props.FloatProperty(name="Length", description="Times the length of brows and lashes", default=1.0, min=0.2, max=3.0)
+    thickness: bpy.props.FloatProperty(name="Thickness", description="Times the thickness of the hairs, 0.08 to 0.11 mm", default=1.0, min=0.2, max=4.0)
+    share: bpy.props.FloatProperty(name="Share", description="How many of the hairs are grown", default=1.0, min=0.02, max=1.0, subtype='FACTOR')
+
+    @classmethod
+    def poll(cls, context):
+        return cls.in_object_mode(context) and cls.with_capture(context)
+
+    def work(self, context):
+        item = captures.require(context)
+        obj = captures.require_head(context, item)
+        strands = read_strands(captures.folder(item))
+        combed = []
+        for part, (points, radius, colour) in strands.items():
+            kept = np.random.default_rng(0).permutation(len(points)) < round(self.share * len(points))
+            factor = self.beard_mm / BEARD_MM if part == "beard" else self.length
+            points = points[:, :1] + factor * (points - points[:, :1])
+            if not curves.grow(context, obj, part, points[kept], self.thickness * radius[kept], colour[kept]):
+                combed.append(curves.TITLES[part])
+        if skin_below(captures.folder(item)).is_file() and bpy.ops.wildcap.compare.poll():
+            bpy.ops.wildcap.compare(show='SKIN')
+        if combed:
+            self.report({'INFO'}, f"{', '.join(combed)}: combed since, and left as they are; delete them to grow them anew")
+
+
+def keep_up(obj, capture: Capture) -> None:
+    """A head that was assembled anew and has hair: the hair follows its shape, and its skin shows what is below. `head.complete` asks."""
+    hairs = curves.of(obj)
+    for hair in hairs:
+        curves.follow(hair, obj)
+    if hairs and skin_below(capture).is_file() and bpy.ops.wildcap.compare.poll():
+        bpy.ops.wildcap.compare(show='SKIN')
+
+
+def skin_below(capture: Capture) -> Path:
+    return status.delivered(capture)[0].with_name("clean_albedo.png")
+
+
+def read_strands(capture: Capture) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Of each part that has hair: points [M, K, 3] in the head's axes (metres), radii [M, K] in metres, linear colours [M, 3]. Raises Problem where there are
+    none, or the file is damaged."""
+    path = status.delivered(capture)[0].with_name(STRANDS)
+    if not path.is_file():
+        raise Problem("This capture has no hair to grow yet.", "Switch on Hair among the settings of 4K Maps, and run that stage.")
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            found = {part: tuple(stored[f"{part}_{name}"].astype(np.float32) for name in ("points", "radius", "colour"))
+                     for part in curves.TITLES if f"{part}_points" in stored.files}
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise Problem(f"{path} is damaged ({error}).", AGAIN) from error
+    for points, radius, colour in found.values():
+        shape = points.shape
+        if len(shape) != 3 or shape[2] != 3 or radius.shape != shape[:2] or colour.shape != (shape[0], 3) or not np.isfinite(points).all():
+            raise Problem(f"{path} is damaged (its hairs have no common shape).", AGAIN)
+    if not found:
+        raise Problem("No brows and no beard were found on this face.", "Hair that is as light as the skin is not told from it; comb curves of your own.")
+    return found
+
+
+CLASSES = (WILDCAP_OT_grow_hair,)

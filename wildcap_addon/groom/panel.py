@@ -1,0 +1,27 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panel: grow hair, and what there is of it."""
+
+import bpy
+
+from .. import captures
+from ..base_panel import CapturePanel
+from . import curves
+
+
+class WILDCAP_PT_groom(CapturePanel, bpy.types.Panel):
+    bl_label = "Hair"
+    bl_order = 56
+
+    def draw(self, context):
+        layout = self.layout
+        layout.operator("wildcap.grow_hair")
+        obj = captures.head(context, captures.active(context))
+        for hair in curves.of(obj) if obj is not None else ():
+            row = layout.row(align=True)
+            row.label(text=hair.name, icon='CURVES', translate=False)
+            row.prop(hair, "hide_viewport", text="", emboss=False)
+            row.prop(hair, "hide_render", text="", emboss=False)
+
+
+CLASSES = (WILDCAP_PT_groom,)
