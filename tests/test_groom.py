@@ -8,17 +8,28 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from core.contract.files import replacing  # noqa: E402
-from core.face import lids  # noqa: E402
 from tests.test_acting import write_head  # noqa: E402
 
 
-def write_strands(folder, vertices: np.ndarray, count: int = 40) -> dict[str, np.ndarray]:
+def upper_lids(vertices: np.ndarray, asset) -> np.ndarray:
+    """Places [N, 3] just above where the lids meet, without the corners."""
+    found = []
+    for side in (1, 2):
+        edge = vertices[asset.copies[asset.seam == side]]
+        edge = edge[np.argsort(edge[:, 0])][8:-8]
+        for place in edge:
+            above = vertices[(vertices[:, 2] > place[2] + 0.0004) & (np.abs(vertices[:, 0] - place[0]) < 0.0015)]
+            nearest = above[np.linalg.norm(above - place, axis=1).argmin()]
+            found.append(place + 0.3 * (nearest - place))
+    return np.array(found)
+
+
+def write_strands(folder, vertices: np.ndarray, asset, count: int = 40) -> dict[str, np.ndarray]:
     """Straight hairs of 6 mm off the skin above the eyes, and lashes before them; their points by part."""
     rng = np.random.default_rng(1)
     above = vertices[(np.abs(vertices[:, 0]) < 0.05) & (vertices[:, 2] > 0.012) & (vertices[:, 2] < 0.022) & (vertices[:, 1] < -0.02)]
-    edge = np.concatenate([lids.closed_edge(vertices, side, 0, 3e-4)[8:-8] for side in (0, 1)])
     points, arrays = {}, {}
-    for part, places in (("brows", above), ("lashes", edge)):
+    for part, places in (("brows", above), ("lashes", upper_lids(vertices, asset))):
         roots = places[rng.choice(len(places), count)]
         points[part] = (roots[:, None] + np.linspace(0, 0.006, 5)[None, :, None] * [0, -1.0, 0.2]).astype(np.float32)
         arrays |= {f"{part}_points": points[part], f"{part}_radius": np.full((count, 5), 4e-5, np.float32),
@@ -29,12 +40,12 @@ def write_strands(folder, vertices: np.ndarray, count: int = 40) -> dict[str, np
 
 
 @pytest.fixture
-def strands(capture):
+def strands(capture, addon):
     """A capture with a head, its material and hair to grow; the hairs' points."""
     vertices = write_head(capture, 1.0)
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.assemble_material()
-    return write_strands(capture / "maps", vertices)
+    return write_strands(capture / "maps", vertices, addon("acting.asset").load())
 
 
 def places(hair) -> np.ndarray:
@@ -124,6 +135,17 @@ def test_one_undo_takes_hair_and_the_skin_below_back(capture, strands, addon):
     assert len(addon("groom.curves").of(head())) == 2
     bpy.ops.ed.undo()
     assert not addon("groom.curves").of(head()) and not [obj for obj in bpy.data.objects if obj.type == 'CURVES']
+
+
+def test_hair_is_in_the_picture_and_goes_aside_with_its_head(strands, addon):
+    bpy.ops.wildcap.grow_hair()
+    hairs = addon("groom.curves").of(head())
+    scene = addon("relight.picture").set_up(head(), "overcast", 64, 1)
+    assert set(hairs) <= set(scene.objects) and head() in set(scene.objects)
+    addon("captures").put_aside(head())
+    assert all(hair.hide_get() for hair in hairs)
+    addon("captures").show_again(head())
+    assert not any(hair.hide_get() for hair in hairs)
 
 
 @pytest.mark.parametrize("suffix", [".usdc", ".abc"])

@@ -13,6 +13,8 @@ HEAD_KEY = "wildcap_capture"
 """Custom property of a head object: its capture's folder."""
 ASIDE_KEY = "wildcap_aside"
 """Custom property of a head that has made room for another one, until its row is clicked."""
+HAIR_KEY = "wildcap_hair"
+"""Custom property of hair curves that were grown on a head: of which part they are."""
 
 
 def active(context) -> bpy.types.PropertyGroup | None:
@@ -78,16 +80,23 @@ def choose(context) -> None:
 
 
 def put_aside(obj: bpy.types.Object) -> None:
-    """Hides a head; one that is hidden is the artist's own doing."""
-    if not obj.hide_get():
-        obj.hide_set(True)
-        obj[ASIDE_KEY] = True
+    """Hides a head and its hair; what is hidden is the artist's own doing."""
+    for thing in (obj, *hair(obj)):
+        if not thing.hide_get():
+            thing.hide_set(True)
+            thing[ASIDE_KEY] = True
 
 
 def show_again(obj: bpy.types.Object) -> None:
-    """Shows a head that was put aside."""
-    if obj.pop(ASIDE_KEY, None):
-        obj.hide_set(False)
+    """Shows a head that was put aside, and its hair."""
+    for thing in (obj, *hair(obj)):
+        if thing.pop(ASIDE_KEY, None):
+            thing.hide_set(False)
+
+
+def hair(obj: bpy.types.Object) -> list[bpy.types.Object]:
+    """The hair curves that were grown on a head."""
+    return [child for child in obj.children if child.type == 'CURVES' and HAIR_KEY in child]
 
 
 def head(context, item) -> bpy.types.Object | None:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair curves on a head: rooted in its UVs, so that they go along with its face units and can be combed with Blender's own brushes.
 
-One object for each part, a child of the head, marked by the custom property PART. A digest of the points tells whether somebody combed them since.
+One object for each part, a child of the head, marked by the custom property captures.HAIR_KEY. A digest of the points tells whether somebody combed them since.
 """
 
 import hashlib
@@ -13,10 +13,10 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 from mathutils.interpolate import poly_3d_calc
 
-from .. import head, node_trees
+from .. import captures, head, local_view, node_trees
 
 TITLES = {"brows": "Brows", "lashes": "Lashes", "beard": "Beard"}
-PART, GROWN = "wildcap_hair", "wildcap_grown"
+GROWN, MATERIAL = "wildcap_grown", "wildcap_hair_material"
 ROOT, COLOUR = "wildcap_root", "wildcap_colour"
 """Attributes of each curve: the place of the skin, in the head's axes, to which it is rooted; its linear albedo."""
 UVS = "surface_uv_coordinate"
@@ -27,14 +27,14 @@ DEFORM = "WildCap Hair on Head"
 
 def of(obj) -> list[bpy.types.Object]:
     """The hair of a head, by part."""
-    found = {child.get(PART): child for child in obj.children if child.type == 'CURVES'}
+    found = {hair[captures.HAIR_KEY]: hair for hair in captures.hair(obj)}
     return [found[part] for part in TITLES if part in found]
 
 
 def grow(context, obj, part: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray) -> bool:
     """The hairs of a part on the head: points [M, K, 3] in its axes, radius [M, K], colour [M, 3] linear. False where somebody combed the ones that are
     there: then only their material is seen to."""
-    hair = next((child for child in of(obj) if child[PART] == part), None)
+    hair = next((child for child in of(obj) if child[captures.HAIR_KEY] == part), None)
     if hair is not None and is_combed(hair):
         follow(hair, obj)
         return False
@@ -44,7 +44,7 @@ def grow(context, obj, part: str, points: np.ndarray, radius: np.ndarray, colour
         for collection in obj.users_collection:
             collection.objects.link(hair)
         hair.parent = obj
-        hair[PART] = part
+        hair[captures.HAIR_KEY] = part
     else:
         old, hair.data = hair.data, data
         for material in old.materials:
@@ -56,6 +56,7 @@ def grow(context, obj, part: str, points: np.ndarray, radius: np.ndarray, colour
         data.materials.append(_material(f"{obj.name} Hair"))
     _root(hair, obj)
     hair[GROWN] = _digest(data)
+    local_view.join(context, [hair])
     return True
 
 
@@ -179,10 +180,10 @@ def _deform_group() -> bpy.types.NodeTree:
 def _material(name: str) -> bpy.types.Material:
     """Hair in its own colour; one of that name keeps the artist's changes."""
     found = bpy.data.materials.get(name)
-    if found is not None and PART in found:
+    if found is not None and MATERIAL in found:
         return found
     material = bpy.data.materials.new(name)
-    material[PART] = True
+    material[MATERIAL] = True
     tree = node_trees.of(material)
     tree.nodes.clear()
     colour, shader, output = (tree.nodes.new(kind) for kind in ('ShaderNodeAttribute', 'ShaderNodeBsdfHairPrincipled', 'ShaderNodeOutputMaterial'))

@@ -17,7 +17,10 @@ class WILDCAP_PT_groom(CapturePanel, bpy.types.Panel):
         layout = self.layout
         layout.operator("wildcap.grow_hair")
         obj = captures.head(context, captures.active(context))
-        for hair in curves.of(obj) if obj is not None else ():
+        hairs = curves.of(obj) if obj is not None else []
+        if hairs:
+            layout.operator("wildcap.compare", text="Show Skin Below").show = 'SKIN'
+        for hair in hairs:
             row = layout.row(align=True)
             row.label(text=hair.name, icon='CURVES', translate=False)
             row.prop(hair, "hide_viewport", text="", emboss=False)

@@ -22,6 +22,8 @@ class WILDCAP_PT_relight(CapturePanel, bpy.types.Panel):
         buttons = side_by_side(layout, tight)
         now = compare.shown(context)
         for kind, (label, _, _) in compare.SHOWN.items():
+            if kind == 'SKIN':  # stands with the hair
+                continue
             buttons.operator("wildcap.compare", text=label, depress=kind == now).show = kind
         layout.prop(props, "light", text="" if tight else None)
         if props.light == 'hdri':
