@@ -12,8 +12,8 @@ import pytest
 from core.contract import stages
 
 ROOT = Path(__file__).resolve().parent.parent
-TOP = {".ci", ".github", ".gitignore", "LICENSE", "Makefile", "README.md", "__init__.py", "__main__.py", "benchmarks", "blender_manifest.toml", "core", "docs",
-       "farm", "pyproject.toml", "requirements", "tests", "wildcap_addon"}
+TOP = {".ci", ".github", ".gitignore", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "__init__.py", "__main__.py", "benchmarks",
+       "blender_manifest.toml", "core", "docs", "farm", "pyproject.toml", "requirements", "tests", "wildcap_addon"}
 ROOMS = {"assets", "batch", "cameras", "contract", "delight", "deliver", "face", "frames", "geometry", "imaging", "light", "registration", "scan",
          "shadow_mask", "solve", "synthetic", "texture", "training", "transfer", "upscale", "weights", "worker"}
 LOOSE = {"README.md", "__init__.py", "__main__.py"}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Face units by clicks: added in the panel, lids and jaw opened, back by Rest."""
+"""Face units by clicks: added in the panel, lids and jaw opened, back by Rest; hair grown, taken back by Ctrl-Z, and grown again."""
 
 import sys
 from pathlib import Path
@@ -11,7 +11,7 @@ import driver as d  # noqa: E402
 
 
 def flow():
-    addon.unfold("WILDCAP_PT_acting")
+    addon.unfold("WILDCAP_PT_acting", "WILDCAP_PT_groom")
     yield from addon.open_sample_head()
     d.screenshot("acting_before")
     yield from d.press("wildcap.add_face_units")
@@ -25,6 +25,25 @@ def flow():
     yield from d.press("wildcap.rest_face")
     yield from d.until(lambda: keys().key_blocks["jawOpen"].value == 0 and keys()["eyesOpen"] == 0, "the face at rest", 20)
     d.say(f"{len(keys().key_blocks) - 1} units")
+    yield from grow_hair()
+    yield from d.move(d.middle())
+    yield from d.key('Z', ctrl=True)
+    yield from d.until(lambda: not hair(), "the head without hair again", 20)
+    yield from grow_hair()
+    d.screenshot("acting_hair")
+    d.say(", ".join(f"{len(thing.data.curves)} {thing.name}" for thing in hair()))
+
+
+def grow_hair():
+    yield from d.press("wildcap.grow_hair")
+    yield from d.until(lambda: len(hair()) == 2, "brows and lashes", 30)
+    yield 1.0
+    skin = addon.head().active_material.node_tree.nodes["WildCap Albedo"].image
+    assert skin.filepath.endswith("clean_albedo.png"), skin.filepath
+
+
+def hair() -> list:
+    return [thing for thing in addon.head().children if thing.type == 'CURVES']
 
 
 def keys():
