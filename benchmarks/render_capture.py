@@ -53,7 +53,7 @@ def extension() -> Iterator[None]:
             import bpy  # noqa: F401  (makes addon_utils importable)
         import addon_utils
 
-        if addon_utils.enable("bl_ext.user_default.wildcap") is None:
+        if addon_utils.enable("bl_ext.user_default.wildcap", default_set=True) is None:
             raise SystemExit("Blender could not enable the extension.")
         try:
             yield

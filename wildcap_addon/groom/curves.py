@@ -20,6 +20,8 @@ GROWN, MATERIAL = "wildcap_grown", "wildcap_hair_material"
 ROOT, COLOUR = "wildcap_root", "wildcap_colour"
 """Attributes of each curve: the place of the skin, in the head's axes, to which it is rooted; its linear albedo."""
 UVS = "surface_uv_coordinate"
+ROUGHNESS, IOR = 0.4, 1.55
+"""Of keratin; hairs' scales spread its shine."""
 INNER_TILE = 10
 """Where the UVs of what is no skin go."""
 DEFORM = "WildCap Hair on Head"
@@ -178,20 +180,20 @@ def _deform_group() -> bpy.types.NodeTree:
 
 
 def _material(name: str) -> bpy.types.Material:
-    """Hair in its own colour; one of that name keeps the artist's changes."""
+    """Hair in its own colour; one of that name keeps the artist's changes.
+
+    Opaque: what was measured is an albedo. Principled Hair's colour is that of a whole head of hair, and single hairs of it over light skin come out blond."""
     found = bpy.data.materials.get(name)
     if found is not None and MATERIAL in found:
         return found
     material = bpy.data.materials.new(name)
     material[MATERIAL] = True
     tree = node_trees.of(material)
-    tree.nodes.clear()
-    colour, shader, output = (tree.nodes.new(kind) for kind in ('ShaderNodeAttribute', 'ShaderNodeBsdfHairPrincipled', 'ShaderNodeOutputMaterial'))
-    colour.attribute_name = COLOUR
-    shader.parametrization = 'COLOR'
-    colour.location, output.location = (-260, 0), (320, 0)
-    tree.links.new(colour.outputs["Color"], shader.inputs["Color"])
-    tree.links.new(shader.outputs["BSDF"], output.inputs["Surface"])
+    shader = next(node for node in tree.nodes if node.type == 'BSDF_PRINCIPLED')
+    shader.inputs["Roughness"].default_value, shader.inputs["IOR"].default_value = ROUGHNESS, IOR
+    colour = tree.nodes.new('ShaderNodeAttribute')
+    colour.attribute_name, colour.location = COLOUR, (-260, 280)
+    tree.links.new(colour.outputs["Color"], shader.inputs["Base Color"])
     return material
 
 
