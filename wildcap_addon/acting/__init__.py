@@ -5,7 +5,7 @@
 import bpy
 
 from .. import head
-from . import mesh, operators, panel
+from . import gaze, mesh, operators, panel
 
 _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *panel.CLASSES))
 
@@ -13,10 +13,11 @@ _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES,
 def register():
     _register()
     head.FOLLOWERS.append(mesh.renewed)
-    head.COMPLETERS.append(mesh.open_filmed_eyes)
+    head.COMPLETERS.extend((mesh.open_filmed_eyes, gaze.keep_up))
 
 
 def unregister():
     head.COMPLETERS.remove(mesh.open_filmed_eyes)
+    head.COMPLETERS.remove(gaze.keep_up)
     head.FOLLOWERS.remove(mesh.renewed)
     _unregister()

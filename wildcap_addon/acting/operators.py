@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: face units onto the head, the iris' colour, and all sliders back to zero."""
+"""Operators: face units onto the head, the iris' colour, what the eyes look at, and all sliders back to zero."""
 
 import bpy
 
 from ...core.contract.messages import Problem
 from .. import captures, head
 from ..base_operator import BaseOperator
-from . import materials, mesh
+from . import gaze, materials, mesh
 
 FILMED = ("filmed", "As Filmed", "What the frames show, where the eyes were open; brown otherwise")
 OPEN = 0.22
@@ -64,6 +64,21 @@ class WILDCAP_OT_rest_face(_OnHead, bpy.types.Operator):
         mesh.rest(_acting(context))
 
 
+class WILDCAP_OT_gaze(_OnHead, bpy.types.Operator):
+    """Have both eyes look at an empty before the face, to be moved and animated; again to have the sliders back"""
+
+    bl_idname = "wildcap.gaze"
+    bl_label = "Gaze"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    def work(self, context):
+        obj = _acting(context)
+        if gaze.of(obj) is None:
+            gaze.add(context, obj)
+        else:
+            gaze.remove(obj)
+
+
 def filmed_open(capture) -> str:
     """What there is to say of the lids of a face that was filmed with open eyes and reconstructed by WildCap 0.1.0, '' for others."""
     seen = capture.read()["stages"].get("registration", {}).get("figures", {}).get("eye_opening")
@@ -80,4 +95,4 @@ def _acting(context):
     return obj
 
 
-CLASSES = (WILDCAP_OT_add_face_units, WILDCAP_OT_iris, WILDCAP_OT_rest_face)
+CLASSES = (WILDCAP_OT_add_face_units, WILDCAP_OT_iris, WILDCAP_OT_gaze, WILDCAP_OT_rest_face)

@@ -7,7 +7,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from .. import captures
 from ..base_panel import CapturePanel
-from . import mesh
+from . import gaze, mesh
 
 FIRST = ("jawOpen", "mouthSmileLeft", "mouthSmileRight", "eyeBlinkLeft", "eyeBlinkRight", "browInnerUp")
 
@@ -32,6 +32,7 @@ class WILDCAP_PT_acting(CapturePanel, bpy.types.Panel):
                 column.prop(key, "value", text=name, slider=True, translate=False)
         row = layout.row()
         row.operator_menu_enum("wildcap.iris", "iris")
+        row.operator("wildcap.gaze", depress=gaze.of(obj) is not None)
         row.operator("wildcap.rest_face")
 
 

@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An empty before the face that both eyes look at: drivers on the eight look units. They are simple expressions, which Blender evaluates without any script."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from .. import local_view
+from .asset import LEFT_EYE, SIDES, load
+
+KEY = "wildcap_gaze"
+"""Custom property of the empty."""
+AHEAD_M = 0.5
+MOST = 1.2
+"""How far the units go: at 1 MakeHuman's turn eyes by 8 to 17 degrees, and at this by a fifth more; further on the lids are drawn out of shape."""
+WAYS = ("Out", "In", "Up", "Down")
+
+
+@dataclass(frozen=True)
+class _Eye:
+    """centre [3] and what it looks at by the rest and by each unit at 1, unit vectors [3], in the head's axes."""
+
+    centre: np.ndarray
+    ahead: np.ndarray
+    turned: dict[str, np.ndarray]
+
+
+def of(obj) -> bpy.types.Object | None:
+    return next((child for child in obj.children if KEY in child), None)
+
+
+def add(context, obj) -> bpy.types.Object:
+    """The empty half a metre before the eyes, where they look at rest, and the drivers."""
+    eyes = [_eye(obj, number) for number in range(2)]
+    empty = bpy.data.objects.new(f"{obj.name} Gaze", None)
+    empty.empty_display_type, empty.empty_display_size = 'SPHERE', 0.015
+    empty[KEY] = True
+    for collection in obj.users_collection:
+        collection.objects.link(empty)
+    empty.parent = obj
+    empty.location = sum(eye.centre + AHEAD_M * eye.ahead for eye in eyes) / 2
+    drive(obj, empty)
+    local_view.join(context, [empty])
+    return empty
+
+
+def remove(obj) -> None:
+    """The units are sliders again, at zero."""
+    for name in _units():
+        obj.data.shape_keys.key_blocks[name].driver_remove("value")
+        obj.data.shape_keys.key_blocks[name].value, obj.data.shape_keys.key_blocks[name].slider_max = 0.0, 1.0
+    bpy.data.objects.remove(of(obj))
+
+
+def keep_up(obj, _capture) -> None:
+    """The eyes of a head that was reconstructed anew lie elsewhere. `head.complete` asks."""
+    if of(obj) is not None and obj.data.shape_keys is not None:
+        drive(obj, of(obj))
+
+
+def drive(obj, empty) -> None:
+    """Each unit is as much of its turn as the eye needs to look at the empty, from 0 to MOST."""
+    for number, side in enumerate(SIDES):
+        eye = _eye(obj, number)
+        outwards = 1 if number == 0 else -1
+        x, y, z = (f"({name} - {value:.6f})" for name, value in zip("xyz", eye.centre, strict=True))
+        yaw, pitch = f"atan2({outwards} * {x}, -{y})", f"atan2({z}, sqrt({x} * {x} + {y} * {y}))"
+        for way in WAYS:
+            asked, angle = (yaw, _yaw) if way in ("Out", "In") else (pitch, _pitch)
+            rest, full = angle(eye.ahead, outwards), angle(eye.turned[way], outwards)
+            key = obj.data.shape_keys.key_blocks[f"eyeLook{way}{side}"]
+            key.driver_remove("value")
+            key.slider_max = MOST
+            driver = key.driver_add("value").driver
+            driver.type = 'SCRIPTED'
+            driver.expression = f"max(0, min({MOST}, ({asked} - {rest:.6f}) / {full - rest:.6f}))"
+            for axis in "XYZ":
+                variable = driver.variables.new()
+                variable.name, variable.type = axis.lower(), 'TRANSFORMS'
+                variable.targets[0].id, variable.targets[0].transform_type = empty, f'LOC_{axis}'
+                variable.targets[0].transform_space = 'LOCAL_SPACE'
+
+
+def _units() -> list[str]:
+    return [f"eyeLook{way}{side}" for side in SIDES for way in WAYS]
+
+
+def _eye(obj, number: int) -> _Eye:
+    """Of the left (0) or the right eye; its middle is that of the sphere that fits the ball best."""
+    asset, keys = load(), obj.data.shape_keys.key_blocks
+    inner = np.flatnonzero(asset.kind == LEFT_EYE + number)
+    rows = len(asset.template) + len(asset.copies) + inner
+    ball = _places(keys[0])[rows]
+    fit = np.concatenate([2 * ball, np.ones((len(ball), 1))], 1)
+    centre = np.linalg.lstsq(fit, (ball**2).sum(1), rcond=None)[0][:3]
+    pupil = rows[np.linalg.norm(asset.uvs[inner] - 0.5, axis=1).argmin()]
+    looks = {way: _unit(_places(keys[f"eyeLook{way}{SIDES[number]}"])[pupil] - centre) for way in WAYS}
+    return _Eye(centre, _unit(_places(keys[0])[pupil] - centre), looks)
+
+
+def _places(key) -> np.ndarray:
+    values = np.empty(3 * len(key.data), np.float32)
+    key.data.foreach_get("co", values)
+    return values.reshape(-1, 3).astype(np.float64)
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)
+
+
+def _yaw(way: np.ndarray, outwards: int) -> float:
+    """Radians towards the temple."""
+    return float(np.arctan2(outwards * way[0], -way[1]))
+
+
+def _pitch(way: np.ndarray, _outwards: int) -> float:
+    """Radians upwards."""
+    return float(np.arctan2(way[2], np.hypot(way[0], way[1])))
