@@ -12,7 +12,7 @@ import pytest
 from core.contract import stages
 
 ROOT = Path(__file__).resolve().parent.parent
-TOP = {".ci", ".github", ".gitignore", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "__init__.py", "__main__.py", "benchmarks",
+TOP = {".ci", ".github", ".gitignore", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "__init__.py", "__main__.py", "benchmarks",
        "blender_manifest.toml", "core", "docs", "farm", "pyproject.toml", "requirements", "tests", "wildcap_addon"}
 ROOMS = {"assets", "batch", "cameras", "contract", "delight", "deliver", "face", "frames", "geometry", "imaging", "light", "registration", "scan",
          "shadow_mask", "solve", "synthetic", "texture", "training", "transfer", "upscale", "weights", "worker"}
