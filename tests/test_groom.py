@@ -164,6 +164,9 @@ def test_hair_goes_out_and_comes_back_by_blenders_own_exporters(strands, addon, 
 @pytest.mark.parametrize("harm, told", [
     (lambda path: path.unlink(), "no hair to grow yet"), (lambda path: path.write_bytes(b"PK no zip"), "is damaged"),
     (lambda path: np.savez(path, brows_points=np.zeros((2, 3)), brows_radius=np.zeros(2), brows_colour=np.zeros((2, 3))), "is damaged"),
+    (lambda path: path.write_bytes(path.read_bytes()[:900] + b"\0" * 40 + path.read_bytes()[940:]), "is damaged"),
+    (lambda path: np.savez(path, brows_points=np.zeros((2, 5, 3)), brows_radius=np.full((2, 5), np.nan), brows_colour=np.zeros((2, 3))), "is damaged"),
+    (lambda path: np.savez_compressed(path, brows_points=np.zeros(40 << 20)), "more than 256 MB"),
     (lambda path: np.savez(path, nothing=np.zeros(1)), "No brows and no beard")])
 def test_hair_that_is_not_there_or_damaged_is_said(capture, strands, addon, harm, told):
     harm(capture / "maps" / "strands.npz")

@@ -3,6 +3,7 @@
 """Operator: the hairs that the stage 4K Maps found come onto the head, and its skin shows what is below them."""
 
 import zipfile
+import zlib
 from pathlib import Path
 
 import bpy
@@ -17,6 +18,8 @@ from . import curves
 
 BEARD_MM = 6.0
 """Length to which the worker grows a beard; how long one is, its albedo does not tell."""
+MOST_BYTES = 256 << 20
+"""A million hairs; more is no beard, and would take the memory before it is seen to be damaged."""
 AGAIN = "Run the stage 4K Maps again."
 
 
@@ -74,15 +77,19 @@ def read_strands(capture: Capture) -> dict[str, tuple[np.ndarray, np.ndarray, np
     if not path.is_file():
         raise Problem("This capture has no hair to grow yet.", "Switch on Hair among the settings of 4K Maps, and run that stage.")
     try:
+        with zipfile.ZipFile(path) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > MOST_BYTES:
+                raise ValueError(f"it holds more than {MOST_BYTES >> 20} MB")
         with np.load(path, allow_pickle=False) as stored:
             found = {part: tuple(stored[f"{part}_{name}"].astype(np.float32) for name in ("points", "radius", "colour"))
                      for part in curves.TITLES if f"{part}_points" in stored.files}
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise Problem(f"{path} is damaged ({error}).", AGAIN) from error
     for points, radius, colour in found.values():
         shape = points.shape
-        if len(shape) != 3 or shape[2] != 3 or radius.shape != shape[:2] or colour.shape != (shape[0], 3) or not np.isfinite(points).all():
-            raise Problem(f"{path} is damaged (its hairs have no common shape).", AGAIN)
+        finite = all(np.isfinite(values).all() for values in (points, radius, colour))
+        if len(shape) != 3 or shape[1] < 2 or shape[2] != 3 or radius.shape != shape[:2] or colour.shape != (shape[0], 3) or not finite:
+            raise Problem(f"{path} is damaged (what it holds are no hairs).", AGAIN)
     if not found:
         raise Problem("No brows and no beard were found on this face.", "Hair that is as light as the skin is not told from it; comb curves of your own.")
     return found
