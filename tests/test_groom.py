@@ -116,6 +116,26 @@ def test_combed_hair_follows_a_head_that_was_reconstructed_anew(capture, strands
     assert addon("groom.curves").is_combed(brows)
 
 
+def test_hairs_that_a_brush_added_stay_where_they_are_and_are_rooted_there(capture, strands, addon):
+    bpy.ops.wildcap.grow_hair()
+    curves = addon("groom.curves")
+    brows, _ = curves.of(head())
+    brows.data.add_curves([5])  # as the Add brush does; its attributes are zero but for the points
+    position = brows.data.attributes["position"].data
+    added = np.array([[0.03, -0.05, 0.02]]) + np.linspace(0, 0.004, 5)[:, None] * [0, -1, 0]
+    added += strands["brows"][0, 0] - added[0]
+    for k, place in enumerate(added):
+        position[len(position) - 5 + k].vector = place
+    write_head(capture, 0.9)
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.assemble_material()
+    places_now = np.array([point.vector for point in position])
+    assert np.abs(places_now[-5:] - added).max() < 1e-6
+    assert np.abs(places_now[:5, 0] - 0.9 * strands["brows"][0, :, 0]).max() < 1e-3
+    root = np.array(brows.data.attributes["wildcap_root"].data[40].vector)
+    assert np.linalg.norm(root - added[0]) < 0.01 and np.array(brows.data.attributes["surface_uv_coordinate"].data[40].vector).any()
+
+
 def test_the_skin_below_is_shown(capture, strands, addon):
     skin = head().data.materials[0].node_tree.nodes["WildCap Albedo"]
     image = bpy.data.images.new("below", 4, 4)

@@ -26,7 +26,7 @@ def surface() -> HeadSurface:
 
 
 @cache
-def brows() -> strokes.Texels:
+def brows() -> strokes.HairTexels:
     return strokes.lay_texels(surface(), (template.mask("brows", SIZE) > 0.5) & surface().covered)
 
 

@@ -131,7 +131,7 @@ class UpscaleSettings:
     whole_head: bool = setting(True)
     """Complete neck, ears, scalp and the back of the head from the solved face where no camera saw them; off: the mean face's plain tone"""
     hair: bool = setting(True)
-    """Find brows, lashes and beard: a mask of each, and the albedo of the skin below them, to groom hair over"""
+    """Find brows, lashes and beard: a mask of each, the albedo of the skin below them, and single hairs for Grow Hair"""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from ..face.strands import Roots, Strands
 from . import strokes, ways
 from .hair import Hair
 from .maps import Maps
-from .strokes import Texels
+from .strokes import HairTexels
 from .surface import HeadSurface
 
 LEAST_COVER, FEWEST = 0.05, 20
@@ -44,7 +44,7 @@ COLOUR_REACH, DARKEST = 5.0, 0.003
 
 
 @dataclass(frozen=True)
-class Kind:
+class HairKind:
     """Hair of one part of the face, named as in Hair. length: mean and spread in mm; diameter in mm at the root; lift: radians off the skin; most: hairs
     per mm^2; bend: how far the skin draws it back along its length."""
 
@@ -56,7 +56,7 @@ class Kind:
     bend: float
 
 
-KINDS = (Kind("brows", (7.0, 1.3), 0.08, 0.30, 3.0, 0.35), Kind("beard", (6.0, 1.5), 0.11, 0.45, 1.5, 0.25))
+KINDS = (HairKind("brows", (7.0, 1.3), 0.08, 0.30, 3.0, 0.35), HairKind("beard", (6.0, 1.5), 0.11, 0.45, 1.5, 0.25))
 """Measures of usual hairs; in a mask, several can share a place. How long a beard is no texture tells: the button in Blender scales it."""
 LASH = {"upper": (110, 9.0), "lower": (60, 5.5)}
 """Lashes of a lid and their length in mm."""
@@ -96,7 +96,7 @@ def write(path: Path, found: dict[str, Strands]) -> None:
         np.savez_compressed(file, **arrays)
 
 
-def _grown(kind: Kind, cover: np.ndarray, colours: np.ndarray, texels: Texels, way: np.ndarray, surface: HeadSurface,
+def _grown(kind: HairKind, cover: np.ndarray, colours: np.ndarray, texels: HairTexels, way: np.ndarray, surface: HeadSurface,
            rng: np.random.Generator) -> Strands:
     """The hairs over texels of which hair covers `cover` [N], in `colours` [N, 3], along `way` [N, 3]."""
     texel = surface.texel[texels.where]
@@ -120,14 +120,14 @@ def _grown(kind: Kind, cover: np.ndarray, colours: np.ndarray, texels: Texels, w
 
 
 def _strewn(expected: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Texels [M], each as often as is `expected` [N] of it, without the clumps of chance: one hair in each of M equal shares of the sum."""
+    """HairTexels [M], each as often as is `expected` [N] of it, without the clumps of chance: one hair in each of M equal shares of the sum."""
     total = np.cumsum(expected)
     count = round(total[-1])
     return np.minimum(np.searchsorted(total, (np.arange(count) + rng.uniform(size=count)) / max(count, 1) * total[-1]), len(expected) - 1)
 
 
-def _walked(start: np.ndarray, sign: int, far: np.ndarray, texels: Texels, way: np.ndarray, tree: cKDTree, beyond: float) -> tuple[np.ndarray, np.ndarray]:
-    """Texels [M] `far` mm [M] along the ways (against them for sign -1), and how far those are: where hair ends, no texel within `beyond` mm, a hair ends."""
+def _walked(start: np.ndarray, sign: int, far: np.ndarray, texels: HairTexels, way: np.ndarray, tree: cKDTree, beyond: float) -> tuple[np.ndarray, np.ndarray]:
+    """HairTexels [M] `far` mm [M] along the ways (against them for sign -1), and how far those are: where hair ends, no texel within `beyond` mm, a hair ends."""
     at, gone = start.copy(), np.zeros(len(start))
     walking = np.ones(len(start), bool)
     step = far / WALK
@@ -169,6 +169,6 @@ def _lash_row(edge: np.ndarray, lid: str, rng: np.random.Generator) -> np.ndarra
     way = np.array([0, -1.0, -0.6 if up > 0 else -0.9]) + (2 * t - 0.9)[:, None] * [0.8 * outwards, 0, 0] + rng.normal(0, 0.12, at.shape)
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     size = length / 1000 * rng.uniform(0.7, 1.1, count) * np.interp(t, [0, 0.4, 1], [0.55, 0.9, 1.0])
-    bow = np.array([0, 0, 0.45 if up > 0 else -0.1])
+    bow = np.array([0, 0, 0.75 if up > 0 else -0.1])
     s = np.linspace(0, 1, STEPS)[None, :, None]
     return at[:, None] + size[:, None, None] * (s * way[:, None] + s**2 * bow)

@@ -25,7 +25,7 @@ AROUND = 1.5
 
 
 @dataclass(frozen=True)
-class Texels:
+class HairTexels:
     """The N texels on which hair grows. where bool [S, S]; position [N, 3] mm, normal, tangent and bitangent [N, 3] unit, row by row."""
 
     where: np.ndarray
@@ -44,14 +44,14 @@ class Texels:
         return flat[:, :1] * self.tangent[index] + flat[:, 1:] * self.bitangent[index]
 
 
-def lay_texels(surface: HeadSurface, where: np.ndarray) -> Texels:
+def lay_texels(surface: HeadSurface, where: np.ndarray) -> HairTexels:
     """The texels of `where` bool [S, S], all of them on the head."""
     tangent, bitangent = surface.frames(where)
     normal = raster.interpolate(vertex_normals(surface.mesh), surface.mesh.faces, surface.face[where], surface.bary[where])
-    return Texels(where, surface.position[where].astype(np.float64), normal / lengths(normal)[:, None], tangent, bitangent)
+    return HairTexels(where, surface.position[where].astype(np.float64), normal / lengths(normal)[:, None], tangent, bitangent)
 
 
-def measure_tensors(albedo: np.ndarray, texels: Texels, texel: float) -> np.ndarray:
+def measure_tensors(albedo: np.ndarray, texels: HairTexels, texel: float) -> np.ndarray:
     """Structure tensors [N, 2, 2] of the strokes of a linear albedo [S, S, 3] in the tangent plane, of trace 1 (0 where nothing is seen), over AROUND: large
     across the strokes, small along them. texel: its width in mm."""
     grey = images.linear_to_srgb(albedo).mean(2)
@@ -63,7 +63,7 @@ def measure_tensors(albedo: np.ndarray, texels: Texels, texel: float) -> np.ndar
     return tensors / np.maximum(np.trace(tensors, axis1=1, axis2=2), 1e-12)[:, None, None]
 
 
-def choose_ways(tensors: np.ndarray, texels: Texels, usual: np.ndarray, trust: float) -> np.ndarray:
+def choose_ways(tensors: np.ndarray, texels: HairTexels, usual: np.ndarray, trust: float) -> np.ndarray:
     """Unit directions from root to tip along the skin [N, 3].
 
     `usual` [N, 3], how such hair grows, tells root from tip, and the direction where strokes tell none: it counts as strokes of coherence `trust`."""

@@ -19,6 +19,8 @@ TITLES = {"brows": "Brows", "lashes": "Lashes", "beard": "Beard"}
 GROWN, MATERIAL = "wildcap_grown", "wildcap_hair_material"
 ROOT, COLOUR = "wildcap_root", "wildcap_colour"
 """Attributes of each curve: the place of the skin, in the head's axes, to which it is rooted; its linear albedo."""
+ROOTED_M = 0.01
+"""Farther from its first point no place of the skin is a hair's root."""
 UVS = "surface_uv_coordinate"
 ROUGHNESS, IOR = 0.4, 1.55
 """Of keratin; hairs' scales spread its shine."""
@@ -68,19 +70,25 @@ def is_combed(hair) -> bool:
 
 
 def follow(hair, obj) -> None:
-    """Moves each hair as the skin under its root moved, where the head has another shape than when they were rooted, and keeps what was combed."""
+    """Moves each hair as the skin under its root moved, where the head has another shape than when they were rooted, and keeps what was combed. Hairs that a
+    brush added since have no such place yet: they are rooted where they are."""
     data, combed = hair.data, is_combed(hair)
-    if ROOT not in data.attributes or UVS not in data.attributes:
+    if ROOT not in data.attributes or UVS not in data.attributes or not data.curves:
         return
     data.surface_uv_map = _rooting_uvs(obj.data)
+    offsets, position = _offsets(data), _read(data.attributes["position"], "vector", 3)
+    first = position[offsets[:-1]]
     uv, before = _read(data.attributes[UVS], "vector", 2), _read(data.attributes[ROOT], "vector", 3)
-    moved = _places(obj.data, uv, before) - before
-    if np.abs(moved).max(initial=0) < 1e-6:
+    known = np.linalg.norm(before - first, axis=1) < ROOTED_M
+    places = before.copy()
+    places[known] = _places(obj.data, uv[known], before[known])
+    uv[~known], places[~known] = _nearest(obj.data, first[~known])
+    moved = np.where(known[:, None], places - before, 0)
+    if known.all() and np.abs(moved).max() < 1e-6:
         return
-    sizes = np.diff(_offsets(data))
-    position = _read(data.attributes["position"], "vector", 3) + np.repeat(moved, sizes, 0)
-    data.attributes["position"].data.foreach_set("vector", position.astype(np.float32).ravel())
-    data.attributes[ROOT].data.foreach_set("vector", (before + moved).astype(np.float32).ravel())
+    position += np.repeat(moved, np.diff(offsets), 0)
+    for name, values in (("position", position), (ROOT, places), (UVS, uv)):
+        data.attributes[name].data.foreach_set("vector", values.astype(np.float32).ravel())
     data.update_tag()
     if not combed:
         hair[GROWN] = _digest(data)
