@@ -127,7 +127,7 @@ def _strewn(expected: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def _walked(start: np.ndarray, sign: int, far: np.ndarray, texels: HairTexels, way: np.ndarray, tree: cKDTree, beyond: float) -> tuple[np.ndarray, np.ndarray]:
-    """HairTexels [M] `far` mm [M] along the ways (against them for sign -1), and how far those are: where hair ends, no texel within `beyond` mm, a hair ends."""
+    """Texels [M] `far` mm [M] along the ways (against them for sign -1), and how far those are: a hair ends where no texel with hair is within `beyond` mm."""
     at, gone = start.copy(), np.zeros(len(start))
     walking = np.ones(len(start), bool)
     step = far / WALK
