@@ -24,7 +24,9 @@ def usd(path: Path) -> dict:
     shaders = [UsdShade.Shader(prim) for prim in prims if prim.IsA(UsdShade.Shader)]
     textures = [shader for shader in shaders if shader.GetIdAttr().Get() == "UsdUVTexture"]
     shapes = [UsdSkel.BlendShape(prim) for prim in prims if prim.IsA(UsdSkel.BlendShape)]
+    hairs = [UsdGeom.BasisCurves(prim) for prim in prims if prim.IsA(UsdGeom.BasisCurves)]
     return {
+        "hairs": {hair.GetPrim().GetName(): [[list(point) for point in hair.GetPointsAttr().Get()], list(hair.GetWidthsAttr().Get() or [])] for hair in hairs},
         "metres_per_unit": UsdGeom.GetStageMetersPerUnit(stage), "up": UsdGeom.GetStageUpAxis(stage),
         "points": [list(point) for point in mesh.GetPointsAttr().Get()], "subdivision": mesh.GetSubdivisionSchemeAttr().Get(),
         "primvars": [primvar.GetPrimvarName() for primvar in UsdGeom.PrimvarsAPI(mesh).GetPrimvars()],

@@ -15,6 +15,8 @@ ASIDE_KEY = "wildcap_aside"
 """Custom property of a head that has made room for another one, until its row is clicked."""
 HAIR_KEY = "wildcap_hair"
 """Custom property of hair curves that were grown on a head: of which part they are."""
+HAIR_COLOUR = "wildcap_colour"
+"""Their attribute of each curve: its linear albedo."""
 
 
 def active(context) -> bpy.types.PropertyGroup | None:

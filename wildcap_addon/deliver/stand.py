@@ -17,7 +17,7 @@ from mathutils import Matrix
 
 from ...core.contract.delivery_plan import PACKING, Plan
 from ...core.contract.messages import Problem
-from .. import colours, head, node_trees
+from .. import captures, colours, head, node_trees
 
 SCENE = "WildCap Delivery"
 HEAD_TILE = 1001
@@ -25,6 +25,8 @@ FACTORS = {"m": 1.0, "cm": 100.0}
 LINKED = {".glb": ("base_color", "normal"), ".gltf": ("base_color", "normal"), ".usdc": ("base_color", "normal", "roughness"),
           ".fbx": ("base_color", "normal", "roughness", "specular"), ".obj": ("base_color", "normal", "roughness", "specular")}
 """What each format's exporter writes as it is. glTF's would make new pictures of roughness and specular."""
+HAIR_IN = ".usdc"
+"""The format that holds hair curves."""
 LIDS = ("eyesOpenLeft", "eyesOpenRight")
 SOCKETS = {"base_color": "Base Color", "roughness": "Roughness", "specular": "Specular IOR Level"}
 
@@ -34,7 +36,7 @@ def standing(context, plan: Plan, source: bpy.types.Object | Path) -> Iterator[b
     """The copy to export, selected and active in a scene of its own; `source` is the object in the scene, or the mesh file. The packing in plan.staged says
     which maps there are."""
     packing = json.loads((plan.staged / PACKING).read_text(encoding="utf-8"))
-    before = {name: set(getattr(bpy.data, name)) for name in ("materials", "images", "meshes", "objects", "scenes", "shape_keys")}
+    before = {name: set(getattr(bpy.data, name)) for name in ("materials", "images", "meshes", "hair_curves", "objects", "scenes", "shape_keys")}
     window, shown = context.window, context.window.scene
     try:
         scene = bpy.data.scenes.new(SCENE)
@@ -50,16 +52,44 @@ def standing(context, plan: Plan, source: bpy.types.Object | Path) -> Iterator[b
         mesh.transform(Matrix.Scale(FACTORS[plan.unit], 4), shape_keys=True)
         _materials(mesh, plan, packing)
         scene.collection.objects.link(obj)
+        hairs = _hairs(plan, source, obj) if plan.what == "head" and plan.format.suffix == HAIR_IN else []
+        for hair in hairs:
+            scene.collection.objects.link(hair)
         window.scene = scene
-        obj.select_set(True, view_layer=scene.view_layers[0])
+        for thing in (obj, *hairs):
+            thing.select_set(True, view_layer=scene.view_layers[0])
         scene.view_layers[0].objects.active = obj
         yield obj
     finally:
         window.scene = shown
-        for name in ("scenes", "objects", "meshes", "materials", "images"):
+        for name in ("scenes", "objects", "meshes", "hair_curves", "materials", "images"):
             kept = getattr(bpy.data, name)
             for thing in set(kept) - before[name]:
                 kept.remove(thing)
+
+
+def _hairs(plan: Plan, source: bpy.types.Object, obj) -> list[bpy.types.Object]:
+    """Copies of the head's hair at rest, children of the copy `obj`, in one plain colour each: USD's preview material reads no attribute."""
+    found = []
+    for hair in captures.hair(source):
+        copy = bpy.data.objects.new(f"{plan.name}_{hair[captures.HAIR_KEY]}", hair.data.copy())
+        copy.data.name, copy.parent, copy.data.surface = copy.name, obj, None
+        copy.data.materials.clear()
+        material, shader = _new(copy.name)
+        shader.inputs["Base Color"].default_value = (*_mean_colour(copy.data), 1)
+        copy.data.materials.append(material)
+        found.append(copy)
+    return found
+
+
+def _mean_colour(data: bpy.types.Curves) -> list[float]:
+    """The mean of the hairs' linear colours; Blender's grey where they have none."""
+    attribute = data.attributes.get(captures.HAIR_COLOUR)
+    if attribute is None or not attribute.data:
+        return [0.8] * 3
+    colours_of = np.empty(4 * len(attribute.data), np.float32)
+    attribute.data.foreach_get("color", colours_of)
+    return colours_of.reshape(-1, 4)[:, :3].mean(0).tolist()
 
 
 def require_eyes(plan: Plan, obj: bpy.types.Object | None) -> None:

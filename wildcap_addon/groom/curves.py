@@ -17,8 +17,8 @@ from .. import captures, head, local_view, node_trees
 
 TITLES = {"brows": "Brows", "lashes": "Lashes", "beard": "Beard"}
 GROWN, MATERIAL = "wildcap_grown", "wildcap_hair_material"
-ROOT, COLOUR = "wildcap_root", "wildcap_colour"
-"""Attributes of each curve: the place of the skin, in the head's axes, to which it is rooted; its linear albedo."""
+ROOT = "wildcap_root"
+"""Attribute of each curve: the place of the skin, in the head's axes, to which it is rooted."""
 ROOTED_M = 0.01
 """Farther from its first point no place of the skin is a hair's root."""
 UVS = "surface_uv_coordinate"
@@ -101,7 +101,7 @@ def _made(name: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray)
     data.attributes["position"].data.foreach_set("vector", points.astype(np.float32).ravel())
     _attribute(data, "radius", 'FLOAT', 'POINT').data.foreach_set("value", radius.astype(np.float32).ravel())
     rgba = np.concatenate([colour, np.ones((count, 1))], 1)
-    _attribute(data, COLOUR, 'FLOAT_COLOR', 'CURVE').data.foreach_set("color", rgba.astype(np.float32).ravel())
+    _attribute(data, captures.HAIR_COLOUR, 'FLOAT_COLOR', 'CURVE').data.foreach_set("color", rgba.astype(np.float32).ravel())
     return data
 
 
@@ -200,7 +200,7 @@ def _material(name: str) -> bpy.types.Material:
     shader = next(node for node in tree.nodes if node.type == 'BSDF_PRINCIPLED')
     shader.inputs["Roughness"].default_value, shader.inputs["IOR"].default_value = ROUGHNESS, IOR
     colour = tree.nodes.new('ShaderNodeAttribute')
-    colour.attribute_name, colour.location = COLOUR, (-260, 280)
+    colour.attribute_name, colour.location = captures.HAIR_COLOUR, (-260, 280)
     tree.links.new(colour.outputs["Color"], shader.inputs["Base Color"])
     return material
 
