@@ -57,7 +57,7 @@ def grow(context, obj, part: str, points: np.ndarray, radius: np.ndarray, colour
         bpy.data.hair_curves.remove(old)
         data.name = name
     if not data.materials:
-        data.materials.append(_material(f"{obj.name} Hair"))
+        data.materials.append(_material(f"{obj.name} Hair", colour.mean(0)))
     _root(hair, obj)
     hair[GROWN] = _digest(data)
     local_view.join(context, [hair])
@@ -187,8 +187,8 @@ def _deform_group() -> bpy.types.NodeTree:
     return group
 
 
-def _material(name: str) -> bpy.types.Material:
-    """Hair in its own colour; one of that name keeps the artist's changes.
+def _material(name: str, mean: np.ndarray) -> bpy.types.Material:
+    """Hair in its own colour, in Solid shading in their mean [3]; one of that name keeps the artist's changes.
 
     Opaque: what was measured is an albedo. Principled Hair's colour is that of a whole head of hair, and single hairs of it over light skin come out blond."""
     found = bpy.data.materials.get(name)
@@ -196,6 +196,7 @@ def _material(name: str) -> bpy.types.Material:
         return found
     material = bpy.data.materials.new(name)
     material[MATERIAL] = True
+    material.diffuse_color = (*mean.tolist(), 1)
     tree = node_trees.of(material)
     shader = next(node for node in tree.nodes if node.type == 'BSDF_PRINCIPLED')
     shader.inputs["Roughness"].default_value, shader.inputs["IOR"].default_value = ROUGHNESS, IOR
