@@ -51,7 +51,9 @@ WORDS = ("Four people whose every hair is known, from nine sides through a phone
          "head and texture are the true ones. *IoU*: of the pixels that hair covers, by the true and by the grown hairs, seen from either side of the front. "
          "*Off*: the median angle on the skin between each true hair and the nearest grown one, from root to tip; *off, usual*: the same of hair that lies "
          "as anatomy has it, whatever the strokes say. Wanted: an IoU of 0.7, and 20 degrees. Nothing was chosen on these four (how clear strokes must be to "
-         "outweigh the usual direction was, on seeds 3, 5 and 13). A beard's length is no part of it: its hairs are 6 mm long on everybody.")
+         "outweigh the usual direction was, on seeds 3, 5 and 13). A beard's length is no part of it: its hairs are 6 mm long on everybody.\n\n"
+         "Where it fails: brows below a fringe are not seen, and the fringe's own strands are grown in their place; stubble, and a beard as light as its "
+         "skin, are no dark strokes, and nothing is found.")
 USUAL_ALONE = 1e6
 """Trust in the usual directions that no stroke outweighs."""
 
