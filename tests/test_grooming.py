@@ -96,6 +96,13 @@ def test_hair_has_the_colour_that_mixes_with_the_skin_to_what_is_seen():
         assert np.exp(np.log(colour).mean(0)) == pytest.approx(HAIR, rel=0.1)
 
 
+def test_black_hair_is_not_blue_where_the_skin_below_is_a_little_off():
+    cover = np.full((64, 64), 0.6, np.float32)
+    albedo = (1 - cover[..., None]) * SKIN * [1, 1, 1.1] + cover[..., None] * 0.004
+    colour = grooming._unmix(albedo, np.broadcast_to(SKIN, albedo.shape), cover, 5.0)
+    assert (colour[..., 2] <= colour[..., 0]).all() and colour.max() < 0.02
+
+
 def test_hair_roots_on_the_skin_in_its_mask_and_stays_outside_of_the_head():
     hairs, mask = groomed(0.4)
     skin = Surface(template.load())

@@ -145,10 +145,12 @@ def _turned(way: np.ndarray, normal: np.ndarray, radians: np.ndarray) -> np.ndar
 
 
 def _unmix(albedo: np.ndarray, skin: np.ndarray, cover: np.ndarray, reach: float) -> np.ndarray:
-    """The hair's linear albedo [S, S, 3]: what mixes with the skin below it to the albedo, by least squares over `reach` texels."""
+    """The hair's linear albedo [S, S, 3]: what mixes with the skin below it to the albedo, by least squares over `reach` texels; never bluer than it is red,
+    as melanin has it, for in black hair the skin's error is more than the hair's own colour."""
     share = cover[..., None]
     mixed = cv2.GaussianBlur((share * (albedo - (1 - share) * skin)).astype(np.float32), (0, 0), reach)
-    return mixed / np.maximum(cv2.GaussianBlur((cover**2).astype(np.float32), (0, 0), reach), 1e-9)[..., None]
+    mixed /= np.maximum(cv2.GaussianBlur((cover**2).astype(np.float32), (0, 0), reach), 1e-9)[..., None]
+    return np.minimum.accumulate(np.maximum(mixed, DARKEST), -1)
 
 
 def _lashes(brows: np.ndarray, vertices: np.ndarray, rng: np.random.Generator) -> Strands:
