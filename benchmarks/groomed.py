@@ -20,6 +20,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from core.contract.files import replacing
+from core.face import template
 from core.face.head import Head
 from core.face.strands import Strands, prisms
 from core.geometry import raster
@@ -31,7 +32,7 @@ from core.synthetic.people import phone
 from core.synthetic.people.figure import Figure, make_figure
 from core.synthetic.people.truth import Scene
 from core.texture.projection import observe
-from core.upscale import grooming, hair
+from core.upscale import grooming, hair, strokes, ways
 from core.upscale.maps import Maps
 from core.upscale.surface import lay_out
 
@@ -54,6 +55,8 @@ WORDS = ("Four people whose every hair is known, from nine sides through a phone
          "outweigh the usual direction was, on seeds 3, 5 and 13). A beard's length is no part of it: its hairs are 6 mm long on everybody.\n\n"
          "Where it fails: brows below a fringe are not seen, and the fringe's own strands are grown in their place; stubble, and a beard as light as its "
          "skin, are no dark strokes, and nothing is found.")
+CHOSEN_ON, TRUSTS, TURNS = (3, 5, 13), (0.03, 0.1, 0.3, 1.0, 3.0), (-40, 0, 40)
+"""People on whom the trust in strokes was chosen; degrees by which the usual directions are turned, for nobody's hair is all as usual."""
 USUAL_ALONE = 1e6
 """Trust in the usual directions that no stroke outweighs."""
 
@@ -62,10 +65,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", metavar="FOLDER", type=Path)
     parser.add_argument("--seeds", type=int, nargs="+", default=[person.seed for person in LIKENESSES], help="the four reserved people, where none are named")
+    parser.add_argument("--trust", action="store_true", help="how far hair is off for how clear strokes must be (seeds 3, 5, 13)")
     parser.add_argument("--page", type=Path, help="where the page goes")
     parser.add_argument("--sheet", type=Path, help="a picture of true and grown hair")
     parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/groomed.json")
     options = parser.parse_args()
+    if options.trust:
+        print(figures.markdown(["person", "part", *map(str, TRUSTS)], [row for seed in CHOSEN_ON for row in try_trusts(options.folder, seed)]))
+        return
     rows, pictures = {}, []
     for seed in options.seeds:
         rows[NAMES.get(seed, str(seed))], picture = judge(options.folder, seed)
@@ -106,6 +113,30 @@ def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
             if part in true and part in grown:
                 row[part] |= {"degrees": _off(true[part], grown[part], figure), "usual_degrees": _off(true[part], usual[part], figure)}
     return row, _picture(figure, views[VIEWS // 2], true, grown)
+
+
+def try_trusts(folder: Path, seed: int) -> list[list]:
+    """For each part of a person: degrees by which the found directions are off the true hairs' in the median, for each of TRUSTS, the mean over TURNS."""
+    figure = make_figure(seed, SIZE)
+    views, seen = photograph(folder / str(seed), figure)
+    surface, maps = lay_out(figure.head, SIZE), _maps(figure, views, seen)
+    found, landmarks, rows = hair.find(maps, surface), template.landmark_points(surface.mesh), []
+    for true in (hairs for hairs in figure.strands if hairs.part in ("brows", "beard")):
+        where = (getattr(found, true.part) > grooming.LEAST_COVER) & surface.covered
+        if where.sum() < grooming.FEWEST:
+            continue
+        texels = strokes.lay_texels(surface, where)
+        tensors = strokes.measure_tensors(maps.diffuse, texels, float(np.median(surface.texel[where])))
+        distance, nearest = cKDTree(texels.position / 1000).query(true.points[:, 0])
+        close, usual = distance < NEAR_MM / 1000, ways.usual(true.part, texels.position, landmarks)
+        normal, hairs = texels.normal[nearest[close]], true.points[close, -1] - true.points[close, 0]
+        off = []
+        for trust in TRUSTS:
+            turned = [np.cos(a) * usual + np.sin(a) * np.cross(texels.normal, usual) for a in np.radians(TURNS)]
+            chosen = [strokes.choose_ways(tensors, texels, way, trust)[nearest[close]] for way in turned]
+            off.append(round(float(np.mean([_median_angle(way, hairs, normal) for way in chosen])), 1))
+        rows.append([str(seed), true.part, *off])
+    return rows
 
 
 def photograph(folder: Path, figure: Figure) -> tuple[list[View], list[np.ndarray]]:
@@ -168,10 +199,15 @@ def _off(true: Strands, grown: Strands, figure: Figure) -> float:
     distance, nearest = cKDTree(grown.points[:, 0]).query(true.points[:, 0])
     close = distance < NEAR_MM / 1000
     normals = vertex_normals(figure.head)[cKDTree(figure.head.vertices).query(true.points[close, 0])[1]]
-    ways = [hairs.points[index, -1] - hairs.points[index, 0] for hairs, index in ((true, np.flatnonzero(close)), (grown, nearest[close]))]
-    ways = [way - (way * normals).sum(1, keepdims=True) * normals for way in ways]
-    cosine = (ways[0] * ways[1]).sum(1) / np.maximum(np.linalg.norm(ways[0], axis=1) * np.linalg.norm(ways[1], axis=1), 1e-12)
-    return round(float(np.median(np.degrees(np.arccos(np.clip(cosine, -1, 1))))), 1)
+    one, other = (hairs.points[index, -1] - hairs.points[index, 0] for hairs, index in ((true, np.flatnonzero(close)), (grown, nearest[close])))
+    return round(_median_angle(one, other, normals), 1)
+
+
+def _median_angle(one: np.ndarray, other: np.ndarray, normals: np.ndarray) -> float:
+    """Degrees between directions [N, 3] on the skin."""
+    one, other = (way - (way * normals).sum(1, keepdims=True) * normals for way in (one, other))
+    cosine = (one * other).sum(1) / np.maximum(np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1), 1e-12)
+    return float(np.median(np.degrees(np.arccos(np.clip(cosine, -1, 1)))))
 
 
 def _overlap(figure: Figure, views: list[View], true: Strands | None, grown: Strands | None) -> float:

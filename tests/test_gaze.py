@@ -80,3 +80,26 @@ def test_the_eyes_of_another_shape_look_at_it_too(head, addon, capture):  # noqa
     bpy.context.view_layer.update()
     for centre, way in looks(head, addon("acting.asset").load()):
         assert degrees(way, np.array(empty.location) - centre) < 3.5
+
+
+def test_eyes_turn_as_far_as_the_guide_says(head, addon):  # noqa: F811
+    """Outwards, inwards, up and down: in degrees from straight ahead, at the most that the units are driven to."""
+    gaze = addon("acting.gaze")
+    eye = gaze._eye(head, 0)
+    most = {way: angle(eye.ahead, 1) + gaze.MOST * (angle(eye.turned[way], 1) - angle(eye.ahead, 1))
+            for way, angle in (("Out", gaze._yaw), ("In", gaze._yaw), ("Up", gaze._pitch), ("Down", gaze._pitch))}
+    assert [round(abs(float(np.degrees(most[way])))) for way in ("Out", "In", "Up", "Down")] == [19, 17, 10, 15]
+
+
+def test_a_driver_of_the_artists_is_not_taken_away(head, addon):  # noqa: F811
+    key = head.data.shape_keys.key_blocks["eyeLookInRight"]
+    key.driver_add("value").driver.expression = "0.3"
+    with pytest.raises(RuntimeError, match="eyeLookInRight has a driver of yours already"):
+        bpy.ops.wildcap.gaze()
+    assert addon("acting.gaze").of(head) is None and head.data.shape_keys.animation_data.drivers.find('key_blocks["eyeLookInRight"].value') is not None
+
+
+def test_an_empty_that_was_deleted_comes_back_by_a_click(head, addon):  # noqa: F811
+    bpy.ops.wildcap.gaze()
+    bpy.data.objects.remove(addon("acting.gaze").of(head))
+    assert bpy.ops.wildcap.gaze() == {'FINISHED'} and addon("acting.gaze").of(head) is not None

@@ -102,6 +102,16 @@ def test_what_was_combed_stays_and_the_rest_grows_anew(strands, addon):
     assert np.linalg.norm(shorter[:, -1] - shorter[:, 0], axis=1) == pytest.approx(0.5 * 0.006 * np.hypot(1, 0.2), rel=1e-3)
 
 
+def test_what_was_thickened_stays_and_data_in_another_use_is_kept(strands, addon):
+    bpy.ops.wildcap.grow_hair()
+    brows, lashes = addon("groom.curves").of(head())
+    brows.data.attributes["radius"].data[0].value = 1e-3
+    other, shared = bpy.data.objects.new("other", lashes.data), lashes.data.name
+    bpy.ops.wildcap.grow_hair(share=0.5)
+    assert brows.data.attributes["radius"].data[0].value == pytest.approx(1e-3) and len(brows.data.curves) == 40
+    assert other.data.name == shared and len(other.data.curves) == 40 and len(lashes.data.curves) == 20
+
+
 def test_combed_hair_follows_a_head_that_was_reconstructed_anew(capture, strands, addon):
     bpy.ops.wildcap.grow_hair()
     brows, _ = addon("groom.curves").of(head())

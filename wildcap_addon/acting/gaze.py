@@ -9,11 +9,12 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ...core.contract.messages import Problem
 from .. import local_view
 from .asset import LEFT_EYE, SIDES, load
 
 KEY = "wildcap_gaze"
-"""Custom property of the empty."""
+"""Custom property of the empty, and of the shape keys whose units look at it."""
 AHEAD_M = 0.5
 MOST = 1.2
 """How far the units go: at 1 MakeHuman's turn eyes by 8 to 17 degrees, and at this by a fifth more; further on the lids are drawn out of shape."""
@@ -34,7 +35,8 @@ def of(obj) -> bpy.types.Object | None:
 
 
 def add(context, obj) -> bpy.types.Object:
-    """The empty half a metre before the eyes, where they look at rest, and the drivers."""
+    """The empty half a metre before the eyes, where they look at rest, and the drivers. Raises Problem where the artist drives a look unit."""
+    _refuse_own(obj.data.shape_keys)
     eyes = [_eye(obj, number) for number in range(2)]
     empty = bpy.data.objects.new(f"{obj.name} Gaze", None)
     empty.empty_display_type, empty.empty_display_size = 'SPHERE', 0.015
@@ -53,6 +55,7 @@ def remove(obj) -> None:
     for name in _units():
         obj.data.shape_keys.key_blocks[name].driver_remove("value")
         obj.data.shape_keys.key_blocks[name].value, obj.data.shape_keys.key_blocks[name].slider_max = 0.0, 1.0
+    del obj.data.shape_keys[KEY]
     bpy.data.objects.remove(of(obj))
 
 
@@ -64,6 +67,7 @@ def keep_up(obj, _capture) -> None:
 
 def drive(obj, empty) -> None:
     """Each unit is as much of its turn as the eye needs to look at the empty, from 0 to MOST."""
+    obj.data.shape_keys[KEY] = True
     for number, side in enumerate(SIDES):
         eye = _eye(obj, number)
         outwards = 1 if number == 0 else -1
@@ -83,6 +87,14 @@ def drive(obj, empty) -> None:
                 variable.name, variable.type = axis.lower(), 'TRANSFORMS'
                 variable.targets[0].id, variable.targets[0].transform_type = empty, f'LOC_{axis}'
                 variable.targets[0].transform_space = 'LOCAL_SPACE'
+
+
+def _refuse_own(keys: bpy.types.Key) -> None:
+    """Drivers of the units are ours where the keys are marked, also when somebody deleted the empty."""
+    drivers = [] if KEY in keys or keys.animation_data is None else keys.animation_data.drivers
+    taken = [name for name in _units() if any(f'"{name}"' in curve.data_path for curve in drivers)]
+    if taken:
+        raise Problem(f"{taken[0]} has a driver of yours already.", "Remove that driver, or go on without Gaze.")
 
 
 def _units() -> list[str]:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair curves on a head: rooted in its UVs, so that they go along with its face units and can be combed with Blender's own brushes.
 
-One object for each part, a child of the head, marked by the custom property captures.HAIR_KEY. A digest of the points tells whether somebody combed them since.
+One object for each part, a child of the head, marked by the custom property captures.HAIR_KEY. A digest tells whether somebody combed them since.
 """
 
 import hashlib
@@ -54,8 +54,9 @@ def grow(context, obj, part: str, points: np.ndarray, radius: np.ndarray, colour
         for material in old.materials:
             data.materials.append(material)
         name = old.name
-        bpy.data.hair_curves.remove(old)
-        data.name = name
+        if old.users == 0:  # the artist may have put it to another use
+            bpy.data.hair_curves.remove(old)
+            data.name = name
     if not data.materials:
         data.materials.append(_material(f"{obj.name} Hair", colour.mean(0)))
     _root(hair, obj)
@@ -65,7 +66,7 @@ def grow(context, obj, part: str, points: np.ndarray, radius: np.ndarray, colour
 
 
 def is_combed(hair) -> bool:
-    """Whether somebody moved, cut or added hairs since they were grown."""
+    """Whether somebody moved, cut, added, thickened or coloured hairs since they were grown."""
     return hair.get(GROWN) != _digest(hair.data)
 
 
@@ -224,6 +225,9 @@ def _read(attribute, field: str, width: int) -> np.ndarray:
 
 
 def _digest(data) -> str:
-    """Stands for how many curves and points there are, and where."""
-    told = _offsets(data).tobytes() + _read(data.attributes["position"], "vector", 3).astype(np.float32).tobytes()
+    """Stands for how many curves and points there are, where, how thick, and in which colours."""
+    told = _offsets(data).tobytes()
+    for name, field, width in (("position", "vector", 3), ("radius", "value", 1), (captures.HAIR_COLOUR, "color", 4)):
+        if name in data.attributes:
+            told += _read(data.attributes[name], field, width).astype(np.float32).tobytes()
     return hashlib.blake2b(told, digest_size=16).hexdigest()

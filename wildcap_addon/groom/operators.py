@@ -4,7 +4,6 @@
 
 import zipfile
 import zlib
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -51,8 +50,7 @@ class WILDCAP_OT_grow_hair(BaseOperator, bpy.types.Operator):
             points = points[:, :1] + factor * (points - points[:, :1])
             if not curves.grow(context, obj, part, points[kept], self.thickness * radius[kept], colour[kept]):
                 combed.append(curves.TITLES[part])
-        if skin_below(captures.folder(item)).is_file() and bpy.ops.wildcap.compare.poll():
-            bpy.ops.wildcap.compare(show='SKIN')
+        show_skin_below(captures.folder(item))
         if combed:
             self.report({'INFO'}, f"{', '.join(combed)}: combed since, and left as they are; delete them to grow them anew")
 
@@ -62,12 +60,14 @@ def keep_up(obj, capture: Capture) -> None:
     hairs = curves.of(obj)
     for hair in hairs:
         curves.follow(hair, obj)
-    if hairs and skin_below(capture).is_file() and bpy.ops.wildcap.compare.poll():
+    if hairs:
+        show_skin_below(capture)
+
+
+def show_skin_below(capture: Capture) -> None:
+    """Has the head's skin show what is below its hair, where that is known and the skin is assembled."""
+    if status.delivered(capture)[0].with_name("clean_albedo.png").is_file() and bpy.ops.wildcap.compare.poll():
         bpy.ops.wildcap.compare(show='SKIN')
-
-
-def skin_below(capture: Capture) -> Path:
-    return status.delivered(capture)[0].with_name("clean_albedo.png")
 
 
 def read_strands(capture: Capture) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
