@@ -101,7 +101,7 @@ def make(person: Person, folder: Path, place: str = "wild") -> Capture:
                                         "width": round(scene.WIDTH * SCALE), "height": round(scene.HEIGHT * SCALE),
                                         "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
     faces, total, count = {}, np.zeros(3), 0
-    opaque = sample.together(head, light.blockers) if light.blockers else head
+    opaque = meshes.joined([head, light.blockers]) if light.blockers else head
     for frame in np.unique(np.linspace(1, len(cameras) - 2, TRUTHS).round().astype(int)).tolist():
         albedo, alpha, face, shadow = sample.frame_truth(head, opaque, skin, sample.view_of(cameras[frame], SCALE), light.sun.direction if light.sun else None)
         faces[frame] = albedo, face

@@ -25,7 +25,7 @@ from core.contract.capture import Capture
 from core.contract.files import replacing, write_json
 from core.contract.settings import Settings
 from core.geometry import raster
-from core.geometry.meshes import Mesh, vertex_normals
+from core.geometry.meshes import Mesh, joined, vertex_normals
 from core.geometry.views import View
 from core.imaging import images
 from core.synthetic import sample, scene
@@ -71,7 +71,7 @@ def photograph(data: Path, folder: Path, name: str) -> Capture:
     filmed.render_parts(work, SEED, {"skin": skin}, [], light, cameras, range(FRAMES), SAMPLES, SCALE, room=False)
     views = [sample.view_of(matrix, SCALE) for matrix in cameras]
     caster, facial = raster.RayCaster(head), face_of(data, head)
-    opaque = raster.RayCaster(sample.together(head, light.blockers)) if light.blockers else caster
+    opaque = raster.RayCaster(joined([head, light.blockers])) if light.blockers else caster
     faces = {}
     for frame in np.unique(np.linspace(1, FRAMES - 2, TRUTHS).round().astype(int)).tolist():
         faces[frame] = _write_truth(target, frame, views[frame], caster, opaque, albedo, facial, light.sun.direction if light.sun else None)
