@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from torch.nn import functional
 
 from core.solve.initial import Start
-from core.solve.light_fit import uneven, update_lights
+from core.solve.light_fit import update_lights
 from core.solve.lighting import Lights, shading_basis
 from core.solve.problem import Observation, albedo, photometric
 from core.solve.recipes import Recipe
@@ -64,11 +64,11 @@ def regions(start: Start, recipe: Recipe, count: int, seed: int = 0):
 
 
 def _region_loss(lights: RegionLights, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> torch.Tensor:
-    """L_pho with the pulls of our own recipe: the shared light towards an even one, the regions' own towards none, as no mask has a border to ask."""
+    """L_pho with the pull of our own recipe: the regions' own light towards none, as no mask has a border to ask."""
     own = o.shader.own(lights)
     loss = photometric(denoised, o.shader.main(lights) + own, o, o.weight * o.trust)
     brightness = (o.weight * albedo(denoised) ** 2).mean()
-    return loss + brightness * (recipe.even * o.weight.sum() * uneven(lights.glob, o, recipe) + recipe.faint * (o.weight * own**2).sum())
+    return loss + brightness * recipe.faint * (o.weight * own**2).sum()
 
 
 def _clusters(start: Start, count: int, seed: int) -> torch.Tensor:

@@ -2,17 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Spherical harmonic shading against quadrature, the grid's interpolation, the closed-form global light, and what holds it to an even one."""
 
-from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
 from core.light.spherical_harmonics import GAMMA_BANDS, per_function
-from core.solve.light_fit import uneven, update_lights
 from core.solve.lighting import Lights, Shader, constant_light, fit_global, interpolation, shading_basis
-from core.solve.problem import Observation, State
-from core.solve.recipes import OURS
 
 BAND_OF = torch.tensor(per_function(GAMMA_BANDS))
 SIDEWAYS = torch.tensor([0, 0, 0, 1, 1, 0, 0, 1, 0])  # of 1, y, z, x, xy, yz, 3 z^2 - 1, xz, x^2 - y^2 those that change their sign with x
@@ -97,26 +93,3 @@ def test_global_light_is_found_in_closed_form():
     texture[:, :10], weight[:10] = 9.0, 0.0  # what is masked must not matter
     assert torch.allclose(fit_global(texture, albedo, basis, weight, ridge=1e-9), gamma, atol=1e-4)
 
-
-def test_what_tells_left_from_right_is_held_to_an_even_light_by_its_share_alone():
-    """On a sphere the basis is orthogonal: the share of each light that a pull leaves follows from its norm in closed form."""
-    directions, solid = sphere(24, 48)
-    basis = shading_basis(directions.float())
-    mirrored = shading_basis(directions.float() * torch.tensor([-1.0, 1, 1])[:, None, None])
-    assert torch.allclose(mirrored, basis * (1 - 2 * SIDEWAYS)[:, None, None], atol=1e-6)
-    recipe = replace(OURS, even=0.2, sides=0.05)
-    weight = (solid / solid.mean()).sqrt().float()  # L_pho weighs squares: a quadrature over the sphere
-    for k in range(1, 9):
-        gamma = constant_light(torch.ones(3))
-        gamma[:, k] += 0.2
-        texture = 0.4 * torch.einsum("ck,khw->chw", gamma, basis)
-        o = Observation(texture, weight, torch.ones_like(weight), torch.zeros(1, 2, *weight.shape), Shader(directions.float(), 0 * weight, (2, 2)), 0 * weight)
-        coloured = gamma * torch.tensor([0.7, 1.0, 1.3])[:, None]
-        parts = [float(uneven(coloured, replace(o, even=even), recipe)) for even in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0))]
-        assert parts[0] == pytest.approx(parts[1] + parts[2], rel=1e-5) and parts[2] == pytest.approx(parts[1] * 0.06, rel=1e-4)  # (0.3^2 + 0.3^2) / 3
-        assert uneven(gamma, o, recipe) == pytest.approx(3 * (0.2 * float(BAND_OF[k])) ** 2 * (0.05 if SIDEWAYS[k] else 1), rel=1e-5)
-        state = State(0, None, torch.full((1, 7, *weight.shape), 2 * 0.4 - 1), Lights(constant_light(torch.ones(3)), torch.zeros(1, 9, 2, 2), torch.ones(3)))
-        update_lights(state, state.denoised, o, replace(recipe, phases=(("main", 0.0, 1.0),), updates=400), 0, 1)
-        seen = float((weight**2 * basis[k] ** 2).sum())
-        pull = 0.2 * (0.05 if SIDEWAYS[k] else 1) * float((weight.sum() * (weight * 0.16).mean() / 0.16) * BAND_OF[k] ** 2)
-        assert float(state.lights.glob[0, k]) / 0.2 == pytest.approx(seen / (seen + pull), abs=0.02)

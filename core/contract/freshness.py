@@ -21,6 +21,7 @@ from .portable_paths import read_portable
 from .settings import Settings, result_paths, result_settings
 from .slimmed import hash_artefact
 from .stages import Stage
+from .together import hash_told
 
 TO_DO, DONE, STALE, OLDER = "to do", "done", "stale", "older"
 FINISHED = (DONE, OLDER)
@@ -68,10 +69,15 @@ def _hash_inputs(root: Path, record: dict, stage: Stage, settings: Settings) -> 
     """Content hash by name: of the capture's files that the stage reads, of what its settings name elsewhere, and of the source for the first stage."""
     names = (*stage.reads, *stage.wishes, *(("own_head.obj", "own_head.json") if stage.name == "solve" and settings.solve.prior else ()))
     found = {name: _digest(hash_artefact(root, record, name)) for name in names}
-    found |= {f"{stage.name}.{name}": _digest(hash_tree(Path(path), sample_file)) for name, path in result_paths(getattr(settings, stage.name)).items()}
+    found |= {f"{stage.name}.{name}": _digest(_hash_place(name, path)) for name, path in result_paths(getattr(settings, stage.name)).items()}
     if not stage.reads:
         found[SOURCE] = record.get("source_stamp", [])
     return found
+
+
+def _hash_place(name: str, path: str) -> dict[str, str] | str:
+    """Of what a setting names outside of the capture; of another capture only what a solve reads of it counts."""
+    return hash_told(path) if name == "together" else hash_tree(Path(path), sample_file)
 
 
 def _other_source(recorded: list, root: Path, record: dict) -> bool:

@@ -114,6 +114,8 @@ class SolveSettings:
     """What a white surface in the face's light is in the frames, linear R,G,B, from a ColorChecker, a grey card or white paper; auto: from the scene"""
     prior: str = setting("", path="folder", flag="--prior")
     """The authors' prior: the folder with its config.json and ckpt.pth. It needs ICT-FaceKit fitted as template, in whose UVs it works; empty: ours"""
+    together: str = setting("", path="folder", label="Together With", flag="--with")
+    """Another capture of the same person in other light, or a folder of several: what they agree on is skin, what differs is light. Empty: alone"""
     checkpoint_every: int = setting(5, min=1, max=600, affects_result=False)
     """Steps between two checkpoints"""
     low_memory: bool = setting(False, affects_result=False)

@@ -34,6 +34,7 @@ from .problem import State, unexplained
 from .recipes import RECIPES, Recipe
 from .sampler import seeded
 from .skin_tone import SkinTone
+from .together import read_others
 from .tone import resolve_skin_tone
 from .window import coarse
 from .witnesses import confirmed
@@ -42,9 +43,9 @@ FACE_CROP = 768
 """Texels at 1024 over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels."""
 
 
-DELIT = {"even": 0.3, "sides": 0.05, "faint": 2.0}
-"""After a delighter little light is left, global or local, and the lights would rather explain how this face (its cheeks, its blotches) differs from the
-mean one, unless what is left is plainly light (traits.py); on raw light every pull costs. Chosen on a head scan and six synthetic heads (docs/results.md)."""
+DELIT = {"split": True, "phases": (("grid", 0.0, 0.5),), "faint": 2.0}
+"""After a delighter little light is left, and the lights would rather explain how this face (its cheeks, its blotches) differs from the mean one. So the global
+light is what the split of both says (split.py), and local light is held to what M's border says. Raw light is too strong and too hard for the split."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
@@ -65,7 +66,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     elsewhere = None
     if options.prior:  # the authors' prior speaks of maps in other UVs
         elsewhere, prior = layout.fitted(capture, head, known, prior, report)
-        evidence = elsewhere.evidence(known, recipe.released_boxes)
+        evidence, recipe = elsewhere.evidence(known, recipe.released_boxes), without_split(recipe)
     _check_often(prior, report)
     cell = FACE_CROP / options.grid_cells * REFERENCE / evidence.extent.side
     part = solve_edited(capture, head, settings, recipe, prior, evidence, cell, report) if settings.edited_part and elsewhere is None else None
@@ -75,12 +76,13 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         return
     conditions = mask_edit.conditions(capture, settings)
     witness = (lambda marks: confirmed(capture, head, marks, evidence.size)) if elsewhere is None else list
-    start = initial.start(prior, evidence, resolve_skin_tone(capture, head, settings, known, evidence, prior.tones, report), cell, recipe, witness)
+    tone = resolve_skin_tone(capture, head, settings, known, evidence, prior.tones, report)
+    start = initial.start(prior, evidence, tone, cell, recipe, witness, read_others(capture, settings))
     denoiser = prior.of_tone(start.tone)
     report.figure("marks_kept_from_light", len(start.marks))
     images.write_srgb(capture.picture("solve", "edges_and_marks"), drawing.edges_and_marks(evidence, start.alpha, start.marks))
     state, seen = start.state, {factor: o.to(denoiser.device) for factor, o in start.observations.items()}
-    stored, key = capture.checkpoints / "solve.safetensors", _key(evidence, settings, start.tone)
+    stored, key = capture.checkpoints / "solve.safetensors", _key(evidence, settings, start)
     stopped = checkpoint.read(stored, key)
     if stopped is not None:
         report.log(f"Going on after step {stopped.step} of {recipe.steps}.")
@@ -116,7 +118,7 @@ def _finished(prior: ConditionedPrior, state: State, evidence: Evidence, start: 
     factor = max(start.observations)
     varied = spread(prior, start.observations[factor], coarse(start.reference, factor), state.lights, recipe, seed, report.check)
     result = maps.finished(state, evidence, start, recipe, varied)
-    return result, Solution(state.denoised, state.lights, evidence.alpha, start.alpha, varied, start.tone, result.gain, start.exposure)
+    return result, Solution(state.denoised, state.lights, evidence.alpha, start.alpha, varied, start.tone, result.gain, start.exposure, start.local)
 
 
 def recipe_of(settings: Settings, prior: Prior) -> Recipe:
@@ -132,6 +134,11 @@ def recipe_of(settings: Settings, prior: Prior) -> Recipe:
     return replace(recipe, steps=settings.solve.steps, guidance=settings.solve.guidance, **({} if settings.delight.delighter == "none" else DELIT))
 
 
+def without_split(recipe: Recipe) -> Recipe:
+    """For maps in other UVs than the built-in head's, on which the split knows its places: the global light moves freely, as on raw light."""
+    return replace(recipe, split=False, phases=RECIPES["wildcap"].phases) if recipe.split else recipe
+
+
 def _check_often(prior: Prior, report: Reporter) -> None:
     """Lets a cancel stop the run between two blocks of the network, forward and backward: one step on a large map takes seconds."""
     def after(module, inputs, output):
@@ -144,10 +151,10 @@ def _check_often(prior: Prior, report: Reporter) -> None:
             layer.register_forward_hook(after)
 
 
-def _key(evidence: Evidence, settings: Settings, tone: SkinTone) -> str:
+def _key(evidence: Evidence, settings: Settings, start: initial.Start) -> str:
     """Stands for everything a run's bytes depend on."""
     digest = hashlib.blake2b(digest_size=16)
-    for tensor in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, tone.tensor):
+    for tensor in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, start.tone.tensor, start.state.lights.glob, start.local):
         digest.update(tensor.numpy().tobytes())
     digest.update(json.dumps([result_settings(settings.solve), settings.seed, settings.compute_device]).encode())
     digest.update(code_key(__package__).encode())  # with the prior's weights

@@ -27,7 +27,8 @@ from .skin_tone import EARLIER, SkinTone
 @dataclass(frozen=True)
 class Solution:
     """What a solve ended with, all of the whole map: denoised x_0 [1, 7, S, S] before the maps' own gain, lights, the mask as `painted` [S, S] and as it was
-    used (`alpha`), the spread [H, W] of a coarser map that the confidence took; the skin tone, gain [3] of the albedo, exposure of the texture."""
+    used (`alpha`), the spread [H, W] of a coarser map that the confidence took; the skin tone, gain [3] of the albedo, exposure of the texture;
+    local [3, C, C]: initial.Start's."""
 
     denoised: torch.Tensor
     lights: Lights
@@ -37,12 +38,13 @@ class Solution:
     tone: SkinTone
     gain: torch.Tensor
     exposure: float
+    local: torch.Tensor
 
 
 def write_solution(path: Path, found: Solution, conditions: dict[str, str]) -> None:
     """`conditions` are mask_edit's: under others this state is of no use."""
     lights = {"glob": found.lights.glob, "grid": found.lights.grid, "chroma": found.lights.chroma}
-    tensors = {name: getattr(found, name) for name in ("denoised", "painted", "alpha", "spread", "gain")} | lights
+    tensors = {name: getattr(found, name) for name in ("denoised", "painted", "alpha", "spread", "gain", "local")} | lights
     tensors["tone"] = found.tone.tensor
     tensors["exposure"] = torch.tensor(found.exposure, dtype=torch.float64)
     tensors = {name: tensor.detach().cpu().clone().contiguous() for name, tensor in tensors.items()}

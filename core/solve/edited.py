@@ -73,4 +73,4 @@ def _sampled(settings: Settings, recipe: Recipe, prior: ConditionedPrior, eviden
     rows, columns = (slice(a.start // factor, a.stop // factor) for a in part.inside)
     whole = earlier.spread.clone()
     whole[rows, columns] = patch[tuple(slice((a.start - b.start) // factor, (a.stop - b.start) // factor) for a, b in zip(part.inside, part.seen, strict=True))]
-    return Solution(denoised, lights, evidence.alpha, start.alpha, whole, earlier.tone, earlier.gain, earlier.exposure)
+    return Solution(denoised, lights, evidence.alpha, start.alpha, whole, earlier.tone, earlier.gain, earlier.exposure, earlier.local)

@@ -47,7 +47,7 @@ class Evidence:
     colour says little of the light; protected [S, S]: what the artist keeps out of M; edge [S, S]: how far M's border lies on a shadow's edge that is
     seen; taken [3]: the colour of what shadows take of the light, over its mean, zeros where that is not known; asked [S, S]: how far the
     artist added to the proposal for M, None where the maps are in other UVs; missing [S, S]: the share of the light that M's border says is missing, None
-    where nobody asked it; even: how far the global light is to be held to an even one, in brightness and in colour (traits.py)."""
+    where nobody asked it."""
 
     texture: torch.Tensor
     weight: torch.Tensor
@@ -62,7 +62,6 @@ class Evidence:
     extent: Extent = Extent()
     asked: torch.Tensor | None = None
     missing: torch.Tensor | None = None
-    even: tuple[float, float] = (1.0, 1.0)
 
     @property
     def size(self) -> int:
@@ -149,7 +148,7 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
         shader = Shader(normal, modulation, cells, recipe.bilinear)
         held = 1.0 if evidence.asked is None else 1 - torch.from_numpy(_sized(evidence.asked.numpy(), size))
         missing = 0.0 if evidence.missing is None else torch.from_numpy(_sized(evidence.missing.numpy(), size))
-        found[factor] = Observation(texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size, held, missing, evidence.even)
+        found[factor] = Observation(texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size, held, missing)
     return found
 
 

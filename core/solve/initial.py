@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import torch
 
@@ -14,21 +14,21 @@ from .border import missing
 from .checkpoint import Solution
 from .edges import with_edges
 from .evidence import Evidence, grid_cells, observations
-from .lighting import Lights, constant_light, fit_global, shading_basis
+from .lighting import Lights, constant_light, fit_around_constant, fit_global, shading_basis
 from .marks import Mark, with_marks
 from .prior import Prior, coordinates, mean_at
 from .problem import Observation, State
 from .problem import albedo as albedo_of
 from .recipes import OURS, Recipe
 from .skin_tone import SkinTone
-from .traits import held
+from .split import Shapes, enlarged, split
 
 
 @dataclass(frozen=True)
 class Start:
     """tone: the skin's; reference x_0^ref [1, 7, S, S]; exposure: what the texture is multiplied by in `observations` (by coarsening factor),
     so that its shading is about one; alpha [S, S]: M as it is used; state: before the first step; marks: what of the skin's own
-    is kept from the light."""
+    is kept from the light; local [3, C, C], natural log: what other captures of the person tell of the light beside theta, zeros without any."""
 
     tone: SkinTone
     reference: torch.Tensor
@@ -37,42 +37,50 @@ class Start:
     observations: dict[int, Observation]
     state: State
     marks: tuple[Mark, ...] = ()
+    local: torch.Tensor = field(default_factory=lambda: torch.zeros(3, 1, 1))
 
 
 def start(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, recipe: Recipe,
-          witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
-    """All that a run begins with. `cell` is a cell of V in texels of a 1024 map; `witness` leaves those marks that the views confirm.
+          witness: Callable[[list[Mark]], list[Mark]] = list, others: Sequence[Evidence] = ()) -> Start:
+    """All that a run begins with. `cell` is a cell of V in texels of a 1024 map; `witness` leaves those marks that the views confirm; `others` are what is
+    known of other captures of the same person.
 
     Raises Problem where no facial skin was seen.
     """
     lit = lit_skin(evidence)
     x_ref = reference(prior, tone, evidence, recipe.reference)
-    exposure = float(mean_tone(albedo_of(x_ref), lit).mean() / mean_tone(evidence.texture, lit).mean().clamp_min(1e-6))
+    exposure = exposure_to(albedo_of(x_ref), evidence.texture, lit)
     trusted = evidence.weight * (1 if recipe.trusting else evidence.trust)
     weight = trusted * (1 - evidence.alpha) if recipe.fitted else lit  # one even light is best told by skin
     lights = first_lights(evidence.texture * exposure, albedo_of(x_ref), evidence.normal, weight if weight.sum() >= 1 else trusted, grid_cells(cell), recipe)
-    return _laid_out(prior, evidence, Start(tone, x_ref, exposure, evidence.alpha, {}, State(0, None, x_ref, lights)), cell, recipe, witness=witness)
+    local = torch.zeros(3, 1, 1)
+    if recipe.split:
+        told = split([shapes_of(each, albedo_of(reference(prior, tone, each, recipe.reference))) for each in (evidence, *others)])
+        light = told.light(evidence.normal)
+        lights.glob = fit_around_constant(light, torch.ones_like(light), shading_basis(evidence.normal), evidence.skin * evidence.weight, 1e-3)
+        if others:  # one capture alone cannot tell a light of this form from a trait
+            local = torch.from_numpy(told.local)
+    begun = Start(tone, x_ref, exposure, evidence.alpha, {}, State(0, None, x_ref, lights), local=local)
+    return _laid_out(prior, evidence, begun, cell, recipe, witness=witness)
 
 
 def again(prior: Prior, evidence: Evidence, earlier: Solution, cell: float, recipe: Recipe, near: torch.Tensor,
           witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
     """What a part of an earlier solve goes on from: that solve's tone, exposure and light, and where `near` [S, S] is 0 its mask too."""
     x_ref = reference(prior, earlier.tone, evidence, recipe.reference)
-    begun = Start(earlier.tone, x_ref, earlier.exposure, evidence.alpha, {}, State(0, None, earlier.denoised, earlier.lights))
+    begun = Start(earlier.tone, x_ref, earlier.exposure, evidence.alpha, {}, State(0, None, earlier.denoised, earlier.lights), local=earlier.local)
     return _laid_out(prior, evidence, begun, cell, recipe, lambda alpha: torch.lerp(earlier.alpha, alpha, near), witness)
 
 
 def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float, recipe: Recipe,
               mask: Callable[[torch.Tensor], torch.Tensor] = lambda alpha: alpha, witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
     """`begun` with M as it is used, the marks that light must not explain, and the observations under both."""
+    evidence = replace(evidence, texture=evidence.texture / enlarged(begun.local, evidence.size).exp())
     lit = torch.einsum("ck,khw->chw", begun.state.lights.glob, shading_basis(evidence.normal)) * albedo_of(begun.reference).clamp_min(1e-3)
     light = evidence.texture * begun.exposure / lit.clamp_min(1e-3)
     if recipe.sharp_edges:
         evidence = with_edges(evidence, light, evidence.weight * (1 if recipe.trusting else evidence.trust))
     evidence = replace(evidence, alpha=mask(evidence.alpha))
-    if recipe.even:
-        seen = evidence.weight * evidence.trust * evidence.skin * (1 - evidence.alpha)
-        evidence = replace(evidence, even=held(evidence.texture * begun.exposure, albedo_of(begun.reference), evidence.normal, seen, evidence.texel))
     if recipe.faint:
         evidence = replace(evidence, missing=missing(light, evidence.alpha, evidence.weight * evidence.trust * evidence.skin, evidence.texel))
     marks: list[Mark] = []
@@ -89,6 +97,17 @@ def lit_skin(evidence: Evidence) -> torch.Tensor:
     if lit.sum() < 1:
         raise Problem("No facial skin was seen in the texture.", "Look at the texture in the report; film the face from the front and from both sides.")
     return lit
+
+
+def exposure_to(albedo: torch.Tensor, texture: torch.Tensor, weight: torch.Tensor) -> float:
+    """What a texture [3, H, W] is multiplied by to be as bright as an albedo under a weight [H, W]."""
+    return float(mean_tone(albedo, weight).mean() / mean_tone(texture, weight).mean().clamp_min(1e-6))
+
+
+def shapes_of(evidence: Evidence, albedo: torch.Tensor) -> Shapes:
+    """What `split` takes of a capture: facial skin outside of M, and brows, lips and beards as little as light may explain them."""
+    told = lit_skin(evidence) * evidence.trust
+    return Shapes(evidence.texture * exposure_to(albedo, evidence.texture, told), albedo, evidence.normal, told)
 
 
 def mean_tone(albedo: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
@@ -139,5 +158,5 @@ def first_lights(texture: torch.Tensor, albedo: torch.Tensor, normal: torch.Tens
     if recipe.fitted:
         basis = shading_basis(normal)
         rest = texture - albedo * torch.einsum("ck,khw->chw", glob, basis)
-        glob = glob + fit_global(rest, albedo, basis, weight, ridge=max(recipe.even, 0.02))
+        glob = glob + fit_global(rest, albedo, basis, weight, ridge=0.02)
     return Lights(glob, torch.zeros(1 if recipe.one_chroma else 3, 9, *cells), (shade / shade.mean()).clone())

@@ -8,7 +8,6 @@ from collections.abc import Callable
 
 import torch
 
-from ..light.spherical_harmonics import GAMMA_BANDS
 from .lighting import Lights, fit_around_constant
 from .problem import Observation, State, albedo, photometric
 from .recipes import Recipe
@@ -38,7 +37,7 @@ def _refit(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe)
     """gamma^g in closed form from what is seen outside of M under \\hat x_t. While there is much noise that map is what the prior expects, and no light but
     the true one makes it fit; later it would agree with whatever light there is."""
     weight = o.weight * (1 - o.shader.alpha) * (1.0 if recipe.trusting else o.trust)
-    fitted = fit_around_constant(o.texture, albedo(denoised), o.shader.basis, weight, max(recipe.even, 0.01))
+    fitted = fit_around_constant(o.texture, albedo(denoised), o.shader.basis, weight, 0.01)
     state.lights.glob = torch.where(weight.sum() >= 1, fitted, state.lights.glob)
 
 
@@ -47,8 +46,6 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
     shading = o.shader.total(lights)
     loss = photometric(denoised, shading, o, o.weight if recipe.trusting else o.weight * o.trust, recipe.blur)
     brightness = (o.weight * albedo(denoised) ** 2).mean()  # L_pho is larger on light skin
-    if recipe.even:
-        loss = loss + recipe.even * brightness * o.weight.sum() * uneven(lights.glob, o, recipe)
     if o.shader.empty:
         return loss
     local = o.shader.local(lights)
@@ -65,17 +62,6 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
         free = o.shader.unmodulated(lights) if recipe.sharp_edges else local  # a shadow's own edge is in M and costs nothing
         loss = loss + recipe.smooth * brightness / o.texel * variation(free, o.shader.box_alpha)
     return loss
-
-
-def uneven(glob: torch.Tensor, o: Observation, recipe: Recipe) -> torch.Tensor:
-    """How far gamma^g [3, 9] is from an even light: the sum of squares of its directed parts, `o.even` of their brightness and of their colours, `recipe.sides`
-    of those that tell left from right. The world is the head's own, x across it."""
-    _, first, second = GAMMA_BANDS
-    directed = torch.cat([first * glob[:, 1:4], second * glob[:, 4:]], 1)
-    mean = directed.mean(0)
-    cost = o.even[0] * len(glob) * mean**2 + o.even[1] * ((directed - mean) ** 2).sum(0)  # of y, z, x, xy, yz, 3 z^2 - 1, xz, x^2 - y^2
-    sideways = cost[2:4].sum() + cost[6]  # x, xy and xz change their sign from the head's left to its right
-    return cost.sum() + (recipe.sides - 1) * sideways
 
 
 def variation(image: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:

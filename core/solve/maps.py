@@ -21,6 +21,7 @@ from .initial import Start, mean_tone
 from .marks import cover
 from .problem import Observation, State, albedo
 from .recipes import Recipe
+from .split import enlarged
 
 DARKEST = 0.004  # linear albedo below which no skin or hair lies
 
@@ -46,8 +47,9 @@ def finished(state: State, evidence: Evidence, start: Start, recipe: Recipe, spr
     shader = start.observations[1].shader
     x = torch.lerp(start.reference, state.denoised, evidence.weight.sqrt())[0]
     with torch.no_grad():
-        shading = shader.total(state.lights).clamp_min(1e-3) / start.exposure
-        main = shader.main(state.lights).clamp_min(1e-3) / start.exposure
+        beside = enlarged(start.local, evidence.size).exp() / start.exposure
+        shading = shader.total(state.lights).clamp_min(1e-3) * beside
+        main = shader.main(state.lights).clamp_min(1e-3) * beside
     diffuse = albedo(x[None])
     if start.marks:  # what is known to be no light is the skin's, be it ever so unlikely to the prior
         kept = torch.from_numpy(cover(start.marks, evidence.size, evidence.texel)) * evidence.weight

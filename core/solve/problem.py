@@ -20,8 +20,7 @@ class Observation:
     trust [H, W] in [0, 1]: how far what is seen there may be explained as light (less for brows, lips and hair); coords [1, 2, H, W] for the prior;
     shader Gamma with N_c and M; ring [H, W]: where L_TV counts; texel: side of a texel in texels of a 1024 map;
     held [H, W] in [0, 1], or one number: how far `Recipe.faint` holds the local light back there; missing [H, W] in [0, 1), or one number: the share
-    of the light that M's border says is missing (border.py), which is what it is held to;
-    even: how far `Recipe.even` holds the global light to an even one, in brightness and in colour (traits.py).
+    of the light that M's border says is missing (border.py), which is what it is held to.
     """
 
     texture: torch.Tensor
@@ -33,7 +32,6 @@ class Observation:
     texel: float = 1.0
     held: torch.Tensor | float = 1.0
     missing: torch.Tensor | float = 0.0
-    even: tuple[float, float] = (1.0, 1.0)
 
     def to(self, device: torch.device | str) -> Observation:
         """The same observation on another device."""

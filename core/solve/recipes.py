@@ -37,6 +37,7 @@ class Recipe:
     open: float = 0.0  # how far the texel grid reaches outside of M; above 0 it takes away shadows that nobody masked, and more
     one_chroma: bool = True  # all local light has one learned colour; False: 27 free numbers per cell
     bilinear: bool = False  # how a texel reads V; else cubic
+    split: bool = False  # gamma^g is what the split of skin and light says (split.py), and stays; else it moves as the phases say
     fitted: bool = True  # gamma^g starts from a least-squares fit to x_0^ref; else from the even light that gives the texture's mean
     sharp_edges: bool = True  # M's border is laid on the shadow's edge where the texture shows one, and there light may step
     protect_marks: bool = True  # moles and round scars inside M tell nothing of the light
@@ -50,8 +51,6 @@ class Recipe:
     tv_of_gamma: bool = False  # L_TV is the squared variation of the SH coefficients; else the L1 variation of the shading on M's ring
     neg: float = 1.0
     smooth: float = 1.4  # L1 variation of s^V inside M, per texel of a 1024 map and mean squared albedo: a brow is not worth its outline, a shadow is
-    even: float = 0.0  # pull of gamma^g towards an even light, per texel and mean squared albedo, the less the surer what it explains is light (traits.py)
-    sides: float = 1.0  # share of that pull on what gives the head's two sides different light: cheeks and beards are alike on both, so it is light
     faint: float = 0.0  # pull of s^V towards what M's border says is missing, likewise; not where the artist added to the proposal for M
 
     # the end

@@ -1,0 +1,191 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Skin or light: what the split of a texture's large shapes (core/solve/split.py) is worth, alone and under the solve, and what it takes for granted.
+
+    python -m benchmarks.split FOLDER [--truths FOLDER] [--only PREFIX ...] [--beside NAME=FOLDER ...] [--skins FOLDER] [--page PATH] [--json PATH]
+
+FOLDER holds captures as benchmarks/state.py measures them, several lights of each person, solved. The closed form alone is a second of work: the texture over
+the global light that it finds, of each capture alone and of all captures of a person together; and with the scales' prior halved and doubled. --beside names
+folders with the same captures solved in another way (an earlier solver, `core run --with`). --skins: painted skins that `core train carry` brought into our
+UVs; their large shapes say how far traits reach and how alike the two sides are. Likenesses stay where they are; only figures are written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import astuple
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from core.contract.capture import Capture
+from core.contract.messages import Problem
+from core.face import template
+from core.face.head import read_filmed_head
+from core.geometry import raster
+from core.imaging import images
+from core.solve import initial, split
+from core.solve.evidence import read_evidence
+from core.solve.prior import load
+from core.solve.problem import albedo
+from core.solve.skin_tone import parse_skin_tone
+from core.training.skins import carried_names, clusters
+
+from . import figures, people
+from .measures.references import NOTHING, TRUE
+from .measures.table import Column, Scores, summarise, to_markdown, to_record
+from .pages import write_page
+from .state_captures import DELIT, SIZE, SOLVED, Filmed, find
+from .state_scores import in_uv, mean_of, of_person, small
+
+COMMAND = "python -m benchmarks.split FOLDER --page docs/results/split.md --json docs/figures/split.json"
+ALONE, TOGETHER, LESS, MORE = "split alone", "split together", "prior of the scales halved", "prior of the scales doubled"
+COLUMNS = {"psnr_uv": Column("PSNR in UV, dB"), "psnr_shared": Column("up to one shared light, dB"), "light_shared": Column("that light, in log", 3, 0),
+           "psnr_alone": Column("up to a light of its own, dB"), "agreement": Column("agreement, dB")}
+WORDS = ("Means over people ± their spread, then differences from the delit texture, person by person, ± the standard error of their mean. *Up to one "
+         "shared light*: one grey second-order light, fitted to all captures of a person together, is no error (a capture cannot tell it from skin, and a "
+         "scan's own map holds some); what differs between captures is. *Agreement*: PSNR of the difference between the captures' albedos. *Split alone* is "
+         "the texture over the global light that the closed form finds, before anything is sampled; *together*, over the light that it finds with all "
+         "captures of that person.")
+BINS_MM = (0, 4, 8, 14, 20, 30, 40, 60)
+PLAIN = 0.5
+"""Clip of a log ratio to the mean face: beyond is hair or paint."""
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--truths", type=Path, help="where NAME/ with the truth lies, if not in FOLDER")
+    parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
+    parser.add_argument("--beside", nargs="+", default=[], metavar="NAME=FOLDER", help="the same captures, solved in another way")
+    parser.add_argument("--skins", type=Path, help="carried skins, for the traits' reach")
+    parser.add_argument("--page", type=Path)
+    parser.add_argument("--json", type=Path)
+    asked = parser.parse_args()
+    folder = asked.folder.resolve()
+    captures = [filmed for filmed in find(folder, (asked.truths or folder).resolve(), folder / "state") if filmed.name.startswith(tuple(asked.only))]
+    if not captures:
+        parser.error(f"{folder} holds no capture with a texture and a truth.")
+    beside = dict(pair.split("=", 1) for pair in asked.beside)
+    scores, by_capture, scales = measure(captures, {name: Path(path) for name, path in beside.items()})
+    found = summarise(scores, COLUMNS, DELIT)
+    sections = [("", f"{WORDS} {len(captures)} captures of {len({filmed.person for filmed in captures})} people."),
+                ("All people", to_markdown(found, COLUMNS, "taken for albedo", DELIT)),
+                ("Capture by capture, up to the person's shared light, dB", capture_table(by_capture)),
+                ("The scales that were found", scale_table(scales))]
+    record = {**to_record(found, scores), "captures": by_capture, "scales": scales}
+    if asked.skins:
+        record["skins"] = reach_of_traits(asked.skins)
+        sections.append(("How far traits reach", reach_table(record["skins"])))
+    print("\n\n".join(f"{heading}\n\n{body}" for heading, body in sections))
+    if asked.page:
+        write_page(asked.page, "Skin or light", COMMAND, sections)
+    if asked.json:
+        figures.write(asked.json, "split", COMMAND, record)
+    return 0
+
+
+def measure(captures: list[Filmed], beside: dict[str, Path]) -> tuple[Scores, dict, dict]:
+    """Method -> person -> figures; capture -> method -> PSNR up to the shared light; capture -> scales, of the capture alone."""
+    scores: Scores = {}
+    by_capture, scales = {}, {}
+    for person in dict.fromkeys(filmed.person for filmed in captures):
+        own = [filmed for filmed in captures if filmed.person == person]
+        shapes = {filmed.name: shapes_of(filmed) for filmed in own}
+        maps = []
+        for filmed in own:
+            others = [shapes[other.name] for other in own if other is not filmed]
+            answers = {method: filmed.answer(method) for method in (NOTHING, TRUE, DELIT, SOLVED)}
+            answers |= {name: solved_map(path / f"{filmed.name}.wildcap") for name, path in beside.items()}
+            alone = split.split([shapes[filmed.name]])
+            scales[filmed.name] = [round(value, 4) for value in astuple(alone.scales)]
+            answers |= {ALONE: divided(filmed, alone, False)}
+            if others:
+                answers |= {TOGETHER: divided(filmed, split.split([shapes[filmed.name], *others]), True)}
+            for name, factor in ((LESS, 0.5), (MORE, 2.0)):
+                typical = split.Scales(*(factor * value for value in split.TYPICAL))
+                answers |= {name: divided(filmed, split.split([shapes[filmed.name]], typical), False)}
+            maps.append(small({method: answer for method, answer in answers.items() if answer is not None}))
+            print(f"{filmed.name}: split", file=sys.stderr, flush=True)
+        each = [in_uv(filmed, answers) for filmed, answers in zip(own, maps, strict=True)]
+        together, alone = of_person(own, maps)
+        for method, of_all in together.items():
+            if method not in (NOTHING, TRUE):
+                scores.setdefault(method, {})[person] = {**mean_of([row[method] for row in each if method in row]), **of_all}
+                for name, psnr in alone[method].items():
+                    by_capture.setdefault(name, {})[method] = round(psnr, 3)
+    return scores, by_capture, scales
+
+
+def shapes_of(filmed: Filmed) -> split.Shapes:
+    """What the solver would split of a capture, with the true tone."""
+    evidence = read_evidence(filmed.capture, read_filmed_head(filmed.capture), SIZE)
+    tone = parse_skin_tone(people.skin_tone(filmed.truth))
+    if tone is None:
+        raise Problem(f"{filmed.truth} has no skin tone.", "Give it a skin_tone.txt with sRGB R,G,B.")
+    return initial.shapes_of(evidence, albedo(initial.reference(load(), tone, evidence, "mean")))
+
+
+def divided(filmed: Filmed, found: split.Split, local: bool) -> np.ndarray:
+    """The delit texture [SIZE, SIZE, 3], linear, over the light that was found."""
+    texture = images.resize(filmed.answer(DELIT), SIZE, SIZE)
+    normal = read_evidence(filmed.capture, read_filmed_head(filmed.capture), SIZE).normal
+    light = found.light(normal) * (split.enlarged(torch.from_numpy(found.local), SIZE).exp() if local else 1)
+    return texture / light.permute(1, 2, 0).numpy()
+
+
+def solved_map(root: Path) -> np.ndarray | None:
+    path = Capture(root).maps / "diffuse_albedo.png"
+    return images.read_linear(path) if path.is_file() else None
+
+
+def reach_of_traits(folder: Path) -> dict:
+    """Of painted skins, one of each cluster: deviation of the grey log ratio to their mean over the facial skin, and its correlation by distance, with the
+    same side and with the mirror image of the other."""
+    count, names = 64, carried_names(folder)
+    mesh = template.load()
+    face, bary = raster.rasterize_uv(mesh, count)
+    bare = np.prod([1 - images.resize(template.mask(name, SIZE), count, count) for name in ("brows", "lips", "eyes", "nostrils", "scalp", "ears")], 0)
+    where = (face >= 0) & (images.resize(template.mask("face", SIZE), count, count) * bare > 0.7)
+    chosen = [cluster[0] for cluster in clusters(folder, names)]
+    logs = np.stack([np.log(np.maximum(images.resize(images.read_linear(folder / f"{name}.png"), count, count), 1e-3)).mean(-1)[where] for name in chosen])
+    logs -= np.median(logs, 1, keepdims=True)
+    logs = np.clip(logs - np.median(logs, 0), -PLAIN, PLAIN)
+    logs -= logs.mean(1, keepdims=True)
+    places = raster.interpolate(mesh.vertices, mesh.faces, face, bary)[where]
+    rng = np.random.default_rng(0)
+    i, j = rng.integers(0, len(places), (2, 200000))
+    product = (logs[:, i] * logs[:, j]).mean(0) / np.square(logs).mean()
+    apart = 1e3 * np.linalg.norm(places[i] - places[j], axis=1)
+    mirrored = 1e3 * np.linalg.norm(places[i] - places[j] * [-1, 1, 1], axis=1)
+    across = (places[i, 0] * places[j, 0] < 0) & (np.abs(places[i, 0]) > 0.012)
+    bins = list(zip(BINS_MM, BINS_MM[1:], strict=False))
+    return {"skins": len(chosen), "deviation": round(float(np.sqrt(np.square(logs).mean())), 4),
+            "same": [round(float(product[(apart >= low) & (apart < high)].mean()), 3) for low, high in bins],
+            "mirrored": [round(float(product[across & (mirrored >= low) & (mirrored < high)].mean()), 3) for low, high in bins]}
+
+
+def capture_table(by_capture: dict[str, dict[str, float]]) -> str:
+    methods = list(dict.fromkeys(method for row in by_capture.values() for method in row if method not in (LESS, MORE)))
+    rows = [[name, *(f"{row[method]:.2f}" if method in row else None for method in methods),
+             f"{row[SOLVED] - row[DELIT]:+.2f}" if SOLVED in row else None] for name, row in by_capture.items()]
+    return figures.markdown(["capture", *methods, "solve adds"], rows)
+
+
+def scale_table(scales: dict[str, list[float]]) -> str:
+    names = ["traits", "global light", "local light", "noise"]
+    return ("Deviations in natural log along the axis of brightness (times 0.58 in each channel).\n\n"
+            + figures.markdown(["capture", *names], [[name, *(f"{value:.3f}" for value in row)] for name, row in scales.items()]))
+
+
+def reach_table(found: dict) -> str:
+    heads = [f"{low} to {high} mm" for low, high in zip(BINS_MM, BINS_MM[1:], strict=False)]
+    return (f"Correlation of the grey log ratio of {found['skins']} painted skins to their mean, whose deviation is {found['deviation']:.2f}, by distance; the "
+            f"model takes exp(-distance / {1e3 * split.REACH_M:.0f} mm), and {split.ALIKE} of it with the mirror image.\n\n"
+            + figures.markdown(["", *heads], [["same side", *found["same"]], ["mirror image", *found["mirrored"]]]))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,218 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Skin or light: the large shapes of a texture, split into what is this person's and what light is left.
+
+In the logarithm a texture is the mean face of the tone, plus this person's traits, plus light, plus noise, and each of these is taken for a Gaussian:
+
+    traits         broad (REACH_M) and mostly alike on the face's two sides (ALIKE), whichever way the skin faces
+    global light   second-order spherical harmonics of the normal, their level free
+    local light    what a light leaves that the normal does not tell (a soft shadow, a delighter's mistake): nearly as broad as traits, but of one side
+    noise          narrow: fine detail, and what the frames' registration leaves of it
+
+So the split is linear algebra (Gaussian process regression; Rasmussen and Williams 2006, chapter 2). How large each of the four is on this face is not known:
+the most probable scales are taken, by the evidence of the texture itself (ibid., section 5.4) and by what they usually are (TYPICAL). No delighter is asked for
+by name: where one leaves much light, much of its texture is explained by light. Of several captures of a person the traits are the same and the lights are
+not, which tells them apart far better, local light included. benchmarks/split.py measures the constants and the outcome.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import cv2
+import numpy as np
+import torch
+from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
+
+from ..face import template
+from ..geometry import raster
+from ..light.spherical_harmonics import sh_basis
+
+CELLS, FIRST_CELLS = 48, 24
+"""Cells along the map's side by which a capture is split, and by which the scales are found: some 4 and 8 mm of the face each."""
+REACH_M, ALIKE = 0.022, 0.8
+"""Distance over which the traits' correlation falls to 1 / e, and the correlation of a place with its mirror image: of painted skins (benchmarks/split.py)."""
+LOCAL_REACH_M, NOISE_REACH_M = 0.020, 0.005
+AXES = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6]])
+"""Axes of a log colour along which the parts are taken for independent: brightness, red against blue, green against both."""
+OF_AXES = np.array([1.0, 0.3, 0.1])
+"""Deviations along these axes over that of brightness, of skins and of light alike."""
+OF_ORDERS = np.array([0.0, 1, 1, 1, 0.6, 0.6, 0.6, 0.6, 0.6])
+"""Deviations of the global light's coefficients over that of a first-order one; the level's own is LEVEL: exposure is free."""
+LEVEL = 0.5
+VISIBLE = np.sqrt(4 * np.pi)
+"""The functions of the normal are scaled to a mean square of one over the sphere."""
+DARKEST = 1e-3
+FULL = 0.5
+"""Share of a cell that has to be seen skin outside of M."""
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Deviations in natural log along the axis of brightness, 1 / sqrt(3) of which each channel has: of the traits, of a first-order coefficient of the global
+    light, of local light, of noise."""
+
+    traits: float
+    light: float
+    local: float
+    noise: float
+
+    def __iter__(self):
+        return (getattr(self, field.name) for field in fields(self))
+
+
+TYPICAL, VARIED = Scales(0.20, 0.08, 0.08, 0.07), 0.6
+"""The scales' own prior: log-normal about these, with this deviation of the logarithm."""
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """What is split of a capture. texture and reference albedo [3, S, S] linear, in the built-in head's UVs; normal [3, S, S], unit, in any axes; weight [S, S]
+    in [0, 1]: how far a texel tells of skin, 0 in M."""
+
+    texture: torch.Tensor
+    reference: torch.Tensor
+    normal: torch.Tensor
+    weight: torch.Tensor
+
+
+@dataclass(frozen=True)
+class Split:
+    """Of the capture that is asked about. coefficients [3, 9]: the global light's logarithm, on orthonormal functions of the normal; traits and local
+    [3, C, C]: natural log, over the whole head; scales as they were found."""
+
+    coefficients: np.ndarray
+    traits: np.ndarray
+    local: np.ndarray
+    scales: Scales
+
+    def light(self, normal: torch.Tensor) -> torch.Tensor:
+        """The global light [3, S, S] at normals [3, S, S], linear: a factor of the albedo."""
+        return torch.from_numpy(np.exp(np.tensordot(self.coefficients, sh_basis(normal.numpy().astype(np.float64), axis=0), 1))).float()
+
+
+@dataclass(frozen=True)
+class Cells:
+    """places [N, 3] in metres on the built-in head and normal [N, 3] of all cells of a head; seen [K]: which of them tell of the skin; values [K, 3] there:
+    log(texture / reference) along AXES; covered [C, C]: where the N lie."""
+
+    places: np.ndarray
+    normal: np.ndarray
+    seen: np.ndarray
+    values: np.ndarray
+    covered: np.ndarray
+
+
+@dataclass(frozen=True)
+class Model:
+    """The covariances of places with others, without their scales, each [N, M]; level: 1 for two of one capture."""
+
+    traits: np.ndarray
+    light: np.ndarray
+    local: np.ndarray
+    noise: np.ndarray
+    level: np.ndarray
+
+    def covariance(self, scales: Scales, axis: int) -> np.ndarray:
+        """Of all parts together, along an axis."""
+        sizes = np.square(OF_AXES[axis] * np.array(tuple(scales)))
+        parts = sum(size * part for size, part in zip(sizes, (self.traits, self.light, self.local, self.noise), strict=True))
+        return parts + LEVEL**2 * self.level + 1e-6 * np.eye(*self.level.shape)
+
+
+def split(captures: list[Shapes], typical: Scales = TYPICAL) -> Split:
+    """Splits the first capture, beside others of the same person where there are any; `typical`: the middle of the scales' prior."""
+    fewer = len(captures) ** -0.5
+    scales = find_scales(*seen_together([cells_of(shapes, round(FIRST_CELLS * fewer)) for shapes in captures]), typical)
+    return infer([cells_of(shapes, round(CELLS * fewer)) for shapes in captures], scales)
+
+
+def cells_of(shapes: Shapes, count: int) -> Cells:
+    """A capture as count x count cells."""
+    weight = shapes.weight.numpy().astype(np.float32)
+    ratio = np.log(np.maximum(shapes.texture.numpy(), DARKEST)) - np.log(np.maximum(shapes.reference.numpy(), DARKEST))
+    share = _shrunk(weight, count)
+    mean = _shrunk(ratio.transpose(1, 2, 0) * weight[..., None], count) / np.maximum(share, 1e-4)[..., None]
+    mesh = template.load()
+    face, bary = raster.rasterize_uv(mesh, count)
+    covered = face >= 0
+    normal = _shrunk(shapes.normal.numpy().transpose(1, 2, 0), count)[covered].astype(np.float64)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-6)
+    seen = np.flatnonzero(share[covered] > FULL)
+    places = raster.interpolate(mesh.vertices, mesh.faces, face, bary)[covered]
+    return Cells(places, normal, seen, mean[covered][seen].astype(np.float64) @ AXES.T, covered)
+
+
+def seen_together(captures: list[Cells]) -> tuple[Model, np.ndarray]:
+    """The covariances among all cells that were seen, and their values [K, 3]."""
+    own = np.repeat(np.arange(len(captures)), [len(cells.seen) for cells in captures])
+    places, normal = (np.concatenate([getattr(cells, name)[cells.seen] for cells in captures]) for name in ("places", "normal"))
+    return model(places, normal, own, places, normal, own), np.concatenate([cells.values for cells in captures])
+
+
+def model(places: np.ndarray, normal: np.ndarray, own: np.ndarray, others: np.ndarray, their_normal: np.ndarray, their_own: np.ndarray) -> Model:
+    """The covariances of places [N, 3] of captures `own` [N] with others; each capture has a light of its own."""
+    same = (own[:, None] == their_own[None]).astype(np.float64)
+    apart = np.linalg.norm(places[:, None] - others[None], axis=-1)
+    mirrored = np.linalg.norm(places[:, None] * [-1, 1, 1] - others[None], axis=-1)
+    variance, their_variance = (1 + ALIKE * np.exp(-2 * np.abs(p[:, 0]) / REACH_M) for p in (places, others))  # higher where a place is its own mirror image
+    traits = (np.exp(-apart / REACH_M) + ALIKE * np.exp(-mirrored / REACH_M)) / np.sqrt(variance[:, None] * their_variance[None])
+    light = (VISIBLE**2 * sh_basis(normal) * OF_ORDERS**2) @ sh_basis(their_normal).T
+    return Model(traits, light * same, np.exp(-apart / LOCAL_REACH_M) * same, np.exp(-apart / NOISE_REACH_M) * same, same)
+
+
+def find_scales(together: Model, values: np.ndarray, typical: Scales = TYPICAL) -> Scales:
+    """The most probable scales, by a search along one of them after the other."""
+    best, most = typical, log_probability(together, values, typical, typical)
+    for step in (2.0, 1.4, 1.2):
+        moved = True
+        while moved:
+            moved = False
+            for name in (field.name for field in fields(Scales)):
+                for factor in (step, 1 / step):
+                    tried = replace(best, **{name: getattr(best, name) * factor})
+                    probable = log_probability(together, values, tried, typical)
+                    if probable > most:
+                        best, most, moved = tried, probable, True
+    return best
+
+
+def log_probability(together: Model, values: np.ndarray, scales: Scales, typical: Scales = TYPICAL) -> float:
+    """Of values [K, 3] under the scales, and of the scales themselves, but for a constant."""
+    total = -0.5 * sum((np.log(found / usual) / VARIED) ** 2 for found, usual in zip(scales, typical, strict=True))
+    for axis in range(3):
+        lower, column = cholesky(together.covariance(scales, axis), lower=True), values[:, axis]
+        total -= 0.5 * float(np.square(solve_triangular(lower, column, lower=True)).sum()) + float(np.log(np.diag(lower)).sum())
+    return total
+
+
+def infer(captures: list[Cells], scales: Scales) -> Split:
+    """The posterior mean of each part of the first capture, under the scales."""
+    together, values = seen_together(captures)
+    first, rest = captures[0], np.concatenate([np.full(len(cells.seen), k) for k, cells in enumerate(captures)])
+    places, normal = (np.concatenate([getattr(cells, name)[cells.seen] for cells in captures]) for name in ("places", "normal"))
+    beyond = model(first.places, first.normal, np.zeros(len(first.places), int), places, normal, rest)
+    basis = VISIBLE * sh_basis(first.normal[first.seen])
+    traits, local, coefficients = np.zeros((3, len(first.places))), np.zeros((3, len(first.places))), np.zeros((3, 9))
+    for axis, size in enumerate(OF_AXES):
+        told = cho_solve(cho_factor(together.covariance(scales, axis)), values[:, axis])
+        traits[axis], local[axis] = (scales.traits * size) ** 2 * beyond.traits @ told, (scales.local * size) ** 2 * beyond.local @ told
+        prior = (scales.light * size * OF_ORDERS) ** 2 + LEVEL**2 * (OF_ORDERS == 0)
+        coefficients[axis] = VISIBLE * prior * (basis.T @ told[rest == 0])
+    return Split(AXES.T @ coefficients, *(_spread(AXES.T @ part, first.covered) for part in (traits, local)), scales)
+
+
+def enlarged(field: torch.Tensor, size: int) -> torch.Tensor:
+    """A field [3, C, C] at size x size."""
+    return torch.nn.functional.interpolate(field[None], (size, size), mode="bicubic", align_corners=False)[0]
+
+
+def _spread(values: np.ndarray, covered: np.ndarray) -> np.ndarray:
+    """[3, N] of the covered cells as maps [3, C, C]; what is off the head takes its neighbours' values."""
+    maps = np.zeros((*covered.shape, 3), np.float32)
+    maps[covered] = values.T
+    return raster.bleed(maps, covered).transpose(2, 0, 1)
+
+
+def _shrunk(image: np.ndarray, count: int) -> np.ndarray:
+    return cv2.resize(np.ascontiguousarray(image, np.float32), (count, count), interpolation=cv2.INTER_AREA)

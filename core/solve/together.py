@@ -1,0 +1,36 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Other captures of the same person, in other light: they tell this one's light from the person's skin (split.py)."""
+
+from __future__ import annotations
+
+from ..contract.capture import Capture
+from ..contract.messages import Problem
+from ..contract.settings import Settings
+from ..contract.together import captures_in
+from ..face.head import read_filmed_head
+from .evidence import Evidence, read_evidence
+
+SIZE = 512
+"""Side at which they are read: what they tell is larger than a cell of split.py."""
+
+
+def read_others(capture: Capture, settings: Settings) -> list[Evidence]:
+    """What is known of the captures that settings.solve.together names; none without it.
+
+    A folder of several may hold this capture, too. Raises Problem where there is no other, for one that has no texture yet, and for a head in other UVs.
+    """
+    named = captures_in(settings.solve.together)
+    roots = [root for root in named if root.resolve() != capture.root.resolve()]
+    if named and not roots:
+        raise Problem(f"{settings.solve.together} is this capture itself.", "Name captures of the same person in other light.")
+    others = []
+    for root in roots:
+        other = Capture(root)
+        if not other.texture.is_file() or not other.shadow_mask_auto.is_file():
+            raise Problem(f"{root.name} has no texture and shadow mask yet.", "Reconstruct it up to the shadow mask first, or leave it out.")
+        head = read_filmed_head(other)
+        if not head.built_in:
+            raise Problem(f"{root.name} has a head in other UVs.", "Solve together only captures whose head is the built-in one.")
+        others.append(read_evidence(other, head, SIZE))
+    return others
