@@ -35,7 +35,7 @@ from core.face import template
 from core.face.head import read_head
 from core.geometry import meshes
 from core.imaging import images
-from core.solve import DELIT, initial, maps
+from core.solve import initial, maps
 from core.solve.evidence import read_evidence
 from core.solve.light_fit import update_lights, variation
 from core.solve.prior import WEIGHTS, load
@@ -73,7 +73,7 @@ ROWS: dict[str, tuple[dict, int, str, bool]] = {
     "moles not protected": ({"protect_marks": False}, CELLS, "painted", True),
     "light explains features too": ({"trusting": True}, CELLS, "painted", True),
     "local light not smooth": ({"smooth": 0.0}, CELLS, "painted", True),
-    "lights held back": (DELIT, CELLS, "painted", True),
+    "light as split from skin": ({"linear": 9.0}, CELLS, "painted", True),
     "global light in closed form at first": ({"phases": (("grid", 0.0, 0.5),), "refit": 0.3}, CELLS, "painted", True),
     "proximal guidance": ({"guidance": "proximal"}, CELLS, "painted", True),
     "75 steps": ({"steps": 75}, CELLS, "painted", True),
@@ -187,8 +187,8 @@ def solved(given: UvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0, cell
         meshes.write_obj(capture.head, template.load())
         evidence = read_evidence(capture, read_head(capture), size)
     start = initial.start(prior, evidence, tone, FACE_CROP / cells, recipe)
-    state = sample(prior.of_tone(start.tone), start.observations, start.state, recipe, seeded(seed)) if with_prior else texels_alone(start, recipe)
-    return maps.finished(state, evidence, start, recipe).diffuse
+    state = sample(prior.of_tone(start.tone), start.observations, start.state, start.recipe, seeded(seed)) if with_prior else texels_alone(start, start.recipe)
+    return maps.finished(state, evidence, start).diffuse
 
 
 def texels_alone(start: initial.Start, recipe: Recipe, updates: int = 600, fit: Callable[..., None] = update_lights, smooth: float = 0.0) -> State:

@@ -125,11 +125,10 @@ def solved(capture: Capture, settings: Settings, method: str, seed: int) -> tupl
     if method in ("texture", "over its blur"):
         return *_by_hand(capture, evidence, settings, method), time.monotonic() - began
     prior = _prior()
-    recipe = recipe_of(settings, prior)
     cell = FACE_CROP / settings.solve.grid_cells * REFERENCE / evidence.extent.side
     tone = parse_skin_tone(settings.solve.skin_tone)
-    start = initial.start(prior, evidence, tone, cell, recipe, lambda marks: confirmed(capture, head, marks, evidence.size))
-    fit = {}
+    start = initial.start(prior, evidence, tone, cell, recipe_of(settings, prior), lambda marks: confirmed(capture, head, marks, evidence.size))
+    fit, recipe = {}, start.recipe
     if method in LIGHTS:
         start, recipe, move = LIGHTS[method](start, recipe)
         fit = {"fit": move}
@@ -137,7 +136,7 @@ def solved(capture: Capture, settings: Settings, method: str, seed: int) -> tupl
         state = texels_alone(start, replace(recipe, decay=0.995), FREE_UPDATES, smooth=FREE_SMOOTH, **fit)
     else:
         state = sample(prior.of_tone(start.tone), start.observations, start.state, recipe, seeded(seed), **fit)
-    result = maps.finished(state, evidence, start, recipe)
+    result = maps.finished(state, evidence, start)
     return result.diffuse, result.shading, time.monotonic() - began
 
 

@@ -47,11 +47,11 @@ def flash(source: Capture, work: Capture, settings: Settings) -> Capture:
 def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict]:
     """The solver's albedo, sRGB [S, S, 3], where the light is known and gone: even, one colour, held throughout; and the seconds."""
     began, prior = time.monotonic(), _prior()
-    recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0)
+    recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0, linear=0.0)
     evidence = read_evidence(capture, read_head(capture), settings.solve.size)
     start = initial.start(prior, evidence, parse_skin_tone(settings.solve.skin_tone), FACE_CROP / settings.solve.grid_cells, recipe)
-    state = sample(prior.of_tone(start.tone), start.observations, start.state, recipe, seeded(settings.seed))
-    return images.linear_to_srgb(maps.finished(state, evidence, start, recipe).diffuse), {"seconds": round(time.monotonic() - began, 1)}
+    state = sample(prior.of_tone(start.tone), start.observations, start.state, start.recipe, seeded(settings.seed))
+    return images.linear_to_srgb(maps.finished(state, evidence, start).diffuse), {"seconds": round(time.monotonic() - began, 1)}
 
 
 def studio(source: Capture, work: Capture, settings: Settings) -> Capture:

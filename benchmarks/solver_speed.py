@@ -171,7 +171,7 @@ def single_steps(row: Row, capture, options: argparse.Namespace) -> dict:
     coarse = OURS.coarse if row.coarse and not prior.one_scale else ()
     recipe = replace(OURS, coarse=coarse, guidance=row.guidance, sharp_edges=False, protect_marks=False)
     begun = initial.start(prior, read_evidence(capture, read_head(capture), options.size), parse_skin_tone(TONE), FACE_CROP / 96, recipe)
-    short = replace(recipe, steps=options.steps, updates=max(1, recipe.updates * options.steps // recipe.steps))
+    short = replace(begun.recipe, steps=options.steps, updates=max(1, recipe.updates * options.steps // recipe.steps))
     if options.compile:
         prior.network = torch.compile(prior.network)
     conditioned = prior.of_tone(begun.tone)

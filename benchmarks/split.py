@@ -3,6 +3,7 @@
 """Skin or light: what the split of a texture's large shapes (core/solve/split.py) is worth, alone and under the solve, and what it takes for granted.
 
     python -m benchmarks.split FOLDER [--truths FOLDER] [--only PREFIX ...] [--beside NAME=FOLDER ...] [--skins FOLDER] [--page PATH] [--json PATH]
+    python -m benchmarks.split FOLDER --only NAME --picture OUT.jpg     the parts of that capture, side by side
 
 FOLDER holds captures as benchmarks/state.py measures them, several lights of each person, solved. The closed form alone is a second of work: the texture over
 the global light that it finds, of each capture alone and of all captures of a person together; and with the scales' prior halved and doubled. --beside names
@@ -49,6 +50,11 @@ WORDS = ("Means over people ± their spread, then differences from the delit tex
          "scan's own map holds some); what differs between captures is. *Agreement*: PSNR of the difference between the captures' albedos. *Split alone* is "
          "the texture over the global light that the closed form finds, before anything is sampled; *together*, over the light that it finds with all "
          "captures of that person.")
+PARTS = ("![As filmed, delit, mean face; with traits, global light, local light; texture over light, solved, true](../pictures/split.jpg)\n\n"
+         "A lamp from below (`python -m benchmarks.split FOLDER --only stubbled_below --picture docs/pictures/split.jpg`). Above: as filmed, delit, "
+         "the mean face of the tone. Middle: with the traits that were found; the light of the whole face that the delighter left, and what it left "
+         "locally. Below: the delit texture over that light, as solved, and the truth. What stays is mostly the delighter's: noise in the dark, a nose "
+         "whose shadow was brightened too much.")
 BINS_MM = (0, 4, 8, 14, 20, 30, 40, 60)
 PLAIN = 0.5
 """Clip of a log ratio to the mean face: beyond is hair or paint."""
@@ -61,6 +67,7 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
     parser.add_argument("--beside", nargs="+", default=[], metavar="NAME=FOLDER", help="the same captures, solved in another way")
     parser.add_argument("--skins", type=Path, help="carried skins, for the traits' reach")
+    parser.add_argument("--picture", type=Path, help="draw the parts of the first capture instead of measuring; of synthetic people only in the docs")
     parser.add_argument("--page", type=Path)
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
@@ -68,11 +75,14 @@ def main() -> int:
     captures = [filmed for filmed in find(folder, (asked.truths or folder).resolve(), folder / "state") if filmed.name.startswith(tuple(asked.only))]
     if not captures:
         parser.error(f"{folder} holds no capture with a texture and a truth.")
+    if asked.picture:
+        images.write_srgb(asked.picture, parts_side_by_side(captures[0]))
+        return 0
     beside = dict(pair.split("=", 1) for pair in asked.beside)
     scores, by_capture, scales = measure(captures, {name: Path(path) for name, path in beside.items()})
     found = summarise(scores, COLUMNS, DELIT)
     sections = [("", f"{WORDS} {len(captures)} captures of {len({filmed.person for filmed in captures})} people."),
-                ("All people", to_markdown(found, COLUMNS, "taken for albedo", DELIT)),
+                ("The parts", PARTS), ("All people", to_markdown(found, COLUMNS, "taken for albedo", DELIT)),
                 ("Capture by capture, up to the person's shared light, dB", capture_table(by_capture)),
                 ("The scales that were found", scale_table(scales))]
     record = {**to_record(found, scores), "captures": by_capture, "scales": scales}
@@ -134,6 +144,25 @@ def divided(filmed: Filmed, found: split.Split, local: bool) -> np.ndarray:
     normal = read_evidence(filmed.capture, read_filmed_head(filmed.capture), SIZE).normal
     light = found.light(normal) * (split.enlarged(torch.from_numpy(found.local), SIZE).exp() if local else 1)
     return texture / light.permute(1, 2, 0).numpy()
+
+
+def parts_side_by_side(filmed: Filmed) -> np.ndarray:
+    """As filmed, delit, mean face; mean face with traits, global and local light about a middle grey; the texture over the global light, solved, true: sRGB, at
+    the truth's tone."""
+    shapes = shapes_of(filmed)
+    found = split.split([shapes])
+    maps = small({method: answer for method in (NOTHING, DELIT, SOLVED, TRUE) if (answer := filmed.answer(method)) is not None})
+    mean = shapes.reference.permute(1, 2, 0).numpy()
+    traits, local = (split.enlarged(torch.from_numpy(part), SIZE).exp().permute(1, 2, 0).numpy() for part in (found.traits, found.local))
+    light = found.light(shapes.normal).permute(1, 2, 0).numpy()
+    where, tone = filmed.where, maps[TRUE][filmed.where].mean(0)
+    skins = [maps[NOTHING], maps[DELIT], mean, mean * traits, maps[DELIT] / light, maps.get(SOLVED, maps[DELIT] / light), maps[TRUE]]
+    toned = [skin * tone / np.maximum(skin[where].mean(0), 1e-6) for skin in skins]
+    lights = [0.35 * part / np.maximum(part[where].mean(0), 1e-6) for part in (light, local)]
+    rows, columns = (np.flatnonzero(where.any(axis)) for axis in (1, 0))
+    box = np.s_[rows[0]:rows[-1] + 1, columns[0]:columns[-1] + 1]
+    shown = [images.linear_to_srgb(np.clip(part, 0, 1))[box] for part in (*toned[:4], *lights, *toned[4:])]
+    return np.vstack([np.hstack(shown[first:first + 3]) for first in (0, 3, 6)])
 
 
 def solved_map(root: Path) -> np.ndarray | None:

@@ -29,7 +29,7 @@ def begun(shading) -> Start:
     o = Observation(texture, inside, torch.ones(SIZE, SIZE), torch.zeros(1, 2, SIZE, SIZE), shader, torch.zeros(SIZE, SIZE))
     mean = (texture * inside).sum((1, 2)) / inside.sum() / 0.4
     state = State(0, None, reference, Lights(constant_light(mean), torch.zeros(1, 9, 4, 4), torch.ones(3)))
-    return Start(torch.full((3,), 0.4), reference, 1.0, torch.zeros(SIZE, SIZE), {1: o}, state)
+    return Start(torch.full((3,), 0.4), OURS, reference, 1.0, torch.zeros(SIZE, SIZE), {1: o}, state)
 
 
 def fitted(start, recipe, move, steps=10) -> tuple[float, float]:

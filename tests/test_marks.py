@@ -119,7 +119,7 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     evidence, recipe = read_evidence(capture, read_head(capture), SIZE), replace(OURS, guidance="proximal", steps=16)
     start = initial.start(prior, evidence, SkinTone.from_linear(TONE, GIVEN), 8.0, recipe)
     assert [(round(m.row / 4), round(m.column / 4)) for m in start.marks] == [(round(row / 4), round(column / 4))]
-    solved = maps.finished(sample(prior.of_tone(start.tone), start.observations, start.state, recipe, seeded(0)), evidence, start, recipe).diffuse
+    solved = maps.finished(sample(prior.of_tone(start.tone), start.observations, start.state, start.recipe, seeded(0)), evidence, start).diffuse
 
     def contrast(image):
         log, away = np.log(np.maximum(image, 1e-3)).mean(-1), distance_to(row, column)

@@ -31,7 +31,7 @@ from .evidence import REFERENCE, Evidence, read_evidence
 from .memory import sample_within_memory, spare_memory
 from .prior import WEIGHTS, ConditionedPrior, Prior, load
 from .problem import State, unexplained
-from .recipes import RECIPES, Recipe
+from .recipes import RECIPES, Recipe, free
 from .sampler import seeded
 from .skin_tone import SkinTone
 from .together import read_others
@@ -42,10 +42,8 @@ from .witnesses import confirmed
 FACE_CROP = 768
 """Texels at 1024 over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels."""
 
-
-DELIT = {"split": True, "phases": (("grid", 0.0, 0.5),), "faint": 2.0}
-"""After a delighter little light is left, and the lights would rather explain how this face (its cheeks, its blotches) differs from the mean one. So the global
-light is what the split of both says (split.py), and local light is held to what M's border says. Raw light is too strong and too hard for the split."""
+FAINT = 2.0
+"""After any delighter little of a shadow is left, and what M takes along of dark skin and beards is not to be explained by local light (Recipe.faint)."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
@@ -66,7 +64,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     elsewhere = None
     if options.prior:  # the authors' prior speaks of maps in other UVs
         elsewhere, prior = layout.fitted(capture, head, known, prior, report)
-        evidence, recipe = elsewhere.evidence(known, recipe.released_boxes), without_split(recipe)
+        evidence, recipe = elsewhere.evidence(known, recipe.released_boxes), free(recipe)  # the split knows its places on the built-in head
     _check_often(prior, report)
     cell = FACE_CROP / options.grid_cells * REFERENCE / evidence.extent.side
     part = solve_edited(capture, head, settings, recipe, prior, evidence, cell, report) if settings.edited_part and elsewhere is None else None
@@ -99,10 +97,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             images.write_srgb(capture.preview / "loss.png", drawing.loss_curve(losses, steps))
             report.preview("preview/loss.png")
 
-    state = sample_within_memory(denoiser, seen, state.to(denoiser.device), recipe, seeded(settings.seed, denoiser.device), on_step, report.log)
-    state.denoised = restored(denoiser, state.denoised, seen[1].coords, recipe, settings.seed)
+    state = sample_within_memory(denoiser, seen, state.to(denoiser.device), start.recipe, seeded(settings.seed, denoiser.device), on_step, report.log)
+    state.denoised = restored(denoiser, state.denoised, seen[1].coords, start.recipe, settings.seed)
     state = state.to("cpu")
-    result, found = _finished(denoiser, state, evidence, start, recipe, settings.seed, report)
+    result, found = _finished(denoiser, state, evidence, start, settings.seed, report)
     delivered = result if elsewhere is None else elsewhere.returned(result, known, state.lights, start.exposure, start.tone)
     maps.write(capture, delivered, found, conditions)
     iris.measure(capture, head, delivered.diffuse, report)
@@ -112,13 +110,14 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     stored.unlink(missing_ok=True)
 
 
-def _finished(prior: ConditionedPrior, state: State, evidence: Evidence, start: initial.Start, recipe: Recipe, seed: int,
+def _finished(prior: ConditionedPrior, state: State, evidence: Evidence, start: initial.Start, seed: int,
               report: Reporter) -> tuple[maps.Maps, Solution]:
     """The maps with their confidence, and what a later solve of a part needs."""
     factor = max(start.observations)
-    varied = spread(prior, start.observations[factor], coarse(start.reference, factor), state.lights, recipe, seed, report.check)
-    result = maps.finished(state, evidence, start, recipe, varied)
-    return result, Solution(state.denoised, state.lights, evidence.alpha, start.alpha, varied, start.tone, result.gain, start.exposure, start.local)
+    varied = spread(prior, start.observations[factor], coarse(start.reference, factor), state.lights, start.recipe, seed, report.check)
+    result = maps.finished(state, evidence, start, varied)
+    return result, Solution(state.denoised, state.lights, evidence.alpha, start.alpha, varied, start.tone, result.gain, start.exposure, start.local,
+                            start.recipe.linear > 0)
 
 
 def recipe_of(settings: Settings, prior: Prior) -> Recipe:
@@ -131,12 +130,8 @@ def recipe_of(settings: Settings, prior: Prior) -> Recipe:
         recipe = replace(recipe, sigma_min=prior.sigmas[0], sigma_max=prior.sigmas[1])
     if settings.solve.recipe != "wildcap":
         return recipe
-    return replace(recipe, steps=settings.solve.steps, guidance=settings.solve.guidance, **({} if settings.delight.delighter == "none" else DELIT))
-
-
-def without_split(recipe: Recipe) -> Recipe:
-    """For maps in other UVs than the built-in head's, on which the split knows its places: the global light moves freely, as on raw light."""
-    return replace(recipe, split=False, phases=RECIPES["wildcap"].phases) if recipe.split else recipe
+    faint = 0.0 if settings.delight.delighter == "none" else FAINT
+    return replace(recipe, steps=settings.solve.steps, guidance=settings.solve.guidance, faint=faint)
 
 
 def _check_often(prior: Prior, report: Reporter) -> None:

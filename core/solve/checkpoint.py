@@ -28,7 +28,7 @@ from .skin_tone import EARLIER, SkinTone
 class Solution:
     """What a solve ended with, all of the whole map: denoised x_0 [1, 7, S, S] before the maps' own gain, lights, the mask as `painted` [S, S] and as it was
     used (`alpha`), the spread [H, W] of a coarser map that the confidence took; the skin tone, gain [3] of the albedo, exposure of the texture;
-    local [3, C, C]: initial.Start's."""
+    local [3, C, C]: initial.Start's; settled: whether the split told the global light."""
 
     denoised: torch.Tensor
     lights: Lights
@@ -39,6 +39,7 @@ class Solution:
     gain: torch.Tensor
     exposure: float
     local: torch.Tensor
+    settled: bool
 
 
 def write_solution(path: Path, found: Solution, conditions: dict[str, str]) -> None:
@@ -46,6 +47,7 @@ def write_solution(path: Path, found: Solution, conditions: dict[str, str]) -> N
     lights = {"glob": found.lights.glob, "grid": found.lights.grid, "chroma": found.lights.chroma}
     tensors = {name: getattr(found, name) for name in ("denoised", "painted", "alpha", "spread", "gain", "local")} | lights
     tensors["tone"] = found.tone.tensor
+    tensors["settled"] = torch.tensor(found.settled)
     tensors["exposure"] = torch.tensor(found.exposure, dtype=torch.float64)
     tensors = {name: tensor.detach().cpu().clone().contiguous() for name, tensor in tensors.items()}
     _save(path, tensors, {FIELD: json.dumps(conditions)})
@@ -61,7 +63,7 @@ def read_solution(path: Path, conditions: dict[str, str]) -> Solution | None:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
         lights = Lights(*(tensors.pop(name) for name in ("glob", "grid", "chroma")))
         tone = SkinTone.from_linear(tensors.pop("tone"), EARLIER)
-        return Solution(lights=lights, tone=tone, exposure=tensors.pop("exposure").item(), **tensors)
+        return Solution(lights=lights, tone=tone, exposure=tensors.pop("exposure").item(), settled=bool(tensors.pop("settled")), **tensors)
     except (OSError, SafetensorError, KeyError, TypeError, ValueError):
         return None
 

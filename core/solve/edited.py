@@ -46,9 +46,9 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
     if part is not None:
         near[part.inside] = 1
     start = initial.again(prior, evidence, earlier, cell, recipe, near, lambda marks: confirmed(capture, head, marks, evidence.size))
-    found = earlier if part is None else _sampled(settings, recipe, prior.of_tone(earlier.tone), evidence, earlier, start, part, report)
+    found = earlier if part is None else _sampled(settings, start.recipe, prior.of_tone(earlier.tone), evidence, earlier, start, part, report)
     state = State(0, None, found.denoised, found.lights)
-    result = maps.finished(state, evidence, start, recipe, found.spread, found.gain)
+    result = maps.finished(state, evidence, start, found.spread, found.gain)
     if part is None:
         report.log("The mask is the last solve's: nothing was solved again.")
     else:
@@ -73,4 +73,4 @@ def _sampled(settings: Settings, recipe: Recipe, prior: ConditionedPrior, eviden
     rows, columns = (slice(a.start // factor, a.stop // factor) for a in part.inside)
     whole = earlier.spread.clone()
     whole[rows, columns] = patch[tuple(slice((a.start - b.start) // factor, (a.stop - b.start) // factor) for a, b in zip(part.inside, part.seen, strict=True))]
-    return Solution(denoised, lights, evidence.alpha, start.alpha, whole, earlier.tone, earlier.gain, earlier.exposure, earlier.local)
+    return Solution(denoised, lights, evidence.alpha, start.alpha, whole, earlier.tone, earlier.gain, earlier.exposure, earlier.local, earlier.settled)

@@ -19,18 +19,20 @@ from .marks import Mark, with_marks
 from .prior import Prior, coordinates, mean_at
 from .problem import Observation, State
 from .problem import albedo as albedo_of
-from .recipes import OURS, Recipe
+from .recipes import OURS, Recipe, free, settled
 from .skin_tone import SkinTone
 from .split import Shapes, enlarged, split
 
 
 @dataclass(frozen=True)
 class Start:
-    """tone: the skin's; reference x_0^ref [1, 7, S, S]; exposure: what the texture is multiplied by in `observations` (by coarsening factor),
-    so that its shading is about one; alpha [S, S]: M as it is used; state: before the first step; marks: what of the skin's own
-    is kept from the light; local [3, C, C], natural log: what other captures of the person tell of the light beside theta, zeros without any."""
+    """tone: the skin's; recipe: the one that was asked for, as this capture's light lets it be used; reference x_0^ref [1, 7, S, S]; exposure: what the texture
+    is multiplied by in `observations` (by coarsening factor), so that its shading is about one; alpha [S, S]: M as it is used; state: before the first step;
+    marks: what of the skin's own is kept from the light; local [3, C, C], natural log: what other captures of the person tell of the light beside theta,
+    zeros without any."""
 
     tone: SkinTone
+    recipe: Recipe
     reference: torch.Tensor
     exposure: float
     alpha: torch.Tensor
@@ -54,28 +56,33 @@ def start(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, recipe:
     weight = trusted * (1 - evidence.alpha) if recipe.fitted else lit  # one even light is best told by skin
     lights = first_lights(evidence.texture * exposure, albedo_of(x_ref), evidence.normal, weight if weight.sum() >= 1 else trusted, grid_cells(cell), recipe)
     local = torch.zeros(3, 1, 1)
-    if recipe.split:
+    if recipe.linear:
         told = split([shapes_of(each, albedo_of(reference(prior, tone, each, recipe.reference))) for each in (evidence, *others)])
         light = told.light(evidence.normal)
-        lights.glob = fit_around_constant(light, torch.ones_like(light), shading_basis(evidence.normal), evidence.skin * evidence.weight, 1e-3)
+        if deviation(light.log(), lit) < recipe.linear:
+            recipe = settled(recipe)
+            lights.glob = fit_around_constant(light, torch.ones_like(light), shading_basis(evidence.normal), evidence.skin * evidence.weight, 1e-3)
+        else:
+            recipe = free(recipe)
         if others:  # one capture alone cannot tell a light of this form from a trait
             local = torch.from_numpy(told.local)
-    begun = Start(tone, x_ref, exposure, evidence.alpha, {}, State(0, None, x_ref, lights), local=local)
-    return _laid_out(prior, evidence, begun, cell, recipe, witness=witness)
+    begun = Start(tone, recipe, x_ref, exposure, evidence.alpha, {}, State(0, None, x_ref, lights), local=local)
+    return _laid_out(prior, evidence, begun, cell, witness=witness)
 
 
 def again(prior: Prior, evidence: Evidence, earlier: Solution, cell: float, recipe: Recipe, near: torch.Tensor,
           witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
     """What a part of an earlier solve goes on from: that solve's tone, exposure and light, and where `near` [S, S] is 0 its mask too."""
     x_ref = reference(prior, earlier.tone, evidence, recipe.reference)
-    begun = Start(earlier.tone, x_ref, earlier.exposure, evidence.alpha, {}, State(0, None, earlier.denoised, earlier.lights), local=earlier.local)
-    return _laid_out(prior, evidence, begun, cell, recipe, lambda alpha: torch.lerp(earlier.alpha, alpha, near), witness)
+    recipe = settled(recipe) if earlier.settled else free(recipe)
+    begun = Start(earlier.tone, recipe, x_ref, earlier.exposure, evidence.alpha, {}, State(0, None, earlier.denoised, earlier.lights), local=earlier.local)
+    return _laid_out(prior, evidence, begun, cell, lambda alpha: torch.lerp(earlier.alpha, alpha, near), witness)
 
 
-def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float, recipe: Recipe,
+def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float,
               mask: Callable[[torch.Tensor], torch.Tensor] = lambda alpha: alpha, witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
     """`begun` with M as it is used, the marks that light must not explain, and the observations under both."""
-    evidence = replace(evidence, texture=evidence.texture / enlarged(begun.local, evidence.size).exp())
+    evidence, recipe = replace(evidence, texture=evidence.texture / enlarged(begun.local, evidence.size).exp()), begun.recipe
     lit = torch.einsum("ck,khw->chw", begun.state.lights.glob, shading_basis(evidence.normal)) * albedo_of(begun.reference).clamp_min(1e-3)
     light = evidence.texture * begun.exposure / lit.clamp_min(1e-3)
     if recipe.sharp_edges:
@@ -97,6 +104,12 @@ def lit_skin(evidence: Evidence) -> torch.Tensor:
     if lit.sum() < 1:
         raise Problem("No facial skin was seen in the texture.", "Look at the texture in the report; film the face from the front and from both sides.")
     return lit
+
+
+def deviation(log: torch.Tensor, weight: torch.Tensor) -> float:
+    """Standard deviation of fields [3, H, W] about their own means, under a weight [H, W]."""
+    away = log - mean_tone(log, weight)[:, None, None]
+    return float(mean_tone(away**2, weight).mean().sqrt())
 
 
 def exposure_to(albedo: torch.Tensor, texture: torch.Tensor, weight: torch.Tensor) -> float:

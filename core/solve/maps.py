@@ -20,7 +20,6 @@ from .evidence import Evidence
 from .initial import Start, mean_tone
 from .marks import cover
 from .problem import Observation, State, albedo
-from .recipes import Recipe
 from .split import enlarged
 
 DARKEST = 0.004  # linear albedo below which no skin or hair lies
@@ -39,7 +38,7 @@ class Maps:
     gain: torch.Tensor
 
 
-def finished(state: State, evidence: Evidence, start: Start, recipe: Recipe, spread: torch.Tensor | None = None, gain: torch.Tensor | None = None) -> Maps:
+def finished(state: State, evidence: Evidence, start: Start, spread: torch.Tensor | None = None, gain: torch.Tensor | None = None) -> Maps:
     """Reads the maps out of \\hat x_0. The albedo is rescaled once so that the mean of the confident facial skin is the skin tone (or by a `gain`
     [3] that was found before); the shading takes the inverse, so that their product stays. What nobody saw is the mean face of that tone: a drawn
     sample would be as likely, but would look like something that was measured. `spread` [H, W], of any size, is
@@ -56,7 +55,7 @@ def finished(state: State, evidence: Evidence, start: Start, recipe: Recipe, spr
         diffuse = torch.lerp(diffuse, evidence.texture / shading, kept)
     diffuse = diffuse.clamp_min(DARKEST)
     if gain is None:
-        gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone.tensor, recipe.rescale)
+        gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone.tensor, start.recipe.rescale)
     normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
     specular = ((x[6] + 1) / 2).clamp(0, 1).numpy()
     explained = (1 - (shading / main).mean(0)).clamp(0, 1)  # the share of the darkness that was called shadow

@@ -37,7 +37,8 @@ class Recipe:
     open: float = 0.0  # how far the texel grid reaches outside of M; above 0 it takes away shadows that nobody masked, and more
     one_chroma: bool = True  # all local light has one learned colour; False: 27 free numbers per cell
     bilinear: bool = False  # how a texel reads V; else cubic
-    split: bool = False  # gamma^g is what the split of skin and light says (split.py), and stays; else it moves as the phases say
+    linear: float = 0.25  # gamma^g is what the split of skin and light says (split.py), and stays, where that light's logarithm deviates by less: to there
+    # exp(x) is 1 + x within 3 %. A stronger light, as of frames that no delighter saw, is free, and all light is with 0
     fitted: bool = True  # gamma^g starts from a least-squares fit to x_0^ref; else from the even light that gives the texture's mean
     sharp_edges: bool = True  # M's border is laid on the shadow's edge where the texture shows one, and there light may step
     protect_marks: bool = True  # moles and round scars inside M tell nothing of the light
@@ -51,7 +52,8 @@ class Recipe:
     tv_of_gamma: bool = False  # L_TV is the squared variation of the SH coefficients; else the L1 variation of the shading on M's ring
     neg: float = 1.0
     smooth: float = 1.4  # L1 variation of s^V inside M, per texel of a 1024 map and mean squared albedo: a brow is not worth its outline, a shadow is
-    faint: float = 0.0  # pull of s^V towards what M's border says is missing, likewise; not where the artist added to the proposal for M
+    faint: float = 0.0  # pull of s^V towards what M's border says is missing, per texel and mean squared albedo; not where the artist added to the
+    # proposal for M
 
     # the end
     released_boxes: bool = False  # with the authors' prior the tone is that of their box, and texture and M count within the bounds of their masks alone
@@ -61,7 +63,8 @@ class Recipe:
 OURS = Recipe()
 
 # What neither the paper nor the released code has is off in both.
-_PLAIN = replace(OURS, coarse=(), hard_mask=True, one_chroma=False, sharp_edges=False, protect_marks=False, trusting=True, smooth=0.0)
+_PLAIN = replace(OURS, coarse=(), hard_mask=True, one_chroma=False, sharp_edges=False, protect_marks=False, trusting=True, smooth=0.0,
+                 linear=0.0)
 
 RECIPES = {
     "wildcap": OURS,
@@ -79,3 +82,13 @@ RECIPES = {
     "released": replace(_PLAIN, steps=599, start=0.599, reference="uniform", clip="decade", candidates=20, blur=True, fitted=False,
                         phases=(("main", 0.0, 101 / 599), ("grid", 101 / 599, 301 / 599)), updates=1, rescale="srgb", released_boxes=True),
 }
+
+
+def settled(recipe: Recipe) -> Recipe:
+    """Where the split has told gamma^g: it stays, V alone moves."""
+    return replace(recipe, phases=tuple(("grid", begin, end) for _, begin, end in recipe.phases), refit=0.0)
+
+
+def free(recipe: Recipe) -> Recipe:
+    """Where it has not: all light moves as the phases say."""
+    return replace(recipe, linear=0.0)

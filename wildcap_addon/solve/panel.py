@@ -46,6 +46,7 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         if item.use_skin_tone:
             layout.label(text=tone_words(item), icon='INFO')
         _draw_white_point(layout, item)
+        layout.prop(item.solve, "together")
         layout.prop(item, "device")
         layout.prop(item, "seed")
         row = layout.row(align=True)
@@ -53,7 +54,7 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         row.operator("wildcap.solve_edited")
         for stage in stages.STAGES[stages.NAMES.index(stages.MASK_STAGE) + 1:]:
             if stage.name != "transfer":  # it stands under Deliver
-                draw_settings(layout, item, stage, without=("skin_tone", "white_point"))
+                draw_settings(layout, item, stage, without=("skin_tone", "white_point", "together"))
 
 
 def tone_words(item) -> str:
