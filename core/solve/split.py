@@ -18,6 +18,7 @@ not, which tells them apart far better, local light included. benchmarks/split.p
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import cache
 
 import cv2
 import numpy as np
@@ -133,14 +134,19 @@ def cells_of(shapes: Shapes, count: int) -> Cells:
     ratio = np.log(np.maximum(shapes.texture.numpy(), DARKEST)) - np.log(np.maximum(shapes.reference.numpy(), DARKEST))
     share = _shrunk(weight, count)
     mean = _shrunk(ratio.transpose(1, 2, 0) * weight[..., None], count) / np.maximum(share, 1e-4)[..., None]
-    mesh = template.load()
-    face, bary = raster.rasterize_uv(mesh, count)
-    covered = face >= 0
+    places, covered = places_of(count)
     normal = _shrunk(shapes.normal.numpy().transpose(1, 2, 0), count)[covered].astype(np.float64)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-6)
     seen = np.flatnonzero(share[covered] > FULL)
-    places = raster.interpolate(mesh.vertices, mesh.faces, face, bary)[covered]
     return Cells(places, normal, seen, mean[covered][seen].astype(np.float64) @ AXES.T, covered)
+
+
+@cache
+def places_of(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of count x count cells: where on the built-in head they lie [N, 3], and which of them do [count, count]."""
+    mesh = template.load()
+    face, bary = raster.rasterize_uv(mesh, count)
+    return raster.interpolate(mesh.vertices, mesh.faces, face, bary)[face >= 0], face >= 0
 
 
 def seen_together(captures: list[Cells]) -> tuple[Model, np.ndarray]:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from ..contract.capture import Capture
-from ..contract.messages import Problem
+from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..contract.together import captures_in
 from ..face.head import read_filmed_head
@@ -15,7 +15,7 @@ SIZE = 512
 """Side at which they are read: what they tell is larger than a cell of split.py."""
 
 
-def read_others(capture: Capture, settings: Settings) -> list[Evidence]:
+def read_others(capture: Capture, settings: Settings, report: Reporter) -> list[Evidence]:
     """What is known of the captures that settings.solve.together names; none without it.
 
     A folder of several may hold this capture, too. Raises Problem where there is no other, for one that has no texture yet, and for a head in other UVs.
@@ -25,7 +25,8 @@ def read_others(capture: Capture, settings: Settings) -> list[Evidence]:
     if named and not roots:
         raise Problem(f"{settings.solve.together} is this capture itself.", "Name captures of the same person in other light.")
     others = []
-    for root in roots:
+    for k, root in enumerate(roots):
+        report.progress(k, len(roots), f"reading {root.name}")
         other = Capture(root)
         if not other.texture.is_file() or not other.shadow_mask_auto.is_file():
             raise Problem(f"{root.name} has no texture and shadow mask yet.", "Reconstruct it up to the shadow mask first, or leave it out.")
