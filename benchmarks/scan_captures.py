@@ -25,7 +25,7 @@ from core.contract.capture import Capture
 from core.contract.files import replacing, write_json
 from core.contract.settings import Settings
 from core.geometry import raster
-from core.geometry.meshes import Mesh, joined, vertex_normals
+from core.geometry.meshes import Mesh, joined, vertex_normals, write_obj
 from core.geometry.views import View
 from core.imaging import images
 from core.synthetic import sample, scene
@@ -75,6 +75,7 @@ def photograph(data: Path, folder: Path, name: str) -> Capture:
     faces = {}
     for frame in np.unique(np.linspace(1, FRAMES - 2, TRUTHS).round().astype(int)).tolist():
         faces[frame] = _write_truth(target, frame, views[frame], caster, opaque, albedo, facial, light.sun.direction if light.sun else None)
+    write_obj(target / "head.obj", head)  # by it the five are known to be one person
     write_json(target / "cameras.json", {"name": name, "light": LIGHTS[name], "focal_px": scene.FOCAL * SCALE,
                                          "width": views[0].width, "height": views[0].height,
                                          "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
