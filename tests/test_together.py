@@ -3,6 +3,7 @@
 """Captures of one person in other light, solved together: what differs is light, what agrees is skin; and what a solve depends on of them."""
 
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from core.contract import stages
 from core.contract.messages import Problem, Reporter
 from core.contract.together import captures_in, hash_told
 from core.face import template
+from core.geometry import meshes
 from core.imaging import images
 from core.solve import split
 
@@ -66,8 +68,11 @@ def test_a_folder_of_captures_names_all_of_them_but_the_one_that_is_solved(two, 
 def test_what_cannot_be_solved_together_is_refused(two, tmp_path):
     first, second, _ = two
     (tmp_path / "nothing").mkdir()
+    other = make(tmp_path / "three" / "Zoë.wildcap")
+    built_in = template.load()
+    meshes.write_obj(other.head, replace(built_in, uvs=built_in.uvs * 0.5))
     second.texture.unlink()
-    for named, problem in ((first.root, "this capture itself"), (tmp_path / "nothing", "no capture"), (second.root, "no texture")):
+    for named, problem in ((first.root, "this capture itself"), (tmp_path / "nothing", "no capture"), (second.root, "no texture"), (other.root, "other UVs")):
         with pytest.raises(Problem, match=problem):
             albedo_of(first, together=str(named))
     assert not first.maps.exists()
