@@ -4,9 +4,9 @@
 
     python -m benchmarks.scan_captures DATA FOLDER [--lights NAME ...]
 
-DATA holds lee_perry_smith/ and lps_sun/, neither of which is part of this project. FOLDER/NAME is the truth in the layout that benchmarks/albedo_score.py says,
-FOLDER/NAME.wildcap the capture: FRAMES frames and their cameras, so that the chain begins at scan. The scan's own map stands for the albedo, though it holds
-light itself: what differs between the five is the measure, not the distance to it. What is there is not made again.
+DATA holds lee_perry_smith/ and lps_sun/, neither of which is part of this project. FOLDER/scan_NAME is the truth in the layout that
+benchmarks/albedo_score.py says, FOLDER/scan_NAME.wildcap the capture: FRAMES frames and their cameras, so that the chain begins at scan. The scan's own map
+stands for the albedo, though it holds light itself: what differs between the five is the measure, not the distance to it. What is there is not made again.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def main() -> None:
 
 def photograph(data: Path, folder: Path, name: str) -> Capture:
     """The capture and truth of one light, made if they are not there; prints the minutes."""
-    target, capture = folder / name, Capture(folder / f"{name}.wildcap")
+    target, capture = folder / f"scan_{name}", Capture(folder / f"scan_{name}.wildcap")
     if (target / "skin_tone.txt").exists():  # written last
         return capture
     began = time.monotonic()
