@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import astuple
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -110,7 +110,7 @@ def measure(captures: list[Filmed], beside: dict[str, Path]) -> tuple[Scores, di
             answers = {method: filmed.answer(method) for method in (NOTHING, TRUE, DELIT, SOLVED)}
             answers |= {name: solved_map(path / f"{filmed.name}.wildcap") for name, path in beside.items()}
             alone = split.split([shapes[filmed.name]])
-            scales[filmed.name] = [round(value, 4) for value in astuple(alone.scales)]
+            scales[filmed.name] = {name: round(value, 4) for name, value in asdict(alone.scales).items()}
             answers |= {ALONE: divided(filmed, alone, False)}
             if others:
                 answers |= {TOGETHER: divided(filmed, split.split([shapes[filmed.name], *others]), True)}
@@ -190,10 +190,14 @@ def reach_of_traits(folder: Path) -> dict:
     apart = 1e3 * np.linalg.norm(places[i] - places[j], axis=1)
     mirrored = 1e3 * np.linalg.norm(places[i] - places[j] * [-1, 1, 1], axis=1)
     across = (places[i, 0] * places[j, 0] < 0) & (np.abs(places[i, 0]) > 0.012)
-    bins = list(zip(BINS_MM, BINS_MM[1:], strict=False))
     return {"skins": len(chosen), "deviation": round(float(np.sqrt(np.square(logs).mean())), 4),
-            "same": [round(float(product[(apart >= low) & (apart < high)].mean()), 3) for low, high in bins],
-            "mirrored": [round(float(product[across & (mirrored >= low) & (mirrored < high)].mean()), 3) for low, high in bins]}
+            "same side": correlation_by_distance(product, apart), "mirror image": correlation_by_distance(product[across], mirrored[across])}
+
+
+def correlation_by_distance(product: np.ndarray, apart_mm: np.ndarray) -> dict[str, float]:
+    """The mean of products [N] of pairs, over the variance, by their distance [N]."""
+    return {f"{low} to {high} mm": round(float(product[(apart_mm >= low) & (apart_mm < high)].mean()), 3)
+            for low, high in zip(BINS_MM, BINS_MM[1:], strict=False)}
 
 
 def capture_table(by_capture: dict[str, dict[str, float]]) -> str:
@@ -203,17 +207,17 @@ def capture_table(by_capture: dict[str, dict[str, float]]) -> str:
     return figures.markdown(["capture", *methods, "solve adds"], rows)
 
 
-def scale_table(scales: dict[str, list[float]]) -> str:
+def scale_table(scales: dict[str, dict[str, float]]) -> str:
     names = ["traits", "global light", "local light", "noise"]
     return ("Deviations in natural log along the axis of brightness (times 0.58 in each channel).\n\n"
-            + figures.markdown(["capture", *names], [[name, *(f"{value:.3f}" for value in row)] for name, row in scales.items()]))
+            + figures.markdown(["capture", *names], [[name, *(f"{value:.3f}" for value in row.values())] for name, row in scales.items()]))
 
 
 def reach_table(found: dict) -> str:
-    heads = [f"{low} to {high} mm" for low, high in zip(BINS_MM, BINS_MM[1:], strict=False)]
+    sides = ("same side", "mirror image")
     return (f"Correlation of the grey log ratio of {found['skins']} painted skins to their mean, whose deviation is {found['deviation']:.2f}, by distance; the "
             f"model takes exp(-distance / {1e3 * split.REACH_M:.0f} mm), and {split.ALIKE} of it with the mirror image.\n\n"
-            + figures.markdown(["", *heads], [["same side", *found["same"]], ["mirror image", *found["mirrored"]]]))
+            + figures.markdown(["", *found[sides[0]]], [[side, *found[side].values()] for side in sides]))
 
 
 if __name__ == "__main__":
