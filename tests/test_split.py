@@ -16,7 +16,7 @@ from core.light.spherical_harmonics import sh_basis
 from core.solve import split as skin_or_light
 from core.solve.split import AXES, Scales, Shapes, cells_of, enlarged, infer, log_probability, seen_together, split
 
-SIZE = 192
+SIZE = 384
 TONE = torch.tensor([0.4, 0.25, 0.2])[:, None, None]
 
 
@@ -129,6 +129,6 @@ def test_little_seen_tells_little_of_the_light():
     nothing = split([Shapes(TONE.expand(3, SIZE, SIZE), TONE.expand(3, SIZE, SIZE), normal, 0 * skin)])
     assert deviation(nothing.light(normal).log()) < 1e-6
     corner = torch.zeros_like(skin)
-    corner[80:90, 90:100] = 1
+    corner[160:180, 180:200] = 1
     cells = cells_of(shapes(lamp(0, 0.2), corner), 48)
     assert deviation(infer([cells], skin_or_light.TYPICAL).light(normal).log()) < 0.2

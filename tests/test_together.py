@@ -15,15 +15,13 @@ from core.contract.together import captures_in, hash_told
 from core.face import template
 from core.geometry import meshes
 from core.imaging import images
-from core.solve import split
 
-from .painted_skin import SIZE, make, settings
+from .painted_skin import SIZE, brief_confidence, make, settings  # noqa: F401
 
 
 @pytest.fixture
-def two(tmp_path, monkeypatch):
+def two(tmp_path):
     """Two captures of the same skin: the first in a soft spot of shade that no mask shows, the second in light from the other side."""
-    monkeypatch.setattr(split, "CELLS", 32)  # quicker, and the spot is larger
     first, second = (make(tmp_path / name / "Zoë.wildcap") for name in ("one", "two"))
     y, x = np.mgrid[:SIZE, :SIZE] / SIZE
     texture = images.read_linear(first.texture)

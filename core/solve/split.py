@@ -31,6 +31,8 @@ from ..light.spherical_harmonics import sh_basis
 
 CELLS, FIRST_CELLS = 48, 24
 """Cells along the map's side by which a capture is split, and by which the scales are found: some 4 and 8 mm of the face each."""
+CELL_TEXELS = 8
+"""Fewest texels along a cell's side: a small map has fewer cells."""
 REACH_M, ALIKE = 0.022, 0.8
 """Distance over which the traits' correlation falls to 1 / e, and the correlation of a place with its mirror image: of painted skins (benchmarks/split.py)."""
 LOCAL_REACH_M, NOISE_REACH_M = 0.020, 0.005
@@ -124,8 +126,9 @@ class Model:
 def split(captures: list[Shapes], typical: Scales = TYPICAL) -> Split:
     """Splits the first capture, beside others of the same person where there are any; `typical`: the middle of the scales' prior."""
     fewer = len(captures) ** -0.5
-    scales = find_scales(*seen_together([cells_of(shapes, round(FIRST_CELLS * fewer)) for shapes in captures]), typical)
-    return infer([cells_of(shapes, round(CELLS * fewer)) for shapes in captures], scales)
+    most = captures[0].weight.shape[0] // CELL_TEXELS
+    scales = find_scales(*seen_together([cells_of(shapes, round(min(FIRST_CELLS, most) * fewer)) for shapes in captures]), typical)
+    return infer([cells_of(shapes, round(min(CELLS, most) * fewer)) for shapes in captures], scales)
 
 
 def cells_of(shapes: Shapes, count: int) -> Cells:
