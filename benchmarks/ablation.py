@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import tempfile
 import time
@@ -73,7 +74,7 @@ ROWS: dict[str, tuple[dict, int, str, bool]] = {
     "moles not protected": ({"protect_marks": False}, CELLS, "painted", True),
     "light explains features too": ({"trusting": True}, CELLS, "painted", True),
     "local light not smooth": ({"smooth": 0.0}, CELLS, "painted", True),
-    "light as split from skin": ({"linear": 9.0}, CELLS, "painted", True),
+    "light as split from skin": ({"linear": math.inf}, CELLS, "painted", True),
     "global light in closed form at first": ({"phases": (("grid", 0.0, 0.5),), "refit": 0.3}, CELLS, "painted", True),
     "proximal guidance": ({"guidance": "proximal"}, CELLS, "painted", True),
     "75 steps": ({"steps": 75}, CELLS, "painted", True),

@@ -85,3 +85,14 @@ def test_of_another_capture_only_what_is_read_counts(two):
     images.write_data(second.shadow_mask, np.zeros((SIZE, SIZE), np.float32))
     assert hash_told(str(second.root)) != told
     assert set(stages.by_name("solve").reads) <= {name.partition("/")[2] for name in told}
+
+
+def test_in_a_light_that_is_too_strong_to_be_told_the_others_are_left_out_and_it_is_said(two):
+    first, second, _ = two
+    y, x = np.mgrid[:SIZE, :SIZE] / SIZE
+    images.write_linear(first.texture, images.read_linear(first.texture) * np.exp(3 * (x - 0.5))[..., None].astype(np.float32))
+    said = []
+    solve.run(first, settings(steps=4, together=str(second.root)), Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))))
+    assert any("The other captures were not used" in text for text in said)
+    with_others = images.read_linear(first.maps / "diffuse_albedo.exr")
+    assert np.array_equal(albedo_of(first), with_others)

@@ -6,11 +6,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from . import stages
 from .hashes import hash_file, hash_tree, sample_file
 from .messages import Problem
 
 RECORD = "capture.json"
-TOLD = ("head.obj", "texture.exr", "texture_confidence.exr", "shadow_mask_auto.png", "shadow_mask.png", "protect_mask.png")
+TOLD = (*stages.by_name("solve").reads, "shadow_mask.png", "protect_mask.png", *stages.OPEN_EYES)
 """What a solve reads of another capture."""
 
 

@@ -75,7 +75,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     conditions = mask_edit.conditions(capture, settings)
     witness = (lambda marks: confirmed(capture, head, marks, evidence.size)) if elsewhere is None else list
     tone = resolve_skin_tone(capture, head, settings, known, evidence, prior.tones, report)
-    start = initial.start(prior, evidence, tone, cell, recipe, witness, read_others(capture, settings, report))
+    others = read_others(capture, settings, report)
+    start = initial.start(prior, evidence, tone, cell, recipe, witness, others)
+    if others and not start.recipe.linear:
+        report.log("The other captures were not used: they help where a delighter has left a faint light, on the built-in head, by the default recipe.")
     denoiser = prior.of_tone(start.tone)
     report.figure("marks_kept_from_light", len(start.marks))
     images.write_srgb(capture.picture("solve", "edges_and_marks"), drawing.edges_and_marks(evidence, start.alpha, start.marks))

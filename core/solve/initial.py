@@ -62,10 +62,10 @@ def start(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, recipe:
         if deviation(light.log(), lit) < recipe.linear:
             recipe = settled(recipe)
             lights.glob = fit_around_constant(light, torch.ones_like(light), shading_basis(evidence.normal), evidence.skin * evidence.weight, 1e-3)
+            if others:  # one capture alone cannot tell a light of this form from a trait
+                local = torch.from_numpy(told.local)
         else:
             recipe = free(recipe)
-        if others:  # one capture alone cannot tell a light of this form from a trait
-            local = torch.from_numpy(told.local)
     begun = Start(tone, recipe, x_ref, exposure, evidence.alpha, {}, State(0, None, x_ref, lights), local=local)
     return _laid_out(prior, evidence, begun, cell, witness=witness)
 
