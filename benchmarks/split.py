@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import sys
 from dataclasses import asdict
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +50,8 @@ WORDS = ("Means over people ± their spread, then differences from the delit tex
          "shared light*: one grey second-order light, fitted to all captures of a person together, is no error (a capture cannot tell it from skin, and a "
          "scan's own map holds some); what differs between captures is. *Agreement*: PSNR of the difference between the captures' albedos. *Split alone* is "
          "the texture over the global light that the closed form finds, before anything is sampled; *together*, over the light that it finds with all "
-         "captures of that person.")
+         "captures of that person. Rows beside these are solves of the same textures by other code or options (`--beside`): *solved before* by commit c93b420, "
+         "whose lights were held back by pulls chosen by hand, *solved together* by `core run - CAPTURE --from solve --until solve --with OTHERS`.")
 PARTS = ("![As filmed, delit, mean face; with traits, global light, local light; texture over light, solved, true](../pictures/split.jpg)\n\n"
          "A lamp from below (`python -m benchmarks.split FOLDER --only stubbled_below --picture docs/pictures/split.jpg`). Above: as filmed, delit, "
          "the mean face of the tone. Middle: with the traits that were found; the light of the whole face that the delighter left, and what it left "
@@ -111,12 +113,12 @@ def measure(captures: list[Filmed], beside: dict[str, Path]) -> tuple[Scores, di
             answers |= {name: solved_map(path / f"{filmed.name}.wildcap") for name, path in beside.items()}
             alone = split.split([shapes[filmed.name]])
             scales[filmed.name] = {name: round(value, 4) for name, value in asdict(alone.scales).items()}
-            answers |= {ALONE: divided(filmed, alone, False)}
+            answers |= {ALONE: divided(shapes[filmed.name], alone, False)}
             if others:
-                answers |= {TOGETHER: divided(filmed, split.split([shapes[filmed.name], *others]), True)}
+                answers |= {TOGETHER: divided(shapes[filmed.name], split.split([shapes[filmed.name], *others]), True)}
             for name, factor in ((LESS, 0.5), (MORE, 2.0)):
                 typical = split.Scales(*(factor * value for value in split.TYPICAL))
-                answers |= {name: divided(filmed, split.split([shapes[filmed.name]], typical), False)}
+                answers |= {name: divided(shapes[filmed.name], split.split([shapes[filmed.name]], typical), False)}
             maps.append(small({method: answer for method, answer in answers.items() if answer is not None}))
             print(f"{filmed.name}: split", file=sys.stderr, flush=True)
         each = [in_uv(filmed, answers) for filmed, answers in zip(own, maps, strict=True)]
@@ -129,21 +131,22 @@ def measure(captures: list[Filmed], beside: dict[str, Path]) -> tuple[Scores, di
     return scores, by_capture, scales
 
 
+prior = cache(load)
+
+
 def shapes_of(filmed: Filmed) -> split.Shapes:
     """What the solver would split of a capture, with the true tone."""
     evidence = read_evidence(filmed.capture, read_filmed_head(filmed.capture), SIZE)
     tone = parse_skin_tone(people.skin_tone(filmed.truth))
     if tone is None:
         raise Problem(f"{filmed.truth} has no skin tone.", "Give it a skin_tone.txt with sRGB R,G,B.")
-    return initial.shapes_of(evidence, albedo(initial.reference(load(), tone, evidence, "mean")))
+    return initial.shapes_of(evidence, albedo(initial.reference(prior(), tone, evidence, "mean")))
 
 
-def divided(filmed: Filmed, found: split.Split, local: bool) -> np.ndarray:
-    """The delit texture [SIZE, SIZE, 3], linear, over the light that was found."""
-    texture = images.resize(filmed.answer(DELIT), SIZE, SIZE)
-    normal = read_evidence(filmed.capture, read_filmed_head(filmed.capture), SIZE).normal
-    light = found.light(normal) * (split.enlarged(torch.from_numpy(found.local), SIZE).exp() if local else 1)
-    return texture / light.permute(1, 2, 0).numpy()
+def divided(shapes: split.Shapes, found: split.Split, local: bool) -> np.ndarray:
+    """The delit texture [SIZE, SIZE, 3], linear, over the light that was found, at any exposure."""
+    light = found.light(shapes.normal) * (split.enlarged(torch.from_numpy(found.local), SIZE).exp() if local else 1)
+    return (shapes.texture / light).permute(1, 2, 0).numpy()
 
 
 def parts_side_by_side(filmed: Filmed) -> np.ndarray:

@@ -45,12 +45,12 @@ def drawn(seed, scales, parts=("traits",)):
     """Log fields [3, S, S] drawn from the model's own Gaussians, at its cells."""
     normal, skin = face()
     cells = cells_of(Shapes(TONE.expand(3, SIZE, SIZE), TONE.expand(3, SIZE, SIZE), normal, skin), 24)
-    everywhere = np.zeros(len(cells.places), int)
-    model = skin_or_light.model(cells.places, cells.normal, everywhere, cells.places, cells.normal, everywhere)
-    rng, values = np.random.default_rng(seed), np.zeros((3, len(everywhere)))
+    everywhere = skin_or_light.Places(cells.places, cells.normal, np.zeros(len(cells.places), int))
+    model = skin_or_light.model(everywhere, everywhere)
+    rng, values = np.random.default_rng(seed), np.zeros((3, len(cells.places)))
     for part in parts:
-        lower = np.linalg.cholesky(getattr(model, part) + 1e-6 * np.eye(len(everywhere)))
-        values += getattr(scales, part) * skin_or_light.OF_AXES[:, None] * (lower @ rng.standard_normal((len(everywhere), 3))).T
+        lower = np.linalg.cholesky(getattr(model, part) + 1e-6 * np.eye(len(cells.places)))
+        values += getattr(scales, part) * skin_or_light.OF_AXES[:, None] * (lower @ rng.standard_normal((len(cells.places), 3))).T
     return enlarged(torch.from_numpy(skin_or_light._spread(AXES.T @ values, cells.covered)), SIZE)
 
 
@@ -105,7 +105,8 @@ def test_exposure_and_the_axes_of_the_world_change_nothing():
 
 def test_the_probability_is_the_gaussians():
     cells = cells_of(shapes(lamp(1, 0.1)), 12)
-    together, values = seen_together([cells])
+    seen, values = seen_together([cells])
+    together = skin_or_light.model(seen, seen)
     scales = skin_or_light.TYPICAL
     by_scipy = sum(multivariate_normal(cov=together.covariance(scales, axis), allow_singular=True).logpdf(values[:, axis]) for axis in range(3))
     constant = -1.5 * len(values) * np.log(2 * np.pi)

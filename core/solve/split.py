@@ -107,6 +107,15 @@ class Cells:
 
 
 @dataclass(frozen=True)
+class Places:
+    """at [N, 3] in metres on the built-in head, normal [N, 3], and own [N]: the number of the capture."""
+
+    at: np.ndarray
+    normal: np.ndarray
+    own: np.ndarray
+
+
+@dataclass(frozen=True)
 class Model:
     """The covariances of places with others, without their scales, each [N, M]; level: 1 for two of one capture."""
 
@@ -127,7 +136,8 @@ def split(captures: list[Shapes], typical: Scales = TYPICAL) -> Split:
     """Splits the first capture, beside others of the same person where there are any; `typical`: the middle of the scales' prior."""
     fewer = len(captures) ** -0.5
     most = captures[0].weight.shape[0] // CELL_TEXELS
-    scales = find_scales(*seen_together([cells_of(shapes, round(min(FIRST_CELLS, most) * fewer)) for shapes in captures]), typical)
+    seen, values = seen_together([cells_of(shapes, round(min(FIRST_CELLS, most) * fewer)) for shapes in captures])
+    scales = find_scales(model(seen, seen), values, typical)
     return infer([cells_of(shapes, round(min(CELLS, most) * fewer)) for shapes in captures], scales)
 
 
@@ -152,21 +162,21 @@ def places_of(count: int) -> tuple[np.ndarray, np.ndarray]:
     return raster.interpolate(mesh.vertices, mesh.faces, face, bary)[face >= 0], face >= 0
 
 
-def seen_together(captures: list[Cells]) -> tuple[Model, np.ndarray]:
-    """The covariances among all cells that were seen, and their values [K, 3]."""
+def seen_together(captures: list[Cells]) -> tuple[Places, np.ndarray]:
+    """All cells that were seen, and their values [K, 3]."""
     own = np.repeat(np.arange(len(captures)), [len(cells.seen) for cells in captures])
-    places, normal = (np.concatenate([getattr(cells, name)[cells.seen] for cells in captures]) for name in ("places", "normal"))
-    return model(places, normal, own, places, normal, own), np.concatenate([cells.values for cells in captures])
+    return Places(*(np.concatenate([getattr(cells, name)[cells.seen] for cells in captures]) for name in ("places", "normal")), own), \
+        np.concatenate([cells.values for cells in captures])
 
 
-def model(places: np.ndarray, normal: np.ndarray, own: np.ndarray, others: np.ndarray, their_normal: np.ndarray, their_own: np.ndarray) -> Model:
-    """The covariances of places [N, 3] of captures `own` [N] with others; each capture has a light of its own."""
-    same = (own[:, None] == their_own[None]).astype(np.float64)
-    apart = np.linalg.norm(places[:, None] - others[None], axis=-1)
-    mirrored = np.linalg.norm(places[:, None] * [-1, 1, 1] - others[None], axis=-1)
-    variance, their_variance = (1 + ALIKE * np.exp(-2 * np.abs(p[:, 0]) / REACH_M) for p in (places, others))  # higher where a place is its own mirror image
-    traits = (np.exp(-apart / REACH_M) + ALIKE * np.exp(-mirrored / REACH_M)) / np.sqrt(variance[:, None] * their_variance[None])
-    light = (VISIBLE**2 * sh_basis(normal) * OF_ORDERS**2) @ sh_basis(their_normal).T
+def model(these: Places, others: Places) -> Model:
+    """The covariances of places with others; each capture has a light of its own."""
+    same = (these.own[:, None] == others.own[None]).astype(np.float64)
+    apart = np.linalg.norm(these.at[:, None] - others.at[None], axis=-1)
+    mirrored = np.linalg.norm(these.at[:, None] * [-1, 1, 1] - others.at[None], axis=-1)
+    variances = [1 + ALIKE * np.exp(-2 * np.abs(places.at[:, 0]) / REACH_M) for places in (these, others)]  # higher where a place is its own mirror image
+    traits = (np.exp(-apart / REACH_M) + ALIKE * np.exp(-mirrored / REACH_M)) / np.sqrt(np.multiply.outer(*variances))
+    light = (VISIBLE**2 * sh_basis(these.normal) * OF_ORDERS**2) @ sh_basis(others.normal).T
     return Model(traits, light * same, np.exp(-apart / LOCAL_REACH_M) * same, np.exp(-apart / NOISE_REACH_M) * same, same)
 
 
@@ -197,17 +207,16 @@ def log_probability(together: Model, values: np.ndarray, scales: Scales, typical
 
 def infer(captures: list[Cells], scales: Scales) -> Split:
     """The posterior mean of each part of the first capture, under the scales."""
-    together, values = seen_together(captures)
-    first, rest = captures[0], np.concatenate([np.full(len(cells.seen), k) for k, cells in enumerate(captures)])
-    places, normal = (np.concatenate([getattr(cells, name)[cells.seen] for cells in captures]) for name in ("places", "normal"))
-    beyond = model(first.places, first.normal, np.zeros(len(first.places), int), places, normal, rest)
+    first, (seen, values) = captures[0], seen_together(captures)
+    among = model(seen, seen)
+    beyond = model(Places(first.places, first.normal, np.zeros(len(first.places), int)), seen)
     basis = VISIBLE * sh_basis(first.normal[first.seen])
     traits, local, coefficients = np.zeros((3, len(first.places))), np.zeros((3, len(first.places))), np.zeros((3, 9))
     for axis, size in enumerate(OF_AXES):
-        told = cho_solve(cho_factor(together.covariance(scales, axis)), values[:, axis])
+        told = cho_solve(cho_factor(among.covariance(scales, axis)), values[:, axis])
         traits[axis], local[axis] = (scales.traits * size) ** 2 * beyond.traits @ told, (scales.local * size) ** 2 * beyond.local @ told
         prior = (scales.light * size * OF_ORDERS) ** 2 + LEVEL**2 * (OF_ORDERS == 0)
-        coefficients[axis] = VISIBLE * prior * (basis.T @ told[rest == 0])
+        coefficients[axis] = VISIBLE * prior * (basis.T @ told[seen.own == 0])
     return Split(AXES.T @ coefficients, *(_spread(AXES.T @ part, first.covered) for part in (traits, local)), scales)
 
 
