@@ -60,14 +60,16 @@ def test_the_command_solves_a_copy_and_takes_it_away(monkeypatch):
     assert job.tool.name == "self_test" and job.settings.device == "cpu" and not folder.exists()
 
 
-@pytest.mark.parametrize(("noise", "passes"), [(0.01, True), (0.1, False)])
-def test_the_score_is_that_of_the_albedo(capture, monkeypatch, noise, passes):
-    monkeypatch.setattr(tool.solve, "run", solved(noise))
+@pytest.mark.parametrize(("above_db", "passes"), [(1.0, True), (-1.0, False)])
+def test_the_score_is_that_of_the_albedo_and_what_lies_below_the_expected_fails(capture, monkeypatch, above_db, passes):
+    expected = json.loads(tool.EXPECTED.read_text(encoding="utf-8"))
+    score = expected["mean_db"] - tool.DEVIATIONS * expected["deviation_db"] + above_db
+    monkeypatch.setattr(tool.solve, "run", solved(10 ** (-score / 20)))
     final, said = run(capture)
     assert isinstance(final, Done if passes else Failed)
     if passes:
         figures = next(message.figures for message in said if isinstance(message, StageDone))
-        assert figures["score_db"] == pytest.approx(40, abs=0.5) and figures["seconds"] >= 0
+        assert figures["score_db"] == pytest.approx(score, abs=0.5) and figures["seconds"] >= 0
         assert any(isinstance(message, Log) and "The sample head was solved again" in message.text for message in said)
     else:
         assert "from what it should be" in final.problem and "Install Solver" in final.remedy
