@@ -115,6 +115,25 @@ def test_seen_hair_is_carried_on_over_the_scalp(cut):
     assert np.median(done.diffuse[back]) < 0.08 and np.median(done.diffuse[neck]) > 0.15
 
 
+def test_a_stray_patch_that_was_seen_at_a_glance_goes_and_a_mark_that_was_seen_well_stays(truth, cut):
+    """Two patches of the neck seen with half of the usual confidence, one of them three times as bright as its skin; and a mark on the cheek as dark."""
+    position, texel = surface().position, surface().texel
+    below = np.argwhere((template.mask("neck", SIZE) > 0.9) & (texel < 1.5 * np.median(texel)))
+    sides = [tuple(below[np.argsort(position[tuple(below.T)][:, 0])[k]]) for k in (len(below) // 5, 4 * len(below) // 5)]
+    stray, plain = (np.linalg.norm(position - position[at], axis=2) < 14 for at in sides)
+    well = (template.mask("face", SIZE) > 0.99) & (seen_well(cut.confidence, surface()) >= 1)
+    cheek = tuple(np.argwhere(well & (template.mask("skin", SIZE) > 0.99))[5000])
+    mark = (np.linalg.norm(position - position[cheek], axis=2) < 3) & well
+    confidence = np.where(stray | plain, np.float32(0.35), cut.confidence)
+    diffuse = np.where((stray | plain)[..., None], truth.diffuse, cut.diffuse)
+    diffuse[stray], diffuse[mark] = np.minimum(3 * diffuse[stray], 1), diffuse[mark] / 3
+    told = complete(replace(cut, confidence=confidence, diffuse=diffuse.astype(np.float32)), surface(), Reporter("upscale"))
+    inner = [np.linalg.norm(position - position[at], axis=2) < 4 for at in sides]
+    off = [float(np.abs(np.log(told.diffuse[at] / truth.diffuse[at])).mean()) for at in inner]
+    assert off[0] < 0.3 and off[1] < 0.2, off  # the stray one was off by 1.1
+    assert np.array_equal(told.diffuse[mark], diffuse[mark].astype(np.float32)) and mark.sum() > 5
+
+
 def test_a_head_seen_all_over_or_not_at_all_stays_as_it_is(truth):
     assert complete(truth, surface(), Reporter("upscale")) is truth
     blind = replace(truth, confidence=np.zeros_like(truth.confidence))

@@ -79,7 +79,7 @@ def train_delighter(config: str, out: Path, report: Reporter, minutes: float | N
         network.load_state_dict({name: value.float() for name, value in load_file(start).items()})
     state = descent.resumed(work, descent.beginning(config, data, network))
     recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
-                            betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"], save_every=180)
+                            betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"], save_every=600)
     descent.descend(network, state, _Steps(Portraits(data["seeds"], t["views"], work, hdri), People(data["people"], t["views"], work, hdri), t),
                     lambda batch, step, share: sum(losses(network, batch, device).values()),
                     lambda average: {kind + name: value for kind, batch in unseen.items() for name, value in figures(average, config, batch, device).items()},
@@ -101,8 +101,7 @@ def _people(t: dict) -> list[int]:
 
 def losses(network: DelightNet, batch: Batch, device: str) -> dict[str, torch.Tensor]:
     """The terms of the loss, each a scalar."""
-    low = device == "cuda" or fast_dtype("cpu") == torch.bfloat16
-    with torch.autocast(device, torch.bfloat16, enabled=low):
+    with torch.autocast(device, torch.bfloat16, enabled=_fast(device)):
         shading, shadow = network(batch.layers.to(device, memory_format=torch.channels_last))
     weight = batch.weight.to(device)
     tone, error = split_tone(shading - batch.shading.to(device), weight)
@@ -112,6 +111,11 @@ def losses(network: DelightNet, batch: Batch, device: str) -> dict[str, torch.Te
     sure = batch.shadow_weight.to(device)
     terms["shadow"] = SHADOW * (lost * sure).sum() / sure.sum().clamp_min(1)
     return terms
+
+
+def _fast(device: str) -> bool:
+    """Whether bfloat16 is the faster type there."""
+    return device == "cuda" or fast_dtype("cpu") == torch.bfloat16
 
 
 @torch.no_grad()
@@ -127,7 +131,9 @@ def figures(average: dict, config: str, batch: Batch, device: str) -> dict[str, 
         if name == "picture":
             layers[:, 6:] = 0
         chosen = batch.layers[:, 15].amax((1, 2)) > 0
-        shading, shadow = (torch.cat([network(part.to(device))[k].cpu() for part in layers[chosen].split(8)]) for k in (0, 1))
+        with torch.autocast(device, torch.bfloat16, enabled=_fast(device)):
+            answers = [network(part.to(device, memory_format=torch.channels_last)) for part in layers[chosen].split(8)]
+        shading, shadow = (torch.cat([answer[k].cpu() for answer in answers]) for k in (0, 1))
         told[name] = mean_deviation(shading - batch.shading[chosen], batch.weight[chosen])
         found, true, sure = shadow > 0, batch.shadow[chosen] > 0.5, batch.shadow_weight[chosen] > 0.9
         told[f"iou_{name}"] = ((found & true & sure).sum() / ((found | true) & sure).sum().clamp_min(1)).item()

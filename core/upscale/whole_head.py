@@ -42,18 +42,21 @@ DARKEST = 0.004
 
 
 def complete(maps: Maps, surface: HeadSurface, report: Reporter, seed: int = 0) -> Maps:
-    """The maps with what was not seen replaced; shading and confidence as they were. Texels whose `seen_well` is 1 keep their bytes."""
+    """The maps with what was not seen replaced; shading and confidence as they were. Texels whose `seen_well` is 1 keep their bytes, but for stray ones
+    beyond the face."""
     report.check()
     seen = seen_well(maps.confidence, surface)
     size = surface.size
-    holes = (seen < 1) & surface.covered
-    report.figure("completed_share_percent", round(100 * float(((1 - seen) * surface.covered * surface.texel**2).sum()
-                                                               / (surface.covered * surface.texel**2).sum()), 1))
-    if not holes.any() or seen.max() < 1:
+    if not ((seen < 1) & surface.covered).any() or seen.max() < 1:
+        report.figure("completed_share_percent", 0.0)
         return maps
     channels, slopes = apart(maps)
     tone = _tone(channels, seen * maps.confidence**2, surface, seed)
     report.check()
+    seen = _without_strays(seen, maps.confidence, np.abs(_low(channels, seen, surface) - tone)[..., :3].mean(2))
+    holes = (seen < 1) & surface.covered
+    report.figure("completed_share_percent", round(100 * float(((1 - seen) * surface.covered * surface.texel**2).sum()
+                                                               / (surface.covered * surface.texel**2).sum()), 1))
     skin = template.mask("skin", size) * seen
     learnt = grain.measure(channels, slopes, (skin >= 0.99).astype(np.float32), surface, seed)
     report.check()
@@ -77,6 +80,17 @@ def seen_well(confidence: np.ndarray, surface: HeadSurface) -> np.ndarray:
     seen = _smoothstep((closed - UNSEEN) / (SEEN - UNSEEN))
     inside = cv2.distanceTransform(np.pad((closed >= UNSEEN) | ~surface.covered, 1, mode="edge").astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
     return (seen * _smoothstep((np.minimum(inside, 1e4) * surface.texel - SKIRT) / FEATHER) * surface.covered).astype(np.float32)
+
+
+def _without_strays(seen: np.ndarray, confidence: np.ndarray, off: np.ndarray) -> np.ndarray:
+    """`seen` [S, S] without what was seen at a glance only and lies `off` the head's tone (log albedo [S, S]): light that was divided out wrongly, cloth, hair.
+
+    What one believes of a texel is a matter of both: off by ODD it needs as much confidence as is missing to that of usual skin. Nothing goes from the face,
+    which every capture sees well and where marks are.
+    """
+    sure = np.clip(confidence / max(float(np.median(confidence[seen == 1])), 1e-6), 0, 1)
+    missing = (1 - sure) * (1 - template.mask("face", len(seen))) * off / ODD
+    return np.where(missing > 0, seen * sure**2 / np.maximum(sure**2 + missing**2, 1e-12), seen).astype(np.float32)
 
 
 def apart(maps: Maps) -> tuple[np.ndarray, np.ndarray]:

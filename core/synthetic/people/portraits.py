@@ -35,6 +35,8 @@ from .unlit import Unlit, random_view, scene_of, see
 SIDE = 256
 CLOSEST, WIDEST = 1.25, 2.0  # side of the picture in sides of the face's landmarks
 RAYS = 160
+STRONGEST = 25.0
+"""Of a lamp's irradiance over pi, where the sky's radiance is one in the mean: the sun is some nine times its sky, a lamp in a dark room more."""
 BARE = ("skin", "lips", "clothes")
 """Parts whose own shading is what a delighter is to find."""
 
@@ -162,7 +164,7 @@ def _lamps(stage: Stage, environment: Environment, rng: np.random.Generator) -> 
     chosen, tints, before = [], [], []
     side = len(stage.position)
     for k in rng.permutation(len(stage.unlit.lamps))[:rng.choice([0, 1, 1, 1, 1, 2])]:
-        strength, warm = np.exp(rng.uniform(np.log(0.35), np.log(9.0))), rng.normal(0.12, 0.22)
+        strength, warm = np.exp(rng.uniform(np.log(0.35), np.log(STRONGEST))), rng.normal(0.12, 0.22)
         tint = strength * np.exp([0.6 * warm, rng.normal(0, 0.04), -warm])
         if environment.colour.any() and rng.random() < 0.5:
             tint = strength * environment.colour / max(float(environment.colour.mean()), 1e-6)
