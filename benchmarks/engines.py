@@ -19,7 +19,7 @@ from . import figures
 ROOT = Path(__file__).resolve().parent.parent
 FOUND = ROOT / "dist" / "gui" / "engines.json"
 COMMAND = "python -m benchmarks.engines"
-SHOWN = {"surface": "no subsurface", "random_walk": "WildCap Skin", "random_walk_skin": "the same, Random Walk (Skin)"}
+SHOWN = {"surface": "no subsurface", "random_walk_skin": "WildCap Skin", "random_walk": "the same, Random Walk, as in 0.1.0"}
 
 
 def main() -> None:

@@ -119,7 +119,8 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     evidence, recipe = read_evidence(capture, read_head(capture), SIZE), replace(OURS, guidance="proximal", steps=16)
     start = initial.start(prior, evidence, SkinTone.from_linear(TONE, GIVEN), 8.0, recipe)
     assert [(round(m.row / 4), round(m.column / 4)) for m in start.marks] == [(round(row / 4), round(column / 4))]
-    solved = maps.finished(sample(prior.of_tone(start.tone), start.observations, start.state, start.recipe, seeded(0)), evidence, start).diffuse
+    result = maps.finished(sample(prior.of_tone(start.tone), start.observations, start.state, start.recipe, seeded(0)), evidence, start)
+    solved = result.diffuse
 
     def contrast(image):
         log, away = np.log(np.maximum(image, 1e-3)).mean(-1), distance_to(row, column)
@@ -130,4 +131,6 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     rings = [error[(distance >= d) & (distance < d + 3)].mean() for d in range(-18, 18, 3)]  # six inside the shadow, six outside
     inside, outside = np.mean(rings[:4]), np.mean(rings[-4:])
     assert abs(outside - inside) < 0.15 * -np.log(1 - TAKEN).mean()
+    usual = (prior.mean_face[6].numpy() + 1) / 2
+    assert np.abs(result.specular - cv2.resize(usual, (SIZE, SIZE), interpolation=cv2.INTER_AREA)).max() < 0.05  # no photograph tells it: no grain of chance
     assert max(rings) - max(inside, outside) < 0.06 and min(rings) - min(inside, outside) > -0.06  # no light or dark outline

@@ -26,12 +26,14 @@ WildCap Normal.Color -> WildCap Normal Map.Color
 WildCap Regions.Fac -> WildCap Skin.Region
 WildCap Skin / NodeGroupInput WildCap Input
 WildCap Skin / NodeGroupOutput WildCap Output
-WildCap Skin / ShaderNodeBsdfPrincipled WildCap Principled: Subsurface Radius=1 0.37 0.19
+WildCap Skin / ShaderNodeBsdfPrincipled WildCap Principled: subsurface_method=RANDOM_WALK_SKIN, Subsurface Radius=1 0.37 0.19
 WildCap Skin / ShaderNodeDisplacement WildCap Displacement
 WildCap Skin / ShaderNodeMath WildCap Regions: operation=MULTIPLY_ADD, use_clamp=True
 WildCap Skin / ShaderNodeMath WildCap Specular Level: operation=MULTIPLY, use_clamp=True
+WildCap Skin / ShaderNodeMix WildCap Given Back: B=1.048 1.073 1.078 1
 WildCap Skin / WildCap Displacement.Displacement -> WildCap Output.Displacement
-WildCap Skin / WildCap Input.Albedo -> WildCap Principled.Base Color
+WildCap Skin / WildCap Given Back.Result -> WildCap Principled.Base Color
+WildCap Skin / WildCap Input.Albedo -> WildCap Given Back.A
 WildCap Skin / WildCap Input.Displacement -> WildCap Displacement.Scale
 WildCap Skin / WildCap Input.Height -> WildCap Displacement.Height
 WildCap Skin / WildCap Input.IOR -> WildCap Principled.IOR
@@ -42,6 +44,7 @@ WildCap Skin / WildCap Input.Roughness -> WildCap Regions.Value
 WildCap Skin / WildCap Input.Roughness -> WildCap Regions.Value
 WildCap Skin / WildCap Input.Specular -> WildCap Specular Level.Value
 WildCap Skin / WildCap Input.Specular Amount -> WildCap Specular Level.Value
+WildCap Skin / WildCap Input.Subsurface -> WildCap Given Back.Fac
 WildCap Skin / WildCap Input.Subsurface -> WildCap Principled.Subsurface Weight
 WildCap Skin / WildCap Input.Subsurface Scale -> WildCap Principled.Subsurface Scale
 WildCap Skin / WildCap Principled.BSDF -> WildCap Output.BSDF
@@ -94,8 +97,9 @@ def test_a_file_of_version_1_is_rebuilt_inside_and_keeps_what_the_artist_did(pat
     assert principled.inputs["Base Color"].links[0].from_node == inside and principled.inputs["Coat Weight"].default_value == pytest.approx(0.2)
     without = [line for line in node_text.lines(group) if "HueSat" not in line and "Hue/" not in line and "Principled BSDF" not in line]
     inside_expected = [line.split("WildCap Skin / ", 1)[1] for line in EXPECTED.splitlines() if line.startswith("WildCap Skin / ")]
-    assert set(inside_expected) - set(without) <= {"WildCap Input.Albedo -> WildCap Principled.Base Color",
-                                                   "ShaderNodeBsdfPrincipled WildCap Principled: Subsurface Radius=1 0.37 0.19"}
+    replaced = {"WildCap Given Back.Result -> WildCap Principled.Base Color",
+                "ShaderNodeBsdfPrincipled WildCap Principled: subsurface_method=RANDOM_WALK_SKIN, Subsurface Radius=1 0.37 0.19"}
+    assert set(inside_expected) - set(without) <= replaced
     skin.inputs["Specular Amount"].default_value = 2.0
     assembled()
     assert skin.inputs["Specular Amount"].default_value == pytest.approx(2.0)

@@ -41,8 +41,8 @@ class Maps:
 def finished(state: State, evidence: Evidence, start: Start, spread: torch.Tensor | None = None, gain: torch.Tensor | None = None) -> Maps:
     """Reads the maps out of \\hat x_0. The albedo is rescaled once so that the mean of the confident facial skin is the skin tone (or by a `gain`
     [3] that was found before); the shading takes the inverse, so that their product stays. What nobody saw is the mean face of that tone: a drawn
-    sample would be as likely, but would look like something that was measured. `spread` [H, W], of any size, is
-    confidence.py's; none by default."""
+    sample would be as likely, but would look like something that was measured. So is the specular albedo: no term of the likelihood knows it, and a draw
+    has twice the squared error of what is expected (docs/results.md). `spread` [H, W], of any size, is confidence.py's; none by default."""
     shader = start.observations[1].shader
     x = torch.lerp(start.reference, state.denoised, evidence.weight.sqrt())[0]
     with torch.no_grad():
@@ -57,7 +57,7 @@ def finished(state: State, evidence: Evidence, start: Start, spread: torch.Tenso
     if gain is None:
         gain = _gain(diffuse, evidence.skin * evidence.weight, start.tone.tensor, start.recipe.rescale)
     normal = torch.nn.functional.normalize(x[3:6], dim=0) * 0.5 + 0.5
-    specular = ((x[6] + 1) / 2).clamp(0, 1).numpy()
+    specular = ((start.reference[0, 6] + 1) / 2).clamp(0, 1).numpy()
     explained = (1 - (shading / main).mean(0)).clamp(0, 1)  # the share of the darkness that was called shadow
     each = gain[:, None, None]
     trusted = confidence(evidence.weight, explained, diffuse * each, albedo(start.reference), spread)

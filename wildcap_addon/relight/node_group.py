@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The node group WildCap Skin: a Principled BSDF set up as skin, with the few sockets an artist turns.
 
+    Albedo, what scattering loses of it given back -> Base Color
     Specular x Specular Amount, clamped -> Specular IOR Level        Roughness x (1 + Region) -> Roughness
     Height, Midlevel, Displacement -> Displacement, in the object's own units
 
@@ -12,12 +13,15 @@ artist's own nodes and links stay.
 import bpy
 
 NAME = "WildCap Skin"
-VERSION = 2
+VERSION = 3
 
 SCATTERING_M = 0.003
 """Scale of the scattering, 3 mm, by which SCATTERING_RGB is multiplied"""
 SCATTERING_RGB = (1.0, 0.37, 0.19)
 """Mean free paths of red, green and blue light over red's (Jensen et al. 2001, skin1: 3.67, 1.37 and 0.68 mm)"""
+GIVEN_BACK = (0.954, 0.932, 0.928)
+"""Share of its Base Color that skin gives back under even light by Cycles's *Random Walk (Skin)*, red, green, blue: the mean over six tones of
+`python -m benchmarks.even_light`. The other random walk gives back 0.78 to 0.91."""
 TYPICAL_SPECULAR = 0.35
 """Mean of the specular map on cheeks and forehead where nobody measured it. The map holds levels for an IOR of 1.5, of which 0.35 is skin's 2.8 percent"""
 
@@ -42,19 +46,23 @@ OUTPUTS = (("BSDF", 'NodeSocketShader'), ("Displacement", 'NodeSocketVector'))
 # name, type, name it had in version 1, place
 NODES = (
     ("WildCap Input", 'NodeGroupInput', "Group Input", (-700, 0)),
+    ("WildCap Given Back", 'ShaderNodeMix', None, (-400, 340)),
     ("WildCap Specular Level", 'ShaderNodeMath', "Math", (-400, 80)),
     ("WildCap Regions", 'ShaderNodeMath', None, (-400, -120)),
     ("WildCap Principled", 'ShaderNodeBsdfPrincipled', "Principled BSDF", (0, 0)),
     ("WildCap Displacement", 'ShaderNodeDisplacement', None, (0, -420)),
     ("WildCap Output", 'NodeGroupOutput', "Group Output", (340, 0)),
 )
+MIX_FACTOR, MIX_A, MIX_B, MIX_RESULT = 0, 6, 7, 2
+"""Numbers of a Mix node's sockets for colours: its names are used several times."""
 LINKS = (
     ("WildCap Input", "Specular", "WildCap Specular Level", 0), ("WildCap Input", "Specular Amount", "WildCap Specular Level", 1),
     ("WildCap Specular Level", 0, "WildCap Principled", "Specular IOR Level"),
     ("WildCap Input", "Region", "WildCap Regions", 0), ("WildCap Input", "Roughness", "WildCap Regions", 1),
     ("WildCap Input", "Roughness", "WildCap Regions", 2),
     ("WildCap Regions", 0, "WildCap Principled", "Roughness"),
-    ("WildCap Input", "Albedo", "WildCap Principled", "Base Color"), ("WildCap Input", "Normal", "WildCap Principled", "Normal"),
+    ("WildCap Input", "Subsurface", "WildCap Given Back", MIX_FACTOR), ("WildCap Input", "Albedo", "WildCap Given Back", MIX_A),
+    ("WildCap Given Back", MIX_RESULT, "WildCap Principled", "Base Color"), ("WildCap Input", "Normal", "WildCap Principled", "Normal"),
     ("WildCap Input", "IOR", "WildCap Principled", "IOR"), ("WildCap Input", "Subsurface", "WildCap Principled", "Subsurface Weight"),
     ("WildCap Input", "Subsurface Scale", "WildCap Principled", "Subsurface Scale"), ("WildCap Principled", "BSDF", "WildCap Output", "BSDF"),
     ("WildCap Input", "Height", "WildCap Displacement", "Height"), ("WildCap Input", "Midlevel", "WildCap Displacement", "Midlevel"),
@@ -107,8 +115,11 @@ def _set_up(nodes: dict[str, bpy.types.Node]) -> None:
     nodes["WildCap Specular Level"].operation, nodes["WildCap Specular Level"].use_clamp = 'MULTIPLY', True
     nodes["WildCap Regions"].operation, nodes["WildCap Regions"].use_clamp = 'MULTIPLY_ADD', True
     shader = nodes["WildCap Principled"]
-    shader.subsurface_method = 'RANDOM_WALK'
+    shader.subsurface_method = 'RANDOM_WALK_SKIN'
     shader.inputs["Subsurface Radius"].default_value = SCATTERING_RGB
+    back = nodes["WildCap Given Back"]
+    back.data_type, back.blend_type = 'RGBA', 'MULTIPLY'
+    back.inputs[MIX_B].default_value = (*(1 / share for share in GIVEN_BACK), 1)
     nodes["WildCap Displacement"].space = 'OBJECT'  # heights are in the head's own units: they grow with the object's scale
 
 
