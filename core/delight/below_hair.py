@@ -1,17 +1,22 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light knows no brows: below them, and on the eyes, a single photograph's shading is what the skin around them says, so that none of their colour is
-taken for light. What a shadow does that crosses a brow is lost there.
+"""Light knows no brows: below hair, and on the eyes, the shading is what the skin around them says, so that none of their colour is taken for light.
 
-A beard covers too much of a face for that: what is light on it is left to the network.
+In a single photograph that holds for brows and eyes: what a shadow does that crosses them is lost, and a beard covers too much of a face, so what is light on
+it is left to the network. In a capture the light that was fitted to the bare skin goes on below any hair, by the head's own shape.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import spsolve
+
+from .evening import Look
+from .second_opinion import Fitted
 
 FEATURES = ("brows", "eyes")
 SURE = 0.3  # share of a cell from which it is not asked what its shading is
@@ -20,8 +25,23 @@ REACH = 1  # cells around them: the network's answer is as coarse as that
 
 def without_features(shading: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Log-shading [h, h, C] with that of cells whose `share` [h, h] of FEATURES is SURE, and of those around them, carried over from the skin."""
-    unknown = cv2.dilate((share > SURE).astype(np.uint8), np.ones((2 * REACH + 1,) * 2, np.uint8)) > 0
-    return completed(shading, unknown).astype(np.float32)
+    return completed(shading, _covered(share)).astype(np.float32)
+
+
+def without_hair(look: Look, fitted: Fitted, share: np.ndarray) -> Look:
+    """The look with the fitted light below hair, whose `share` of the head is [h, h], at the level at which it meets the skin around."""
+    here = look.face >= 0
+    hairy, bare = _covered(share) & here, here & ~_covered(share)
+    if not hairy.any() or not bare.any():
+        return look
+    level = completed(np.where(bare[..., None], look.shading - fitted.log, 0), ~bare)
+    return replace(look, shading=np.where(hairy[..., None], fitted.log + level, look.shading).astype(np.float32),
+                   shadow=np.where(hairy, fitted.shadow, look.shadow).astype(np.float32))
+
+
+def _covered(share: np.ndarray) -> np.ndarray:
+    """bool [h, h]: the cells whose share of hair is SURE, and those around them."""
+    return cv2.dilate((share > SURE).astype(np.uint8), np.ones((2 * REACH + 1,) * 2, np.uint8)) > 0
 
 
 def completed(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:

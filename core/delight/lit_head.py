@@ -23,13 +23,14 @@ FIT_POINTS = 6000
 
 @dataclass(frozen=True)
 class LitHead:
-    """The head; its smoothed unit normals [V, 3]; transfer [V, 9] of the sky; not_brows [V]: 0 where dark hair is; the light; and
-    best_lit [3]: the linear colour of the best lit skin, taken for the colour of the skin itself."""
+    """The head; its smoothed unit normals [V, 3]; transfer [V, 9] of the sky; skin [V]: 1 on bare facial skin; hair [V]: the share of the views that show
+    hair, eyes or cloth there, and 1 on the brows; the light; and best_lit [3]: the linear colour of the best lit skin, taken for that of the skin itself."""
 
     head: Head
     normals: np.ndarray
     transfer: np.ndarray
-    not_brows: np.ndarray
+    skin: np.ndarray
+    hair: np.ndarray
     light: Light
     best_lit: np.ndarray
 
@@ -58,11 +59,12 @@ class LitHead:
 def lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
     """Fits the light of these views to the head; half of the stage's progress. Raises Problem where the views hardly see it."""
     normals = smooth_normals(head)
-    colours, count = vertex_colours(head, normals, views, report)
+    colours, count, hair = vertex_colours(head, normals, views, report)
     transfer = radiance_transfer(head.caster, head.mesh.vertices, normals, step=lambda done, of: report.progress(of + done, 4 * of, "Casting rays at the sky"))
-    skin, not_brows = skin_weights(head.mesh)
+    skin, brows = skin_weights(head.mesh)
+    skin, hair = skin * (1 - hair), np.maximum(hair, brows)
     light, reached = _fit(head, normals, transfer, colours, skin * (count >= min(2, len(views))), report)
-    return LitHead(head, normals, transfer, not_brows, light, _best_lit(light, normals, transfer, reached, count))
+    return LitHead(head, normals, transfer, skin, hair, light, _best_lit(light, normals, transfer, reached, count))
 
 
 def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.ndarray]:

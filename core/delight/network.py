@@ -4,8 +4,8 @@
 
 It sees a square around the face at SIDE pixels and answers at half of that; the answer is lifted to the picture's pixels along its edges (lift.py), and the
 picture is divided by it, so pores are kept and none can be invented. In a capture the frames' answers are evened out over the head (evening.py) and brought
-together with the light that was fitted to all frames (second_opinion.py); in a single photograph the skin around brows and eyes answers for them
-(below_hair.py).
+together with the light that was fitted to all frames (second_opinion.py), which is all that is believed below hair; in a single photograph the skin around
+brows and eyes answers for them (below_hair.py).
 `core train delighter` makes the weights.
 """
 
@@ -30,15 +30,14 @@ from ..face.head import read_head
 from ..geometry.raster import interpolate, sample
 from ..geometry.views import View, read_views
 from ..imaging import images
-from .below_hair import FEATURES, without_features
+from .below_hair import FEATURES, without_features, without_hair
 from .casts import without_casts
 from .contract import Delit
 from .evening import Look, even_out
 from .lift import lift, lift_share
 from .lit_head import BRIGHTEST, LitHead, lit_head
-from .second_opinion import beyond, coarse, of_both
+from .second_opinion import Fitted, beyond, coarse, of_both
 from .shading import light_in_frame, light_seen
-from .surface import skin_weights
 from .unet import DARKEST, SIDE, DelightNet, network_input
 
 DATA_FILES = ("weights/delighter.safetensors", "weights/delighter.json")
@@ -54,11 +53,13 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
     looks, fitted = [], []
     for i, view in enumerate(views):
         report.progress(4 * len(views) + 3 * i, 8 * len(views), f"Looking at frame {i + 1} of {len(views)}")
-        look, log = _look_at_view(net, view, head)
+        look, light = _look_at_view(net, view, head)
         looks.append(look)
-        fitted.append(log)
-    skins = [_skin_seen(head, look) for look in looks]
-    looks = without_casts(of_both(even_out(head, views, looks), fitted, skins), skins)
+        fitted.append(light)
+    skins, hair = ([_seen(head, values, look) for look in looks] for values in (head.skin, head.hair))
+    looks = of_both(even_out(head, views, looks), fitted, skins)
+    looks = [without_hair(look, light, share) for look, light, share in zip(looks, fitted, hair, strict=True)]
+    looks = without_casts(looks, skins)
     for i, (view, look) in enumerate(zip(views, looks, strict=True)):
         report.progress(7 * len(views) + i, 8 * len(views), f"Delighting frame {i + 1} of {len(views)}")
         srgb = images.read_srgb(view.path)
@@ -109,8 +110,8 @@ def crop(picture: np.ndarray, box: tuple[float, float, float], size: int) -> np.
     return cv2.warpAffine(np.ascontiguousarray(picture, np.float32), to_crop, (size, size), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
-def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[Look, np.ndarray]:
-    """What the network says of a frame, and the log-shading of the fitted light at the same size."""
+def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[Look, Fitted]:
+    """What the network says of a frame, and what the fitted light does."""
     pixels, _ = view.project(_landmarks(head))
     box = face_box(pixels[np.isfinite(pixels).all(1)])
     y, x = np.mgrid[0:SIDE, 0:SIDE]
@@ -121,8 +122,8 @@ def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[Look, np.
     geometry = (ambient, ambient + free[..., None] * direct, normal @ view.rotation.T, (face >= 0).astype(np.float32))
     picture = crop(images.read_srgb(view.path), box, SIDE)
     look = _look(net, box, picture, geometry)
-    light, _ = light_seen(images.srgb_to_linear(picture), head, face, bary, round(max(view.width, view.height) * SIDE / box[2]))
-    return replace(look, face=face[1::2, 1::2], bary=bary[1::2, 1::2]), coarse(light, SIDE // 2)
+    light, share = light_seen(images.srgb_to_linear(picture), head, face, bary, round(max(view.width, view.height) * SIDE / box[2]))
+    return replace(look, face=face[1::2, 1::2], bary=bary[1::2, 1::2]), coarse(light, share, SIDE // 2)
 
 
 @torch.inference_mode()
@@ -139,10 +140,9 @@ def _look(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray,
     return Look(box, shading + middle, shadow[..., 0], np.log(np.maximum(small, DARKEST)))
 
 
-def _skin_seen(head: LitHead, look: Look) -> np.ndarray:
-    """Where a look shows bare skin of the head, [h, h] in [0, 1]."""
-    weight, _ = skin_weights(head.mesh)
-    return interpolate(weight[:, None], head.mesh.faces, look.face, look.bary)[..., 0]
+def _seen(head: LitHead, values: np.ndarray, look: Look) -> np.ndarray:
+    """Values [V] of the head where a look shows it, [h, h]."""
+    return interpolate(values[:, None], head.mesh.faces, look.face, look.bary)[..., 0]
 
 
 def _hull(points: np.ndarray, look: Look) -> np.ndarray:

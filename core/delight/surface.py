@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the views say about the head's surface: its smoothed normals, and the colour of each vertex over all views."""
+"""What the views say about the head's surface: its smoothed normals, the colour of each vertex's skin over all views, and where hair hides it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sparse
 
 from ..contract.messages import Problem, Reporter
-from ..face import template
+from ..face import parser, template
 from ..face.head import Head
 from ..geometry.meshes import Mesh
 from ..geometry.raster import sample, visible_from
@@ -17,6 +17,8 @@ from ..imaging import images
 
 GRAZING = 0.35  # cosine of the view angle under which a vertex's colour is not trusted
 NOT_SKIN = ("lips", "brows", "eyes")
+HAIRY = ("brows", "beard", "hair", "eyes", "clothes")
+"""Parts of a picture whose own colour says nothing of the light on the skin."""
 
 
 def smooth_normals(head: Head, rounds: int = 2) -> np.ndarray:
@@ -32,13 +34,15 @@ def smooth_normals(head: Head, rounds: int = 2) -> np.ndarray:
     return normals
 
 
-def vertex_colours(head: Head, normals: np.ndarray, views: list[View], report: Reporter) -> tuple[np.ndarray, np.ndarray]:
-    """Linear colour [V, 3], the median over the views that see a vertex well (so that highlights, which move, drop out), and their number [V].
+def vertex_colours(head: Head, normals: np.ndarray, views: list[View], report: Reporter) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Linear colour [V, 3], the median over the views that show a vertex's skin well (so that highlights, which move, drop out), their number [V], and the
+    share [V] of HAIRY over the views that see it at all.
 
     Raises Problem when hardly any vertex is seen.
     """
     mesh = head.mesh
     seen_colours = np.full((len(views), len(mesh.vertices), 3), np.nan, np.float32)
+    shown, hidden = np.zeros(len(mesh.vertices)), np.zeros(len(mesh.vertices))
     for i, view in enumerate(views):
         report.progress(i, 4 * len(views), "Reading the skin's colour")
         towards = view.centre - mesh.vertices
@@ -47,25 +51,39 @@ def vertex_colours(head: Head, normals: np.ndarray, views: list[View], report: R
         inside = ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)
         candidates = np.flatnonzero(inside & (cosine > GRAZING))
         candidates = candidates[visible_from(head.caster, mesh.vertices[candidates], normals[candidates], view.centre)]
-        srgb = sample(images.read_srgb(view.path), pixels[candidates])
-        candidates, srgb = candidates[srgb.max(1) < 0.99], srgb[srgb.max(1) < 0.99]  # what is burnt out has lost its colour
-        seen_colours[i, candidates] = images.srgb_to_linear(srgb)
+        picture = images.read_srgb(view.path)
+        share = sample(_hairy_share(head, view, picture), pixels[candidates])
+        shown[candidates] += 1
+        hidden[candidates] += share
+        srgb = sample(picture, pixels[candidates])
+        skin = (srgb.max(1) < 0.99) & (share < 0.5)  # what is burnt out has lost its colour
+        seen_colours[i, candidates[skin]] = images.srgb_to_linear(srgb[skin])
     count = np.isfinite(seen_colours[..., 0]).sum(0)
     if (count > 0).sum() < 100:
         raise Problem("The selected frames hardly see the registered head.", "Look at the pictures of the stages cameras and registration in report.html.")
     colours = np.zeros((len(mesh.vertices), 3))
     colours[count > 0] = np.nanmedian(seen_colours[:, count > 0], 0)
-    return colours, count
+    return colours, count, hidden / np.maximum(shown, 1)
+
+
+def _hairy_share(head: Head, view: View, picture: np.ndarray) -> np.ndarray:
+    """The share of HAIRY at a frame's pixels, [H, W]; none where nobody can tell: on a head of another topology, which has no landmarks."""
+    if head.built_in:
+        pixels, _ = view.project(template.landmark_points(head.mesh))
+        if np.isfinite(pixels).all():
+            return parser.parse(picture, pixels).of(*HAIRY)
+    return np.zeros(picture.shape[:2], np.float32)
 
 
 def skin_weights(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """([V], [V]): 1 on plain facial skin, 0 on lips, brows, eyes and off the face; and 0 on the brows, 1 elsewhere. All 1 on a mesh of another topology."""
+    """([V], [V]): 1 on plain facial skin, 0 on lips, brows, eyes and off the face; and 1 on the brows, 0 elsewhere.
+    On a mesh of another topology all is skin."""
     if mesh.uvs is None or mesh.faces.shape != template.load().faces.shape:
-        return np.ones(len(mesh.vertices)), np.ones(len(mesh.vertices))
+        return np.ones(len(mesh.vertices)), np.zeros(len(mesh.vertices))
     skin = template.mask("skin", 512)
     for name in NOT_SKIN:
         skin = skin * (1 - template.mask(name, 512))
     uv = np.zeros((len(mesh.vertices), 2))
     uv[mesh.faces] = mesh.uvs[mesh.face_uvs]
     texels = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512
-    return sample(skin, texels), sample(1 - template.mask("brows", 512), texels)
+    return sample(skin, texels), sample(template.mask("brows", 512), texels)
