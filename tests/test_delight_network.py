@@ -98,7 +98,7 @@ def test_views_are_brought_to_one_albedo():
     """Three looks at one head whose shadings are off by a constant and by a slope: afterwards what they leave as albedo agrees."""
     mesh = template.load()
     nowhere = np.zeros(len(mesh.vertices))
-    head = LitHead(Head(mesh), vertex_normals(mesh), np.zeros((len(nowhere), 9)), 1 - nowhere, nowhere, None, np.ones(3))
+    head = LitHead(Head(mesh), vertex_normals(mesh), np.zeros((len(nowhere), 9)), 1 - nowhere, nowhere, nowhere, None, np.ones(3))
     face, bary = template.landmarks()
     landmarks = (mesh.vertices[mesh.faces[face]] * bary[..., None]).sum(1)
     views, looks = [], []

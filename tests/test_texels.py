@@ -153,7 +153,7 @@ def evenly_lit(tmp_path_factory):
     transfer = np.zeros((len(normals), 9))
     transfer[:, 0] = 1
     light = Light(np.full((9, 3), 0.3) * (np.arange(9) == 0)[:, None], np.array([0.0, 0, 1]), np.zeros(3), np.full(3, 0.01))
-    return LitHead(Head(mesh), normals, transfer, np.ones(len(normals)), np.zeros(len(normals)), light, np.full(3, 0.4)), views, painted_head.person()[2]
+    return LitHead(Head(mesh), normals, transfer, np.ones(len(normals)), *np.zeros((2, len(normals))), light, np.full(3, 0.4)), views, painted_head.person()[2]
 
 
 def test_what_the_views_of_a_head_agree_on_is_its_colour_whatever_their_exposures(evenly_lit):

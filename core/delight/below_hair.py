@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light knows no brows: below hair, and on the eyes, the shading is what the skin around them says, so that none of their colour is taken for light.
+"""Light knows no hair: below it, and on the eyes, the shading is what the skin around them says, so that none of their colour is taken for light.
 
 In a single photograph that holds for brows and eyes: what a shadow does that crosses them is lost, and a beard covers too much of a face, so what is light on
-it is left to the network. In a capture the light that was fitted to the bare skin goes on below any hair, by the head's own shape.
+it is left to the network. In a capture the light that was fitted to the bare skin goes on below beard and hair and on the eyes, by the head's own shape; brows,
+which lie where shading changes most, are left to both answers as skin is.
 """
 
 from __future__ import annotations

@@ -24,13 +24,14 @@ FIT_POINTS = 6000
 @dataclass(frozen=True)
 class LitHead:
     """The head; its smoothed unit normals [V, 3]; transfer [V, 9] of the sky; skin [V]: 1 on bare facial skin; hair [V]: the share of the views that show
-    hair, eyes or cloth there, and 1 on the brows; the light; and best_lit [3]: the linear colour of the best lit skin, taken for that of the skin itself."""
+    hair, eyes or cloth there; brows [V]; the light; and best_lit [3]: the linear colour of the best lit skin, taken for that of the skin itself."""
 
     head: Head
     normals: np.ndarray
     transfer: np.ndarray
     skin: np.ndarray
     hair: np.ndarray
+    brows: np.ndarray
     light: Light
     best_lit: np.ndarray
 
@@ -62,9 +63,9 @@ def lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
     colours, count, hair = vertex_colours(head, normals, views, report)
     transfer = radiance_transfer(head.caster, head.mesh.vertices, normals, step=lambda done, of: report.progress(of + done, 4 * of, "Casting rays at the sky"))
     skin, brows = skin_weights(head.mesh)
-    skin, hair = skin * (1 - hair), np.maximum(hair, brows)
+    skin = skin * (1 - hair)
     light, reached = _fit(head, normals, transfer, colours, skin * (count >= min(2, len(views))), report)
-    return LitHead(head, normals, transfer, skin, hair, light, _best_lit(light, normals, transfer, reached, count))
+    return LitHead(head, normals, transfer, skin, hair, brows, light, _best_lit(light, normals, transfer, reached, count))
 
 
 def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.ndarray]:

@@ -25,7 +25,7 @@ def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free:
     """[H, W] in [0, 1]: how much of the sun each pixel gets. `side`: the longer side in pixels of the frame this is a part of.
 
     linear, ambient, direct [H, W, 3]: the frame, the skin's colour under the sky, and what the sun would add; free [H, W]: 1 where
-    the head itself leaves the sun visible; skin [H, W]: 0 on the brows, whose darkness is their own; head bool [H, W].
+    the head itself leaves the sun visible; skin [H, W]: 0 on brows and hair, whose darkness is their own; head bool [H, W].
     """
     log = np.log(np.maximum(linear, 1e-3)).astype(np.float32)
     shaded = np.log(np.maximum(ambient, 1e-4)).astype(np.float32)

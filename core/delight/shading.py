@@ -60,7 +60,8 @@ def light_seen(linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.nda
     ambient, direct, free, _ = head.at(face, bary)
     share = np.ones(here.shape, np.float32)
     if head.light.has_sun:
-        share = sun_share(linear, ambient, direct, free, 1 - interpolate(head.hair[:, None], head.mesh.faces, face, bary)[..., 0], here, side)
+        own = interpolate(np.maximum(head.hair, head.brows)[:, None], head.mesh.faces, face, bary)[..., 0]
+        share = sun_share(linear, ambient, direct, free, 1 - own, here, side)
     lit = np.maximum(bleed((ambient + share[..., None] * direct).astype(np.float32), here), 1e-4)
     if head.light.has_sun:
         lit = lit * np.exp(seamless(np.log(np.maximum(linear, 1e-3) / lit), share, here, side))

@@ -17,8 +17,8 @@ from ..imaging import images
 
 GRAZING = 0.35  # cosine of the view angle under which a vertex's colour is not trusted
 NOT_SKIN = ("lips", "brows", "eyes")
-HAIRY = ("brows", "beard", "hair", "eyes", "clothes")
-"""Parts of a picture whose own colour says nothing of the light on the skin."""
+HAIRY = ("beard", "hair", "eyes", "clothes")
+"""Parts of a picture whose own colour says nothing of the light on the skin; brows are narrow, and where a brow is on a head is known."""
 
 
 def smooth_normals(head: Head, rounds: int = 2) -> np.ndarray:
