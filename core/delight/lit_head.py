@@ -60,10 +60,10 @@ class LitHead:
 def lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
     """Fits the light of these views to the head; half of the stage's progress. Raises Problem where the views hardly see it."""
     normals = smooth_normals(head)
-    colours, count, hair = vertex_colours(head, normals, views, report)
+    colours, count, hair, seen_brows = vertex_colours(head, normals, views, report)
     transfer = radiance_transfer(head.caster, head.mesh.vertices, normals, step=lambda done, of: report.progress(of + done, 4 * of, "Casting rays at the sky"))
     skin, brows = skin_weights(head.mesh)
-    skin = skin * (1 - hair)
+    skin, brows = skin * (1 - hair) * (1 - seen_brows), np.maximum(brows, seen_brows)
     light, reached = _fit(head, normals, transfer, colours, skin * (count >= min(2, len(views))), report)
     return LitHead(head, normals, transfer, skin, hair, brows, light, _best_lit(light, normals, transfer, reached, count))
 

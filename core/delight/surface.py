@@ -18,7 +18,7 @@ from ..imaging import images
 GRAZING = 0.35  # cosine of the view angle under which a vertex's colour is not trusted
 NOT_SKIN = ("lips", "brows", "eyes")
 HAIRY = ("beard", "hair", "eyes", "clothes")
-"""Parts of a picture whose own colour says nothing of the light on the skin; brows are narrow, and where a brow is on a head is known."""
+"""Parts of a picture whose own colour says nothing of the light on the skin. Brows are told apart from them: they are narrow."""
 
 
 def smooth_normals(head: Head, rounds: int = 2) -> np.ndarray:
@@ -34,15 +34,15 @@ def smooth_normals(head: Head, rounds: int = 2) -> np.ndarray:
     return normals
 
 
-def vertex_colours(head: Head, normals: np.ndarray, views: list[View], report: Reporter) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def vertex_colours(head: Head, normals: np.ndarray, views: list[View], report: Reporter) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Linear colour [V, 3], the median over the views that show a vertex's skin well (so that highlights, which move, drop out), their number [V], and the
-    share [V] of HAIRY over the views that see it at all.
+    shares [V] of HAIRY and of brows over the views that see it at all.
 
     Raises Problem when hardly any vertex is seen.
     """
     mesh = head.mesh
     seen_colours = np.full((len(views), len(mesh.vertices), 3), np.nan, np.float32)
-    shown, hidden = np.zeros(len(mesh.vertices)), np.zeros(len(mesh.vertices))
+    shown, hidden = np.zeros(len(mesh.vertices)), np.zeros((len(mesh.vertices), 2))
     for i, view in enumerate(views):
         report.progress(i, 4 * len(views), "Reading the skin's colour")
         towards = view.centre - mesh.vertices
@@ -52,27 +52,29 @@ def vertex_colours(head: Head, normals: np.ndarray, views: list[View], report: R
         candidates = np.flatnonzero(inside & (cosine > GRAZING))
         candidates = candidates[visible_from(head.caster, mesh.vertices[candidates], normals[candidates], view.centre)]
         picture = images.read_srgb(view.path)
-        share = sample(_hairy_share(head, view, picture), pixels[candidates])
+        shares = sample(_hairy_shares(head, view, picture), pixels[candidates])
         shown[candidates] += 1
-        hidden[candidates] += share
+        hidden[candidates] += shares
         srgb = sample(picture, pixels[candidates])
-        skin = (srgb.max(1) < 0.99) & (share < 0.5)  # what is burnt out has lost its colour
+        skin = (srgb.max(1) < 0.99) & (shares.sum(1) < 0.5)  # what is burnt out has lost its colour
         seen_colours[i, candidates[skin]] = images.srgb_to_linear(srgb[skin])
     count = np.isfinite(seen_colours[..., 0]).sum(0)
     if (count > 0).sum() < 100:
         raise Problem("The selected frames hardly see the registered head.", "Look at the pictures of the stages cameras and registration in report.html.")
     colours = np.zeros((len(mesh.vertices), 3))
     colours[count > 0] = np.nanmedian(seen_colours[:, count > 0], 0)
-    return colours, count, hidden / np.maximum(shown, 1)
+    hair, brows = (hidden / np.maximum(shown, 1)[:, None]).T
+    return colours, count, hair, brows
 
 
-def _hairy_share(head: Head, view: View, picture: np.ndarray) -> np.ndarray:
-    """The share of HAIRY at a frame's pixels, [H, W]; none where nobody can tell: on a head of another topology, which has no landmarks."""
+def _hairy_shares(head: Head, view: View, picture: np.ndarray) -> np.ndarray:
+    """The shares of HAIRY and of brows at a frame's pixels, [H, W, 2]; none where nobody can tell: on a head of another topology, which has no landmarks."""
     if head.built_in:
         pixels, _ = view.project(template.landmark_points(head.mesh))
         if np.isfinite(pixels).all():
-            return parser.parse(picture, pixels).of(*HAIRY)
-    return np.zeros(picture.shape[:2], np.float32)
+            parts = parser.parse(picture, pixels)
+            return np.stack([parts.of(*HAIRY), parts.of("brows")], -1)
+    return np.zeros((*picture.shape[:2], 2), np.float32)
 
 
 def skin_weights(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
