@@ -5,9 +5,10 @@
     python -m benchmarks.groomed FOLDER [--seeds 3 ...] [--page docs/results/hair.md] [--sheet docs/pictures/hair.jpg] [--json docs/figures/groomed.json]
 
 The people of core/synthetic/people seen by rays from nine sides, lit by one lamp and a sky without shadows, through a phone's pipeline; cameras, head and the
-albedo's texture are the true ones, so that nothing but finding hair, its strokes and its growth is judged. Coverage: pixels of the frames in which hair
-covers more than a tenth of a millimetre's surroundings, by the true and by the grown hairs. Direction: each true hair against the nearest grown one within
-3 mm, from root to tip, on the skin; beside it what the usual directions alone give. FOLDER keeps the pictures.
+albedo's texture are the true ones, and the face parser is asked in these pictures as the chain asks it, so that nothing but finding hair, its strokes and its
+growth is judged. Coverage: pixels of the frames in which hair covers more than a tenth of a millimetre's surroundings, by the true and by the grown hairs.
+Parser: texels to which it gives more than half, against those where hair grows. Direction: each true hair against the nearest grown one within 3 mm, from root
+to tip, on the skin; beside it what the usual directions alone give. FOLDER keeps the pictures.
 """
 
 from __future__ import annotations
@@ -20,8 +21,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from core.contract.files import replacing
+from core.contract.messages import Reporter
 from core.face import template
 from core.face.head import Head
+from core.face.parts import GROWTHS
 from core.face.strands import Strands, prisms
 from core.geometry import raster
 from core.geometry.meshes import joined, vertex_normals
@@ -31,6 +34,7 @@ from core.synthetic import sample, scene
 from core.synthetic.people import phone
 from core.synthetic.people.figure import Figure, make_figure
 from core.synthetic.people.truth import Scene
+from core.texture.parts_shown import PartsShown, tell_parts
 from core.texture.projection import observe
 from core.upscale import grooming, hair, strokes, ways
 from core.upscale.maps import Maps
@@ -49,12 +53,12 @@ JUDGED = (3, 5)
 COVERED, NEAR_MM = 0.1, 3.0
 COMMAND = "python -m benchmarks.groomed FOLDER --page docs/results/hair.md --sheet docs/pictures/hair.jpg --json docs/figures/groomed.json"
 WORDS = ("Four people whose every hair is known, from nine sides through a phone's pipeline (1,440 x 1,920). No other step of the chain lies between: cameras, "
-         "head and texture are the true ones. *IoU*: of the pixels that hair covers, by the true and by the grown hairs, seen from either side of the front. "
-         "*Off*: the median angle on the skin between each true hair and the nearest grown one, from root to tip; *off, usual*: the same of hair that lies "
-         "as anatomy has it, whatever the strokes say. Wanted: an IoU of 0.7, and 20 degrees. Nothing was chosen on these four (how clear strokes must be to "
-         "outweigh the usual direction was, on seeds 3, 5 and 13). A beard's length is no part of it: its hairs are 6 mm long on everybody.\n\n"
-         "Where it fails: brows below a fringe are not seen, and the fringe's own strands are grown in their place; stubble, and a beard as light as its "
-         "skin, are no dark strokes, and nothing is found.")
+         "head and texture are the true ones, and the face parser is asked in these pictures. *IoU*: of the pixels that hair covers, by the true and by the "
+         "grown hairs, seen from either side of the front. *Parser*: of the texels to which the parser gives more than half, and those where hair grows, "
+         "whether a fringe hides them or not. *Off*: the median angle on the skin between each true hair and the nearest grown one, from root to tip; *off, "
+         "usual*: the same of hair that lies as anatomy has it, whatever the strokes say. Wanted: an IoU of 0.7, and 20 degrees. Nothing was chosen on these "
+         "four. How clear strokes must be to outweigh the usual direction was, on seeds 3, 5 and 13, and there the rule that joins the parser's answer with "
+         "the strokes was looked at, too. A beard's length is no part of it: its hairs are 6 mm long on everybody.")
 CHOSEN_ON, TRUSTS, TURNS = (3, 5, 13), (0.03, 0.1, 0.3, 1.0, 3.0), (-40, 0, 40)
 """People on whom the trust in strokes was chosen; degrees by which the usual directions are turned, for nobody's hair is all as usual."""
 USUAL_ALONE = 1e6
@@ -89,9 +93,9 @@ def main() -> None:
 
 def to_table(rows: dict[str, dict]) -> str:
     """Markdown: a line for each part of each person."""
-    lines = [[name, part, row["true_hairs"], row["grown_hairs"], row["iou"], row.get("degrees"), row.get("usual_degrees")]
+    lines = [[name, part, row["true_hairs"], row["grown_hairs"], row["iou"], row["parser_iou"], row.get("degrees"), row.get("usual_degrees")]
              for name, parts in rows.items() for part, row in parts.items()]
-    return figures.markdown(["person", "part", "true hairs", "grown hairs", "IoU", "off, degrees", "off, usual"], lines)
+    return figures.markdown(["person", "part", "true hairs", "grown hairs", "IoU", "parser", "off, degrees", "off, usual"], lines)
 
 
 def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
@@ -99,8 +103,8 @@ def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
     figure = make_figure(seed)
     views, seen = photograph(folder / str(seed), figure)
     surface = lay_out(figure.head, SIZE)
-    maps = _maps(figure, views, seen)
-    found = hair.find(maps, surface)
+    maps, shown = _maps(figure, views, seen)
+    found = hair.find(maps, surface, shown.shares[..., :len(GROWTHS)])
     cleaned, _ = hair.clean(maps, found, surface, seed)
     grown = grooming.groom(maps, found, cleaned, surface, seed)
     usual = grooming.groom(maps, found, cleaned, surface, seed, trust=USUAL_ALONE)
@@ -109,7 +113,7 @@ def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
     for part in ("brows", "beard"):
         if part in true or part in grown:
             row[part] = {"true_hairs": _count(true.get(part)), "grown_hairs": _count(grown.get(part)),
-                                  "iou": _overlap(figure, views, true.get(part), grown.get(part))}
+                                  "iou": _overlap(figure, views, true.get(part), grown.get(part)), "parser_iou": _told(figure, shown, part)}
             if part in true and part in grown:
                 row[part] |= {"degrees": _off(true[part], grown[part], figure), "usual_degrees": _off(true[part], usual[part], figure)}
     return row, _picture(figure, views[VIEWS // 2], true, grown)
@@ -119,8 +123,8 @@ def try_trusts(folder: Path, seed: int) -> list[list]:
     """For each part of a person: degrees by which the found directions are off the true hairs' in the median, for each of TRUSTS, the mean over TURNS."""
     figure = make_figure(seed, SIZE)
     views, seen = photograph(folder / str(seed), figure)
-    surface, maps = lay_out(figure.head, SIZE), _maps(figure, views, seen)
-    found, landmarks, rows = hair.find(maps, surface), template.landmark_points(surface.mesh), []
+    surface, (maps, shown) = lay_out(figure.head, SIZE), _maps(figure, views, seen)
+    found, landmarks, rows = hair.find(maps, surface, shown.shares[..., :len(GROWTHS)]), template.landmark_points(surface.mesh), []
     for true in (hairs for hairs in figure.strands if hairs.part in ("brows", "beard")):
         where = (getattr(found, true.part) > grooming.LEAST_COVER) & surface.covered
         if where.sum() < grooming.FEWEST:
@@ -176,18 +180,19 @@ def _look(world: Scene, view: View) -> tuple[np.ndarray, np.ndarray]:
     return _shrunk(colour), normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
 
 
-def _maps(figure: Figure, views: list[View], seen: list[np.ndarray]) -> Maps:
-    """The texture that the true albedo of the views makes, as maps; what none of them sees has the bare skin's."""
+def _maps(figure: Figure, views: list[View], seen: list[np.ndarray]) -> tuple[Maps, PartsShown]:
+    """The texture that the true albedo of the views makes, as maps (what none of them sees has the bare skin's), and what the parser says of the views."""
     surface = Head(figure.head).unfold(SIZE)
     total, weights = np.zeros((SIZE, SIZE, 3)), np.zeros((SIZE, SIZE, 1))
-    for view, colour in zip(views, seen, strict=True):
-        look = observe(view, colour, surface, 1.0)
+    looks = [observe(view, colour, surface, 1.0) for view, colour in zip(views, seen, strict=True)]
+    for look in looks:
         weight = look.weight[..., None] ** 2
         total, weights = total + weight * look.log_colour, weights + weight
     bare = images.resize(figure.skin.diffuse, SIZE, SIZE)
     diffuse = np.where(weights > 1e-4, np.exp(total / np.maximum(weights, 1e-9)), bare).astype(np.float32)
     one = np.ones((SIZE, SIZE), np.float32)
-    return Maps(diffuse, one[..., None] * [0, 0, 1], 0.35 * one, np.clip(weights[..., 0], 0, 1).astype(np.float32), np.repeat(one[..., None], 3, 2))
+    maps = Maps(diffuse, one[..., None] * [0, 0, 1], 0.35 * one, np.clip(weights[..., 0], 0, 1).astype(np.float32), np.repeat(one[..., None], 3, 2))
+    return maps, tell_parts(looks, surface, Reporter("texture"))
 
 
 def _count(hairs: Strands | None) -> int:
@@ -217,6 +222,13 @@ def _overlap(figure: Figure, views: list[View], true: Strands | None, grown: Str
         a, b = (_cover(figure, view, hairs) > COVERED for hairs in (true, grown))
         both, either = both + (a & b).sum(), either + (a | b).sum()
     return round(float(both / max(either, 1)), 3)
+
+
+def _told(figure: Figure, shown: PartsShown, part: str) -> float:
+    """Intersection over union of the texels to which the parser gives more than half and of those where such hair grows, as far as a view shows them."""
+    grows = images.resize(figure.growth[part], SIZE, SIZE) > 0.25 if part in figure.growth else np.zeros((SIZE, SIZE), bool)
+    told, grows = (where[shown.told] for where in (shown.shares[..., GROWTHS.index(part)] > 0.5, grows))
+    return round(float((told & grows).sum() / max((told | grows).sum(), 1)), 3)
 
 
 def _cover(figure: Figure, view: View, hairs: Strands | None) -> np.ndarray:

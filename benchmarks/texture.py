@@ -53,7 +53,7 @@ def measure(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: 
     head, report, results = read_head(capture), Reporter("texture"), {}
     looks = looks_of(capture, head.caster, truth)
     if "delit" in rows and any(capture.delit.glob("*.png")):
-        results["delit"] = _row("aligned", *texture.observe_all(capture, head, size, report), looks, steps, pictures and pictures / "delit.jpg")
+        results["delit"] = _row("aligned", *texture.observe_all(capture, head, size, report)[:2], looks, steps, pictures and pictures / "delit.jpg")
     with tempfile.TemporaryDirectory() as folder:
         copy = Capture(Path(folder) / "copy.wildcap")
         for part in (capture.frames, capture.cameras):
@@ -61,7 +61,7 @@ def measure(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: 
         shutil.copy(capture.head, copy.head)
         delighter = from_json({"delight": {"delighter": "folder", "folder": str(truth.absolute() / "albedo")}})
         importlib.import_module("core.delight").run(copy, delighter, Reporter("delight"))
-        observations, surface = texture.observe_all(copy, head, size, report)
+        observations, surface, _ = texture.observe_all(copy, head, size, report)
         for row in (row for row in rows if row != "delit"):
             try:
                 results[row] = _row(row, observations, surface, looks, steps, pictures and pictures / f"{row}.jpg")

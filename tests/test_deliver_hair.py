@@ -1,8 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that was grown goes along with a USD, as another reader finds it; no other format has it, and nothing of it stays in the .blend."""
+"""Hair that was grown goes along with a USD, as another reader finds it; no other format has it, and nothing of it stays in the .blend. A close-up's eyes and
+mouth go along with none."""
 
+import shutil
 from importlib import util
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +13,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("OpenImageIO", reason="the worker's part needs its packages")
 
-from .test_deliver import by_another_reader, capture, deliver  # noqa: E402, F401  (capture is a fixture)
+from . import delivered  # noqa: E402
+from .test_deliver import by_another_reader, capture, deliver, glb  # noqa: E402, F401  (capture is a fixture)
 
 POINTS = np.array([[[0, -0.1, 0.02], [0, -0.103, 0.021], [0, -0.106, 0.023]], [[0.01, -0.1, 0.02], [0.01, -0.104, 0.02], [0.011, -0.107, 0.02]]], np.float32)
 
@@ -37,3 +41,18 @@ def test_other_formats_have_the_head_alone(hairy):
     trimesh = pytest.importorskip("trimesh")
     folder = deliver(hairy, format="glb")
     assert len(trimesh.load_scene(folder / "face.glb", process=False).geometry) == 1
+
+
+def test_a_close_up_stays_with_the_artist(capture):  # noqa: F811
+    head = bpy.context.view_layer.objects.active
+    head.shape_key_clear()
+    shutil.copyfile(Path(__file__).resolve().parent.parent / "core/assets/head.obj", capture.head)
+    delivered.record_solve(capture)
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.add_face_units()
+    bpy.ops.wildcap.close_up()
+    worn = len(head.children)
+    document, _ = glb(deliver(capture, format="glb") / "face.glb")
+    named = " ".join(material["name"] for material in document["materials"])
+    assert len(document["meshes"]) == 1 and "Eyes" in named and "Cornea" not in named, "the plain eyes"
+    assert len(document["meshes"][0]["primitives"]) == 4 and len(head.children) == worn and head.modifiers

@@ -74,7 +74,7 @@ def groomed(cover: float, seed: int = 0) -> tuple[dict, np.ndarray]:
     albedo = (1 - mask[..., None]) * skin + mask[..., None] * HAIR
     none = np.zeros((SIZE, SIZE), np.float32)
     maps = Maps(albedo.astype(np.float32), none[..., None] + [0, 0, 1], none, none + 1, none[..., None] + np.ones(3))
-    return grooming.groom(maps, Hair(mask, none, none), skin, surface(), seed), mask
+    return grooming.groom(maps, Hair(mask, none, none, none), skin, surface(), seed), mask
 
 
 def test_hair_covers_as_much_of_the_skin_as_the_mask_says():
@@ -101,6 +101,14 @@ def test_black_hair_is_not_blue_where_the_skin_below_is_a_little_off():
     albedo = (1 - cover[..., None]) * SKIN * [1, 1, 1.1] + cover[..., None] * 0.004
     colour = grooming._unmix(albedo, np.broadcast_to(SKIN, albedo.shape), cover, 5.0)
     assert (colour[..., 2] <= colour[..., 0]).all() and colour.max() < 0.02
+
+
+def test_hair_that_was_hidden_has_the_colour_of_the_rest_and_is_brown_where_none_was_seen():
+    skin, cover = np.broadcast_to(SKIN, (64, 64, 3)), np.zeros((64, 64), np.float32)
+    assert grooming._unmix(skin, skin, cover, 2.0) == pytest.approx(np.broadcast_to(grooming.BROWN, skin.shape))
+    cover[:, :32] = 0.5
+    colour = grooming._unmix((1 - cover[..., None]) * skin + cover[..., None] * HAIR, skin, cover, 2.0)
+    assert colour[:, 50:] == pytest.approx(np.broadcast_to(HAIR, (64, 14, 3)), rel=0.01)
 
 
 def test_hair_roots_on_the_skin_in_its_mask_and_stays_outside_of_the_head():

@@ -17,7 +17,7 @@ from core.geometry import meshes, raster  # noqa: E402
 from core.imaging import images  # noqa: E402
 from core.registration import hair  # noqa: E402
 from core.synthetic.painted_head import camera, person  # noqa: E402
-from core.texture import foreign  # noqa: E402
+from core.texture import foreign, parts_shown  # noqa: E402
 from core.texture.projection import observe  # noqa: E402
 
 SIZE, AZIMUTHS = 256, (-50, -20, 0, 20, 50)
@@ -61,12 +61,17 @@ def observations(views, head):
     return [observe(view, np.full((view.height, view.width, 3), 0.5, np.float32), surface, 1.0) for view in views], surface
 
 
+def left_out(seen, surface) -> np.ndarray:
+    return foreign.leave_out_hair(seen, parts_shown.tell_parts(seen, surface, Reporter("texture")), surface)
+
+
 def test_what_most_views_show_as_hair_is_left_out_of_all(monkeypatch, views, head, observations):
     seen, surface = observations
     scalp = (template.mask("scalp", SIZE) > 0.5).astype(np.float32)
     before = [o.weight.copy() for o in seen]
-    sees(monkeypatch, foreign, views, head, scalp, {2: lambda share: 0 * share})
-    found = foreign.leave_out_hair(seen, surface, Reporter("texture"))
+    sees(monkeypatch, parts_shown, views, head, scalp, {2: lambda share: 0 * share})
+    shown = parts_shown.tell_parts(seen, surface, Reporter("texture"))
+    found = foreign.leave_out_hair(seen, shown, surface)
     inner = np.minimum(scalp, 1 - foreign_edge(scalp)) > 0.5
     for o, was in zip(seen, before, strict=True):
         there = inner & (was > 0)
@@ -74,6 +79,9 @@ def test_what_most_views_show_as_hair_is_left_out_of_all(monkeypatch, views, hea
         skin = (foreign_edge(scalp) + scalp < 0.5) & (was > 0)
         assert np.allclose(o.weight[skin], was[skin]) and skin.any()
     assert found[inner & (np.max(before, axis=0) > 0)].mean() > 0.8
+    hair = shown.shares[..., parts_shown.ASKED.index("hair")]
+    assert np.median(hair[inner & shown.told]) > 0.7 and hair[~shown.told].max() == 0 and np.array_equal(shown.told, np.max(before, axis=0) > 0)
+    assert shown.shares[..., parts_shown.ASKED.index("brows")].max() == 0
 
 
 def foreign_edge(mask: np.ndarray) -> np.ndarray:
@@ -94,8 +102,8 @@ def test_a_strand_that_one_view_shows_counts_in_that_one(monkeypatch, views, hea
         share[:, share.shape[1] // 2 - 12:share.shape[1] // 2 + 12] = 1
         return share
 
-    sees(monkeypatch, foreign, views, head, scalp, {1: with_strand})
-    foreign.leave_out_hair(seen, surface, Reporter("texture"))
+    sees(monkeypatch, parts_shown, views, head, scalp, {1: with_strand})
+    left_out(seen, surface)
     face = (template.mask("face", SIZE) > 0.5) & (foreign_edge(scalp) + scalp < 0.5)
     lost = [(face & (was > 0) & (o.weight < 0.5 * was)).sum() / (face & (was > 0)).sum() for o, was in zip(seen, before, strict=True)]
     assert lost[1] > 0.05 and max(lost[:1] + lost[2:]) < 0.02
@@ -106,8 +114,8 @@ def test_where_hardly_any_hair_is_seen_nothing_changes(monkeypatch, views, head,
     before = [o.weight.copy() for o in seen]
     dot = np.zeros((SIZE, SIZE), np.float32)
     dot[100:104, 100:104] = 1
-    sees(monkeypatch, foreign, views, head, dot)
-    assert not foreign.leave_out_hair(seen, surface, Reporter("texture")).any()
+    sees(monkeypatch, parts_shown, views, head, dot)
+    assert not left_out(seen, surface).any()
     assert all((o.weight == was).all() for o, was in zip(seen, before, strict=True))
 
 

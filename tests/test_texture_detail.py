@@ -38,7 +38,7 @@ def fine(log):
 def test_the_step_brings_back_detail_that_a_mean_has_lost(tmp_path):
     paint = skin(SIZE)
     capture = capture_of(tmp_path / "egg", paint, (-40, 0, 40))
-    observations, surface = texture.observe_all(capture, read_head(capture), SIZE, Reporter("texture"))
+    observations, surface, _ = texture.observe_all(capture, read_head(capture), SIZE, Reporter("texture"))
     built = texture.build(observations, surface, from_json({}), Reporter("texture"))
     dull = cv2.GaussianBlur(built.log_texture, (0, 0), 1.5)
     wanted = built.confidence > 0.6
@@ -140,7 +140,7 @@ def test_a_texture_larger_than_its_views_maps_is_read_from_the_frames(tmp_path):
     head, report = read_head(capture), Reporter("texture")
 
     def made(side: int, size: int) -> texture.Built:
-        return texture.build(*texture.observe_all(capture, head, side, report), from_json({}), report, size)
+        return texture.build(*texture.observe_all(capture, head, side, report)[:2], from_json({}), report, size)
 
     small, large, whole = made(SIZE, SIZE), made(SIZE, 2 * SIZE), made(2 * SIZE, 2 * SIZE)
     inner = cv2.erode((whole.confidence > 0.6).astype(np.uint8), np.ones((9, 9))) > 0

@@ -15,6 +15,8 @@ ASIDE_KEY = "wildcap_aside"
 """Custom property of a head that has made room for another one, until its row is clicked."""
 HAIR_KEY = "wildcap_hair"
 """Custom property of hair curves that were grown on a head: of which part they are."""
+CLOSE_UP_KEY = "wildcap_close_up"
+"""Custom property of the objects of a head's close-up eyes and mouth: what each is."""
 HAIR_COLOUR = "wildcap_colour"
 """Their attribute of each curve: its linear albedo."""
 
@@ -82,16 +84,16 @@ def choose(context) -> None:
 
 
 def put_aside(obj: bpy.types.Object) -> None:
-    """Hides a head and its hair; what is hidden is the artist's own doing."""
-    for thing in (obj, *hair(obj)):
+    """Hides a head and what it wears; what is hidden is the artist's own doing."""
+    for thing in (obj, *worn(obj)):
         if not thing.hide_get():
             thing.hide_set(True)
             thing[ASIDE_KEY] = True
 
 
 def show_again(obj: bpy.types.Object) -> None:
-    """Shows a head that was put aside, and its hair."""
-    for thing in (obj, *hair(obj)):
+    """Shows a head that was put aside, and what it wears."""
+    for thing in (obj, *worn(obj)):
         if thing.pop(ASIDE_KEY, None):
             thing.hide_set(False)
 
@@ -99,6 +101,16 @@ def show_again(obj: bpy.types.Object) -> None:
 def hair(obj: bpy.types.Object) -> list[bpy.types.Object]:
     """The hair curves that were grown on a head."""
     return [child for child in obj.children if child.type == 'CURVES' and HAIR_KEY in child]
+
+
+def close_up(obj: bpy.types.Object) -> list[bpy.types.Object]:
+    """The objects of a head's close-up eyes and mouth."""
+    return [child for child in obj.children if child.type == 'MESH' and CLOSE_UP_KEY in child]
+
+
+def worn(obj: bpy.types.Object) -> list[bpy.types.Object]:
+    """What is shown wherever the head is."""
+    return hair(obj) + close_up(obj)
 
 
 def head(context, item) -> bpy.types.Object | None:

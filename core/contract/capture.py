@@ -55,6 +55,7 @@ class Capture:
         self.texture_filmed = self.root / "texture_filmed.png"
         self.texture_confidence = self.root / "texture_confidence.exr"
         self.texture_detail = self.root / "texture_detail.exr"  # what the frames show beyond the texture's texels; absent where they show no more
+        self.texture_parts = self.root / "texture_parts.png"  # where the frames show brows, beard and head hair; absent where none was there to be asked
         self.shadow_mask_auto = self.root / "shadow_mask_auto.png"
         self.shadow_mask = self.root / "shadow_mask.png"
         self.protect_mask = self.root / "protect_mask.png"

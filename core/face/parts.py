@@ -13,6 +13,8 @@ import numpy as np
 PARTS = ("skin", "lips", "brows", "beard", "hair", "eyes", "clothes", "background")
 """What is told apart. Where hair grows, the skin between its roots counts as hair of that kind; lashes belong to the eyes, teeth to the lips, hands to the
 background."""
+GROWTHS = ("brows", "beard", "hair")
+"""The parts that are hair; "hair" is the head's."""
 SIDE = 192  # of the crop
 MARGIN = 1.9  # side of the square in heights of the face's landmarks: hair and neck are in it
 BRIDGE, CHIN = 9, 152

@@ -31,6 +31,7 @@ from .detail import fine_detail
 from .fill import fill
 from .filmed import filmed
 from .foreign import clothes, leave_out_background, leave_out_hair
+from .parts_shown import GROWTHS, PartsShown, tell_parts
 from .projection import Observation, observe
 
 OBSERVED = 1024
@@ -40,7 +41,8 @@ after the other is read along it."""
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """delit/, cameras/, head.obj -> texture.exr (linear), texture.png (sRGB), texture_confidence.exr [S, S] in [0, 1],
-    texture_filmed.png (sRGB), the same with the light in it, where the frames are still there, and texture_detail.exr where they show more than a texel.
+    texture_filmed.png (sRGB), the same with the light in it, and texture_parts.png (brows, beard and head hair in [0, 1]) where the frames are still there, and
+    texture_detail.exr where they show more than a texel.
 
     Raises Problem where no view was delit or none of them sees the head.
     """
@@ -48,7 +50,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     if head.mesh.uvs is None:
         raise Problem("The registered head has no UVs.", "Run the stage registration again.")
     size = settings.texture.size
-    observations, surface = observe_all(capture, head, min(size, OBSERVED), report)
+    observations, surface, shown = observe_all(capture, head, min(size, OBSERVED), report)
     covered = surface.covered_at(size)
     built = build(observations, surface, settings, report, size)
     if built.confidence[covered].max(initial=0) <= 0:
@@ -58,6 +60,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     images.write_linear(capture.texture, texture)
     images.write_srgb(capture.texture_png, images.linear_to_srgb(texture))
     images.write_data(capture.texture_confidence, built.confidence)
+    remove_file(capture.texture_parts)
+    if shown.told.any():
+        images.write_data(capture.texture_parts, shown.shares[..., :len(GROWTHS)])
     _leave_figures(capture, report, observations, built, texture, covered)
     detail = fine_detail(observations, surface, size, report)
     remove_file(capture.texture_detail)
@@ -82,8 +87,9 @@ class Built:
     losses: dict
 
 
-def observe_all(capture: Capture, head: Head, size: int, report: Reporter) -> tuple[list[Observation], Unfolded]:
-    """What each delit view sees of the head on a map of `size`; the frame's own sharpness counts. Raises Problem where no view was delit."""
+def observe_all(capture: Capture, head: Head, size: int, report: Reporter) -> tuple[list[Observation], Unfolded, PartsShown]:
+    """What each delit view sees of the head on a map of `size`, the frame's own sharpness counted, and which parts of the person they show. Raises Problem
+    where no view was delit."""
     frames = read_frames(capture).by_name
     views = [(view, path) for view in read_views(capture) if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
     if not views:
@@ -97,9 +103,10 @@ def observe_all(capture: Capture, head: Head, size: int, report: Reporter) -> tu
         report.progress(i, len(views) + 6, f"projecting {view.name}")
         observations.append(observe(view, _delit(path, view), surface, frames[view.name].sharpness / best))
     report.figure("blinks", len(leave_out_blinks(capture, observations, surface, report)))
-    hair = leave_out_hair(observations, surface, report)
+    shown = tell_parts(observations, surface, report)
+    hair = leave_out_hair(observations, shown, surface)
     report.figure("hair_percent", round(100 * float(hair[surface.covered].mean()), 1))
-    return observations, surface
+    return observations, surface, shown
 
 
 def _delit(path: Path, view: View) -> np.ndarray:

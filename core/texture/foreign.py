@@ -12,11 +12,11 @@ import cv2
 import numpy as np
 
 from ..contract.messages import Problem, Reporter
-from ..face import faces, parser, template
-from ..face.head import Head, Unfolded
+from ..face import faces, template
+from ..face.head import Unfolded
 from ..geometry import raster
-from ..geometry.views import View
 from ..imaging import images
+from .parts_shown import ASKED, PartsShown
 from .projection import Observation
 
 COLOUR = 0.35
@@ -35,54 +35,22 @@ LEAST_HAIR = 0.005
 """Share of the map below which nothing is hair: the parser's doubts."""
 
 
-def leave_out_hair(observations: list[Observation], surface: Unfolded, report: Reporter) -> np.ndarray:
-    """Takes quality and weight from texels that lie under hair or cloth, by the face parser, and returns how surely they do, float32 [S, S] in [0, 1].
+def leave_out_hair(observations: list[Observation], shown: PartsShown, surface: Unfolded) -> np.ndarray:
+    """Takes quality and weight from texels that lie under hair of the head or cloth, and returns how surely they do, float32 [S, S] in [0, 1].
 
     What most views show so counts in all of them; what one view shows so (a strand before a cheek) counts in that one.
-    Raises Problem where the parser's weights are damaged.
     """
-    total, votes, shares = np.zeros(surface.covered.shape, np.float32), np.zeros(surface.covered.shape, np.float32), []
-    for i, observation in enumerate(observations):
-        report.progress(i, len(observations), f"telling hair from skin in {observation.name}")
-        shares.append(_hidden_share(observation, surface))
-        if shares[-1] is not None:
-            share, known = shares[-1]
-            total += observation.weight * known
-            votes += observation.weight * known * share
-    usual = np.where(total > 0, votes / np.maximum(total, 1e-9), 0)
+    usual = shown.shares[..., [ASKED.index("hair"), ASKED.index("clothes")]].sum(-1)
     if surface.head.built_in:  # of the scalp behind what any crop shows, what is next to it tells
-        usual = np.where((total <= 0) & (template.mask("scalp", len(usual)) > 0.5), raster.bleed(usual, total > 0), usual)
+        usual = np.where(~shown.told & (template.mask("scalp", len(usual)) > 0.5), raster.bleed(usual, shown.told), usual)
     if (usual[surface.covered] > HIDDEN[1]).mean() < LEAST_HAIR:
         return np.zeros_like(usual)
     low, high = HIDDEN
-    for observation, found in zip(observations, shares, strict=True):
-        hidden = usual if found is None else np.maximum(usual, found[0] * found[1])
+    for observation, own in zip(observations, shown.hidden, strict=True):
+        hidden = usual if own is None else np.maximum(usual, own)
         kept = np.clip((high - hidden) / (high - low), 0, 1).astype(np.float32)
         observation.quality, observation.weight = observation.quality * kept, observation.weight * kept
     return np.clip((usual - low) / (high - low), 0, 1).astype(np.float32)
-
-
-def _hidden_share(observation: Observation, surface: Unfolded) -> tuple[np.ndarray, np.ndarray] | None:
-    """How much of what a view shows at each texel is hair of the head or cloth, and where that is known, float32 [S, S]; None where nobody tells."""
-    if not observation.view.path.is_file():
-        return None
-    srgb = images.read_srgb(observation.view.path)
-    landmarks = _landmarks(srgb, observation.view, surface.head)
-    if landmarks is None:
-        return None
-    parts = parser.parse(srgb, landmarks)
-    height, width = observation.picture.shape[:2]
-    at = [observation.pixels[..., k] - 0.5 for k in range(2)]
-    return tuple(cv2.remap(images.resize(part, width, height), *at, cv2.INTER_LINEAR) for part in (parts.of("hair", "clothes"), parts.known()))
-
-
-def _landmarks(srgb: np.ndarray, view: View, head: Head) -> np.ndarray | None:
-    """The face's landmarks [468, 2] in a view's frame: where the built-in head has them, from any side, or as they are found."""
-    if not head.built_in:
-        face = faces.detect(srgb)
-        return None if face is None else face.landmarks
-    pixels, _ = view.project(template.landmark_points(head.mesh))
-    return pixels * [srgb.shape[1] / view.width, srgb.shape[0] / view.height] if np.isfinite(pixels).all() else None
 
 
 def leave_out_background(observations: list[Observation], report: Reporter) -> int:

@@ -21,7 +21,7 @@ from ..contract.stages import STRANDS
 from ..face.head import read_head
 from ..face.strands import Strands
 from ..imaging import images
-from . import detail, drawing, gloss, grooming, hair
+from . import detail, drawing, gloss, grooming, growth, hair
 from .maps import Maps, read_maps
 from .surface import lay_out
 from .whole_head import complete
@@ -80,11 +80,17 @@ def _whole(capture: Capture, maps: Maps, settings: Settings, report: Reporter) -
     if not options.hair:
         return maps, None, {}
     report.progress(0, 1, "finding brows, lashes and beard")
-    found = hair.find(maps, surface, report.check)
+    parts = growth.read_parts(capture, surface.size)
+    report.figure("hair_told_by", "strokes" if parts is None else "frames and strokes")
+    found = hair.find(maps, surface, parts, report.check)
     report.check()
     cleaned, share = hair.clean(maps, found, surface, settings.seed, report.check)
     for name in ("brows", "lashes", "beard"):
         report.figure(f"{name}_cm2", round(float((getattr(found, name) * surface.texel**2).sum()) / 100, 2))
+    behind = round(100 * float((found.hidden * found.brows).sum() / max(found.brows.sum(), 1e-6)))
+    if behind:
+        report.figure("brows_hidden_percent", behind)
+        report.log(f"Hair lies before {behind} % of the brows: there they are grown like the other side, or as brows usually are.")
     images.write_srgb(capture.picture("upscale", "albedo_hair_skin_below"), drawing.masks(maps.diffuse, found, cleaned))
     report.progress(0, 1, "growing hair")
     hairs = grooming.groom(maps, found, cleaned, surface, settings.seed, check=report.check)

@@ -41,6 +41,10 @@ CLEARANCE = 0.0003
 """Metres that a hair keeps from the skin."""
 COLOUR_REACH, DARKEST = 5.0, 0.003
 """mm over which hair has one colour, and the darkest that it may be."""
+LEAST_SEEN = 1e-3
+"""Mean square of the cover around a texel below which its hair takes the colour of the whole part."""
+BROWN = 0.05, 0.03, 0.018
+"""Linear albedo of brown hair: of what nothing was seen."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +82,10 @@ def groom(maps: Maps, hair: Hair, cleaned: np.ndarray, surface: HeadSurface, see
         if where.sum() < FEWEST:
             continue
         texels, texel = strokes.lay_texels(surface, where), float(np.median(surface.texel[where]))
-        way = strokes.choose_ways(strokes.measure_tensors(maps.diffuse, texels, texel), texels, ways.usual(kind.name, texels.position, landmarks), trust)
-        colours = _unmix(maps.diffuse, cleaned, cover * where, COLOUR_REACH / texel)[where]
+        seen = 1 - hair.hidden  # what lies before a brow is no stroke of it, and not its colour
+        tensors = strokes.measure_tensors(maps.diffuse, texels, texel) * seen[where][:, None, None]
+        way = strokes.choose_ways(tensors, texels, ways.usual(kind.name, texels.position, landmarks), trust)
+        colours = _unmix(maps.diffuse, cleaned, cover * where * seen, COLOUR_REACH / texel)[where]
         check()
         found[kind.name] = _grown(kind, cover[where], colours, texels, way, surface, np.random.default_rng([seed, number]))
     if "brows" in found:
@@ -146,10 +152,12 @@ def _turned(way: np.ndarray, normal: np.ndarray, radians: np.ndarray) -> np.ndar
 
 def _unmix(albedo: np.ndarray, skin: np.ndarray, cover: np.ndarray, reach: float) -> np.ndarray:
     """The hair's linear albedo [S, S, 3]: what mixes with the skin below it to the albedo, by least squares over `reach` texels; never bluer than it is red,
-    as melanin has it, for in black hair the skin's error is more than the hair's own colour."""
+    as melanin has it, for in black hair the skin's error is more than the hair's own colour. Where none is seen, that of all."""
     share = cover[..., None]
-    mixed = cv2.GaussianBlur((share * (albedo - (1 - share) * skin)).astype(np.float32), (0, 0), reach)
-    mixed /= np.maximum(cv2.GaussianBlur((cover**2).astype(np.float32), (0, 0), reach), 1e-9)[..., None]
+    mixed, square = (share * (albedo - (1 - share) * skin)).astype(np.float32), (share**2).astype(np.float32)
+    whole = mixed.sum((0, 1)) / square.sum() if square.sum() > FEWEST else np.float32(BROWN)
+    mixed, square = (cv2.GaussianBlur(part, (0, 0), reach) for part in (mixed, square))
+    mixed = (mixed + LEAST_SEEN * whole) / (square[..., None] + LEAST_SEEN)
     return np.minimum.accumulate(np.maximum(mixed, DARKEST), -1)
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Brows, lashes and beard as soft masks, and the albedo of the skin below them, so that hair can be groomed over clean skin.
 
-Hair is what is darker than the skin around it would be there, where such hair grows; a beard is told from bare skin by how many dark strokes it has.
+Hair is what differs from the skin that would be there, where such hair grows (growth.py); how much of it there is says how far it differs.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ import numpy as np
 
 from ..face import beard, template
 from ..imaging import images
-from . import grain
+from . import grain, growth
+from .growth import Growth
 from .maps import Maps
 from .surface import HeadSurface
 from .whole_head import FEATURES, apart, seen_well
@@ -26,32 +27,38 @@ LIDS = (33, 7, 163, 144, 145, 153, 154, 155, 133), (263, 249, 390, 373, 374, 380
 LASHES = 1.6
 """mm on either side of the rim in which lashes are looked for."""
 LEAST_HAIR = 0.25
-"""Log albedo by which hair must be darker than its skin to be told from it; the fair brows of some people are not."""
+"""Log albedo by which hair must be darker than its skin to be told from it by that alone; the fair brows of some people are not."""
+USUAL = {"brows": 0.5, "beard": 0.5}
+"""Share that hair covers where there is some,"""
+SPREAD = 0.25
+"""and its deviation: what counts where hair is hardly another colour than its skin."""
 
 
 @dataclass(frozen=True)
 class Hair:
-    """How much of each texel hair covers, float32 [S, S] in [0, 1] each."""
+    """How much of each texel hair covers, float32 [S, S] in [0, 1] each; hidden: how surely hair of the head lay before it in the frames."""
 
     brows: np.ndarray
     lashes: np.ndarray
     beard: np.ndarray
+    hidden: np.ndarray
 
 
-def find(maps: Maps, surface: HeadSurface, check: Callable[[], None] = lambda: None) -> Hair:
-    """The hair that the albedo shows. `check` may raise to cancel, here and below."""
+def find(maps: Maps, surface: HeadSurface, parts: np.ndarray | None = None, check: Callable[[], None] = lambda: None) -> Hair:
+    """The hair of a face. parts: what growth.read_parts gives. `check` may raise to cancel, here and below."""
     channels, _ = apart(maps)
     light = channels[..., :3].mean(2)
     zones, texel = _zones(surface), float(np.median(surface.texel))
     check()
-    bare = (template.mask("skin", surface.size) > 0.99) & (zones["beard"] < 0.05) & (zones["brows"] < 0.01) & (seen_well(maps.confidence, surface) >= 1)
-    fine = beard.fine(light, texel)
-    usual = beard.deviation(fine[bare])
-    present = beard.presence(fine, usual, bare, zones["beard"], surface.texel)
+    grown = growth.find(light, maps.confidence, zones, surface, parts)
     check()
-    skin = _skin(light[..., None], zones, present, surface)[..., 0]
-    around = _closed(light, texel)
-    return Hair(_cover(skin - light, zones["brows"], usual), _cover(around - light, zones["lashes"], usual), _cover(skin - light, present, usual))
+    darker = _skin(light[..., None], zones, grown.beard, grown.head, surface)[..., 0] - light
+    lashes = _cover(_closed(light, texel) - light, zones["lashes"], grown.grain)
+    if not grown.told:
+        return Hair(_cover(darker, grown.brows, grown.grain), lashes, _cover(darker, grown.beard, grown.grain), grown.head)
+    brows, clearest = _told_cover(darker, grown.brows * (1 - grown.head), grown.grain, USUAL["brows"])
+    bearded, _ = _told_cover(darker, grown.beard, grown.grain, USUAL["beard"], clearest)
+    return Hair(_behind(brows, grown, surface), lashes, bearded, grown.head)
 
 
 def clean(maps: Maps, hair: Hair, surface: HeadSurface, seed: int = 0, check: Callable[[], None] = lambda: None) -> tuple[np.ndarray, np.ndarray]:
@@ -66,7 +73,7 @@ def clean(maps: Maps, hair: Hair, surface: HeadSurface, seed: int = 0, check: Ca
     where = (share > 0) & surface.covered
     if not where.any():
         return maps.diffuse, share
-    skin = _skin(channels, zones, cv2.dilate((hair.beard > 0.02).astype(np.float32), beard.disc(2.0 / texel)), surface)
+    skin = _skin(channels, zones, cv2.dilate((hair.beard > 0.02).astype(np.float32), beard.disc(2.0 / texel)), hair.hidden, surface)
     check()
     lids = zones["lashes"][..., None]
     skin = skin * (1 - lids) + _closed(channels, texel) * lids  # a field from beyond the sockets knows no lid
@@ -121,11 +128,11 @@ def _off(position: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.linalg.norm(position - a - share[:, None] * along, axis=1)
 
 
-def _skin(channels: np.ndarray, zones: dict[str, np.ndarray], bearded: np.ndarray, surface: HeadSurface) -> np.ndarray:
+def _skin(channels: np.ndarray, zones: dict[str, np.ndarray], bearded: np.ndarray, hidden: np.ndarray, surface: HeadSurface) -> np.ndarray:
     """Channels [S, S, C] of the skin as they would be without hair, without detail."""
     size = surface.size
     other = np.maximum.reduce([*(template.mask(name, size) for name in (*FEATURES, "scalp")), zones["brows"]])
-    weight = (1 - np.clip(1.5 * other, 0, 1)) * (1 - np.clip(4 * bearded, 0, 1))
+    weight = (1 - np.clip(1.5 * other, 0, 1)) * (1 - np.clip(4 * bearded, 0, 1)) * (1 - hidden)
     return surface.smooth(channels, weight, 2.5, 0.25)
 
 
@@ -137,6 +144,29 @@ def _cover(darker: np.ndarray, zone: np.ndarray, usual: float) -> np.ndarray:
         return np.zeros_like(zone)
     least, most = (1 - np.exp(-x) for x in (2 * usual, full))
     return (np.clip((1 - np.exp(-darker) - least) / (most - least), 0, 1) * zone).astype(np.float32)
+
+
+def _told_cover(darker: np.ndarray, there: np.ndarray, grain: float, usual: float, clearest: float = 0.0) -> tuple[np.ndarray, float]:
+    """Share of hair [S, S] where the parser says that there is some, and how far below the skin's albedo the clearest hairs lie, as a share of it.
+
+    What a texel is darker or lighter than its skin over what the clearest hairs are, and `usual`, each weighed by how sure it is: the less hair differs from
+    its skin, over the `grain` of that, the less does its contrast tell. `clearest`: of the person's other dark hair, for stubble nowhere fills a texel.
+    """
+    off, sure = 1 - np.exp(-darker), there > 0.5
+    if not sure.any():
+        return np.zeros_like(there), clearest
+    dark = off[sure].mean() >= 0
+    off = np.maximum(off, -off - 2 * grain) if dark else np.maximum(-off, off - 2 * grain)  # grey hair has strokes of the other sign, too
+    full = max(float(np.percentile(off[sure], 99)), clearest if dark else 0.0, grain)
+    trust = SPREAD**2 / (SPREAD**2 + (grain / full) ** 2)
+    cover = (trust * np.clip(off / full, 0, 1) + (1 - trust) * usual) * there
+    return cover.astype(np.float32), full if dark else clearest
+
+
+def _behind(brows: np.ndarray, grown: Growth, surface: HeadSurface) -> np.ndarray:
+    """Brows with those that lie behind hair of the head: as the other one is, where that is seen, and as brows usually are where neither is."""
+    other, hidden = brows[:, ::-1], grown.head[:, ::-1]  # the template's two sides mirror each other on the map
+    return brows * (1 - grown.head) + grown.head * (other * (1 - hidden) + USUAL["brows"] * template.mask("brows", surface.size) * hidden)
 
 
 def _closed(picture: np.ndarray, texel: float) -> np.ndarray:

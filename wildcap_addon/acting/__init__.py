@@ -6,6 +6,7 @@ import bpy
 
 from .. import head
 from . import gaze, mesh, operators, panel
+from .close_up import building
 
 _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES, *panel.CLASSES))
 
@@ -13,11 +14,12 @@ _register, _unregister = bpy.utils.register_classes_factory((*operators.CLASSES,
 def register():
     _register()
     head.FOLLOWERS.append(mesh.renewed)
-    head.COMPLETERS.extend((mesh.open_filmed_eyes, gaze.keep_up))
+    head.COMPLETERS.extend((mesh.open_filmed_eyes, gaze.keep_up, building.keep_up))
 
 
 def unregister():
     head.COMPLETERS.remove(mesh.open_filmed_eyes)
     head.COMPLETERS.remove(gaze.keep_up)
+    head.COMPLETERS.remove(building.keep_up)
     head.FOLLOWERS.remove(mesh.renewed)
     _unregister()

@@ -14,6 +14,8 @@ IRISES = {"brown": (0.13, 0.055, 0.02), "hazel": (0.25, 0.16, 0.06), "green": (0
 """Linear colours."""
 DEFAULT = "brown"
 KEY = "wildcap_inside"
+IRIS, IRIS_NODE = "iris", "WildCap Iris"
+"""Kind of the material of an iris that is an object of its own (close_up), and its node that has the colour."""
 
 
 def inside(name: str, iris: str | tuple) -> list[bpy.types.Material]:
@@ -24,10 +26,31 @@ def inside(name: str, iris: str | tuple) -> list[bpy.types.Material]:
 
 
 def recolour(obj, iris: str | tuple) -> None:
-    """Another colour of the iris, in the eyes that the head has."""
+    """Another colour of the iris, in the eyes that the head has and in those of its close-up."""
     for material in obj.data.materials:
         if material is not None and material.get(KEY) == "eyes":
             _paint(material, obj.name, iris)
+    for material in {slot.material for child in obj.children for slot in child.material_slots if slot.material is not None}:
+        if material.get(KEY) == IRIS:
+            tint(material, IRISES.get(iris, iris))
+
+
+def tint(material, colour: tuple[float, float, float]) -> None:
+    """Gives an iris its linear colour."""
+    material.diffuse_color = (*colour, 1)
+    node = material.node_tree.nodes.get(IRIS_NODE)
+    if node is not None:
+        node.outputs[0].default_value = (*colour, 1)
+
+
+def colour_of(obj) -> tuple[float, float, float]:
+    """The linear colour that the head's irises have."""
+    for material in obj.data.materials:
+        node = material.node_tree.nodes.get("WildCap Eye") if material is not None and material.get(KEY) == "eyes" else None
+        told = node.image.get("wildcap_iris", "") if node is not None and node.image is not None else ""
+        if told:
+            return IRISES[told] if told in IRISES else tuple(float(value) for value in told.split())
+    return IRISES[DEFAULT]
 
 
 def _material(name: str, kind: str, colour: tuple, roughness: float, coat: float) -> bpy.types.Material:

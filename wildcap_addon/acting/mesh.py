@@ -46,7 +46,7 @@ def add(obj, iris: str = "") -> None:
     old = obj.data
     _check(obj, asset)
     head, normals = _vertices(old), _corner_normals(old)
-    seen = _filmed(obj, asset)
+    seen = filmed_eyes(obj, asset)
     carried = carrying.carried(asset, head, seen)
     new = _built(old, asset, carried[0])
     slots = list(old.materials) or [None]
@@ -75,13 +75,13 @@ def measured_iris(seen: filmed.FilmedEyes | None) -> tuple[float, float, float] 
 
 def filmed_iris(obj) -> tuple[float, float, float]:
     """As `measured_iris`, of a head's capture. Raises Problem where none was measured."""
-    colour = measured_iris(_filmed(obj, load()))
+    colour = measured_iris(filmed_eyes(obj, load()))
     if colour is None:
         raise Problem("The frames do not tell the colour of these eyes.", "Choose a colour instead.")
     return colour
 
 
-def _filmed(obj, asset: FaceUnits) -> filmed.FilmedEyes | None:
+def filmed_eyes(obj, asset: FaceUnits) -> filmed.FilmedEyes | None:
     """What the head's capture knows of its eyes."""
     return filmed.read(Capture(Path(bpy.path.abspath(obj[captures.HEAD_KEY]))), asset) if obj.get(captures.HEAD_KEY) else None
 
@@ -90,7 +90,7 @@ def follow(obj, head: np.ndarray, normals: np.ndarray) -> None:
     """Moves a head that has its units to another registered shape [V, 3]; values, animation, drivers and the artist's own keys stay."""
     asset = load()
     obj.data[OUTER] = len(asset.triangles)  # a head of WildCap 0.1.0 did not say
-    _shape(obj, *carrying.carried(asset, head, _filmed(obj, asset)), normals)
+    _shape(obj, *carrying.carried(asset, head, filmed_eyes(obj, asset)), normals)
 
 
 def _shape(obj, rest: np.ndarray, units: dict, normals: np.ndarray) -> None:

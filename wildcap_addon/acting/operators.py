@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: face units onto the head, the iris' colour, what the eyes look at, and all sliders back to zero."""
+"""Operators: face units onto the head, the iris' colour, what the eyes look at, eyes and mouth for a close-up, and all sliders back to zero."""
 
 import bpy
 
@@ -8,6 +8,7 @@ from ...core.contract.messages import Problem
 from .. import captures, head
 from ..base_operator import BaseOperator
 from . import gaze, materials, mesh
+from .close_up import building
 
 FILMED = ("filmed", "As Filmed", "What the frames show, where the eyes were open; brown otherwise")
 OPEN = 0.22
@@ -79,6 +80,21 @@ class WILDCAP_OT_gaze(_OnHead, bpy.types.Operator):
             gaze.remove(obj)
 
 
+class WILDCAP_OT_close_up(_OnHead, bpy.types.Operator):
+    """Give the head eyes and a mouth worth a close-up, as objects of their own that go along with its face units; again to have its plain ones back"""
+
+    bl_idname = "wildcap.close_up"
+    bl_label = "Close-Up Eyes"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    def work(self, context):
+        obj = _acting(context)
+        if building.of(obj):
+            building.remove(obj)
+        else:
+            building.add(context, obj)
+
+
 def filmed_open(capture) -> str:
     """What there is to say of the lids of a face that was filmed with open eyes and reconstructed by WildCap 0.1.0, '' for others."""
     seen = capture.read()["stages"].get("registration", {}).get("figures", {}).get("eye_opening")
@@ -95,4 +111,4 @@ def _acting(context):
     return obj
 
 
-CLASSES = (WILDCAP_OT_add_face_units, WILDCAP_OT_iris, WILDCAP_OT_gaze, WILDCAP_OT_rest_face)
+CLASSES = (WILDCAP_OT_add_face_units, WILDCAP_OT_iris, WILDCAP_OT_gaze, WILDCAP_OT_close_up, WILDCAP_OT_rest_face)

@@ -8,6 +8,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from .. import captures
 from ..base_panel import CapturePanel
 from . import gaze, mesh
+from .close_up import building
 
 FIRST = ("jawOpen", "mouthSmileLeft", "mouthSmileRight", "eyeBlinkLeft", "eyeBlinkRight", "browInnerUp")
 
@@ -34,6 +35,7 @@ class WILDCAP_PT_acting(CapturePanel, bpy.types.Panel):
         row.operator_menu_enum("wildcap.iris", "iris")
         row.operator("wildcap.gaze", depress=gaze.of(obj) is not None)
         row.operator("wildcap.rest_face")
+        layout.operator("wildcap.close_up", depress=bool(building.of(obj)))
 
 
 CLASSES = (WILDCAP_PT_acting,)

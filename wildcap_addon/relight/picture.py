@@ -20,12 +20,12 @@ FOCAL_LENGTH_MM = 85.0
 
 
 def set_up(obj: bpy.types.Object, light: str | Hdri | None, resolution: int, samples: int, turn: float = 0.0, view: str = colours.VIEWS[0]) -> bpy.types.Scene:
-    """The relight scene with this head and its hair alone in it, framed and lit (None: dark); the light is turned by `turn` radians about the head. The picture
-    is shown by the view transform `view`, and its file says so."""
+    """The relight scene with this head and what it wears alone in it, framed and lit (None: dark); the light is turned by `turn` radians about the head. The
+    picture is shown by the view transform `view`, and its file says so."""
     scene = bpy.data.scenes.get(SCENE) or bpy.data.scenes.new(SCENE)
     for other in [o for o in scene.collection.objects if o.type not in ('CAMERA', 'LIGHT')]:
         scene.collection.objects.unlink(other)
-    for thing in (obj, *captures.hair(obj)):
+    for thing in (obj, *captures.worn(obj)):
         scene.collection.objects.link(thing)
     frame, radius = frame_of(obj)
     lights.build(scene, light, frame, radius, turn)

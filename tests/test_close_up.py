@@ -1,0 +1,185 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Eyes and mouth for a close-up: as deep as life's, they look where they are told, lids and tears keep to them, and nothing of them stays when they go."""
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+mathutils = pytest.importorskip("mathutils")
+BVHTree = pytest.importorskip("mathutils.bvhtree").BVHTree
+
+from tests.test_acting import COPIES, HEAD, coordinates, head, shown, write_head  # noqa: E402, F401  (head is a fixture)
+from tests.test_gaze import degrees  # noqa: E402
+
+KINDS = {f"{side} {what}" for side in ("Left", "Right") for what in ("Eye", "Cornea", "Wet Line", "Caruncle")} | {"Teeth", "Tongue"}
+OPENINGS = (0.0, 0.3, 0.6, 1.0)
+LOOKS = ("Up", "Down", "In", "Out")
+
+
+@pytest.fixture
+def close_up(head):  # noqa: F811
+    assert bpy.ops.wildcap.close_up() == {'FINISHED'}
+    return head
+
+
+def things(head) -> dict:  # noqa: F811
+    return {child["wildcap_close_up"]: child for child in head.children if "wildcap_close_up" in child}
+
+
+def set_face(head, opened: float, **units) -> None:  # noqa: F811
+    keys = head.data.shape_keys
+    for key in keys.key_blocks:
+        if not key.name.startswith("eyesOpen"):
+            key.value = units.get(key.name, 0.0)
+    keys["eyesOpen"] = opened
+    keys.update_tag()
+    bpy.context.view_layer.update()
+
+
+def seen(thing) -> np.ndarray:
+    """Vertices as they are shown, in the head's axes."""
+    evaluated = thing.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return coordinates(evaluated.data.vertices) @ np.array(evaluated.matrix_local)[:3, :3].T + np.array(evaluated.matrix_local)[:3, 3]
+
+
+def ball_and_gaze(head, side: str) -> tuple[np.ndarray, np.ndarray]:  # noqa: F811
+    matrix = np.array(things(head)[f"{side} Eye"].evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_local)
+    return matrix[:3, 3], -matrix[:3, 1] / np.linalg.norm(matrix[:3, 1])
+
+
+def tree_of(thing) -> BVHTree:
+    return BVHTree.FromPolygons(seen(thing).tolist(), [list(p.vertices) for p in thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.polygons])
+
+
+def test_an_eye_is_as_deep_as_lifes_and_inside_of_the_heads_own_ball(close_up, addon):
+    assert set(things(close_up)) == KINDS and all(thing.parent == close_up for thing in things(close_up).values())
+    asset = addon("acting.asset").load()
+    for number, side in enumerate(("Left", "Right")):
+        ball = addon("acting.close_up.ball").of(close_up, number)
+        centre, gaze = ball_and_gaze(close_up, side)
+        shell, inner = seen(things(close_up)[f"{side} Cornea"]) - centre, things(close_up)[f"{side} Eye"]
+        apex = (shell @ gaze).max()
+        assert 0.0008 < apex - ball.radius < 0.0013, "the cornea stands out by a millimetre"
+        own = coordinates(close_up.data.shape_keys.reference_key.data)[HEAD + COPIES + np.flatnonzero(asset.kind == 1 + number)] - centre
+        assert apex < (own @ gaze).max() + 1e-4, "no farther than the ball to which the lids were fitted"
+        slots, places = np.array([p.material_index for p in inner.data.polygons]), seen(inner) - centre
+        iris = np.unique([v for p in inner.data.polygons if p.material_index == 1 for v in p.vertices])
+        depth = apex - places[iris] @ gaze
+        assert depth.min() > 0.0018 and depth.max() < 0.0032
+        rim = np.linalg.norm(places[iris] - (places[iris] @ gaze)[:, None] * gaze, axis=1)
+        assert 0.0015 < rim.min() < 0.0025 and 0.0055 < rim.max() < 0.0065, "a hole for the pupil, and an iris as wide as life's"
+        assert set(slots) == {0, 1, 2}
+
+
+def test_it_looks_where_the_empty_is_and_a_bone_can_hold_that(close_up, addon):
+    bpy.ops.wildcap.gaze()
+    empty = addon("acting.gaze").of(close_up)
+    middle = np.mean([ball_and_gaze(close_up, side)[0] for side in ("Left", "Right")], 0)
+    for yaw, pitch in ((0, 0), (15, 0), (-15, 0), (0, 8), (0, -13), (11, 7)):
+        a, b = np.radians((yaw, pitch))
+        empty.location = middle + 0.6 * np.array([np.sin(a) * np.cos(b), -np.cos(a) * np.cos(b), np.sin(b)])
+        bpy.context.view_layer.update()
+        for side in ("Left", "Right"):
+            centre, gaze = ball_and_gaze(close_up, side)
+            assert degrees(gaze, np.array(empty.location) - centre) < 3.5, (yaw, pitch, side)
+    holder = bpy.data.objects.new("Bone", None)
+    bpy.context.scene.collection.objects.link(holder)
+    close_up.location, close_up.scale = (1, 2, 3), (2, 2, 2)
+    bpy.context.view_layer.update()
+    holder.location = close_up.matrix_world @ mathutils.Vector((0.1, -0.5, 0.03))
+    empty.constraints.new('COPY_LOCATION').target = holder
+    bpy.context.view_layer.update()
+    centre, gaze = ball_and_gaze(close_up, "Left")
+    assert degrees(gaze, np.array((0.1, -0.5, 0.03)) - centre) < 3.5
+    for thing in things(close_up).values():
+        for curve in (thing.animation_data.drivers if thing.animation_data else []):
+            assert curve.driver.is_valid and curve.driver.is_simple_expression
+
+
+def test_lids_and_tears_keep_to_an_eye_however_it_is_opened_and_turned(close_up, addon):
+    asset, rims_of = addon("acting.asset").load(), addon("acting.close_up.ball").rims
+    poses = [(opened, {}) for opened in OPENINGS] + [(1.0, {f"eyeLook{way}{side}": 1.2 for side in ("Left", "Right")}) for way in LOOKS]
+    for way in LOOKS:
+        for side in ("Left", "Right"):
+            close_up.data.shape_keys.key_blocks[f"eyeLook{way}{side}"].slider_max = 1.2
+    for opened, units in poses:
+        set_face(close_up, opened, **units)
+        skin = shown(close_up)
+        for number, side in enumerate(("Left", "Right")):
+            shell, rims = tree_of(things(close_up)[f"{side} Cornea"]), rims_of(asset, number)
+            rim = np.concatenate([rims.upper, rims.lower])
+            for place in skin[rim]:
+                near, normal, _, _ = shell.find_nearest(place.tolist())
+                assert (mathutils.Vector(place) - near).dot(normal) > 0, (opened, units, side)
+            wet = coordinates(things(close_up)[f"{side} Wet Line"].evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices)
+            skin_tree = BVHTree.FromPolygons(skin.tolist(), [list(p.vertices) for p in close_up.data.polygons if max(p.vertices) < len(skin)])
+            from_lid = np.array([skin_tree.find_nearest(place.tolist())[3] for place in wet])
+            from_ball = np.array([shell.find_nearest(place.tolist())[3] for place in wet])
+            assert min(from_lid.min(), from_ball.min()) < 1e-4
+            assert np.minimum(from_lid, from_ball).max() < 3e-4 + 0.25 * from_ball.max(), "it spans the gap"
+
+
+def test_it_goes_as_it_came_and_an_undo_takes_it_back(head, addon):  # noqa: F811
+    before = {name: {block.name for block in getattr(bpy.data, name)} for name in ("objects", "meshes", "materials", "images", "node_groups", "shape_keys")}
+    rest = shown(head)
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.wildcap.close_up()
+    bpy.ops.ed.undo_push(message="after")
+    name = head.name
+    bpy.ops.ed.undo()
+    head = bpy.data.objects[name]  # noqa: F811
+    assert not things(head) and not head.modifiers
+    bpy.ops.wildcap.close_up()
+    mine = bpy.data.objects.new("Mine", None)
+    bpy.context.scene.collection.objects.link(mine)
+    mine.parent = head
+    bpy.ops.wildcap.close_up()
+    assert not things(head) and not head.modifiers and mine.parent == head
+    bpy.data.objects.remove(mine)
+    assert {name: {block.name for block in getattr(bpy.data, name)} for name in before} == before
+    assert np.abs(shown(head) - rest).max() < 1e-6
+    with pytest.raises(RuntimeError, match="no face units yet"):
+        head.shape_key_clear()
+        bpy.ops.wildcap.close_up()
+
+
+def test_it_follows_another_shape_and_another_colour_and_what_was_set_stays(close_up, addon, capture):
+    iris = next(slot.material for slot in things(close_up)["Left Eye"].material_slots if slot.material["wildcap_inside"] == "iris")
+    shader = next(node for node in iris.node_tree.nodes if node.type == 'BSDF_PRINCIPLED')
+    shader.inputs["Roughness"].default_value = 0.77
+    bpy.ops.wildcap.iris(iris='blue')
+    assert tuple(iris.node_tree.nodes["WildCap Iris"].outputs[0].default_value)[:3] == pytest.approx(addon("acting.materials").IRISES["blue"])
+    objects = set(things(close_up).values())
+    write_head(capture, 1.15)
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.assemble_material()
+    assert set(things(close_up).values()) == objects and shader.inputs["Roughness"].default_value == pytest.approx(0.77)
+    for number, side in enumerate(("Left", "Right")):
+        assert ball_and_gaze(close_up, side)[0] == pytest.approx(addon("acting.close_up.ball").of(close_up, number).centre, abs=1e-5)
+    scene = addon("relight.picture").set_up(close_up, "three_point", 64, 1)
+    assert objects <= set(scene.collection.objects)
+
+
+def test_both_engines_have_an_output_that_shows_something(close_up):
+    for thing in things(close_up).values():
+        for slot in thing.material_slots:
+            for engine in ('CYCLES', 'EEVEE'):
+                output = slot.material.node_tree.get_output_node(engine)
+                assert output is not None and output.inputs["Surface"].is_linked, (slot.material.name, engine)
+    cornea = things(close_up)["Left Cornea"]
+    assert not cornea.visible_shadow, "it would leave the iris in the dark"
+
+
+def test_nothing_of_the_mouth_comes_through_the_skin_at_rest_and_in_any_unit(close_up, addon):
+    asset = addon("acting.asset").load()
+    outer = [list(p.vertices) for p in close_up.data.polygons[:len(asset.triangles)]]
+    through = {}
+    for unit in ("", *(name for name in asset.units if name != "mouthClose")):  # which alone is no pose: it undoes an open jaw
+        set_face(close_up, 0.0, **({unit: 1.0} if unit else {}))
+        skin = BVHTree.FromPolygons(shown(close_up).tolist(), outer)
+        for kind in ("Teeth", "Tongue") if unit != "tongueOut" else ("Teeth",):
+            crossed = len(tree_of(things(close_up)[kind]).overlap(skin))
+            if crossed:
+                through[unit, kind] = crossed
+    assert not through

@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The close-up's objects of both eyes, children of the head: what turns is turned by the head's look units, what lies on the lids finds them by geometry nodes.
+
+No object hangs on the head's vertices: the head's lids keep to these eyes, so that the eyes cannot wait for the head's shape."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from .. import materials as of_the_head
+from ..asset import LEFT_EYE, SIDES, FaceUnits, load
+from . import ball, materials, nodes, shapes
+
+REACH_M = 0.00042
+"""How far tears climb onto the ball before a lid."""
+ACROSS = 5
+"""Vertices of the wet line from the lid to the ball."""
+CARUNCLE_M = 0.0054
+"""From the inner corner outwards, over which the caruncle comes down to the ball: life's is some 5 mm wide, and its fold follows."""
+BOWED = 0.5
+"""How much sooner it comes down in its middle than at the lids: its edge is a crescent."""
+LIFT = 0.10
+"""How far the caruncle stands out in its middle, as a share of the lids' opening there."""
+
+
+def build(obj, keep, iris_m: tuple[float, float]) -> None:
+    """Makes or renews the objects of both eyes; `keep(kind, data)` gives the object of a kind with new mesh data. iris_m: radii in metres."""
+    asset = load()
+    shells = []
+    for number, side in enumerate(SIDES):
+        eye = ball.of(obj, number)
+        edge = shapes.limbus(eye.radius, iris_m[number])
+        inner = keep(f"{side} Eye", _turned(f"{obj.name} {side} Eye", shapes.inner(eye.radius, edge), number))
+        shell = keep(f"{side} Cornea", _turned(f"{obj.name} {side} Cornea", shapes.shell(eye.radius, edge), 0))
+        for thing in (inner, shell):
+            _place(thing, obj, eye, side)
+        materials.fill(inner, materials.white(obj.name), materials.iris(obj.name, of_the_head.colour_of(obj)), materials.pupil(obj.name))
+        materials.fill(shell, materials.cornea(obj.name))
+        _let_light_in(shell)
+        rims = ball.rims(asset, number)
+        wet = keep(f"{side} Wet Line", _wet(f"{obj.name} {side} Wet Line", rims))
+        materials.fill(wet, materials.tears(obj.name))
+        _let_light_in(wet)
+        flesh = keep(f"{side} Caruncle", _caruncle(f"{obj.name} {side} Caruncle", rims, asset))
+        materials.fill(flesh, materials.flesh(obj.name))
+        for thing, tree in ((wet, nodes.wet_line()), (flesh, nodes.caruncle())):
+            nodes.modify(thing, tree, Head=obj, Shell=shell)
+            _smoothed(thing)
+        shells.append(shell)
+    first = len(asset.template) + len(asset.copies) + int(np.flatnonzero(asset.kind == LEFT_EYE)[0])
+    nodes.modify(obj, nodes.lids_on_eyes(), Left=shells[0], Right=shells[1], First=first)
+
+
+def _turned(name: str, shape: shapes.Turned, number: int):
+    """Mesh data of a shape; the right eye's picture is turned over, so that what lies towards the nose does on both."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(shape.vertices, [], shape.faces)
+    uv = shape.uvs.copy()
+    if number:
+        uv[..., 0] = 0.5 - uv[..., 0]
+    mesh.uv_layers.new(name="UVMap").data.foreach_set("uv", uv.astype(np.float32).ravel())
+    mesh.polygons.foreach_set("material_index", shape.slots.astype(np.int32))
+    mesh.shade_smooth()
+    mesh.update()
+    return mesh
+
+
+def _wet(name: str, rims: ball.Rims):
+    """Two strips, along the upper and the lower lid; where its vertices lie, geometry nodes find."""
+    rim = np.concatenate([rims.upper, rims.lower])
+    opposite = np.concatenate([rims.lower, rims.upper])
+    across = np.tile(np.linspace(0, 1, ACROSS), len(rim))
+    strips = [_grid(len(rims.upper), ACROSS, flipped=True), len(rims.upper) * ACROSS + _grid(len(rims.lower), ACROSS)]
+    return _strip(name, np.concatenate(strips), {"rim": rim.repeat(ACROSS), "opposite": opposite.repeat(ACROSS), "across": across,
+                                                 "reach": np.full(len(across), REACH_M)})
+
+
+def _caruncle(name: str, rims: ball.Rims, asset: FaceUnits):
+    """A sheet from the inner corner outwards, as wide as the lids are open."""
+    away = np.linalg.norm(asset.template[rims.upper] - asset.template[rims.corner], axis=1)
+    count = int((away < CARUNCLE_M).sum())
+    upper, lower = np.append(rims.corner, rims.upper[:count]), np.append(rims.corner, rims.lower[:count])
+    along = np.append(0, away[:count]) / CARUNCLE_M
+    rows = 7
+    across = np.tile(np.linspace(0, 1, rows), count + 1)
+    early = 1 + BOWED * np.sin(np.pi * across)
+    t = np.clip((along.repeat(rows) * early - 0.3) / 0.7, 0, 1)
+    onto = t * t * (3 - 2 * t)
+    hump = np.sin(np.pi * across) * (1 - 0.5 * onto)
+    return _strip(name, _grid(count + 1, rows, flipped=True), {"rim": upper.repeat(rows), "opposite": lower.repeat(rows), "across": across, "onto": onto,
+                                                               "lift": LIFT * hump})
+
+
+def _grid(count: int, rows: int, flipped: bool = False) -> np.ndarray:
+    """Quads [F, 4] of count columns of `rows` vertices, one column after the other."""
+    a = (np.arange(count - 1)[:, None] * rows + np.arange(rows - 1)).ravel()
+    quads = np.stack([a, a + rows, a + rows + 1, a + 1], 1)
+    return quads[:, ::-1] if flipped else quads
+
+
+def _strip(name: str, faces: np.ndarray, attributes: dict[str, np.ndarray]):
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(np.zeros((len(next(iter(attributes.values()))), 3)), [], faces)
+    for key, values in attributes.items():
+        whole = values.dtype.kind == "i"
+        layer = mesh.attributes.new(key, 'INT' if whole else 'FLOAT', 'POINT')
+        layer.data.foreach_set("value", values.astype(np.int32 if whole else np.float32))
+    mesh.shade_smooth()
+    mesh.update()
+    return mesh
+
+
+def _place(thing, obj, eye: ball.Ball, side: str) -> None:
+    """At the ball's middle, turned by the head's look units: sums of products, which need no script."""
+    thing.location, thing.rotation_mode = eye.centre, 'XYZ'
+    for axis, rest, share in ((0, -eye.pitch, 0), (2, eye.yaw, 1)):
+        thing.driver_remove("rotation_euler", axis)
+        driver = thing.driver_add("rotation_euler", axis).driver
+        driver.type = 'SCRIPTED'
+        terms = [f"{rest:.6f}"]
+        for way, turn in eye.turns.items():
+            variable = driver.variables.new()
+            variable.name = f"look_{way.lower()}"
+            variable.targets[0].id_type, variable.targets[0].id = 'KEY', obj.data.shape_keys
+            variable.targets[0].data_path = f'key_blocks["eyeLook{way}{side}"].value'
+            terms.append(f"{turn[share] * (1 if share else -1):.6f} * look_{way.lower()}")
+        driver.expression = " + ".join(terms)
+
+
+def _let_light_in(thing) -> None:
+    """What is clear throws no shadow on what is behind; light that was scattered there goes out through it."""
+    thing.visible_shadow = thing.visible_diffuse = False
+
+
+def _smoothed(thing) -> None:
+    modifier = thing.modifiers.get("Subdivision") or thing.modifiers.new("Subdivision", 'SUBSURF')
+    modifier.levels, modifier.render_levels = 1, 2

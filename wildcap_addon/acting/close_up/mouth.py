@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The close-up's objects of the mouth: teeth in gums, and a tongue, carried to the head as its own bands are, with shape keys that go along with its units."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..asset import FaceUnits, load
+from . import ball, materials, mouth_shapes
+
+SHOWN_M, FARTHEST_M = 0.001, 0.006
+"""How far the upper teeth end below where the lips meet, as most people's do, and how far they are moved for it at most: the bands of the built-in head
+are carried by the face around them, which knows nothing of where lips end."""
+WIDE_M = 0.009
+"""Half the width of the upper front teeth that are looked at for it."""
+LEAST_M = 3e-4
+"""A unit that moves jaw and tongue by less moves the lips alone."""
+
+
+def build(obj, keep) -> None:
+    """Makes or renews teeth and tongue; `keep(kind, data)` gives the object of a kind with new mesh data."""
+    asset = load()
+    upper, lower, tongue = mouth_shapes.bands(asset)
+    first = len(asset.template) + len(asset.copies)
+    keys = obj.data.shape_keys.key_blocks
+    rest = ball.places(keys[0])[first:]
+    moves = {name: ball.places(keys[name])[first:] - rest for name in asset.units}
+    moves = {name: moved for name, moved in moves.items() if np.abs(moved[np.concatenate([lower, tongue])]).max() > LEAST_M}
+    shape = mouth_shapes.teeth_and_gums(asset)
+    placed = _affine(asset.parts[np.concatenate([upper, lower])], rest[np.concatenate([upper, lower])], shape.vertices)
+    lower_by = _lowering(asset, ball.places(keys[0]), placed[~shape.lower])
+    placed = placed + lower_by
+    turned = {name: np.where(shape.lower[:, None], _affine(rest[lower], moved[lower], placed), 0) for name, moved in moves.items()}
+    teeth = keep("Teeth", _data(f"{obj.name} Teeth and Gums", placed, shape.faces, shape.slots))
+    materials.fill(teeth, materials.teeth(obj.name), materials.gums(obj.name))
+    _keyed(teeth, obj, placed, turned)
+    faces = [[int(where) for where in np.searchsorted(tongue, [i - first for i in face if i >= 0])] for face in _faces(asset, first, tongue)]
+    flesh = keep("Tongue", _data(f"{obj.name} Tongue", rest[tongue] + lower_by, faces, np.zeros(len(faces))))
+    materials.fill(flesh, materials.tongue(obj.name))
+    _keyed(flesh, obj, rest[tongue] + lower_by, {name: moved[tongue] for name, moved in moves.items()})
+    modifier = flesh.modifiers.get("Subdivision") or flesh.modifiers.new("Subdivision", 'SUBSURF')
+    modifier.levels, modifier.render_levels = 1, 2
+
+
+def _lowering(asset: FaceUnits, head: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """The way [3] from where the upper teeth [N, 3] were carried to where the lips of the head at rest meet before them."""
+    lips = asset.copies[asset.seam == 0]
+    meet = head[lips[np.abs(asset.template[lips, 0]).argmin()]]
+    edge = upper[np.abs(upper[:, 0] - meet[0]) < WIDE_M, 2].min()
+    return np.array([0, 0, np.clip(meet[2] - SHOWN_M - edge, -FARTHEST_M, FARTHEST_M)])
+
+
+def _affine(before: np.ndarray, after: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Where the affine map that takes places [N, 3] to others (or to displacements) takes points [M, 3]."""
+    one = np.concatenate([before, np.ones((len(before), 1))], 1)
+    return np.concatenate([points, np.ones((len(points), 1))], 1) @ np.linalg.lstsq(one, after, rcond=None)[0]
+
+
+def _faces(asset: FaceUnits, first: int, rows: np.ndarray) -> list[list[int]]:
+    inside = np.isin(asset.faces[:, 0] - first, rows)
+    return asset.faces[inside].tolist()
+
+
+def _data(name: str, vertices: np.ndarray, faces: list, slots: np.ndarray):
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices, [], faces)
+    mesh.polygons.foreach_set("material_index", slots.astype(np.int32))
+    mesh.shade_smooth()
+    mesh.update()
+    return mesh
+
+
+def _keyed(thing, obj, rest: np.ndarray, moves: dict[str, np.ndarray]) -> None:
+    """Shape keys of the units that move it, driven by the head's own."""
+    thing.shape_key_add(name="Basis", from_mix=False)
+    for name, moved in moves.items():
+        if np.abs(moved).max() < LEAST_M:
+            continue
+        key = thing.shape_key_add(name=name, from_mix=False)
+        key.slider_min, key.slider_max = -10, 10  # the head's own sliders are the limit
+        key.data.foreach_set("co", (rest + moved).astype(np.float32).ravel())
+        driver = key.driver_add("value").driver
+        driver.type = 'SUM'
+        variable = driver.variables.new()
+        variable.targets[0].id_type, variable.targets[0].id = 'KEY', obj.data.shape_keys
+        variable.targets[0].data_path = f'key_blocks["{name}"].value'

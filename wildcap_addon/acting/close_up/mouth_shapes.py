@@ -1,0 +1,189 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shapes of a mouth: single teeth in their gums, along the bands that stand for teeth in the built-in head and within their outsides; its tongue, rounder.
+
+Lengths in metres, in the template's axes: -y is ahead, z up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..asset import JAWS, FaceUnits
+
+WIDTHS_MM = {"upper": (8.5, 6.6, 7.7, 7.0, 6.8, 10.2), "lower": (5.4, 5.9, 6.9, 7.0, 7.1, 11.0)}
+"""Widths of permanent teeth from the middle outwards, up to the first molar: no picture shows those behind."""
+DEPTHS_MM = {"upper": (6.2, 5.6, 7.2, 8.6, 8.6, 10.4), "lower": (5.2, 5.4, 6.9, 7.6, 8.0, 10.0)}
+"""From lip or cheek to tongue, at the neck."""
+LENGTHS_MM = {"upper": (10.4, 9.2, 10.2, 8.6, 8.0, 7.4), "lower": (8.8, 9.2, 10.4, 8.8, 8.0, 7.2)}
+"""From the gum to the edge."""
+INCISORS = 2
+CANINE = 2
+INSET_M = {"upper": 0.0006, "lower": 0.0018}
+"""How far the teeth stand within the outside of the band: the upper ones bite over the lower ones."""
+LAP_M = 0.0007
+"""By which upper and lower teeth end before the bands do, so that they never touch."""
+AROUND, ALONG = 20, 10
+GUM_COLUMNS, GUM_ROWS = 161, 13
+ROOT_M = 0.0065
+"""Height of the gum beyond the teeth's necks."""
+TEETH, GUMS = range(2)
+
+
+@dataclass(frozen=True)
+class Mouth:
+    """vertices [V, 3]; faces: quads and others; slot of each face; lower [V]: whether a vertex goes along with the jaw."""
+
+    vertices: np.ndarray
+    faces: list[list[int]]
+    slots: np.ndarray
+    lower: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Arch:
+    """The band's outer edge from one end to the other: places [N, 3], and their distances from the middle [N], metres, negative to the right."""
+
+    places: np.ndarray
+    along: np.ndarray
+
+    def at(self, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places [..., 3] and ways outwards [..., 3], level, at distances from the middle."""
+        place = np.stack([np.interp(along, self.along, column) for column in self.places.T], -1)
+        step = 0.004
+        before, after = (np.stack([np.interp(along + s, self.along, column) for column in self.places.T], -1) for s in (-step, step))
+        run = after - before
+        out = np.stack([run[..., 1], -run[..., 0], 0 * run[..., 0]], -1)
+        return place, out / np.linalg.norm(out, axis=-1, keepdims=True)
+
+
+def bands(asset: FaceUnits) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows, among the inner vertices, of the upper teeth, the lower ones and the tongue: the parts that move with the jaws, each joined by its faces."""
+    first = len(asset.template) + len(asset.copies)
+    part = np.arange(len(asset.parts))
+    edges = np.concatenate([asset.faces[:, [a, (a + 1) % 4]] for a in range(4)]) - first
+    edges = edges[(edges >= 0).all(1)]
+    for _ in range(60):  # the least row that is joined to each
+        least = part.copy()
+        np.minimum.at(least, edges[:, 0], part[edges[:, 1]])
+        np.minimum.at(least, edges[:, 1], part[edges[:, 0]])
+        least = least[least]
+        if (least == part).all():
+            break
+        part = least
+    jaws = np.flatnonzero(asset.kind == JAWS)
+    groups = sorted((jaws[part[jaws] == one] for one in np.unique(part[jaws])), key=len)
+    upper, lower = sorted(groups[:2], key=lambda rows: -asset.parts[rows, 2].mean())
+    return upper, lower, groups[2]
+
+
+def teeth_and_gums(asset: FaceUnits) -> Mouth:
+    """Both rows of teeth in their gums."""
+    upper, lower, _ = bands(asset)
+    vertices, faces, slots, below = [], [], [], []
+    count = 0
+    for jaw, rows, up in (("upper", upper, 1.0), ("lower", lower, -1.0)):
+        arch = _arch(asset.parts[rows], up)
+        for slot, pieces in ((TEETH, _teeth(jaw, arch, up)), (GUMS, [_gum(jaw, arch, up)])):
+            for places, quads in pieces:
+                vertices.append(places)
+                faces += [[count + corner for corner in (quad if up > 0 else quad[::-1])] for quad in quads]
+                slots += [slot] * len(quads)
+                below.append(np.full(len(places), up < 0))
+                count += len(places)
+    return Mouth(np.concatenate(vertices), faces, np.array(slots), np.concatenate(below))
+
+
+def _arch(band: np.ndarray, up: float) -> _Arch:
+    """The biting edge of a band [N, 3], smooth, from the right end to the left one."""
+    outer = []
+    for x in np.linspace(0, 0.999 * band[:, 0].max(), 40):  # the outermost and farthest from the root, along the left side
+        near = band[np.abs(np.abs(band[:, 0]) - x) < 0.006]
+        score = -near[:, 1] + 1.2 * np.abs(near[:, 0]) - 0.8 * up * near[:, 2]
+        outer.append(np.abs(near[score.argmax()]) * [1, 0, 0] + near[score.argmax()] * [0, 1, 1])
+    left = np.unique(np.round(outer, 6), axis=0)
+    left = left[np.lexsort((left[:, 1], left[:, 0]))]
+    left = left[np.append(True, np.diff(left[:, 1]) > -1e-5)]
+    places = np.concatenate([left[:0:-1] * [-1, 1, 1], left])
+    along = np.append(0, np.linalg.norm(np.diff(places, axis=0), axis=1).cumsum())
+    fine = np.linspace(0, along[-1], 201)
+    places = np.stack([np.interp(fine, along, column) for column in places.T], -1)
+    kernel = np.hanning(31) / np.hanning(31).sum()
+    padded = np.concatenate([2 * places[:1] - places[15:0:-1], places, 2 * places[-1:] - places[-2:-17:-1]])
+    places = np.stack([np.convolve(column, kernel, 'valid') for column in padded.T], -1)
+    along = np.append(0, np.linalg.norm(np.diff(places, axis=0), axis=1).cumsum())
+    return _Arch(places, along - along[-1] / 2)
+
+
+def _sizes(jaw: str, arch: _Arch) -> tuple[np.ndarray, float]:
+    """Where each tooth of a side begins and ends along the arch [7], and how much larger than life they are to fill it."""
+    widths = np.append(0, np.cumsum(WIDTHS_MM[jaw])) / 1000
+    larger = min(1.25, 0.97 * arch.along[-1] / widths[-1])
+    return widths * larger, larger
+
+
+def _teeth(jaw: str, arch: _Arch, up: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Vertices and quads of each tooth: rings from within the gum to the edge, and a cap."""
+    ends, larger = _sizes(jaw, arch)
+    turn = np.arange(AROUND) * 2 * np.pi / AROUND
+    c, s = np.cos(turn), np.sin(turn)
+    square = np.sign(c) * np.abs(c) ** 0.62, np.sign(s) * np.abs(s) ** 0.72  # a rounded rectangle
+    found = []
+    for number in range(len(WIDTHS_MM[jaw])):
+        h = np.concatenate([np.linspace(-0.45, 0.9, ALONG), [0.965, 1.0]])  # 0 at the gum, 1 at the edge
+        front = number <= CANINE
+        swell = np.interp(h, [-0.45, 0, 0.35, 0.75, 0.93, 1.0], [0.62, 0.86, 0.98, 1.0, 0.93, 0.72] if front else [0.66, 0.90, 1.0, 1.0, 0.86, 0.55])
+        deep = np.interp(h, [-0.45, 0, 0.3, 0.7, 0.95, 1.0], [0.7, 1.0, 0.92, 0.5, 0.26, 0.14] if number < INCISORS else
+                         [0.7, 1.0, 0.98, 0.66, 0.36, 0.16] if front else [0.75, 0.94, 1.0, 0.95, 0.70, 0.40])
+        width, depth = (ends[number + 1] - ends[number]) * 0.985, DEPTHS_MM[jaw][number] / 1000 * larger
+        length = LENGTHS_MM[jaw][number] / 1000 * larger
+        tip = np.abs(square[0]) * (0.14 if number == CANINE else 0.02)  # the edge of a canine is a point
+        for side in (-1, 1):
+            place, out = arch.at(np.array(side * (ends[number] + ends[number + 1]) / 2))
+            run = np.array([-out[1], out[0], 0])
+            lean = 0.10 if number < INCISORS else 0.04  # the crowns of front teeth lean towards the lips
+            reach = (h[:, None] - tip[None] * np.clip(h[:, None] - 0.6, 0, 1) / 0.4)
+            away = -INSET_M[jaw] - depth / 2 * deep[:, None] * (1 - square[1][None]) - lean * length * (1 - h[:, None]) * (h[:, None] < 1)
+            away = away - 0.0011 * larger * np.clip(0.25 - h[:, None], 0, 1)
+            down = -up * (reach - 1) * length - up * -LAP_M
+            points = place + square[0][None, :, None] * (swell[:, None] * width / 2)[..., None] * run + away[..., None] * out + down[..., None] * [0, 0, 1.0]
+            points = points.reshape(-1, 3)
+            k = np.arange(AROUND)
+            quads = [np.stack([r * AROUND + k, r * AROUND + (k + 1) % AROUND, (r + 1) * AROUND + (k + 1) % AROUND, (r + 1) * AROUND + k], 1)
+                     for r in range(len(h) - 1)]
+            last = (len(h) - 1) * AROUND
+            half = np.arange(AROUND // 2 - 1)
+            cap = np.stack([last + half, last + half + 1, last + (AROUND - 2 - half), last + (AROUND - 1 - half)], 1)
+            found.append((points, np.concatenate([*quads, cap])))
+    return found
+
+
+def _gum(jaw: str, arch: _Arch, up: float) -> tuple[np.ndarray, np.ndarray]:
+    """The gum's sheet over the necks: from the fold before the teeth down to a margin in arcs, and behind them up again."""
+    ends, larger = _sizes(jaw, arch)
+    along = np.linspace(-ends[-1] - 0.001, ends[-1] + 0.001, GUM_COLUMNS)
+    tooth = np.clip(np.searchsorted(ends, np.abs(along)) - 1, 0, len(ends) - 2)
+    middle, half = (ends[tooth] + ends[tooth + 1]) / 2, (ends[tooth + 1] - ends[tooth]) / 2
+    off = np.clip(np.abs(np.abs(along) - middle) / half, 0, 1)
+    depth = np.interp(np.abs(along), (ends[:-1] + ends[1:]) / 2, np.array(DEPTHS_MM[jaw]) / 1000 * larger)
+    length = np.interp(np.abs(along), (ends[:-1] + ends[1:]) / 2, np.array(LENGTHS_MM[jaw]) / 1000 * larger)
+    place, out = arch.at(along)
+    margin = length * (1 - 0.02 - 0.30 * off**3.2)  # from the edge: between two teeth the gum reaches farther
+    lean = 0.10 * length
+    bulge = 0.0009 * np.cos(np.pi / 2 * off)  # over each root
+    top = length + ROOT_M
+    before, behind = -INSET_M[jaw] - lean, -INSET_M[jaw] - lean - depth
+    rows = []
+    for share in np.linspace(0, 1, GUM_ROWS):
+        if share < 0.5:
+            t = 1 - 2 * share  # 1 in the fold, 0 at the margin
+            round_ = np.sqrt(np.clip(1 - (1 - np.minimum(1, 5 * t)) ** 2, 0, 1))
+            away, high = before - 0.0009 + (0.0013 + bulge) * round_ - 0.002 * t**2, margin + (top - margin) * t
+        else:
+            t = 2 * share - 1
+            away, high = behind + 0.0012 - 0.0022 * np.sqrt(t), margin + 0.0004 + (top - margin) * t
+        rows.append(place + away[:, None] * out + up * (high + LAP_M)[:, None] * [0, 0, 1.0])
+    points = np.stack(rows, 1).reshape(-1, 3)
+    a = (np.arange(GUM_COLUMNS - 1)[:, None] * GUM_ROWS + np.arange(GUM_ROWS - 1)).ravel()
+    return points, np.stack([a, a + 1, a + GUM_ROWS + 1, a + GUM_ROWS], 1)

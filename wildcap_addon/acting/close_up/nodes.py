@@ -1,0 +1,156 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Nodes in one line each, and the geometry nodes by which lids, tears and caruncle keep to an eye, whatever opens, turns or reshapes the head."""
+
+import bpy
+
+LIDS, WET, CARUNCLE = "WildCap Lids on Eyes", "WildCap Wet Line", "WildCap Caruncle"
+CLEAR_M = 0.00015
+"""At which lids stay from the clear shell: the film of tears."""
+MOST_M = 0.004
+"""Of what lies deeper inside an eye is no lid."""
+AHEAD_M = 0.003
+"""Before an eye's middle: what is farther back no lid shows."""
+SUNK_M = 0.0004
+"""How far the caruncle begins within the rims of the lids, and ends within the ball."""
+
+
+def add(tree, kind: str, inputs: dict | tuple = (), **settings):
+    """A node with its settings; each input, by its place or name, is a socket to be linked or a value."""
+    node = tree.nodes.new(kind)
+    for name, value in settings.items():
+        setattr(node, name, value)
+    for name, value in inputs.items() if isinstance(inputs, dict) else enumerate(inputs):
+        if isinstance(value, bpy.types.NodeSocket):
+            tree.links.new(value, node.inputs[name])
+        elif value is not None:
+            node.inputs[name].default_value = value
+    return node
+
+
+def math(tree, operation: str, *values):
+    return add(tree, 'ShaderNodeMath', values, operation=operation).outputs[0]
+
+
+def vector(tree, operation: str, *values):
+    """The vector, or the number where the operation gives one."""
+    node = add(tree, 'ShaderNodeVectorMath', values, operation=operation)
+    return node.outputs["Value" if operation in ('LENGTH', 'DOT_PRODUCT', 'DISTANCE') else "Vector"]
+
+
+def scaled(tree, direction, factor):
+    return add(tree, 'ShaderNodeVectorMath', {"Vector": direction, "Scale": factor}, operation='SCALE').outputs["Vector"]
+
+
+def group(name: str, inputs: dict[str, str], build) -> bpy.types.NodeTree:
+    """The geometry nodes of a name, made once per file: inputs, name -> kind of socket, follow the geometry."""
+    tree = bpy.data.node_groups.get(name)
+    if tree is None:
+        tree = bpy.data.node_groups.new(name, 'GeometryNodeTree')
+        tree.is_modifier = True
+        tree.interface.new_socket("Geometry", in_out='INPUT', socket_type='NodeSocketGeometry')
+        for title, kind in inputs.items():
+            tree.interface.new_socket(title, in_out='INPUT', socket_type=kind)
+        tree.interface.new_socket("Geometry", in_out='OUTPUT', socket_type='NodeSocketGeometry')
+        source, target = tree.nodes.new('NodeGroupInput'), tree.nodes.new('NodeGroupOutput')
+        tree.links.new(build(tree, source.outputs), target.inputs[0])
+        for place, node in enumerate(tree.nodes):
+            node.location = (180 * (place % 12), -220 * (place // 12))
+    return tree
+
+
+def modify(obj, tree, **inputs) -> None:
+    """The modifier of a group on an object, with its inputs."""
+    modifier = obj.modifiers.get(tree.name) or obj.modifiers.new(tree.name, 'NODES')
+    modifier.node_group = tree
+    for socket in tree.interface.items_tree:
+        if socket.in_out == 'INPUT' and socket.name in inputs:
+            if bpy.app.version < (5, 2, 0):
+                modifier[socket.identifier] = inputs[socket.name]
+            else:  # where they are properties of their own
+                getattr(modifier.properties.inputs, socket.identifier).value = inputs[socket.name]
+
+
+def lids_on_eyes() -> bpy.types.NodeTree:
+    """Moves lids out of the eyes, and takes away what the close-up's own objects stand for: vertices from First on, which are the head's last ones."""
+    return group(LIDS, {"Left": 'NodeSocketObject', "Right": 'NodeSocketObject', "First": 'NodeSocketInt'}, _lids)
+
+
+def wet_line() -> bpy.types.NodeTree:
+    """A strip of fluid from the rim of a lid onto the ball. Attributes: rim, opposite: vertices of the head; reach: how far onto the ball, metres;
+    across: from the lid (0) to the ball (1)."""
+    return group(WET, {"Head": 'NodeSocketObject', "Shell": 'NodeSocketObject'}, _wet)
+
+
+def caruncle() -> bpy.types.NodeTree:
+    """Flesh between the lids' rims at the inner corner. Attributes: rim, opposite; across: from the upper rim (0) to the lower one; onto: 1 where it has
+    come down to the ball; lift: how far it stands out, as a share of the opening there."""
+    return group(CARUNCLE, {"Head": 'NodeSocketObject', "Shell": 'NodeSocketObject'}, _caruncle)
+
+
+def _lids(tree, inputs):
+    geometry = inputs["Geometry"]
+    index = add(tree, 'GeometryNodeInputIndex').outputs[0]
+    for side in ("Left", "Right"):
+        place = add(tree, 'GeometryNodeInputPosition').outputs[0]
+        near, out, centre = _on_shell(tree, inputs[side], place)
+        above = vector(tree, 'DOT_PRODUCT', vector(tree, 'SUBTRACT', place, near), out)
+        short = math(tree, 'SUBTRACT', CLEAR_M, above)
+        ahead = math(tree, 'MULTIPLY', add(tree, 'ShaderNodeSeparateXYZ', (vector(tree, 'SUBTRACT', place, centre),)).outputs[1], -1.0)
+        lid = math(tree, 'MULTIPLY', math(tree, 'GREATER_THAN', ahead, AHEAD_M),
+                   math(tree, 'MULTIPLY', math(tree, 'LESS_THAN', short, MOST_M), math(tree, 'GREATER_THAN', short, 0.0)))
+        lid = math(tree, 'MULTIPLY', lid, math(tree, 'LESS_THAN', index, inputs["First"]))
+        geometry = add(tree, 'GeometryNodeSetPosition', {"Geometry": geometry, "Selection": lid, "Offset": scaled(tree, out, short)}).outputs[0]
+    beyond = math(tree, 'GREATER_THAN', index, math(tree, 'SUBTRACT', inputs["First"], 0.5))
+    return add(tree, 'GeometryNodeDeleteGeometry', {"Geometry": geometry, "Selection": beyond}, domain='POINT').outputs[0]
+
+
+def _wet(tree, inputs):
+    lid, other, across = _lid(tree, inputs["Head"])
+    towards = vector(tree, 'NORMALIZE', vector(tree, 'SUBTRACT', other, lid))
+    below, _, _ = _on_shell(tree, inputs["Shell"], lid)
+    onto = vector(tree, 'ADD', lid, scaled(tree, towards, _attribute(tree, "reach", 'FLOAT')))
+    ball, out, _ = _on_shell(tree, inputs["Shell"], onto)
+    ball = vector(tree, 'SUBTRACT', ball, scaled(tree, out, 0.00003))  # its edge lies below the shell, not above it
+    bent = _between(tree, _between(tree, lid, ball, 0.5), below, 0.55)  # hollow, as tears climb lid and ball
+    curve = _between(tree, _between(tree, lid, bent, across), _between(tree, bent, ball, across), across)
+    return add(tree, 'GeometryNodeSetPosition', {"Geometry": inputs["Geometry"], "Position": curve}).outputs[0]
+
+
+def _caruncle(tree, inputs):
+    lid, other, across = _lid(tree, inputs["Head"])
+    middle = _between(tree, lid, other, across)
+    ball, out, _ = _on_shell(tree, inputs["Shell"], middle)
+    gap = vector(tree, 'DISTANCE', lid, other)
+    lift = math(tree, 'SUBTRACT', math(tree, 'MULTIPLY', gap, _attribute(tree, "lift", 'FLOAT')), SUNK_M)
+    flesh = vector(tree, 'ADD', middle, scaled(tree, out, lift))
+    ball = vector(tree, 'SUBTRACT', ball, scaled(tree, out, SUNK_M))
+    return add(tree, 'GeometryNodeSetPosition', {"Geometry": inputs["Geometry"],
+                                                 "Position": _between(tree, flesh, ball, _attribute(tree, "onto", 'FLOAT'))}).outputs[0]
+
+
+def _on_shell(tree, shell, place) -> tuple:
+    """The place of an object's surface that is nearest, the way out there, and the object's middle."""
+    info = add(tree, 'GeometryNodeObjectInfo', {"Object": shell}, transform_space='RELATIVE').outputs
+    search = add(tree, 'GeometryNodeProximity', (info["Geometry"],), target_element='FACES')
+    tree.links.new(place, next(socket for socket in search.inputs if socket.type == 'VECTOR'))
+    near = search.outputs["Position"]
+    return near, vector(tree, 'NORMALIZE', vector(tree, 'SUBTRACT', near, info["Location"])), info["Location"]
+
+
+def _lid(tree, head) -> tuple:
+    """Where a vertex' rim is, the one opposite, and its share of the way across."""
+    surface = add(tree, 'GeometryNodeObjectInfo', {"Object": head}, transform_space='RELATIVE').outputs["Geometry"]
+    place = add(tree, 'GeometryNodeInputPosition').outputs[0]
+    found = [add(tree, 'GeometryNodeSampleIndex', {"Geometry": surface, "Value": place, "Index": _attribute(tree, name, 'INT')}, data_type='FLOAT_VECTOR',
+                 domain='POINT').outputs[0] for name in ("rim", "opposite")]
+    return *found, _attribute(tree, "across", 'FLOAT')
+
+
+def _attribute(tree, name: str, kind: str):
+    node = add(tree, 'GeometryNodeInputNamedAttribute', {"Name": name}, data_type=kind)
+    return next(socket for socket in node.outputs if socket.enabled)
+
+
+def _between(tree, a, b, share):
+    return vector(tree, 'ADD', a, scaled(tree, vector(tree, 'SUBTRACT', b, a), share))

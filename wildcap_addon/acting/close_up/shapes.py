@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shapes of an eye: a white that ends softly over a recessed iris with a true hole for a pupil, and the clear shell over both. The gaze is -y, lengths are
+metres, and all lies inside of the ball that the head's own lids were fitted to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+IRIS_M = 0.0059
+"""Radius of an adult's iris."""
+LIMBUS_AT = (0.33, 0.46)
+"""Radians from the gaze between which the iris ends, however large the ball is: the cornea over it has to end within the ball's own, at 0.52."""
+BULGE = 0.06
+"""How far the cornea stands out before the white's sphere, as a share of the radius: 0.9 to 1 mm."""
+EDGE = 0.08
+"""Radians beyond the iris at which the cornea has become the white's sphere."""
+FILM_M = 0.00012
+"""Between the white and the clear shell."""
+SOFT = 0.075
+"""Radians over which the white fades over the iris' rim."""
+BACK, SHELL_BACK = 2.4, 2.0
+"""Radians from the gaze where the white, and the shell, end; lids cover what is behind."""
+PUPIL = 0.34
+"""Radius of the pupil over the iris'."""
+ROOT_M, DISH_M = 0.0001, 0.00065
+"""How far the iris' outer edge lies behind the plane of the limbus, and its inner edge behind the outer one."""
+TURNS = 96
+WHITE, IRIS, PUPIL_SLOT = range(3)
+
+
+@dataclass(frozen=True)
+class Turned:
+    """A mesh turned about the gaze: vertices [V, 3]; quads [F, 4]; UVs [F, 4, 2], around and from the middle outwards; slot [F]."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    uvs: np.ndarray
+    slots: np.ndarray
+
+
+def limbus(radius: float, iris_m: float) -> float:
+    """Radians from the gaze where the iris ends, on a ball of a radius."""
+    return float(np.clip(np.arcsin(min(0.9, iris_m / radius)), *LIMBUS_AT))
+
+
+def surface(angle: np.ndarray, radius: float, edge: float) -> np.ndarray:
+    """Distance of the shell from the ball's centre at angles from the gaze; edge: the limbus."""
+    return radius * (1 + BULGE * np.clip(1 - (angle / (edge + EDGE)) ** 2, 0, None) ** 1.5)
+
+
+def shell(radius: float, edge: float) -> Turned:
+    """Cornea, and tears over the white: one surface without a step."""
+    angle = np.concatenate([np.linspace(1e-4, edge + EDGE, 22), np.linspace(edge + EDGE, SHELL_BACK, 20)[1:]])
+    far = surface(angle, radius, edge)
+    return _turn([(far * np.sin(angle), -far * np.cos(angle), angle / SHELL_BACK, 0)])
+
+
+def inner(radius: float, edge: float) -> Turned:
+    """White, iris and the dark behind the pupil."""
+    white = radius - FILM_M
+    angle = np.concatenate([np.linspace(edge - SOFT, edge + SOFT, 8), np.linspace(edge + SOFT, 1.6, 14)[1:], np.linspace(1.6, BACK, 6)[1:]])
+    outside = (white * np.sin(angle), -white * np.cos(angle), np.clip((angle - edge + SOFT) / (1.6 - edge + SOFT), 0.002, 0.998), WHITE)
+    rim, plane = white * np.sin(edge), -white * np.cos(edge) + ROOT_M
+    across = np.linspace(0, 1.04, 20)  # a little farther than the white begins
+    hole = PUPIL * rim
+    iris = (hole + across * (rim - hole), plane + DISH_M * (1 - across), np.clip(across, 0.002, 0.998), IRIS)
+    behind = np.array([hole, 1.05 * hole, 0.8 * hole, 0.0001])
+    dark = (behind, plane + DISH_M + np.array([0, 0.0004, 0.0014, 0.0016]), np.zeros(4), PUPIL_SLOT)
+    return _turn([outside, iris, dark])
+
+
+def _turn(parts: list[tuple]) -> Turned:
+    """Each part: distance [R] from the axis, y [R], the UVs' v [R], and a slot. Rings are told from the gaze outwards, but for the dark behind the pupil."""
+    k, first = np.arange(TURNS), 0
+    n, turn = (k + 1) % TURNS, k * 2 * np.pi / TURNS
+    vertices, faces, uvs, slots = [], [], [], []
+    for away, y, v, slot in parts:
+        vertices.append(np.stack([away[:, None] * np.cos(turn), y[:, None] + 0 * turn, away[:, None] * np.sin(turn)], -1).reshape(-1, 3))
+        for ring in range(len(away) - 1):
+            a, b = first + ring * TURNS, first + (ring + 1) * TURNS
+            quad = np.stack([a + k, b + k, b + n, a + n], 1)
+            uv = np.stack([np.stack([(k + step) / TURNS, 0 * k + v[row]], 1) for step, row in ((0, ring), (0, ring + 1), (1, ring + 1), (1, ring))], 1)
+            order = slice(None, None, -1 if slot == PUPIL_SLOT else 1)
+            faces.append(quad[:, order])
+            uvs.append(uv[:, order])
+            slots.append(np.full(TURNS, slot))
+        first += len(away) * TURNS
+    return Turned(np.concatenate(vertices), np.concatenate(faces), np.concatenate(uvs), np.concatenate(slots))
