@@ -10,9 +10,9 @@ import pytest
 
 from core.contract.capture import Capture
 from core.contract.messages import Problem
-from core.face import template
+from core.face import shown_parts, template
 from core.imaging import images
-from core.upscale import growth, hair
+from core.upscale import hair
 from core.upscale.maps import Maps
 
 from .hairy_head import SIZE, surface
@@ -96,9 +96,9 @@ def test_brows_behind_a_fringe_are_like_the_other_one_or_as_usual(both):
 
 def test_the_parts_of_a_capture_are_read_at_the_size_of_its_maps(tmp_path):
     capture = Capture(tmp_path / "a.wildcap")
-    assert growth.read_parts(capture, 32) is None
+    assert shown_parts.read_parts(capture, 32) is None
     images.write_data(capture.texture_parts, np.full((64, 64, 3), [0.2, 0.4, 0.6], np.float32))
-    assert growth.read_parts(capture, 32) == pytest.approx(np.full((32, 32, 3), [0.2, 0.4, 0.6]), abs=0.005)
+    assert shown_parts.read_parts(capture, 32) == pytest.approx(np.full((32, 32, 3), [0.2, 0.4, 0.6]), abs=0.005)
     images.write_data(capture.texture_parts, np.full((64, 64), 0.5, np.float32))
     with pytest.raises(Problem, match="parts of a face that grow hair"):
-        growth.read_parts(capture, 32)
+        shown_parts.read_parts(capture, 32)

@@ -98,6 +98,16 @@ def test_shadow_on_the_left_cheek_is_masked_on_the_left_cheek(capture):
         assert columns[0 if side > 0 else 1] > 20 * columns[1 if side > 0 else 0]
 
 
+def test_a_beard_that_the_parser_saw_in_the_frames_is_no_shadow(capture):
+    """A chin as dark as a shadow: by its darkness alone it is taken for one."""
+    chin = painted_blob((0.5, 0.86), 0.12) * (template.mask("skin", SIZE) > 0.5)
+    texture = skin_texture() * (1 - chin[..., None] * 0.8)
+    beard = (chin > 0.5) & (template.mask("face", SIZE) > 0.5)
+    assert beard.sum() > 500 and proposed(capture, texture, dilate_px=0)[beard].mean() > 0.5
+    images.write_data(capture.texture_parts, np.stack([0 * chin, chin, 0 * chin], -1).astype(np.float32))
+    assert proposed(capture, texture, dilate_px=0)[beard].mean() < 0.05
+
+
 def test_dilation_grows_with_the_setting_and_nothing_else_changes(capture):
     texture = skin_texture() * (1 - painted_blob(cheek(1), 0.10)[..., None] * (1 - SHADOW))
     areas = [proposed(capture, texture, dilate_px=px).sum() for px in (0, 8, 32)]

@@ -16,6 +16,7 @@ from ..contract.messages import Reporter
 from ..contract.settings import Settings
 from ..face import template
 from ..face.head import Unfolded, read_filmed_head
+from ..face.shown_parts import read_hidden_skin
 from ..geometry.raster import bleed, interpolate
 from ..imaging import images
 from ..light.skylight import ambient_occlusion, radiance_transfer
@@ -112,6 +113,8 @@ def _evidence(capture: Capture, head: Unfolded, visible: np.ndarray) -> Evidence
     brows = template.mask("brows", size) if built_in else np.zeros_like(skin)
     for name in UNLIKE_SKIN if built_in else ():
         skin = skin * (1 - template.mask(name, size))
+    if built_in:
+        skin = skin * (1 - read_hidden_skin(capture, size))
     visible = interpolate(visible[:, None], head.mesh.faces, head.face, head.bary)[..., 0]
     return Evidence(texture, filmed, bleed(head.spread(head.normals), head.covered), bleed(visible, head.covered).astype(np.float32),
                     head.covered & (confidence > SEEN) & (face > 0.5), skin, brows)

@@ -14,6 +14,7 @@ from ..contract.capture import Capture
 from ..contract.messages import Problem
 from ..face import beard, template
 from ..face.head import Head
+from ..face.shown_parts import read_hidden_skin
 from ..geometry import raster
 from ..imaging import images
 from .lighting import Shader
@@ -43,7 +44,7 @@ class Extent:
 @dataclass(frozen=True)
 class Evidence:
     """texture [3, S, S] linear; weight [S, S]: how far it counts, 0 where nobody looked; alpha [S, S]: the soft shadow mask M; normal [3, S, S], unit, world
-    space, N_c; covered bool [S, S]: texels of the head; skin [S, S]: facial skin without lips, brows and eyes; trust [S, S]: 1, less where a texel's
+    space, N_c; covered bool [S, S]: texels of the head; skin [S, S]: facial skin without lips, brows, eyes and hair; trust [S, S]: 1, less where a texel's
     colour says little of the light; protected [S, S]: what the artist keeps out of M; edge [S, S]: how far M's border lies on a shadow's edge that is
     seen; taken [3]: the colour of what shadows take of the light, over its mean, zeros where that is not known; asked [S, S]: how far the
     artist added to the proposal for M, None where the maps are in other UVs; missing [S, S]: the share of the light that M's border says is missing, None
@@ -83,7 +84,8 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     confidence, texture = np.clip(confidence, 0, 1), np.clip(texture, 0, None)
     if confidence.max() < 1e-3:
         raise Problem("No texel of the texture was seen by any frame.", "Run the chain again from the cameras, and look at its report.")
-    seen, bearded = _sized(confidence, size), _sized(beard.seen_in(texture, confidence), size)
+    hidden = read_hidden_skin(capture, size)
+    seen, bearded = _sized(confidence, size), np.maximum(_sized(beard.seen_in(texture, confidence), size), hidden)
     texture = _sized(texture * confidence[..., None], size) / np.maximum(seen, 1e-4)[..., None]  # what nobody saw must not darken its neighbours
     if head.mesh.uvs is None:
         raise Problem("The head has no UV coordinates.", "Run the registration stage again.")
@@ -96,7 +98,7 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     protected = _sized(images.read_mask(capture.protect_mask), size) if capture.protect_mask.is_file() else np.zeros_like(mask)
     alpha = softened(mask) * (1 - protected)
     skin = template.mask("skin", size) * template.mask("face", size)
-    skin = skin * (1 - template.mask("eyes", size))
+    skin = skin * (1 - template.mask("eyes", size)) * (1 - hidden)
     weight = np.where(covered, np.clip(seen / TRUSTED, 0, 1), 0)
     tensors = [np.ascontiguousarray(a, np.float32) for a in (texture.transpose(2, 0, 1), weight, np.where(covered, alpha, 0), normal.transpose(2, 0, 1))]
     unlike_skin = np.maximum.reduce([template.mask(name, size) for name in ("brows", "lips", "eyes", "nostrils", "scalp")])

@@ -19,9 +19,10 @@ from ..contract.messages import Reporter
 from ..contract.settings import Settings
 from ..contract.stages import STRANDS
 from ..face.head import read_head
+from ..face.shown_parts import read_parts
 from ..face.strands import Strands
 from ..imaging import images
-from . import detail, drawing, gloss, grooming, growth, hair
+from . import detail, drawing, gloss, grooming, hair
 from .maps import Maps, read_maps
 from .surface import lay_out
 from .whole_head import complete
@@ -80,7 +81,7 @@ def _whole(capture: Capture, maps: Maps, settings: Settings, report: Reporter) -
     if not options.hair:
         return maps, None, {}
     report.progress(0, 1, "finding brows, lashes and beard")
-    parts = growth.read_parts(capture, surface.size)
+    parts = read_parts(capture, surface.size)
     report.figure("hair_told_by", "strokes" if parts is None else "frames and strokes")
     found = hair.find(maps, surface, parts, report.check)
     report.check()

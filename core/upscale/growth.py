@@ -9,11 +9,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ..contract.capture import Capture
-from ..contract.messages import Problem
 from ..face import beard, template
 from ..face.parts import GROWTHS
-from ..imaging import images
 from .surface import HeadSurface
 from .whole_head import seen_well
 
@@ -39,17 +36,6 @@ class Growth:
     head: np.ndarray
     grain: float
     told: bool
-
-
-def read_parts(capture: Capture, size: int) -> np.ndarray | None:
-    """What the face parser saw in the frames, float32 [size, size, len(GROWTHS)]; None where they were not asked. Raises Problem for another picture."""
-    if not capture.texture_parts.is_file():
-        return None
-    parts = images.read_data(capture.texture_parts)
-    if parts.shape[2] != len(GROWTHS):
-        raise Problem(f"{capture.texture_parts} has {parts.shape[2]} channels, and the parts of a face that grow hair are {len(GROWTHS)}.",
-                      "Run the stage texture again.")
-    return images.resize(parts, size, size).clip(0, 1)
 
 
 def find(light: np.ndarray, confidence: np.ndarray, zones: dict[str, np.ndarray], surface: HeadSurface, parts: np.ndarray | None) -> Growth:

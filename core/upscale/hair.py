@@ -45,7 +45,7 @@ class Hair:
 
 
 def find(maps: Maps, surface: HeadSurface, parts: np.ndarray | None = None, check: Callable[[], None] = lambda: None) -> Hair:
-    """The hair of a face. parts: what growth.read_parts gives. `check` may raise to cancel, here and below."""
+    """The hair of a face. parts: what read_parts gives. `check` may raise to cancel, here and below."""
     channels, _ = apart(maps)
     light = channels[..., :3].mean(2)
     zones, texel = _zones(surface), float(np.median(surface.texel))
