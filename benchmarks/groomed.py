@@ -59,7 +59,7 @@ WORDS = ("Four people whose every hair is known, from nine sides through a phone
          "usual*: the same of hair that lies as anatomy has it, whatever the strokes say. Wanted: an IoU of 0.7, and 20 degrees. Nothing was chosen on these "
          "four. How clear strokes must be to outweigh the usual direction was, on seeds 3, 5 and 13, and there the rule that joins the parser's answer with "
          "the strokes was looked at, too. A beard's length is no part of it: its hairs are 6 mm long on everybody.\n\n"
-         "Where it falls short: stubble is found, but grown like a beard, far denser and longer than it is (*Beard Length* and *Share* are the artist's to set), "
+         "Where it falls short: stubble is found, but grown like a beard, far denser and longer than it is (*Beard Length* and *Share* are the artist's), "
          "and not in its colour. Where both brows lie behind a fringe, usual ones are grown, in no colour of the person's. Dark brows become a little wider "
          "than by dark strokes alone (an IoU of 0.88 and 0.87 before on the bearded and the stubbled man).")
 CHOSEN_ON, TRUSTS, TURNS = (3, 5, 13), (0.03, 0.1, 0.3, 1.0, 3.0), (-40, 0, 40)

@@ -17,7 +17,6 @@ import scipy.sparse as sparse
 from scipy.sparse.linalg import spsolve
 
 from .evening import Look
-from .second_opinion import Fitted
 
 FEATURES = ("brows", "eyes")
 SURE = 0.3  # share of a cell from which it is not asked what its shading is
@@ -29,15 +28,17 @@ def without_features(shading: np.ndarray, share: np.ndarray) -> np.ndarray:
     return completed(shading, _covered(share)).astype(np.float32)
 
 
-def without_hair(look: Look, fitted: Fitted, share: np.ndarray) -> Look:
-    """The look with the fitted light below hair, whose `share` of the head is [h, h], at the level at which it meets the skin around."""
+def without_hair(look: Look, fitted: np.ndarray, share: np.ndarray) -> Look:
+    """The look with the fitted log-shading [h, h, 3] below hair, whose `share` of the head is [h, h], at the level at which it meets the skin around; and the
+    shadow that is seen there."""
     here = look.face >= 0
     hairy, bare = _covered(share) & here, here & ~_covered(share)
     if not hairy.any() or not bare.any():
         return look
-    level = completed(np.where(bare[..., None], look.shading - fitted.log, 0), ~bare)
-    return replace(look, shading=np.where(hairy[..., None], fitted.log + level, look.shading).astype(np.float32),
-                   shadow=np.where(hairy, fitted.shadow, look.shadow).astype(np.float32))
+    known = np.concatenate([look.shading - fitted, look.shadow[..., None]], -1)
+    around = completed(np.where(bare[..., None], known, 0), ~bare)
+    return replace(look, shading=np.where(hairy[..., None], fitted + around[..., :3], look.shading).astype(np.float32),
+                   shadow=np.where(hairy, around[..., 3], look.shadow).astype(np.float32))
 
 
 def _covered(share: np.ndarray) -> np.ndarray:

@@ -36,7 +36,7 @@ from .contract import Delit
 from .evening import Look, even_out
 from .lift import lift, lift_share
 from .lit_head import BRIGHTEST, LitHead, lit_head
-from .second_opinion import Fitted, beyond, coarse, of_both
+from .second_opinion import beyond, coarse, of_both
 from .shading import light_in_frame, light_seen
 from .unet import DARKEST, SIDE, DelightNet, network_input
 
@@ -53,12 +53,12 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
     looks, fitted = [], []
     for i, view in enumerate(views):
         report.progress(4 * len(views) + 3 * i, 8 * len(views), f"Looking at frame {i + 1} of {len(views)}")
-        look, light = _look_at_view(net, view, head)
+        look, log = _look_at_view(net, view, head)
         looks.append(look)
-        fitted.append(light)
+        fitted.append(log)
     skins, hair = ([_seen(head, values, look) for look in looks] for values in (head.skin, head.hair))
     looks = of_both(even_out(head, views, looks), fitted, skins)
-    looks = [without_hair(look, light, share) for look, light, share in zip(looks, fitted, hair, strict=True)]
+    looks = [without_hair(look, log, share) for look, log, share in zip(looks, fitted, hair, strict=True)]
     looks = without_casts(looks, skins)
     for i, (view, look) in enumerate(zip(views, looks, strict=True)):
         report.progress(7 * len(views) + i, 8 * len(views), f"Delighting frame {i + 1} of {len(views)}")
@@ -110,8 +110,8 @@ def crop(picture: np.ndarray, box: tuple[float, float, float], size: int) -> np.
     return cv2.warpAffine(np.ascontiguousarray(picture, np.float32), to_crop, (size, size), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
-def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[Look, Fitted]:
-    """What the network says of a frame, and what the fitted light does."""
+def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[Look, np.ndarray]:
+    """What the network says of a frame, and the log-shading of the fitted light at the same size."""
     pixels, _ = view.project(_landmarks(head))
     box = face_box(pixels[np.isfinite(pixels).all(1)])
     y, x = np.mgrid[0:SIDE, 0:SIDE]
@@ -122,8 +122,8 @@ def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[Look, Fit
     geometry = (ambient, ambient + free[..., None] * direct, normal @ view.rotation.T, (face >= 0).astype(np.float32))
     picture = crop(images.read_srgb(view.path), box, SIDE)
     look = _look(net, box, picture, geometry)
-    light, share = light_seen(images.srgb_to_linear(picture), head, face, bary, round(max(view.width, view.height) * SIDE / box[2]))
-    return replace(look, face=face[1::2, 1::2], bary=bary[1::2, 1::2]), coarse(light, share, SIDE // 2)
+    light, _ = light_seen(images.srgb_to_linear(picture), head, face, bary, round(max(view.width, view.height) * SIDE / box[2]))
+    return replace(look, face=face[1::2, 1::2], bary=bary[1::2, 1::2]), coarse(light, SIDE // 2)
 
 
 @torch.inference_mode()

@@ -8,7 +8,7 @@ often: a lamp it did not find, a lifted hand, hair.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -19,21 +19,13 @@ FITTED = 0.8  # weight of the fitted light's answer where the two agree ...
 DOUBT = 1.0  # ... and natural log units of luminance between them at which it is half of that
 
 
-@dataclass(frozen=True)
-class Fitted:
-    """The fitted light's answer at a look's size: log-shading [h, h, 3] and shadow [h, h] in [0, 1]."""
-
-    log: np.ndarray
-    shadow: np.ndarray
-
-
-def of_both(looks: list[Look], fitted: list[Fitted], skins: list[np.ndarray]) -> list[Look]:
-    """The looks moved towards the fitted light of each, brought to their level over bare skin (skins [h, h], above 0.5 there)."""
-    apart = [(light.log - look.shading)[skin > 0.5] for look, light, skin in zip(looks, fitted, skins, strict=True)]
+def of_both(looks: list[Look], fitted: list[np.ndarray], skins: list[np.ndarray]) -> list[Look]:
+    """The looks moved towards the fitted log-shading [h, h, 3] of each, brought to their level over bare skin (skins [h, h], above 0.5 there)."""
+    apart = [(log - look.shading)[skin > 0.5] for look, log, skin in zip(looks, fitted, skins, strict=True)]
     if not sum(map(len, apart)):
         return looks
     level = np.median(np.concatenate(apart), 0)
-    return [_towards(look, light.log - level) for look, light in zip(looks, fitted, strict=True)]
+    return [_towards(look, log - level) for look, log in zip(looks, fitted, strict=True)]
 
 
 def beyond(shading: np.ndarray, shadow: np.ndarray, known: np.ndarray, box: tuple[slice, slice], light: np.ndarray, share: np.ndarray,
@@ -51,10 +43,9 @@ def beyond(shading: np.ndarray, shadow: np.ndarray, known: np.ndarray, box: tupl
     return shading, shadow
 
 
-def coarse(light: np.ndarray, share: np.ndarray, side: int) -> Fitted:
-    """The fitted light of a square picture, linear [S, S, 3], and the sun's share [S, S], averaged to `side` as the eye would."""
-    small, lit = (cv2.resize(np.asarray(part, np.float32), (side, side), interpolation=cv2.INTER_AREA) for part in (light, share))
-    return Fitted(np.log(np.maximum(small, 1e-4)), 1 - lit)
+def coarse(light: np.ndarray, side: int) -> np.ndarray:
+    """The log [side, side, 3] of the light in a square picture, linear [S, S, 3], averaged as the eye would."""
+    return np.log(np.maximum(cv2.resize(np.asarray(light, np.float32), (side, side), interpolation=cv2.INTER_AREA), 1e-4))
 
 
 def _towards(look: Look, log: np.ndarray) -> Look:

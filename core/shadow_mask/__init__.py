@@ -37,7 +37,8 @@ UNLIKE_SKIN = ("lips", "brows", "eyes", "nostrils", "scalp")  # their darkness i
 @dataclass(frozen=True)
 class Evidence:
     """At the working size: texture (I_UV) and filmed (with its light) linear [S, S, 3]; normals [S, S, 3]; visible [S, S]: the sky's share that
-    reaches the surface; judged bool [S, S]: texels of the face that somebody saw; skin, brows [S, S] in [0, 1]: plain skin, and brows."""
+    reaches the surface; judged bool [S, S]: texels of the face that somebody saw, and no beard or hair; skin, brows [S, S] in [0, 1]: plain skin, and
+    brows."""
 
     texture: np.ndarray
     filmed: np.ndarray
@@ -113,11 +114,9 @@ def _evidence(capture: Capture, head: Unfolded, visible: np.ndarray) -> Evidence
     brows = template.mask("brows", size) if built_in else np.zeros_like(skin)
     for name in UNLIKE_SKIN if built_in else ():
         skin = skin * (1 - template.mask(name, size))
-    if built_in:
-        skin = skin * (1 - read_hidden_skin(capture, size))
     visible = interpolate(visible[:, None], head.mesh.faces, head.face, head.bary)[..., 0]
     return Evidence(texture, filmed, bleed(head.spread(head.normals), head.covered), bleed(visible, head.covered).astype(np.float32),
-                    head.covered & (confidence > SEEN) & (face > 0.5), skin, brows)
+                    head.covered & (confidence > SEEN) & (face > 0.5) & (read_hidden_skin(capture, size) < 0.5), skin, brows)
 
 
 def _leave_figures(capture: Capture, report: Reporter, source: str, evidence: Evidence, found: Proposal) -> None:
