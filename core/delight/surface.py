@@ -10,6 +10,7 @@ import scipy.sparse as sparse
 from ..contract.messages import Problem, Reporter
 from ..face import parser, template
 from ..face.head import Head
+from ..face.parts import trust_share
 from ..geometry.meshes import Mesh
 from ..geometry.raster import sample, visible_from
 from ..geometry.views import View
@@ -35,8 +36,8 @@ def smooth_normals(head: Head, rounds: int = 2) -> np.ndarray:
 
 
 def vertex_colours(head: Head, normals: np.ndarray, views: list[View], report: Reporter) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Linear colour [V, 3], the median over the views that show a vertex's skin well (so that highlights, which move, drop out), their number [V], and the
-    shares [V] of HAIRY and of brows over the views that see it at all.
+    """Linear colour [V, 3], the median over the views that show a vertex's skin well (so that highlights, which move, drop out), their number [V], how surely
+    HAIRY hides it, and the share of brows, [V] each, over the views that see it at all.
 
     Raises Problem when hardly any vertex is seen.
     """
@@ -68,12 +69,12 @@ def vertex_colours(head: Head, normals: np.ndarray, views: list[View], report: R
 
 
 def _hairy_shares(head: Head, view: View, picture: np.ndarray) -> np.ndarray:
-    """The shares of HAIRY and of brows at a frame's pixels, [H, W, 2]; none where nobody can tell: on a head of another topology, which has no landmarks."""
+    """How surely HAIRY is there, and the share of brows, at a frame's pixels, [H, W, 2]; none where nobody can tell: on a head of another topology, which has no landmarks."""
     if head.built_in:
         pixels, _ = view.project(template.landmark_points(head.mesh))
         if np.isfinite(pixels).all():
             parts = parser.parse(picture, pixels)
-            return np.stack([parts.of(*HAIRY), parts.of("brows")], -1)
+            return np.stack([trust_share(parts.of(*HAIRY)), parts.of("brows")], -1)
     return np.zeros((*picture.shape[:2], 2), np.float32)
 
 
