@@ -69,7 +69,8 @@ def vertex_colours(head: Head, normals: np.ndarray, views: list[View], report: R
 
 
 def _hairy_shares(head: Head, view: View, picture: np.ndarray) -> np.ndarray:
-    """How surely HAIRY is there, and the share of brows, at a frame's pixels, [H, W, 2]; none where nobody can tell: on a head of another topology, which has no landmarks."""
+    """How surely HAIRY is there, and the share of brows, at a frame's pixels, [H, W, 2]; none where nobody can tell: a head of another topology has no
+    landmarks."""
     if head.built_in:
         pixels, _ = view.project(template.landmark_points(head.mesh))
         if np.isfinite(pixels).all():
