@@ -18,7 +18,7 @@ GROWTHS = ("brows", "beard", "hair")
 SIDE = 192  # of the crop
 MARGIN = 1.9  # side of the square in heights of the face's landmarks: hair and neck are in it
 BRIDGE, CHIN = 9, 152
-SURE = 0.7, 0.9
+SURE = 0.8, 0.95
 """Share of a part below which it counts for nothing, and from which on it counts in full, where its darkness must not be taken for a shadow, nor a shadow for
 it: of the bare sample's jaw, half in hard shadow, a hundredth has a beard's share above 0.82; where a full beard is, the median is 0.93."""
 
