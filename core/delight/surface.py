@@ -10,7 +10,7 @@ import scipy.sparse as sparse
 from ..contract.messages import Problem, Reporter
 from ..face import parser, template
 from ..face.head import Head
-from ..face.parts import trust_share
+from ..face.parts import keep_present
 from ..geometry.meshes import Mesh
 from ..geometry.raster import sample, visible_from
 from ..geometry.views import View
@@ -20,6 +20,7 @@ GRAZING = 0.35  # cosine of the view angle under which a vertex's colour is not 
 NOT_SKIN = ("lips", "brows", "eyes")
 HAIRY = ("beard", "hair", "eyes", "clothes")
 """Parts of a picture whose own colour says nothing of the light on the skin. Brows are told apart from them: they are narrow."""
+ASKED = (*HAIRY, "brows")
 
 
 def smooth_normals(head: Head, rounds: int = 2) -> np.ndarray:
@@ -36,14 +37,14 @@ def smooth_normals(head: Head, rounds: int = 2) -> np.ndarray:
 
 
 def vertex_colours(head: Head, normals: np.ndarray, views: list[View], report: Reporter) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Linear colour [V, 3], the median over the views that show a vertex's skin well (so that highlights, which move, drop out), their number [V], how surely
-    HAIRY hides it, and the share of brows, [V] each, over the views that see it at all.
+    """Linear colour [V, 3], the median over the views that show a vertex's skin well (so that highlights, which move, drop out), their number [V], and the
+    shares [V] of HAIRY and of brows over the views that see it at all.
 
     Raises Problem when hardly any vertex is seen.
     """
     mesh = head.mesh
     seen_colours = np.full((len(views), len(mesh.vertices), 3), np.nan, np.float32)
-    shown, hidden = np.zeros(len(mesh.vertices)), np.zeros((len(mesh.vertices), 2))
+    shares = np.full((len(views), len(mesh.vertices), len(ASKED)), np.nan, np.float32)
     for i, view in enumerate(views):
         report.progress(i, 4 * len(views), "Reading the skin's colour")
         towards = view.centre - mesh.vertices
@@ -53,30 +54,40 @@ def vertex_colours(head: Head, normals: np.ndarray, views: list[View], report: R
         candidates = np.flatnonzero(inside & (cosine > GRAZING))
         candidates = candidates[visible_from(head.caster, mesh.vertices[candidates], normals[candidates], view.centre)]
         picture = images.read_srgb(view.path)
-        shares = sample(_hairy_shares(head, view, picture), pixels[candidates])
-        shown[candidates] += 1
-        hidden[candidates] += shares
         srgb = sample(picture, pixels[candidates])
-        skin = (srgb.max(1) < 0.99) & (shares.sum(1) < 0.5)  # what is burnt out has lost its colour
-        seen_colours[i, candidates[skin]] = images.srgb_to_linear(srgb[skin])
+        unburnt = srgb.max(1) < 0.99  # what is burnt out has lost its colour
+        seen_colours[i, candidates[unburnt]] = images.srgb_to_linear(srgb[unburnt])
+        shares[i, candidates] = _shares(head, view, picture, pixels[candidates])
+    hidden, share = _without_doubts(shares)
+    seen_colours[hidden] = np.nan
     count = np.isfinite(seen_colours[..., 0]).sum(0)
     if (count > 0).sum() < 100:
         raise Problem("The selected frames hardly see the registered head.", "Look at the pictures of the stages cameras and registration in report.html.")
     colours = np.zeros((len(mesh.vertices), 3))
     colours[count > 0] = np.nanmedian(seen_colours[:, count > 0], 0)
-    hair, brows = (hidden / np.maximum(shown, 1)[:, None]).T
-    return colours, count, hair, brows
+    return colours, count, share[:, :-1].sum(1).clip(0, 1), share[:, -1]
 
 
-def _hairy_shares(head: Head, view: View, picture: np.ndarray) -> np.ndarray:
-    """How surely HAIRY is there, and the share of brows, at a frame's pixels, [H, W, 2]; none where nobody can tell: a head of another topology has no
-    landmarks."""
+def _shares(head: Head, view: View, picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """The shares of ASKED at pixels [N, 2] of a frame, [N, len(ASKED)]; none where nobody can tell: a head of another topology has no landmarks."""
     if head.built_in:
-        pixels, _ = view.project(template.landmark_points(head.mesh))
-        if np.isfinite(pixels).all():
-            parts = parser.parse(picture, pixels)
-            return np.stack([trust_share(parts.of(*HAIRY)), parts.of("brows")], -1)
-    return np.zeros((*picture.shape[:2], 2), np.float32)
+        marks, _ = view.project(template.landmark_points(head.mesh))
+        if np.isfinite(marks).all():
+            parts = parser.parse(picture, marks)
+            return np.stack([sample(parts.of(name), pixels) for name in ASKED], -1)
+    return np.zeros((len(pixels), len(ASKED)), np.float32)
+
+
+def _without_doubts(shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shares of ASKED [K, V, len(ASKED)], nan where a view sees nothing -> where a view shows more of them than skin, bool [K, V], and their means over the
+    views [V, len(ASKED)]; of beard and hair where the person has any."""
+    seen = np.isfinite(shares[..., :1]).sum(0)
+    mean = np.nansum(shares, 0) / np.maximum(seen, 1)
+    for name in ("beard", "hair"):
+        part = ASKED.index(name)
+        mean[:, part] = keep_present(mean[:, part])
+    present = (mean > 0).any(0)
+    return np.nansum(shares * present, -1) > 0.5, mean
 
 
 def skin_weights(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ import numpy as np
 from ..contract.capture import Capture
 from ..contract.messages import Problem
 from ..imaging import images
-from .parts import GROWTHS, trust_share
+from .parts import GROWTHS, keep_present
 
 
 def read_parts(capture: Capture, size: int) -> np.ndarray | None:
@@ -24,8 +24,8 @@ def read_parts(capture: Capture, size: int) -> np.ndarray | None:
 
 
 def read_hidden_skin(capture: Capture, size: int) -> np.ndarray:
-    """How surely beard or the head's hair hides each texel's skin, float32 [size, size]: what is dark there is no shadow. 0 where the frames were not asked."""
+    """The share of beard and of the head's hair at each texel, float32 [size, size]: what is dark there is no shadow. 0 where the frames were not asked."""
     parts = read_parts(capture, size)
     if parts is None:
         return np.zeros((size, size), np.float32)
-    return trust_share(parts[..., GROWTHS.index("beard")] + parts[..., GROWTHS.index("hair")])
+    return np.clip(sum(keep_present(parts[..., GROWTHS.index(name)]) for name in ("beard", "hair")), 0, 1)
