@@ -23,7 +23,7 @@ WANTED = (
     r"__(init|main)__\.py", r"farm/flamenco/wildcap\.js", r"blender_manifest\.toml", r"LICENSE", r"README\.md",
     r"requirements/(worker|perceptual|cuda|farm)\.txt",
     r"requirements/locks/([a-z0-9_]+-3\.[0-9]+(-cpu|-cuda)?|pip)\.txt",
-    r"wildcap_addon/([a-z_]+/)?[a-z_]+\.py",
+    r"wildcap_addon/([a-z_]+/){0,2}[a-z_]+\.py",
     r"core/README\.md", r"core/[a-z_]+\.py", r"core/(batch|contract|worker|imaging|geometry|face|light)/[a-z0-9_]+\.py",
     r"core/(frames|cameras|scan|registration|delight|texture|shadow_mask|solve|transfer|upscale|deliver)/(importers/)?[a-z0-9_]+\.py",
     r"core/weights/[a-z0-9_]+\.(safetensors|json)", r"core/weights/face_nets/([a-z_]+\.tflite|NOTICE\.md|LICENSE\.txt)",
