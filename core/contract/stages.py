@@ -35,6 +35,8 @@ MAPS = ("diffuse_albedo.png", "diffuse_albedo.exr", "specular_albedo.png", "norm
 STRANDS = "strands.npz"
 """Beside the delivered maps, where hair was found: the single hairs that Grow Hair brings in."""
 OPEN_EYES = ("head_open.obj", "eyes.json")
+PARTS = "texture_parts.png"
+"""What the face parser saw in the frames, where they were at hand."""
 
 STAGES = (
     Stage("frames", "Frames", (), ("frames/",), "core.frames"),
@@ -46,13 +48,13 @@ STAGES = (
     Stage("texture", "Texture", ("frames/", "delit/", "cameras/", "head.obj"), ("texture.exr", "texture.png", "texture_confidence.exr"), "core.texture",
           on_device=True, wishes=OPEN_EYES),
     Stage("shadow_mask", "Shadow Mask", ("delit/", "cameras/", "head.obj", "texture.exr", "texture_confidence.exr"), ("shadow_mask_auto.png",),
-          "core.shadow_mask", wishes=("texture_filmed.png", "frames/", *OPEN_EYES)),
+          "core.shadow_mask", wishes=("texture_filmed.png", PARTS, "frames/", *OPEN_EYES)),
     Stage("solve", "Solve", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
           tuple(f"maps/{name}" for name in MAPS), "core.solve", shared=("seed",), on_device=True,
-          wishes=("shadow_mask.png", "protect_mask.png", "texture_filmed.png", "frames/", "cameras/", "delit/", *OPEN_EYES)),
+          wishes=("shadow_mask.png", "protect_mask.png", "texture_filmed.png", PARTS, "frames/", "cameras/", "delit/", *OPEN_EYES)),
     Stage("upscale", "4K Maps", ("head.obj", *(f"maps/{name}" for name in MAPS)), tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale",
           shared=("seed", "device"), on_device=True,
-          wishes=("texture_detail.exr", "texture_parts.png")),
+          wishes=("texture_detail.exr", PARTS)),
     Stage("transfer", "Delivery", ("head.obj", *(f"maps/{name}" for name in MAPS)), ("delivery/",), "core.transfer",
           wishes=(*(f"maps_4k/{name}" for name in MAPS), "own_head.obj", "own_head.json", "scan.ply", "frames/", "cameras/")),
 )

@@ -11,7 +11,7 @@ from .hashes import hash_file, hash_tree, sample_file
 from .messages import Problem
 
 RECORD = "capture.json"
-TOLD = (*stages.by_name("solve").reads, "shadow_mask.png", "protect_mask.png", *stages.OPEN_EYES)
+TOLD = (*stages.by_name("solve").reads, "shadow_mask.png", "protect_mask.png", stages.PARTS, *stages.OPEN_EYES)
 """What a solve reads of another capture."""
 
 
