@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from core.contract import freshness, hashes, stages
+from core.contract import freshness, hashes, stages, together
 from core.contract.capture import FORMAT, Capture
 from core.contract.files import write_json
 from core.contract.hashes import hash_source, same_source
@@ -262,3 +262,12 @@ def test_a_capture_of_this_format_is_refused_by_what_knows_only_the_first(captur
     write_json(capture.json, {**capture.read(), "format": FORMAT + 1})
     with pytest.raises(Problem, match="newer version"):
         capture.read()
+
+
+def test_a_stage_that_asks_what_the_parser_saw_is_stale_when_that_changes():
+    """Read from the sources: who imports face/shown_parts.py reads texture_parts.png."""
+    core = Path(stages.__file__).parents[1]
+    asking = {stage for stage in stages.STAGES for file in (core / stage.module.split(".")[1]).rglob("*.py")
+              if "shown_parts" in file.read_text(encoding="utf-8")}
+    assert {stage.name for stage in asking} == {"shadow_mask", "solve", "upscale"}
+    assert all(stages.PARTS in stage.wishes for stage in asking) and stages.PARTS in together.TOLD
