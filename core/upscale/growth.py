@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from ..face import beard, template
-from ..face.parts import GROWTHS
+from ..face.parts import GROWTHS, keep_present
 from .surface import HeadSurface
 from .whole_head import seen_well
 
@@ -49,7 +49,8 @@ def find(light: np.ndarray, confidence: np.ndarray, zones: dict[str, np.ndarray]
     if parts is None:
         return Growth(zones["brows"], beard.presence(fine, grain, bare, zones["beard"], surface.texel), head, grain, False)
     likely = {name: _likely(name, parts, np.minimum(np.abs(fine) / max(grain, 1e-6), LOUDEST), texel) for name in ALIKE}
-    return Growth(_faded(likely["brows"]) * _near_brows(surface), _faded(likely["beard"]) * _bearable(zones["beard"]), head, grain, True)
+    bearded = keep_present(likely["beard"] * _bearable(zones["beard"]))  # hard shadows on a bare jaw are half a beard to the parser
+    return Growth(_faded(likely["brows"]) * _near_brows(surface), _faded(bearded), head, grain, True)
 
 
 def _likely(name: str, parts: np.ndarray, loud: np.ndarray, texel: float) -> np.ndarray:
