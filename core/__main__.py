@@ -75,7 +75,7 @@ def _parser() -> argparse.ArgumentParser:
     command_settings.add_options(deliver, "deliver")
     deliver.set_defaults(command=_deliver)
     commands.add_parser("settings", help="list every setting: its default, what it may be, its flag, what it does").set_defaults(command=_settings)
-    table = commands.add_parser("presets", help="say how each program gets its maps, and what each format drops: the tables of docs/guide.md")
+    table = commands.add_parser("presets", help="say how each program gets its maps, and what each format drops: the tables of docs/guide/deliver.md")
     table.set_defaults(command=_presets)
     commands.add_parser("stages", help="list the stages of the chain").set_defaults(command=_stages)
     cards = commands.add_parser("delighters", help="say of each way to take the light out where it runs, what leaves the machine and what it costs")

@@ -263,4 +263,4 @@ def test_the_terminal_delivers_without_blender(capture, capsys):
 
 def test_the_guide_has_the_tables_as_they_are(capsys):
     assert main(["presets"]) == 0
-    assert capsys.readouterr().out.strip() in (ROOT / "docs" / "guide.md").read_text(encoding="utf-8")
+    assert capsys.readouterr().out.strip() in (ROOT / "docs" / "guide" / "deliver.md").read_text(encoding="utf-8")

@@ -5,6 +5,7 @@
 import ast
 import re
 from functools import cache
+from pathlib import Path
 
 import pytest
 
@@ -12,11 +13,10 @@ from core.contract.settings import known_settings
 
 from .conftest import ROOT
 
-GUIDE = (ROOT / "docs" / "guide.md").read_text(encoding="utf-8")
-TABLE = GUIDE[GUIDE.index("| message |"):]
-MESSAGES = re.findall(r"^\| (?!message|---|\*\*)(.+?) \|", TABLE, flags=re.MULTILINE)
+PAGES = {path.name: path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs" / "guide").glob("*.md"))}
+MESSAGES = re.findall(r"^\| (?!message|---|\*\*)(.+?) \|", PAGES["trouble.md"], flags=re.MULTILINE)
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-PROSE = GUIDE[:GUIDE.index("| message |")] + README
+PROSE = "\n".join(re.sub(r"^\| message.*?\n\n", "", text, flags=re.MULTILINE | re.DOTALL) for text in (*PAGES.values(), README))
 BUTTONS = sorted({name.rstrip(".,:") for name in re.findall(r"\*\*(.+?)\*\*", PROSE, flags=re.DOTALL)})
 NOT_BUTTONS = {"WildCap"}  # the tab
 
@@ -48,6 +48,26 @@ def test_a_button_of_the_guide_is_there(button):
     assert name in NOT_BUTTONS or name.casefold() in said, name
 
 
-def test_the_pictures_of_the_guide_are_there():
-    pictures = [f"docs/{name}" for name in re.findall(r"\]\((pictures/[^)]+)\)", GUIDE)] + re.findall(r"\]\((docs/pictures/[^)]+)\)", README)
-    assert len(pictures) > 6 and [p for p in pictures if not (ROOT / p).is_file()] == []
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_of_the_guide_is_short_and_has_a_picture(name):
+    lines = PAGES[name].splitlines()
+    assert len(lines) <= 80 and "](../pictures/" in PAGES[name]
+    assert [line for line in lines if len(line) > 120 and not line.startswith("|")] == []
+
+
+def docs() -> list[Path]:
+    return [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
+
+
+def anchors(path: Path) -> set[str]:
+    """The names by which a page's headings can be linked to."""
+    headings = re.findall(r"^#+ (.+)$", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", docs(), ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_links_and_pictures_lead_somewhere(page):
+    for target, anchor in re.findall(r"\]\((?!https?:|mailto:)([^)#\s]*)(?:#([^)\s]+))?\)", re.sub(r"`[^`\n]*`", "", page.read_text(encoding="utf-8"))):
+        there = page if not target else page.parent / target
+        assert there.exists(), target
+        assert not anchor or anchor in anchors(there), f"{target}#{anchor}"

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where a head goes: per target the names, packing, units and normals of its maps; per file format what it cannot hold. Written here and nowhere else.
 
-Ground floor: standard library only. Shown by the add-on beside the choice, by `python -m core presets`, and in docs/guide.md.
+Ground floor: standard library only. Shown by the add-on beside the choice, by `python -m core presets`, and in docs/guide/deliver.md.
 """
 
 from __future__ import annotations
@@ -146,7 +146,7 @@ SCAN_MAPS = (Picture("{name}_albedo", ALBEDO, COLOUR, "base_color"), Picture("{n
 
 
 def markdown() -> str:
-    """The table of docs/guide.md."""
+    """The table of docs/guide/deliver.md."""
     lines = ["| preset | mesh | unit | normals | pictures | maps |", "| --- | --- | --- | --- | --- | --- |"]
     for preset in PRESETS.values():
         names = ", ".join(f"`{picture.name.format(name='NAME')}{'.1001' if preset.numbered else ''}`" for picture in preset.maps)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How Blender feels while the real solver runs and a mask is painted: stalls of the main thread and redraws of the 3D view, idle and busy in one run.
 
-A timer of ours notes when it is called; what a call is late by, the main thread was held. Prints the figures for docs/guide.md.
+A timer of ours notes when it is called; what a call is late by, the main thread was held. Prints the figures for the docs.
 """
 
 import json
