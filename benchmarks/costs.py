@@ -15,7 +15,6 @@ Exponents are fits of the logarithm of the processor's seconds to that of the si
 from __future__ import annotations
 
 import argparse
-import os
 import shutil
 import sys
 from collections.abc import Iterator
@@ -194,13 +193,7 @@ def to_and_fro(frames: list[np.ndarray], count: int) -> Iterator[np.ndarray]:
 
 def machine() -> dict:
     """What the figures were measured on; networks: the precision in which the processor runs them."""
-    try:
-        told = Path("/proc/cpuinfo").read_text(encoding="utf-8")
-        name = next(line.partition(":")[2].strip() for line in told.splitlines() if line.startswith("model name"))
-    except (OSError, StopIteration):
-        name = None
-    return {"processor": name, "cores": os.cpu_count(), "memory_gb": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9),
-            "networks": str(fast_dtype("cpu")).removeprefix("torch.")}
+    return {**figures.machine(), "networks": str(fast_dtype("cpu")).removeprefix("torch.")}
 
 
 def together(found: dict, whole: str) -> dict | None:

@@ -33,7 +33,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--quality", choices=QUALITIES, default="standard")
-    parser.add_argument("--json", type=Path, help="where the figures of README and docs/results.md go")
+    parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/demo.json")
     arguments = parser.parse_args()
     capture = Capture(arguments.folder.resolve() / "sample.wildcap")
     started = time.monotonic()

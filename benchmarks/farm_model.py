@@ -225,7 +225,7 @@ def page(found: dict) -> str:
         "## The bottleneck", wrapped(bottleneck(found)),
         "## The formulas", "Faces know nothing of each other, so everything is linear in their number F:", FORMULAS,
         wrapped("Per face, Frames, Cameras and Scan grow with the frames; Delight and Texture with the views that are selected of them (16 of any number); "
-                "Solve and 4K Maps with the side of the maps. [Results](results.md) has what was measured of each."),
+                "Solve and 4K Maps with the side of the maps. [Costs](results/costs.md) has what was measured of each."),
         "## Assumed", figures.markdown(["argument", "value", "what it is"], assumed)]
     return "\n\n".join(parts) + "\n"
 

@@ -1,16 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The record that a benchmark leaves behind: {"benchmark", "command", "commit", "figures"}, one JSON file each.
+"""The record that a benchmark leaves behind: {"benchmark", "command", "commit", "date", "machine", "figures"}, one JSON file each.
 
-Benchmarks write it where their --json says; what is published lies in docs/figures/NAME.json, and docs/results.md and the README's figures
-come from there (benchmarks/results.py). Figures are nested dicts of plain numbers; null is one that was not measured. Rows of a table are
+Benchmarks write it where their --json says; what is published lies in docs/figures/NAME.json, and the pages of docs/results and the README's
+figures come from there (benchmarks/results). Figures are nested dicts of plain numbers; null is one that was not measured. Rows of a table are
 printed in the order in which they were written.
 """
 
 from __future__ import annotations
 
+import datetime
 import json
 import math
+import os
 import subprocess
 from pathlib import Path
 
@@ -21,6 +23,21 @@ from core.contract.messages import Problem
 
 ROOT = Path(__file__).resolve().parent.parent
 PUBLISHED = ROOT / "docs" / "figures"
+KEYS = {"benchmark", "command", "commit", "date", "machine", "figures"}
+
+
+class Figures(dict):
+    """Nested figures whose keys are attributes, too: `demo.rows.WildCap.psnr`."""
+
+    @classmethod
+    def of(cls, figures: dict) -> Figures:
+        return cls({key: cls.of(value) if isinstance(value, dict) else value for key, value in figures.items()})
+
+    def __getattr__(self, name: str):
+        try:
+            return self[name]
+        except KeyError:
+            raise AttributeError(f"there is no figure {name!r} among {', '.join(self)}") from None
 
 
 def write(path: Path, benchmark: str, command: str, figures: dict, keep: bool = False) -> None:
@@ -32,11 +49,12 @@ def write(path: Path, benchmark: str, command: str, figures: dict, keep: bool = 
     path, figures = Path(path), plain(figures)
     if keep and path.is_file():
         figures = merged(read(path.stem, path.parent)["figures"], figures)
-    write_json(path, {"benchmark": benchmark, "command": command, "commit": commit(), "figures": figures})
+    here = {"commit": commit(), "date": datetime.date.today().isoformat(), "machine": machine_line()}
+    write_json(path, {"benchmark": benchmark, "command": command, **here, "figures": figures})
 
 
 def read(name: str, folder: Path = PUBLISHED) -> dict:
-    """The record `name` of a folder. Raises Problem where it is missing or is no record."""
+    """The record `name` of a folder; "date" and "machine" are None in older ones. Raises Problem where it is missing or is no record."""
     path = Path(folder) / f"{name}.json"
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
@@ -44,7 +62,9 @@ def read(name: str, folder: Path = PUBLISHED) -> dict:
         raise Problem(f"{path} is missing.", f"Run the benchmark with `--json {path}`.") from None
     except ValueError as error:
         raise Problem(f"{path} is not JSON ({error}).", "Run the benchmark again.") from None
-    if not isinstance(record, dict) or set(record) != {"benchmark", "command", "commit", "figures"} or not isinstance(record["figures"], dict):
+    if isinstance(record, dict):
+        record = {"date": None, "machine": None, **record}
+    if not isinstance(record, dict) or set(record) != KEYS or not isinstance(record["figures"], dict):
         raise Problem(f"{path} is not a benchmark's record.", 'It holds "benchmark", "command", "commit" and "figures"; benchmarks/figures.py writes it.')
     return record
 
@@ -79,3 +99,21 @@ def commit() -> str | None:
     except (OSError, subprocess.CalledProcessError):
         return None
     return found.stdout.strip()
+
+
+def machine() -> dict:
+    """The processor's name, its cores, and the memory in GB; None where the system does not say it."""
+    try:
+        told = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+        name = next(line.partition(":")[2].strip() for line in told.splitlines() if line.startswith("model name"))
+        memory = round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9)
+    except (OSError, StopIteration):
+        name = memory = None
+    return {"processor": name, "cores": os.cpu_count(), "memory_gb": memory}
+
+
+def machine_line() -> str:
+    """The same in words."""
+    here = machine()
+    memory = f", {here['memory_gb']} GB" if here["memory_gb"] else ""
+    return f"{here['cores']} cores ({here['processor'] or 'unknown processor'}){memory}"

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One subject's row of the gallery in docs/results.md, by one command; two lines of seven pictures:
+"""One subject's row of the gallery in docs/results/gallery.md, by one command; two lines of seven pictures:
 
     python -m benchmarks.gallery CAPTURE OUT.jpg [--truth MAPS]
 

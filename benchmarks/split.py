@@ -38,10 +38,11 @@ from core.training.skins import carried_names, clusters
 from . import figures, people
 from .measures.references import NOTHING, TRUE
 from .measures.table import Column, Scores, summarise, to_markdown, to_record
-from .pages import write_page
+from .pages import Sections, write_page
 from .state_captures import DELIT, SIZE, SOLVED, Filmed, find
 from .state_scores import in_uv, mean_of, of_person, small
 
+TITLE = "Skin or light"
 COMMAND = "python -m benchmarks.split FOLDER --page docs/results/split.md --json docs/figures/split.json"
 ALONE, TOGETHER, LESS, MORE = "split alone", "split together", "prior of the scales halved", "prior of the scales doubled"
 COLUMNS = {"psnr_uv": Column("PSNR in UV, dB"), "psnr_shared": Column("up to one shared light, dB"), "light_shared": Column("that light, in log", 3, 0),
@@ -82,21 +83,27 @@ def main() -> int:
         return 0
     beside = dict(pair.split("=", 1) for pair in asked.beside)
     scores, by_capture, scales = measure(captures, {name: Path(path) for name, path in beside.items()})
-    found = summarise(scores, COLUMNS, DELIT)
-    sections = [("", f"{WORDS} {len(captures)} captures of {len({filmed.person for filmed in captures})} people."),
-                ("The parts", PARTS), ("All people", to_markdown(found, COLUMNS, "taken for albedo", DELIT)),
-                ("Capture by capture, up to the person's shared light, dB", capture_table(by_capture)),
-                ("The scales that were found", scale_table(scales))]
-    record = {**to_record(found, scores), "captures": by_capture, "scales": scales}
+    record = {**to_record(summarise(scores, COLUMNS, DELIT), scores), "captures": by_capture, "scales": scales}
     if asked.skins:
         record["skins"] = reach_of_traits(asked.skins)
-        sections.append(("How far traits reach", reach_table(record["skins"])))
-    print("\n\n".join(f"{heading}\n\n{body}" for heading, body in sections))
+    text = sections(record)
+    print("\n\n".join(f"{heading}\n\n{body}" for heading, body in text))
     if asked.page:
-        write_page(asked.page, "Skin or light", COMMAND, sections)
+        write_page(asked.page, TITLE, COMMAND, text)
     if asked.json:
         figures.write(asked.json, "split", COMMAND, record)
     return 0
+
+
+def sections(record: dict) -> Sections:
+    """Heading and Markdown of each part of the page."""
+    people, captures = {name for rows in record["people"].values() for name in rows}, record["captures"]
+    found = summarise(record["people"], COLUMNS, DELIT)
+    parts = [("", f"{WORDS} {len(captures)} captures of {len(people)} people."), ("The parts", PARTS),
+             ("All people", to_markdown(found, COLUMNS, "taken for albedo", DELIT)),
+             ("Capture by capture, up to the person's shared light, dB", capture_table(captures)),
+             ("The scales that were found", scale_table(record["scales"]))]
+    return parts + ([("How far traits reach", reach_table(record["skins"]))] if "skins" in record else [])
 
 
 def measure(captures: list[Filmed], beside: dict[str, Path]) -> tuple[Scores, dict, dict]:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What benchmarks put into their records has the keys by which docs/results.in.md asks for it."""
+"""What benchmarks put into their records has the keys by which benchmarks/results asks for it."""
 
 import json
 

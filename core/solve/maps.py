@@ -42,7 +42,7 @@ def finished(state: State, evidence: Evidence, start: Start, spread: torch.Tenso
     """Reads the maps out of \\hat x_0. The albedo is rescaled once so that the mean of the confident facial skin is the skin tone (or by a `gain`
     [3] that was found before); the shading takes the inverse, so that their product stays. What nobody saw is the mean face of that tone: a drawn
     sample would be as likely, but would look like something that was measured. So is the specular albedo: no term of the likelihood knows it, and a draw
-    has twice the squared error of what is expected (docs/results.md). `spread` [H, W], of any size, is confidence.py's; none by default."""
+    has twice the squared error of what is expected (docs/results/confidence.md). `spread` [H, W], of any size, is confidence.py's; none by default."""
     shader = start.observations[1].shader
     x = torch.lerp(start.reference, state.denoised, evidence.weight.sqrt())[0]
     with torch.no_grad():

@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The pages of docs/results and the figures of hand-written texts, out of the records in docs/figures (`make results`):
+
+    python -m benchmarks.results [--check] [--captures FOLDER]
+
+Runs no benchmark: each leaves its record by its own --json (benchmarks/figures.py). NAME.py in here is the page docs/results/NAME.md: TITLE, SAYS
+(its line in the index), RECORDS, and `sections`, which takes the figures of these records in that order and gives headings with Markdown. told.py
+has the phrases with figures in the README and elsewhere. --check writes nothing and ends with code 1 where a text is not as the records have it.
+
+No picture is made here of what is in the repository alone. teaser.jpg and gallery_NAME.jpg show solved captures: --captures names a folder with
+sample.wildcap (as `make demo` leaves it) and NAME.wildcap (benchmarks/people.py). Others are made by their page's benchmark (--picture, --pictures).
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+
+from core.contract.messages import Problem
+
+from .. import figures
+from ..pages import page_text, replace_text
+from . import told
+
+ROOT = figures.ROOT
+NAMES = tuple(module.name for module in iter_modules(__path__) if module.name not in ("__main__", "told"))
+"""The pages' names."""
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 where something differs")
+    parser.add_argument("--captures", type=Path, help="solved captures, for teaser.jpg and the gallery's pictures")
+    asked = parser.parse_args()
+    try:
+        old = {path: path.read_text(encoding="utf-8") if path.is_file() else "" for path in (*pages(), *told.texts(ROOT))}
+        new = {**pages(), **told.texts(ROOT)}
+    except Problem as problem:
+        print(problem, file=sys.stderr)
+        return 1
+    wrong = [f"{path.relative_to(ROOT)} is not as the records have it: run `make results`." for path in new if new[path] != old[path]]
+    for path, text in {} if asked.check else new.items():
+        replace_text(path, text)
+    for command in pictures(asked.captures.resolve()) if asked.captures else ():
+        print(" ".join(command), flush=True)
+        subprocess.run([sys.executable, "-m", *command], cwd=ROOT, check=True)
+    wrong = [*(wrong if asked.check else ()), *strangers()]
+    print(*wrong, sep="\n", end="\n" * bool(wrong), file=sys.stderr)
+    return 1 if wrong else 0
+
+
+def pages() -> dict[Path, str]:
+    """Path and text of every page. Raises Problem where a record is missing."""
+    return {ROOT / "docs" / "results" / f"{name}.md": page(name) for name in NAMES}
+
+
+def page(name: str) -> str:
+    """The text of docs/results/NAME.md."""
+    module = import_module(f"{__name__}.{name}")
+    records = [figures.read(record) for record in module.RECORDS]
+    return page_text(module.TITLE, [] if name == "index" else records, module.sections(*(figures.Figures.of(record["figures"]) for record in records)))
+
+
+def strangers() -> list[str]:
+    """What lies in docs/results and is no page of ours."""
+    there = sorted((ROOT / "docs" / "results").glob("*.md"))
+    return [f"{path.relative_to(ROOT)} has no benchmarks/results/{path.stem}.py that writes it." for path in there if path.stem not in NAMES]
+
+
+def pictures(captures: Path) -> Iterator[list[str]]:
+    """Module and arguments of the commands that draw the pages' pictures of the solved captures in a folder."""
+    target = ROOT / "docs" / "pictures"
+    for capture in sorted(path for path in captures.glob("*.wildcap") if (path / "maps" / "normal.png").is_file()):
+        name, truth = capture.stem, captures / capture.stem / "maps"
+        if name == "sample":
+            yield ["benchmarks.teaser", str(capture), str(target / "teaser.jpg")]
+        if (target / f"gallery_{name}.jpg").is_file():
+            known = ["--truth", str(truth)] if truth.is_dir() else []
+            yield ["benchmarks.gallery", str(capture), str(target / f"gallery_{name}.jpg"), *known]

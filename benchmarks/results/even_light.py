@@ -1,0 +1,17 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""docs/results/even_light.md: what skin gives back of its albedo in Cycles."""
+
+from __future__ import annotations
+
+from ..even_light import WORDS, table
+from ..figures import Figures
+from ..pages import Sections
+
+TITLE = "What skin gives back of its albedo"
+SAYS = "Cycles's two random walks, and the material that makes up for what is lost"
+RECORDS = ("even_light",)
+
+
+def sections(found: Figures) -> Sections:
+    return [("", WORDS), ("", table(found))]

@@ -1,0 +1,18 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""docs/results/hair.md: hair that is grown from pictures, against people whose every hair is known."""
+
+from __future__ import annotations
+
+from ..figures import Figures
+from ..groomed import WORDS, to_table
+from ..pages import Sections
+
+TITLE = "Hair that is grown from pictures"
+SAYS = "brows and beards as curves, against people whose every hair is known"
+RECORDS = ("groomed",)
+PICTURE = "![From left to right a frame, the true hairs, the grown hairs](../pictures/hair.jpg)"
+
+
+def sections(groomed: Figures) -> Sections:
+    return [("", WORDS), ("", to_table(groomed.people)), ("", PICTURE)]

@@ -1,0 +1,18 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""docs/results/photographs.md: the delighter on single photographs."""
+
+from __future__ import annotations
+
+from ..figures import Figures
+from ..measures.table import summarise, to_markdown
+from ..pages import Sections
+from ..photographs import COLUMNS, TITLES, WORDS
+
+TITLE = "Single photographs: the face that is kept and the light that is left"
+SAYS = "real people under many lights, beside answers that do nothing, give one colour, divide by a blur, or know the light"
+RECORDS = ("photographs",)
+
+
+def sections(found: Figures) -> Sections:
+    return [("", WORDS), *((TITLES[name], to_markdown(summarise(found[name].people, COLUMNS), COLUMNS, "answer")) for name in TITLES if name in found)]

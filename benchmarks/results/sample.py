@@ -1,0 +1,26 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""docs/results/sample.md: the sample video, whose truth is known, by `make demo`."""
+
+from __future__ import annotations
+
+from ..demo import table
+from ..figures import Figures
+from ..pages import Sections, prose
+
+TITLE = "The sample video"
+SAYS = "a synthetic face, the sun behind leaves, against its true albedo: what `make demo` says on your machine"
+RECORDS = ("demo",)
+
+
+def sections(demo: Figures) -> Sections:
+    return [("", prose(f"""
+        ![frame, mask, albedo, specular, normal, three lights](../pictures/teaser.jpg)
+
+        The solved albedo against the truth, in the picture, on facial skin; the true skin tone is given (mean of
+        {demo.views} frames). *After one gain*: per channel, in linear light. *Detail*: the correlation with the truth's log
+        green between 1 and 3 px. *Shadow step*: log(answer / truth), lit less dark, at the shadow's edge.
+        """, table(demo), """
+        What a delighter alone leaves, and what the solve adds to it, is on other pages: [relit](relit.md),
+        [the head scan](scan.md), [the state of the albedo](state.md). The [gallery](gallery.md) shows every map.
+        """))]

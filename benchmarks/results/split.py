@@ -1,0 +1,17 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""docs/results/split.md: what telling skin and light apart is worth."""
+
+from __future__ import annotations
+
+from .. import split
+from ..figures import Figures
+from ..pages import Sections
+
+TITLE = split.TITLE
+SAYS = "what telling them apart is worth, with one capture of a person and with several"
+RECORDS = ("split",)
+
+
+def sections(found: Figures) -> Sections:
+    return split.sections(found)
