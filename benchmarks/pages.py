@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A page of docs/results: title, then the command, the commit, the day and the machine of each record that it shows, then sections.
+"""A page of docs/results: title, then command, commit, day and machine of each record that it shows, then sections.
 
-A benchmark may write its page when it has run (`write_page`); `python -m benchmarks.results` writes all of them out of the records.
+A benchmark may write its page when it has run (`write_page`); `python -m benchmarks.results` writes all of them out of
+the records, which hold six decimals: a last digit may differ.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ Sections = list[tuple[str, str]]
 
 def write_page(path: Path, title: str, command: str, sections: Sections) -> None:
     """Writes the page of a benchmark that has just run."""
-    made = {"command": command, "commit": commit(), "date": datetime.date.today().isoformat(), "machine": machine_line()}
+    today = datetime.date.today().isoformat()
+    made = {"command": command, "commit": commit(), "date": today, "machine": machine_line()}
     replace_text(path, page_text(title, [made], sections))
 
 
@@ -41,13 +43,14 @@ def made_by(records: list[dict]) -> str:
     """Command, commit, day and machine of each record; what a record does not know is left out."""
     lines = []
     for record in records:
-        known = [f"commit {record['commit'] or 'unknown'}", record.get("date"), record.get("machine") and f"on {record['machine']}"]
-        lines.append(f"`{record['command']}`, {', '.join(filter(None, known))}.")
+        machine = f"on {record['machine']}" if record.get("machine") else None
+        known = filter(None, [f"commit {record['commit'] or 'unknown'}", record.get("date"), machine])
+        lines.append(f"`{record['command']}`, {', '.join(known)}.")
     return f"Made by {lines[0]}" if len(lines) == 1 else "Made by\n\n" + "\n".join(f"- {line}" for line in lines)
 
 
 def prose(*parts: str) -> str:
-    """Paragraphs, tables and pictures, with a blank line between them; what is indented in the source is not so on the page."""
+    """Paragraphs, tables and pictures with a blank line between them, without the source's indentation."""
     return "\n\n".join(inspect.cleandoc(part) for part in parts)
 
 

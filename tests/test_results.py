@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pages of docs/results and the figures of hand-written texts come from the records: what is edited by hand is found."""
+"""The pages of docs/results and the figures of hand-written texts are the records': what is edited by hand is found."""
 
 import re
 import shutil
@@ -19,7 +19,8 @@ TEXTS = told.told()
 
 @pytest.mark.parametrize("name", results.NAMES)
 def test_a_page_is_what_the_records_give(name):
-    assert (ROOT / "docs" / "results" / f"{name}.md").read_text(encoding="utf-8") == results.page(name), "run `make results`"
+    text = (ROOT / "docs" / "results" / f"{name}.md").read_text(encoding="utf-8")
+    assert text == results.page(name), "run `make results`"
 
 
 def test_every_page_is_written_and_in_the_index():
@@ -55,12 +56,14 @@ def test_a_page_tells_what_its_records_know(tmp_path):
     figures.write(tmp_path / "one.json", "demo", "make demo", {"views": 14})
     record = figures.read("one", tmp_path)
     told_of = pages.page_text("One", [record], [("", "Words."), ("More", "| a |\n| --- |")])
-    assert told_of.startswith(f"{pages.MADE}\n\n# One\n\nMade by `make demo`, commit ") and told_of.endswith("Words.\n\n## More\n\n| a |\n| --- |\n")
+    assert told_of.startswith(f"{pages.MADE}\n\n# One\n\nMade by `make demo`, commit ")
+    assert told_of.endswith("Words.\n\n## More\n\n| a |\n| --- |\n")
     assert record["date"] in told_of and "cores" in " ".join(told_of.split())
     older = pages.made_by([{**record, "date": None, "machine": None, "commit": "abc"}, record])
     assert "- `make demo`, commit abc.\n- `make demo`, commit" in older
-    pages.write_page(tmp_path / "results" / "one.md", "One", "make demo", [("", "Words.")])
-    assert (tmp_path / "results" / "one.md").read_text(encoding="utf-8") == pages.page_text("One", [record], [("", "Words.")])
+    written = tmp_path / "results" / "one.md"
+    pages.write_page(written, "One", "make demo", [("", "Words.")])
+    assert written.read_text(encoding="utf-8") == pages.page_text("One", [record], [("", "Words.")])
 
 
 def test_prose_is_laid_out_and_tables_are_left_as_they_are():
@@ -72,7 +75,8 @@ def test_prose_is_laid_out_and_tables_are_left_as_they_are():
           item
         - another
         """, "| a |\n| --- |")
-    assert "\n\n".join(map(pages.reflow, body.split("\n\n"))) == "Words that go on.\n\n- one item\n- another\n\n| a |\n| --- |"
+    laid_out = "\n\n".join(map(pages.reflow, body.split("\n\n")))
+    assert laid_out == "Words that go on.\n\n- one item\n- another\n\n| a |\n| --- |"
     assert max(map(len, pages.reflow("- " + "word " * 60).splitlines())) <= pages.WIDTH
 
 
@@ -89,10 +93,12 @@ def test_pictures_are_made_of_solved_captures_that_the_pages_show(tmp_path):
         (tmp_path / f"{name}.wildcap" / "maps" / "normal.png").touch()
     (tmp_path / "tan.wildcap").mkdir()
     (tmp_path / "dark" / "maps").mkdir(parents=True)
-    made = {(command[0], *(part for part in command if part.endswith(("jpg", "maps")))) for command in results.pictures(tmp_path)}
-    shown = ROOT / "docs" / "pictures"
-    assert made == {("benchmarks.teaser", str(shown / "teaser.jpg")), ("benchmarks.gallery", str(shown / "gallery_sample.jpg")),
-                    ("benchmarks.gallery", str(shown / "gallery_dark.jpg"), str(tmp_path / "dark" / "maps"))}
+    made = {(command[0], *(part for part in command if part.endswith(("jpg", "maps"))))
+            for command in results.pictures(tmp_path)}
+    teaser, sample, dark = (str(ROOT / "docs" / "pictures" / f"{name}.jpg")
+                            for name in ("teaser", "gallery_sample", "gallery_dark"))
+    assert made == {("benchmarks.teaser", teaser), ("benchmarks.gallery", sample),
+                    ("benchmarks.gallery", dark, str(tmp_path / "dark" / "maps"))}
 
 
 def test_the_command_writes_pages_and_texts_and_then_finds_nothing(tmp_path, monkeypatch, capsys):
@@ -109,7 +115,8 @@ def test_the_command_writes_pages_and_texts_and_then_finds_nothing(tmp_path, mon
         return results.main(), capsys.readouterr().err
 
     code, said = run("--check")
-    assert code == 1 and "README.md is not" in said and "docs/results/index.md is not" in said and not (tmp_path / "docs" / "results").exists()
+    assert code == 1 and "README.md is not" in said and "docs/results/index.md is not" in said
+    assert not (tmp_path / "docs" / "results").exists()
     assert run() == (0, "") and run("--check") == (0, "")
     assert readme.read_text(encoding="utf-8") == right
     (tmp_path / "docs" / "results" / "stranger.md").touch()

@@ -4,12 +4,14 @@
 
     python -m benchmarks.results [--check] [--captures FOLDER]
 
-Runs no benchmark: each leaves its record by its own --json (benchmarks/figures.py). NAME.py in here is the page docs/results/NAME.md: TITLE, SAYS
-(its line in the index), RECORDS, and `sections`, which takes the figures of these records in that order and gives headings with Markdown. told.py
-has the phrases with figures in the README and elsewhere. --check writes nothing and ends with code 1 where a text is not as the records have it.
+Runs no benchmark: each leaves its record by its own --json (benchmarks/figures.py). NAME.py in here is the page
+docs/results/NAME.md: TITLE, SAYS (its line in the index), RECORDS, and `sections`, which takes the figures of these
+records in that order and gives headings with Markdown. told.py has the phrases with figures in the README and elsewhere.
+--check writes nothing and ends with code 1 where a text is not as the records have it.
 
-No picture is made here of what is in the repository alone. teaser.jpg and gallery_NAME.jpg show solved captures: --captures names a folder with
-sample.wildcap (as `make demo` leaves it) and NAME.wildcap (benchmarks/people.py). Others are made by their page's benchmark (--picture, --pictures).
+No picture is made here of what is in the repository alone. teaser.jpg and gallery_NAME.jpg show solved captures:
+--captures names a folder with sample.wildcap (as `make demo` leaves it) and NAME.wildcap (benchmarks/people.py). Others
+are made by their page's benchmark (--picture, --pictures).
 """
 
 from __future__ import annotations
@@ -39,12 +41,12 @@ def main() -> int:
     parser.add_argument("--captures", type=Path, help="solved captures, for teaser.jpg and the gallery's pictures")
     asked = parser.parse_args()
     try:
-        old = {path: path.read_text(encoding="utf-8") if path.is_file() else "" for path in (*pages(), *told.texts(ROOT))}
         new = {**pages(), **told.texts(ROOT)}
     except Problem as problem:
         print(problem, file=sys.stderr)
         return 1
-    wrong = [f"{path.relative_to(ROOT)} is not as the records have it: run `make results`." for path in new if new[path] != old[path]]
+    wrong = [f"{path.relative_to(ROOT)} is not as the records have it: run `make results`."
+             for path, text in new.items() if not path.is_file() or path.read_text(encoding="utf-8") != text]
     for path, text in {} if asked.check else new.items():
         replace_text(path, text)
     for command in pictures(asked.captures.resolve()) if asked.captures else ():
@@ -64,13 +66,15 @@ def page(name: str) -> str:
     """The text of docs/results/NAME.md."""
     module = import_module(f"{__name__}.{name}")
     records = [figures.read(record) for record in module.RECORDS]
-    return page_text(module.TITLE, [] if name == "index" else records, module.sections(*(figures.Figures.of(record["figures"]) for record in records)))
+    sections = module.sections(*(figures.Figures.of(record["figures"]) for record in records))
+    return page_text(module.TITLE, [] if name == "index" else records, sections)
 
 
 def strangers() -> list[str]:
     """What lies in docs/results and is no page of ours."""
     there = sorted((ROOT / "docs" / "results").glob("*.md"))
-    return [f"{path.relative_to(ROOT)} has no benchmarks/results/{path.stem}.py that writes it." for path in there if path.stem not in NAMES]
+    return [f"{path.relative_to(ROOT)} has no benchmarks/results/{path.stem}.py that writes it."
+            for path in there if path.stem not in NAMES]
 
 
 def pictures(captures: Path) -> Iterator[list[str]]:

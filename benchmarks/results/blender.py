@@ -15,14 +15,14 @@ RECORDS = ("window", "blender_memory")
 def sections(window: Figures, memory: Figures) -> Sections:
     redraws, late, worst = window.redraws_per_second, window.late_ms, window.worst_gap_ms
     return [("", prose(f"""
-        In a real window, strokes painted before and during a solve, software OpenGL on the two cores that the solver used too:
-        {redraws.idle:.1f} redraws a second idle and {redraws.solving:.1f} while solving; the main thread's timer was late by
-        {late.idle} and {late.solving} ms (99 of 100), the worst gap between two redraws was {worst.idle} and {worst.solving} ms.
-        Linux shares processors between sessions before it looks at priorities; since the worker's session steps back too, a
-        solve costs Blender nothing that could be measured in its redraw rate. 50 ms and 250 ms, which were asked for, Blender
-        misses here without a solver as well.
+        In a real window, strokes painted before and during a solve, software OpenGL on the two cores that the solver
+        used too: {redraws.idle:.1f} redraws a second idle and {redraws.solving:.1f} while solving; the main thread's
+        timer was late by {late.idle} and {late.solving} ms (99 of 100), the worst gap between two redraws was
+        {worst.idle} and {worst.solving} ms. Linux shares processors between sessions before it looks at priorities;
+        since the worker's session steps back too, a solve costs Blender nothing that could be measured in its redraw
+        rate. 50 ms and 250 ms, which were asked for, Blender misses here without a solver as well.
 
         With all 4K maps shown Blender takes {memory.shown_gb:.1f} GB of memory ({memory.empty_gb:.1f} GB empty;
-        {memory.loading_gb:.1f} GB while they load, {memory.mask_opened_gb:.1f} GB when a mask of 4096 texels is opened beside
-        them).
+        {memory.loading_gb:.1f} GB while they load, {memory.mask_opened_gb:.1f} GB when a mask of 4096 texels is opened
+        beside them).
         """))]

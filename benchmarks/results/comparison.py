@@ -22,42 +22,43 @@ def sections(comparison: Figures) -> Sections:
         return one[name][kind][row]["0"].raw.psnr
 
     return [("", prose(f"""
-        The baselines are of our own writing (`benchmarks/light_models.py`), not those authors' code, and put other light
-        models behind our solver: the same prior, guidance, start and pulls. *Regions*: five or ten soft regions with an SH
-        light each; where they lie is learned, as in DeFace, and begins as clusters of place and lightness, so they are a
-        shadow mask of sorts. *Environment*: one diffuse cubemap for the whole face, as in FLARE. *No prior*: its albedo's
-        texels follow the frames alone, smoothly. *Over its blur*: the texture divided by its own blur, what one does by hand.
-        All maps have {comparison.size} texels a side; the mean is over the six people of the [gallery](gallery.md); a row's
-        best and its ties (within half of what two seeds of ours differ by) are bold, for each input apart. SSIM and FLIP are
-        those after one gain.
+        The baselines are of our own writing (`benchmarks/light_models.py`), not those authors' code, and put other
+        light models behind our solver: the same prior, guidance, start and pulls. *Regions*: five or ten soft regions
+        with an SH light each; where they lie is learned, as in DeFace, and begins as clusters of place and lightness,
+        so they are a shadow mask of sorts. *Environment*: one diffuse cubemap for the whole face, as in FLARE. *No
+        prior*: its albedo's texels follow the frames alone, smoothly. *Over its blur*: the texture divided by its own
+        blur, what one does by hand. All maps have {comparison.size} texels a side; the mean is over the six people of
+        the [gallery](gallery.md); a row's best and its ties (within half of what two seeds of ours differ by) are bold,
+        for each input apart. SSIM and FLIP are those after one gain.
         """, OLDER, table(comparison))),
         ("Read honestly", prose(f"""
-        **We do not lead everywhere.** What the paper's light model is for, light that is still in the frames, it does: on raw
-        frames it is {raw.wildcap.PSNR - raw.texture.PSNR:.1f} dB over the texture and
-        {raw.wildcap.PSNR - raw.environment.PSNR:.1f} dB over one environment; regions that learn where the shadows lie are as
-        good (five {raw["regions 5"].PSNR - raw.wildcap.PSNR:+.2f} dB in PSNR, ten
-        {raw["regions 10"].PSNR - raw.wildcap.PSNR:+.2f} dB, FLIP {raw["regions 5"].FLIP:.3f} and {raw["regions 10"].FLIP:.3f}
-        to our {raw.wildcap.FLIP:.3f}), and leave less of a shadow's edge. On the one real skin, the head scan, it leads by
-        {scan.raw.wildcap.PSNR - scan.raw["regions 10"].PSNR:.1f} dB on raw frames, and is the best light model on delit ones,
-        {scan.delit.wildcap.PSNR - scan.delit["regions 10"].PSNR:.1f} dB over regions and
-        {scan.delit.wildcap.PSNR - scan.delit.environment.PSNR:.1f} dB over the environment; the texture taken as it is beats it
-        there by {scan.delit.texture.PSNR - scan.delit.wildcap.PSNR:.1f} dB.
+        **We do not lead everywhere.** What the paper's light model is for, light that is still in the frames, it does:
+        on raw frames it is {raw.wildcap.PSNR - raw.texture.PSNR:.1f} dB over the texture and
+        {raw.wildcap.PSNR - raw.environment.PSNR:.1f} dB over one environment; regions that learn where the shadows lie
+        are as good (five {raw["regions 5"].PSNR - raw.wildcap.PSNR:+.2f} dB in PSNR, ten
+        {raw["regions 10"].PSNR - raw.wildcap.PSNR:+.2f} dB, FLIP {raw["regions 5"].FLIP:.3f} and
+        {raw["regions 10"].FLIP:.3f} to our {raw.wildcap.FLIP:.3f}), and leave less of a shadow's edge. On the one real
+        skin, the head scan, it leads by {scan.raw.wildcap.PSNR - scan.raw["regions 10"].PSNR:.1f} dB on raw frames, and
+        is the best light model on delit ones, {scan.delit.wildcap.PSNR - scan.delit["regions 10"].PSNR:.1f} dB over
+        regions and {scan.delit.wildcap.PSNR - scan.delit.environment.PSNR:.1f} dB over the environment; the texture
+        taken as it is beats it there by {scan.delit.texture.PSNR - scan.delit.wildcap.PSNR:.1f} dB.
 
         **On delit synthetic people freer lights are ahead**: regions by
         {delit["regions 10"].PSNR - delit.wildcap.PSNR:.1f} dB, the environment by
-        {delit.environment.PSNR - delit.wildcap.PSNR:.1f} dB, most of it where the delighter left much of the light (tan, three
-        mixed lamps: {single("tan", "delit", "texture"):.1f} dB as a texture, {single("tan", "delit", "environment"):.1f} dB
-        with the environment, {single("tan", "delit", "wildcap"):.1f} dB with ours). After a delighter our lights were held
-        back, because on the scan a free light takes the beard and the cheeks for light. That gave most of a lamp away on tan
-        and held on the scan; where both are about equal (light, overcast: {single("light", "delit", "environment"):.1f} dB with
-        the environment, {single("light", "delit", "wildcap"):.1f} dB with ours) it held, and on these people a free light is
-        right: they come from the generator that made the prior's mean face and have few large traits of their own. The
-        regions' shared light was held as ours was, their own lights towards none; the environment is held by its smoothness.
+        {delit.environment.PSNR - delit.wildcap.PSNR:.1f} dB, most of it where the delighter left much of the light
+        (tan, three mixed lamps: {single("tan", "delit", "texture"):.1f} dB as a texture,
+        {single("tan", "delit", "environment"):.1f} dB with the environment, {single("tan", "delit", "wildcap"):.1f} dB
+        with ours). After a delighter our lights were held back, because on the scan a free light takes the beard and
+        the cheeks for light. That gave most of a lamp away on tan and held on the scan; where both are about equal
+        (light, overcast: {single("light", "delit", "environment"):.1f} dB with the environment,
+        {single("light", "delit", "wildcap"):.1f} dB with ours) it held, and on these people a free light is right: they
+        come from the generator that made the prior's mean face and have few large traits of their own. The regions'
+        shared light was held as ours was, their own lights towards none; the environment is held by its smoothness.
 
         **On raw frames of dark skin** (dark: {single("dark", "raw", "wildcap"):.1f} dB, regions
-        {single("dark", "raw", "regions 5"):.1f} dB) highlights stay in our albedo: local light may only darken, and only inside
-        the mask.
+        {single("dark", "raw", "regions 5"):.1f} dB) highlights stay in our albedo: local light may only darken, and
+        only inside the mask.
 
-        **What would change it**: a prior that has seen many real people, beards among them; local light that may brighten; and
-        more heads to choose on than these eight. The first needs data that may be trained on and a GPU.
+        **What would change it**: a prior that has seen many real people, beards among them; local light that may
+        brighten; and more heads to choose on than these eight. The first needs data that may be trained on and a GPU.
         """))]

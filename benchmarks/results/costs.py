@@ -18,19 +18,21 @@ def sections(costs: Figures) -> Sections:
     return [("", prose(f"""
         60 frames at standard quality take {whole.standard.minutes:.1f} minutes (asked for: 4), in float32
         {whole.float32.minutes:.1f} (6), 300 frames {whole["frames-300"].minutes:.1f} (7), 1,000 frames
-        {whole["frames-1000"].minutes:.1f}, and {whole.float32.peak_mb / 1000:.1f} GB at most (3), by the solve in float32.
+        {whole["frames-1000"].minutes:.1f}, and {whole.float32.peak_mb / 1000:.1f} GB at most (3), by the solve in
+        float32.
 
-        The sample video on {here.cores} cores, without a GPU. Each stage runs in a process of its own; its seconds begin with
-        importing its libraries, its peak memory holds them. Where other processes took more than 0.2 cores meanwhile the cell
-        says so: its seconds are an upper bound. Frames and cameras of a draft have the standard's settings and are not
-        measured twice. This processor ran the networks in {here.networks}; *float32* has solve and 4K as a processor runs them
-        that does not multiply bfloat16. frames-N is the whole chain on a film of so many frames (`benchmarks.long_films`).
+        The sample video on {here.cores} cores, without a GPU. Each stage runs in a process of its own; its seconds
+        begin with importing its libraries, its peak memory holds them. Where other processes took more than 0.2 cores
+        meanwhile the cell says so: its seconds are an upper bound. Frames and cameras of a draft have the standard's
+        settings and are not measured twice. This processor ran the networks in {here.networks}; *float32* has solve and
+        4K as a processor runs them that does not multiply bfloat16. frames-N is the whole chain on a film of so many
+        frames (`benchmarks.long_films`).
         """, table(costs), f"""
         Of a texture above 1024, views are looked at and aligned on maps of 1024 and read along them one by one:
-        {costs["texture-2048"].texture.peak_mb / 1000:.1f} GB at 2048. 1024 is the largest side that can be chosen for the
-        solve: the prior has seen nothing finer, so 2048 says what it would cost, not that it would help. From 512 the network
-        makes a map of 2048, the rest is resampled. The number of frames reaches frames and cameras alone: of more than 40
-        frames 40 carry the structure, and the others are placed by them; the scan takes 24 pairs of whatever there is, delight
-        and texture the views V. Exponents are fits of the logarithm of the processor's seconds to that of the size: for a side,
-        2 is linear in texels. *over*: the stage was ended after so long.
+        {costs["texture-2048"].texture.peak_mb / 1000:.1f} GB at 2048. 1024 is the largest side that can be chosen for
+        the solve: the prior has seen nothing finer, so 2048 says what it would cost, not that it would help. From 512
+        the network makes a map of 2048, the rest is resampled. The number of frames reaches frames and cameras alone:
+        of more than 40 frames 40 carry the structure, and the others are placed by them; the scan takes 24 pairs of
+        whatever there is, delight and texture the views V. Exponents are fits of the logarithm of the processor's
+        seconds to that of the size: for a side, 2 is linear in texels. *over*: the stage was ended after so long.
         """))]

@@ -14,21 +14,23 @@ RECORDS = ("own_mesh", "carried_skins", "atlas")
 
 def sections(own: Figures, carried: Figures, atlas: Figures) -> Sections:
     return [("", prose("""
-        Your own mesh on the sample's head: median and 95th percentile of its drawn skin's distance to the built-in head; none
-        has a flipped triangle.
+        Your own mesh on the sample's head: median and 95th percentile of its drawn skin's distance to the built-in
+        head; none has a flipped triangle.
         """, markdown(["mesh", "shapes", "median", "95 %"], [
-            [name, row.shapes, f"{row.median_mm:.2f} mm", f"{row.p95_mm:.2f} mm"] for name, row in own.rows.items()]), f"""
-        That says how near the surfaces lie, not whether a cheek's middle is a cheek's middle. For a mesh whose answer is known
-        (the built-in head, coarser, in centimetres, Y up) `tests/test_own_template.py` keeps the vertices in the face within
-        1 mm of where they belong (median; 95 %: 2 mm). Lids stay as your mesh has them: open eyes stay open over the head's
-        closed ones. Teeth can show between lips that only touch. Ears follow the shape around them, not their folds. Mouth,
-        sockets and what lies below the neck get a smooth continuation of the skin; the confidence map is black there.
+            [name, row.shapes, f"{row.median_mm:.2f} mm", f"{row.p95_mm:.2f} mm"]
+            for name, row in own.rows.items()]), f"""
+        That says how near the surfaces lie, not whether a cheek's middle is a cheek's middle. For a mesh whose answer
+        is known (the built-in head, coarser, in centimetres, Y up) `tests/test_own_template.py` keeps the vertices in
+        the face within 1 mm of where they belong (median; 95 %: 2 mm). Lids stay as your mesh has them: open eyes stay
+        open over the head's closed ones. Teeth can show between lips that only touch. Ears follow the shape around
+        them, not their folds. Mouth, sockets and what lies below the neck get a smooth continuation of the skin; the
+        confidence map is black there.
 
-        The {carried.skins} VALID skins in our UVs: {100 * carried.counterpart:.1f} % of the map has a counterpart, the head lies
-        {carried.median_mm:.2f} mm from ours (95 %: {carried.p95_mm:.2f} mm).
+        The {carried.skins} VALID skins in our UVs: {100 * carried.counterpart:.1f} % of the map has a counterpart, the
+        head lies {carried.median_mm:.2f} mm from ours (95 %: {carried.p95_mm:.2f} mm).
 
         The scan's atlas (xatlas) on the sample: {100 * atlas.covered:.0f} % of its square covered, stretch
-        {atlas.stretch_p95:.2f} (95th percentile; 1 is none), in {atlas.seconds} s of the stage Delivery on two busy cores. The
-        scan's albedo beyond the head's reach (hair, clothes) is the filmed colour times one gain, so sunlit cloth is too bright;
-        `scan_albedo_known.png` says where.
+        {atlas.stretch_p95:.2f} (95th percentile; 1 is none), in {atlas.seconds} s of the stage Delivery on two busy
+        cores. The scan's albedo beyond the head's reach (hair, clothes) is the filmed colour times one gain, so sunlit
+        cloth is too bright; `scan_albedo_known.png` says where.
         """))]

@@ -11,104 +11,124 @@ from ..pages import Sections, prose
 
 TITLE = "What was measured"
 SAYS = ""
-RECORDS = ("state", "demo", "relit", "relit_people", "scan_albedo", "whole_chain", "costs", "comparison", "photographs", "whole_head", "skin_tone",
-           "confidence")
+RECORDS = ("state", "demo", "relit", "relit_people", "scan_albedo", "whole_chain", "costs", "comparison", "photographs",
+           "whole_head", "skin_tone", "confidence")
 GROUPS = {
-    "The albedo": ("sample", "relit", "state", "split", "scan", "gallery", "comparison", "rerender", "controlled", "ablation", "prior", "confidence"),
+    "The albedo": ("sample", "relit", "state", "split", "scan", "gallery", "comparison", "rerender", "controlled",
+                   "ablation", "prior", "confidence"),
     "Before the solve": ("geometry", "delighters", "photographs", "shadows", "skin_tone"),
     "After the solve": ("upscale", "whole_head", "hair", "even_light", "engines", "delivery"),
     "Time and memory": ("costs", "solver_speed", "png_levels", "blender"),
 }
 ELSEWHERE = """
-    - [promises](../promises.md): hostile files and kills at random moments; [farm](../farm.md) and [growth](../growth.md): many
-      faces; [cameras](../cameras.md), [scan and head](../scan_and_head.md), [parts](../parts.md): figures beside their methods
+    - [promises](../promises.md): hostile files and kills at random moments; [farm](../farm.md) and
+      [growth](../growth.md): many faces; [cameras](../cameras.md), [scan and head](../scan_and_head.md),
+      [parts](../parts.md): figures beside their methods
     """
 
 
-def sections(state: Figures, demo: Figures, relit: Figures, people: Figures, scan: Figures, chain: Figures, costs: Figures, comparison: Figures,
-             photographs: Figures, head: Figures, tone: Figures, confidence: Figures) -> Sections:
+def sections(*records: Figures) -> Sections:
+    of = Figures(zip(RECORDS, records, strict=True))
     return [("", prose("""
-        Every page has the command, the commit and the day that made its figures, all on 2 cores of a shared machine (AMD EPYC,
-        25 GB), without a GPU: seconds are upper bounds. Pictures show synthetic subjects only. Only the sample, the state of the
-        albedo and *Skin or light* are by the solver as it is; pages of older solves say so.
+        Every page has the command, the commit and the day that made its figures, all on 2 cores of a shared machine
+        (AMD EPYC, 25 GB), without a GPU: seconds are upper bounds. Pictures show synthetic subjects only. Only the
+        sample, the state of the albedo and *Skin or light* are by the solver as it is; pages of older solves say so.
         """)),
-        ("In short", headline(state.summary, demo.rows, relit.sample, people.mean, scan.rows, costs.together)),
-        ("Over people", spread(state)),
-        ("Where we lose", losses(state, relit.sample, chain.rows, comparison.people.delit, photographs, head, tone, confidence)),
-        *((group, "\n".join(f"- [{module.TITLE}]({name}.md): {module.SAYS}" for name in names
-                            for module in [import_module(f"{__package__}.{name}")])) for group, names in GROUPS.items()),
+        ("In short", headline(of)),
+        ("Over people", spread(of.state)),
+        ("Where we lose", losses(of)),
+        *((group, "\n".join(map(link, names))) for group, names in GROUPS.items()),
         ("Elsewhere", prose(ELSEWHERE))]
 
 
-def headline(summary: Figures, sample: Figures, relit: Figures, people: Figures, scan: Figures, minutes: Figures) -> str:
-    """The same three or four answers on every set: PSNR in dB."""
+def link(name: str) -> str:
+    """A line of the index."""
+    module = import_module(f"{__package__}.{name}")
+    return f"- [{module.TITLE}]({name}.md): {module.SAYS}"
+
+
+def headline(of: Figures) -> str:
+    """The same answers on every set: PSNR in dB."""
+    summary, sample, scan, minutes = of.state.summary, of.demo.rows, of.scan_albedo.rows, of.costs.together
+    relit, people = of.relit.sample, of.relit_people.mean
+
     def people_like(method: str) -> str:
         return f"{summary[method].psnr.mean:.2f} ± {summary[method].psnr.spread:.2f}"
 
-    rows = [["the filmed texture", people_like("doing nothing"), f"{sample['raw video'].psnr:.2f}", f"{scan['raw video'].psnr:.2f}",
-             f"{relit.raw.psnr:.2f}", f"{people.raw.psnr:.2f}"],
-            ["one flat colour", people_like("flat colour"), f"{sample['flat true tone'].psnr:.2f}", f"{scan['flat true tone'].psnr:.2f}", None, None],
-            ["the delit texture", people_like("delit texture"), None, None, f"{relit.delit.psnr:.2f}", f"{people.delit.psnr:.2f}"],
-            ["**WildCap**", people_like("solved"), f"{sample.WildCap.psnr:.2f}", f"{scan.WildCap.psnr:.2f}", f"{relit.solved.psnr:.2f}",
-             f"{people.solved.psnr:.2f}"],
+    def others(row: str) -> list[str | None]:
+        return [found[row] and f"{found[row].psnr:.2f}" for found in sets]
+
+    sets = [{"raw": sample["raw video"], "flat": sample["flat true tone"], "delit": None, "solved": sample.WildCap},
+            {"raw": scan["raw video"], "flat": scan["flat true tone"], "delit": None, "solved": scan.WildCap},
+            {**relit, "flat": None}, {**people, "flat": None}]
+    rows = [["the filmed texture", people_like("doing nothing"), *others("raw")],
+            ["one flat colour", people_like("flat colour"), *others("flat")],
+            ["the delit texture", people_like("delit texture"), *others("delit")],
+            ["**WildCap**", people_like("solved"), *others("solved")],
             ["the true albedo's texture", people_like("true light"), None, None, None, None]]
-    return prose(markdown(["PSNR, dB", "[albedo, people like people](state.md)", "[albedo, sample](sample.md)", "[albedo, head scan](scan.md)",
-                           "[relit, sample](relit.md)", "[relit, six people](relit.md)"], rows), f"""
-        The true skin tone is given to all; on people like people each picture gets one gain per channel on top. On sample and
-        scan the filmed frames stand for their texture. A face takes
-        [{minutes.standard.minutes:.1f} minutes on 2 cores](costs.md), of 300 frames {minutes["frames-300"].minutes:.1f}.
+    head = ["PSNR, dB", "[albedo, people like people](state.md)", "[albedo, sample](sample.md)",
+            "[albedo, head scan](scan.md)", "[relit, sample](relit.md)", "[relit, six people](relit.md)"]
+    return prose(markdown(head, rows), f"""
+        The true skin tone is given to all; on people like people each picture gets one gain per channel on top. On
+        sample and scan the filmed frames stand for their texture. A face takes [{minutes.standard.minutes:.1f} minutes
+        on 2 cores](costs.md), of 300 frames {minutes["frames-300"].minutes:.1f}.
         """)
 
 
 def spread(state: Figures) -> str:
     """What the solve adds to the delit texture, and how unevenly."""
     solved, captures = state.summary.solved, state.captures
-    gains = {name: rows.solved.psnr - rows["delit texture"].psnr for name, rows in captures.items() if rows.solved.get("psnr") is not None}
+    gains = {name: rows.solved.psnr - rows["delit texture"].psnr for name, rows in captures.items()
+             if rows.solved.get("psnr") is not None}
     worst, best = min(gains, key=gains.get), max(gains, key=gains.get)
     return prose(f"""
-        Over {solved.psnr.people} people ({len(gains)} captures) the solve adds {solved.psnr.difference:+.2f} ± {solved.psnr.error:.2f} dB to the delit texture
-        in the picture (person by person, ± the standard error of the mean), {solved.psnr_shared.difference:+.2f} ±
-        {solved.psnr_shared.error:.2f} dB on the map up to one shared light, and {solved.agreement.difference:+.2f} ±
-        {solved.agreement.error:.2f} dB to how well two captures of a person agree. Capture by capture it is between
-        {gains[worst]:+.2f} dB (`{worst}`) and {gains[best]:+.2f} dB (`{best}`); {sum(gain < 0 for gain in gains.values())} of
-        {len(gains)} become worse in the picture. One person is a real scan, the others are synthetic with strands, eyes and a
-        phone's pipeline. [The page](state.md) tells the commit, and so the delighter and the solver.
+        Over {solved.psnr.people} people ({len(gains)} captures) the solve adds {solved.psnr.difference:+.2f} ±
+        {solved.psnr.error:.2f} dB to the delit texture in the picture (person by person, ± the standard error of the
+        mean), {solved.psnr_shared.difference:+.2f} ± {solved.psnr_shared.error:.2f} dB on the map up to one shared
+        light, and {solved.agreement.difference:+.2f} ± {solved.agreement.error:.2f} dB to how well two captures of a
+        person agree. Capture by capture it is between {gains[worst]:+.2f} dB (`{worst}`) and {gains[best]:+.2f} dB
+        (`{best}`); {sum(gain < 0 for gain in gains.values())} of {len(gains)} become worse in the picture. One person
+        is a real scan, the others are synthetic with strands, eyes and a phone's pipeline. [The page](state.md) tells
+        the commit, and so the delighter and the solver.
         """)
 
 
-def losses(state: Figures, relit: Figures, chain: Figures, delit: Figures, photographs: Figures, head: Figures, tone: Figures,
-           confidence: Figures) -> str:
+def losses(of: Figures) -> str:
     """What a reader should know before the tables."""
-    answers, lamps, neck = state.summary, photographs.lamps.summary, head.synthetic
-    alone = chain["scan, network"]
+    answers, lamps, delit = of.state.summary, of.photographs.lamps.summary, of.comparison.people.delit
+    relit, scalp, dark = of.relit.sample, of.whole_head.synthetic.scalp, of.skin_tone.groups.dark
+    alone = of.whole_chain.rows["scan, network"]
     return prose(f"""
-        - **One flat colour is nearly as near to the truth** in the picture as our albedo ({answers["flat colour"].psnr.mean:.2f}
-          and {answers.solved.psnr.mean:.2f} dB over people, FLIP {answers["flat colour"].flip.mean:.3f} and
-          {answers.solved.flip.mean:.3f}).
-        - **The delighter decides.** On a bearded man under seven lamps it leaves {lamps.network.light_slope.mean:.2f} of a change
-          of the light, and {lamps.network.psnr.mean:.1f} dB where a flat colour has {lamps["flat colour"].psnr.mean:.1f}
-          ([single photographs](photographs.md)). On the head scan the solve loses
+        - **One flat colour is nearly as near to the truth** in the picture as our albedo
+          ({answers["flat colour"].psnr.mean:.2f} and {answers.solved.psnr.mean:.2f} dB over people, FLIP
+          {answers["flat colour"].flip.mean:.3f} and {answers.solved.flip.mean:.3f}).
+        - **The delighter decides.** On a bearded man under seven lamps it leaves {lamps.network.light_slope.mean:.2f}
+          of a change of the light, and {lamps.network.psnr.mean:.1f} dB where a flat colour has
+          {lamps["flat colour"].psnr.mean:.1f} ([single photographs](photographs.md)). On the head scan the solve loses
           {alone.solve_off.psnr - alone.solved.psnr:.1f} dB to the delit texture: it takes beard and cheeks for light
           ([scan](scan.md)).
         - **Freer lights are ahead on delit synthetic people**: ten regions by
           {delit["regions 10"].PSNR - delit.wildcap.PSNR:.1f} dB, one environment by
           {delit.environment.PSNR - delit.wildcap.PSNR:.1f} dB ([comparison](comparison.md)).
-        - **Our relief and gloss do not help yet**: without them a relit head is {relit.plain.psnr - relit.solved.psnr:.2f} dB
-          nearer to the truth ([relit](relit.md)); normals and specular say no more than the mean face's ([prior](prior.md)).
-        - **Brows, eyes and lips lose contrast** ({answers.solved.kept_brows.mean:.2f}, {answers.solved.kept_eyes.mean:.2f} and
-          {answers.solved.kept_lips.mean:.2f} of the truth's is kept; [state](state.md#features-kept)), and edges of hard shadows
-          leave a faint outline, the paper's own failure case.
-        - **Dark skin comes out {tone.groups.dark.scene.lightness:.1f} L* too light** where nothing but the frames tells its tone
+        - **Our relief and gloss do not help yet**: without them a relit head is
+          {relit.plain.psnr - relit.solved.psnr:.2f} dB nearer to the truth ([relit](relit.md)); normals and specular
+          say no more than the mean face's ([prior](prior.md)).
+        - **Brows, eyes and lips lose contrast** ({answers.solved.kept_brows.mean:.2f},
+          {answers.solved.kept_eyes.mean:.2f} and {answers.solved.kept_lips.mean:.2f} of the truth's is kept;
+          [state](state.md#features-kept)), and edges of hard shadows leave a faint outline, the paper's own failure
+          case.
+        - **Dark skin comes out {dark.scene.lightness:.1f} L* too light** where nothing but the frames tells its tone
           ([skin tone](skin_tone.md)), and keeps highlights on raw frames ([comparison](comparison.md)).
-        - **The confidence map knows little**: a correlation of {confidence.correlation.mean:.2f} with the true error, 0.4 was the
-          aim ([confidence](confidence.md)).
+        - **The confidence map knows little**: a correlation of {of.confidence.correlation.mean:.2f} with the true
+          error, 0.4 was the aim ([confidence](confidence.md)).
         - **In even studio light the solve makes the texture worse** ([controlled](controlled.md)).
-        - **Of a scalp that nobody saw we make bare skin** ({neck.scalp.completed:.0f} of 255 off where hair was;
-          [whole head](whole_head.md)); a cap, or a cloth of the skin's colour, is not told from hair or skin. Stubble is grown
-          like a beard ([hair](hair.md)). Under open lids the skin is completed from around, and shows when the head blinks.
-        - **The prior is small**, trained on a shared CPU on synthetic skins and few real ones ([prior](prior.md)): on the scan it
-          takes a part of the fine detail with the shadow. The authors' own weights were not at hand: their loader and loop are
-          verified with random weights only ([how far](../authors_prior.md)).
-        - **One real skin**: all but the head scan and two sets of photographs is synthetic, by the generators that trained the
-          networks (other seeds: a test reads the manifests). No real phone, no real person filmed by us.
+        - **Of a scalp that nobody saw we make bare skin** ({scalp.completed:.0f} of 255 off where hair was; [whole
+          head](whole_head.md)); a cap, or a cloth of the skin's colour, is not told from hair or skin. Stubble is grown
+          like a beard ([hair](hair.md)). Under open lids the skin is completed from around, and shows when the head
+          blinks.
+        - **The prior is small**, trained on a shared CPU on synthetic skins and few real ones ([prior](prior.md)): on
+          the scan it takes a part of the fine detail with the shadow. The authors' own weights were not at hand: their
+          loader and loop are verified with random weights only ([how far](../authors_prior.md)).
+        - **One real skin**: all but the head scan and two sets of photographs is synthetic, by the generators that
+          trained the networks (other seeds: a test reads the manifests). No real phone, no real person filmed by us.
         """)

@@ -10,9 +10,10 @@ from ..pages import Sections
 from ..photographs import COLUMNS, TITLES, WORDS
 
 TITLE = "Single photographs: the face that is kept and the light that is left"
-SAYS = "real people under many lights, beside answers that do nothing, give one colour, divide by a blur, or know the light"
+SAYS = "real people under many lights, beside answers that do nothing, give one colour, or know the light"
 RECORDS = ("photographs",)
 
 
 def sections(found: Figures) -> Sections:
-    return [("", WORDS), *((TITLES[name], to_markdown(summarise(found[name].people, COLUMNS), COLUMNS, "answer")) for name in TITLES if name in found)]
+    return [("", WORDS), *((title, to_markdown(summarise(found[name].people, COLUMNS), COLUMNS, "answer"))
+                           for name, title in TITLES.items() if name in found)]

@@ -8,7 +8,7 @@ from ..figures import Figures
 from ..pages import Sections, prose
 
 TITLE = "The prior"
-SAYS = "what it was trained on, that it does not copy, and what of normals and specular follows from the diffuse (nothing)"
+SAYS = "what it was trained on, that it does not copy, and that normals and specular do not follow from the diffuse"
 RECORDS = ("prior_training", "prior")
 
 
@@ -16,16 +16,16 @@ def sections(training: Figures, prior: Figures) -> Sections:
     samples, response = prior.samples, prior.response.sampled
     return [("", prose(f"""
         {training.million_parameters:.1f} million parameters, trained {training.minutes} minutes on two CPU cores on
-        {training.synthetic_skins} synthetic skins and {training.scanned_skins} skins of the VALID avatars (diffuse only); the
-        card beside the weights has its held-out losses.
+        {training.synthetic_skins} synthetic skins and {training.scanned_skins} skins of the VALID avatars (diffuse
+        only); the card beside the weights has its held-out losses.
 
-        {samples.count} samples lie at {samples.median:.2f} times the distance from the nearest training patch that training
-        patches have from each other (median; least {samples.least:.2f}): it does not copy (`samples OUT.png --work DIR --skins
-        FOLDER`).
+        {samples.count} samples lie at {samples.median:.2f} times the distance from the nearest training patch that
+        training patches have from each other (median; least {samples.least:.2f}): it does not copy (`samples OUT.png
+        --work DIR --skins FOLDER`).
 
-        **Normals and specular that follow from the diffuse are as far from the truth as the mean face's**
-        (`response --subjects 9000 9002 --size 256 --steps 12`: {response.normals_of_mean_face:.2f} and
+        **Normals and specular that follow from the diffuse are as far from the truth as the mean face's** (`response
+        --subjects 9000 9002 --size 256 --steps 12`: {response.normals_of_mean_face:.2f} and
         {response.specular_of_mean_face:.2f} of its error, {response.normals_of_another:.2f} and
-        {response.specular_of_another:.2f} of another subject's); 20 % better was the aim. A longer training, on a GPU, is the
-        next thing to try; the command is ready.
+        {response.specular_of_another:.2f} of another subject's); 20 % better was the aim. A longer training, on a GPU,
+        is the next thing to try; the command is ready.
         """))]

@@ -18,8 +18,8 @@ def sections(demo: Figures) -> Sections:
         ![frame, mask, albedo, specular, normal, three lights](../pictures/teaser.jpg)
 
         The solved albedo against the truth, in the picture, on facial skin; the true skin tone is given (mean of
-        {demo.views} frames). *After one gain*: per channel, in linear light. *Detail*: the correlation with the truth's log
-        green between 1 and 3 px. *Shadow step*: log(answer / truth), lit less dark, at the shadow's edge.
+        {demo.views} frames). *After one gain*: per channel, in linear light. *Detail*: the correlation with the truth's
+        log green between 1 and 3 px. *Shadow step*: log(answer / truth), lit less dark, at the shadow's edge.
         """, table(demo), """
         What a delighter alone leaves, and what the solve adds to it, is on other pages: [relit](relit.md),
         [the head scan](scan.md), [the state of the albedo](state.md). The [gallery](gallery.md) shows every map.

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The figures of texts that are written by hand: phrases that have to stand in them, numbers and all, and exactly once.
 
-The words are the author's; where a record has another number, `texts` puts it in. A phrase may be broken over lines in the text.
+The words are the author's; where a record has another number, `texts` puts it in. A phrase may be broken over lines.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ NUMBER = r"[-+]?\d+(?:\.\d+)?"
 
 
 def texts(root: Path) -> dict[Path, str]:
-    """Path and text of each, with the records' numbers in its phrases. Raises Problem where a phrase is not there, or more than once."""
+    """Path and text of each, with the records' numbers in its phrases. Raises Problem where one is not there once."""
     found = {}
     for name, phrases in told().items():
         text = (root / name).read_text(encoding="utf-8")
@@ -33,7 +33,8 @@ def corrected(text: str, phrase: str, name: str) -> str:
     words = (r"\s+".join(map(re.escape, re.split(r" +", part))) for part in re.split(NUMBER, phrase))
     matches = list(re.finditer(f"({NUMBER})".join(words), text))
     if len(matches) != 1:
-        raise Problem(f"{name} has the phrase {phrase!r} {len(matches)} times.", "Write it there once, or change it in benchmarks/results/told.py.")
+        raise Problem(f"{name} has the phrase {phrase!r} {len(matches)} times.",
+                      "Write it there once, or change it in benchmarks/results/told.py.")
     for group, number in reversed(list(enumerate(re.findall(NUMBER, phrase), 1))):
         text = text[:matches[0].start(group)] + number + text[matches[0].end(group):]
     return text
@@ -49,39 +50,60 @@ class _Published:
 def told() -> dict[str, list[str]]:
     """The phrases of each text."""
     of = _Published()
-    together, installed, answers = of.costs.together, of.installation, of.state.summary
-    sun, surfaces, scale, memory, cost = of.geometry.lps_sun, of.sample_surfaces, of.head_scale, of.blender_memory, of.opendelight_cost
-    truth, relit = sun.cameras.against_truth, of.relit.sample
+    installed, memory, cost = of.installation, of.blender_memory, of.opendelight_cost
     return {
-        "README.md": [
-            f"{installed.freed_gb:.1f} GB for the solver's environment, {of.demo.capture_gb:.1f} GB per face",
-            f"the most that a stage took was {together.float32.peak_mb / 1000:.1f} GB",
-            f"60 frames take {together.standard.minutes:.1f} minutes on {of.costs.machine.cores} CPU cores",
-            f"({together.float32.minutes:.1f} without bfloat16), 300 frames {together['frames-300'].minutes:.1f}, a draft {together.draft.minutes:.1f}",
-            *(f"| {label} | {relit[row].psnr:.2f} dB | {answers[method].psnr.mean:.2f} ± {answers[method].psnr.spread:.2f} dB |"
-              for label, row, method in (("the filmed texture", "raw", "doing nothing"), ("the delit texture", "delit", "delit texture"),
-                                         ("**WildCap**", "solved", "solved"))),
-            f"| one flat colour | - | {answers['flat colour'].psnr.mean:.2f} ± {answers['flat colour'].psnr.spread:.2f} dB |"],
-        "docs/cameras.md": [
-            f"median centre error {truth.centre_error_median_percent:.3f} % of the camera distance, at most {truth.centre_error_max_percent:.2f} %, "
-            f"rotations {truth.rotation_error_median_deg:.2f} degrees",
-            f"six synthetic heads it was set on: median {100 * scale.set_on.median:+.1f} %, worst {100 * scale.set_on.worst:+.1f} %; "
-            f"three others: {100 * scale.others.median:+.1f} %, worst {100 * scale.others.worst:+.1f} %",
-            f"lids closed: {100 * scale.scan:+.1f} % ({100 * scale.scan_by_corners:.1f} % by the corners of the eyes)"],
-        "docs/scan_and_head.md": [
-            *("| {}, head scan under hard sun | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |".format(
-                name, *(found[key] for found in (sun[name].against_truth.by_cameras, sun[name].against_truth.after_icp)
-                        for key in ("median_mm", "p90_mm", "p95_mm"))) for name in ("scan", "head")),
-            *("| {}, sample | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |".format(
-                name, *(surfaces[name][key] for key in ("median_mm", "p90_mm", "p95_mm", "icp_median_mm", "icp_p90_mm", "icp_p95_mm")))
-              for name in ("scan", "head")),
-            f"Head to scan, median: {surfaces.head_to_scan_mm.sample:.2f} and {surfaces.head_to_scan_mm.scan:.2f} mm"],
+        "README.md": in_readme(of),
+        "docs/cameras.md": in_cameras(of.geometry.lps_sun.cameras.against_truth, of.head_scale),
+        "docs/scan_and_head.md": in_scan_and_head(of.geometry.lps_sun, of.sample_surfaces),
         "docs/guide/install.md": [f"{installed.told_gb:.1f} GB are told, {installed.freed_gb:.1f} GB come off again"],
         "docs/guide/relight.md": [
-            f"takes {memory.shown_gb:.1f} GB of memory ({memory.empty_gb:.1f} GB empty; {memory.loading_gb:.1f} GB while they load, "
-            f"{memory.mask_opened_gb:.1f} GB when a mask"],
+            f"takes {memory.shown_gb:.1f} GB of memory ({memory.empty_gb:.1f} GB empty; {memory.loading_gb:.1f} GB "
+            f"while they load, {memory.mask_opened_gb:.1f} GB when a mask"],
         "docs/delighters.md": [
-            f"{cost.tera_multiplications:.2f} x 10^12 multiplications, three quarters of them in the decoder, and {cost.peak_gb:.1f} GB of memory",
-            f"a frame took {cost.seconds} s on two threads, while 10^12 multiplications of one large matrix product took "
-            f"{cost.seconds_of_a_product} s there; a cancel was heard within {cost.seconds_to_cancel:.1f} s"],
+            f"{cost.tera_multiplications:.2f} x 10^12 multiplications, three quarters of them in the decoder, and "
+            f"{cost.peak_gb:.1f} GB of memory",
+            f"a frame took {cost.seconds} s on two threads, while 10^12 multiplications of one large matrix product "
+            f"took {cost.seconds_of_a_product} s there; a cancel was heard within {cost.seconds_to_cancel:.1f} s"],
     }
+
+
+def in_readme(of: _Published) -> list[str]:
+    together, answers, relit = of.costs.together, of.state.summary, of.relit.sample
+
+    def people_like(method: str) -> str:
+        return f"{answers[method].psnr.mean:.2f} ± {answers[method].psnr.spread:.2f} dB"
+
+    return [
+        f"{of.installation.freed_gb:.1f} GB for the solver's environment, {of.demo.capture_gb:.1f} GB per face",
+        f"the most that a stage took was {together.float32.peak_mb / 1000:.1f} GB",
+        f"60 frames take {together.standard.minutes:.1f} minutes on {of.costs.machine.cores} CPU cores",
+        f"({together.float32.minutes:.1f} without bfloat16), 300 frames {together['frames-300'].minutes:.1f}, "
+        f"a draft {together.draft.minutes:.1f}",
+        f"| the filmed texture | {relit.raw.psnr:.2f} dB | {people_like('doing nothing')} |",
+        f"| one flat colour | - | {people_like('flat colour')} |",
+        f"| the delit texture | {relit.delit.psnr:.2f} dB | {people_like('delit texture')} |",
+        f"| **WildCap** | {relit.solved.psnr:.2f} dB | {people_like('solved')} |"]
+
+
+def in_cameras(truth: figures.Figures, scale: figures.Figures) -> list[str]:
+    def percent(share: float) -> str:
+        return f"{100 * share:+.1f} %"
+
+    return [
+        f"median centre error {truth.centre_error_median_percent:.3f} % of the camera distance, at most "
+        f"{truth.centre_error_max_percent:.2f} %, rotations {truth.rotation_error_median_deg:.2f} degrees",
+        f"six synthetic heads it was set on: median {percent(scale.set_on.median)}, worst "
+        f"{percent(scale.set_on.worst)}; three others: {percent(scale.others.median)}, worst {percent(scale.others.worst)}",
+        f"lids closed: {percent(scale.scan)} ({100 * scale.scan_by_corners:.1f} % by the corners of the eyes)"]
+
+
+def in_scan_and_head(sun: figures.Figures, sample: figures.Figures) -> list[str]:
+    keys = ("median_mm", "p90_mm", "p95_mm")
+    apart, phrases = sample.head_to_scan_mm, []
+    for name in ("scan", "head"):
+        truth = sun[name].against_truth
+        rows = {"head scan under hard sun": [way[key] for way in (truth.by_cameras, truth.after_icp) for key in keys],
+                "sample": [sample[name][before + key] for before in ("", "icp_") for key in keys]}
+        phrases += [f"| {name}, {row} | {' | '.join(f'{value:.2f}' for value in values)} |"
+                    for row, values in rows.items()]
+    return [*phrases, f"Head to scan, median: {apart.sample:.2f} and {apart.scan:.2f} mm"]
