@@ -93,7 +93,8 @@ def in_cameras(truth: figures.Figures, scale: figures.Figures) -> list[str]:
         f"median centre error {truth.centre_error_median_percent:.3f} % of the camera distance, at most "
         f"{truth.centre_error_max_percent:.2f} %, rotations {truth.rotation_error_median_deg:.2f} degrees",
         f"six synthetic heads it was set on: median {percent(scale.set_on.median)}, worst "
-        f"{percent(scale.set_on.worst)}; three others: {percent(scale.others.median)}, worst {percent(scale.others.worst)}",
+        f"{percent(scale.set_on.worst)}; three others: {percent(scale.others.median)}, "
+        f"worst {percent(scale.others.worst)}",
         f"lids closed: {percent(scale.scan)} ({100 * scale.scan_by_corners:.1f} % by the corners of the eyes)"]
 
 
