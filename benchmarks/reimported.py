@@ -58,7 +58,8 @@ def main() -> None:
     asked = parser.parse_args()
     with extension(), tempfile.TemporaryDirectory() as work:
         original, flat, returned = compare(Path(work), DELIVERED, asked.resolution, asked.samples)
-    record = {f"{preset}_{kind}": {name: round(value, 3) for name, value in vars(each).items() if name != "picture"} for (preset, kind), each in returned.items()}
+    record = {f"{preset}_{kind}": {name: round(value, 3) for name, value in vars(back).items() if name != "picture"}
+              for (preset, kind), back in returned.items()}
     table = to_markdown(record)
     print(table)
     if asked.picture:
