@@ -66,8 +66,8 @@ FORMATS = {
                   unit="m", normals="opengl"),
     "fbx": Format("FBX", ".fbx", ("FBX's material has no subsurface scattering, so no scale of it either, and no displacement.",
                                   "What does not read FBX's roughness and specular links needs those maps set by hand."), unit="cm"),
-    "obj": Format("OBJ", ".obj", ("OBJ has no shape keys and no units.", "Its MTL has no subsurface scattering, and many programs ignore its normal map."),
-                  shape_keys=False),
+    "obj": Format("OBJ", ".obj", ("OBJ has no shape keys and no units.", "Its MTL has no subsurface scattering, and says of no map that it is no colour: "
+                                  "in Blender set all but the albedo to Non-Color."), shape_keys=False),
 }
 
 PICTURES = {"png8": "PNG, 8 bit", "png16": "PNG, 16 bit", "exr": "EXR, half float"}

@@ -1,0 +1,218 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Each delivered file, brought back by Blender's own importer and rendered beside the head that it was made of.
+
+    python -m benchmarks.reimported [--resolution 384] [--samples 64] [--page docs/results/reimported.md] [--picture OUT.jpg] [--json OUT.json]
+
+A copy of the sample head is delivered to a folder that is gone afterwards. Both heads stand under the same light before the same camera, with the
+same noise. The original is shown with and without scattering under the skin, which no exchange format holds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+
+from . import figures
+from .render_capture import extension
+
+ADDON = "bl_ext.user_default.wildcap.wildcap_addon"
+COMMAND = "python -m benchmarks.reimported --page docs/results/reimported.md --picture docs/pictures/reimported.jpg --json docs/figures/reimported.json"
+DELIVERED = (("blender", "glb"), ("blender", "gltf"), ("blender", "usd"), ("unreal", "fbx"), ("unity_hdrp", "fbx"), ("character_creator", "obj"))
+LIGHT = "three_point"
+WANTED_DB = 30.0
+WORDS = (
+    "The sample head in its material, and each file that Deliver makes of it as Blender's own importer reads it, under the same light before the same camera. "
+    "PSNR over the pixels of the head, in sRGB; wanted: 30 dB for glTF and USD. No exchange format holds scattering under the skin, so the second column "
+    "compares with the same head without it: what is left there is what a format loses of maps and mesh. *Points*: the farthest that a vertex came back from "
+    "where it was.")
+
+
+@dataclass(frozen=True)
+class Returned:
+    """What came back of a file: psnr_db against the original, flat_psnr_db against the original without scattering, off_mm the farthest vertex, shape_keys
+    and maps: their numbers; picture [H, W, 3], sRGB."""
+
+    psnr_db: float
+    flat_psnr_db: float
+    off_mm: float
+    shape_keys: int
+    maps: int
+    picture: np.ndarray
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--resolution", type=int, default=384)
+    parser.add_argument("--samples", type=int, default=64)
+    parser.add_argument("--page", type=Path)
+    parser.add_argument("--picture", type=Path)
+    parser.add_argument("--json", type=Path)
+    asked = parser.parse_args()
+    with extension(), tempfile.TemporaryDirectory() as work:
+        original, flat, returned = compare(Path(work), DELIVERED, asked.resolution, asked.samples)
+    record = {f"{preset}_{kind}": {name: round(value, 3) for name, value in vars(back).items() if name != "picture"}
+              for (preset, kind), back in returned.items()}
+    table = to_markdown(record)
+    print(table)
+    if asked.picture:
+        from .gallery import write_small
+
+        write_small(asked.picture, np.hstack([original, flat, *(returned[key].picture for key in DELIVERED[0:1] + DELIVERED[2:4] + DELIVERED[5:])]))
+    if asked.json:
+        figures.write(asked.json, "reimported", COMMAND, record)
+    if asked.page:
+        from .pages import write_page
+
+        shown = "![The original, without scattering, and back from glTF, USD, FBX and OBJ](../pictures/reimported.jpg)"
+        write_page(asked.page, "What comes back", COMMAND, [("", WORDS), ("", table), ("", shown)])
+
+
+def to_markdown(record: dict) -> str:
+    rows = [[name.replace("_", " "), f"{row['psnr_db']:.1f}", f"{row['flat_psnr_db']:.1f}", f"{row['off_mm']:.4f} mm", row["shape_keys"], row["maps"]]
+            for name, row in record.items()]
+    return figures.markdown(["preset and format", "PSNR, dB", "against the original without scattering, dB", "points", "shape keys", "maps"], rows)
+
+
+def compare(work: Path, deliveries: tuple[tuple[str, str], ...], resolution: int, samples: int,
+            ) -> tuple[np.ndarray, np.ndarray, dict[tuple[str, str], Returned]]:
+    """The original and the original without scattering, sRGB [H, W, 3] each, and what came back of each (preset, format). The extension is enabled; `work`
+    is empty."""
+    import bpy
+
+    from core.contract import sample_head
+
+    capture = sample_head.copy_to(work)
+    headless, picture = (import_module(f"{ADDON}.relight.{name}") for name in ("headless", "picture"))
+    head, item = headless.open_head(capture.root)
+    bpy.ops.wildcap.add_face_units()
+    folders = {each: deliver(item, *each) for each in deliveries}
+    scene = picture.set_up(head, LIGHT, resolution, samples)
+    original, covered = render(scene, work / "original.png")
+    with without_scattering(head):
+        flat, _ = render(scene, work / "flat.png")
+    scene.collection.objects.unlink(head)
+    returned = {}
+    for (preset, kind), folder in folders.items():
+        back = bring_back(folder)
+        for thing in back:
+            scene.collection.objects.link(thing)
+        shown, _ = render(scene, work / f"{preset}_{kind}.png")
+        returned[preset, kind] = Returned(psnr(shown, original, covered), psnr(shown, flat, covered), 1000 * off(head, back), *counted(back), shown)
+        for thing in back:
+            bpy.data.objects.remove(thing)
+    return original, flat, returned
+
+
+def deliver(item, preset: str, kind: str) -> Path:
+    """The delivery's folder. The worker's part is done in this process."""
+    import bpy
+
+    from core.contract.capture import Capture
+    from core.contract.messages import Done
+    from core.worker.job import write_job
+    from core.worker.runner import run_job
+
+    operators, waiting, captures, properties = (import_module(f"{ADDON}.{name}") for name in ("deliver.operators", "deliver.waiting", "captures", "properties"))
+    item.deliver.preset, item.deliver.format = preset, kind
+    capture = Capture(Path(captures.root(item)))
+    settings = {**properties.values(item)["deliver"], "roughness": operators.roughness(captures.head(bpy.context, item)), "whole": False}
+    plan = operators.planned(bpy.context)
+    ended = run_job(write_job(capture, tool="deliver", settings={"deliver": settings}))
+    if not isinstance(ended, Done):
+        raise SystemExit(f"{preset}, {kind}: {ended}")
+    root = captures.root(item)
+    waiting.maps_made(root, plan)
+    return waiting.finish(bpy.context, item) if waiting.ready(root) is not None else waiting.last(root)
+
+
+def bring_back(folder: Path) -> list:
+    """The mesh objects of a delivered file, as Blender's importer makes them, in metres: OBJ alone does not say its unit."""
+    import bpy
+
+    path = next(path for path in folder.iterdir() if path.suffix in (".glb", ".gltf", ".usdc", ".fbx", ".obj"))
+    before = set(bpy.data.objects)
+    {".glb": lambda: bpy.ops.import_scene.gltf(filepath=str(path)), ".gltf": lambda: bpy.ops.import_scene.gltf(filepath=str(path)),
+     ".usdc": lambda: bpy.ops.wm.usd_import(filepath=str(path)), ".fbx": lambda: bpy.ops.import_scene.fbx(filepath=str(path)),
+     ".obj": lambda: bpy.ops.wm.obj_import(filepath=str(path), global_scale=0.01)}[path.suffix]()
+    made = set(bpy.data.objects) - before
+    bpy.context.view_layer.update()
+    meshes = [thing for thing in made if thing.type == 'MESH']
+    if path.suffix == ".obj":
+        as_the_hint_says(meshes)
+    for thing in meshes:
+        place, thing.parent = thing.matrix_world.copy(), None
+        thing.matrix_world = place
+    for other in made - set(meshes):
+        bpy.data.objects.remove(other)
+    return meshes
+
+
+def as_the_hint_says(meshes: list) -> None:
+    """Switches what MTL cannot say to be no colour: every picture but the albedo."""
+    for node in (node for thing in meshes for slot in thing.material_slots for node in slot.material.node_tree.nodes if node.type == 'TEX_IMAGE'):
+        if "Base Color" not in {link.to_socket.name for link in node.outputs["Color"].links}:
+            node.image.colorspace_settings.name = "Non-Color"
+
+
+def render(scene, path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """A still, sRGB [H, W, 3] without a look, and where the head is in it, bool [H, W]."""
+    from core.imaging import images
+
+    output = import_module(f"{ADDON}.relight.output")
+    scene.render.film_transparent = True
+    output.still(scene, path, True)
+    linear = images.read_linear(path.with_suffix(".exr"))
+    return images.linear_to_srgb(np.clip(linear, 0, 1)), linear.max(-1) > 0  # nothing shines behind it
+
+
+@contextmanager
+def without_scattering(head) -> Iterator[None]:
+    """The head's skin without light that spreads under it."""
+    nodes = [node for slot in head.material_slots for node in slot.material.node_tree.nodes if node.type == 'GROUP' and "Subsurface" in node.inputs]
+    before = [node.inputs["Subsurface"].default_value for node in nodes]
+    for node in nodes:
+        node.inputs["Subsurface"].default_value = 0.0
+    try:
+        yield
+    finally:
+        for node, value in zip(nodes, before, strict=True):
+            node.inputs["Subsurface"].default_value = value
+
+
+def psnr(shown: np.ndarray, wanted: np.ndarray, covered: np.ndarray) -> float:
+    return float(-10 * np.log10(max(np.square(shown - wanted)[covered].mean(), 1e-10)))
+
+
+def off(head, back: list) -> float:
+    """The farthest that a vertex of what came back lies from the head's nearest, metres."""
+    from scipy.spatial import cKDTree
+
+    return float(cKDTree(points_of(head)).query(np.concatenate([points_of(thing) for thing in back]))[0].max())
+
+
+def points_of(thing) -> np.ndarray:
+    """Vertices [V, 3] at rest in the world, metres."""
+    points = np.empty(3 * len(thing.data.vertices), np.float32)
+    keys = thing.data.shape_keys
+    (thing.data.vertices if keys is None else keys.reference_key.data).foreach_get("co", points)
+    return points.reshape(-1, 3) @ np.array(thing.matrix_world)[:3, :3].T + np.array(thing.matrix_world)[:3, 3]
+
+
+def counted(back: list) -> tuple[int, int]:
+    """How many shape keys beside the rest, and how many pictures its materials show."""
+    keys = sum(len(thing.data.shape_keys.key_blocks) - 1 for thing in back if thing.data.shape_keys is not None)
+    images = {node.image.name for thing in back for slot in thing.material_slots if slot.material is not None
+              for node in slot.material.node_tree.nodes if node.type == 'TEX_IMAGE' and node.image is not None and node.image.size[0] > 0}
+    return keys, len(images)
+
+
+if __name__ == "__main__":
+    main()
