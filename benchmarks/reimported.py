@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Each delivered file, brought back by Blender's own importer and rendered beside the head that it was made of.
 
-    python -m benchmarks.reimported [--resolution 384] [--samples 64] [--page docs/results/reimported.md] [--picture OUT.jpg] [--json OUT.json]
+    python -m benchmarks.reimported [--resolution 384] [--samples 64] [--picture OUT.jpg] [--json OUT.json]
 
 A copy of the sample head is delivered to a folder that is gone afterwards. Both heads stand under the same light before the same camera, with the
 same noise. The original is shown with and without scattering under the skin, which no exchange format holds.
@@ -24,15 +24,10 @@ from . import figures
 from .render_capture import extension
 
 ADDON = "bl_ext.user_default.wildcap.wildcap_addon"
-COMMAND = "python -m benchmarks.reimported --page docs/results/reimported.md --picture docs/pictures/reimported.jpg --json docs/figures/reimported.json"
+SHOWN = (("blender", "glb"), ("blender", "usd"), ("unreal", "fbx"), ("character_creator", "obj"))
+COMMAND = "python -m benchmarks.reimported --picture docs/pictures/reimported.jpg --json docs/figures/reimported.json"
 DELIVERED = (("blender", "glb"), ("blender", "gltf"), ("blender", "usd"), ("unreal", "fbx"), ("unity_hdrp", "fbx"), ("character_creator", "obj"))
 LIGHT = "three_point"
-WANTED_DB = 30.0
-WORDS = (
-    "The sample head in its material, and each file that Deliver makes of it as Blender's own importer reads it, under the same light before the same camera. "
-    "PSNR over the pixels of the head, in sRGB; wanted: 30 dB for glTF and USD. No exchange format holds scattering under the skin, so the second column "
-    "compares with the same head without it: what is left there is what a format loses of maps and mesh. *Points*: the farthest that a vertex came back from "
-    "where it was.")
 
 
 @dataclass(frozen=True)
@@ -52,7 +47,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--resolution", type=int, default=384)
     parser.add_argument("--samples", type=int, default=64)
-    parser.add_argument("--page", type=Path)
     parser.add_argument("--picture", type=Path)
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
@@ -60,25 +54,21 @@ def main() -> None:
         original, flat, returned = compare(Path(work), DELIVERED, asked.resolution, asked.samples)
     record = {f"{preset}_{kind}": {name: round(value, 3) for name, value in vars(back).items() if name != "picture"}
               for (preset, kind), back in returned.items()}
-    table = to_markdown(record)
-    print(table)
+    print(table(figures.Figures.of(record)))
     if asked.picture:
         from .gallery import write_small
 
-        write_small(asked.picture, np.hstack([original, flat, *(returned[key].picture for key in DELIVERED[0:1] + DELIVERED[2:4] + DELIVERED[5:])]))
+        write_small(asked.picture, np.hstack([original, flat, *(returned[key].picture for key in SHOWN)]))
     if asked.json:
         figures.write(asked.json, "reimported", COMMAND, record)
-    if asked.page:
-        from .pages import write_page
-
-        shown = "![The original, without scattering, and back from glTF, USD, FBX and OBJ](../pictures/reimported.jpg)"
-        write_page(asked.page, "What comes back", COMMAND, [("", WORDS), ("", table), ("", shown)])
 
 
-def to_markdown(record: dict) -> str:
-    rows = [[name.replace("_", " "), f"{row['psnr_db']:.1f}", f"{row['flat_psnr_db']:.1f}", f"{row['off_mm']:.4f} mm", row["shape_keys"], row["maps"]]
-            for name, row in record.items()]
-    return figures.markdown(["preset and format", "PSNR, dB", "against the original without scattering, dB", "points", "shape keys", "maps"], rows)
+def table(found: figures.Figures) -> str:
+    """Rows: deliveries."""
+    return figures.markdown(
+        ["preset and format", "PSNR, dB", "without scattering, dB", "points, mm", "shape keys", "maps"],
+        [[name.replace("_", " "), f"{back.psnr_db:.1f}", f"{back.flat_psnr_db:.1f}", f"{back.off_mm:.3f}",
+          str(back.shape_keys), str(back.maps)] for name, back in found.items()])
 
 
 def compare(work: Path, deliveries: tuple[tuple[str, str], ...], resolution: int, samples: int,

@@ -17,7 +17,8 @@ GROUPS = {
     "The albedo": ("sample", "relit", "state", "split", "scan", "gallery", "comparison", "rerender", "controlled",
                    "ablation", "prior", "confidence"),
     "Before the solve": ("geometry", "delighters", "photographs", "shadows", "skin_tone"),
-    "After the solve": ("upscale", "whole_head", "hair", "even_light", "engines", "delivery"),
+    "After the solve": ("upscale", "whole_head", "hair", "even_light", "engines", "delivery",
+                        "reimported"),
     "Time and memory": ("costs", "solver_speed", "png_levels", "blender"),
 }
 ELSEWHERE = """
