@@ -94,8 +94,8 @@ def _by_views(capture: Capture, settings: Settings, views: list[View], subject: 
     points = _on_skin(unscanned.Points(*read_points(capture)), views, subject, report)
     fitted = unscanned.fit(model, views, found, subject.trust, points, seen, report, 10, 0.9 * STEPS)
     placed = model.mesh.moved(fitted.pose.apply(model.mesh.vertices))
-    levelled = bust.level_edge(model.mesh, fitted.vertices)
-    vertices = intersections.mended(placed, levelled, lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
+    vertices = intersections.mended(placed, fitted.vertices, lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
+    vertices = bust.level_edge(model.mesh, vertices)
     head, aligned = model.mesh.moved(vertices), model.mesh.moved(fitted.pose.apply(model.shape(fitted.coefficients)))
     quality.figures(report, model, aligned, head, found, fitted.coefficients, np.zeros(0), subject.follow)
     quality.figures_of_views(report, fitted, views, head)
@@ -127,7 +127,8 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
     start = pose.apply(model.shape(coefficients))
     vertices = nonrigid.fit(model, start, scan, follow, hold, found.points, trust, settings.registration.iterations, report, 20, 0.9 * STEPS, found.put)
     placed = model.mesh.moved(pose.apply(model.mesh.vertices))
-    vertices = intersections.mended(placed, bust.level_edge(model.mesh, vertices), lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
+    vertices = intersections.mended(placed, vertices, lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
+    vertices = bust.level_edge(model.mesh, vertices)  # last: where folds are smoothed at the edge, it would bend again
 
     head, aligned = model.mesh.moved(vertices), model.mesh.moved(start)
     distances = scan.distances(vertices[follow > 0.5], meshes.vertex_normals(head)[follow > 0.5])
