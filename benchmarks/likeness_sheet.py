@@ -36,7 +36,7 @@ def write_sheet(out: Path, seeds: list[int], work: Path, facekit: Path | None = 
 
 
 def _shots(figure: Figure, work: Path) -> list[np.ndarray]:
-    light, shots = scene.Light(SKY, scene.Sun(SUN / np.linalg.norm(SUN), 2.0, 0.06)), []
+    light, shots = scene.SceneLight(SKY, scene.Sun(SUN / np.linalg.norm(SUN), 2.0, 0.06)), []
     for k, (azimuth, height, distance, target, focal, bare) in enumerate(SHOTS):
         a, h = np.radians([azimuth, height])
         at = np.array(target) + distance * np.array([np.sin(a) * np.cos(h), -np.cos(a) * np.cos(h), np.sin(h)])

@@ -34,7 +34,7 @@ TONE = "0.69,0.54,0.45"
 
 
 @dataclass(frozen=True)
-class Row:
+class SolverVariant:
     """A way to sample, or (`stage`) the settings of a whole stage, and the seconds it shall take on two cores."""
 
     float32: bool = False
@@ -48,16 +48,16 @@ class Row:
 
 DRAFT, STANDARD = {"size": 512, "steps": 30, "guidance": "proximal"}, {"size": 1024}
 ROWS = {
-    "plain": Row(float32=True, channels_first=True, coarse=False),
-    "ours": Row(),
-    "float32": Row(float32=True),
-    "low memory": Row(low_memory=True),
-    "draft": Row(guidance="proximal"),
-    "draft at 512": Row(stage=DRAFT, target=90),
-    "standard at 1024": Row(stage=STANDARD, target=480),
-    "standard at 1024, low memory": Row(stage={**STANDARD, "low_memory": True}, low_memory=True),
-    "draft at 512, float32": Row(float32=True, stage=DRAFT, target=180),
-    "standard at 1024, float32": Row(float32=True, stage=STANDARD, target=960),
+    "plain": SolverVariant(float32=True, channels_first=True, coarse=False),
+    "ours": SolverVariant(),
+    "float32": SolverVariant(float32=True),
+    "low memory": SolverVariant(low_memory=True),
+    "draft": SolverVariant(guidance="proximal"),
+    "draft at 512": SolverVariant(stage=DRAFT, target=90),
+    "standard at 1024": SolverVariant(stage=STANDARD, target=480),
+    "standard at 1024, low memory": SolverVariant(stage={**STANDARD, "low_memory": True}, low_memory=True),
+    "draft at 512, float32": SolverVariant(float32=True, stage=DRAFT, target=180),
+    "standard at 1024, float32": SolverVariant(float32=True, stage=STANDARD, target=960),
 }
 
 
@@ -136,7 +136,7 @@ def make(folder: str, source: str | None) -> None:
     meshes.write_obj(capture.head, template.load())
 
 
-def measured(row: Row, folder: Path, options: argparse.Namespace) -> dict:
+def measured(row: SolverVariant, folder: Path, options: argparse.Namespace) -> dict:
     """A row's figures, in this process."""
     import torch
 
@@ -152,7 +152,7 @@ def measured(row: Row, folder: Path, options: argparse.Namespace) -> dict:
     return found
 
 
-def single_steps(row: Row, capture, options: argparse.Namespace) -> dict:
+def single_steps(row: SolverVariant, capture, options: argparse.Namespace) -> dict:
     """`options.steps` steps that lie along the walk as all of them do, each with as many light updates as one of theirs."""
     from dataclasses import replace
 
@@ -187,7 +187,7 @@ def single_steps(row: Row, capture, options: argparse.Namespace) -> dict:
             "processor_seconds_per_step": round(worked / short.steps, 4), "steps": short.steps, "dtype": dtype}
 
 
-def whole_stage(row: Row, capture, options: argparse.Namespace) -> dict:
+def whole_stage(row: SolverVariant, capture, options: argparse.Namespace) -> dict:
     """The stage solve, the mask's proposal before it where the capture has frames; imports and loading count."""
     import torch
 
@@ -208,7 +208,7 @@ def whole_stage(row: Row, capture, options: argparse.Namespace) -> dict:
             "dtype": str(dtype).removeprefix("torch.")}
 
 
-def prior_of(row: Row, options: argparse.Namespace):
+def prior_of(row: SolverVariant, options: argparse.Namespace):
     """The shipped prior, or one of the authors' size, as the row has it."""
     import torch
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from core.imaging import images
 
-from .albedo_score import Look
+from .albedo_score import HeadInView
 from .delight_measures import stepping
 from .measures.agreement import agreement
 from .measures.calibration import calibrate
@@ -30,7 +30,7 @@ DOUBT = 1.02
 Figures = dict[str, float | None]
 
 
-def in_pictures(answers: dict[str, np.ndarray], looks: list[Look]) -> dict[str, Figures]:
+def in_pictures(answers: dict[str, np.ndarray], looks: list[HeadInView]) -> dict[str, Figures]:
     """Method -> PSNR, SSIM and FLIP after one gain per channel, detail, and what is left along the shadow's edge, means over the frames with a truth.
     answers: linear maps [S, S, 3], among them the filmed one, which tells where the light steps."""
     found: dict[str, list[Figures]] = {method: [] for method in answers}
@@ -117,7 +117,7 @@ def _kept(filmed: Filmed, maps: dict[str, np.ndarray], method: str) -> Figures:
     return kept(*(contrasts(images.linear_to_srgb(maps[name]), points, filmed.where) for name in (method, TRUE)))
 
 
-def _seen(look: Look, answer: np.ndarray) -> np.ndarray:
+def _seen(look: HeadInView, answer: np.ndarray) -> np.ndarray:
     """A linear map as a look sees it, sRGB [H, W, 3]."""
     return images.linear_to_srgb(np.clip(look.picture(answer), 0, 1))
 

@@ -19,7 +19,7 @@ from core.synthetic.people import figure, filmed, person, truth  # noqa: E402
 SCALE, SAMPLES = 0.25, 24
 SHIRT, IRIS = (0.05, 0.30, 0.10), (0.02, 0.06, 0.25)
 ELSEWHERE = np.array([0.3, -0.2, 0.1])  # metres
-EVEN = scene.Light((1.0, 1.0, 1.0))
+EVEN = scene.SceneLight((1.0, 1.0, 1.0))
 
 
 @pytest.fixture(scope="module")

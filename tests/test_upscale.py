@@ -19,7 +19,7 @@ from core.imaging import images
 from core.training import fine_windows, upscaler
 from core.upscale import gloss, network
 from core.upscale.enlarge import enlarge, load_network
-from core.upscale.maps import Maps, read_maps
+from core.upscale.maps import HeadMaps, read_maps
 
 SMALL, LARGE = 256, 1024
 PLAIN = {"whole_head": False, "hair": False}  # test_whole_head.py and test_hair.py look at these
@@ -113,11 +113,11 @@ def test_a_cancel_between_maps_leaves_no_folder(capture):
     assert not capture.maps_4k.exists() and not list(capture.root.glob(".*"))
 
 
-def rough_maps(size: int) -> Maps:
+def rough_maps(size: int) -> HeadMaps:
     rng = np.random.default_rng(0)
     normal = rng.normal(0, 0.2, (size, size, 3)).astype(np.float32) + np.float32([0, 0, 1])
-    return Maps(rng.random((size, size, 3)).astype(np.float32), normal / np.linalg.norm(normal, axis=2, keepdims=True),
-                rng.random((size, size)).astype(np.float32), np.ones((size, size), np.float32), np.ones((size, size, 3), np.float32))
+    return HeadMaps(rng.random((size, size, 3)).astype(np.float32), normal / np.linalg.norm(normal, axis=2, keepdims=True),
+                    rng.random((size, size)).astype(np.float32), np.ones((size, size), np.float32), np.ones((size, size, 3), np.float32))
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +138,7 @@ def test_strips_are_the_whole(busy, monkeypatch):
         assert np.abs(stripped[rows] - stripped[70]).max() < 1e-5, rows
 
 
-def _with_strips(monkeypatch, rows: int, maps: Maps, net: network.Rcan) -> np.ndarray:
+def _with_strips(monkeypatch, rows: int, maps: HeadMaps, net: network.Rcan) -> np.ndarray:
     monkeypatch.setattr("core.upscale.enlarge.STRIP", rows)
     return enlarge(maps, lambda share: None, network=net)
 
@@ -162,7 +162,7 @@ def test_an_untrained_network_resamples(capture):
 
 def test_a_block_begins_as_the_identity():
     features = torch.randn(1, 16, 8, 8)
-    assert torch.equal(network.Block(16, 4)(features), features)
+    assert torch.equal(network.ChannelAttentionBlock(16, 4)(features), features)
 
 
 def test_the_stage_takes_the_network(capture, busy, monkeypatch):

@@ -19,7 +19,7 @@ from ..core.contract import messages, stages, unforeseen
 from ..core.contract.capture import Capture
 from ..core.contract.messages import Problem
 from ..core.contract.settings import Settings
-from ..core.worker.background import Task
+from ..core.worker.background import BackgroundTask
 from ..core.worker.client import Worker
 from ..core.worker.job import read_job, write_job
 from . import batches, captures, preferences, problems, properties, status, timings
@@ -33,7 +33,7 @@ class Job:
     """A worker at a capture, and the last thing it said. `previews` counts the preview pictures so far."""
 
     goal: str  # 'make', 'reconstruct', 'solve', 'install', 'test', or 'ask' for what is found out or tidied up in seconds
-    worker: Worker | Task
+    worker: Worker | BackgroundTask
     then: Callable[[], None] | None = None  # called when it ended well
     ended: Callable[[], None] | None = None  # called before that, however it ended
     well: bool = False
@@ -101,7 +101,7 @@ def start(item, goal: str, *, first: str | None = None, last: str | None = None,
     return job
 
 
-def begin(root: str, goal: str, worker: Worker | Task, then: Callable[[], None] | None = None) -> Job:
+def begin(root: str, goal: str, worker: Worker | BackgroundTask, then: Callable[[], None] | None = None) -> Job:
     """Starts a worker, or puts it in line behind the one that runs, and listens to it. Raises Problem when it cannot."""
     waiting = root != "" and _busy()
     if not waiting:

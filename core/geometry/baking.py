@@ -24,7 +24,7 @@ BLEED_PX = 16
 
 
 @dataclass(frozen=True)
-class Places:
+class TexelPartners:
     """For each texel [S, S] of a tile where its partner lies in the source's maps.
 
     uv float32 [S, S, 2] (nan: no partner), turn float32 [S, S]: the angle in radians that takes directions of the source's tangent plane to the
@@ -50,7 +50,7 @@ class Source:
         self.tangent, self.hand = surfaces.tangents(self.mesh)
 
 
-def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick: Callable[[float], None], painted: np.ndarray | None = None) -> Places:
+def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick: Callable[[float], None], painted: np.ndarray | None = None) -> TexelPartners:
     """Partners, up to `farthest` metres away, of the texels of a tile (u, v) of the target's UVs, in a map of `size`.
 
     painted bool [F]: the triangles that count (all by default). `tick` is called with the share done, per strip.
@@ -86,10 +86,10 @@ def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick:
             flat = view[inside]
             flat[found] = values
             view[inside] = flat
-    return Places(uv, turn, mirrored, covered)
+    return TexelPartners(uv, turn, mirrored, covered)
 
 
-def bake(image: np.ndarray, at: Places) -> np.ndarray:
+def bake(image: np.ndarray, at: TexelPartners) -> np.ndarray:
     """A source map [H, W(, C)] read at the places, bicubic, [S, S(, C)] float32; the gaps filled and bled."""
     image = _matched(np.asarray(image, np.float32), at)
     height, width = image.shape[:2]
@@ -102,7 +102,7 @@ def bake(image: np.ndarray, at: Places) -> np.ndarray:
     return bled(out, at)
 
 
-def bake_normals(packed: np.ndarray, at: Places) -> np.ndarray:
+def bake_normals(packed: np.ndarray, at: TexelPartners) -> np.ndarray:
     """A tangent space normal map [H, W, 3] packed into [0, 1], OpenGL Y+, turned from the source's tangent frames into the target's.
 
     What it tells is how the skin leaves its own smooth surface; that is kept, for the target brings a smooth surface of its own.
@@ -120,7 +120,7 @@ def bake_normals(packed: np.ndarray, at: Places) -> np.ndarray:
     return bled(out, at)
 
 
-def bled(image: np.ndarray, at: Places) -> np.ndarray:
+def bled(image: np.ndarray, at: TexelPartners) -> np.ndarray:
     """The map with a margin around what is known that repeats its nearest texel, and a smooth continuation of it beyond, over the rest of the tile."""
     known = at.known
     if known.all() or not known.any():
@@ -147,7 +147,7 @@ def _continued(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
     return (weighted + coarse.reshape(weighted.shape) * (1 - weight[..., None])).astype(np.float32)
 
 
-def _matched(image: np.ndarray, at: Places) -> np.ndarray:
+def _matched(image: np.ndarray, at: TexelPartners) -> np.ndarray:
     """The source map made smaller where it is finer than the target's texels, lest they skip some of it."""
     step = np.linalg.norm(np.diff(at.uv[::2], axis=1) * [image.shape[1], image.shape[0]], axis=-1)
     step = float(np.nanmedian(step)) if np.isfinite(step).any() else 1.0

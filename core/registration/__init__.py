@@ -69,7 +69,7 @@ class Subject:
     `weights_of` gives them, without the lids where the eyes are open; trust [468]."""
 
     found: landmarks.Landmarks
-    model: alignment.Model
+    model: alignment.HeadModel
     follow: np.ndarray
     shaped: np.ndarray
     hold: np.ndarray
@@ -154,18 +154,18 @@ def _finish(capture: Capture, settings: Settings, views: list[View], head: meshe
     images.write_srgb(capture.picture("registration", "wireframe"), drawing.overlay(drawing.three_views(views, found), head, found))
 
 
-def load_model() -> alignment.Model:
+def load_model() -> alignment.HeadModel:
     """The built-in head with its identity space and landmarks."""
     face, bary = template.landmarks()
-    return alignment.Model(template.load(), template.identity(), face, bary, template.landmark_weights())
+    return alignment.HeadModel(template.load(), template.identity(), face, bary, template.landmark_weights())
 
 
-def trusting(model: alignment.Model, put: np.ndarray) -> alignment.Model:
+def trusting(model: alignment.HeadModel, put: np.ndarray) -> alignment.HeadModel:
     """The model with full weight on the landmarks [468] that the artist has put, the net's worst among them."""
     return replace(model, landmark_weight=np.where(put, 1.0, model.landmark_weight))
 
 
-def weights_of(model: alignment.Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def weights_of(model: alignment.HeadModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """follow [V] and shaped [V] in [0, 1]: how far the scan is believed at a vertex, by the last fit and by the identity's;
     hold [468]: how much longer a landmark counts than the others."""
     follow = _per_vertex(model.mesh, template.mask(FOLLOWED, 512))

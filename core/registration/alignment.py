@@ -33,7 +33,7 @@ class Similarity:
 
 
 @dataclass(frozen=True)
-class Model:
+class HeadModel:
     """The template's part of a fit: mesh, identity [K, V, 3], landmark anchors (face [468], bary [468, 3]) and their weights [468]."""
 
     mesh: Mesh
@@ -62,7 +62,7 @@ def similarity(source: np.ndarray, target: np.ndarray, weights: np.ndarray) -> S
     return Similarity(float(scale), rotation, b - scale * rotation @ a)
 
 
-def fit_landmarks(model: Model, points: np.ndarray, trust: np.ndarray, rounds: int = 12) -> tuple[Similarity, np.ndarray]:
+def fit_landmarks(model: HeadModel, points: np.ndarray, trust: np.ndarray, rounds: int = 12) -> tuple[Similarity, np.ndarray]:
     """Similarity and coefficients [K] that lay the model's landmarks over points [468, 3] (nan: unknown)."""
     known, weights = _usable(model, points, trust)
     coefficients = np.zeros(len(model.identity))
@@ -76,7 +76,7 @@ def fit_landmarks(model: Model, points: np.ndarray, trust: np.ndarray, rounds: i
     return pose, coefficients
 
 
-def fit_scan(model: Model, pose: Similarity, coefficients: np.ndarray, points: np.ndarray, trust: np.ndarray,
+def fit_scan(model: HeadModel, pose: Similarity, coefficients: np.ndarray, points: np.ndarray, trust: np.ndarray,
              scan: Scan, shaped: np.ndarray, rounds: int = 15) -> tuple[Similarity, np.ndarray]:
     """As fit_landmarks, with point-to-plane distances of the vertices (weights shaped [V] in [0, 1]) to the scan."""
     index = np.flatnonzero(shaped > 0.05)
@@ -92,7 +92,7 @@ def fit_scan(model: Model, pose: Similarity, coefficients: np.ndarray, points: n
     return pose, coefficients
 
 
-def _usable(model: Model, points: np.ndarray, trust: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _usable(model: HeadModel, points: np.ndarray, trust: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     known = np.isfinite(points).all(1) & (trust * model.landmark_weight > 0)
     return known, (trust * model.landmark_weight)[known]
 

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.views import View
-from .alignment import Model
+from .alignment import HeadModel
 from .landmarks import Landmarks
 
 TURNED_AWAY, SQUARE = 0.15, 0.45
@@ -49,7 +49,7 @@ def joined(parts: list[Constraints]) -> Constraints:
     return Constraints(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Constraints)))
 
 
-def from_landmarks(model: Model, vertices: np.ndarray, views: list[View], found: Landmarks, trust: np.ndarray, reach: float) -> Constraints:
+def from_landmarks(model: HeadModel, vertices: np.ndarray, views: list[View], found: Landmarks, trust: np.ndarray, reach: float) -> Constraints:
     """Two constraints per view and landmark that is seen squarely enough; trust [468]. What misses by much more than `reach` metres counts for little.
     A single view does not tell depths, so there each landmark is also held, loosely, to the depth that it was lifted to."""
     at = model.at_landmarks(vertices)

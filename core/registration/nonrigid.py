@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu
 
 from ..contract.messages import Reporter
 from ..geometry.meshes import Mesh, vertex_normals
-from .alignment import Model
+from .alignment import HeadModel
 from .correspondence import Scan, trimmed
 from .intersections import flipped
 
@@ -34,7 +34,7 @@ PUT_AREA_M2 = 1e-3
 """The same for one that the artist has put, from the first step to the last."""
 
 
-def fit(model: Model, start: np.ndarray, scan: Scan, follow: np.ndarray, hold: np.ndarray, points: np.ndarray, trust: np.ndarray,
+def fit(model: HeadModel, start: np.ndarray, scan: Scan, follow: np.ndarray, hold: np.ndarray, points: np.ndarray, trust: np.ndarray,
         iterations: int, report: Reporter, first: float, steps: float, put: np.ndarray | None = None) -> np.ndarray:
     """Vertices [V, 3] in metres. start [V, 3]: the aligned head; follow [V] in [0, 1]: how far the scan is believed;
     hold [468]: how much longer a landmark counts than the others (lips and lids); points [468, 3], trust [468] as in Landmarks;
@@ -103,7 +103,7 @@ def operators(mesh: Mesh) -> tuple[np.ndarray, sparse.csr_matrix]:
     return np.maximum(area, floor), (sparse.diags(np.asarray(weights.sum(1)).ravel()) - weights).tocsr()
 
 
-def anchors(model: Model) -> sparse.csr_matrix:
+def anchors(model: HeadModel) -> sparse.csr_matrix:
     """[468, V]: takes vertices to landmarks."""
     corners = model.mesh.faces[model.landmark_face]
     rows = np.repeat(np.arange(len(corners)), 3)

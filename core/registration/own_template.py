@@ -46,7 +46,7 @@ SHUT = 0.12
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedTemplate:
     """vertices [V, 3] metres, of all of the artist's mesh; skin bool [F]: triangles with a counterpart on the head; distances [M] in metres from the
     skin that was drawn to the head; flipped triangles; pictures (sRGB) in which the face was found."""
 
@@ -61,7 +61,7 @@ class Fitted:
 class BuiltIn:
     """The built-in head: its model, and per vertex and landmark the weights that registration uses (registration.weights_of)."""
 
-    model: alignment.Model
+    model: alignment.HeadModel
     follow: np.ndarray
     shaped: np.ndarray
     hold: np.ndarray
@@ -88,7 +88,7 @@ def run(capture: Capture, settings: Settings, head: Mesh, ours: BuiltIn, report:
     images.write_srgb(capture.picture("registration", "own_template"), _drawn(head, own.mesh.moved(fitted.vertices), fitted.pictures[0]))
 
 
-def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> Fitted:
+def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> FittedTemplate:
     """Lays the artist's mesh over the head. Raises Problem where no face is found on it or the fit does not hold."""
     whole, index = surfaces.welded(own.mesh)
     first = np.full(len(whole.vertices), -1)
@@ -109,7 +109,7 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     of_skin = np.cumsum(label[whole.faces[:, 0]] == main) - 1  # triangle of the whole -> of the skin
     weight, marks_at, marks_bary = np.zeros(len(found.points)), np.zeros(len(found.points), int), np.full((len(found.points), 3), 1 / 3)
     weight[known[good]], marks_at[known[good]], marks_bary[known[good]] = found.trust[known[good]], of_skin[at[good]], bary[good]
-    model = alignment.Model(skin, shapes[:, used], marks_at, marks_bary, weight)
+    model = alignment.HeadModel(skin, shapes[:, used], marks_at, marks_bary, weight)
 
     target = _at_landmarks(head)
     trust = template.landmark_weights().copy()
@@ -141,10 +141,10 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     counterpart = np.zeros(len(whole.vertices), bool)
     normals = vertex_normals(final)
     counterpart[used] = (surface.nearest(vertices, normals, PAINTED_M)[0] >= 0) & (_free_sky(final, normals) > OPEN[0])
-    return Fitted(everything[index], counterpart[whole.faces].any(1), distances, nonrigid.flipped_triangles(skin.moved(start), final), pictures)
+    return FittedTemplate(everything[index], counterpart[whole.faces].any(1), distances, nonrigid.flipped_triangles(skin.moved(start), final), pictures)
 
 
-def _matched(model: alignment.Model, start: np.ndarray, follow: np.ndarray, head: Mesh, ours: BuiltIn, report: Reporter) -> np.ndarray:
+def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, head: Mesh, ours: BuiltIn, report: Reporter) -> np.ndarray:
     """The placed skin [V, 3], each vertex taken to the place on the head that it has on the built-in head laid over it.
 
     Between landmarks two faces say little about which point is which; the built-in head's identity space says it: it is laid over the
@@ -166,7 +166,7 @@ def _matched(model: alignment.Model, start: np.ndarray, follow: np.ndarray, head
     return start + carried.field(start[known], shift, start, report)
 
 
-def _follow(model: alignment.Model, placed: alignment.Similarity, coefficients: np.ndarray, surface: surfaces.Surface, eyes: bool) -> np.ndarray:
+def _follow(model: alignment.HeadModel, placed: alignment.Similarity, coefficients: np.ndarray, surface: surfaces.Surface, eyes: bool) -> np.ndarray:
     """How far each vertex of the placed skin is drawn to the head [V] in [0, 1]."""
     at = model.mesh.moved(placed.apply(model.shape(coefficients)))
     normals = vertex_normals(at)

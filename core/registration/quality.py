@@ -12,7 +12,7 @@ from ..contract.messages import Problem, Reporter
 from ..geometry import atlas
 from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.views import View
-from .alignment import Model
+from .alignment import HeadModel
 from .correspondence import Scan
 from .intersections import flipped, intersecting
 from .landmarks import Landmarks
@@ -33,7 +33,7 @@ class Unlike(Problem):
     """A head that could not be laid over the scan."""
 
 
-def figures(report: Reporter, model: Model, aligned: Mesh, head: Mesh, found: Landmarks, coefficients: np.ndarray, distances: np.ndarray,
+def figures(report: Reporter, model: HeadModel, aligned: Mesh, head: Mesh, found: Landmarks, coefficients: np.ndarray, distances: np.ndarray,
             follow: np.ndarray) -> None:
     """Reports a fit's figures. aligned: the head before the non-rigid fit; distances [M] of the followed vertices (follow [V] > 0.5) to the scan."""
     known = np.isfinite(found.points).all(1)

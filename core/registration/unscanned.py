@@ -18,7 +18,7 @@ from ..contract.messages import Reporter
 from ..geometry.meshes import Mesh
 from ..geometry.views import View
 from . import nonrigid, silhouettes
-from .alignment import Model, Similarity, fit_landmarks, stepped
+from .alignment import HeadModel, Similarity, fit_landmarks, stepped
 from .constraints import Constraints, from_landmarks, from_points, joined
 from .landmarks import Landmarks
 
@@ -51,7 +51,7 @@ class Points:
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedHead:
     """The pose and coefficients [K] of the identity fit; vertices [V, 3] after the relaxation; how many constraints of each kind it had, and by how much
     they miss in the median [m]."""
 
@@ -62,8 +62,8 @@ class Fitted:
     miss_m: dict[str, float]
 
 
-def fit(model: Model, views: list[View], found: Landmarks, trust: np.ndarray, points: Points, follow: np.ndarray, report: Reporter,
-        first: float, steps: float) -> Fitted:
+def fit(model: HeadModel, views: list[View], found: Landmarks, trust: np.ndarray, points: Points, follow: np.ndarray, report: Reporter,
+        first: float, steps: float) -> FittedHead:
     """follow [V] in [0, 1]: which part of the head the pictures are believed about; trust [468]. Progress goes from `first` to `steps`."""
     pose, coefficients = fit_landmarks(model, found.points, trust)
     start = model.mesh.moved(pose.apply(model.shape(coefficients)))
@@ -87,18 +87,18 @@ def fit(model: Model, views: list[View], found: Landmarks, trust: np.ndarray, po
     vertices = _relaxed(model, vertices, lambda mesh: _constraints(model, mesh, views, found, trust, points, follow, outlines, edges, REACH_M[1]),
                         found, lambda step: report.progress(first + (steps - first) * (0.7 + 0.3 * step / STEPS), steps, "fitting the head to the views"))
     parts = _constraints(model, model.mesh.moved(vertices), views, found, trust, points, follow, outlines, edges, REACH_M[1])
-    return Fitted(pose, coefficients, vertices, {name: len(part) for name, part in parts.items()},
-                  {name: float(np.median(np.abs(part.distance))) if len(part) else float("nan") for name, part in parts.items()})
+    return FittedHead(pose, coefficients, vertices, {name: len(part) for name, part in parts.items()},
+                      {name: float(np.median(np.abs(part.distance))) if len(part) else float("nan") for name, part in parts.items()})
 
 
-def _constraints(model: Model, mesh: Mesh, views: list[View], found: Landmarks, trust: np.ndarray, points: Points, follow: np.ndarray, outlines: list,
+def _constraints(model: HeadModel, mesh: Mesh, views: list[View], found: Landmarks, trust: np.ndarray, points: Points, follow: np.ndarray, outlines: list,
                  edges: np.ndarray, reach: float) -> dict[str, Constraints]:
     return {"landmarks": from_landmarks(model, mesh.vertices, views, found, trust, max(reach, 0.006)),
             "points": from_points(mesh, follow, points.places, points.towards, reach),
             "outlines": joined([silhouettes.compare(outline, mesh, edges, follow, reach) for outline in outlines])}
 
 
-def _relaxed(model: Model, start: np.ndarray, constraints, found: Landmarks, tick) -> np.ndarray:
+def _relaxed(model: HeadModel, start: np.ndarray, constraints, found: Landmarks, tick) -> np.ndarray:
     """Vertices [V, 3]: thin-plate displacements of `start`, stiff to soft; constraints(mesh) -> {kind: Constraints}."""
     area, laplacian = nonrigid.operators(model.mesh.moved(start))
     bending = (laplacian.T @ sparse.diags(1 / area) @ laplacian).tocsr()

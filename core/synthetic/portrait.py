@@ -28,7 +28,7 @@ GOBOS = ("none", "none", "none", "leaves", "leaves", "blinds", "edge")
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedLight:
     """The light as a fit to the registered head would find it, up to its usual errors, times the skin's tone: ambient [P, 3] of a second-order sky,
     sunlit [P, 3] the same and a sun that only the head itself blocks; smooth normals [P, 3] of the registered head; direct [P, 3]: what the sun would add
     where nothing blocks it, None where nobody asks for it."""
@@ -55,7 +55,7 @@ class Portrait:
     head: np.ndarray
     face: np.ndarray
     skin: np.ndarray
-    fitted: Fitted
+    fitted: FittedLight
 
 
 def portrait(seed: int, size: int = 256, light: int = 0, panoramas: list[np.ndarray] = (), texels: int = 1024) -> Portrait:
@@ -225,7 +225,7 @@ def _shadow(sight: Sight, lamps: list, colours: list, reach: list, ambient: np.n
 
 
 def _fitted(sight: Sight, carried: np.ndarray, environment: Environment, lamps: list, colours: list, albedo: np.ndarray, gains: np.ndarray,
-            rng: np.random.Generator) -> Fitted:
+            rng: np.random.Generator) -> FittedLight:
     transfer = sight.at_pixels(carried @ BASIS.astype(np.float32))
     reach = [sight.reach[np.argmax(sight.lamps @ lamp)] for lamp in lamps]
     return fitted_light(transfer, sight.smooth, reach, environment, lamps, colours, _tone(sight, albedo) * gains, rng)
@@ -238,7 +238,7 @@ def _tone(sight: Sight, albedo: np.ndarray) -> np.ndarray:
 
 
 def fitted_light(transfer: np.ndarray, smooth: np.ndarray, reach: list[np.ndarray], environment: Environment, lamps: list, colours: list, tone: np.ndarray,
-                 rng: np.random.Generator) -> Fitted:
+                 rng: np.random.Generator) -> FittedLight:
     """What core/light/sunlight.py would find, without its search: the second-order sky and the strongest lamp, each a little off.
 
     transfer [P, 9] and smooth normals [P, 3] of the head; reach: of each lamp what the head itself lets through [P]; tone [3]: of the exposed skin.
@@ -263,7 +263,7 @@ def fitted_light(transfer: np.ndarray, smooth: np.ndarray, reach: list[np.ndarra
         towards /= np.linalg.norm(towards)
         direct = np.maximum(normal @ towards, 0)[:, None] * colours[main] * np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.05, 3))
     sunlit = lit + direct * reach[main][:, None] if found else lit
-    return Fitted(*((part * tone).astype(np.float32) for part in (lit, sunlit)), normal.astype(np.float32), (direct * tone).astype(np.float32))
+    return FittedLight(*((part * tone).astype(np.float32) for part in (lit, sunlit)), normal.astype(np.float32), (direct * tone).astype(np.float32))
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -59,7 +59,7 @@ def main() -> None:
 
 
 def render_frames(work: Path, seed: int, skin: Skin, cameras: np.ndarray, frames: list[int], samples: int, scale: float = 1.0,
-                  leaves: bool = True, room: bool = True, light: scene.Light | None = None, suffix: str = ".png") -> None:
+                  leaves: bool = True, room: bool = True, light: scene.SceneLight | None = None, suffix: str = ".png") -> None:
     """work/NNNNN.png of these frames (numbers into cameras [N, 4, 4]) by Cycles in a process of its own; files that exist are kept.
 
     `scale`: of the pictures' size; `leaves`: whether they stand between the sun and the head; `room`: whether there is anything behind it; `light`: instead
@@ -67,7 +67,7 @@ def render_frames(work: Path, seed: int, skin: Skin, cameras: np.ndarray, frames
     """
     work.mkdir(parents=True, exist_ok=True)
     sun = scene.sun_of(seed)
-    light = light or scene.Light(scene.SKY, sun, scene.leaves(seed, sun) if leaves else None)
+    light = light or scene.SceneLight(scene.SKY, sun, scene.leaves(seed, sun) if leaves else None)
     meshes.write_obj(work / "head.obj", subject_mesh(seed))
     if light.blockers:
         meshes.write_obj(work / "leaves.obj", light.blockers)

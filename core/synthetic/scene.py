@@ -32,7 +32,7 @@ SKY = (0.42, 0.55, 0.80)
 
 
 @dataclass(frozen=True)
-class Lamp:
+class AreaLamp:
     """A square area lamp that shines at the head: where it is [3] and its side in metres, its power in watts, its colour in linear sRGB."""
 
     position: tuple[float, float, float]
@@ -42,14 +42,14 @@ class Lamp:
 
 
 @dataclass(frozen=True)
-class Light:
+class SceneLight:
     """All that lights a subject. sky: its radiance everywhere, [3], or an equirectangular panorama [H, W, 3] as Blender reads one (its middle column is +X);
     blockers: what stands between the lights and the head, unseen by the camera; flash: watts of a small lamp in the camera's own place, that goes with it."""
 
     sky: tuple[float, float, float] | np.ndarray = SKY
     sun: Sun | None = None
     blockers: Mesh | None = None
-    lamps: tuple[Lamp, ...] = ()
+    lamps: tuple[AreaLamp, ...] = ()
     flash: float = 0.0
 
 

@@ -22,7 +22,7 @@ from ..geometry import raster
 from ..imaging import images
 from .blend import blurred
 from .features import Features
-from .projection import DARKEST, Observation
+from .projection import DARKEST, UnwrappedView
 
 TILE = 288
 """Pixels along a side of the part of a view that one step looks at: bounds memory and seconds whatever the frames' size; a multiple of 16."""
@@ -46,7 +46,7 @@ class Target:
     trust: np.ndarray  # float32 [h, w] in [0, 1]: how far a pixel may pull; zero off the head
 
 
-def refine(log_texture: np.ndarray, observations: list[Observation], surface: Unfolded, wanted: np.ndarray, features: Features, steps: int,
+def refine(log_texture: np.ndarray, observations: list[UnwrappedView], surface: Unfolded, wanted: np.ndarray, features: Features, steps: int,
            report: Reporter, device: str = "cpu") -> tuple[np.ndarray, dict]:
     """The blend log_texture [S, S, 3] with its detail optimised, and {"before", "after"}: the mean loss over the same tiles.
 
@@ -83,7 +83,7 @@ def refine(log_texture: np.ndarray, observations: list[Observation], surface: Un
     return result.astype(np.float32), {"before": before, "after": after}
 
 
-def _target(observation: Observation, surface: Unfolded, wanted: np.ndarray) -> Target | None:
+def _target(observation: UnwrappedView, surface: Unfolded, wanted: np.ndarray) -> Target | None:
     """A view's pixels that see wanted texels; None where there are none. Follows the alignment, so all views pull at the same texels."""
     seen = (observation.weight > 0) & wanted
     if seen.sum() < 64:

@@ -29,7 +29,7 @@ from ..solve.prior import fast_dtype
 from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
 from .people import People, is_prepared, prepare_people
-from .portraits import Batch, Portraits, mirrored, prepare
+from .portraits import PortraitBatch, Portraits, mirrored, prepare
 from .prior import FIRST_SEED, HELD_OUT_SEED, named_data
 from .release import again, release
 from .shading_errors import disagreement, mean_deviation, mean_size, slope_error, split_tone
@@ -78,9 +78,9 @@ def train_delighter(config: str, out: Path, report: Reporter, minutes: float | N
     if start:
         network.load_state_dict({name: value.float() for name, value in load_file(start).items()})
     state = descent.resumed(work, descent.beginning(config, data, network))
-    recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
-                            betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"], save_every=600)
-    descent.descend(network, state, _Steps(Portraits(data["seeds"], t["views"], work, hdri), People(data["people"], t["views"], work, hdri), t),
+    recipe = descent.TrainingRecipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
+                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"], save_every=600)
+    descent.descend(network, state, _DelighterSteps(Portraits(data["seeds"], t["views"], work, hdri), People(data["people"], t["views"], work, hdri), t),
                     lambda batch, step, share: sum(losses(network, batch, device).values()),
                     lambda average: {kind + name: value for kind, batch in unseen.items() for name, value in figures(average, config, batch, device).items()},
                     recipe, minutes, work, device, report)
@@ -99,7 +99,7 @@ def _people(t: dict) -> list[int]:
     return [seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * t["people"]) if seed not in reserved_seeds()][:t["people"]]
 
 
-def losses(network: DelightNet, batch: Batch, device: str) -> dict[str, torch.Tensor]:
+def losses(network: DelightNet, batch: PortraitBatch, device: str) -> dict[str, torch.Tensor]:
     """The terms of the loss, each a scalar."""
     with torch.autocast(device, torch.bfloat16, enabled=_fast(device)):
         shading, shadow = network(batch.layers.to(device, memory_format=torch.channels_last))
@@ -119,7 +119,7 @@ def _fast(device: str) -> bool:
 
 
 @torch.no_grad()
-def figures(average: dict, config: str, batch: Batch, device: str) -> dict[str, float]:
+def figures(average: dict, config: str, batch: PortraitBatch, device: str) -> dict[str, float]:
     """The averaged network on held-out portraits: deviation of the log-albedo about its mean over the skin, with and without geometry, beside that of the
     picture as it is (natural log units), and the intersection over union of the shadows."""
     network = DelightNet(**CONFIGS[config]["model"])
@@ -159,14 +159,14 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
                    people=data["people"][:ready], started=data["started"])
 
 
-class _Steps(Dataset):
+class _DelighterSteps(Dataset):
     """The batch of each step: it depends on the step alone, so a resumed training draws what an unbroken one would have."""
 
     def __init__(self, portraits: Portraits, people: People, options: dict):
         self.portraits, self.people, self.options = portraits, people, options
-        self.drawn: tuple[int, Batch | None] = -1, None
+        self.drawn: tuple[int, PortraitBatch | None] = -1, None
 
-    def __getitem__(self, step: int) -> Batch:
+    def __getitem__(self, step: int) -> PortraitBatch:
         torch.set_num_threads(1)
         index = step // self.options["echo"]
         rng = np.random.default_rng((self.options["seed"], index))

@@ -23,7 +23,7 @@ STATE = "state.pt"
 
 
 @dataclass(frozen=True)
-class Recipe:
+class TrainingRecipe:
     """rate(step, share of the time) -> learning rate; averaging: the longest memory of the averaged weights; workers: processes that make batches;
     save_every: seconds between checkpoints."""
 
@@ -60,7 +60,7 @@ def read_state(work: Path) -> dict:
     return torch.load(path, weights_only=True, map_location="cpu")
 
 
-def descend(network: torch.nn.Module, state: dict, batches: Dataset, loss: Callable, figures: Callable[[dict], object], recipe: Recipe, minutes: float,
+def descend(network: torch.nn.Module, state: dict, batches: Dataset, loss: Callable, figures: Callable[[dict], object], recipe: TrainingRecipe, minutes: float,
             work: Path, device: str, report: Reporter) -> None:
     """Trains until `minutes` are over, those of earlier runs included; `state` is changed, and written to `work`.
 

@@ -28,7 +28,7 @@ from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
 from .prior import FIRST_SEED, HELD_OUT_SEED
 from .release import again, release
-from .snapshots import Batch, Snapshots, is_prepared, prepare
+from .snapshots import SnapshotBatch, Snapshots, is_prepared, prepare
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "parser.safetensors"
 _MODEL = {"widths": [40, 64, 112, 144], "depths": [1, 1, 1, 2]}
@@ -64,8 +64,8 @@ def train_parser(config: str, out: Path, report: Reporter, minutes: float | None
     torch.manual_seed(t["seed"])
     network = ParseNet(**CONFIGS[config]["model"])
     state = descent.resumed(work, descent.beginning(config, data, network))
-    recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 100) * max(0.02, 0.5 + 0.5 * math.cos(math.pi * share)),
-                            betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.995, workers=t["workers"], save_every=150)
+    recipe = descent.TrainingRecipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 100) * max(0.02, 0.5 + 0.5 * math.cos(math.pi * share)),
+                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.995, workers=t["workers"], save_every=150)
     descent.descend(network, state, Steps(Snapshots(data["seeds"], t["views"], work, hdri), t), lambda batch, step, share: loss(network, batch, device),
                     lambda average: figures(average, config, unseen, device), recipe, minutes, work, device, report)
     return export(work, out)
@@ -85,7 +85,7 @@ def prepare_figures(config: str, work: Path, report: Reporter) -> None:
     prepare(named["held_out_seeds"] + named["seeds"], t["views"], work, report)
 
 
-def loss(network: ParseNet, batch: Batch, device: str) -> torch.Tensor:
+def loss(network: ParseNet, batch: SnapshotBatch, device: str) -> torch.Tensor:
     """The cross-entropy of the shares, of which pixels near small parts have more than their number."""
     with torch.autocast(device, torch.bfloat16, enabled=device == "cuda"):
         logits = network(batch.layers.to(device, memory_format=torch.channels_last))
@@ -97,7 +97,7 @@ def loss(network: ParseNet, batch: Batch, device: str) -> torch.Tensor:
 
 
 @torch.no_grad()
-def figures(average: dict, config: str, batch: Batch, device: str) -> dict[str, float]:
+def figures(average: dict, config: str, batch: SnapshotBatch, device: str) -> dict[str, float]:
     """The averaged network on photographs of held-out figures: intersection over union of each part, where a part is what most of a pixel is."""
     network = ParseNet(**CONFIGS[config]["model"])
     network.load_state_dict(average)
@@ -129,9 +129,9 @@ class Steps(Dataset):
 
     def __init__(self, snapshots: Snapshots, options: dict):
         self.snapshots, self.options = snapshots, options
-        self.drawn: tuple[int, list[Batch]] = -1, []
+        self.drawn: tuple[int, list[SnapshotBatch]] = -1, []
 
-    def __getitem__(self, step: int) -> Batch:
+    def __getitem__(self, step: int) -> SnapshotBatch:
         torch.set_num_threads(1)
         index, turn = divmod(step, self.options["echo"])
         if self.drawn[0] != index:

@@ -24,7 +24,7 @@ from ..solve.network import UNet, denoise
 from ..solve.prior import BLIND, WEIGHTS, build, condition, fast_dtype, packed
 from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
-from .patches import Batch, Windows, mean_map, reference_skins, spread_about
+from .patches import PatchBatch, Windows, mean_map, reference_skins, spread_about
 from .release import again, release
 from .skins import SCALES, Skins, carried_names, carried_skins, clusters, synthetic_skins
 
@@ -68,16 +68,16 @@ def train_prior(config: str, out: Path, report: Reporter, minutes: float | None 
     network = build(CONFIGS[config])
     statistics = {name: value.to(device) for name, value in state["statistics"].items()}
 
-    def loss(batch: Batch, step: int, share: float) -> torch.Tensor:
+    def loss(batch: PatchBatch, step: int, share: float) -> torch.Tensor:
         return _loss(network, statistics, batch, np.random.default_rng((t["seed"], step, 1)), device).mean()
 
     def figures(average: dict) -> dict:
         return {kind: _held_out_loss(average, statistics, config, b, device) for kind, b in held_out_windows.items()}
 
     # constant, then linear to zero over the second half
-    recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.02, min(1.0, 2 * (1 - share))),
-                            betas=(0.9, 0.99), weight_decay=1e-3, averaging=0.9995, workers=t["workers"], save_every=120)
-    descent.descend(network, state, _Steps(windows, t), loss, figures, recipe, minutes, work, device, report)
+    recipe = descent.TrainingRecipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.02, min(1.0, 2 * (1 - share))),
+                                    betas=(0.9, 0.99), weight_decay=1e-3, averaging=0.9995, workers=t["workers"], save_every=120)
+    descent.descend(network, state, _PriorSteps(windows, t), loss, figures, recipe, minutes, work, device, report)
     return export(work, out)
 
 
@@ -131,19 +131,19 @@ def _begin(config: str, data: dict, skins: Skins, windows: Windows) -> dict:
                              statistics={"mean_face": mean, "spread": spread_about(windows, mean, t["patch"])})
 
 
-class _Steps(Dataset):
+class _PriorSteps(Dataset):
     """The batch of each step: it depends on the step alone, so a resumed training draws what an unbroken one would have."""
 
     def __init__(self, windows: Windows, options: dict):
         self.windows, self.options = windows, options
 
-    def __getitem__(self, step: int) -> Batch:
+    def __getitem__(self, step: int) -> PatchBatch:
         t = self.options
         wide = 2 if step % t["wide_every"] == 0 else 1
         return self.windows.draw(t["batch"] // wide**2, t["patch"] * wide, np.random.default_rng((t["seed"], step, 0)))
 
 
-def _loss(network: UNet, statistics: dict[str, torch.Tensor], batch: Batch, rng: np.random.Generator, device: str) -> torch.Tensor:
+def _loss(network: UNet, statistics: dict[str, torch.Tensor], batch: PatchBatch, rng: np.random.Generator, device: str) -> torch.Tensor:
     """EDM's weighted denoising error per sample [N] (Karras et al. 2022, table 1): the squared error of F itself, where the truth is known.
     What is not known goes in as pure noise."""
     mean, deviation = (torch.tensor([SIGMA[int(scale)][i] for scale in batch.scale]) for i in (0, 1))
@@ -165,7 +165,7 @@ def _loss(network: UNet, statistics: dict[str, torch.Tensor], batch: Batch, rng:
 
 
 @torch.no_grad()
-def _held_out_loss(average: dict, statistics: dict, config: str, batch: Batch, device: str) -> list[float]:
+def _held_out_loss(average: dict, statistics: dict, config: str, batch: PatchBatch, device: str) -> list[float]:
     """The averaged network's loss per scale, always on the same patches and noise."""
     network = build(CONFIGS[config])
     network.load_state_dict(average)

@@ -125,9 +125,9 @@ def train_texels(config: str, out: Path, report: Reporter, minutes: float | None
     if start:
         network.load_state_dict({name: value.float() for name, value in load_file(start).items()})
     state = descent.resumed(work, descent.beginning(config, data, network))
-    recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
-                            betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"], save_every=180)
-    descent.descend(network, state, _Steps(UnfoldedPeople(data["seeds"], work, hdri), t),
+    recipe = descent.TrainingRecipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
+                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"], save_every=180)
+    descent.descend(network, state, _TexelSteps(UnfoldedPeople(data["seeds"], work, hdri), t),
                     lambda batch, step, share: sum(losses(network, batch, device).values()),
                     lambda average: figures(average, config, unseen, device), recipe, minutes, work, device, report)
     return export(work, out)
@@ -216,7 +216,7 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
                    people=ready, started=data["started"])
 
 
-class _Steps(Dataset):
+class _TexelSteps(Dataset):
     """`[step]` is the step's batch, whichever process asks for it; mirrored at every other one."""
 
     def __init__(self, people: UnfoldedPeople, t: dict):

@@ -65,9 +65,9 @@ def train_upscaler(config: str, out: Path, report: Reporter, minutes: float | No
     def loss(batch, step, share):
         return _error(network, batch, device, max(growth for growth in GROWTH if growth[0] <= share)[1]).mean()
 
-    recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 100) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
-                            betas=(0.9, 0.99), weight_decay=1e-4, averaging=0.995, workers=t["workers"], save_every=180)
-    descent.descend(network, state, _Steps(FineWindows(data["seeds"], t["views"], work), t), loss,
+    recipe = descent.TrainingRecipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 100) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
+                                    betas=(0.9, 0.99), weight_decay=1e-4, averaging=0.995, workers=t["workers"], save_every=180)
+    descent.descend(network, state, _UpscalerSteps(FineWindows(data["seeds"], t["views"], work), t), loss,
                     lambda average: figures(average, config, held_out, device), recipe, minutes or t["minutes"], work, device, report)
     return export(work, out)
 
@@ -108,7 +108,7 @@ def shallow(weights: dict[str, torch.Tensor], blocks: int) -> dict[str, torch.Te
     return {name: value for name, value in weights.items() if not (name.startswith("groups.") and int(name.split(".")[2]) >= blocks)}
 
 
-class _Steps(Dataset):
+class _UpscalerSteps(Dataset):
     """The batch of each step, which depends on the step alone."""
 
     def __init__(self, windows: FineWindows, options: dict):

@@ -16,13 +16,13 @@ from pathlib import Path
 from ..contract.files import storage_problem
 from ..contract.messages import Problem
 from . import bare_environment, locks
-from .background import Task
+from .background import BackgroundTask
 from .environment import COMPUTE_FILE, answer, python_of, required, verify
 from .pip_steps import carry_out, compute_of, lock_of, steps
 
 
 def installation(folder: Path, requirements: Path, log: Path, base: Path | None = None, compute: str = "auto", source: str = "pytorch",
-                 wheels: Path | None = None, packages: int = 0) -> Task:
+                 wheels: Path | None = None, packages: int = 0) -> BackgroundTask:
     """Makes an environment in the background. One in the same folder as a broken or cancelled one continues that; where that does not work, it is made anew.
 
     `folder` is new, empty, or one that an earlier installation began; `base` is the Python to make it from (None: found); `compute` is 'auto', 'cpu',
@@ -36,7 +36,7 @@ def installation(folder: Path, requirements: Path, log: Path, base: Path | None 
     expected = packages or 3 * len(required(requirements))  # each brings about two more
     wheels = Path(wheels) if source == "folder" else None
 
-    def work(task: Task) -> None:
+    def work(task: BackgroundTask) -> None:
         try:
             log.parent.mkdir(parents=True, exist_ok=True)
             with open(log, "w", encoding="utf-8") as file:
@@ -44,7 +44,7 @@ def installation(folder: Path, requirements: Path, log: Path, base: Path | None 
         except OSError as error:
             raise storage_problem(error, folder) from error
 
-    return Task("environment", work)
+    return BackgroundTask("environment", work)
 
 
 def find_python() -> Path | None:
@@ -71,7 +71,7 @@ def base_python() -> Path:
     return found
 
 
-def _install(task: Task, folder: Path, requirements: Path, base: Path, compute: str, source: str, wheels: Path | None, hear, log: Path) -> None:
+def _install(task: BackgroundTask, folder: Path, requirements: Path, base: Path, compute: str, source: str, wheels: Path | None, hear, log: Path) -> None:
     lock = lock_of(base, requirements)
     locks.check_path(lock, folder, limited=os.name == "nt")
     made_for = " ".join((compute, source, lock.name))
@@ -89,8 +89,8 @@ def _begun(folder: Path, made_for: str) -> bool:
     return mark.is_file() and mark.read_text(encoding="utf-8") == made_for and answer(python_of(folder), "import pip; print('pip')") == "pip"
 
 
-def _bring(task: Task, folder: Path, requirements: Path, lock: locks.Lock, base: Path, compute: str, source: str, wheels: Path | None, hear, log: Path,
-           made_for: str, anew: bool) -> list[str]:
+def _bring(task: BackgroundTask, folder: Path, requirements: Path, lock: locks.Lock, base: Path, compute: str, source: str, wheels: Path | None, hear,
+           log: Path, made_for: str, anew: bool) -> list[str]:
     """One try of all steps; what is wrong then."""
     if anew:
         task.say(0, 100, "making the solver's folder")
@@ -106,7 +106,7 @@ def _bring(task: Task, folder: Path, requirements: Path, lock: locks.Lock, base:
     return verify(python_of(folder), requirements, importing=True)
 
 
-def _listener(task: Task, log, expected: int):
+def _listener(task: BackgroundTask, log, expected: int):
     """What hears pip's lines: into the log, and package by package into the task's progress."""
     seen = 0
 

@@ -8,7 +8,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.contract import delivery_plan
-from ...core.contract.delivery_plan import Plan
+from ...core.contract.delivery_plan import DeliveryPlan
 from ...core.contract.messages import Problem
 from ...core.worker import read_only
 from .. import captures, jobs, properties
@@ -83,7 +83,7 @@ class WILDCAP_OT_open_delivery(BaseOperator, bpy.types.Operator):
         bpy.ops.wm.path_open(filepath=str(folder))
 
 
-def planned(context) -> Plan:
+def planned(context) -> DeliveryPlan:
     """The delivery that the settings ask for. Raises Problem where it cannot be made."""
     item = captures.require(context)
     settings = properties.settings(item).deliver

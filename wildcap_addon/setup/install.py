@@ -77,7 +77,7 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
         jobs.begin("", "ask", environment.removal(folder))
 
 
-def told(plan: index.Plan, compute: str, folder: Path, free: int) -> tuple[str, ...]:
+def told(plan: index.InstallationPlan, compute: str, folder: Path, free: int) -> tuple[str, ...]:
     """What an installation means, before the artist says yes; `free` bytes are on the folder's disk."""
     return (iface_("PyTorch {} for {} and {} more packages.").format(plan.packages.get("torch", ""), iface_(COMPUTES[compute]), len(plan.packages) - 1),
             iface_("{} to download from {}.").format(index.gigabytes(plan.download), ", ".join(plan.hosts)),
@@ -94,7 +94,7 @@ def chosen() -> tuple[str, str, Path | None]:
     return pip_steps.compute_of(preferences.get().compute), source, preferences.wheels_folder()
 
 
-def look_up(task, compute: str, source: str, wheels: Path | None, folder: Path) -> index.Plan:
+def look_up(task, compute: str, source: str, wheels: Path | None, folder: Path) -> index.InstallationPlan:
     """The plan of an installation, asked of the package index."""
     task.say(0, 4, "looking for a Python to begin with")
     base = installation.base_python()

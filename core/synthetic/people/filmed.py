@@ -23,7 +23,7 @@ TRACED = f"{__package__}.render"
 """The module that traces every frame's light anew."""
 
 
-def render(work: Path, figure: Figure, light: scene.Light, cameras: np.ndarray, frames: Iterable[int], samples: int, scale: float = 1.0,
+def render(work: Path, figure: Figure, light: scene.SceneLight, cameras: np.ndarray, frames: Iterable[int], samples: int, scale: float = 1.0,
            poses: np.ndarray | None = None, room: bool = True, bare: bool = False, focal: float = 1.0, module: str = TRACED) -> None:
     """work/NNNNN.exr, linear, of these frames (numbers into cameras [N, 4, 4], camera to world); files that exist are kept.
 
@@ -40,7 +40,7 @@ def render(work: Path, figure: Figure, light: scene.Light, cameras: np.ndarray, 
     render_parts(work, figure.person.seed, parts, strands, light, cameras, frames, samples, scale, poses, room, focal, module)
 
 
-def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Path], light: scene.Light, cameras: np.ndarray, frames: Iterable[int],
+def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Path], light: scene.SceneLight, cameras: np.ndarray, frames: Iterable[int],
                  samples: int, scale: float = 1.0, poses: np.ndarray | None = None, room: bool = True, focal: float = 1.0, module: str = TRACED) -> None:
     """As `render`, of meshes and strands that are files already."""
     work.mkdir(parents=True, exist_ok=True)
