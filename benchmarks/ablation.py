@@ -42,7 +42,7 @@ from core.solve.light_fit import update_lights, variation
 from core.solve.prior import WEIGHTS, load
 from core.solve.problem import State, albedo, photometric
 from core.solve.recipes import OURS, RECIPES, Recipe
-from core.solve.sampler import sample, seeded
+from core.solve.sampler import Sampler, seeded
 from core.solve.skin_tone import GIVEN, SkinTone
 
 from . import figures
@@ -189,7 +189,10 @@ def solved(given: MaskedUvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0
         meshes.write_obj(capture.head, template.load())
         evidence = read_evidence(capture, read_head(capture), size)
     start = initial.start(prior, evidence, tone, FACE_CROP / cells, recipe)
-    state = sample(prior.of_tone(start.tone), start.observations, start.state, start.recipe, seeded(seed)) if with_prior else texels_alone(start, start.recipe)
+    if with_prior:
+        state = Sampler(prior.of_tone(start.tone), start.recipe, seeded(seed)).sample(start.observations, start.state)
+    else:
+        state = texels_alone(start, start.recipe)
     return maps.finished(state, evidence, start).diffuse
 
 

@@ -160,27 +160,28 @@ def single_steps(row: SolverVariant, capture, options: argparse.Namespace) -> di
 
     from core.contract.messages import Reporter
     from core.face.head import read_head
-    from core.solve import FACE_CROP, initial
+    from core.solve import initial
     from core.solve.evidence import read_evidence
     from core.solve.memory import sample_within_memory
     from core.solve.recipes import OURS
-    from core.solve.sampler import seeded
+    from core.solve.sampler import Sampler, seeded
     from core.solve.skin_tone import parse_skin_tone
 
     prior = prior_of(row, options)
     coarse = OURS.coarse if row.coarse and not prior.one_scale else ()
     recipe = replace(OURS, coarse=coarse, guidance=row.guidance, sharp_edges=False, protect_marks=False)
-    begun = initial.start(prior, read_evidence(capture, read_head(capture), options.size), parse_skin_tone(TONE), FACE_CROP / 96, recipe)
+    evidence = read_evidence(capture, read_head(capture), options.size)
+    begun = initial.start(prior, evidence, parse_skin_tone(TONE), evidence.cell_side(96), recipe)
     short = replace(begun.recipe, steps=options.steps, updates=max(1, recipe.updates * options.steps // recipe.steps))
     if options.compile:
         prior.network = torch.compile(prior.network)
     conditioned = prior.of_tone(begun.tone)
     if options.compile or options.device != "cpu":
-        sample_within_memory(conditioned, begun.observations, begun.state, short, seeded(0))  # warms up
+        sample_within_memory(Sampler(conditioned, short, seeded(0)), begun.observations, begun.state)  # warms up
         begun.state.step, begun.state.x, begun.state.denoised = 0, None, begun.reference
     report = Reporter("solve", emit=lambda message: print(message.text, file=sys.stderr))
     began, worked = time.perf_counter(), time.process_time()
-    sample_within_memory(conditioned, begun.observations, begun.state, short, seeded(0), log=report.log)
+    sample_within_memory(Sampler(conditioned, short, seeded(0)), begun.observations, begun.state, log=report.log)
     seconds, worked = time.perf_counter() - began, time.process_time() - worked
     dtype = str(prior.network.proj_in.weight.dtype).removeprefix("torch.")
     return {"seconds": round(seconds, 3), "processor_seconds": round(worked, 2), "seconds_per_step": round(seconds / short.steps, 4),

@@ -154,12 +154,12 @@ def _loss(network: UNet, statistics: dict[str, torch.Tensor], batch: PatchBatch,
     sigma = (torch.from_numpy(rng.standard_normal(len(mean))).float() * deviation).to(device).add(mean).exp().clamp(0.005, BLIND)
     noise = torch.from_numpy(rng.standard_normal(batch.clean.shape, dtype=np.float32)).to(device)
     told = condition(batch.coords.to(device), OCTAVES, **statistics, tone=batch.tone.to(device), blind=blind)
-    s, spread = sigma[:, None, None, None].expand(-1, 7, -1, -1).clone(), told["spread"]
+    s, spread = sigma[:, None, None, None].expand(-1, 7, -1, -1).clone(), told.spread
     s[:, 3:][blind > 0] = BLIND
-    noisy = torch.where(known > 0, clean + s * noise, told["mean"] + (s**2 + spread**2).sqrt() * noise)
+    noisy = torch.where(known > 0, clean + s * noise, told.mean + (s**2 + spread**2).sqrt() * noise)
     low = device == "cuda" or fast_dtype("cpu") == torch.bfloat16
     with torch.autocast(device, torch.bfloat16, enabled=low):
-        denoised = denoise(network, noisy, sigma, levels=s, **told)
+        denoised = denoise(network, noisy, sigma, told, s)
     weight = known * (s**2 + spread**2) / (s * spread) ** 2
     return (weight * (denoised - clean) ** 2).sum((1, 2, 3)) / known.sum((1, 2, 3)).clamp_min(1)
 
