@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -41,6 +41,15 @@ LEAST_PX = 64
 """Shares of the head's width and height around it in which its features are looked for; and the side of a part of a frame below which they are not."""
 
 
+@dataclass(frozen=True)
+class HeadCameras:
+    """Cameras with respect to the head: as a bundle, as the model that has them, and the tracks that told them."""
+
+    bundle: Bundle
+    model: pycolmap.Reconstruction
+    tracks: list
+
+
 def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, report: Reporter,
            by: Collection[str] | None = None) -> tuple[pycolmap.Reconstruction, float | None]:
     """The model with its cameras placed with respect to the head, in the head's world (metres), and the share of the error that is left of the head's matches
@@ -56,19 +65,19 @@ def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, re
     if len(tracks) < LEAST_TRACKS:
         return model, None
     fitted, held_out = _halves(straight, tracks)
-    followed, _, _ = _follow(room, registered, own, fitted, still, width, report)
-    left = _miss(followed, names, held_out, reach) / max(_miss(bundle, names, held_out, reach), 1e-9)
+    followed = _follow(room, registered, own, fitted, still, width, report)
+    left = _miss(followed.bundle, names, held_out, reach) / max(_miss(bundle, names, held_out, reach), 1e-9)
     if left > SWAYED:
         return model, left
-    bundle, alone, tracks = _follow(room, registered, own, straight, still, width, report)
-    if len(tracks) < LEAST_TRACKS:
+    cameras = _follow(room, registered, own, straight, still, width, report)
+    if len(cameras.tracks) < LEAST_TRACKS:
         return model, left
-    return (_with_others(alone, room, everything, registered, bundle, tracks, own, straight) if len(everything) > len(registered) else alone), left
+    return (_with_others(cameras, room, everything, registered, own, straight) if len(everything) > len(registered) else cameras.model), left
 
 
 def _follow(room: pycolmap.Reconstruction, registered: list, own: Matches, straight: Matches, bundle: Bundle, width: float,
-            report: Reporter) -> tuple[Bundle, pycolmap.Reconstruction, list]:
-    """The cameras with respect to the head, by these of its matches (`straight`: of their pixels without the lens), the model that has them, and its tracks."""
+            report: Reporter) -> HeadCameras:
+    """The cameras with respect to the head, by these of its matches (`straight`: of their pixels without the lens)."""
     names = [image.name for image in registered]
     for step, share in enumerate(REACH):
         report.progress(step, len(REACH), "finding the cameras with respect to the head")
@@ -76,7 +85,7 @@ def _follow(room: pycolmap.Reconstruction, registered: list, own: Matches, strai
         alone = rebuilt(room, bundle, registered, tracks, own)
         _adjust(alone)
         bundle = _with_poses(bundle, alone, names, tracks)
-    return bundle, alone, tracks
+    return HeadCameras(bundle, alone, tracks)
 
 
 def _halves(matches: Matches, tracks: list) -> tuple[Matches, Matches]:
@@ -93,9 +102,10 @@ def _miss(bundle: Bundle, names: list[str], matches: Matches, reach_px: float) -
     return float(np.median(np.linalg.norm(placed.project(camera, point) - pixel, axis=1))) if len(pixel) else np.inf
 
 
-def _with_others(alone: pycolmap.Reconstruction, room: pycolmap.Reconstruction, everything: list, registered: list, bundle: Bundle, tracks: list,
+def _with_others(cameras: HeadCameras, room: pycolmap.Reconstruction, everything: list, registered: list,
                  own: Matches, straight: Matches) -> pycolmap.Reconstruction:
     """The model of the frames `registered` with the others of `everything`: placed by its points, or where they were in the room if they show too few."""
+    alone, bundle, tracks = cameras.model, cameras.bundle, cameras.tracks
     names = [image.name for image in registered]
     found = {image.name: pose_of(image) for image in alone.images.values()}
     points = np.array([alone.points3D[number].xyz for number in sorted(alone.points3D)])

@@ -92,12 +92,12 @@ def _by_views(capture: Capture, settings: Settings, views: list[View], subject: 
     model, found = subject.model, subject.found
     seen = np.max([subject.follow, *(strength * _per_vertex(model.mesh, template.mask(name, 512)) for name, strength in SEEN.items())], axis=0)
     points = _on_skin(unscanned.Points(*read_points(capture)), views, subject, report)
-    fitted = unscanned.fit(model, views, found, subject.trust, points, seen, report, 10, 0.9 * STEPS)
+    fitted = unscanned.fit(model, unscanned.ShownByViews(views, found, subject.trust, points, seen), report, 10, 0.9 * STEPS)
     placed = model.mesh.moved(fitted.pose.apply(model.mesh.vertices))
     levelled = bust.level_edge(model.mesh, fitted.vertices)
     vertices = intersections.mended(placed, levelled, lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
     head, aligned = model.mesh.moved(vertices), model.mesh.moved(fitted.pose.apply(model.shape(fitted.coefficients)))
-    quality.figures(report, model, aligned, head, found, fitted.coefficients, np.zeros(0), subject.follow)
+    quality.figures(report, model, quality.HeadFit(head, aligned, fitted.coefficients, np.zeros(0)), found, subject.follow)
     quality.figures_of_views(report, fitted, views, head)
     quality.judge_views(report, views, head, fitted)
     quality.tell_draft(report, views, head)
@@ -117,7 +117,7 @@ def _on_skin(points: unscanned.Points, views: list[View], subject: Subject, repo
 def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: meshes.Mesh, subject: Subject, least_share: float,
              report: Reporter) -> meshes.Mesh:
     found, model = subject.found, subject.model
-    follow, shaped, hold, trust = subject.follow, subject.shaped, subject.hold, subject.trust
+    follow, shaped, trust = subject.follow, subject.shaped, subject.trust
     report.progress(10, STEPS, "placing the head")
     pose, coefficients = alignment.fit_landmarks(model, found.points, trust)
     report.progress(12, STEPS, "telling hair from skin")
@@ -125,13 +125,15 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
     report.progress(15, STEPS, "finding the nearest head")
     pose, coefficients = alignment.fit_scan(model, pose, coefficients, found.points, trust, scan, shaped)
     start = pose.apply(model.shape(coefficients))
-    vertices = nonrigid.fit(model, start, scan, follow, hold, found.points, trust, settings.registration.iterations, report, 20, 0.9 * STEPS, found.put)
+    targets = nonrigid.LandmarkTargets(found.points, trust, subject.hold, found.put)
+    vertices = nonrigid.fit(model, start, scan, follow, targets, settings.registration.iterations,
+                            lambda share: report.progress(20 + (0.9 * STEPS - 20) * share, 0.9 * STEPS, "fitting the head to the scan"))
     placed = model.mesh.moved(pose.apply(model.mesh.vertices))
     vertices = intersections.mended(placed, bust.level_edge(model.mesh, vertices), lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
 
     head, aligned = model.mesh.moved(vertices), model.mesh.moved(start)
     distances = scan.distances(vertices[follow > 0.5], meshes.vertex_normals(head)[follow > 0.5])
-    quality.figures(report, model, aligned, head, found, coefficients, distances, follow)
+    quality.figures(report, model, quality.HeadFit(head, aligned, coefficients, distances), found, follow)
     quality.judge(report, head, scan, distances, follow, least_share)
     _finish(capture, settings, views, head, subject, report)
     return head

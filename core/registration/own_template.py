@@ -128,7 +128,8 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
         trust[_lid_marks()] = 0
     start = placed.apply(model.shape(coefficients))
     start = _matched(model, start, follow, head, ours, report)
-    vertices = nonrigid.fit(model, start, dense, follow, ours.hold, target, SLIGHT * trust, ITERATIONS, report, 0.5, 1)
+    vertices = nonrigid.fit(model, start, dense, follow, nonrigid.LandmarkTargets(target, SLIGHT * trust, ours.hold), ITERATIONS,
+                            lambda share: report.progress(0.5 + 0.5 * share, 1, "fitting the head to the scan"))
 
     final = skin.moved(vertices)
     drawn = follow > 0.5
@@ -157,8 +158,9 @@ def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, 
     pose, coefficients = alignment.fit_landmarks(ours.model, points, model.landmark_weight)
     trust = SLIGHT * model.landmark_weight
     pose, coefficients = alignment.fit_scan(ours.model, pose, coefficients, points, trust, cover, np.maximum(ours.shaped, 0.7))
-    over = nonrigid.fit(ours.model, pose.apply(ours.model.shape(coefficients)), cover, np.maximum(ours.follow, 0.5 * ours.shaped), ours.hold, points,
-                        trust, COVER_ITERATIONS, report, 0, 0.5)
+    targets = nonrigid.LandmarkTargets(points, trust, ours.hold)
+    over = nonrigid.fit(ours.model, pose.apply(ours.model.shape(coefficients)), cover, np.maximum(ours.follow, 0.5 * ours.shaped), targets,
+                        COVER_ITERATIONS, lambda share: report.progress(0.5 * share, 0.5, "fitting the head to the scan"))
     known = np.flatnonzero(follow > 0.1)
     face, bary = surfaces.Surface(ours.model.mesh.moved(over), SOURCE_SPACING_M).nearest(start[known], vertex_normals(skin)[known], REACH_M[1])
     known, face, bary = known[face >= 0], face[face >= 0], bary[face >= 0]

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,9 +33,20 @@ class Unlike(Problem):
     """A head that could not be laid over the scan."""
 
 
-def figures(report: Reporter, model: HeadModel, aligned: Mesh, head: Mesh, found: Landmarks, coefficients: np.ndarray, distances: np.ndarray,
-            follow: np.ndarray) -> None:
-    """Reports a fit's figures. aligned: the head before the non-rigid fit; distances [M] of the followed vertices (follow [V] > 0.5) to the scan."""
+@dataclass(frozen=True)
+class HeadFit:
+    """What a fit came to: head; aligned, the same before the non-rigid fit; coefficients [K] of the identity; distances [M] in metres of the vertices that
+    are followed to the scan, none where there is no scan."""
+
+    head: Mesh
+    aligned: Mesh
+    coefficients: np.ndarray
+    distances: np.ndarray
+
+
+def figures(report: Reporter, model: HeadModel, fit: HeadFit, found: Landmarks, follow: np.ndarray) -> None:
+    """Reports a fit's figures. follow [V]: the vertices above 0.5 are drawn to the scan, where there is one."""
+    head, distances = fit.head, fit.distances
     known = np.isfinite(found.points).all(1)
     miss = np.linalg.norm(model.at_landmarks(head.vertices) - found.points, axis=1)
     face = (follow > 0.5)[head.faces].all(1)
@@ -47,11 +58,11 @@ def figures(report: Reporter, model: HeadModel, aligned: Mesh, head: Mesh, found
     if found.put.any():
         report.figure("put_landmark_residual_mm", round(1e3 * float(miss[found.put].max()), 2))
     report.figure("eye_opening", round(found.opening, 2) if np.isfinite(found.opening) else None)
-    report.figure("identity_norm", round(float(np.linalg.norm(coefficients)), 2))
+    report.figure("identity_norm", round(float(np.linalg.norm(fit.coefficients)), 2))
     report.figure("head_to_scan_median_mm", round(1e3 * float(np.median(distances)), 3) if len(distances) else None)
     report.figure("head_to_scan_p90_mm", round(1e3 * float(np.percentile(distances, 90)), 3) if len(distances) else None)
     report.figure("face_with_scan_percent", round(100 * len(distances) / max(int((follow > 0.5).sum()), 1), 1))
-    report.figure("flipped_triangles", int(flipped(aligned, head.vertices).sum()))
+    report.figure("flipped_triangles", int(flipped(fit.aligned, head.vertices).sum()))
     report.figure("intersecting_triangles", len(intersecting(head.vertices, head.faces)))
     report.figure("uv_stretch_p95", round(float(np.percentile(stretched, 95)), 2))
 
