@@ -27,6 +27,7 @@ from core.imaging import images
 from core.synthetic.identities import reserved_seeds
 from core.synthetic.sight import random_camera
 from core.training import delighter, people
+from core.training.descent import TrainingRun
 
 QUIET = Reporter("train", emit=lambda message: None)
 
@@ -206,12 +207,12 @@ def test_a_training_goes_on_where_it_stopped(monkeypatch, tmp_path):
     monkeypatch.setattr(delighter, "prepare", lambda seeds, views, work, *rest: _prepared(seeds, work))
     monkeypatch.setattr(delighter, "prepare_people", lambda seeds, views, work, *rest: people.prepare_people(seeds, views, work, QUIET, processes=2))
     with pytest.raises(Problem, match="There are no people in"):
-        delighter.train_delighter("cpu", tmp_path / "out.safetensors", QUIET, growing=True, work=tmp_path / "work")
+        delighter.train_delighter("cpu", tmp_path / "out.safetensors", QUIET, TrainingRun(growing=True, work=tmp_path / "work"))
     out = tmp_path / "out.safetensors"
-    first = delighter.train_delighter("cpu", out, QUIET, minutes=0.01, work=tmp_path / "work")
-    second = delighter.train_delighter("cpu", out, QUIET, minutes=0.02, work=tmp_path / "work")
+    first = delighter.train_delighter("cpu", out, QUIET, TrainingRun(0.01, tmp_path / "work"))
+    second = delighter.train_delighter("cpu", out, QUIET, TrainingRun(0.02, tmp_path / "work"))
     assert second["steps"] > first["steps"] > 0 and second["started"] == "random weights" and len(second["people"]) == 1
-    begun = delighter.train_delighter("cpu", tmp_path / "third.safetensors", QUIET, minutes=0.01, start=out, work=_emptied(tmp_path / "work"))
+    begun = delighter.train_delighter("cpu", tmp_path / "third.safetensors", QUIET, TrainingRun(0.01, _emptied(tmp_path / "work"), start=out))
     assert begun["started"] == "the weights before"
     assert json.loads(out.with_suffix(".json").read_text(encoding="utf-8"))["held_out"]["none"] > 0
     assert not set(second["seeds"]) & set(second["held_out_seeds"])

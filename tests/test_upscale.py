@@ -17,6 +17,7 @@ from core.contract.settings import from_json
 from core.face import template
 from core.imaging import images
 from core.training import fine_windows, upscaler
+from core.training.descent import TrainingRun
 from core.upscale import gloss, network
 from core.upscale.enlarge import enlarge, load_network
 from core.upscale.maps import HeadMaps, read_maps
@@ -230,13 +231,13 @@ def test_a_training_goes_on_where_it_stopped(windows, tmp_path, monkeypatch):
             "training": {"patch": 8, "batch": 4, "rate": 5e-3, "minutes": 1, "skins": 2, "views": 1, "held_out": 1, "seed": 0, "workers": 0}}
     monkeypatch.setitem(upscaler.CONFIGS, "cpu", tiny)
     out = tmp_path / "upscaler.safetensors"
-    first = upscaler.train_upscaler("cpu", out, Reporter("train"), minutes=0.01, work=windows)
-    second = upscaler.train_upscaler("cpu", out, Reporter("train"), minutes=0.02, work=windows)
+    first = upscaler.train_upscaler("cpu", out, Reporter("train"), TrainingRun(0.01, windows))
+    second = upscaler.train_upscaler("cpu", out, Reporter("train"), TrainingRun(0.02, windows))
     assert second["steps"] > first["steps"] > 0 and second["parameters"] == sum(p.numel() for p in network.Rcan(**tiny["model"]).parameters())
     assert load_network(out).tail.weight.abs().max() > 0 and out.with_suffix(".json").is_file()
     monkeypatch.setitem(upscaler.CONFIGS, "gpu", tiny)
     with pytest.raises(Problem, match="other data or of another configuration"):
-        upscaler.train_upscaler("gpu", out, Reporter("train"), work=windows)
+        upscaler.train_upscaler("gpu", out, Reporter("train"), TrainingRun(work=windows))
 
 
 def test_degrading_keeps_the_mean_and_halves_a_relief_as_asked():

@@ -25,7 +25,7 @@ from ..solve.prior import BLIND, WEIGHTS, build, condition, fast_dtype, packed
 from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
 from .patches import PatchBatch, Windows, mean_map, reference_skins, spread_about
-from .release import again, release
+from .release import Card, again, release
 from .skins import SCALES, Skins, carried_names, carried_skins, clusters, synthetic_skins
 
 OCTAVES = 6
@@ -50,16 +50,30 @@ of which more is then to be seen (ln sigma lower by CLEARER)."""
 CLEARER = 1.5
 
 
-def train_prior(config: str, out: Path, report: Reporter, minutes: float | None = None, skins: Path | None = None, held_out: list[str] = (),
-                work: Path | None = None) -> dict:
-    """Trains for `minutes` in all (those of earlier runs included), writes `out` (safetensors, fp16) and its card, returns the card.
+def train_prior(config: str, out: Path, report: Reporter, run: descent.TrainingRun, skins: Path | None = None,
+                held_out: list[str] = ()) -> dict:
+    """Trains the solver's prior.
 
-    Raises Problem where `skins` is no carried folder, or the work folder holds a training on other data.
+    Parameters
+    ----------
+    config : one of CONFIGS
+    out : safetensors, fp16; its card is written beside it
+    report : hears of progress
+    run : minutes and the work folder; no light falls on its maps, and it always begins with random weights
+    skins : folder of skins that `train carry` brought into our UVs
+    held_out : skins of that folder that are kept from training
+
+    Returns
+    -------
+    The card.
+
+    Raises
+    ------
+    Problem : where `skins` is no carried folder, or the work folder holds a training on other data
     """
-    work = Path(work or Path(tempfile.gettempdir()) / "wildcap_prior")
+    work = Path(run.work or Path(tempfile.gettempdir()) / "wildcap_prior")
     work.mkdir(parents=True, exist_ok=True)
     t = CONFIGS[config]["training"]
-    minutes = minutes or t["minutes"]
     device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
     data = named_data(t, skins, held_out)
     windows, seen, unseen = _windows(data, skins, work, report)
@@ -75,9 +89,10 @@ def train_prior(config: str, out: Path, report: Reporter, minutes: float | None 
         return {kind: _held_out_loss(average, statistics, config, b, device) for kind, b in held_out_windows.items()}
 
     # constant, then linear to zero over the second half
-    recipe = descent.TrainingRecipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.02, min(1.0, 2 * (1 - share))),
+    recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
+                                    rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.02, min(1.0, 2 * (1 - share))),
                                     betas=(0.9, 0.99), weight_decay=1e-3, averaging=0.9995, workers=t["workers"], save_every=120)
-    descent.descend(network, state, _PriorSteps(windows, t), loss, figures, recipe, minutes, work, device, report)
+    descent.descend(network, state, descent.Objective(_PriorSteps(windows, t), loss, figures), recipe, work, device, report)
     return export(work, out)
 
 
@@ -92,8 +107,9 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
         told += f"; {len(data['skins'])} skins of {data['from']}, carried into the built-in UVs, diffuse only"
     losses = {kind: dict(zip((f"scale_{scale}" for scale in SCALES), of, strict=True)) for kind, of in state["history"][-1][2].items()}
     what = "mean squared error of the network's output on fixed patches and noise of held-out skins; 1 is that of the mean face"
-    return release(out, state, {**CONFIGS[state["config"]], "scales": list(SCALES)}, told, again("prior", state), {"loss": losses, "what": what},
-                   {**statistics, "references": levels, "references_range": limits}, tones=[[round(v, 4) for v in tone] for tone in state["tones"]])
+    card = Card({**CONFIGS[state["config"]], "scales": list(SCALES)}, told, again("prior", state), {"loss": losses, "what": what},
+                {"tones": [[round(v, 4) for v in tone] for tone in state["tones"]]})
+    return release(out, state, card, {**statistics, "references": levels, "references_range": limits})
 
 
 def named_data(t: dict, skins: Path | None, held_out: list[str]) -> dict:
