@@ -31,7 +31,7 @@ from . import command_line, descent
 from .people import People, is_prepared, prepare_people
 from .portraits import PortraitBatch, Portraits, mirrored, prepare
 from .prior import FIRST_SEED, HELD_OUT_SEED, named_data
-from .release import Card, again, release
+from .release import TrainingCard, again, release
 from .shading_errors import disagreement, mean_deviation, mean_size, slope_error, split_tone
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "delighter.safetensors"
@@ -173,7 +173,7 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     command = again("delighter", state) + (" --hdri hdri" if data["panoramas"] else "")
     ready = sum(is_prepared(seed, CONFIGS[state["config"]]["training"]["views"], work) for seed in data["people"])  # the others were not there yet
     more = {"panoramas": data["panoramas"], "people": data["people"][:ready], "started": data["started"]}
-    return release(out, state, Card(CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what}, more))
+    return release(out, state, TrainingCard(CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what}, more))
 
 
 class _DelighterSteps(Dataset):

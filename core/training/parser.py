@@ -27,7 +27,7 @@ from ..face.parts import PARTS
 from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
 from .prior import FIRST_SEED, HELD_OUT_SEED
-from .release import Card, again, release
+from .release import TrainingCard, again, release
 from .snapshots import SnapshotBatch, Snapshots, is_prepared, prepare
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "parser.safetensors"
@@ -136,7 +136,7 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     config, named = CONFIGS[state["config"]], state["data"]
     ready = sum(is_prepared(seed, config["training"]["views"], work) for seed in named["seeds"])  # the others were not there yet
     more = {"panoramas": named["panoramas"], "prepared": ready}
-    return release(out, state, Card(config, told, command, {**state["history"][-1][2], "what": what}, more))
+    return release(out, state, TrainingCard(config, told, command, {**state["history"][-1][2], "what": what}, more))
 
 
 class Steps(Dataset):

@@ -25,7 +25,7 @@ from ..solve.prior import BLIND, WEIGHTS, build, condition, fast_dtype, packed
 from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
 from .patches import PatchBatch, Windows, mean_map, reference_skins, spread_about
-from .release import Card, again, release
+from .release import TrainingCard, again, release
 from .skins import SCALES, Skins, carried_names, carried_skins, clusters, synthetic_skins
 
 OCTAVES = 6
@@ -107,8 +107,8 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
         told += f"; {len(data['skins'])} skins of {data['from']}, carried into the built-in UVs, diffuse only"
     losses = {kind: dict(zip((f"scale_{scale}" for scale in SCALES), of, strict=True)) for kind, of in state["history"][-1][2].items()}
     what = "mean squared error of the network's output on fixed patches and noise of held-out skins; 1 is that of the mean face"
-    card = Card({**CONFIGS[state["config"]], "scales": list(SCALES)}, told, again("prior", state), {"loss": losses, "what": what},
-                {"tones": [[round(v, 4) for v in tone] for tone in state["tones"]]})
+    card = TrainingCard({**CONFIGS[state["config"]], "scales": list(SCALES)}, told, again("prior", state), {"loss": losses, "what": what},
+                        {"tones": [[round(v, 4) for v in tone] for tone in state["tones"]]})
     return release(out, state, card, {**statistics, "references": levels, "references_range": limits})
 
 

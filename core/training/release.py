@@ -15,7 +15,7 @@ from ..contract.files import replacing
 
 
 @dataclass(frozen=True)
-class Card:
+class TrainingCard:
     """What a training's card says beside what its state tells: its configuration; data: in words what was learnt from; command: what makes these weights
     again; held_out: the last figures on held-out data and what they are; more: entries that only this training's card has."""
 
@@ -26,7 +26,7 @@ class Card:
     more: dict = field(default_factory=dict)
 
 
-def release(out: Path, state: dict, card: Card, tensors: dict[str, torch.Tensor] | None = None) -> dict:
+def release(out: Path, state: dict, card: TrainingCard, tensors: dict[str, torch.Tensor] | None = None) -> dict:
     """Writes the averaged weights of a training and their card.
 
     Parameters

@@ -36,7 +36,7 @@ from ..synthetic.environments import read_panoramas
 from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
 from .prior import FIRST_SEED, HELD_OUT_SEED
-from .release import Card, again, release
+from .release import TrainingCard, again, release
 from .shading_errors import disagreement, mean_deviation, mean_size, slope_error, split_tone
 from .unfolded import LitPerson, light_up
 
@@ -227,7 +227,7 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     command = again("texels", state) + (" --hdri hdri" if data["panoramas"] else "")
     ready = sum(_path(work, seed).is_file() for seed in data["seeds"])
     more = {"panoramas": data["panoramas"], "people": ready, "started": data["started"]}
-    return release(out, state, Card(CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what}, more))
+    return release(out, state, TrainingCard(CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what}, more))
 
 
 class _TexelSteps(Dataset):

@@ -77,8 +77,9 @@ def scenes_of(seed: int) -> list[LitSkin]:
     found = []
     for k in range(LIGHTS):
         rng = np.random.default_rng([seed, k, 31])
-        sky, sun, colour, _ = light.random_light(rng)
-        colour = colour * (rng.random() < 0.7)  # else the sun is behind clouds, or there is none
+        drawn = light.random_light(rng)
+        sky, sun = drawn.sky, drawn.sun
+        colour = drawn.colour * (rng.random() < 0.7)  # else the sun is behind clouds, or there is none
         cosine = np.maximum(normals @ sun, 0)
         facing = np.flatnonzero(cosine > 0.02)
         reach = np.zeros(len(points))

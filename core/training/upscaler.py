@@ -25,7 +25,7 @@ from ..upscale.network import MISSED, Rcan, bicubic
 from . import command_line, descent
 from .fine_windows import FineWindows, prepare
 from .prior import named_data
-from .release import Card, again, release
+from .release import TrainingCard, again, release
 
 _MODEL = {"groups": 5, "blocks": 10, "width": 64}
 CONFIGS = {
@@ -115,7 +115,7 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     state, config = state | {"average": shallow(state["average"], KEPT)}, config | {"model": config["model"] | {"blocks": min(KEPT, config["model"]["blocks"])}}
     told = "Windows of procedural skins of core/synthetic at 4096 on the built-in head, which derives from the MakeHuman base mesh (CC0)"
     what = "mean absolute error on degraded patches of held-out skins, as a share of bicubic resampling's, with all blocks that were trained"
-    return release(out, state, Card(config, told, again("upscaler", state), {**state["history"][-1][2], "what": what}, {"growth": GROWTH}))
+    return release(out, state, TrainingCard(config, told, again("upscaler", state), {**state["history"][-1][2], "what": what}, {"growth": GROWTH}))
 
 
 def shallow(weights: dict[str, torch.Tensor], blocks: int) -> dict[str, torch.Tensor]:
