@@ -43,7 +43,7 @@ def film(folder: Path, name: str, figure: Figure, light: scene.SceneLight, said:
     taken = phone.sample_phone(seed)
     cameras, poses = scene.camera_path(seed, frames), motion.sway(frames, taken.sway_mm, taken.sway_degrees, np.random.default_rng([seed, 71]))
     work = folder / "rendered" / name
-    filmed.render(work, figure, light, cameras, range(frames), SAMPLES, SCALE, poses, room)
+    filmed.render(work, figure, light, scene.Shot(cameras, range(frames), SAMPLES, SCALE, poses, room))
     rendered = time.monotonic()
     inside = np.linalg.inv(poses) @ cameras
     views = [sample.view_of(matrix, SCALE) for matrix in inside]

@@ -78,7 +78,7 @@ def film(folder: Path, count: int) -> Path:
     if not all((work / f"{number:05d}.exr").is_file() for number in numbers):
         from core.synthetic.people.figure import make_figure
 
-        filmed.render(work, make_figure(SEED), KINDS[LIGHT](SEED), cameras, numbers, SAMPLES, module="benchmarks.long_films_render")
+        filmed.render(work, make_figure(SEED), KINDS[LIGHT](SEED), scene.Shot(cameras, numbers, SAMPLES), module="benchmarks.long_films_render")
     out.mkdir(exist_ok=True)
     write_json(out / "cameras.json", {"name": "film", "light": LIGHT, "focal_px": scene.FOCAL, "width": scene.WIDTH, "height": scene.HEIGHT,
                                       "cameras": [{"frame": k, "matrix_world": cameras[number].tolist()} for k, number in enumerate(numbers)]})

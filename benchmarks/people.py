@@ -92,7 +92,7 @@ def make(person: FilmedPerson, folder: Path, place: str = "wild") -> Capture:
     skin = make_skin(sample_parameters(person.seed), sample.MAPS)
     light, cameras = _set(person, place)
     work = folder / "rendered" / name
-    sample.render_frames(work, person.seed, skin, cameras, list(range(len(cameras))), SAMPLES, SCALE, room=False, light=light, suffix=".exr")
+    sample.render_frames(work, person.seed, skin, scene.Shot(cameras, list(range(len(cameras))), SAMPLES, SCALE, room=False), light=light, suffix=".exr")
     head = subject_mesh(person.seed)
     meshes.write_obj(truth / "head.obj", head)
     if place == "wild":

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -120,9 +120,9 @@ def _light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.ndarray,
     """A random light: shading without cast shadows [S, S, 3], the share of it that these leave [S, S, 3], and the blocked share of the sun [S, S]."""
     thrown_by, radius = SHADOWS[shadows]
     rng = np.random.default_rng(seeds)
-    sky, sun, colour, _ = random_light(rng)
-    lit, shadow, normal = bake(template.load(), size, sky, sun, colour, radius, thrown_by, rng)
-    open_light, _, _ = bake(template.load(), size, sky, sun, colour, radius, "none", rng)
+    drawn = replace(random_light(rng), radius=radius)
+    lit, shadow, normal = bake(template.load(), size, drawn, thrown_by, rng)
+    open_light, _, _ = bake(template.load(), size, drawn, "none", rng)
     face = template.mask("face", size) > 0.5
     even = _sh_part(open_light, normal, face)
     rest = open_light - even

@@ -7,6 +7,7 @@ World: metres, +Z up, the head's middle at the origin, its face towards -Y. The 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,6 +52,21 @@ class SceneLight:
     blockers: Mesh | None = None
     lamps: tuple[AreaLamp, ...] = ()
     flash: float = 0.0
+
+
+@dataclass(frozen=True)
+class Shot:
+    """What is rendered of a scene, and how well. cameras [N, 4, 4]: camera to world; frames: numbers into them; samples: of Cycles, a pixel; scale: of the
+    pictures' size; poses [N, 4, 4]: where the head is in each frame, head to world, None: still; room: whether there is anything behind the person; focal:
+    factor on the focal length, for close-ups."""
+
+    cameras: np.ndarray
+    frames: Sequence[int]
+    samples: int
+    scale: float = 1.0
+    poses: np.ndarray | None = None
+    room: bool = True
+    focal: float = 1.0
 
 
 def sun_of(seed: int) -> Sun:

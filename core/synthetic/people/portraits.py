@@ -23,7 +23,7 @@ from ...light.skylight import radiance_transfer
 from ...light.spherical_harmonics import LAMBERT, per_function, sh_basis
 from ..environments import Environment, made_environment, panorama_environment
 from ..olat import BASIS, LIGHTS
-from ..portrait import GOBOS, FittedLight, Portrait, fitted_light, gobo
+from ..portrait import GOBOS, FittedLight, LampOnHead, Portrait, fitted_light, gobo
 from ..response import curve, develop, expose
 from .clutter import backdrop, cover, with_open_mouth
 from .figure import Figure
@@ -254,8 +254,9 @@ def _shadow(stage: RelightableView, lamps: list[int], tints: list, before: list,
 def _fitted(stage: RelightableView, environment: Environment, lamps: list[int], tints: list, tone: np.ndarray, rng: np.random.Generator) -> FittedLight:
     here = stage.here.ravel()
     transfer, smooth = stage.transfer.reshape(-1, 9).astype(np.float32), stage.normal.reshape(-1, 3).astype(np.float32) / 127
-    reach = [stage.reach[..., k].ravel().astype(np.float32)[here] / 255 for k in lamps]
-    found = fitted_light(transfer[here], smooth[here], reach, environment, [stage.unlit.lamps[k] for k in lamps], tints, tone, rng)
+    shining = [LampOnHead(stage.unlit.lamps[k], tint, stage.reach[..., k].ravel().astype(np.float32)[here] / 255)
+               for k, tint in zip(lamps, tints, strict=True)]
+    found = fitted_light(transfer[here], smooth[here], shining, environment, tone, rng)
     whole = [np.zeros((len(here), 3), np.float32) for _ in range(3)]
     for target, values in zip(whole, (found.ambient, found.sunlit, found.normal), strict=True):
         target[here] = values
