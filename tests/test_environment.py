@@ -68,7 +68,7 @@ def follow(task: BackgroundTask, timeout_s: float = 120) -> list:
 
 
 def install(folder: Path, local: Path, **options) -> list:
-    task = installation.installation(folder, local, folder.with_name("install.log"), **options)
+    task = installation.installation(folder, local, folder.with_name("install.log"), None, installation.PackageSource(**options))
     task.start()
     return follow(task)
 
@@ -137,7 +137,7 @@ def test_what_cannot_be_loaded_after_two_tries_is_told(local, tmp_path):
 
 
 def test_a_cancelled_installation_says_so(local, tmp_path):
-    task = installation.installation(tmp_path / "env", local, tmp_path / "install.log")
+    task = installation.installation(tmp_path / "env", local, tmp_path / "install.log", None, installation.PackageSource())
     task.start()
     task.cancel()
     assert isinstance(follow(task)[-1], Cancelled)
@@ -240,10 +240,10 @@ def test_other_peoples_folders_are_left_alone(local, tmp_path):
     mine.mkdir()
     (mine / "a.jpg").write_bytes(b"1")
     with pytest.raises(Problem, match="other files"):
-        installation.installation(mine, local, tmp_path / "log")
+        installation.installation(mine, local, tmp_path / "log", None, installation.PackageSource())
     (mine / "pyvenv.cfg").write_text("home = /usr/bin")  # an environment of somebody else's
     with pytest.raises(Problem, match="other files"):
-        installation.installation(mine, local, tmp_path / "log")
+        installation.installation(mine, local, tmp_path / "log", None, installation.PackageSource())
     with pytest.raises(Problem, match="no environment that WildCap made"):
         remove(mine)
     assert (mine / "a.jpg").is_file()

@@ -41,8 +41,8 @@ def _add_build(parser: argparse.ArgumentParser) -> None:
 
 def _install(options: argparse.Namespace) -> int:
     folder = options.folder.absolute()
-    task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), Path(sys.executable), options.compute,
-                                     "folder" if options.wheels else options.packages, options.wheels)
+    task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), Path(sys.executable),
+                                     installation.PackageSource(options.compute, "folder" if options.wheels else options.packages, options.wheels))
     _follow(task)
     print(f"The solver is ready: {python_of(folder)}")
     return 0

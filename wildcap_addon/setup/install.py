@@ -41,8 +41,8 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
         plan = asking.answer(("plan", compute, source, wheels))
         if plan is not None:
             index.check_space(plan, folder)
-        task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), compute=compute, source=source,
-                                         wheels=wheels, packages=len(plan.packages) if plan is not None else 0)
+        task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), None,
+                                         installation.PackageSource(compute, source, wheels), len(plan.packages) if plan is not None else 0)
         asking.forget(("size", str(folder)))
         jobs.begin("", "install", task, lambda: accept(environment.python_of(folder)))
 
