@@ -84,7 +84,7 @@ def test_what_a_worker_prepared_waits_for_a_click(addon, capture, monkeypatch):
     bpy = pytest.importorskip("bpy")
     session, mask_image = addon("paint.session"), addon("paint.mask_image")
     started, prepared = [], addon("jobs").before_start
-    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **options: started.append(options) or [prepare() for prepare in prepared])
+    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool, **options: started.append(tool) or [prepare() for prepare in prepared])
     bpy.ops.wildcap.bring_in_head()
     with pytest.raises(RuntimeError, match="Click Paint Mask first"):
         bpy.ops.wildcap.snap_mask()
@@ -95,7 +95,7 @@ def test_what_a_worker_prepared_waits_for_a_click(addon, capture, monkeypatch):
     mine[5:9] = 1
     mask_image.set_values(session.mask(), mine)
     bpy.ops.wildcap.snap_mask()
-    assert started[0]["tool"] == "mask_edges" and (capture / "shadow_mask.png").read_bytes() == mask_image.grey_png(mine)
+    assert started[0] == "mask_edges" and (capture / "shadow_mask.png").read_bytes() == mask_image.grey_png(mine)
     theirs = np.zeros((64, 64), np.float32)
     theirs[6:8] = 1
     (capture / "shadow_mask_edges.png").write_bytes(mask_image.grey_png(theirs))
@@ -127,7 +127,7 @@ def test_the_estimated_tone_reaches_the_settings(addon, capture, monkeypatch):
         figures = {"skin_tone_srgb": [0.5, 0.25, 0.125]}
 
     started = []
-    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **options: started.append(options) or Job())
+    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool, **options: started.append(options) or Job())
     bpy.ops.wildcap.estimate_skin_tone()
     started[0]["then"]()
     item = addon("captures").active(bpy.context)

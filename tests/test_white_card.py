@@ -48,10 +48,10 @@ def test_the_chart_that_the_solver_finds_reaches_the_settings(addon, item, monke
         figures = {"white_point": [0.9, 0.8, 0.6]}
 
     started = []
-    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **options: started.append(options) or Job())
+    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool, **options: started.append((tool, options)) or Job())
     bpy.ops.wildcap.find_color_checker()
-    assert started[0]["tool"] == "white_point"
-    started[0]["then"]()
+    assert started[0][0] == "white_point"
+    started[0][1]["then"]()
     assert item.solve.white_point == "0.9000,0.8000,0.6000"
 
 

@@ -42,7 +42,7 @@ class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
         until_it_ends = ExitStack()
         at = until_it_ends.enter_context(read_only.stand_in(captures.folder(item), chosen["folder"]))
         try:
-            jobs.start(item, "deliver", tool="deliver", then=lambda: waiting.maps_made(root, plan), at=at, ended=until_it_ends.close, deliver=chosen)
+            jobs.start_tool(item, "deliver", "deliver", then=lambda: waiting.maps_made(root, plan), at=at, ended=until_it_ends.close, deliver=chosen)
         except BaseException:
             until_it_ends.close()
             raise

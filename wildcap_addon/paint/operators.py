@@ -124,7 +124,7 @@ class WILDCAP_OT_snap_mask(ToolOperator, bpy.types.Operator):
 
     def work(self, context):
         item = captures.require(context)
-        jobs.start(item, "tool", tool="mask_edges", then=lambda: session.offer('SNAPPED'))
+        jobs.start_tool(item, "mask_edges", then=lambda: session.offer('SNAPPED'))
 
 
 CLASSES = (WILDCAP_OT_paint_mask, WILDCAP_OT_finish_mask, WILDCAP_OT_edit_mask, WILDCAP_OT_detect_mask, WILDCAP_OT_snap_mask)
