@@ -142,7 +142,7 @@ def build(observations: list[UnwrappedView], surface: Unfolded, settings: Settin
 
         features = load_features(settings.texture.perceptual_network, settings.compute_device)
         wanted = (confidence > 0.3) & (template.mask("face", len(confidence)) > 0.5 if built_in else True)
-        log_texture, losses = refine(log_texture, observations, surface, wanted, features, settings.texture.perceptual, report, settings.compute_device)
+        log_texture, losses = refine(log_texture, observations, surface, wanted, features, settings.texture.perceptual, report)
         report.figure("perceptual_network", features.name)
     return Built(log_texture, confidence, gains, shift, losses)
 

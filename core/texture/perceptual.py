@@ -47,11 +47,24 @@ class Target:
 
 
 def refine(log_texture: np.ndarray, observations: list[UnwrappedView], surface: Unfolded, wanted: np.ndarray, features: Features, steps: int,
-           report: Reporter, device: str = "cpu") -> tuple[np.ndarray, dict]:
-    """The blend log_texture [S, S, 3] with its detail optimised, and {"before", "after"}: the mean loss over the same tiles.
+           report: Reporter) -> tuple[np.ndarray, dict]:
+    """The blend with its detail optimised; same machine, same map.
 
-    wanted: bool [S, S], texels worth looking at (the face). Same machine, same map.
+    Parameters
+    ----------
+    log_texture : [S, S, 3], natural log of linear colour
+    observations : the views
+    surface : of the head, unfolded at their size
+    wanted : bool [S, S], texels worth looking at (the face)
+    features : what tells the perceptual distance; its device is computed on
+    steps : of the optimisation
+    report : hears of progress
+
+    Returns
+    -------
+    The texture as `log_texture` is, and {"before", "after"}: the mean loss over the same tiles.
     """
+    device = features.device
     targets = []
     for i, observation in enumerate(observations):
         report.progress(i, len(observations), f"perceptual step: looking through {observation.name}")
