@@ -195,13 +195,14 @@ def test_a_cancel_ends_the_writing_and_leaves_nothing(tmp_path):
             raise CancelledError("upscale")
 
     with pytest.raises(CancelledError):
-        upscale._write_together([partial(images.write_data, tmp_path / f"{i}.png", np.zeros((4 * images.ROWS, 8)), check=cancelled) for i in range(3)],
+        blank = np.zeros((4 * images.ROWS_BETWEEN_CHECKS, 8))
+        upscale._write_together([partial(images.write_data, tmp_path / f"{i}.png", blank, check=cancelled) for i in range(3)],
                                 lambda done: None)
     assert not list(tmp_path.iterdir()) and len(asked) <= 5, "what had not begun did not begin"
 
 
 def test_a_map_of_many_strips_is_whole(tmp_path):
-    for rows in (images.ROWS - 1, images.ROWS, 2 * images.ROWS + 7):
+    for rows in (images.ROWS_BETWEEN_CHECKS - 1, images.ROWS_BETWEEN_CHECKS, 2 * images.ROWS_BETWEEN_CHECKS + 7):
         truth = np.linspace(0, 1, 3 * rows * 5, dtype=np.float32).reshape(rows, 5, 3)
         images.write_data(tmp_path / "a.png", truth, bits=16)
         images.write_data(tmp_path / "a.exr", truth)

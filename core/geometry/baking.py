@@ -18,7 +18,8 @@ from ..imaging import images
 from . import atlas, raster, surfaces
 from .meshes import Mesh, vertex_normals
 
-STRIP = 128
+STRIP_ROWS = 128
+"""Rows of a map that are worked out at once: what they need beside the map stays small, and a cancel is heard."""
 BLEED_PX = 16
 """Bleed at a map of 4096; smaller maps have less in proportion, but no less than two."""
 
@@ -63,9 +64,9 @@ def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick:
     low, high = _rows(part, size)
     uv = np.full((size, size, 2), np.nan, np.float32)
     turn, mirrored, covered = np.zeros((size, size), np.float32), np.zeros((size, size), bool), np.zeros((size, size), bool)
-    for row in range(0, size, STRIP):
+    for row in range(0, size, STRIP_ROWS):
         tick(row / size)
-        end = min(row + STRIP, size)
+        end = min(row + STRIP_ROWS, size)
         crossing = (high >= row) & (low <= end)
         if not crossing.any():
             continue
@@ -95,10 +96,10 @@ def bake(image: np.ndarray, at: TexelPartners) -> np.ndarray:
     height, width = image.shape[:2]
     out = np.empty((*at.covered.shape, *image.shape[2:]), np.float32)
     low, high = image.min(), image.max()
-    for row in range(0, len(out), STRIP):
-        uv = np.nan_to_num(at.uv[row:row + STRIP])
+    for row in range(0, len(out), STRIP_ROWS):
+        uv = np.nan_to_num(at.uv[row:row + STRIP_ROWS])
         x, y = uv[..., 0] * width - 0.5, (1 - uv[..., 1]) * height - 0.5
-        out[row:row + STRIP] = np.clip(cv2.remap(image, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE), low, high)  # cubic overshoots at edges
+        out[row:row + STRIP_ROWS] = np.clip(cv2.remap(image, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE), low, high)  # cubic overshoots at edges
     return bled(out, at)
 
 
@@ -108,8 +109,8 @@ def bake_normals(packed: np.ndarray, at: TexelPartners) -> np.ndarray:
     What it tells is how the skin leaves its own smooth surface; that is kept, for the target brings a smooth surface of its own.
     """
     out = bake(packed, at)
-    for row in range(0, len(out), STRIP):
-        part = np.s_[row:row + STRIP]
+    for row in range(0, len(out), STRIP_ROWS):
+        part = np.s_[row:row + STRIP_ROWS]
         vectors = out[part] * 2 - 1
         turn, known = at.turn[part], at.known[part]
         x, y = vectors[..., 0].copy(), vectors[..., 1] * np.where(at.mirrored[part], -1, 1)

@@ -22,7 +22,7 @@ from ..contract.files import replacing
 from ..contract.messages import Problem
 from ..contract.stages import advise_remaking
 from . import heif
-from .checks import MOST_BYTES, SAVE_ANEW, check_written, open_picture, read_pixels
+from .checks import MOST_PICTURE_BYTES, SAVE_ANEW, check_written, open_picture, read_pixels
 
 EXIF = {heif.FOCAL_LENGTH: "FocalLength", heif.FOCAL_35MM: "FocalLengthIn35mmFilm", heif.PLANE_RESOLUTION: "FocalPlaneXResolution",
         heif.PLANE_UNIT: "FocalPlaneResolutionUnit", heif.WIDTH: "PixelXDimension", heif.HEIGHT: "PixelYDimension"}
@@ -34,7 +34,7 @@ QUICK = {"level": 1, "filter": 0x20}
 """zlib's level and libpng's filter (each row less the one above it) of pictures that are not shipped: of what was tried on the solved maps
 (`python -m benchmarks.png_levels`) the quickest that is hardly larger than libpng's own choice of filters."""
 
-ROWS = 256
+ROWS_BETWEEN_CHECKS = 256
 """Rows that are encoded between two looks at a cancel: 0.3 s of a map of 4096; a multiple of what EXR packs together (16)."""
 
 
@@ -180,7 +180,7 @@ def _rgb(pixels: np.ndarray) -> np.ndarray:
 
 def _read(path: Path) -> np.ndarray:
     if heif.is_heif(path):
-        return heif.read_pixels(path, MOST_BYTES)
+        return heif.read_pixels(path, MOST_PICTURE_BYTES)
     pixels, turned = read_pixels(Path(path))
     lying, rows, columns = TURNS.get(turned, TURNS[1])
     return np.ascontiguousarray((pixels.swapaxes(0, 1) if lying else pixels)[::rows, ::columns])
@@ -220,9 +220,9 @@ def _write(path: Path, pixels: np.ndarray, encoding: _Encoding, check: Callable[
 
 def _write_rows(output: oiio.ImageOutput, pixels: np.ndarray, check: Callable[[], None]) -> bool:
     """Whether all rows could be written. A map of 4096 takes seconds, so `check` is asked in between."""
-    for row in range(0, len(pixels), ROWS):
+    for row in range(0, len(pixels), ROWS_BETWEEN_CHECKS):
         check()
-        if not output.write_scanlines(row, min(row + ROWS, len(pixels)), 0, pixels[row:row + ROWS]):
+        if not output.write_scanlines(row, min(row + ROWS_BETWEEN_CHECKS, len(pixels)), 0, pixels[row:row + ROWS_BETWEEN_CHECKS]):
             return False
     return True
 

@@ -53,7 +53,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     subject = _subject(landmarks.with_artists(landmarks.onto_surface(found, views, surface), given), report)
     photographs = read_frames(capture).kind == PHOTOGRAPHS
     try:
-        head = _by_scan(capture, settings, views, surface, subject, quality.ENOUGH_SHARE if photographs else quality.LEAST_SHARE, report)
+        head = _by_scan(capture, settings, views, surface, subject, quality.LEAST_SHARE_OF_PHOTOGRAPHS if photographs else quality.LEAST_FOLLOWED_SHARE, report)
         if photographs:
             quality.tell_draft(report, views, head)
     except quality.Unlike as problem:
@@ -111,7 +111,7 @@ def _on_skin(points: unscanned.Points, views: list[View], subject: Subject, repo
     pose, coefficients = alignment.fit_landmarks(subject.model, subject.found.points, subject.trust)
     head = subject.model.mesh.moved(pose.apply(subject.model.shape(coefficients)))
     share = np.nan_to_num(hair.hidden_share(points.places, points.towards, views, head, report))
-    return unscanned.Points(points.places[share <= hair.HAIR], points.towards[share <= hair.HAIR])
+    return unscanned.Points(points.places[share <= hair.HAIR_SHARE], points.towards[share <= hair.HAIR_SHARE])
 
 
 def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: meshes.Mesh, subject: Subject, least_share: float,

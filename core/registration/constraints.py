@@ -17,7 +17,7 @@ from ..geometry.views import View
 from .alignment import HeadModel
 from .landmarks import Landmarks
 
-TURNED_AWAY, SQUARE = 0.15, 0.45
+LEAST_COSINE, FULL_COSINE = 0.15, 0.45
 """Cosines between a landmark's normal and its view: below the first it has slid onto the outline and says nothing, from the second on it counts fully."""
 DEPTH_SHARE = 0.06
 """What a depth taken from the mean head counts for beside a landmark's place in the picture: people differ from it by a centimetre, and a net's mark errs by
@@ -64,7 +64,7 @@ def from_landmarks(model: HeadModel, vertices: np.ndarray, views: list[View], fo
         rays = view.rays(pixels)
         towards = view.centre - at
         towards /= np.linalg.norm(towards, axis=1, keepdims=True)
-        facing = np.clip(((normals * towards).sum(1) - TURNED_AWAY) / (SQUARE - TURNED_AWAY), 0, 1)
+        facing = np.clip(((normals * towards).sum(1) - LEAST_COSINE) / (FULL_COSINE - LEAST_COSINE), 0, 1)
         weight = facing * used * trust * model.landmark_weight
         index = np.flatnonzero(weight > 0.01)
         along = ((at - view.centre) * rays).sum(1, keepdims=True)

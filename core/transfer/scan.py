@@ -14,7 +14,7 @@ import numpy as np
 import trimesh
 
 from ..geometry import atlas, raster, surfaces
-from ..geometry.baking import STRIP, TexelPartners
+from ..geometry.baking import STRIP_ROWS, TexelPartners
 from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.views import View
 from ..imaging import images
@@ -113,9 +113,9 @@ def displacement(head: Mesh, scan: Mesh, size: int, tick: Callable[[float], None
     """How far the scan lies outside the head, along the head's normals, in metres: float32 [S, S] in the head's UVs; zero where there is no scan."""
     surface, normals = surfaces.Surface(scan, 0.01), vertex_normals(head)
     out, known = np.zeros((size, size), np.float32), np.zeros((size, size), bool)
-    for row in range(0, size, STRIP):
+    for row in range(0, size, STRIP_ROWS):
         tick(row / size)
-        end = min(row + STRIP, size)
+        end = min(row + STRIP_ROWS, size)
         face, bary = raster.rasterize_uv(head, size, (row, end))
         inside = face >= 0
         points = raster.interpolate(head.vertices, head.faces, face[inside], bary[inside].astype(np.float64))
