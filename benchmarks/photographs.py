@@ -34,7 +34,7 @@ from core.imaging import images
 from . import figures
 from .delight_portraits import subjects_by_tone
 from .measures.agreement import disagreement
-from .measures.features_kept import contrasts, joint, kept
+from .measures.features_kept import contrast_kept, contrasts, joint
 from .measures.pictures import detail, log_green
 from .measures.references import BLUR, FLAT, NOTHING, TRUE, blur_divided_out, flat_colour
 from .measures.slopes import slope
@@ -135,7 +135,7 @@ def of_sitter(sitter: LightSeries, answers: list[np.ndarray]) -> dict[str, float
     """The figures of one answer to all of a sitter's pictures; answers linear [H, W, 3]."""
     true = images.linear_to_srgb(sitter.albedo)
     log_true, truths = log_green(true), [contrasts(true, sitter.landmarks, lit) for lit in sitter.lit]
-    shares, filmed = ([kept(contrasts(images.linear_to_srgb(np.clip(picture, 0, 1)), sitter.landmarks, lit), truth)
+    shares, filmed = ([contrast_kept(contrasts(images.linear_to_srgb(np.clip(picture, 0, 1)), sitter.landmarks, lit), truth)
                        for picture, lit, truth in zip(each, sitter.lit, truths, strict=True)] for each in (answers, sitter.linear))
     errors, slopes = [], []
     for i, j in combinations(range(len(answers)), 2):

@@ -100,9 +100,9 @@ def test_what_a_worker_prepared_waits_for_a_click(addon, capture, monkeypatch):
     theirs[6:8] = 1
     (capture / "shadow_mask_edges.png").write_bytes(mask_image.grey_png(theirs))
     started[0]["then"]()
-    assert np.array_equal(mask_image.values(session.mask()), mine), "nothing changes by itself"
+    assert np.array_equal(mask_image.mask_values(session.mask()), mine), "nothing changes by itself"
     bpy.ops.wildcap.edit_mask(kind='SNAPPED')
-    assert np.array_equal(mask_image.values(session.mask()), theirs) and session.offered() == ""
+    assert np.array_equal(mask_image.mask_values(session.mask()), theirs) and session.offered() == ""
     with pytest.raises(RuntimeError, match="does not have"):
         bpy.ops.wildcap.detect_mask()
     for name in ("delit", "cameras"):
@@ -113,7 +113,7 @@ def test_what_a_worker_prepared_waits_for_a_click(addon, capture, monkeypatch):
     started[1]["then"]()
     assert session.offered() == 'PROPOSAL'
     bpy.ops.wildcap.edit_mask(kind='PROPOSAL')
-    assert session.offered() == "" and mask_image.values(session.mask()).max() == 0
+    assert session.offered() == "" and mask_image.mask_values(session.mask()).max() == 0
     bpy.ops.wildcap.paint_mask(mask='PROTECT')
     with pytest.raises(RuntimeError, match="choose Shadow"):
         bpy.ops.wildcap.detect_mask()
@@ -132,4 +132,4 @@ def test_the_estimated_tone_reaches_the_settings(addon, capture, monkeypatch):
     started[0]["then"]()
     item = addon("captures").active(bpy.context)
     assert item.use_skin_tone and tuple(item.skin_tone) == (0.5, 0.25, 0.125)
-    assert addon("properties").values(item)["solve"]["skin_tone"] == "0.5000,0.2500,0.1250"
+    assert addon("properties").job_settings(item)["solve"]["skin_tone"] == "0.5000,0.2500,0.1250"

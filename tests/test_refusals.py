@@ -129,7 +129,7 @@ def test_a_blender_without_surroundings(addon, monkeypatch):
     hdri, props = addon("hdri"), bpy.context.scene.wildcap
     props.hdri_file = ""
     monkeypatch.setattr(hdri, "_worlds", lambda: [])
-    refuses("without pictures of surroundings", hdri.chosen, props)
+    refuses("without pictures of surroundings", hdri.chosen_hdri, props)
 
 
 def test_without_a_face_there_is_nothing_to_work_on(addon):

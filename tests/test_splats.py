@@ -84,6 +84,6 @@ def test_training_lowers_the_depth_error(seen):
 
 
 def test_splats_without_a_gpu_are_a_problem_only_when_asked_for():
-    assert not splats.wanted("auto", "cpu") and not splats.wanted("stereo", "cuda")
+    assert not splats.use_splats("auto", "cpu") and not splats.use_splats("stereo", "cuda")
     with pytest.raises(Problem, match="gsplat"):
-        splats.wanted("splats", "cpu")
+        splats.use_splats("splats", "cpu")

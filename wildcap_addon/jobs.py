@@ -94,7 +94,7 @@ def start(item, goal: str, *, first: str | None = None, last: str | None = None,
     shared : settings for this once
     """
     capture = captures.folder(item)
-    job = _launch(item, goal, capture, then, lambda: write_job(capture, first=first, last=last, settings={**properties.values(item), **shared}))
+    job = _launch(item, goal, capture, then, lambda: write_job(capture, first=first, last=last, settings={**properties.job_settings(item), **shared}))
     job.on_stage = on_stage
     job.planned = stages.NAMES[stages.NAMES.index(first or stages.NAMES[0]):stages.NAMES.index(last or stages.NAMES[-1]) + 1]
     return job
@@ -113,7 +113,7 @@ def start_tool(item, tool: str, goal: str = "tool", *, then: Callable[[], None] 
     shared : settings for this once
     """
     capture = at or captures.folder(item)
-    job = _launch(item, goal, capture, then, lambda: write_job(capture, tool=tool, settings={**properties.values(item), **shared}))
+    job = _launch(item, goal, capture, then, lambda: write_job(capture, tool=tool, settings={**properties.job_settings(item), **shared}))
     job.ended = ended
     return job
 

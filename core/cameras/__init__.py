@@ -51,7 +51,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     model.transform(solved.head.world_from_model)
     centres = np.array([image.projection_center() for image in model.images.values() if image.has_pose])
     widest = coverage.widest_deg(centres)
-    records = solved.asked or frames.records
+    records = solved.to_place or frames.records
     if widest < LEAST_COVERAGE_DEG and frames.kind != PHOTOGRAPHS:
         raise Problem(f"The camera moved only {widest:.0f} degrees around the head; {LEAST_COVERAGE_DEG:.0f} are the least.",
                       "Film again while you walk around the face from one ear to the other.")
@@ -108,7 +108,7 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
 def _findings(solved: Solved, records: Sequence[FrameRecord], centres: np.ndarray, report: Reporter) -> None:
     """What is wrong with a capture that can be used, and how to shoot it again."""
     shown = {record.name: record.shown for record in records}
-    if solved.way == "face" and not solved.held and len(records) >= LEAST_VIEWS:
+    if solved.way == "face" and not solved.every_frame_held and len(records) >= LEAST_VIEWS:
         rough = "refined by what little matches" if solved.refined else "to ten degrees or so"
         report.finding(f"The frames do not overlap enough to be matched: the cameras come from the face's landmarks, {rough}. Expect a rough head.",
                        "Take a photograph every ten degrees around the face, from ear to ear, with a busy background.")

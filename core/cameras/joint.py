@@ -145,7 +145,7 @@ def rebuilt(model: pycolmap.Reconstruction, bundle: Bundle, registered: list, tr
     return rebuilt
 
 
-def held(model: pycolmap.Reconstruction) -> bool:
+def holds_every_frame(model: pycolmap.Reconstruction) -> bool:
     """Whether every registered frame sees as many matched points as its pose needs."""
     seen = Counter(element.image_id for point in model.points3D.values() for element in point.track.elements)
     return all(seen[number] >= LEAST_MATCHES for number, image in model.images.items() if image.has_pose)

@@ -18,7 +18,7 @@ from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import faces
 from . import skeleton
-from .joint import held, refine
+from .joint import holds_every_frame, refine
 from .landmarks import find_landmarks
 from .matches import Matches
 from .mirrored import find_mirrored
@@ -49,7 +49,7 @@ class Solved:
     before its background, and whether the camera stood still then; mirrored frames that were left out; tracks that refined a model from the face,
     and whether they are enough to trust it; the matches it comes from, where more is to be made of them; whether
     after that every frame is held by what matches; swayed: the share of the error of the head's matches that went when the room had no say;
-    asked: the frames that were to be placed, where those are not all."""
+    to_place: the frames that were to be placed, where those are not all."""
 
     model: pycolmap.Reconstruction
     way: str
@@ -61,9 +61,9 @@ class Solved:
     tracks: int = 0
     refined: bool = True
     matches: Matches = field(default_factory=Matches)
-    held: bool = False
+    every_frame_held: bool = False
     swayed: float = 0.0
-    asked: tuple[FrameRecord, ...] = ()
+    to_place: tuple[FrameRecord, ...] = ()
 
 
 def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
@@ -75,7 +75,7 @@ def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter
         asked = spread_over(records)
         report.log(f"All but the head stays where it is: the camera stood still. Only the head's own matches count, in {len(asked)} of {len(records)} frames.")
         found = find_landmarks(_spread(asked), capture.frames, report)
-        return replace(_solve(Frames(asked, frames.kind), found, capture, settings, report, stood=True), asked=asked)
+        return replace(_solve(Frames(asked, frames.kind), found, capture, settings, report, stood=True), to_place=asked)
     return _solve(frames, found, capture, settings, report)
 
 
@@ -145,7 +145,7 @@ def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Setting
     missing = [record for record in frames.records if record.name not in fits and record.name not in solved.mirrored]
     unknown = any(record.focal_px is None for record in frames.records)
     model = refine(solved.model, solved.found, solved.matches, unknown, report, camera_groups(missing, capture.frames))
-    return replace(solved, model=model, head=find_head(model, solved.found, apart), held=held(model))
+    return replace(solved, model=model, head=find_head(model, solved.found, apart), every_frame_held=holds_every_frame(model))
 
 
 def _by_features(skin: bool, frames: Frames, capture: Capture, found: dict, settings: Settings, report: Reporter,

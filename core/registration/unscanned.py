@@ -68,7 +68,7 @@ class ShownByViews:
     believed about."""
 
     views: list[View]
-    found: Landmarks
+    landmarks: Landmarks
     trust: np.ndarray
     points: Points
     follow: np.ndarray
@@ -86,7 +86,7 @@ class _ViewConstraints:
     def of(self, mesh: Mesh, reach: float) -> dict[str, Constraints]:
         """By kind, for a head as it lies now. reach: metres by which a point or outline may lie off."""
         shown = self.shown
-        return {"landmarks": from_landmarks(self.model, mesh.vertices, shown.views, shown.found, shown.trust, max(reach, 0.006)),
+        return {"landmarks": from_landmarks(self.model, mesh.vertices, shown.views, shown.landmarks, shown.trust, max(reach, 0.006)),
                 "points": from_points(mesh, shown.follow, shown.points.places, shown.points.towards, reach),
                 "outlines": joined([silhouettes.compare(outline, mesh, self.edges, shown.follow, reach) for outline in self.outlines])}
 
@@ -105,7 +105,7 @@ def fit(model: HeadModel, shown: ShownByViews, report: Reporter, first: float, s
     -------
     The fit, in the world of the views, metres.
     """
-    views, found, trust, follow = shown.views, shown.found, shown.trust, shown.follow
+    views, found, trust, follow = shown.views, shown.landmarks, shown.trust, shown.follow
     pose, coefficients = fit_landmarks(model, found.points, trust)
     start = model.mesh.moved(pose.apply(model.shape(coefficients)))
     outlines = []

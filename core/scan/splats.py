@@ -49,7 +49,7 @@ class UndistortedFrame:
     origin: np.ndarray
 
 
-def wanted(method: str, device: str) -> bool:
+def use_splats(method: str, device: str) -> bool:
     """Whether the scan is to be made by splats. Raises Problem where they were asked for and cannot run."""
     ready = device == "cuda" and torch.cuda.is_available() and importlib.util.find_spec("gsplat") is not None
     if method == "splats" and not ready:

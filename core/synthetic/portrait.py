@@ -14,7 +14,7 @@ import numpy as np
 
 from ..imaging import images
 from ..light.spherical_harmonics import sh_basis
-from .environments import Environment, made_environment, panorama_environment, seen
+from .environments import Environment, background_radiance, made_environment, panorama_environment
 from .identities import subject_mesh
 from .light import in_the_way
 from .olat import BASIS, DIRECTIONS, LIGHTS, LightStage, light_stage, mirrored, transport
@@ -187,7 +187,7 @@ def _background(environment: Environment, sight: Sight, light: float, rng: np.ra
     """What lies behind the head [S, S, 3]: the panorama out of focus, a dark studio, or cloth and walls of any colour."""
     kind = rng.random()
     if kind < 0.45:
-        return seen(environment, sight.rays) * np.float32(np.exp(rng.normal(0, 0.3)))
+        return background_radiance(environment, sight.rays) * np.float32(np.exp(rng.normal(0, 0.3)))
     if kind < 0.6:
         ground = np.full((sight.size, sight.size, 3), 0.02, np.float32)
     else:

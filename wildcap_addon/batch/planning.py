@@ -50,7 +50,7 @@ def _list_faces(context) -> tuple[list[BatchFace], list[str]]:
         if source is None:
             left_out.append(item.name)
         else:
-            faces.append(BatchFace(_name(capture.root.stem, taken), source, capture.root, item.quality, properties.values(item)))
+            faces.append(BatchFace(_name(capture.root.stem, taken), source, capture.root, item.quality, properties.job_settings(item)))
     return faces, left_out
 
 

@@ -38,7 +38,7 @@ class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
         plan, root = planned(context), captures.root(item)
         delivery_plan.check_target(plan)
         stand.require_eyes(plan, captures.head(context, item))
-        chosen = {**properties.values(item)["deliver"], "roughness": roughness(captures.head(context, item)), "whole": False}
+        chosen = {**properties.job_settings(item)["deliver"], "roughness": roughness(captures.head(context, item)), "whole": False}
         until_it_ends = ExitStack()
         at = until_it_ends.enter_context(read_only.stand_in(captures.folder(item), chosen["folder"]))
         try:

@@ -29,15 +29,15 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
 
     @staticmethod
     def tell() -> tuple[str, ...] | None:
-        compute, source, wheels, folder = *chosen(), preferences.environment_folder()
+        compute, source, wheels, folder = *chosen_packages(), preferences.environment_folder()
         plan = asking.answer(("plan", compute, source, wheels))
         if plan is None:
             asking.ask(("plan", compute, source, wheels), lambda task: look_up(task, compute, source, wheels, folder), "install_solver")
             return None
-        return told(plan, compute, folder, index.check_space(plan, folder))
+        return describe_plan(plan, compute, folder, index.check_space(plan, folder))
 
     def work(self, context):
-        compute, source, wheels, folder = *chosen(), preferences.environment_folder()
+        compute, source, wheels, folder = *chosen_packages(), preferences.environment_folder()
         plan = asking.answer(("plan", compute, source, wheels))
         if plan is not None:
             index.check_space(plan, folder)
@@ -77,7 +77,7 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
         jobs.begin("", "ask", environment.removal(folder))
 
 
-def told(plan: index.InstallationPlan, compute: str, folder: Path, free: int) -> tuple[str, ...]:
+def describe_plan(plan: index.InstallationPlan, compute: str, folder: Path, free: int) -> tuple[str, ...]:
     """What an installation means, before the artist says yes; `free` bytes are on the folder's disk."""
     return (iface_("PyTorch {} for {} and {} more packages.").format(plan.packages.get("torch", ""), iface_(COMPUTES[compute]), len(plan.packages) - 1),
             iface_("{} to download from {}.").format(index.gigabytes(plan.download), ", ".join(plan.hosts)),
@@ -85,7 +85,7 @@ def told(plan: index.InstallationPlan, compute: str, folder: Path, free: int) ->
             "You can go on working meanwhile, cancel, and continue later.")
 
 
-def chosen() -> tuple[str, str, Path | None]:
+def chosen_packages() -> tuple[str, str, Path | None]:
     """(compute, source, wheels) of the preferences, with what Automatic means here. Raises Problem for what cannot be here, and while Blender is to stay off
     a network that is needed."""
     source = preferences.get().packages
