@@ -84,7 +84,14 @@ def test_what_a_worker_prepared_waits_for_a_click(addon, capture, monkeypatch):
     bpy = pytest.importorskip("bpy")
     session, mask_image = addon("paint.session"), addon("paint.mask_image")
     started, prepared = [], addon("jobs").before_start
-    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool, **options: started.append(tool) or [prepare() for prepare in prepared])
+
+    def start(**options):
+        started.append(options)
+        for prepare in prepared:
+            prepare()
+
+    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool, **options: start(tool=tool, **options))
+    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **options: start(**options))
     bpy.ops.wildcap.bring_in_head()
     with pytest.raises(RuntimeError, match="Click Paint Mask first"):
         bpy.ops.wildcap.snap_mask()
@@ -95,7 +102,7 @@ def test_what_a_worker_prepared_waits_for_a_click(addon, capture, monkeypatch):
     mine[5:9] = 1
     mask_image.set_values(session.mask(), mine)
     bpy.ops.wildcap.snap_mask()
-    assert started[0] == "mask_edges" and (capture / "shadow_mask.png").read_bytes() == mask_image.grey_png(mine)
+    assert started[0]["tool"] == "mask_edges" and (capture / "shadow_mask.png").read_bytes() == mask_image.grey_png(mine)
     theirs = np.zeros((64, 64), np.float32)
     theirs[6:8] = 1
     (capture / "shadow_mask_edges.png").write_bytes(mask_image.grey_png(theirs))
