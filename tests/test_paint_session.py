@@ -103,7 +103,7 @@ def test_a_painting_whose_head_was_undone_or_deleted_still_ends_and_keeps_its_ma
     session, values = addon("paint.session"), addon("paint.mask_image")
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.paint_mask()
-    painted = np.zeros_like(values.values(session.mask()))
+    painted = np.zeros_like(values.mask_values(session.mask()))
     painted[10:20, 30:40] = 1
     values.set_values(session.mask(), painted)
     bpy.ops.object.mode_set(mode='OBJECT')
