@@ -145,7 +145,7 @@ def test_why_a_batch_cannot_be_started(addon, batches, monkeypatch, tmp_path):
     running, jobs = addon("batch.running"), addon("jobs")
     anna, bert = (batch_faces.filmed(tmp_path / "films", name) for name in ("anna", "bert"))
     open_captures(anna, bert)
-    jobs._jobs[str(anna.root)] = jobs.Job('solve', addon("asking").Task("solve", lambda task: None))
+    jobs._jobs[str(anna.root)] = jobs.Job('solve', addon("asking").BackgroundTask("solve", lambda task: None))
     refuses("A job is running", bpy.ops.wildcap.reconstruct_all)
     jobs._jobs.clear()
     preferences = addon("preferences").get()
