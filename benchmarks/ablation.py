@@ -42,12 +42,12 @@ from core.solve.light_fit import update_lights, variation
 from core.solve.prior import WEIGHTS, load
 from core.solve.problem import State, albedo, photometric
 from core.solve.recipes import OURS, RECIPES, Recipe
-from core.solve.sampler import sample, seeded
+from core.solve.sampler import Sampler, seeded
 from core.solve.skin_tone import GIVEN, SkinTone
 
 from . import figures
 from .ablation_measures import measure, summary, table
-from .uv_problems import LEE_PERRY_SMITH, SHADOWS, UvProblem, problem
+from .uv_problems import LEE_PERRY_SMITH, SHADOWS, MaskedUvProblem, problem
 
 SUBJECTS = ("9000", "9002", "9004", "9007", "9008", LEE_PERRY_SMITH.name if LEE_PERRY_SMITH.is_dir() else "9001")
 FACE_CROP, CELLS = 768, 96
@@ -166,7 +166,7 @@ def _solve_problem(subject: str, shadows: str, wanted: list[tuple[str, int]], op
     return found
 
 
-def solve_row(given: UvProblem, row: str, seed: int, steps: int) -> np.ndarray:
+def solve_row(given: MaskedUvProblem, row: str, seed: int, steps: int) -> np.ndarray:
     """The linear albedo [S, S, 3] that one row's method finds; it is told the true skin tone."""
     if row == "the texture itself":
         return given.texture
@@ -177,7 +177,8 @@ def solve_row(given: UvProblem, row: str, seed: int, steps: int) -> np.ndarray:
     return solved(given, recipe, tone, seed, cells, mask, with_prior)
 
 
-def solved(given: UvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0, cells: int = CELLS, mask: str = "painted", with_prior: bool = True) -> np.ndarray:
+def solved(given: MaskedUvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0, cells: int = CELLS, mask: str = "painted",
+           with_prior: bool = True) -> np.ndarray:
     """The linear albedo [S, S, 3] under a recipe and a requested tone."""
     size, prior = len(given.albedo), _prior()
     with tempfile.TemporaryDirectory() as folder:
@@ -188,7 +189,10 @@ def solved(given: UvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0, cell
         meshes.write_obj(capture.head, template.load())
         evidence = read_evidence(capture, read_head(capture), size)
     start = initial.start(prior, evidence, tone, FACE_CROP / cells, recipe)
-    state = sample(prior.of_tone(start.tone), start.observations, start.state, start.recipe, seeded(seed)) if with_prior else texels_alone(start, start.recipe)
+    if with_prior:
+        state = Sampler(prior.of_tone(start.tone), start.recipe, seeded(seed)).sample(start.observations, start.state)
+    else:
+        state = texels_alone(start, start.recipe)
     return maps.finished(state, evidence, start).diffuse
 
 
@@ -213,7 +217,7 @@ def texels_alone(start: initial.Start, recipe: Recipe, updates: int = 600, fit: 
     return state
 
 
-def tone_error(given: UvProblem, tone: tuple[float, float, float], steps: int) -> tuple[float, float]:
+def tone_error(given: MaskedUvProblem, tone: tuple[float, float, float], steps: int) -> tuple[float, float]:
     """CIEDE2000 between a requested skin tone and the mean of the solved facial skin: as it is delivered, and before the mean is brought to the request."""
     skin, found = _skin(len(given.albedo)), []
     for rescale in (OURS.rescale, "none"):

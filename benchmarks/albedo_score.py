@@ -39,7 +39,7 @@ LABELS = {"WildCap": "**WildCap**", "raw video": "the raw video", "flat true ton
 
 
 @dataclass(frozen=True)
-class Truth:
+class AlbedoTruth:
     """One frame's truth: albedo sRGB [H, W, 3], facial skin bool [H, W], and where the sun does not reach, bool [H, W] or None."""
 
     frame: int
@@ -48,23 +48,23 @@ class Truth:
     shadow: np.ndarray | None
 
 
-def read_truth(folder: Path) -> list[Truth]:
+def read_truth(folder: Path) -> list[AlbedoTruth]:
     """The frames of a truth folder. Raises Problem when there are none."""
     frames = []
     for path in sorted((folder / "albedo").glob("*.png")):
         shadow = folder / "shadow" / path.name
-        frames.append(Truth(int(path.stem), images.read_srgb(path), images.read_mask(folder / "face" / path.name) > 0.5,
-                            images.read_mask(shadow) > 0.5 if shadow.exists() else None))
+        frames.append(AlbedoTruth(int(path.stem), images.read_srgb(path), images.read_mask(folder / "face" / path.name) > 0.5,
+                                  images.read_mask(shadow) > 0.5 if shadow.exists() else None))
     if not frames:
         raise Problem(f"{folder} holds no true albedo.", "Name a folder with albedo/NNNN.png and face/NNNN.png.")
     return frames
 
 
 @dataclass(frozen=True)
-class Look:
+class HeadInView:
     """What a view with truth sees of a head: hit bool [H, W], and for each pixel that hits where on the map it lies, [N, 2], u and v."""
 
-    true: Truth
+    true: AlbedoTruth
     hit: np.ndarray
     uv: np.ndarray
 
@@ -86,7 +86,7 @@ def score_capture(capture: Capture, truth: Path, pictures: Path | None = None, t
     return {"frames_not_registered": missing, **score_map(albedo, seen)}
 
 
-def looks(capture: Capture, truth: Path) -> tuple[list[Look], list[int]]:
+def looks(capture: Capture, truth: Path) -> tuple[list[HeadInView], list[int]]:
     """The registered frames with truth as they see the capture's head, and the numbers of those that were not registered. Raises Problem where none was."""
     whole = read_head(capture)
     head, caster = whole.mesh, whole.caster
@@ -99,13 +99,13 @@ def looks(capture: Capture, truth: Path) -> tuple[list[Look], list[int]]:
             continue
         face, bary, _ = raster.render_view(caster, views[true.frame], true.face.shape[1] / views[true.frame].width)
         hit = face >= 0
-        seen.append(Look(true, hit, raster.interpolate(head.uvs, head.face_uvs, face[hit], bary[hit])))
+        seen.append(HeadInView(true, hit, raster.interpolate(head.uvs, head.face_uvs, face[hit], bary[hit])))
     if not seen:
         raise Problem("None of the frames with a known albedo was registered.", "Look at the cameras stage in the report.")
     return seen, missing
 
 
-def score_map(albedo: np.ndarray, seen: list[Look]) -> dict:
+def score_map(albedo: np.ndarray, seen: list[HeadInView]) -> dict:
     """The figures of an albedo map, sRGB [S, S, 3], in the UVs of the head that `seen` sees."""
     results = [compare(look.picture(albedo), look.true, look.true.face & look.hit) for look in seen]
     coverage = [(look.hit & look.true.face).sum() / look.true.face.sum() for look in seen]
@@ -130,11 +130,11 @@ def _video(path: Path) -> Iterator[np.ndarray]:
             yield frame.to_ndarray(format="rgb24").astype(np.float32) / 255
 
 
-def compare(predicted: np.ndarray, true: Truth, mask: np.ndarray) -> dict:
+def compare(predicted: np.ndarray, true: AlbedoTruth, mask: np.ndarray) -> dict:
     """One frame's figures: predicted albedo sRGB [H, W, 3] against the truth over the pixels of `mask`."""
     box = face_box(mask)
     predicted, mask = predicted[box], mask[box]
-    true = Truth(true.frame, true.albedo[box], true.face[box], None if true.shadow is None else true.shadow[box])
+    true = AlbedoTruth(true.frame, true.albedo[box], true.face[box], None if true.shadow is None else true.shadow[box])
     figures = {"raw": differences(predicted, true.albedo, mask), "gain": differences(with_gain(predicted, true.albedo, mask), true.albedo, mask)}
     log_true, log = log_green(true.albedo), log_green(predicted)
     figures["detail"] = detail(log, log_true, mask)

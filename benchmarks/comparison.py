@@ -39,10 +39,10 @@ from core.contract.messages import Reporter
 from core.contract.settings import Settings, from_json, preset
 from core.face.head import read_head
 from core.imaging import images
-from core.solve import FACE_CROP, initial, maps, recipe_of
-from core.solve.evidence import REFERENCE, Evidence, read_evidence
+from core.solve import initial, maps, recipe_of
+from core.solve.evidence import Evidence, read_evidence
 from core.solve.prior import load
-from core.solve.sampler import sample, seeded
+from core.solve.sampler import Sampler, seeded
 from core.solve.skin_tone import parse_skin_tone
 from core.solve.witnesses import confirmed
 
@@ -125,7 +125,7 @@ def solved(capture: Capture, settings: Settings, method: str, seed: int) -> tupl
     if method in ("texture", "over its blur"):
         return *_by_hand(capture, evidence, settings, method), time.monotonic() - began
     prior = _prior()
-    cell = FACE_CROP / settings.solve.grid_cells * REFERENCE / evidence.extent.side
+    cell = evidence.cell_side(settings.solve.grid_cells)
     tone = parse_skin_tone(settings.solve.skin_tone)
     start = initial.start(prior, evidence, tone, cell, recipe_of(settings, prior), lambda marks: confirmed(capture, head, marks, evidence.size))
     fit, recipe = {}, start.recipe
@@ -135,7 +135,7 @@ def solved(capture: Capture, settings: Settings, method: str, seed: int) -> tupl
     if method == FREE:
         state = texels_alone(start, replace(recipe, decay=0.995), FREE_UPDATES, smooth=FREE_SMOOTH, **fit)
     else:
-        state = sample(prior.of_tone(start.tone), start.observations, start.state, recipe, seeded(seed), **fit)
+        state = Sampler(prior.of_tone(start.tone), recipe, seeded(seed), **fit).sample(start.observations, start.state)
     result = maps.finished(state, evidence, start)
     return result.diffuse, result.shading, time.monotonic() - began
 

@@ -22,10 +22,10 @@ from core.contract.settings import Settings, from_json
 from core.face import template
 from core.face.head import read_head
 from core.imaging import images
-from core.solve import FACE_CROP, initial, maps, recipe_of
+from core.solve import initial, maps, recipe_of
 from core.solve.evidence import read_evidence
 from core.solve.prior import load
-from core.solve.sampler import sample, seeded
+from core.solve.sampler import Sampler, seeded
 from core.solve.skin_tone import parse_skin_tone
 
 from .flash_light import write_delit
@@ -49,8 +49,8 @@ def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, 
     began, prior = time.monotonic(), _prior()
     recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0, linear=0.0)
     evidence = read_evidence(capture, read_head(capture), settings.solve.size)
-    start = initial.start(prior, evidence, parse_skin_tone(settings.solve.skin_tone), FACE_CROP / settings.solve.grid_cells, recipe)
-    state = sample(prior.of_tone(start.tone), start.observations, start.state, start.recipe, seeded(settings.seed))
+    start = initial.start(prior, evidence, parse_skin_tone(settings.solve.skin_tone), evidence.cell_side(settings.solve.grid_cells), recipe)
+    state = Sampler(prior.of_tone(start.tone), start.recipe, seeded(settings.seed)).sample(start.observations, start.state)
     return images.linear_to_srgb(maps.finished(state, evidence, start).diffuse), {"seconds": round(time.monotonic() - began, 1)}
 
 

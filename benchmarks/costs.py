@@ -43,7 +43,7 @@ LEFT_OUT = shutil.ignore_patterns("maps*", "checkpoints", "comparison", "deliver
 
 
 @dataclass(frozen=True)
-class Row:
+class StageRun:
     """What is run: these stages in order, with the settings {stage: {name: value}} over the preset `quality`. frames: of a video of so many frames, from
     nothing; views: so many of the frames are selected (V); float32: whatever the processor can do, the networks compute in that."""
 
@@ -57,14 +57,14 @@ class Row:
 
 LENGTHS = (60, 120, 300, 1000)
 ROWS = {
-    "standard": Row(stages.NAMES),
-    "draft": Row(stages.NAMES[stages.NAMES.index("scan"):], quality="draft"),  # frames and cameras have the same settings in both
-    "float32": Row(("solve", "upscale"), float32=True),
-    **{f"solve-{size}": Row(("solve",), {"solve": {"size": size}}) for size in (512, 2048)},
-    **{f"texture-{size}": Row(("texture",), {"texture": {"size": size}}) for size in (512, 2048)},
-    **{f"grid-{cells}": Row(("solve",), {"solve": {"grid_cells": cells}}) for cells in (384, 1, 24)},
-    **{f"views-{count}": Row(("delight", "texture"), views=count) for count in (8, 32)},
-    **{f"frames-{count}": Row(stages.NAMES, {"frames": {"max_frames": count}}, frames=count) for count in LENGTHS},
+    "standard": StageRun(stages.NAMES),
+    "draft": StageRun(stages.NAMES[stages.NAMES.index("scan"):], quality="draft"),  # frames and cameras have the same settings in both
+    "float32": StageRun(("solve", "upscale"), float32=True),
+    **{f"solve-{size}": StageRun(("solve",), {"solve": {"size": size}}) for size in (512, 2048)},
+    **{f"texture-{size}": StageRun(("texture",), {"texture": {"size": size}}) for size in (512, 2048)},
+    **{f"grid-{cells}": StageRun(("solve",), {"solve": {"grid_cells": cells}}) for cells in (384, 1, 24)},
+    **{f"views-{count}": StageRun(("delight", "texture"), views=count) for count in (8, 32)},
+    **{f"frames-{count}": StageRun(stages.NAMES, {"frames": {"max_frames": count}}, frames=count) for count in LENGTHS},
 }
 """In the order of what matters most."""
 WHOLES = ("standard", "float32", "draft", *(f"frames-{count}" for count in LENGTHS))
@@ -135,7 +135,7 @@ def measured(name: str, options: argparse.Namespace) -> bool:
     return True
 
 
-def prepare(row: Row, capture: Path, options: argparse.Namespace) -> Path:
+def prepare(row: StageRun, capture: Path, options: argparse.Namespace) -> Path:
     """Makes the row's capture where it is not there yet, and returns its video. Raises Problem where it begins with what nobody made."""
     base = options.work / "standard.wildcap"
     if options.capture and not base.exists():

@@ -16,7 +16,7 @@ from core.imaging import images
 from core.synthetic import pigment
 
 from .ablation_measures import feature_distance
-from .albedo_score import Truth
+from .albedo_score import AlbedoTruth
 from .measures.pictures import detail, differences, edge_bands, face_box, log_green, shadow_step, with_gain
 
 FIGURES = ("psnr", "ssim", "flip", "features", "detail", "shadow_step")
@@ -28,7 +28,7 @@ TONES = (("very light", 55), ("light", 41), ("intermediate", 28), ("tan", 10), (
 """Groups of skin and the individual typology angle, in degrees, above which each lies (Chardon et al. 1991; Del Bino and Bernerd 2013)."""
 
 
-def score(predicted: np.ndarray, photograph: np.ndarray, true: Truth, features: bool = True) -> dict[str, float]:
+def score(predicted: np.ndarray, photograph: np.ndarray, true: AlbedoTruth, features: bool = True) -> dict[str, float]:
     """FIGURES of one delit picture sRGB [H, W, 3] over the facial skin of its truth; nan what cannot be told. `photograph`: what it was made from."""
     box, mask = face_box(true.face), true.face
     predicted, photograph, albedo, mask = predicted[box], photograph[box], true.albedo[box], mask[box]
@@ -53,7 +53,7 @@ def stepping(log_shading: np.ndarray, mask: np.ndarray, shadow: np.ndarray) -> n
     return near & (means[0] - means[1] > LEAST_STEP)
 
 
-def flat_tone(true: Truth) -> np.ndarray:
+def flat_tone(true: AlbedoTruth) -> np.ndarray:
     """sRGB [3] of the linear mean of the true albedo over the facial skin."""
     return images.linear_to_srgb(images.srgb_to_linear(true.albedo[true.face]).mean(0))
 

@@ -20,7 +20,7 @@ from core.synthetic.portrait import relit, sight_of
 from core.synthetic.sight import Sight
 from core.synthetic.skin import make_skin
 
-from .albedo_score import Truth
+from .albedo_score import AlbedoTruth
 from .delight_measures import TONES
 from .delight_sets import Photograph, Photographs
 
@@ -62,7 +62,7 @@ def _photograph(seed: int, light: int, group: str, work: Path) -> Photograph:
                                               for name in PICTURES for p in [getattr(made, name)]})
     stored = np.load(path)
     srgb, albedo, skin, shadow = (stored[name].astype(np.float32) for name in PICTURES)
-    truth = Truth(0, images.linear_to_srgb(albedo), skin > 0.5, shadow > 0.5)
+    truth = AlbedoTruth(0, images.linear_to_srgb(albedo), skin > 0.5, shadow > 0.5)
     return Photograph(f"{seed}/{light}", srgb / 255, truth, group)
 
 

@@ -18,7 +18,7 @@ from core.contract.messages import Problem
 from core.geometry.views import read_views
 from core.imaging import images
 
-from .albedo_score import Truth, read_truth
+from .albedo_score import AlbedoTruth, read_truth
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Photograph:
 
     name: str
     srgb: np.ndarray
-    truth: Truth
+    truth: AlbedoTruth
     group: str = ""
     frame: str = ""
 
@@ -51,7 +51,7 @@ def light_stage(folder: Path, every: int = 1) -> Photographs:
         albedo, mask = (folder / kind / f"{name}.png" for kind in ("align_diffuse", "align_mask_face"))
         if not (albedo.is_file() and mask.is_file()):
             raise Problem(f"{folder} lacks align_diffuse/{name}.png or align_mask_face/{name}.png.", "Add it, or leave that camera out.")
-        truth = Truth(0, images.read_srgb(albedo), images.read_mask(mask) > 0.5, None)
+        truth = AlbedoTruth(0, images.read_srgb(albedo), images.read_mask(mask) > 0.5, None)
         found += [Photograph(f"{name}/{path.stem}", images.read_srgb(path), truth, camera.parent.name) for path in sorted(camera.glob("*.png"))[::every]]
     if not found:
         raise Problem(f"{folder} holds no photographs with a known albedo.", "It needs align_image/PERSON/CAM/NNN.png, align_diffuse and align_mask_face.")

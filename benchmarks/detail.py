@@ -18,7 +18,7 @@ from core.geometry import raster
 from core.geometry.views import View
 from core.imaging import images
 
-from .albedo_score import Truth
+from .albedo_score import AlbedoTruth
 
 RAYS = 3
 """Rays along a pixel's side; odd, so that the middle one is the pixel's centre."""
@@ -32,20 +32,20 @@ PORE_PX = (0.7, 2.0)
 
 
 @dataclass(frozen=True)
-class Look:
+class FaceRays:
     """What a view's rays meet, cut to the face; worked out once, for any number of textures.
 
     true: the frame's truth, cut alike; at float32 [RAYS * h, RAYS * w, 2]: where on the map, from its upper left, in [0, 1];
     hit bool of the same; bare bool [h, w]: pixels off brows, lips, eyes and nostrils.
     """
 
-    true: Truth
+    true: AlbedoTruth
     at: np.ndarray
     hit: np.ndarray
     bare: np.ndarray
 
 
-def look(caster: raster.RayCaster, view: View, true: Truth, margin: int = 41) -> Look:
+def look(caster: raster.RayCaster, view: View, true: AlbedoTruth, margin: int = 41) -> FaceRays:
     """A view's rays into the head around the face of `true` (any size of that view)."""
     height, width = true.face.shape
     rows, columns = (np.flatnonzero(true.face.any(axis)) for axis in (1, 0))
@@ -57,16 +57,16 @@ def look(caster: raster.RayCaster, view: View, true: Truth, margin: int = 41) ->
     at, hit = np.stack([uv[:, 0], 1 - uv[:, 1]], 1).astype(np.float32).reshape(*x.shape, 2), (face >= 0).reshape(x.shape)
     covers = np.maximum.reduce([template.mask(name, 512) for name in ("brows", "lips", "eyes", "nostrils")])
     bare = _shrunk(raster.sample(covers, at.reshape(-1, 2) * 512).reshape(x.shape) * hit) < 0.1
-    return Look(Truth(true.frame, true.albedo[box], true.face[box], None if true.shadow is None else true.shadow[box]), at, hit, bare)
+    return FaceRays(AlbedoTruth(true.frame, true.albedo[box], true.face[box], None if true.shadow is None else true.shadow[box]), at, hit, bare)
 
 
-def centre_rays(seen: Look, texture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def centre_rays(seen: FaceRays, texture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The map sRGB [S, S, 3] by one ray per pixel, as albedo_score renders it: sRGB [h, w, 3] and the pixels that hit."""
     at, hit = (x[RAYS // 2::RAYS, RAYS // 2::RAYS] for x in (seen.at, seen.hit))
     return raster.sample(texture, at.reshape(-1, 2) * len(texture)).reshape(*hit.shape, 3) * hit[..., None], hit
 
 
-def marks(seen: Look, texture: np.ndarray) -> dict | None:
+def marks(seen: FaceRays, texture: np.ndarray) -> dict | None:
     """Figures of one frame for a texture sRGB [S, S, 3] in the head's UVs.
 
     mole_contrast: regression of the rendered moles on the true ones, 1 keeps their depth and place, 0 lost them all; moles: how many;

@@ -55,7 +55,7 @@ def main() -> int:
     options = parser.parse_args()
     try:
         farm_nodes.refuse_elsewhere()
-        return Trial(options.folder.absolute(), options.captures, options.seed).run(options.json)
+        return FarmTrial(options.folder.absolute(), options.captures, options.seed).run(options.json)
     except Problem as problem:
         print(problem.problem, problem.remedy, sep="\n", file=sys.stderr)
         return 2
@@ -64,7 +64,7 @@ def main() -> int:
         return 130
 
 
-class Trial:
+class FarmTrial:
     """FOLDER/trial.json says how far it is."""
 
     def __init__(self, folder: Path, captures: int, seed: int):

@@ -174,7 +174,7 @@ def _task(group, row: dict, disk: dict[str, float], film_mb: float) -> dict[str,
     """Cost of one task of a face. It reads what its own stages and all before them read, once: what is there already is compared with what it was made from."""
     upto = stages.STAGES[:stages.NAMES.index(group.last) + 1]
     written = entries(name for stage in group.stages for name in stage.writes)
-    read = set(entries(name for stage in upto for name in (*stage.reads, *stage.wishes))) - set(written)
+    read = set(entries(name for stage in upto for name in (*stage.reads, *stage.optional_reads))) - set(written)
     reads, writes = sum(disk.get(name, 0.0) for name in read) + film_mb, sum(disk[name] for name in written)
     return {"seconds": sum(row[stage.name]["seconds"] for stage in group.stages), "processor_s": sum(row[stage.name]["processor_s"] for stage in group.stages),
             "peak_gb": max(row[stage.name]["peak_mb"] for stage in group.stages) / 1000, "read_mb": reads, "write_mb": writes, "traffic_mb": reads + writes}

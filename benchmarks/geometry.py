@@ -39,7 +39,7 @@ LAST = "texture"
 
 
 @dataclass(frozen=True)
-class Subject:
+class ScannedSubject:
     """What is captured, and what is known of it: `truth` laid out as benchmarks/albedo_score.py says, `mesh` the true surface where it is not `truth`'s own."""
 
     source: Path
@@ -47,16 +47,16 @@ class Subject:
     mesh: Path | None = None
 
 
-def subjects(data: Path) -> dict[str, Subject]:
+def subjects(data: Path) -> dict[str, ScannedSubject]:
     """The captures by name; those of `data` that are not there are left out."""
     sample = ROOT / "core" / "synthetic" / "sample"
-    found = {"sample": Subject(sample / "capture.mp4", sample),
-             "lps_sun": Subject(data / "lps_sun" / "capture.mp4", data / "lps_sun", data / "lee_perry_smith" / "LeePerrySmith.glb"),
-             "bust": Subject(data / "bust")}
+    found = {"sample": ScannedSubject(sample / "capture.mp4", sample),
+             "lps_sun": ScannedSubject(data / "lps_sun" / "capture.mp4", data / "lps_sun", data / "lee_perry_smith" / "LeePerrySmith.glb"),
+             "bust": ScannedSubject(data / "bust")}
     return {name: subject for name, subject in found.items() if subject.source.exists()}
 
 
-def measure(name: str, subject: Subject, folder: Path, fresh: bool = False) -> dict:
+def measure(name: str, subject: ScannedSubject, folder: Path, fresh: bool = False) -> dict:
     """One capture's figures: run, compared with the truth where there is one, drawn. What stops it is told in "stopped"."""
     capture = Capture(folder / f"{name}.wildcap")
     if fresh:
@@ -99,7 +99,7 @@ def run_stages(capture: Capture, source: Path) -> tuple[dict, dict | None]:
     return costs, None
 
 
-def _cameras(capture: Capture, subject: Subject, part: str) -> dict:
+def _cameras(capture: Capture, subject: ScannedSubject, part: str) -> dict:
     import pycolmap
 
     from core.geometry.views import read_views
@@ -113,7 +113,7 @@ def _cameras(capture: Capture, subject: Subject, part: str) -> dict:
     return {**figures, **({"against_truth": {k: float(v) for k, v in compare(capture, subject.truth).items()}} if subject.truth else {})}
 
 
-def _surface(capture: Capture, subject: Subject, part: str) -> dict:
+def _surface(capture: Capture, subject: ScannedSubject, part: str) -> dict:
     from .head_against_truth import compare
 
     figures = capture.read()["stages"].get({"scan": "scan", "head": "registration"}[part], {}).get("figures", {})
@@ -122,7 +122,7 @@ def _surface(capture: Capture, subject: Subject, part: str) -> dict:
     return {"own": figures, "against_truth": compare(capture, subject.truth, subject.mesh, {"scan": "scan.ply", "head": "head.obj"}[part])}
 
 
-def _texture(capture: Capture, subject: Subject, part: str) -> dict:
+def _texture(capture: Capture, subject: ScannedSubject, part: str) -> dict:
     from .texture import measure as measure_texture
 
     figures = capture.read()["stages"].get("texture", {}).get("figures", {})

@@ -37,7 +37,7 @@ from core.synthetic.people.truth import Scene
 from core.texture.parts_shown import PartsShown, tell_parts
 from core.texture.projection import observe
 from core.upscale import grooming, hair, strokes, ways
-from core.upscale.maps import Maps
+from core.upscale.maps import HeadMaps
 from core.upscale.surface import lay_out
 
 from . import figures
@@ -183,7 +183,7 @@ def _look(world: Scene, view: View) -> tuple[np.ndarray, np.ndarray]:
     return _shrunk(colour), normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
 
 
-def _maps(figure: Figure, views: list[View], seen: list[np.ndarray]) -> tuple[Maps, PartsShown]:
+def _maps(figure: Figure, views: list[View], seen: list[np.ndarray]) -> tuple[HeadMaps, PartsShown]:
     """The texture that the true albedo of the views makes, as maps (what none of them sees has the bare skin's), and what the parser says of the views."""
     surface = Head(figure.head).unfold(SIZE)
     total, weights = np.zeros((SIZE, SIZE, 3)), np.zeros((SIZE, SIZE, 1))
@@ -194,7 +194,7 @@ def _maps(figure: Figure, views: list[View], seen: list[np.ndarray]) -> tuple[Ma
     bare = images.resize(figure.skin.diffuse, SIZE, SIZE)
     diffuse = np.where(weights > 1e-4, np.exp(total / np.maximum(weights, 1e-9)), bare).astype(np.float32)
     one = np.ones((SIZE, SIZE), np.float32)
-    maps = Maps(diffuse, one[..., None] * [0, 0, 1], 0.35 * one, np.clip(weights[..., 0], 0, 1).astype(np.float32), np.repeat(one[..., None], 3, 2))
+    maps = HeadMaps(diffuse, one[..., None] * [0, 0, 1], 0.35 * one, np.clip(weights[..., 0], 0, 1).astype(np.float32), np.repeat(one[..., None], 3, 2))
     return maps, tell_parts(looks, surface, Reporter("texture"))
 
 

@@ -116,7 +116,8 @@ def _run(case: Case, stage: str, source: str = "-", forced: bool = True, **setti
 def _of_stage(stage: stages.Stage) -> Callable:
     def make(case: Case, stock: Stock, rng: random.Random) -> None:
         root = capture_at(case.place).root
-        files = [file for name in (*stage.reads, *stage.wishes) for file in ([root / name] if (root / name).is_file() else sorted((root / name).glob("*.*")))]
+        names = (*stage.reads, *stage.optional_reads)
+        files = [file for name in names for file in ([root / name] if (root / name).is_file() else sorted((root / name).glob("*.*")))]
         ours = [file for file in files if file.name not in ("retouched.psd", "rig.txt") and not file.name.startswith(".") and file.is_file()]
         _run(case, stage.name)
         _spoil(case, rng.choice(ours), rng)

@@ -87,7 +87,7 @@ def _run(arguments: argparse.Namespace, work: Path, watched: tuple[Path, Path], 
             continue
         place = work / "trials" / str(number)
         place.parent.mkdir(exist_ok=True)
-        trial = kills_trials.Trial(number, kind, random.Random(f"{arguments.seed} {number}"), undisturbed, place, private)
+        trial = kills_trials.KillTrial(number, kind, random.Random(f"{arguments.seed} {number}"), undisturbed, place, private)
         started = time.monotonic()
         kinds[kind](trial)
         trial.faults += [f"{path.relative_to(work)} lies outside the capture" for path in _outside(watched)]

@@ -19,7 +19,7 @@ from core.contract.messages import Done, Failed
 
 from .kills_capture import GUESTS, ROOT, capture_at, delivery_folders, start
 from .kills_judge import tree
-from .kills_trials import Trial, wait_until
+from .kills_trials import KillTrial, wait_until
 from .kills_worker import Forked, Moment, in_fork, running_at
 
 MASKS = {'SHADOW': "shadow_mask.png", 'PROTECT': "protect_mask.png"}
@@ -31,7 +31,7 @@ PARTING_S = 5.0
 """In which a process ends whose parent is gone."""
 
 
-def saving(trial: Trial) -> None:
+def saving(trial: KillTrial) -> None:
     """The add-on is killed while it saves a mask several times, in half of the trials while a worker is at the capture: the mask is the old one or one of
     the new, and the old one is in the history where it was replaced."""
     early = [name for name in trial.undisturbed.names if stages.NAMES.index(name) <= stages.NAMES.index(stages.MASK_STAGE)]  # no mask is an input of theirs
@@ -85,7 +85,7 @@ def _save_masks(root: Path, which: str, seed: int, painted: Path) -> None:
         stamp = keeping.store(mask, contract.Capture(root), which, stamp)
 
 
-def delivering(trial: Trial) -> None:
+def delivering(trial: KillTrial) -> None:
     """A delivery over an older one is killed, up to twice, and then made: the folder holds the old one or the new one, and the user's files stay."""
     base = trial.undisturbed.delivered()
     trial.undisturbed.copy(base, trial.place)
@@ -124,7 +124,7 @@ def _delivery(target: Path) -> dict[str, str]:
     return found
 
 
-def colmap(trial: Trial) -> None:
+def colmap(trial: KillTrial) -> None:
     """While COLMAP places the cameras: its process is killed, or the worker's alone, or both. The one that is left ends, and the next run finds cameras."""
     trial.undisturbed.copy(trial.undisturbed.base("cameras", again=trial.rng.random() < 0.5), trial.place)
     victim, after = trial.rng.choice(("COLMAP", "worker", "both")), trial.rng.uniform(0, COLMAP_S)

@@ -35,7 +35,7 @@ SPARE = 1.2
 
 
 @dataclass
-class Trial:
+class KillTrial:
     """What a trial did and found. `where` says what was struck and when."""
 
     number: int
@@ -81,7 +81,7 @@ class Trial:
         self.faults += [f"after the kill: {fault}" for fault in kills_judge.after_kill(self.place, self.undisturbed.known, masks, within)]
 
 
-def killed(trial: Trial, writing: bool) -> None:
+def killed(trial: KillTrial, writing: bool) -> None:
     """A worker and its group are killed, up to three times in a row, and then left to end."""
     stage = trial.stage()
     trial.begin(stage)
@@ -93,7 +93,7 @@ def killed(trial: Trial, writing: bool) -> None:
     trial.resume(stage)
 
 
-def command(trial: Trial) -> None:
+def command(trial: KillTrial) -> None:
     """The worker's own command as Blender starts it, killed while it imports, works or ends."""
     stage = trial.stage()
     trial.begin(stage)
@@ -114,7 +114,7 @@ def command(trial: Trial) -> None:
     trial.resume(stage)
 
 
-def full(trial: Trial) -> None:
+def full(trial: KillTrial) -> None:
     """The disk is full at a random byte of what a stage writes; then there is room again. Without disks of our own: no file may be longer than some size."""
     stage = trial.stage()
     again, share = trial.rng.random() < 0.5, trial.rng.random()
@@ -149,7 +149,7 @@ def _sizes(root: Path, stage: str) -> list[int]:
     return [(root / name).stat().st_size for name in same_maps.written(Capture(root), stages.by_name(stage))]
 
 
-def asleep(trial: Trial) -> None:
+def asleep(trial: KillTrial) -> None:
     """A worker is stopped, a second one takes its place after the lease's term, and the first one awakes, meanwhile or afterwards: it changes nothing."""
     stage = trial.stage()
     trial.begin(stage)
@@ -195,7 +195,7 @@ def wait_until(true: Callable[[], object], limit_s: float = 10 * SHORT_TERM_S) -
         time.sleep(0.002)
 
 
-def at_once(trial: Trial) -> None:
+def at_once(trial: KillTrial) -> None:
     """Two workers are started at the same job: one does it, the other one is refused by name, or finds it done when it comes late."""
     stage = trial.stage()
     trial.begin(stage)

@@ -33,7 +33,7 @@ SCALE, SAMPLES = 5 / 6, 4  # of 720 x 960; rays per pixel before denoising
 PACE = 6
 
 
-def film(folder: Path, name: str, figure: Figure, light: scene.Light, said: str, frames: int, room: bool) -> Capture:
+def film(folder: Path, name: str, figure: Figure, light: scene.SceneLight, said: str, frames: int, room: bool) -> Capture:
     """FOLDER/NAME (the truth, with the video) and FOLDER/NAME.wildcap (frames, true cameras and a head half a millimetre off, where the room has nothing that
     cameras could be found by), made if they are not there; prints the minutes."""
     target, capture = folder / name, Capture(folder / f"{name}.wildcap")
@@ -43,7 +43,7 @@ def film(folder: Path, name: str, figure: Figure, light: scene.Light, said: str,
     taken = phone.sample_phone(seed)
     cameras, poses = scene.camera_path(seed, frames), motion.sway(frames, taken.sway_mm, taken.sway_degrees, np.random.default_rng([seed, 71]))
     work = folder / "rendered" / name
-    filmed.render(work, figure, light, cameras, range(frames), SAMPLES, SCALE, poses, room)
+    filmed.render(work, figure, light, scene.Shot(cameras, range(frames), SAMPLES, SCALE, poses, room))
     rendered = time.monotonic()
     inside = np.linalg.inv(poses) @ cameras
     views = [sample.view_of(matrix, SCALE) for matrix in inside]
@@ -68,7 +68,7 @@ def _spent() -> float:
     return times.children_user + times.children_system
 
 
-def _write_truth(target: Path, figure: Figure, light: scene.Light, views: list, poses: np.ndarray) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+def _write_truth(target: Path, figure: Figure, light: scene.SceneLight, views: list, poses: np.ndarray) -> dict[int, tuple[np.ndarray, np.ndarray]]:
     """albedo/ (as it is seen), bare/ (below hair and clothes), face/, shadow/, normal/ and parts/PART/ of TRUTHS frames; the albedo and the bare skin of the
     face of each, by frame: what a light meter and the skin's tone ask for."""
     seen = truth.Scene(figure, light.blockers)
@@ -90,7 +90,7 @@ def _write_truth(target: Path, figure: Figure, light: scene.Light, views: list, 
     return faces
 
 
-def _write_record(target: Path, figure: Figure, light: scene.Light, said: str, inside: np.ndarray, poses: np.ndarray, taken: phone.Phone) -> None:
+def _write_record(target: Path, figure: Figure, light: scene.SceneLight, said: str, inside: np.ndarray, poses: np.ndarray, taken: phone.Phone) -> None:
     """head.obj (closed lids), opened.obj, strands, the true maps and maps/part_*.png, cameras.json, and light.json with sky.exr."""
     meshes.write_obj(target / "head.obj", figure.head)
     meshes.write_obj(target / "opened.obj", figure.opened.skin)

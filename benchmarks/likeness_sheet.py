@@ -36,12 +36,13 @@ def write_sheet(out: Path, seeds: list[int], work: Path, facekit: Path | None = 
 
 
 def _shots(figure: Figure, work: Path) -> list[np.ndarray]:
-    light, shots = scene.Light(SKY, scene.Sun(SUN / np.linalg.norm(SUN), 2.0, 0.06)), []
+    light, shots = scene.SceneLight(SKY, scene.Sun(SUN / np.linalg.norm(SUN), 2.0, 0.06)), []
     for k, (azimuth, height, distance, target, focal, bare) in enumerate(SHOTS):
         a, h = np.radians([azimuth, height])
         at = np.array(target) + distance * np.array([np.sin(a) * np.cos(h), -np.cos(a) * np.cos(h), np.sin(h)])
         folder = work / str(k)
-        filmed.render(folder, figure, light, scene.looking(at[None], np.array([target]), np.zeros(1)), [0], SAMPLES, SCALE, room=False, bare=bare, focal=focal)
+        camera = scene.looking(at[None], np.array([target]), np.zeros(1))
+        filmed.render(folder, figure, light, scene.Shot(camera, [0], SAMPLES, SCALE, room=False, focal=focal), bare)
         shots.append(_square(images.linear_to_srgb(np.clip(images.read_linear(folder / "00000.exr"), 0, 1))))
     return shots
 

@@ -89,11 +89,11 @@ def film_all(person: Likeness, folder: Path, lights: list[str], facekit: Path | 
         film(folder, f"{person.name}_{light}", figure, FURTHER[LIGHTS[light]](person.seed), LIGHTS[light], FURTHER_FRAMES, room=False)
 
 
-def photograph_again(person: people.Person, folder: Path, light: str) -> None:
+def photograph_again(person: people.FilmedPerson, folder: Path, light: str) -> None:
     """A bald person in another light, as benchmarks/people.py does it."""
     kind = LIGHTS[light] if LIGHTS[light] != person.light else OTHERWISE
     began = time.monotonic()
-    people.make(people.Person(f"{person.name}_{light}", person.seed, kind), folder)
+    people.make(people.FilmedPerson(f"{person.name}_{light}", person.seed, kind), folder)
     print(f"{person.name}_{light}: {(time.monotonic() - began) / 60:.1f} min", flush=True)
 
 

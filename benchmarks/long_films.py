@@ -74,11 +74,11 @@ def film(folder: Path, count: int) -> Path:
     out = folder / str(count)
     if (out / "film.mp4").is_file():
         return out
-    cameras, numbers, work, taken = scene.camera_path(SEED, FRAMES, DEGREES), chosen(count), folder / "rendered", phone.sample_phone(SEED)
+    cameras, numbers, work, taken = scene.camera_path(SEED, FRAMES, DEGREES), chosen_frames(count), folder / "rendered", phone.sample_phone(SEED)
     if not all((work / f"{number:05d}.exr").is_file() for number in numbers):
         from core.synthetic.people.figure import make_figure
 
-        filmed.render(work, make_figure(SEED), KINDS[LIGHT](SEED), cameras, numbers, SAMPLES, module="benchmarks.long_films_render")
+        filmed.render(work, make_figure(SEED), KINDS[LIGHT](SEED), scene.Shot(cameras, numbers, SAMPLES), module="benchmarks.long_films_render")
     out.mkdir(exist_ok=True)
     write_json(out / "cameras.json", {"name": "film", "light": LIGHT, "focal_px": scene.FOCAL, "width": scene.WIDTH, "height": scene.HEIGHT,
                                       "cameras": [{"frame": k, "matrix_world": cameras[number].tolist()} for k, number in enumerate(numbers)]})
@@ -86,7 +86,7 @@ def film(folder: Path, count: int) -> Path:
     return out
 
 
-def chosen(count: int) -> list[int]:
+def chosen_frames(count: int) -> list[int]:
     """Which frames of the longest film make up one of so many, from its first to its last."""
     whole = np.linspace(0, FRAMES - 1, SHARED if count <= SHARED else FRAMES).round().astype(int)
     return whole[np.linspace(0, len(whole) - 1, count).round().astype(int)].tolist()

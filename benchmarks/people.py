@@ -41,7 +41,7 @@ from .shadow_captures import registered, write_views
 
 
 @dataclass(frozen=True)
-class Person:
+class FilmedPerson:
     """name: the group of skin tone (benchmarks/delight_measures.py) and the capture's name; light: one of people_lights.KINDS or FURTHER."""
 
     name: str
@@ -50,12 +50,12 @@ class Person:
 
 
 PEOPLE = (
-    Person("very_light", 900111, "noon sun behind leaves"),
-    Person("light", 900103, "overcast"),
-    Person("intermediate", 900119, "window bars"),
-    Person("tan", 900104, "mixed lamps"),
-    Person("brown", 900101, "hazy sun"),
-    Person("dark", 900102, "noon sun behind leaves"),
+    FilmedPerson("very_light", 900111, "noon sun behind leaves"),
+    FilmedPerson("light", 900103, "overcast"),
+    FilmedPerson("intermediate", 900119, "window bars"),
+    FilmedPerson("tan", 900104, "mixed lamps"),
+    FilmedPerson("brown", 900101, "hazy sun"),
+    FilmedPerson("dark", 900102, "noon sun behind leaves"),
 )
 """The first seed from 900101 on in each group: nothing was chosen by eye. reserved.json keeps them from training."""
 PLACES = ("wild", "flash", "studio")
@@ -83,7 +83,7 @@ def main() -> None:
                 solve(capture, arguments.folder / person.name, arguments.until, arguments.quality)
 
 
-def make(person: Person, folder: Path, place: str = "wild") -> Capture:
+def make(person: FilmedPerson, folder: Path, place: str = "wild") -> Capture:
     """The person's capture and truth, made if they are not there."""
     name = person.name if place == "wild" else f"{person.name}_{place}"
     capture, truth = Capture(folder / f"{name}.wildcap"), folder / name
@@ -92,7 +92,7 @@ def make(person: Person, folder: Path, place: str = "wild") -> Capture:
     skin = make_skin(sample_parameters(person.seed), sample.MAPS)
     light, cameras = _set(person, place)
     work = folder / "rendered" / name
-    sample.render_frames(work, person.seed, skin, cameras, list(range(len(cameras))), SAMPLES, SCALE, room=False, light=light, suffix=".exr")
+    sample.render_frames(work, person.seed, skin, scene.Shot(cameras, list(range(len(cameras))), SAMPLES, SCALE, room=False), light=light, suffix=".exr")
     head = subject_mesh(person.seed)
     meshes.write_obj(truth / "head.obj", head)
     if place == "wild":
@@ -116,12 +116,14 @@ def make(person: Person, folder: Path, place: str = "wild") -> Capture:
     return capture
 
 
-def _set(person: Person, place: str) -> tuple[scene.Light, np.ndarray]:
+def _set(person: FilmedPerson, place: str) -> tuple[scene.SceneLight, np.ndarray]:
     """The light at a place, and its cameras, camera-to-world [N, 4, 4]."""
     if place == "studio":
-        return scene.Light((1.0, 1.0, 1.0)), scene.rig()
+        return scene.SceneLight((1.0, 1.0, 1.0)), scene.rig()
     path = scene.camera_path(person.seed, FRAMES)
-    return (scene.Light((0.0, 0.0, 0.0), flash=FLASH_W), path[1::FLASH_EVERY]) if place == "flash" else ((KINDS | FURTHER)[person.light](person.seed), path)
+    if place == "flash":
+        return scene.SceneLight((0.0, 0.0, 0.0), flash=FLASH_W), path[1::FLASH_EVERY]
+    return (KINDS | FURTHER)[person.light](person.seed), path
 
 
 def write_maps(folder: Path, skin: Skin) -> None:

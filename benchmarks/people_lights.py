@@ -10,51 +10,51 @@ from __future__ import annotations
 import numpy as np
 
 from core.geometry.meshes import Mesh
-from core.synthetic.scene import SKY, Lamp, Light, Sun, leaves
+from core.synthetic.scene import SKY, AreaLamp, SceneLight, Sun, leaves
 
 HEIGHT = 64  # rows of a panorama
 GRASS, ROOM = (0.10, 0.13, 0.06), (0.11, 0.10, 0.09)
 
 
-def noon(seed: int) -> Light:
+def noon(seed: int) -> SceneLight:
     """High sun behind a twig, blue sky, grass that shines back."""
     sun = Sun(_towards(np.random.default_rng([seed, 50]).choice([-1, 1]) * 32, 56))
-    return Light(panorama(SKY, SKY, GRASS), sun, leaves(seed, sun))
+    return SceneLight(panorama(SKY, SKY, GRASS), sun, leaves(seed, sun))
 
 
-def overcast(seed: int) -> Light:
+def overcast(seed: int) -> SceneLight:
     """A sky thrice as bright above as at the horizon (CIE, Moon and Spencer 1942) over pavement."""
-    return Light(panorama((1.2, 1.25, 1.3), (0.4, 0.417, 0.433), (0.14, 0.135, 0.13)))
+    return SceneLight(panorama((1.2, 1.25, 1.3), (0.4, 0.417, 0.433), (0.14, 0.135, 0.13)))
 
 
-def window_bars(seed: int) -> Light:
+def window_bars(seed: int) -> SceneLight:
     """A low sun through a window's bars into a dim room; the window's sky lights that side of the face softly."""
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
     sun = Sun(_towards(38 * side, 24), 3.4, 0.0093, (1.0, 0.9, 0.74))
     window = _patch(panorama(ROOM, ROOM, (0.07, 0.05, 0.04)), _towards(60 * side, 18), 34, (1.5, 1.75, 2.1))
-    return Light(window, sun, bars(sun.direction))
+    return SceneLight(window, sun, bars(sun.direction))
 
 
-def mixed_lamps(seed: int) -> Light:
+def mixed_lamps(seed: int) -> SceneLight:
     """An evening at home: a warm bulb on one side, a cool screen on the other, a ceiling lamp."""
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
-    return Light(panorama((0.030, 0.024, 0.018), (0.03, 0.024, 0.018), (0.018, 0.012, 0.008)), lamps=(
-        Lamp((0.75 * side, -0.65, 0.30), 0.12, 7.0, (1.0, 0.62, 0.30)),
-        Lamp((-0.55 * side, -0.85, -0.10), 0.30, 13.0, (0.55, 0.78, 1.0)),
-        Lamp((0.10 * side, -0.35, 1.25), 0.35, 9.0, (1.0, 0.80, 0.58))))
+    return SceneLight(panorama((0.030, 0.024, 0.018), (0.03, 0.024, 0.018), (0.018, 0.012, 0.008)), lamps=(
+        AreaLamp((0.75 * side, -0.65, 0.30), 0.12, 7.0, (1.0, 0.62, 0.30)),
+        AreaLamp((-0.55 * side, -0.85, -0.10), 0.30, 13.0, (0.55, 0.78, 1.0)),
+        AreaLamp((0.10 * side, -0.35, 1.25), 0.35, 9.0, (1.0, 0.80, 0.58))))
 
 
-def haze(seed: int) -> Light:
+def haze(seed: int) -> SceneLight:
     """A sun behind thin cloud, soft and from the side: the head's own shadow and no other."""
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
-    return Light(panorama((0.55, 0.62, 0.75), (0.75, 0.72, 0.68), (0.16, 0.14, 0.11)), Sun(_towards(58 * side, 36), 4.0, 0.09, (1.0, 0.95, 0.87)))
+    return SceneLight(panorama((0.55, 0.62, 0.75), (0.75, 0.72, 0.68), (0.16, 0.14, 0.11)), Sun(_towards(58 * side, 36), 4.0, 0.09, (1.0, 0.95, 0.87)))
 
 
-def lamp_below(seed: int) -> Light:
+def lamp_below(seed: int) -> SceneLight:
     """A lamp on a table below the face, in a dim room: shading upside down, shadows that rise from nose and lips."""
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
-    return Light(panorama((0.035, 0.034, 0.033), (0.04, 0.038, 0.035), (0.06, 0.045, 0.03)), lamps=(
-        Lamp((0.16 * side, -0.50, -0.48), 0.10, 8.0, (1.0, 0.74, 0.46)),))
+    return SceneLight(panorama((0.035, 0.034, 0.033), (0.04, 0.038, 0.035), (0.06, 0.045, 0.03)), lamps=(
+        AreaLamp((0.16 * side, -0.50, -0.48), 0.10, 8.0, (1.0, 0.74, 0.46)),))
 
 
 KINDS = {"noon sun behind leaves": noon, "overcast": overcast, "window bars": window_bars, "mixed lamps": mixed_lamps, "hazy sun": haze}

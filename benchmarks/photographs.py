@@ -34,7 +34,7 @@ from core.imaging import images
 from . import figures
 from .delight_portraits import subjects_by_tone
 from .measures.agreement import disagreement
-from .measures.features_kept import contrasts, joint, kept
+from .measures.features_kept import contrast_kept, contrasts, joint
 from .measures.pictures import detail, log_green
 from .measures.references import BLUR, FLAT, NOTHING, TRUE, blur_divided_out, flat_colour
 from .measures.slopes import slope
@@ -60,7 +60,7 @@ WORDS = ("PSNR after one gain per channel, and *detail*, the correlation with th
 
 
 @dataclass(frozen=True)
-class Sitter:
+class LightSeries:
     """A person under several lights, the head held still. srgb: the pictures [H, W, 3]; albedo: the truth, linear [H, W, 3]; landmarks [468, 2] in pixels;
     face bool [H, W]; lit: per picture the pixels bool [H, W] that count."""
 
@@ -119,7 +119,7 @@ def answers_to(srgb: np.ndarray, albedo: np.ndarray, lit: np.ndarray, delighter:
     return {NOTHING: linear, FLAT: flat_colour(linear, lit), BLUR: blur_divided_out(linear, lit), TRUE: albedo, delighter: ours}
 
 
-def of_sitters(sitters: Iterator[Sitter], delighter: str, pictures: Path | None = None) -> Scores:
+def of_sitters(sitters: Iterator[LightSeries], delighter: str, pictures: Path | None = None) -> Scores:
     """Answer -> person -> figures of COLUMNS."""
     scores: Scores = {}
     for sitter in sitters:
@@ -131,11 +131,11 @@ def of_sitters(sitters: Iterator[Sitter], delighter: str, pictures: Path | None 
     return scores
 
 
-def of_sitter(sitter: Sitter, answers: list[np.ndarray]) -> dict[str, float | None]:
+def of_sitter(sitter: LightSeries, answers: list[np.ndarray]) -> dict[str, float | None]:
     """The figures of one answer to all of a sitter's pictures; answers linear [H, W, 3]."""
     true = images.linear_to_srgb(sitter.albedo)
     log_true, truths = log_green(true), [contrasts(true, sitter.landmarks, lit) for lit in sitter.lit]
-    shares, filmed = ([kept(contrasts(images.linear_to_srgb(np.clip(picture, 0, 1)), sitter.landmarks, lit), truth)
+    shares, filmed = ([contrast_kept(contrasts(images.linear_to_srgb(np.clip(picture, 0, 1)), sitter.landmarks, lit), truth)
                        for picture, lit, truth in zip(each, sitter.lit, truths, strict=True)] for each in (answers, sitter.linear))
     errors, slopes = [], []
     for i, j in combinations(range(len(answers)), 2):
@@ -167,7 +167,7 @@ def of_pairs(subjects: int, delighter: str) -> Scores:
             for answer, groups in found.items()}
 
 
-def light_stage_sitters(data: Path) -> Iterator[Sitter]:
+def light_stage_sitters(data: Path) -> Iterator[LightSeries]:
     """The people of DATA/faceolat. Raises Problem where it is not there."""
     folder = data / "faceolat"
     if not (folder / "landmarks.json").is_file():
@@ -176,10 +176,10 @@ def light_stage_sitters(data: Path) -> Iterator[Sitter]:
         person, camera = name.split("_")
         face = images.read_mask(folder / "align_mask_face" / f"{name}.png") > 0.5
         pictures = [images.read_srgb(path) for path in sorted((folder / "align_image" / person / camera).glob("*.png"))]
-        yield Sitter(person, pictures, images.read_linear(folder / "align_diffuse" / f"{name}.png"), np.array(points, float), face, [face] * len(pictures))
+        yield LightSeries(person, pictures, images.read_linear(folder / "align_diffuse" / f"{name}.png"), np.array(points, float), face, [face] * len(pictures))
 
 
-def lamp_sitters(data: Path) -> Iterator[Sitter]:
+def lamp_sitters(data: Path) -> Iterator[LightSeries]:
     """The man of DATA/near_ps_human1, brightened to a usual exposure. Raises Problem where he is not there or no face is found."""
     folder = data / "near_ps_human1"
     paths = sorted(folder.glob("[0-9]*.png"))
@@ -196,13 +196,13 @@ def lamp_sitters(data: Path) -> Iterator[Sitter]:
     reached = [(picture.mean(-1) > LIT * np.percentile(picture.mean(-1), 98)) & (hull > 0) for picture in lit]
     everywhere, weight = np.logical_or.reduce(reached), sum(picture.mean(-1, keepdims=True) for picture in lit)
     merge = sum(picture * picture.mean(-1, keepdims=True) for picture in lit) / np.maximum(weight, 1e-6)  # by its own brightness: no seam where a lamp ends
-    yield Sitter("bearded man", [images.linear_to_srgb(picture) for picture in lit], merge.astype(np.float32), points, everywhere, reached)
+    yield LightSeries("bearded man", [images.linear_to_srgb(picture) for picture in lit], merge.astype(np.float32), points, everywhere, reached)
 
 
-SITTERS: dict[str, Callable[[Path], Iterator[Sitter]]] = {"faceolat": light_stage_sitters, "lamps": lamp_sitters}
+SITTERS: dict[str, Callable[[Path], Iterator[LightSeries]]] = {"faceolat": light_stage_sitters, "lamps": lamp_sitters}
 
 
-def sheet(sitter: Sitter, given: list[dict[str, np.ndarray]], side: int = 256) -> np.ndarray:
+def sheet(sitter: LightSeries, given: list[dict[str, np.ndarray]], side: int = 256) -> np.ndarray:
     """Three of a sitter's lights, a row per answer at the truth's tone; sRGB."""
     rows, columns = (np.flatnonzero(sitter.face.any(axis)) for axis in (1, 0))
     box, tone = np.s_[rows[0]:rows[-1] + 1, columns[0]:columns[-1] + 1], sitter.albedo[sitter.face].mean(0)

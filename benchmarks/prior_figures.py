@@ -30,7 +30,7 @@ from core.solve.network import denoise
 from core.solve.prior import WEIGHTS, ConditionedPrior, Prior, condition, coordinates, load, mean_at
 from core.solve.problem import Observation, State
 from core.solve.recipes import OURS
-from core.solve.sampler import ancestral, karras, sample, seeded
+from core.solve.sampler import Sampler, ancestral, karras, seeded
 from core.solve.skin_tone import GIVEN, SkinTone
 from core.synthetic.skin import make_skin
 from core.training.patches import mean_map
@@ -114,9 +114,9 @@ def unconditional(prior: Prior, coords: torch.Tensor, tone: torch.Tensor, steps:
     told = condition(coords, prior.octaves, prior.mean_face, prior.spread, tone, torch.zeros(len(tone)))
     sigmas = [s for s in karras(steps, 0.01, 80.0) if s <= FIRST_SIGMA]
     generator = torch.Generator().manual_seed(0)
-    x = told["mean"] + sigmas[0] * torch.randn(told["mean"].shape, generator=generator)
+    x = told.mean + sigmas[0] * torch.randn(told.mean.shape, generator=generator)
     for s, s_next in zip(sigmas[:-1], sigmas[1:], strict=True):
-        clean = denoise(prior.network, x, torch.full((len(x),), s), **told)
+        clean = denoise(prior.network, x, torch.full((len(x),), s), told)
         s_down, s_up = ancestral(s, s_next)
         x = x + (x - clean) / s * (s_down - s) + s_up * torch.randn(x.shape, generator=generator)
     return clean
@@ -179,7 +179,7 @@ def given_diffuse(prior: ConditionedPrior, truth: torch.Tensor, steps: int, guid
     coords = coordinates(size, slice(0, size), slice(0, size))
     lights = Lights(constant_light(torch.ones(3)), torch.zeros(1, 9, 1, 1), torch.ones(3))
     start = mean_at(prior.prior.mean_face, coords, prior.tone)
-    return sample(prior, found, State(0, None, start, lights), recipe, seeded(0)).denoised[0] * everywhere
+    return Sampler(prior, recipe, seeded(0)).sample(found, State(0, None, start, lights)).denoised[0] * everywhere
 
 
 def errors(maps: torch.Tensor, truth: torch.Tensor, face: torch.Tensor) -> tuple[float, float]:

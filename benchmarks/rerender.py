@@ -26,7 +26,7 @@ from core.imaging import images
 
 from . import figures
 from .ablation_measures import feature_distance
-from .albedo_score import Look, Truth
+from .albedo_score import AlbedoTruth, HeadInView
 from .comparison import LIGHTS, OURS, row_folder
 from .measures.pictures import differences, face_box, with_gain
 from .people import PEOPLE
@@ -41,11 +41,11 @@ FORMATS = {"psnr": "{:.2f} dB", "ssim": "{:.4f}", "flip": "{:.4f}", "features": 
 
 
 @dataclass(frozen=True)
-class Delit:
+class DelitFrame:
     """A delit frame, sRGB [H, W, 3], and how the head looks from there; `look.true.face` is the facial skin that is judged."""
 
     picture: np.ndarray
-    look: Look
+    look: HeadInView
 
 
 def main() -> None:
@@ -66,7 +66,7 @@ def main() -> None:
     print(table(found))
 
 
-def delit_views(capture: Capture) -> list[Delit]:
+def delit_views(capture: Capture) -> list[DelitFrame]:
     """The frames that were delit, with the facial skin that each of them sees from the front."""
     head = meshes.read_obj(capture.head)
     caster, normals = raster.RayCaster(head), meshes.vertex_normals(head)
@@ -85,7 +85,7 @@ def delit_views(capture: Capture) -> list[Delit]:
         judged = np.zeros(hit.shape, bool)
         judged[hit] = (raster.sample(skin, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512) > 0.5) & (cosine > GRAZING)
         picture = images.read_srgb(path)
-        views.append(Delit(picture, Look(Truth(len(views), picture, judged, None), hit, uv)))
+        views.append(DelitFrame(picture, HeadInView(AlbedoTruth(len(views), picture, judged, None), hit, uv)))
     return views
 
 
@@ -95,7 +95,7 @@ def rendering(work: Path, row: str) -> np.ndarray:
     return images.read_linear(folder / "diffuse_albedo.exr") * images.read_linear(folder / "shading.exr")
 
 
-def score(rendered: np.ndarray, views: list[Delit]) -> dict[str, float]:
+def score(rendered: np.ndarray, views: list[DelitFrame]) -> dict[str, float]:
     """PSNR, SSIM, FLIP and, where its network is installed, the feature distance of a map [S, S, 3] (linear) to the delit frames, each the mean over views."""
     found = []
     for view in views:

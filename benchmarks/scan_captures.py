@@ -16,6 +16,7 @@ import json
 import os
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -68,13 +69,13 @@ def photograph(data: Path, folder: Path, name: str) -> Capture:
     relief = 2 * images.read_data(data / NEEDED[3])[..., :3] - 1
     gloss = images.read_data(data / NEEDED[2])
     skin = filmed.skin_part(work, head, albedo, gloss[..., 0] if gloss.ndim == 3 else gloss, relief / np.linalg.norm(relief, axis=-1, keepdims=True))
-    filmed.render_parts(work, SEED, {"skin": skin}, [], light, cameras, range(FRAMES), SAMPLES, SCALE, room=False)
+    filmed.render_parts(work, SEED, {"skin": skin}, [], light, scene.Shot(cameras, range(FRAMES), SAMPLES, SCALE, room=False))
     views = [sample.view_of(matrix, SCALE) for matrix in cameras]
     caster, facial = raster.RayCaster(head), face_of(data, head)
     opaque = raster.RayCaster(joined([head, light.blockers])) if light.blockers else caster
     faces = {}
     for frame in np.unique(np.linspace(1, FRAMES - 2, TRUTHS).round().astype(int)).tolist():
-        faces[frame] = _write_truth(target, frame, views[frame], caster, opaque, albedo, facial, light.sun.direction if light.sun else None)
+        faces[frame] = _write_truth(target, frame, views[frame], LitScan(caster, opaque, albedo, facial, light.sun.direction if light.sun else None))
     write_obj(target / "head.obj", head)  # by it the five are known to be one person
     write_json(target / "cameras.json", {"name": name, "light": LIGHTS[name], "focal_px": scene.FOCAL * SCALE,
                                          "width": views[0].width, "height": views[0].height,
@@ -116,20 +117,31 @@ def face_of(data: Path, head: Mesh) -> np.ndarray:
     return total / np.maximum(count, 1)
 
 
-def _write_truth(target: Path, frame: int, view: View, caster: raster.RayCaster, opaque: raster.RayCaster, albedo: np.ndarray, facial: np.ndarray,
-                 sun: np.ndarray | None, over: int = 2) -> tuple[np.ndarray, np.ndarray]:
+@dataclass(frozen=True)
+class LitScan:
+    """The scan ready for rays; opaque: it with all that throws shadows; its albedo [S, S, 3], linear; facial [V] in [0, 1], how far a vertex is facial skin;
+    sun [3]: unit direction to it, None where there is none."""
+
+    caster: raster.RayCaster
+    opaque: raster.RayCaster
+    albedo: np.ndarray
+    facial: np.ndarray
+    sun: np.ndarray | None
+
+
+def _write_truth(target: Path, frame: int, view: View, scan: LitScan, over: int = 2) -> tuple[np.ndarray, np.ndarray]:
     """albedo/, face/ and shadow/ of a frame; its albedo [h, w, 3] and facial skin bool [h, w]."""
-    head = caster.mesh
-    face, bary, _ = raster.render_view(caster, view, over)
+    head, albedo, sun = scan.caster.mesh, scan.albedo, scan.sun
+    face, bary, _ = raster.render_view(scan.caster, view, over)
     hit = face >= 0
     uv = raster.interpolate(head.uvs, head.face_uvs, face, bary)[hit]
     colour, skin, dark = np.zeros((*hit.shape, 3), np.float32), np.zeros(hit.shape, np.float32), np.zeros(hit.shape, np.float32)
     colour[hit] = raster.sample(albedo, np.stack([uv[:, 0] * albedo.shape[1], (1 - uv[:, 1]) * albedo.shape[0]], -1))
-    skin[hit] = (facial[head.faces[face[hit]]] * bary[hit]).sum(1)
+    skin[hit] = (scan.facial[head.faces[face[hit]]] * bary[hit]).sum(1)
     if sun is not None:
         points = raster.interpolate(head.vertices, head.faces, face, bary)[hit]
         normals = raster.interpolate(vertex_normals(head), head.faces, face, bary)[hit]
-        dark[hit] = (normals @ sun <= 0) | opaque.blocked(points + 5e-4 * normals, np.repeat(sun[None], len(points), 0))
+        dark[hit] = (normals @ sun <= 0) | scan.opaque.blocked(points + 5e-4 * normals, np.repeat(sun[None], len(points), 0))
     cover, colour, skin, dark = (images.resize(values, view.width, view.height) for values in (hit.astype(np.float32), colour, skin, dark))
     colour, face, name = colour / np.maximum(cover, 1e-6)[..., None], (skin > 0.5) & (cover > 0.99), f"{frame:04d}.png"
     for folder in ("albedo", "face", *(["shadow"] if sun is not None else [])):

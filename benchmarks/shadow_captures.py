@@ -28,7 +28,7 @@ from core.geometry.views import View, read_views
 from core.imaging import images
 from core.shadow_mask.lift import lift_shadows
 from core.synthetic.identities import subject_mesh
-from core.synthetic.light import bake, random_light
+from core.synthetic.light import SkyAndSun, bake, random_light
 from core.synthetic.painted_head import camera
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
@@ -72,21 +72,21 @@ def _lit(mesh: Mesh, seed: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
     """Shading [S, S, 3] and the true shadow bool [S, S] under the first of the seed's random lights whose shadow is one."""
     face = template.mask("face", 64) > 0.5
     for i in range(1000):
-        sky, sun, colour, radius = random_light(np.random.default_rng([seed, 30, i]))
-        if radius > SOFTEST:
+        light = random_light(np.random.default_rng([seed, 30, i]))
+        if light.radius > SOFTEST:
             continue
-        _, shadow, takes = _shadow(mesh, 64, sky, sun, colour, radius, kind, (seed, 31, i))
+        _, shadow, takes = _shadow(mesh, 64, light, kind, (seed, 31, i))
         if SHARE[0] < shadow[face].mean() < SHARE[1] and np.median(takes[face & shadow & (takes > 0)]) > DARKER:
             break
-    shading, shadow, _ = _shadow(mesh, SIZE, sky, sun, colour, radius, kind, (seed, 31, i))
+    shading, shadow, _ = _shadow(mesh, SIZE, light, kind, (seed, 31, i))
     return shading, shadow
 
 
-def _shadow(mesh: Mesh, size: int, sky, sun, colour, radius: float, kind: str, seeds: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _shadow(mesh: Mesh, size: int, light: SkyAndSun, kind: str, seeds: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Shading [S, S, 3], where the sun does not reach bool [S, S], and the share of the light that whatever stands in the sun's way takes [S, S]."""
-    shading, blocked, normal = bake(mesh, size, sky, sun, colour, radius, kind, np.random.default_rng(seeds))
-    cosine = normal @ sun
-    sunlit = shading.mean(-1) + np.maximum(cosine, 0) * blocked * colour.mean()
+    shading, blocked, normal = bake(mesh, size, light, kind, np.random.default_rng(seeds))
+    cosine = normal @ light.sun
+    sunlit = shading.mean(-1) + np.maximum(cosine, 0) * blocked * light.colour.mean()
     return shading, (blocked > 0.5) | (cosine <= 0.02), 1 - shading.mean(-1) / np.maximum(sunlit, 1e-4)
 
 

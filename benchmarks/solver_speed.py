@@ -34,7 +34,7 @@ TONE = "0.69,0.54,0.45"
 
 
 @dataclass(frozen=True)
-class Row:
+class SolverVariant:
     """A way to sample, or (`stage`) the settings of a whole stage, and the seconds it shall take on two cores."""
 
     float32: bool = False
@@ -48,16 +48,16 @@ class Row:
 
 DRAFT, STANDARD = {"size": 512, "steps": 30, "guidance": "proximal"}, {"size": 1024}
 ROWS = {
-    "plain": Row(float32=True, channels_first=True, coarse=False),
-    "ours": Row(),
-    "float32": Row(float32=True),
-    "low memory": Row(low_memory=True),
-    "draft": Row(guidance="proximal"),
-    "draft at 512": Row(stage=DRAFT, target=90),
-    "standard at 1024": Row(stage=STANDARD, target=480),
-    "standard at 1024, low memory": Row(stage={**STANDARD, "low_memory": True}, low_memory=True),
-    "draft at 512, float32": Row(float32=True, stage=DRAFT, target=180),
-    "standard at 1024, float32": Row(float32=True, stage=STANDARD, target=960),
+    "plain": SolverVariant(float32=True, channels_first=True, coarse=False),
+    "ours": SolverVariant(),
+    "float32": SolverVariant(float32=True),
+    "low memory": SolverVariant(low_memory=True),
+    "draft": SolverVariant(guidance="proximal"),
+    "draft at 512": SolverVariant(stage=DRAFT, target=90),
+    "standard at 1024": SolverVariant(stage=STANDARD, target=480),
+    "standard at 1024, low memory": SolverVariant(stage={**STANDARD, "low_memory": True}, low_memory=True),
+    "draft at 512, float32": SolverVariant(float32=True, stage=DRAFT, target=180),
+    "standard at 1024, float32": SolverVariant(float32=True, stage=STANDARD, target=960),
 }
 
 
@@ -136,7 +136,7 @@ def make(folder: str, source: str | None) -> None:
     meshes.write_obj(capture.head, template.load())
 
 
-def measured(row: Row, folder: Path, options: argparse.Namespace) -> dict:
+def measured(row: SolverVariant, folder: Path, options: argparse.Namespace) -> dict:
     """A row's figures, in this process."""
     import torch
 
@@ -152,7 +152,7 @@ def measured(row: Row, folder: Path, options: argparse.Namespace) -> dict:
     return found
 
 
-def single_steps(row: Row, capture, options: argparse.Namespace) -> dict:
+def single_steps(row: SolverVariant, capture, options: argparse.Namespace) -> dict:
     """`options.steps` steps that lie along the walk as all of them do, each with as many light updates as one of theirs."""
     from dataclasses import replace
 
@@ -160,34 +160,35 @@ def single_steps(row: Row, capture, options: argparse.Namespace) -> dict:
 
     from core.contract.messages import Reporter
     from core.face.head import read_head
-    from core.solve import FACE_CROP, initial
+    from core.solve import initial
     from core.solve.evidence import read_evidence
     from core.solve.memory import sample_within_memory
     from core.solve.recipes import OURS
-    from core.solve.sampler import seeded
+    from core.solve.sampler import Sampler, seeded
     from core.solve.skin_tone import parse_skin_tone
 
     prior = prior_of(row, options)
     coarse = OURS.coarse if row.coarse and not prior.one_scale else ()
     recipe = replace(OURS, coarse=coarse, guidance=row.guidance, sharp_edges=False, protect_marks=False)
-    begun = initial.start(prior, read_evidence(capture, read_head(capture), options.size), parse_skin_tone(TONE), FACE_CROP / 96, recipe)
+    evidence = read_evidence(capture, read_head(capture), options.size)
+    begun = initial.start(prior, evidence, parse_skin_tone(TONE), evidence.cell_side(96), recipe)
     short = replace(begun.recipe, steps=options.steps, updates=max(1, recipe.updates * options.steps // recipe.steps))
     if options.compile:
         prior.network = torch.compile(prior.network)
     conditioned = prior.of_tone(begun.tone)
     if options.compile or options.device != "cpu":
-        sample_within_memory(conditioned, begun.observations, begun.state, short, seeded(0))  # warms up
+        sample_within_memory(Sampler(conditioned, short, seeded(0)), begun.observations, begun.state)  # warms up
         begun.state.step, begun.state.x, begun.state.denoised = 0, None, begun.reference
     report = Reporter("solve", emit=lambda message: print(message.text, file=sys.stderr))
     began, worked = time.perf_counter(), time.process_time()
-    sample_within_memory(conditioned, begun.observations, begun.state, short, seeded(0), log=report.log)
+    sample_within_memory(Sampler(conditioned, short, seeded(0)), begun.observations, begun.state, log=report.log)
     seconds, worked = time.perf_counter() - began, time.process_time() - worked
     dtype = str(prior.network.proj_in.weight.dtype).removeprefix("torch.")
     return {"seconds": round(seconds, 3), "processor_seconds": round(worked, 2), "seconds_per_step": round(seconds / short.steps, 4),
             "processor_seconds_per_step": round(worked / short.steps, 4), "steps": short.steps, "dtype": dtype}
 
 
-def whole_stage(row: Row, capture, options: argparse.Namespace) -> dict:
+def whole_stage(row: SolverVariant, capture, options: argparse.Namespace) -> dict:
     """The stage solve, the mask's proposal before it where the capture has frames; imports and loading count."""
     import torch
 
@@ -208,7 +209,7 @@ def whole_stage(row: Row, capture, options: argparse.Namespace) -> dict:
             "dtype": str(dtype).removeprefix("torch.")}
 
 
-def prior_of(row: Row, options: argparse.Namespace):
+def prior_of(row: SolverVariant, options: argparse.Namespace):
     """The shipped prior, or one of the authors' size, as the row has it."""
     import torch
 

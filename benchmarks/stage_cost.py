@@ -21,7 +21,7 @@ from core.contract.capture import Capture
 from core.contract.messages import Problem, StageDone
 from core.contract.settings import Settings, preset
 from core.contract.stages import by_name
-from core.worker.job import Job
+from core.worker.job import JobRequest
 from core.worker.runner import explained, run_stage
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -94,7 +94,7 @@ def run(capture: str, stage: str, job: str = "{}") -> dict:
             if asked.get("source") and not step.reads:
                 capture.set_source(asked["source"])
             capture.forget([stage])
-            run_stage(step, Job(capture, asked.get("source", ""), (step,), True, settings),
+            run_stage(step, JobRequest(capture, asked.get("source", ""), (step,), True, settings),
                       lambda message: finished.append(message) if isinstance(message, StageDone) else None, lambda: False)
     except Exception as error:  # told as the chain tells it
         problem: Problem = explained(error, stage, capture.logs / f"{stage}.log")

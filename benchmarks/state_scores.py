@@ -10,12 +10,12 @@ import numpy as np
 
 from core.imaging import images
 
-from .albedo_score import Look
+from .albedo_score import HeadInView
 from .delight_measures import stepping
 from .measures.agreement import agreement
 from .measures.calibration import calibrate
 from .measures.edges import score_edges
-from .measures.features_kept import contrasts, joint, kept
+from .measures.features_kept import contrast_kept, contrasts, joint
 from .measures.parts import score_parts
 from .measures.pictures import detail, differences, face_box, log_green, shadow_step, with_gain
 from .measures.references import NOTHING, TRUE, face_height
@@ -30,7 +30,7 @@ DOUBT = 1.02
 Figures = dict[str, float | None]
 
 
-def in_pictures(answers: dict[str, np.ndarray], looks: list[Look]) -> dict[str, Figures]:
+def in_pictures(answers: dict[str, np.ndarray], looks: list[HeadInView]) -> dict[str, Figures]:
     """Method -> PSNR, SSIM and FLIP after one gain per channel, detail, and what is left along the shadow's edge, means over the frames with a truth.
     answers: linear maps [S, S, 3], among them the filmed one, which tells where the light steps."""
     found: dict[str, list[Figures]] = {method: [] for method in answers}
@@ -64,7 +64,7 @@ def in_uv(filmed: Filmed, maps: dict[str, np.ndarray]) -> dict[str, Figures]:
         alone = fit_light([log_ratio(answer[where], truth[where])], [normals])
         figures: Figures = {"psnr_uv": psnr_after_gain(answer[where], truth[where]), "light_alone": alone.deviation,
                             "psnr_alone": psnr_after_gain(without_light(answer[where], normals, alone), truth[where])}
-        figures |= {f"kept_{name}": value for name, value in kept(contrasts(images.linear_to_srgb(answer), points, where), true_contrasts).items()}
+        figures |= {f"kept_{name}": value for name, value in contrast_kept(contrasts(images.linear_to_srgb(answer), points, where), true_contrasts).items()}
         for name, part in score_parts(answer[where], truth[where], parts).items():
             figures |= {f"psnr_{name}": part.psnr, f"bias_{name}": part.bias}
         found[method] = figures
@@ -114,10 +114,10 @@ def small(answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def _kept(filmed: Filmed, maps: dict[str, np.ndarray], method: str) -> Figures:
     points = landmarks_in_uv()
-    return kept(*(contrasts(images.linear_to_srgb(maps[name]), points, filmed.where) for name in (method, TRUE)))
+    return contrast_kept(*(contrasts(images.linear_to_srgb(maps[name]), points, filmed.where) for name in (method, TRUE)))
 
 
-def _seen(look: Look, answer: np.ndarray) -> np.ndarray:
+def _seen(look: HeadInView, answer: np.ndarray) -> np.ndarray:
     """A linear map as a look sees it, sRGB [H, W, 3]."""
     return images.linear_to_srgb(np.clip(look.picture(answer), 0, 1))
 

@@ -39,7 +39,7 @@ from core.imaging import images
 from core.texture.blend import weighted_mean
 
 from .albedo_score import compare, mean_scores, read_truth
-from .detail import Look, centre_rays, look, marks, mean_of
+from .detail import FaceRays, centre_rays, look, marks, mean_of
 
 ROWS = ("average", "blend", "aligned", "perceptual", "delit")
 STEPS = 150
@@ -72,7 +72,7 @@ def measure(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: 
     return results
 
 
-def looks_of(capture: Capture, caster: raster.RayCaster, truth: Path) -> dict[str, Look]:
+def looks_of(capture: Capture, caster: raster.RayCaster, truth: Path) -> dict[str, FaceRays]:
     """Frame name -> what its rays meet, of the registered frames with a true albedo."""
     frames = read_frames(capture).by_name
     known = {true.frame: true for true in read_truth(truth)}
@@ -82,7 +82,7 @@ def looks_of(capture: Capture, caster: raster.RayCaster, truth: Path) -> dict[st
     return found
 
 
-def _row(row: str, observations: list, surface, looks: dict[str, Look], steps: int, picture: Path | None = None) -> dict:
+def _row(row: str, observations: list, surface, looks: dict[str, FaceRays], steps: int, picture: Path | None = None) -> dict:
     started = time.monotonic()
     map_ = _texture(row, [replace(o) for o in observations], surface, steps)
     seconds = time.monotonic() - started
@@ -103,7 +103,7 @@ def _texture(row: str, observations: list, surface, steps: int) -> np.ndarray:
     return images.linear_to_srgb(texture.fill(linear, confidence, surface.covered))
 
 
-def score(map_: np.ndarray, frames: Iterable[Look]) -> dict:
+def score(map_: np.ndarray, frames: Iterable[FaceRays]) -> dict:
     """albedo_score's figures of a map, sRGB [S, S, 3], and those of benchmarks/detail.py, means over the frames."""
     scores, found = [], []
     for seen in frames:
@@ -115,7 +115,7 @@ def score(map_: np.ndarray, frames: Iterable[Look]) -> dict:
             "shadow_step": mean["shadow_step"], "frames": len(scores), **mean_of(found)}
 
 
-def _leave_one_out(observations: list, surface, looks: dict[str, Look], count: int) -> dict:
+def _leave_one_out(observations: list, surface, looks: dict[str, FaceRays], count: int) -> dict:
     """The aligned texture without one view, scored in that view alone; `count` views in turn, evenly spread."""
     names = [o.name for o in observations if o.name in looks]
     chosen = [names[i] for i in np.unique(np.linspace(1, max(len(names) - 2, 1), count).round().astype(int))]

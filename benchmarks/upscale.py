@@ -41,7 +41,7 @@ from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
 from core.training.fine_windows import CHANNELS, FACTOR, Degradation, degraded, prepare
 from core.upscale import detail, enlarged
-from core.upscale.maps import Maps
+from core.upscale.maps import HeadMaps
 
 from .ablation_measures import feature_distance
 from .detail import moles
@@ -125,7 +125,7 @@ def compare(result: np.ndarray, true: np.ndarray) -> dict[str, float]:
 def cost(method: str, size: int = 1024) -> dict[str, float]:
     """Seconds and peak memory in GiB of enlarging maps of that size, in the process it is called in."""
     rng, blank = np.random.default_rng(0), np.ones((size, size, 3), np.float32)
-    maps = Maps(rng.random((size, size, 3), np.float32), blank / np.sqrt(3), rng.random((size, size), np.float32), blank[..., 0], blank)
+    maps = HeadMaps(rng.random((size, size, 3), np.float32), blank / np.sqrt(3), rng.random((size, size), np.float32), blank[..., 0], blank)
     began = time.perf_counter()
     enlarged(maps, FACTOR * size, method, "cpu", lambda done: None)
     return {"seconds": round(time.perf_counter() - began, 1), "peak GiB": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20, 2)}
@@ -135,7 +135,7 @@ def _enlarged(small: np.ndarray, method: str) -> np.ndarray:
     """Maps [7, H, W] in the network's channels, four times as large: [4H, 4W, 7]."""
     diffuse, normal = images.srgb_to_linear(np.moveaxis(small[:3], 0, -1)), np.moveaxis(small[3:6], 0, -1)
     blank = np.ones_like(diffuse)
-    maps = Maps(diffuse, normal, small[6], blank[..., 0], blank)
+    maps = HeadMaps(diffuse, normal, small[6], blank[..., 0], blank)
     return enlarged(maps, FACTOR * len(diffuse), method, "cpu", lambda done: None)
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -42,7 +42,7 @@ CACHE = Path(tempfile.gettempdir()) / "wildcap_ablation"
 
 
 @dataclass(frozen=True)
-class UvProblem:
+class MaskedUvProblem:
     """float32, linear. albedo, texture [S, S, 3]; shadow [S, S]: the blocked share of the sun; mask [S, S]: M as an artist would paint it, a bit too large."""
 
     albedo: np.ndarray
@@ -62,7 +62,7 @@ class UvProblem:
         return {"shadow": self.face & (self.shadow > 0.5) & ~band, "band": self.face & band, "outside": self.face & (self.shadow < 0.05) & ~band}
 
 
-def problem(subject: str, shadows: str, size: int, kind: str = "raw") -> UvProblem:
+def problem(subject: str, shadows: str, size: int, kind: str = "raw") -> MaskedUvProblem:
     """`subject`: a seed of core/synthetic, "lee_perry_smith", or the path of a skin in our UVs (sRGB); `shadows` from SHADOWS; `kind`: raw or delit.
 
     The same arguments give the same problem.
@@ -77,7 +77,7 @@ def problem(subject: str, shadows: str, size: int, kind: str = "raw") -> UvProbl
     lit = albedo * shading * kept
     lit *= 0.8 / np.percentile(lit[face].max(-1), 99.5)
     seen = cv2.GaussianBlur(lit, (3, 3), 0.5) + rng.normal(0, NOISE, lit.shape)
-    return UvProblem(albedo, np.maximum(seen, 0).astype(np.float32), shadow, _painted(shadow))
+    return MaskedUvProblem(albedo, np.maximum(seen, 0).astype(np.float32), shadow, _painted(shadow))
 
 
 def albedo_of(subject: str, size: int) -> np.ndarray:
@@ -120,9 +120,9 @@ def _light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.ndarray,
     """A random light: shading without cast shadows [S, S, 3], the share of it that these leave [S, S, 3], and the blocked share of the sun [S, S]."""
     thrown_by, radius = SHADOWS[shadows]
     rng = np.random.default_rng(seeds)
-    sky, sun, colour, _ = random_light(rng)
-    lit, shadow, normal = bake(template.load(), size, sky, sun, colour, radius, thrown_by, rng)
-    open_light, _, _ = bake(template.load(), size, sky, sun, colour, radius, "none", rng)
+    drawn = replace(random_light(rng), radius=radius)
+    lit, shadow, normal = bake(template.load(), size, drawn, thrown_by, rng)
+    open_light, _, _ = bake(template.load(), size, drawn, "none", rng)
     face = template.mask("face", size) > 0.5
     even = _sh_part(open_light, normal, face)
     rest = open_light - even

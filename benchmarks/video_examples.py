@@ -30,9 +30,9 @@ def main() -> None:
     seed = RESERVED["sample"]
     skin = make_skin(sample_parameters(seed), MAPS)
     with tempfile.TemporaryDirectory() as work:
-        def shots(name: str, cameras: np.ndarray, **options) -> list[np.ndarray]:
+        def shots(name: str, cameras: np.ndarray, room: bool = True) -> list[np.ndarray]:
             """Linear pictures through camera-to-world matrices [N, 4, 4]."""
-            render_frames(Path(work) / name, seed, skin, cameras, list(range(len(cameras))), SAMPLES, SCALE, leaves=False, **options)
+            render_frames(Path(work) / name, seed, skin, scene.Shot(cameras, list(range(len(cameras))), SAMPLES, SCALE, room=room), leaves=False)
             return [images.read_linear(Path(work) / name / f"{k:05d}.png") for k in range(len(cameras))]
 
         good = shots("good", np.stack([around(azimuth, 6 + 8 * np.sin(azimuth / 20)) for azimuth in (-60, -30, 0, 30, 60)]))

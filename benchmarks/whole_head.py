@@ -37,7 +37,7 @@ from core.solve.prior import load
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.skin import make_skin
 from core.upscale import grain, hair
-from core.upscale.maps import Maps, read_maps
+from core.upscale.maps import HeadMaps, read_maps
 from core.upscale.surface import HeadSurface, lay_out
 from core.upscale.whole_head import UNSEEN, complete
 
@@ -122,13 +122,13 @@ def of_capture(capture: Capture, subject: int | None = None) -> dict:
             "hair": {name: round(_cm2(getattr(found, name), surface), 2) for name in ("brows", "lashes", "beard")}}
 
 
-def _painted(surface: HeadSurface, seed: int, **changes) -> Maps:
+def _painted(surface: HeadSurface, seed: int, **changes) -> HeadMaps:
     skin = make_skin(replace(sample_parameters(seed), **changes), surface.size)
     one = np.ones((surface.size,) * 2, np.float32)
-    return Maps(skin.diffuse.astype(np.float32), skin.normal.astype(np.float32), skin.specular, 0.7 * one, np.repeat(one[..., None], 3, 2))
+    return HeadMaps(skin.diffuse.astype(np.float32), skin.normal.astype(np.float32), skin.specular, 0.7 * one, np.repeat(one[..., None], 3, 2))
 
 
-def _step(maps: Maps, here: np.ndarray, there: np.ndarray, surface: HeadSurface) -> float:
+def _step(maps: HeadMaps, here: np.ndarray, there: np.ndarray, surface: HeadSurface) -> float:
     """Mean difference of the log tone (over 2 mm) between the texels of a ring and the nearest of another on the surface."""
     tone = np.log(_tone(maps, surface))
     _, nearest = cKDTree(surface.position[here][::4]).query(surface.position[there][::4], distance_upper_bound=25.0)
@@ -136,11 +136,11 @@ def _step(maps: Maps, here: np.ndarray, there: np.ndarray, surface: HeadSurface)
     return float(np.abs(tone[there][::4][met] - tone[here][::4][nearest[met]]).mean())
 
 
-def _tone(maps: Maps, surface: HeadSurface) -> np.ndarray:
+def _tone(maps: HeadMaps, surface: HeadSurface) -> np.ndarray:
     return np.exp(cv2.GaussianBlur(np.log(np.maximum(maps.diffuse, 0.004)), (0, 0), 2.0 / float(np.median(surface.texel))))
 
 
-def _cut(maps: Maps, surface: HeadSurface) -> dict:
+def _cut(maps: HeadMaps, surface: HeadSurface) -> dict:
     """Mean step of log albedo over the map's cut (less than 1 mm apart in space, far apart in the map), and between neighbours along its edge."""
     edge = np.zeros(surface.covered.shape, bool)
     edge[[0, -1]] = edge[:, [0, -1]] = True
@@ -151,7 +151,7 @@ def _cut(maps: Maps, surface: HeadSurface) -> dict:
     return {"across": float(step[away > 50].mean()), "beside": float(step[away < 3].mean())}
 
 
-def _grain(maps: Maps, where: np.ndarray, surface: HeadSurface) -> float:
+def _grain(maps: HeadMaps, where: np.ndarray, surface: HeadSurface) -> float:
     fine = grain.bands(np.log(np.maximum(maps.diffuse, 0.004)), np.ones(where.shape, np.float32), float(np.median(surface.texel)))[2]
     return float(np.subtract(*np.percentile(fine[where], [83, 17])))
 
@@ -160,7 +160,7 @@ def _error(albedo: np.ndarray, truth: np.ndarray, where: np.ndarray) -> float:
     return float(255 * np.abs(images.linear_to_srgb(albedo[where]) - images.linear_to_srgb(truth[where])).mean())
 
 
-def _darker(hairy: Maps, bare: Maps) -> np.ndarray:
+def _darker(hairy: HeadMaps, bare: HeadMaps) -> np.ndarray:
     return np.clip(np.log(np.maximum(bare.diffuse, 0.004)) - np.log(np.maximum(hairy.diffuse, 0.004)), 0, None).mean(2)
 
 

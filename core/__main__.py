@@ -58,7 +58,20 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("python -m core", description="From a phone video of a face to a relightable head.")
     parser.add_argument("--version", action="version", version=f"WildCap {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    _add_chain(commands)
+    _add_captures(commands)
+    commands.add_parser("doctor", help="say what is installed, what is missing and what to do").set_defaults(command=_doctor)
+    test = commands.add_parser("self-test", help="solve the sample head again on this machine, and compare it with what it should be")
+    test.add_argument("--device", choices=("auto", "cpu", "cuda", "mps"), default="auto")
+    test.set_defaults(command=_self_test)
+    batch_commands.add_commands(commands)
+    setup_commands.add_commands(commands)
+    commands.add_parser("train", help="train a network, or bring other skins in for it (developers): train prior --help, train carry --help")
+    return parser
 
+
+def _add_chain(commands) -> None:
+    """The chain, what it delivers, and what there is to choose from."""
     run = commands.add_parser("run", help="run the chain; a second run continues where the first stopped")
     run.add_argument("source", metavar="SOURCE", help="a video, or a folder of photographs; - for the one the capture was made from")
     run.add_argument("capture", metavar="CAPTURE", type=Path, help="the face's folder, usually NAME.wildcap; made if it is not there")
@@ -81,6 +94,10 @@ def _parser() -> argparse.ArgumentParser:
     cards = commands.add_parser("delighters", help="say of each way to take the light out where it runs, what leaves the machine and what it costs")
     cards.add_argument("--markdown", action="store_true", help="as docs/delighters.md has it")
     cards.set_defaults(command=_delighters)
+
+
+def _add_captures(commands) -> None:
+    """What is done with a capture that is there, and what people bring into it by hand."""
     status = commands.add_parser("status", help="say which stages of a capture are done")
     status.add_argument("capture", metavar="CAPTURE", type=Path)
     status.set_defaults(command=_status)
@@ -118,14 +135,6 @@ def _parser() -> argparse.ArgumentParser:
     white.add_argument("--at", metavar=("X", "Y"), nargs=2, type=float, help="a pixel of the card, from the frame's upper left")
     white.add_argument("--card", choices=settings.CARDS, default="grey")
     white.set_defaults(command=_white)
-    commands.add_parser("doctor", help="say what is installed, what is missing and what to do").set_defaults(command=_doctor)
-    test = commands.add_parser("self-test", help="solve the sample head again on this machine, and compare it with what it should be")
-    test.add_argument("--device", choices=("auto", "cpu", "cuda", "mps"), default="auto")
-    test.set_defaults(command=_self_test)
-    batch_commands.add_commands(commands)
-    setup_commands.add_commands(commands)
-    commands.add_parser("train", help="train a network, or bring other skins in for it (developers): train prior --help, train carry --help")
-    return parser
 
 
 def _run(options: argparse.Namespace) -> int:

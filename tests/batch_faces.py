@@ -50,7 +50,7 @@ def finish_up_to_mask(capture: Capture, settings: Settings) -> None:
 
 def planned(folder: Path, *captures: Capture, gate: str = "artist", settings: dict | None = None) -> Path:
     """A batch as a terminal plans it: with its captures in its own folder."""
-    faces = [record.Face(capture.root.stem, capture.source, capture.root, "draft", settings or {}) for capture in captures]
+    faces = [record.BatchFace(capture.root.stem, capture.source, capture.root, "draft", settings or {}) for capture in captures]
     record.write_batch(record.Batch(folder, tuple(faces), gate))
     return folder
 

@@ -45,7 +45,7 @@ def main() -> None:
     half[:, :half.shape[1] // 2] = 0.5
     mask.set_values(image, half)
     bpy.ops.wildcap.finish_mask()
-    seen["mask"] = round(float(mask.values(mask.load(capture))[:, :8].mean()), 2)
+    seen["mask"] = round(float(mask.mask_values(mask.load(capture))[:, :8].mean()), 2)
     item.solve.skin_tone = "auto"
     if "worker" in sys.argv:
         addon["preferences"].set_python(Path(sys.executable))

@@ -31,6 +31,6 @@ def lay_over(template: Path, folder: Path, steps: tuple[int, int] = (6, 3), **op
     with pytest.MonkeyPatch.context() as patched:
         for name, value in zip(("ITERATIONS", "COVER_ITERATIONS"), steps, strict=True):
             patched.setattr(own_template, name, value)
-        patched.setattr(render_landmarks, "SIDES", render_landmarks.SIDES[:5])
+        patched.setattr(render_landmarks, "VIEWS_DEG", render_landmarks.VIEWS_DEG[:5])
         own_template.run(capture, from_json({"registration": {"template": str(template), **options}, "transfer": {"size": 1024}}), *person(), report)
     return capture, report

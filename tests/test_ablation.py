@@ -9,7 +9,7 @@ from benchmarks import ablation, uv_problems
 from benchmarks.ablation_measures import measure, summary, table
 from core.face import template
 from core.imaging import images
-from core.synthetic.light import bake
+from core.synthetic.light import SkyAndSun, bake
 
 
 @pytest.fixture(autouse=True)
@@ -35,7 +35,7 @@ def test_light_that_sh_cannot_explain_is_a_tenth():
     p, size = (1, 2, 3), 64
     shading, _, _ = uv_problems._light("edge, half soft", p, size)
     face = template.mask("face", size) > 0.5
-    _, _, normal = bake(template.load(), size, np.ones((9, 3)), np.array([0.6, 0.0, 0.8]), np.ones(3), 0.01, "none", np.random.default_rng(0))
+    _, _, normal = bake(template.load(), size, SkyAndSun(np.ones((9, 3)), np.array([0.6, 0.0, 0.8]), np.ones(3), 0.01), "none", np.random.default_rng(0))
     even = uv_problems._sh_part(shading, normal, face)
     share = np.sqrt(((shading - even)[face] ** 2).mean()) / even[face].mean()
     assert share == pytest.approx(uv_problems.UNEXPLAINED, rel=0.15)

@@ -64,7 +64,7 @@ def test_a_quality_sets_the_settings_and_keeps_the_skin_tone(addon):
     item.use_skin_tone, item.skin_tone = True, (0.5, 0.25, 0.125)
     item.solve.prior = "/authors"
     item.quality = "draft"
-    values = properties.values(item)
+    values = properties.job_settings(item)
     assert values["solve"]["prior"] == str(Path("/authors").absolute())
     draft = properties.core_settings.preset("draft")
     assert values["solve"]["size"] == draft.solve.size
@@ -85,7 +85,7 @@ def test_every_place_on_the_disk_is_chosen_as_one_and_made_absolute(addon, tmp_p
         assert group.bl_rna.properties[own].subtype == ('DIR_PATH' if kind == "folder" else 'FILE_PATH'), name
         for given, expected in (("//mine é/", tmp_path / "mine é"), ("mine", Path("mine").absolute()), ("~/mine", Path("~/mine").expanduser()), ("", "")):
             setattr(group, own, given)
-            assert properties.values(item)[stage][own] == str(expected), name
+            assert properties.job_settings(item)[stage][own] == str(expected), name
 
 
 def test_choosing_a_video_makes_a_capture_and_the_same_video_finds_it_again(addon, tmp_path):

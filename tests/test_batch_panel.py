@@ -145,7 +145,7 @@ def test_why_a_batch_cannot_be_started(addon, batches, monkeypatch, tmp_path):
     running, jobs = addon("batch.running"), addon("jobs")
     anna, bert = (batch_faces.filmed(tmp_path / "films", name) for name in ("anna", "bert"))
     open_captures(anna, bert)
-    jobs._jobs[str(anna.root)] = jobs.Job('solve', addon("asking").Task("solve", lambda task: None))
+    jobs._jobs[str(anna.root)] = jobs.Job('solve', addon("asking").BackgroundTask("solve", lambda task: None))
     refuses("A job is running", bpy.ops.wildcap.reconstruct_all)
     jobs._jobs.clear()
     preferences = addon("preferences").get()
@@ -190,7 +190,7 @@ def test_the_key_of_a_paid_service_goes_to_those_alone_who_need_it(addon, batche
     environment = addon("batch.running")._environment
     keys = []
     for delighter in ("network", "switchlight"):
-        face = record.Face("anna", capture.source, capture.root, "draft", {"delight": {"delighter": delighter}})
+        face = record.BatchFace("anna", capture.source, capture.root, "draft", {"delight": {"delighter": delighter}})
         keys.append(environment(record.Batch(tmp_path, (face,))).get("WILDCAP_SWITCHLIGHT_KEY"))
         job = task.write_job(capture, settings=face.settings)
         keys.append(task._paid_key(job).get("WILDCAP_SWITCHLIGHT_KEY"))

@@ -28,16 +28,16 @@ def test_the_walk_goes_through_the_masks_that_wait(addon, batches, tmp_path):
     items = bpy.context.scene.wildcap.captures
     assert [item.name for item in items] == ["anna", "bert", "carl"]
     assert addon("properties").settings(items[0]).seed == 3 and items[0].quality == "draft" and tuple(items[0].skin_tone) == (0.5, 0.25, 0.125)
-    assert addon("properties").values(items[0])["solve"]["skin_tone"] == "0.5,0.25,0.125", "or what the batch has solved would be out of date here"
+    assert addon("properties").job_settings(items[0])["solve"]["skin_tone"] == "0.5,0.25,0.125", "or what the batch has solved would be out of date here"
     items[2].skin_tone[0] = 0.6
-    assert addon("properties").values(items[2])["solve"]["skin_tone"] == "0.6000,0.2500,0.1250"
+    assert addon("properties").job_settings(items[2])["solve"]["skin_tone"] == "0.6000,0.2500,0.1250"
     batch_faces.wait(addon, lambda: batch_faces.seen(batches))
     assert [face.name for face in batches.waiting()] == ["anna", "carl"] and batches.view().count(state.TO_DO) == 1
     assert ("Masks waiting: 2, to do: 1", False) in drawn(addon("batch.panel").WILDCAP_PT_batch)
     bpy.ops.wildcap.next_mask()
     assert session.root() == str(faces[0].root) and bpy.context.mode == 'PAINT_TEXTURE' and bpy.context.object.name == "anna"
     image = session.mask()
-    painted = addon("paint.mask_image").values(image).copy()
+    painted = addon("paint.mask_image").mask_values(image).copy()
     painted[10:20, 30:40] = 1
     addon("paint.mask_image").set_values(image, painted)
     bpy.ops.wildcap.accept_mask()

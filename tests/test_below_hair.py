@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from core.delight.below_hair import completed, without_features
-from core.delight.evening import Look
+from core.delight.evening import ShadingEstimate
 from core.imaging import images
 
 network = importlib.import_module("core.delight.network")
@@ -57,7 +57,7 @@ def test_a_photograph_keeps_a_brow_where_the_parser_sees_one(monkeypatch):
 
     def look(net, box, crop):
         log = np.log(images.srgb_to_linear(network.cv2.resize(crop, (128, 128), interpolation=network.cv2.INTER_AREA)))
-        return Look(box, log, 0 * log[..., 0], log)
+        return ShadingEstimate(box, log, 0 * log[..., 0], log)
     monkeypatch.setattr(network, "_look", look)
     albedo = images.srgb_to_linear(network.delight_photograph(picture, None)[0])
     skin = albedo[130, 100].mean()

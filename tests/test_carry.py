@@ -26,7 +26,7 @@ def painted(tmp_path, monkeypatch):
     points = raster.interpolate(head.vertices, head.faces, face, bary)
     tells = np.stack([0.5 + 4 * points[..., 0], 0.5 + 4 * points[..., 2], np.full(face.shape, 0.3)], -1).clip(0, 1)
     images.write_srgb(folder / "a skin.png", raster.bleed(tells.astype(np.float32), face >= 0), 16)
-    fitted = own_template.Fitted(head.vertices, np.ones(len(head.faces), bool), np.zeros(9), 0, [])
+    fitted = own_template.FittedTemplate(head.vertices, np.ones(len(head.faces), bool), np.zeros(9), 0, [])
     monkeypatch.setattr(own_template, "fit", lambda *_: fitted)
     return folder
 

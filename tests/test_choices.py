@@ -43,7 +43,7 @@ def test_the_active_mesh_is_kept_as_it_is_with_its_uvs_and_without_modifiers(add
     assert len(found) == len(expected) and all(row[:3] == pytest.approx(place, abs=1e-5) for row, place in zip(found, expected, strict=True))
     assert len(obj_rows(path, "vt")) > 0
     assert head.select_get() and mine.select_get() and bpy.context.view_layer.objects.active == mine
-    assert addon("properties").values(item)["registration"]["template"] == str(path)
+    assert addon("properties").job_settings(item)["registration"]["template"] == str(path)
     bpy.ops.wildcap.use_built_in_head()
     assert item.registration.template == "" and not bpy.ops.wildcap.use_built_in_head.poll()
 
@@ -85,16 +85,16 @@ def test_the_wipe_shows_a_frame_before_and_after_and_leaves_no_image_behind(addo
     images = len(bpy.data.images)
     bpy.ops.wildcap.compare_delit(which=0)
     capture_of = addon("captures").folder(item)
-    assert delighters.shown(capture_of) == "00003" and len(bpy.data.images) == images
+    assert delighters.shown_frame(capture_of) == "00003" and len(bpy.data.images) == images
     assert at(0.3) == [200, 100, 50, 255] and at(0.7) == [100, 50, 25, 255] and at(0.5)[:3] == [255, 255, 255] and at(0.1)[3] == 0
     manager.wildcap_wipe = 0.8
     assert at(0.7) == [200, 100, 50, 255]
     manager.wildcap_wipe = 0.0
     assert at(0.3) == [100, 50, 25, 255]
     bpy.ops.wildcap.compare_delit()
-    assert delighters.shown(capture_of) == "00009" and at(0.5) == [40, 40, 40, 255]
+    assert delighters.shown_frame(capture_of) == "00009" and at(0.5) == [40, 40, 40, 255]
     bpy.ops.wildcap.compare_delit()
-    assert delighters.shown(capture_of) == "00003", "round and round"
+    assert delighters.shown_frame(capture_of) == "00003", "round and round"
     assert len({delighters.icon() for _ in range(2)}) == 1
     delighters.forget()
 

@@ -111,7 +111,7 @@ def test_what_was_disturbed_is_measured_once_more_and_the_better_one_kept(tmp_pa
     options = costs.argparse.Namespace(work=tmp_path, json=tmp_path / "costs.json", capture=None, film=None, limit_s=600, again=True)
     busy = {"frames": [0.1], "cameras": [0.9, 1.5, 0.3, 0.0], "scan": [0.0]}
     capture = tmp_path / "standard.wildcap"
-    monkeypatch.setitem(costs.ROWS, "standard", costs.Row(("frames", "cameras", "scan")))
+    monkeypatch.setitem(costs.ROWS, "standard", costs.StageRun(("frames", "cameras", "scan")))
     monkeypatch.setattr(stage_cost, "measure", lambda capture, stage, *given: capture.mkdir(exist_ok=True) or {**DONE, "others": busy[stage].pop(0)})
     kept = []
     for _ in range(5):

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("flip_evaluator")
 
 from benchmarks import delight, delight_portraits  # noqa: E402
-from benchmarks.albedo_score import Truth  # noqa: E402
+from benchmarks.albedo_score import AlbedoTruth  # noqa: E402
 from benchmarks.delight_measures import FIGURES, flat_tone, mean_of, score, shortfalls, table, tone_group  # noqa: E402
 from benchmarks.delight_sets import Photograph, Photographs, light_stage  # noqa: E402
 from benchmarks.measures import pictures  # noqa: E402
@@ -30,7 +30,7 @@ def truth():
     face[20:280, 20:280] = True
     shadow = np.zeros_like(face)
     shadow[:, 150:] = True
-    return Truth(0, albedo, face, shadow)
+    return AlbedoTruth(0, albedo, face, shadow)
 
 
 def lit(truth, light):

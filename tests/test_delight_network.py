@@ -13,7 +13,7 @@ import torch
 from core.contract.messages import Problem, Reporter
 from core.delight.below_hair import without_hair
 from core.delight.casts import without_casts
-from core.delight.evening import Look, even_out
+from core.delight.evening import ShadingEstimate, even_out
 from core.delight.lift import lift, lift_share
 from core.delight.lit_head import LitHead
 from core.delight.network import WEIGHTS, crop, face_box, load
@@ -27,6 +27,7 @@ from core.imaging import images
 from core.synthetic.identities import reserved_seeds
 from core.synthetic.sight import random_camera
 from core.training import delighter, people
+from core.training.descent import TrainingRun
 
 QUIET = Reporter("train", emit=lambda message: None)
 
@@ -108,7 +109,7 @@ def test_views_are_brought_to_one_albedo():
         slope = np.linspace(-0.2, 0.2, 96, dtype=np.float32)[None, :, None] * (seed == 2)
         log = np.full((96, 96, 3), np.log(0.3), np.float32)
         views.append(view)
-        looks.append(Look((0.0, 0.0, 96.0), log - np.log(0.4) + np.float32(off) + slope, np.zeros((96, 96), np.float32), log, where, at))
+        looks.append(ShadingEstimate((0.0, 0.0, 96.0), log - np.log(0.4) + np.float32(off) + slope, np.zeros((96, 96), np.float32), log, where, at))
     even = even_out(head, views, looks)
 
     def spread(answers):
@@ -128,13 +129,14 @@ def test_the_hue_of_the_shade_leaves_the_albedo_and_that_of_lips_stays():
     albedo = np.log(np.float32([0.5, 0.35, 0.27])) + np.zeros((64, 64, 3), np.float32)
     albedo[40:44, 10:50] += np.float32([0.1, -0.4, -0.3])
     said = light - shadow[..., None] * np.float32([-0.07, 0, 0.07])
-    (mended,) = without_casts([Look((0, 0, 64), said, shadow, light + albedo)], [np.ones((64, 64), np.float32)])
+    given = ShadingEstimate((0, 0, 64), said, shadow, light + albedo)
+    (mended,) = without_casts([given], [np.ones((64, 64), np.float32)])
 
     def hue(look):
         left = look.log - look.shading
         return left - left.mean(-1, keepdims=True)
 
-    before, after = (hue(look)[:, 30:].mean((0, 1)) - hue(look)[:, :30].mean((0, 1)) for look in (Look((0, 0, 64), said, shadow, light + albedo), mended))
+    before, after = (hue(look)[:, 30:].mean((0, 1)) - hue(look)[:, :30].mean((0, 1)) for look in (given, mended))
     assert np.abs(before).max() > 0.06 and np.abs(after).max() < 0.01
     lips = hue(mended)[41:43, 12:48].mean((0, 1)) - hue(mended)[:38].mean((0, 1))
     assert lips == pytest.approx([0.3, -0.2, -0.1], abs=0.02)
@@ -175,7 +177,7 @@ def test_the_shipped_network_is_the_one_its_card_tells_of():
 
 def test_two_answers_are_weighed_where_they_agree_and_the_network_wins_where_they_do_not():
     face, skin = np.zeros((32, 32), int), np.ones((32, 32), np.float32)
-    look = Look((0, 0, 32), np.zeros((32, 32, 3), np.float32), skin, np.zeros((32, 32, 3), np.float32), face)
+    look = ShadingEstimate((0, 0, 32), np.zeros((32, 32, 3), np.float32), skin, np.zeros((32, 32, 3), np.float32), face)
     fitted = np.zeros((32, 32, 3), np.float32) + 5  # a level is no difference
     fitted[:4] += 0.1
     fitted[-4:] += 7
@@ -190,7 +192,7 @@ def test_below_hair_the_fitted_light_goes_on_at_the_level_of_the_skin_around():
     true = np.repeat((-0.02 * x - 0.01 * y)[..., None], 3, -1)
     hair = (np.hypot(x - 24, y - 30) < 12).astype(np.float32)
     face = np.where(np.hypot(x - 24, y - 24) < 23, 0, -1)
-    look = Look((0, 0, 48), true - 1.1 * hair[..., None], hair, true, face)
+    look = ShadingEstimate((0, 0, 48), true - 1.1 * hair[..., None], hair, true, face)
     told = without_hair(look, true + 0.4, hair)
     assert np.abs(told.shading - true)[face >= 0].max() < 0.01 and told.shadow[face >= 0].max() < 1e-6
     assert np.array_equal(told.shading[face < 0], look.shading[face < 0])
@@ -205,12 +207,12 @@ def test_a_training_goes_on_where_it_stopped(monkeypatch, tmp_path):
     monkeypatch.setattr(delighter, "prepare", lambda seeds, views, work, *rest: _prepared(seeds, work))
     monkeypatch.setattr(delighter, "prepare_people", lambda seeds, views, work, *rest: people.prepare_people(seeds, views, work, QUIET, processes=2))
     with pytest.raises(Problem, match="There are no people in"):
-        delighter.train_delighter("cpu", tmp_path / "out.safetensors", QUIET, growing=True, work=tmp_path / "work")
+        delighter.train_delighter("cpu", tmp_path / "out.safetensors", QUIET, TrainingRun(growing=True, work=tmp_path / "work"))
     out = tmp_path / "out.safetensors"
-    first = delighter.train_delighter("cpu", out, QUIET, minutes=0.01, work=tmp_path / "work")
-    second = delighter.train_delighter("cpu", out, QUIET, minutes=0.02, work=tmp_path / "work")
+    first = delighter.train_delighter("cpu", out, QUIET, TrainingRun(0.01, tmp_path / "work"))
+    second = delighter.train_delighter("cpu", out, QUIET, TrainingRun(0.02, tmp_path / "work"))
     assert second["steps"] > first["steps"] > 0 and second["started"] == "random weights" and len(second["people"]) == 1
-    begun = delighter.train_delighter("cpu", tmp_path / "third.safetensors", QUIET, minutes=0.01, start=out, work=_emptied(tmp_path / "work"))
+    begun = delighter.train_delighter("cpu", tmp_path / "third.safetensors", QUIET, TrainingRun(0.01, _emptied(tmp_path / "work"), start=out))
     assert begun["started"] == "the weights before"
     assert json.loads(out.with_suffix(".json").read_text(encoding="utf-8"))["held_out"]["none"] > 0
     assert not set(second["seeds"]) & set(second["held_out_seeds"])

@@ -43,13 +43,13 @@ def capture(addon, tmp_path, monkeypatch):
         for i in range(len(key.data))[MOVED]:
             key.data[i].co += Vector(move)
 
-    def start(item, goal, *, tool, then, at, ended, **shared):
+    def start(item, tool, goal, *, then, at, ended, **shared):
         last = delivered.deliver(at, **shared["deliver"])
         ended()
         assert isinstance(last, Done), last
         then()
 
-    monkeypatch.setattr(addon("jobs"), "start", start)
+    monkeypatch.setattr(addon("jobs"), "start_tool", start)
     return capture
 
 

@@ -12,7 +12,7 @@ from core.face import template
 from core.solve.draft import restored
 from core.solve.prior import coordinates, load
 from core.solve.recipes import Recipe
-from core.solve.sampler import sample, seeded
+from core.solve.sampler import Sampler, seeded
 
 from .test_sampler import observation, start
 
@@ -44,7 +44,7 @@ def test_what_the_albedo_tells_is_restored_and_the_albedo_stays():
     """The error that is left is that which no one can know, OWN; a sample has that twice, and the closed form's own on top."""
     prior = Related()
     truth = prior.draw(torch.Generator().manual_seed(2))
-    drawn = sample(prior, {1: observation((truth[0, :3] + 1) / 2)}, start(), DRAFT, seeded(0)).denoised
+    drawn = Sampler(prior, DRAFT, seeded(0)).sample({1: observation((truth[0, :3] + 1) / 2)}, start()).denoised
     out = restored(prior, drawn, coordinates(SIZE, slice(0, SIZE), slice(0, SIZE)), DRAFT, 0)
     assert torch.equal(out[:, :3], drawn[:, :3])
     left, before = ((maps - truth)[:, 3:].pow(2).mean().sqrt() for maps in (out, drawn))

@@ -16,7 +16,7 @@ import pytest
 
 from core.contract.messages import Cancelled, Done, Failed, Problem, Progress
 from core.worker import environment, index, installation, locks
-from core.worker.background import Task
+from core.worker.background import BackgroundTask
 from core.worker.environment import answer, judge, python_of, remove, required, survey, verify
 from core.worker.installation import find_python
 
@@ -58,7 +58,7 @@ def local(tmp_path, monkeypatch) -> Path:
     return folder
 
 
-def follow(task: Task, timeout_s: float = 120) -> list:
+def follow(task: BackgroundTask, timeout_s: float = 120) -> list:
     messages, deadline = [], time.monotonic() + timeout_s
     while task.running:
         messages += task.poll()
@@ -68,7 +68,7 @@ def follow(task: Task, timeout_s: float = 120) -> list:
 
 
 def install(folder: Path, local: Path, **options) -> list:
-    task = installation.installation(folder, local, folder.with_name("install.log"), **options)
+    task = installation.installation(folder, local, folder.with_name("install.log"), None, installation.PackageSource(**options))
     task.start()
     return follow(task)
 
@@ -137,7 +137,7 @@ def test_what_cannot_be_loaded_after_two_tries_is_told(local, tmp_path):
 
 
 def test_a_cancelled_installation_says_so(local, tmp_path):
-    task = installation.installation(tmp_path / "env", local, tmp_path / "install.log")
+    task = installation.installation(tmp_path / "env", local, tmp_path / "install.log", None, installation.PackageSource())
     task.start()
     task.cancel()
     assert isinstance(follow(task)[-1], Cancelled)
@@ -147,7 +147,7 @@ def test_what_an_installation_brings_is_known_before_it_begins(local, tmp_path):
     def work(task, run=None):
         return index.plan(local, installation.base_python(), "cpu", "pytorch", run or task.run, task.say)
 
-    task = Task("index", work)
+    task = BackgroundTask("index", work)
     task.start()
     messages = follow(task)
     assert isinstance(messages[-1], Done), messages[-1]
@@ -161,9 +161,9 @@ def test_what_an_installation_brings_is_known_before_it_begins(local, tmp_path):
     with pytest.raises(Problem, match="are needed while"):
         index.check_space(huge, tmp_path)
     with pytest.raises(Problem, match=r"did not answer as expected \(No matching distribution\)"):
-        work(task, lambda command: (1, "ERROR: No matching distribution.") if "--report" in command else Task.run(task, command))
+        work(task, lambda command: (1, "ERROR: No matching distribution.") if "--report" in command else BackgroundTask.run(task, command))
     wheels[0].unlink()
-    task = Task("index", work)
+    task = BackgroundTask("index", work)
     task.start()
     assert "did not answer as expected" in follow(task)[-1].problem
 
@@ -210,11 +210,11 @@ def test_a_task_ends_with_its_problem_or_at_once_when_cancelled():
         raise Problem("It cannot be.", "Let it be.")
 
     for work, problem in ((refuse, "It cannot be."), (lambda task: 1 / 0, "An error inside WildCap stopped")):
-        task = Task("try", work)
+        task = BackgroundTask("try", work)
         task.start()
         ended, = follow(task)
         assert ended.problem.startswith(problem)
-    task = Task("sleep", lambda task: task.run([sys.executable, "-c", "import time; time.sleep(60)"]))
+    task = BackgroundTask("sleep", lambda task: task.run([sys.executable, "-c", "import time; time.sleep(60)"]))
     task.start()
     task.cancel()
     assert follow(task, 2) == [Cancelled("sleep")]
@@ -225,7 +225,7 @@ def test_a_cancel_ends_what_the_command_has_started(tmp_path):
     """venv runs pip's installer as a process of its own, which must not go on in a folder that the next installation begins with."""
     late = tmp_path / "late"
     child = f"import time, pathlib; pathlib.Path({str(tmp_path / 'begun')!r}).touch(); time.sleep(1); pathlib.Path({str(late)!r}).touch()"
-    task = Task("venv", lambda task: task.run([sys.executable, "-c", f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"]))
+    task = BackgroundTask("venv", lambda task: task.run([sys.executable, "-c", f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"]))
     task.start()
     while not (tmp_path / "begun").exists():
         time.sleep(0.02)
@@ -240,10 +240,10 @@ def test_other_peoples_folders_are_left_alone(local, tmp_path):
     mine.mkdir()
     (mine / "a.jpg").write_bytes(b"1")
     with pytest.raises(Problem, match="other files"):
-        installation.installation(mine, local, tmp_path / "log")
+        installation.installation(mine, local, tmp_path / "log", None, installation.PackageSource())
     (mine / "pyvenv.cfg").write_text("home = /usr/bin")  # an environment of somebody else's
     with pytest.raises(Problem, match="other files"):
-        installation.installation(mine, local, tmp_path / "log")
+        installation.installation(mine, local, tmp_path / "log", None, installation.PackageSource())
     with pytest.raises(Problem, match="no environment that WildCap made"):
         remove(mine)
     assert (mine / "a.jpg").is_file()

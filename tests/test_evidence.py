@@ -101,7 +101,7 @@ def test_what_was_slimmed_away_is_made_again_for_whoever_looks_at_it(addon, reco
     for path in [*folder.frames.iterdir()]:
         path.unlink()
     started = []
-    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **options: started.append((goal, options)))
+    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool: started.append(tool))
     ask()
-    assert started == [("tool", {"tool": "bring_back"})] and not cameras()
+    assert started == ["bring_back"] and not cameras()
     assert addon("status").look(folder, Settings()).problem is None

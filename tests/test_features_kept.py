@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.measures.features_kept import BROWS, contrasts, joint, kept
+from benchmarks.measures.features_kept import BROWS, contrast_kept, contrasts, joint
 from benchmarks.measures.slopes import slope
 from core.face import template
 from core.geometry.raster import interpolate
@@ -52,15 +52,15 @@ def test_a_contrast_is_the_logarithm_of_skin_over_feature(points):
 
 def test_a_gain_changes_nothing_and_a_square_root_halves(points):
     truth = measured(points, drawn(points, 0.4))
-    assert kept(measured(points, 0.3 * drawn(points, 0.4)), truth) == pytest.approx({"brows": 1.0}, abs=1e-3)
-    assert kept(measured(points, np.sqrt(drawn(points, 0.4))), truth)["brows"] == pytest.approx(0.5, abs=1e-3)
-    assert kept(measured(points, drawn(points, 1.0)), truth)["brows"] == pytest.approx(0, abs=1e-3)
+    assert contrast_kept(measured(points, 0.3 * drawn(points, 0.4)), truth) == pytest.approx({"brows": 1.0}, abs=1e-3)
+    assert contrast_kept(measured(points, np.sqrt(drawn(points, 0.4))), truth)["brows"] == pytest.approx(0.5, abs=1e-3)
+    assert contrast_kept(measured(points, drawn(points, 1.0)), truth)["brows"] == pytest.approx(0, abs=1e-3)
 
 
 def test_what_is_not_seen_has_no_contrast(points):
     face = np.zeros((SIZE, SIZE), bool)
     found = contrasts(images.linear_to_srgb(drawn(points, 0.5)), points, face)
-    assert set(found.values()) == {None} and kept(found, measured(points, drawn(points, 0.5))) == {}
+    assert set(found.values()) == {None} and contrast_kept(found, measured(points, drawn(points, 0.5))) == {}
 
 
 def test_jointly_a_bleached_face_loses_all_and_the_pictures_themselves_keep_their_light():

@@ -270,4 +270,4 @@ def test_a_stage_that_asks_what_the_parser_saw_is_stale_when_that_changes():
     asking = {stage for stage in stages.STAGES for file in (core / stage.module.split(".")[1]).rglob("*.py")
               if "shown_parts" in file.read_text(encoding="utf-8")}
     assert {stage.name for stage in asking} == {"shadow_mask", "solve", "upscale"}
-    assert all(stages.PARTS in stage.wishes for stage in asking) and stages.PARTS in together.TOLD
+    assert all(stages.PARTS in stage.optional_reads for stage in asking) and stages.PARTS in together.TOLD

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from core.face import lids, template
-from core.face.strands import Surface, prisms
+from core.face.strands import SkinSurface, prisms
 from core.geometry import raster
 from core.geometry.meshes import joined
 from core.upscale import grooming, strokes, ways
 from core.upscale.hair import Hair
-from core.upscale.maps import Maps
+from core.upscale.maps import HeadMaps
 from core.upscale.surface import HeadSurface, lay_out
 
 SIZE = 1024
@@ -73,7 +73,7 @@ def groomed(cover: float, seed: int = 0) -> tuple[dict, np.ndarray]:
     skin = np.broadcast_to(SKIN, (SIZE, SIZE, 3)).astype(np.float32)
     albedo = (1 - mask[..., None]) * skin + mask[..., None] * HAIR
     none = np.zeros((SIZE, SIZE), np.float32)
-    maps = Maps(albedo.astype(np.float32), none[..., None] + [0, 0, 1], none, none + 1, none[..., None] + np.ones(3))
+    maps = HeadMaps(albedo.astype(np.float32), none[..., None] + [0, 0, 1], none, none + 1, none[..., None] + np.ones(3))
     return grooming.groom(maps, Hair(mask, none, none, none), skin, surface(), seed), mask
 
 
@@ -113,7 +113,7 @@ def test_hair_that_was_hidden_has_the_colour_of_the_rest_and_is_brown_where_none
 
 def test_hair_roots_on_the_skin_in_its_mask_and_stays_outside_of_the_head():
     hairs, mask = groomed(0.4)
-    skin = Surface(template.load())
+    skin = SkinSurface(template.load())
     for part, grown in hairs.items():
         assert np.abs(skin.height(grown.points[:, 0])[0]).max() < 0.002
         assert (skin.height(grown.points[:, 1:].reshape(-1, 3))[0] > -0.0005).mean() > 0.97, part

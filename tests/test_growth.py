@@ -13,7 +13,7 @@ from core.contract.messages import Problem
 from core.face import shown_parts, template
 from core.imaging import images
 from core.upscale import hair
-from core.upscale.maps import Maps
+from core.upscale.maps import HeadMaps
 
 from .hairy_head import SIZE, surface
 
@@ -40,7 +40,7 @@ def found(skin: np.ndarray, layers: list[tuple[np.ndarray, np.ndarray]], parts: 
     for share, colour in layers:
         albedo = albedo * (1 - share[..., None]) + share[..., None] * colour
     one = np.ones((SIZE, SIZE), np.float32)
-    maps = Maps(albedo.astype(np.float32), one[..., None] * [0, 0, 1], 0.35 * one, 0.7 * one, np.repeat(one[..., None], 3, 2))
+    maps = HeadMaps(albedo.astype(np.float32), one[..., None] * [0, 0, 1], 0.35 * one, 0.7 * one, np.repeat(one[..., None], 3, 2))
     return hair.find(maps, surface(), parts)
 
 

@@ -14,13 +14,13 @@ from core.face import template
 from core.geometry import meshes
 from core.imaging import images
 from core.upscale import hair
-from core.upscale.maps import Maps
+from core.upscale.maps import HeadMaps
 
 from .hairy_head import SIZE, painted, surface
 
 
 @pytest.fixture(scope="module")
-def heads() -> dict[str, Maps]:
+def heads() -> dict[str, HeadMaps]:
     """The same skin three times."""
     return {"bearded": painted(beard=1.0), "shaven": painted(), "hairless": painted(brows=0.0)}
 
@@ -30,7 +30,7 @@ def found(heads) -> dict[str, hair.Hair]:
     return {name: hair.find(heads[name], surface()) for name in ("bearded", "shaven")}
 
 
-def darker(hairy: Maps, bare: Maps) -> np.ndarray:
+def darker(hairy: HeadMaps, bare: HeadMaps) -> np.ndarray:
     """How much the hair takes from the albedo, log, [S, S]."""
     return np.clip(np.log(np.maximum(bare.diffuse, 0.004)) - np.log(np.maximum(hairy.diffuse, 0.004)), 0, None).mean(2)
 

@@ -150,7 +150,7 @@ def test_a_solve_in_the_middle_of_painting_takes_the_mask_as_it_is_painted(addon
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.paint_mask()
     image = addon("paint.session").mask()
-    painted = addon("paint.mask_image").values(image).copy()
+    painted = addon("paint.mask_image").mask_values(image).copy()
     painted[10:20, 30:40] = 1
     addon("paint.mask_image").set_values(image, painted)
     bpy.ops.wildcap.solve()
@@ -223,11 +223,11 @@ def test_how_long_a_quality_takes_is_learned_from_the_last_solve(addon, jobs, tm
     timings = addon("timings")
     settings = import_module(timings.__package__.replace("wildcap_addon", "core.contract.settings"))
     timings._rates.clear()
-    assert timings.words("cpu") == ""
+    assert timings.describe_minutes("cpu") == ""
     a_capture(tmp_path, "a")
     bpy.ops.wildcap.solve()
     finish(jobs)
-    assert "Standard" in timings.words("cpu") and timings.words("cuda") == ""
+    assert "Standard" in timings.describe_minutes("cpu") and timings.describe_minutes("cuda") == ""
     standard = settings.preset("standard")
     timings.record(standard, 240.0)
     assert timings.minutes("standard", "cpu") == pytest.approx(4.0)

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from benchmarks import comparison, light_models, rerender
-from benchmarks.albedo_score import Look, Truth
+from benchmarks.albedo_score import AlbedoTruth, HeadInView
 from core.solve.initial import Start
 from core.solve.lighting import Lights, Shader, constant_light
 from core.solve.problem import Observation, State
@@ -97,7 +97,7 @@ def test_a_rendering_that_is_the_frame_scores_and_a_wrong_one_does_not():
     linear = np.where(flat <= 0.04045, flat / 12.92, ((flat + 0.055) / 1.055) ** 2.4).astype(np.float32)
     y, x = np.mgrid[:64, :64]
     uv = np.stack([(x + 0.5) / 64, 1 - (y + 0.5) / 64], -1).reshape(-1, 2)
-    look = Look(Truth(0, flat, np.ones((64, 64), bool), None), np.ones((64, 64), bool), uv)
-    same = rerender.score(0.5 * linear, [rerender.Delit(flat, look)])  # a view's exposure does not count
+    look = HeadInView(AlbedoTruth(0, flat, np.ones((64, 64), bool), None), np.ones((64, 64), bool), uv)
+    same = rerender.score(0.5 * linear, [rerender.DelitFrame(flat, look)])  # a view's exposure does not count
     assert same["psnr"] > 60 and same["ssim"] > 0.999
-    assert rerender.score(linear[::-1], [rerender.Delit(flat, look)])["psnr"] < 25
+    assert rerender.score(linear[::-1], [rerender.DelitFrame(flat, look)])["psnr"] < 25

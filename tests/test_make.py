@@ -35,12 +35,12 @@ def job(addon, monkeypatch):
 def take(addon) -> None:
     """What the timer does in a window."""
     results, item = addon("make.results"), bpy.context.scene.wildcap.captures[0]
-    if results.wanted(addon("captures").root(item)):
+    if results.has_news(addon("captures").root(item)):
         results.take(bpy.context, item)
 
 
 def wanted(addon) -> bool:
-    return addon("make.results").wanted(addon("captures").root(bpy.context.scene.wildcap.captures[0]))
+    return addon("make.results").has_news(addon("captures").root(bpy.context.scene.wildcap.captures[0]))
 
 
 def head(addon):

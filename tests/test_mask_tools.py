@@ -84,7 +84,14 @@ def test_what_a_worker_prepared_waits_for_a_click(addon, capture, monkeypatch):
     bpy = pytest.importorskip("bpy")
     session, mask_image = addon("paint.session"), addon("paint.mask_image")
     started, prepared = [], addon("jobs").before_start
-    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **options: started.append(options) or [prepare() for prepare in prepared])
+
+    def start(**options):
+        started.append(options)
+        for prepare in prepared:
+            prepare()
+
+    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool, **options: start(tool=tool, **options))
+    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **options: start(**options))
     bpy.ops.wildcap.bring_in_head()
     with pytest.raises(RuntimeError, match="Click Paint Mask first"):
         bpy.ops.wildcap.snap_mask()
@@ -100,9 +107,9 @@ def test_what_a_worker_prepared_waits_for_a_click(addon, capture, monkeypatch):
     theirs[6:8] = 1
     (capture / "shadow_mask_edges.png").write_bytes(mask_image.grey_png(theirs))
     started[0]["then"]()
-    assert np.array_equal(mask_image.values(session.mask()), mine), "nothing changes by itself"
+    assert np.array_equal(mask_image.mask_values(session.mask()), mine), "nothing changes by itself"
     bpy.ops.wildcap.edit_mask(kind='SNAPPED')
-    assert np.array_equal(mask_image.values(session.mask()), theirs) and session.offered() == ""
+    assert np.array_equal(mask_image.mask_values(session.mask()), theirs) and session.offered() == ""
     with pytest.raises(RuntimeError, match="does not have"):
         bpy.ops.wildcap.detect_mask()
     for name in ("delit", "cameras"):
@@ -113,7 +120,7 @@ def test_what_a_worker_prepared_waits_for_a_click(addon, capture, monkeypatch):
     started[1]["then"]()
     assert session.offered() == 'PROPOSAL'
     bpy.ops.wildcap.edit_mask(kind='PROPOSAL')
-    assert session.offered() == "" and mask_image.values(session.mask()).max() == 0
+    assert session.offered() == "" and mask_image.mask_values(session.mask()).max() == 0
     bpy.ops.wildcap.paint_mask(mask='PROTECT')
     with pytest.raises(RuntimeError, match="choose Shadow"):
         bpy.ops.wildcap.detect_mask()
@@ -127,9 +134,9 @@ def test_the_estimated_tone_reaches_the_settings(addon, capture, monkeypatch):
         figures = {"skin_tone_srgb": [0.5, 0.25, 0.125]}
 
     started = []
-    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **options: started.append(options) or Job())
+    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool, **options: started.append(options) or Job())
     bpy.ops.wildcap.estimate_skin_tone()
     started[0]["then"]()
     item = addon("captures").active(bpy.context)
     assert item.use_skin_tone and tuple(item.skin_tone) == (0.5, 0.25, 0.125)
-    assert addon("properties").values(item)["solve"]["skin_tone"] == "0.5000,0.2500,0.1250"
+    assert addon("properties").job_settings(item)["solve"]["skin_tone"] == "0.5000,0.2500,0.1250"

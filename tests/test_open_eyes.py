@@ -40,13 +40,13 @@ def fitted(person):
     return start, eyeballs.fit(start, tuple(rims_of(opened, side) for side in (0, 1)), 0.35)
 
 
-def rims_of(opened: lids.OpenHead, side: int) -> lid_marks.Rims:
+def rims_of(opened: lids.OpenHead, side: int) -> lid_marks.LidMarks:
     """Nine marks on each edge, from the outer corner to the inner one, and the iris where the cornea's top is."""
     outer, inner = (opened.skin.vertices[corner] for corner in lids.corners()[side])
     edges = [np.concatenate([[inner], opened.skin.vertices[rim], [outer]])[::-1] for rim in opened.rims[side]]
     chosen = [edge[np.linspace(0, len(edge) - 1, 9).round().astype(int)] for edge in edges]
     ball = opened.balls[side]
-    return lid_marks.Rims(*chosen, ball.centre + (1 + lids.CORNEA_BULGE) * ball.radius * ball.gaze, 0.0059, 9)
+    return lid_marks.LidMarks(*chosen, ball.centre + (1 + lids.CORNEA_BULGE) * ball.radius * ball.gaze, 0.0059, 9)
 
 
 def view_from(degrees: float, distance: float = 0.5) -> View:
@@ -58,7 +58,7 @@ def view_from(degrees: float, distance: float = 0.5) -> View:
     return View(f"{degrees}.jpg", None, camera, rotation, -rotation @ (distance * back), True)
 
 
-def seen_eye(rims: lid_marks.Rims, view: View) -> Eye:
+def seen_eye(rims: lid_marks.LidMarks, view: View) -> Eye:
     upper, lower, iris = (view.project(points)[0] for points in (rims.upper, rims.lower, rims.iris[None]))
     depth = view.project(rims.iris[None])[1][0]
     return Eye(upper, lower, iris[0], rims.iris_radius * 1500 / depth)

@@ -26,7 +26,7 @@ def test_the_mask_painted_on_the_left_cheek_is_saved_on_the_left_cheek(addon, ca
     assert header == b"\x08\x00", "8 bit grey"
     read = bpy.data.images.load(str(capture / "shadow_mask.png"))
     read.colorspace_settings.name = 'Non-Color'
-    again = mask_image.values(read)
+    again = mask_image.mask_values(read)
     row, column = np.argwhere(again > 0.5)[0]
     assert column > width / 2, "the person's left is right of the middle of the map"
     assert row > height / 2, "the cheek is below the middle"
@@ -91,7 +91,7 @@ def test_strokes_reach_the_capture_while_the_artist_paints_on(addon, capture, mo
         monkeypatch.setattr(session, "KEEP_UP_S", 0.0)
         session.keep_up(stroking=False)
         session.wait()
-        assert file() == mask_image.grey_png(mask_image.values(image)) != before
+        assert file() == mask_image.grey_png(mask_image.mask_values(image)) != before
         before = file()
     assert [p.read_bytes() for p in (capture / "mask_history").iterdir()] == [standin.plain((77,))], "one session is one step of the history"
     bpy.ops.wildcap.finish_mask()
@@ -119,11 +119,11 @@ def test_the_buttons_change_the_mask_as_they_say(addon, capture):
     first = np.zeros((image.size[1], image.size[0]), np.float32)
     first[5:9, 40:50] = 1
     mask_image.set_values(image, first)
-    assert np.array_equal(mask_image.values(image), first)
+    assert np.array_equal(mask_image.mask_values(image), first)
     bpy.ops.wildcap.edit_mask(kind='INVERT')
-    assert np.array_equal(mask_image.values(image), 1 - first)
+    assert np.array_equal(mask_image.mask_values(image), 1 - first)
     bpy.ops.wildcap.edit_mask(kind='PROPOSAL')
-    assert mask_image.values(image).max() == 0
+    assert mask_image.mask_values(image).max() == 0
     bpy.ops.wildcap.finish_mask()
     assert (capture / "shadow_mask.png").read_bytes() == mask_image.grey_png(np.zeros_like(first))
 
@@ -142,10 +142,10 @@ def test_what_is_protected_is_a_mask_of_its_own(addon, capture):
     mask_image.set_values(paint.stencil_image, spot)
     bpy.ops.wildcap.paint_mask(mask='SHADOW', on='SHEET')
     assert (capture / "protect_mask.png").read_bytes() == mask_image.grey_png(spot), "turning to the other mask saves this one"
-    assert session.which() == 'SHADOW' and session.on_sheet() and paint.stencil_image.name.endswith("Shadow Mask")
+    assert session.painted_kind() == 'SHADOW' and session.on_sheet() and paint.stencil_image.name.endswith("Shadow Mask")
     bpy.ops.wildcap.finish_mask()
     bpy.ops.wildcap.paint_mask(mask='PROTECT')
-    assert np.array_equal(mask_image.values(paint.stencil_image), spot)
+    assert np.array_equal(mask_image.mask_values(paint.stencil_image), spot)
     with pytest.raises(RuntimeError, match="never proposed"):
         bpy.ops.wildcap.edit_mask(kind='PROPOSAL')
     bpy.ops.wildcap.finish_mask()

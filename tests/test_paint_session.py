@@ -103,7 +103,7 @@ def test_a_painting_whose_head_was_undone_or_deleted_still_ends_and_keeps_its_ma
     session, values = addon("paint.session"), addon("paint.mask_image")
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.paint_mask()
-    painted = np.zeros_like(values.values(session.mask()))
+    painted = np.zeros_like(values.mask_values(session.mask()))
     painted[10:20, 30:40] = 1
     values.set_values(session.mask(), painted)
     bpy.ops.object.mode_set(mode='OBJECT')
@@ -182,7 +182,7 @@ def test_a_file_saved_while_painting_goes_on_painting_and_leaves_as_it_began(add
     assert not session.active()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
     assert session.active() and session.on_sheet() and bpy.context.mode == 'PAINT_TEXTURE'
-    assert np.array_equal(mask_image.values(session.mask()), painted)
+    assert np.array_equal(mask_image.mask_values(session.mask()), painted)
     painted = spot(session.mask(), 30)
     mask_image.set_values(session.mask(), painted)
     bpy.ops.wildcap.finish_mask()
@@ -209,7 +209,7 @@ def test_the_newer_mask_of_file_and_capture_wins_and_the_other_goes_to_the_histo
     os.utime(blend, (2e9, 2e9) if newer == "file" else (1e9, 1e9))
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     winner, loser = (mask_image.grey_png(mine), other) if newer == "file" else (other, mask_image.grey_png(mine))
-    assert (capture / "shadow_mask.png").read_bytes() == winner == mask_image.grey_png(mask_image.values(session.mask()))
+    assert (capture / "shadow_mask.png").read_bytes() == winner == mask_image.grey_png(mask_image.mask_values(session.mask()))
     assert loser in [p.read_bytes() for p in (capture / "mask_history").iterdir()]
     bpy.ops.wildcap.finish_mask()
     assert (capture / "shadow_mask.png").read_bytes() == winner

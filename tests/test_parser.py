@@ -19,6 +19,7 @@ from core.synthetic.identities import reserved_seeds
 from core.synthetic.people import figure, snapshot, unlit
 from core.training import descent, snapshots
 from core.training import parser as training
+from core.training.descent import TrainingRun
 
 QUIET = Reporter("train", emit=lambda message: None)
 SEED, VIEWS = 3, 2  # a man with cropped hair, a full beard and open eyes
@@ -215,19 +216,19 @@ def test_a_killed_training_goes_on_to_the_same_weights(work, tmp_path, monkeypat
             patched.setattr(training, "loss", counted)
             if kill:
                 with pytest.raises(KeyboardInterrupt):
-                    training.train_parser("cpu", folder / "parser.safetensors", QUIET, 12, None, False, folder)
-            card = training.train_parser("cpu", folder / "parser.safetensors", QUIET, 12, None, False, folder)
+                    training.train_parser("cpu", folder / "parser.safetensors", QUIET, TrainingRun(12, folder))
+            card = training.train_parser("cpu", folder / "parser.safetensors", QUIET, TrainingRun(12, folder))
         weights.append({name: value.clone() for name, value in parser.load(folder / "parser.safetensors").state_dict().items()})
     assert card["steps"] == 18 and card["prepared"] == 1 and set(PARTS) < set(card["held_out"]), card
     assert all(torch.equal(weights[0][name], weights[1][name]) for name in weights[0])
     with pytest.raises(Problem, match="other data"):
         monkeypatch.setitem(options, "figures", 2)
-        training.train_parser("cpu", folder / "parser.safetensors", QUIET, 12, None, True, folder)
+        training.train_parser("cpu", folder / "parser.safetensors", QUIET, TrainingRun(12, folder, growing=True))
 
 
 def test_growing_needs_figures(tmp_path):
     with pytest.raises(Problem, match="There are no figures"):
-        training.train_parser("cpu", tmp_path / "parser.safetensors", QUIET, 1, None, True, tmp_path / "work")
+        training.train_parser("cpu", tmp_path / "parser.safetensors", QUIET, TrainingRun(1, tmp_path / "work", growing=True))
 
 
 def test_the_figures_of_a_row_are_those_counted_by_hand():

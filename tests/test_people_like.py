@@ -113,7 +113,7 @@ def test_pigment_traits_are_mostly_alike_on_both_sides():
 
 
 def test_hair_grows_from_the_skin_and_not_into_the_head(someone):
-    skin = strands.Surface(someone.opened.skin)
+    skin = strands.SkinSurface(someone.opened.skin)
     for growth in someone.strands:
         height, _ = skin.height(growth.points[:, 0])
         assert np.abs(height).max() < 0.002, growth.part

@@ -24,11 +24,11 @@ def stage():
     return next(s for s in (sitter.stage(np.random.default_rng(seed)) for seed in range(9)) if share(s, "beard").sum() > 150 and share(s, "brows").sum() > 100)
 
 
-def share(stage: portraits.Stage, name: str) -> np.ndarray:
+def share(stage: portraits.RelightableView, name: str) -> np.ndarray:
     return stage.unlit.shares[..., PARTS.index(name)].astype(np.float32) / 255
 
 
-def contrast(picture: np.ndarray, stage: portraits.Stage) -> float:
+def contrast(picture: np.ndarray, stage: portraits.RelightableView) -> float:
     """How much darker brows and beard are than the skin, natural log of the mean channel."""
     log = np.log(np.maximum(picture.mean(-1), 1e-3))
     grown, skin = share(stage, "brows") + share(stage, "beard"), share(stage, "skin")
@@ -38,7 +38,7 @@ def contrast(picture: np.ndarray, stage: portraits.Stage) -> float:
 def test_a_sight_comes_back_as_it_was_kept(stage, tmp_path):
     portraits.save(tmp_path / "0.npz", stage)
     back = portraits.load(tmp_path / "0.npz")
-    assert all(np.array_equal(getattr(stage, f.name), getattr(back, f.name)) for f in fields(portraits.Stage) if f.name != "unlit")
+    assert all(np.array_equal(getattr(stage, f.name), getattr(back, f.name)) for f in fields(portraits.RelightableView) if f.name != "unlit")
     assert all(np.array_equal(getattr(stage.unlit, f.name), getattr(back.unlit, f.name)) for f in fields(portraits.Unlit))
 
 

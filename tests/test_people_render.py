@@ -19,7 +19,7 @@ from core.synthetic.people import figure, filmed, person, truth  # noqa: E402
 SCALE, SAMPLES = 0.25, 24
 SHIRT, IRIS = (0.05, 0.30, 0.10), (0.02, 0.06, 0.25)
 ELSEWHERE = np.array([0.3, -0.2, 0.1])  # metres
-EVEN = scene.Light((1.0, 1.0, 1.0))
+EVEN = scene.SceneLight((1.0, 1.0, 1.0))
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ def pictured(tmp_path_factory):
     poses = np.tile(np.eye(4), (2, 1, 1))
     poses[1, :3, 3] = ELSEWHERE
     work = tmp_path_factory.mktemp("rendered")
-    filmed.render(work, someone, EVEN, poses @ camera, [0, 1], SAMPLES, SCALE, poses, room=False)
+    filmed.render(work, someone, EVEN, scene.Shot(poses @ camera, [0, 1], SAMPLES, SCALE, poses, room=False))
     frames = [images.read_linear(work / f"{k:05d}.exr")[..., :3] for k in range(2)]
     return frames, truth.look(truth.Scene(someone), sample.view_of(camera[0], SCALE), over=3)
 

@@ -33,7 +33,7 @@ def sitter():
     lights = [np.exp(1.5 * (direction - 0.5))[..., None] for direction in (x, y, 1 - x, 1 - y)]
     face = (np.abs(x - 0.5) < 0.4) & (np.abs(y - 0.5) < 0.45)
     srgb = [images.linear_to_srgb(np.clip(albedo * light, 0, 1)).astype(np.float32) for light in lights]
-    return photographs.Sitter("drawn", srgb, albedo, points, face, [face] * 4)
+    return photographs.LightSeries("drawn", srgb, albedo, points, face, [face] * 4)
 
 
 def test_references_score_what_they_must(sitter, monkeypatch):

@@ -13,7 +13,7 @@ from core.contract.capture import Capture
 from core.contract.messages import Problem
 from core.contract.settings import Settings
 from core.worker import client, terminal
-from core.worker.background import Task
+from core.worker.background import BackgroundTask
 from core.worker.job import write_job
 
 from . import recorded
@@ -66,7 +66,7 @@ def test_the_key_goes_to_workers_that_send_and_to_nobody_else(key, tmp_path, mon
             terminal.follow(tmp_path, capture, write_job(capture, settings={"delight": {"delighter": delighter}}), {"A": "B"})
     assert given == [{"A": "B"}, {"A": "B", switchlight_api.KEY_VARIABLE: KEY}]
     heard = []
-    task = Task("try", lambda task: task.run([sys.executable, "-c", "import os; print(os.environ)"], heard.append))
+    task = BackgroundTask("try", lambda task: task.run([sys.executable, "-c", "import os; print(os.environ)"], heard.append))
     task.start()
     task._thread.join()
     assert heard and KEY not in "".join(heard)

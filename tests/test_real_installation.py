@@ -49,7 +49,7 @@ def test_from_the_question_through_a_cancel_to_a_solve_and_removed_again(addon, 
     asking_s = follow(jobs)
     assert problems.of("") is None, problems.of("")
     told = install.WILDCAP_OT_install_solver.tell()
-    plan = addon("asking").answer(("plan", *install.chosen()))
+    plan = addon("asking").answer(("plan", *install.chosen_packages()))
 
     bpy.ops.wildcap.install_solver()
     follow(jobs, lambda job: job.progress is not None and job.progress.done >= 8)

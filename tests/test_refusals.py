@@ -80,7 +80,7 @@ def test_what_is_painted_may_be_lost_on_the_way(addon, capture, session):
 
 def test_the_set_up_keeps_its_buttons_while_it_works(addon):
     jobs = addon("jobs")
-    jobs._jobs[""] = jobs.Job('ask', addon("asking").Task("setup", lambda task: None))
+    jobs._jobs[""] = jobs.Job('ask', addon("asking").BackgroundTask("setup", lambda task: None))
     try:
         refuses("being installed already", bpy.ops.wildcap.install_solver)
         refuses("being installed: wait", bpy.ops.wildcap.remove_solver)
@@ -94,7 +94,7 @@ def test_a_second_job_and_a_look_that_is_not_over(addon, capture):
     item = captures.active(bpy.context)
     status._known.clear()
     refuses("Looking at the capture", bpy.ops.wildcap.solve_edited)
-    jobs._jobs[captures.root(item)] = jobs.Job('solve', addon("asking").Task("solve", lambda task: None))
+    jobs._jobs[captures.root(item)] = jobs.Job('solve', addon("asking").BackgroundTask("solve", lambda task: None))
     try:
         refuses("being worked on already", jobs.start, item, "solve")
         refuses("wait for it, or click Cancel", bpy.ops.wildcap.solve)
@@ -129,7 +129,7 @@ def test_a_blender_without_surroundings(addon, monkeypatch):
     hdri, props = addon("hdri"), bpy.context.scene.wildcap
     props.hdri_file = ""
     monkeypatch.setattr(hdri, "_worlds", lambda: [])
-    refuses("without pictures of surroundings", hdri.chosen, props)
+    refuses("without pictures of surroundings", hdri.chosen_hdri, props)
 
 
 def test_without_a_face_there_is_nothing_to_work_on(addon):

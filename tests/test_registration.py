@@ -83,7 +83,7 @@ def test_a_known_head_is_recovered(known):
     assert abs(first.scale / pose.scale - 1) < 0.02
     near, coefficients = alignment.fit_scan(model, first, coefficients, points, trust, scan, shaped)
     start = near.apply(model.shape(coefficients))
-    vertices = nonrigid.fit(model, start, scan, follow, hold, points, trust, 12, Reporter("registration"), 0, 1)
+    vertices = nonrigid.fit(model, start, scan, follow, nonrigid.LandmarkTargets(points, trust, hold), 12)
 
     error = np.linalg.norm(vertices - truth, axis=1)
     by_landmarks = np.linalg.norm(first.apply(model.mesh.vertices) - truth, axis=1)

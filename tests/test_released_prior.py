@@ -14,7 +14,7 @@ from torch.nn import functional
 
 from core.contract.messages import Problem
 from core.solve import prior, released
-from core.solve.network import denoise
+from core.solve.network import Condition, denoise
 
 CONFIGS = {
     "posenc, patches of 2, attention, variance": (
@@ -163,7 +163,7 @@ def test_a_checkpoint_of_another_kind_gives_what_its_formulas_give(tmp_path, nam
     inner = forward(state, model, torch.cat([x, condition], 1) / (s**2 + data**2).sqrt(), sigma, extra)
     wanted = s * data / (s**2 + data**2).sqrt() * inner + data**2 / (s**2 + data**2) * x
     assert inner.abs().mean() > 0.05, "there is something to compare"
-    assert (denoise(network, x, sigma, condition, extra) - wanted).abs().max() < 2e-5
+    assert (denoise(network, x, sigma, Condition(condition, extra)) - wanted).abs().max() < 2e-5
 
 
 def test_noise_is_read_where_the_folder_carries_it_and_asked_for_where_not(tmp_path):
@@ -177,7 +177,7 @@ def test_noise_is_read_where_the_folder_carries_it_and_asked_for_where_not(tmp_p
     np.save(tmp_path / released.NOISE_FILE, noise)
     loaded = prior.load(tmp_path, dtype=torch.float32)
     window = torch.from_numpy(noise[None, :, 8:24, 32:48])
-    assert (loaded.of_tone()(x, 1.0, coords) - denoise(loaded.network, x, torch.tensor([1.0]), window)).abs().max() < 1e-6
+    assert (loaded.of_tone()(x, 1.0, coords) - denoise(loaded.network, x, torch.tensor([1.0]), Condition(window))).abs().max() < 1e-6
     for wrong in (noise[:2], noise[:, :8], noise.astype(np.int32), np.where(noise > 2, np.nan, noise)):
         np.save(tmp_path / released.NOISE_FILE, wrong)
         with pytest.raises(Problem, match="of shape"):

@@ -146,7 +146,7 @@ def test_the_surroundings_of_a_picture_light_the_head_and_turn_with_their_rotati
     with pytest.raises(RuntimeError, match="There is no picture at"):
         bpy.ops.wildcap.render()
     props.hdri_file = ""
-    assert addon("hdri").chosen(props).path.is_file(), "one of Blender's own worlds"
+    assert addon("hdri").chosen_hdri(props).path.is_file(), "one of Blender's own worlds"
     assert len(bpy.data.scenes["WildCap Relight"].world.node_tree.nodes) == 5
 
 
@@ -165,7 +165,7 @@ def test_filmed_delit_and_solved_are_shown_in_the_same_material(addon, capture):
         (capture / "comparison" / name).write_bytes((capture / "texture.png").read_bytes())
     for kind, name in (('FILMED', "filmed.png"), ('DELIT', "delit.png")):
         bpy.ops.wildcap.compare(show=kind)
-        assert compare.shown(bpy.context) == kind
+        assert compare.shown_picture(bpy.context) == kind
         assert lines(tree) == sorted(line.replace("diffuse_albedo.png", name) for line in solved)
     bpy.ops.wildcap.compare(show='SOLVED')
-    assert compare.shown(bpy.context) == 'SOLVED' and lines(tree) == solved
+    assert compare.shown_picture(bpy.context) == 'SOLVED' and lines(tree) == solved

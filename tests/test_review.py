@@ -10,8 +10,8 @@ import pytest
 
 from core.__main__ import main
 from core.batch import review
-from core.batch.record import Batch, Face, write_batch
-from core.batch.state import DONE, STOPPED, TO_DO, WAITING, State
+from core.batch.record import Batch, BatchFace, write_batch
+from core.batch.state import DONE, STOPPED, TO_DO, WAITING, FaceState
 from core.contract import stages
 from core.contract.capture import Capture
 from core.contract.files import write_json
@@ -24,9 +24,9 @@ from .test_report import Page
 FINDING = {"problem": "The light <changed>.", "remedy": "Lock the exposure.", "frames": ["1.jpg"]}
 
 
-def make(root, name: str, findings: int = 0, **figures) -> Face:
+def make(root, name: str, findings: int = 0, **figures) -> BatchFace:
     """A face with what these figures (stage_figure=value) say of it."""
-    face = Face(name, root / "film.mp4", root / f"{name}.wildcap")
+    face = BatchFace(name, root / "film.mp4", root / f"{name}.wildcap")
     face.capture.claim()
     for measure in review.MEASURES:
         if measure.label in figures or measure.label == review.FINDINGS:
@@ -68,8 +68,8 @@ def test_the_worst_measure_decides_and_where_that_is_equal_their_mean(batch):
 
 
 def test_stopped_faces_come_first_then_those_that_wait(batch, monkeypatch):
-    states = {"good": State(STOPPED, review.GROUPS[0], "It <broke>.", "Mend it."), "told": State(WAITING, review.GROUPS[2]), "half": State(DONE),
-              "bad chin": State(TO_DO, review.GROUPS[1])}
+    states = {"good": FaceState(STOPPED, review.GROUPS[0], "It <broke>.", "Mend it."), "told": FaceState(WAITING, review.GROUPS[2]), "half": FaceState(DONE),
+              "bad chin": FaceState(TO_DO, review.GROUPS[1])}
     monkeypatch.setattr(review, "derive_state", lambda batch, face: states[face.name])
     assert order(batch) == ["good", "told", "half", "bad chin"]
     page = Page((batch.root / review.NAME).read_text(encoding="utf-8"))
@@ -81,7 +81,7 @@ def test_stopped_faces_come_first_then_those_that_wait(batch, monkeypatch):
 def test_the_page_is_escaped_loads_nothing_and_links_where_the_reports_are(batch):
     capture = batch.faces[2].capture
     capture.report.write_text("report", encoding="utf-8")
-    strange = Face("<b>", batch.root / "film.mp4", batch.root / "a #1 <i>.wildcap")
+    strange = BatchFace("<b>", batch.root / "film.mp4", batch.root / "a #1 <i>.wildcap")
     strange.capture.claim()
     strange.capture.report.write_text("report", encoding="utf-8")
     path, _ = review.write_review(Batch(batch.root, (*batch.faces, strange)))
@@ -111,13 +111,13 @@ def test_pictures_are_small_and_in_the_page_and_a_damaged_one_is_left_out(batch)
 
 
 def test_a_face_that_nothing_is_known_of_and_a_record_that_cannot_be_read_have_their_places(batch):
-    new = Face("new", batch.root / "film.mp4", batch.root / "new.wildcap")
+    new = BatchFace("new", batch.root / "film.mp4", batch.root / "new.wildcap")
     odd = make(batch.root, "odd")
     record = odd.capture.read()
     record["stages"]["frames"]["figures"] = {"masked_percent": "much"}
     record["stages"]["shadow_mask"] = {**record["stages"]["frames"], "figures": {"masked_percent": float("nan")}}
     write_json(odd.capture.json, record)
-    torn = Face("torn", batch.root / "film.mp4", batch.root / "torn.wildcap")
+    torn = BatchFace("torn", batch.root / "film.mp4", batch.root / "torn.wildcap")
     torn.root.mkdir()
     torn.capture.json.write_text("{", encoding="utf-8")
     assert order(Batch(batch.root, (new, *batch.faces, torn, odd))) == ["torn", "half", "told", "bad chin", "good", "new", "odd"]

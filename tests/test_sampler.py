@@ -12,7 +12,7 @@ from core.solve.lighting import Lights, Shader, constant_light
 from core.solve.prior import coordinates
 from core.solve.problem import Observation, State
 from core.solve.recipes import RECIPES, Recipe
-from core.solve.sampler import ancestral, karras, sample, schedule, seeded
+from core.solve.sampler import Sampler, ancestral, karras, schedule, seeded
 
 SIZE = 32
 MEAN, SPREAD = 0.1, 0.3
@@ -70,7 +70,7 @@ def test_schedule_walks_the_last_part_of_karras_sequence():
 
 def test_without_observation_the_sampler_draws_from_the_prior():
     o = observation(torch.zeros(3, SIZE, SIZE), weight=torch.zeros(SIZE, SIZE))
-    drawn = torch.cat([sample(gaussian_prior, {1: o}, start(), EVEN, seeded(seed)).denoised for seed in range(3)])
+    drawn = torch.cat([Sampler(gaussian_prior, EVEN, seeded(seed)).sample({1: o}, start()).denoised for seed in range(3)])
     assert abs(drawn.mean().item() - MEAN) < 0.02
     assert abs(drawn.std().item() - SPREAD) < 0.03
 
@@ -86,7 +86,7 @@ def test_posterior_mean_under_a_gaussian_prior(guidance):
     weight[:, SIZE // 2:] = 0.0  # the right half is unseen: its posterior is the prior
     recipe = Recipe(steps=75, coarse=(), guidance=guidance, rate=0.0)
     o = {1: observation(texture, weight=weight)}
-    drawn = torch.stack([sample(gaussian_prior, o, start(light=light), recipe, seeded(seed)).denoised[0] for seed in range(12)])
+    drawn = torch.stack([Sampler(gaussian_prior, recipe, seeded(seed)).sample(o, start(light=light)).denoised[0] for seed in range(12)])
     seen, unseen = drawn[:, :3, :, :SIZE // 2], drawn[:, :3, :, SIZE // 2:]
     assert (seen.mean(0) - truth[0, :3, :, :SIZE // 2]).abs().mean() < 0.02
     assert seen.std(0).mean() < 0.04
@@ -110,7 +110,7 @@ def test_a_known_soft_shadow_is_removed_and_only_with_the_grid():
     recipe = Recipe(steps=60, coarse=())
     errors = {}
     for name, alpha in (("grid", mask), ("no grid", torch.zeros_like(mask))):
-        out = sample(prior, {1: observation(texture, alpha, (8, 8))}, start(-0.2, 64, cells=(8, 8)), recipe, seeded(0))
+        out = Sampler(prior, recipe, seeded(0)).sample({1: observation(texture, alpha, (8, 8))}, start(-0.2, 64, cells=(8, 8)))
         error = ((out.denoised - truth)[0, :3] / 2) ** 2
         errors[name] = error[:, shadow].mean().sqrt().item(), error[:, mask == 0].mean().sqrt().item()
     assert errors["grid"][0] < 0.6 * errors["no grid"][0]
@@ -126,7 +126,7 @@ def test_the_paper_and_its_code_remove_a_known_shadow_too(name):
     o = observation(texture, support, (8, 8))
     first = start(-0.2, 64, cells=(8, 8))
     first.lights.grid = torch.zeros(3, 9, 8, 8)
-    out = sample(prior, {1: o}, first, recipe, seeded(0))
+    out = Sampler(prior, recipe, seeded(0)).sample({1: o}, first)
     error, before = ((out.denoised - truth)[0, :3] / 2).abs(), (texture - (truth[0, :3] + 1) / 2).abs()
     assert error[:, shadow].mean() < 0.7 * before[:, shadow].mean()
     assert error[:, support == 0].mean() < 0.05  # lights fitted one after the other leave more outside than lights fitted together
@@ -135,7 +135,7 @@ def test_the_paper_and_its_code_remove_a_known_shadow_too(name):
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not():
     prior, _, texture, mask, _ = shadow_problem(32)
     o = {1: observation(texture, mask)}
-    a, b, c = (sample(prior, o, start(-0.2), Recipe(steps=12, coarse=()), seeded(seed)).denoised for seed in (5, 5, 6))
+    a, b, c = (Sampler(prior, Recipe(steps=12, coarse=()), seeded(seed)).sample(o, start(-0.2)).denoised for seed in (5, 5, 6))
     assert torch.equal(a, b) and not torch.equal(a, c)
 
 
@@ -156,9 +156,9 @@ def test_resuming_from_a_checkpoint_gives_the_same_bytes(tmp_path, coarse):
         if state.step == 5:
             checkpoint.write(path, state, "key")
 
-    whole = sample(denoiser, o, start(-0.2), recipe, seeded(1), store)
+    whole = Sampler(denoiser, recipe, seeded(1)).sample(o, start(-0.2), store)
     assert checkpoint.read(path, "another key") is None
-    resumed = sample(denoiser, o, checkpoint.read(path, "key"), recipe, seeded(1))
+    resumed = Sampler(denoiser, recipe, seeded(1)).sample(o, checkpoint.read(path, "key"))
     assert torch.equal(whole.denoised, resumed.denoised) and torch.equal(whole.lights.grid, resumed.lights.grid)
     path.write_bytes(path.read_bytes()[:1000])
     assert checkpoint.read(path, "key") is None
@@ -171,7 +171,7 @@ def test_any_mask_gives_finite_maps(kind, guidance):
     alpha = {"empty": torch.zeros(32, 32), "full": torch.ones(32, 32), "one texel": torch.zeros(32, 32)}[kind]
     if kind == "one texel":
         alpha[7, 9] = 1
-    out = sample(prior, {1: observation(texture, alpha)}, start(-0.2), Recipe(steps=20, coarse=(), guidance=guidance), seeded(0))
+    out = Sampler(prior, Recipe(steps=20, coarse=(), guidance=guidance), seeded(0)).sample({1: observation(texture, alpha)}, start(-0.2))
     assert torch.isfinite(out.denoised).all()
     assert ((out.denoised - truth)[0, :3, 20:] / 2).abs().mean() < (0.1 if kind != "full" else 0.5)
 
@@ -179,4 +179,4 @@ def test_any_mask_gives_finite_maps(kind, guidance):
 def test_divergence_is_a_problem_with_a_remedy():
     o = {1: observation(torch.full((3, SIZE, SIZE), float("nan")))}
     with pytest.raises(Problem, match="diverged at step 1"):
-        sample(gaussian_prior, o, start(), EVEN, seeded(0))
+        Sampler(gaussian_prior, EVEN, seeded(0)).sample(o, start())

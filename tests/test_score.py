@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("flip_evaluator")
 
-from benchmarks.albedo_score import Truth, compare  # noqa: E402
+from benchmarks.albedo_score import AlbedoTruth, compare  # noqa: E402
 from core.imaging import images  # noqa: E402
 
 
@@ -19,7 +19,7 @@ def truth():
     face[20:180, 20:140] = True
     shadow = np.zeros_like(face)
     shadow[:, 80:] = True
-    return Truth(0, albedo, face, shadow)
+    return AlbedoTruth(0, albedo, face, shadow)
 
 
 def test_a_constant_error_of_a_tenth_is_twenty_decibels(truth):

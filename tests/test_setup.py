@@ -41,7 +41,7 @@ def wait(checking, limit_s: float = 60):
 
 def plan_of(addon, disk: int = 1_600_000_000):
     index = addon("setup.install").index
-    return index.Plan({"torch": "2.13.0", "numpy": "1.26.4", "av": "15.1.0"}, ("files.pythonhosted.org",), 430_000_000, disk)
+    return index.InstallationPlan({"torch": "2.13.0", "numpy": "1.26.4", "av": "15.1.0"}, ("files.pythonhosted.org",), 430_000_000, disk)
 
 
 def test_installing_asks_the_index_first_and_says_what_it_means(setup, monkeypatch, tmp_path):
@@ -56,7 +56,7 @@ def test_installing_asks_the_index_first_and_says_what_it_means(setup, monkeypat
     follow(setup)
     assert asked == [("cpu", "pytorch", None)] and asking.answer(("plan", "cpu", "pytorch", None)) == plan_of(setup), "from now on the dialog opens at once"
     assert "the CPU" in install.WILDCAP_OT_install_solver.tell()[0] and jobs.of("") is None
-    lines = install.told(plan_of(setup), "cpu", tmp_path / "Löser", 23_400_000_000)
+    lines = install.describe_plan(plan_of(setup), "cpu", tmp_path / "Löser", 23_400_000_000)
     for words in ("PyTorch 2.13.0 for the CPU and 2 more packages", "0.4 GB to download from files.pythonhosted.org", "1.6 GB on disk",
                   "Löser", "23.4 GB are free"):
         assert any(words in line for line in lines), words
@@ -147,7 +147,7 @@ def test_the_set_up_offers_a_test_once_a_solver_answers_and_no_longer_when_it_do
 
 def test_the_chosen_python_is_tried_in_the_background(setup, tmp_path):
     operators, preferences = setup("setup.operators"), setup("preferences")
-    task = operators.Task("setup", lambda task: operators.try_out(task, tmp_path / "none"))
+    task = operators.BackgroundTask("setup", lambda task: operators.try_out(task, tmp_path / "none"))
     setup("jobs").begin("", "ask", task, lambda: setup("setup.checking").accept(tmp_path / "none"))
     follow(setup)
     assert "not a working Python" in setup("problems").of("").problem and preferences.python() is None

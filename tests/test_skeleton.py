@@ -25,7 +25,7 @@ def test_the_sharpest_frame_of_each_part_is_chosen_in_order():
         there = frames[10 * part:10 * part + 10]
         assert name == max(there, key=lambda frame: frame[1])[0]
     assert skeleton.choose(frames, 100) == [name for name, _, _ in frames]
-    assert skeleton.size(frames[:40]) == 40 and skeleton.size(frames) == skeleton.SIZE
+    assert skeleton.size(frames[:40]) == 40 and skeleton.size(frames) == skeleton.CARRYING_FRAMES
 
 
 def test_more_frames_carry_a_film_that_shows_little_and_those_of_fewer_stay():
@@ -138,7 +138,7 @@ def solved(folder, work, sharpest_first=True):
 
 def test_the_order_in_which_features_are_found_changes_no_byte(filmed, tmp_path, monkeypatch):
     """Threads end in any order; here, once as they do, and once from the last picture to the first."""
-    monkeypatch.setattr(skeleton, "SIZE", 7)
+    monkeypatch.setattr(skeleton, "CARRYING_FRAMES", 7)
     monkeypatch.setattr(colmap, "FILM_FEATURES", 400)  # of which these small pictures have half
     extract, order = pycolmap.extract_features, []
 
@@ -156,9 +156,9 @@ def test_the_order_in_which_features_are_found_changes_no_byte(filmed, tmp_path,
 
 def test_what_lies_beyond_a_chosen_frame_that_is_not_mapped_is_placed_by_those_that_are(filmed, tmp_path, monkeypatch):
     """As at the end of a long film, whose outermost chosen frame shows too little to be mapped."""
-    monkeypatch.setattr(skeleton, "SIZE", 7)
+    monkeypatch.setattr(skeleton, "CARRYING_FRAMES", 7)
     monkeypatch.setattr(colmap, "FILM_FEATURES", 400)
-    monkeypatch.setattr(colmap, "CARRIED", 0.8)
+    monkeypatch.setattr(colmap, "LEAST_CARRIED_SHARE", 0.8)
     map_, chosen = colmap._map, []
     monkeypatch.setattr(colmap, "_map", lambda job, names: chosen.extend(names) or map_(job, names[1:]))
     _, registered = solved(filmed, tmp_path / "work", sharpest_first=False)

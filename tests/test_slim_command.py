@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from core.__main__ import main
-from core.batch.record import Batch, Face, write_batch
+from core.batch.record import Batch, BatchFace, write_batch
 from core.contract import slimmed, slimming, stages
 from core.contract.capture import Capture
 from core.contract.messages import Failed, Problem, Reporter
@@ -64,7 +64,7 @@ def test_the_terminal_lists_removes_and_brings_back(root, capture, capsys):
 
 def test_of_a_batch_the_faces_that_are_done_are_slimmed_and_the_others_left_and_said(root, capture, capsys):
     folder = capture.root.parent
-    write_batch(Batch(folder, tuple(Face(name, folder / "film.mp4", folder / f"{name}.wildcap") for name in ("zoë", "new"))))
+    write_batch(Batch(folder, tuple(BatchFace(name, folder / "film.mp4", folder / f"{name}.wildcap") for name in ("zoë", "new"))))
     said = command(root, "slim", folder)
     assert "zoë" in said and "2 files" in said and "new" in said and "left, for it is not done: head is next" in said and "1 of 2 faces" in said
     assert len(pictures(capture)) == 2

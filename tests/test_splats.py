@@ -28,7 +28,7 @@ def patch(radius: float, columns: int, reach: float) -> Mesh:
     return Mesh(points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
 
 
-def photograph(yaw: float, pitch: float) -> tuple[splats.Photograph, np.ndarray]:
+def photograph(yaw: float, pitch: float) -> tuple[splats.UndistortedFrame, np.ndarray]:
     """The painted front, and its true depth."""
     yaw, pitch = np.radians(yaw), np.radians(pitch)
     centre = POLE + 0.3 * np.array([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)])
@@ -47,7 +47,7 @@ def photograph(yaw: float, pitch: float) -> tuple[splats.Photograph, np.ndarray]
     colour = 0.5 + 0.22 * np.stack([np.sin(points @ w) for w in ([330, 0, 150], [-150, 0, 300], [200, 0, -280])], -1)
     picture = np.where(hit[..., None], colour.reshape(SIDE, SIDE, 3), 0.9).astype(np.float32)  # a white wall behind
     depth = np.where(hit, (distance / length).reshape(SIDE, SIDE), np.nan)
-    return splats.Photograph(picture, hit, rotation, centre, FOCAL, origin), depth
+    return splats.UndistortedFrame(picture, hit, rotation, centre, FOCAL, origin), depth
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +84,6 @@ def test_training_lowers_the_depth_error(seen):
 
 
 def test_splats_without_a_gpu_are_a_problem_only_when_asked_for():
-    assert not splats.wanted("auto", "cpu") and not splats.wanted("stereo", "cuda")
+    assert not splats.use_splats("auto", "cpu") and not splats.use_splats("stereo", "cuda")
     with pytest.raises(Problem, match="gsplat"):
-        splats.wanted("splats", "cpu")
+        splats.use_splats("splats", "cpu")

@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("flip_evaluator")
 
 from benchmarks import state, state_captures, state_scores  # noqa: E402
-from benchmarks.albedo_score import Look, Truth  # noqa: E402
+from benchmarks.albedo_score import AlbedoTruth, HeadInView  # noqa: E402
 from benchmarks.measures.references import FLAT, NOTHING, TRUE  # noqa: E402
 from benchmarks.measures.tone import BEST_PSNR  # noqa: E402
 from benchmarks.state_captures import DELIT, SIZE, SOLVED  # noqa: E402
@@ -103,7 +103,7 @@ def test_pictures_are_judged_as_the_maps_are_seen():
     truth = (SKIN * np.exp(0.1 * rng.standard_normal((side, side, 1)))).astype(np.float32)
     y, x = (np.mgrid[0:side, 0:side] + 0.5) / side
     uv, face, shadow = np.stack([x.ravel(), 1 - y.ravel()], 1), (np.abs(x - 0.5) < 0.45) & (np.abs(y - 0.5) < 0.45), x > 0.5
-    look = Look(Truth(0, images.linear_to_srgb(truth), face, shadow), np.ones((side, side), bool), uv)
+    look = HeadInView(AlbedoTruth(0, images.linear_to_srgb(truth), face, shadow), np.ones((side, side), bool), uv)
     filmed = truth * np.where(shadow, 0.4, 1.0)[..., None]
     found = state_scores.in_pictures({NOTHING: filmed, TRUE: truth, FLAT: np.broadcast_to(SKIN, truth.shape)}, [look])
     assert found[TRUE]["psnr"] > 50 and found[TRUE]["detail"] == pytest.approx(1, abs=1e-3) and found[TRUE]["overshoot"] < 0.01

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from core.cameras.matches import Matches
-from core.cameras.settled import SWAYED, on_head, settle
+from core.cameras.settled import MOST_LEFT_SHARE, on_head, settle
 from core.cameras.world import HeadFrame
 from core.contract.messages import Reporter
 from core.face import template
@@ -76,7 +76,7 @@ def missed_px(model, true, turns, shifts) -> np.ndarray:
 def test_the_head_is_followed_where_it_swayed():
     model, matches, turns, shifts = filmed(0.0015, 0.6)
     settled, left = settle(model, IN_HEAD, matches, Reporter("cameras"))
-    assert left < SWAYED and settled is not model
+    assert left < MOST_LEFT_SHARE and settled is not model
     before, after = (missed_px(each, model, turns, shifts).mean() for each in (model, settled))
     assert after < 0.25 * before and after < 0.3
     assert {image.name for image in settled.images.values()} == {image.name for image in model.images.values()}
@@ -89,7 +89,7 @@ def test_frames_that_do_not_tell_are_placed_by_those_that_do():
     model, matches, turns, shifts = filmed(0.0015, 0.6)
     chosen = sorted(matches.keypoints)[::2]
     settled, left = settle(model, IN_HEAD, matches, Reporter("cameras"), chosen)
-    assert left < SWAYED and {image.name for image in settled.images.values()} == set(matches.keypoints)
+    assert left < MOST_LEFT_SHARE and {image.name for image in settled.images.values()} == set(matches.keypoints)
     before, after = (missed_px(each, model, turns, shifts)[1::2].mean() for each in (model, settled))
     assert after < 0.25 * before and after < 0.3
 
@@ -106,14 +106,14 @@ def test_a_head_at_rest_keeps_the_cameras_of_the_room(monkeypatch, noise_px):
 def test_a_sway_of_a_fifth_of_a_millimetre_is_seen():
     model, matches, turns, shifts = filmed(0.0002, 0.1)
     settled, left = settle(model, IN_HEAD, matches, Reporter("cameras"))
-    assert left < SWAYED
+    assert left < MOST_LEFT_SHARE
     assert missed_px(settled, model, turns, shifts).mean() < 0.25 * missed_px(model, model, turns, shifts).mean()
 
 
 def test_hair_that_fits_together_nowhere_is_no_motion():
     model, matches, _, _ = filmed(0.0, 0.0, ragged=0.6)
     settled, left = settle(model, IN_HEAD, matches, Reporter("cameras"))
-    assert settled is model and left > SWAYED
+    assert settled is model and left > MOST_LEFT_SHARE
 
 
 def test_a_film_in_which_hardly_anything_of_the_head_matches_is_left_as_it_is():

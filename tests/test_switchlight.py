@@ -133,32 +133,32 @@ def test_nothing_is_sent_without_consent_a_key_or_a_network(capture, serve, monk
 def test_consent_holds_for_these_pictures_here_and_nothing_else(capture, serve, monkeypatch, tmp_path):
     first = serve()
     agree(capture)
-    assert consent.given(capture, consent.sending(capture, False))
+    assert consent.is_given(capture, consent.sending(capture, False))
     other = make(tmp_path / "other.wildcap", selected=4)
     other.consent.write_bytes(capture.consent.read_bytes())
-    assert not consent.given(other, consent.sending(other, False)), "copied to another capture, though its frames are the same"
+    assert not consent.is_given(other, consent.sending(other, False)), "copied to another capture, though its frames are the same"
     with pytest.raises(Problem, match="consent"):
         consent.require(other, consent.sending(other, False))
     kept = (capture.frames / "00001.png").read_bytes()
     (capture.frames / "00001.png").write_bytes(standin.png([[(9, 9, 9)] * 60] * 80))
-    assert not consent.given(capture, consent.sending(capture, False)), "another picture under the same name"
+    assert not consent.is_given(capture, consent.sending(capture, False)), "another picture under the same name"
     (capture.frames / "00001.png").write_bytes(kept)
-    assert consent.given(capture, consent.sending(capture, False))
-    assert not consent.given(capture, consent.sending(capture, False, [f"0000{i}.png" for i in range(4)])), "one more frame"
-    assert not consent.given(capture, consent.sending(capture, True)), "other answers"
+    assert consent.is_given(capture, consent.sending(capture, False))
+    assert not consent.is_given(capture, consent.sending(capture, False, [f"0000{i}.png" for i in range(4)])), "one more frame"
+    assert not consent.is_given(capture, consent.sending(capture, True)), "other answers"
     serve()
-    assert consent.given(capture, consent.sending(capture, False)), "the same machine"
+    assert consent.is_given(capture, consent.sending(capture, False)), "the same machine"
     monkeypatch.setenv(switchlight_api.BASE_VARIABLE, "https://elsewhere.example/v1")
-    assert not consent.given(capture, consent.sending(capture, False)), "another machine"
+    assert not consent.is_given(capture, consent.sending(capture, False)), "another machine"
     monkeypatch.setenv(switchlight_api.BASE_VARIABLE, first.url)
     capture.consent.write_text('{"frames": 3}')
-    assert not consent.given(capture, consent.sending(capture, False)), "damaged"
+    assert not consent.is_given(capture, consent.sending(capture, False)), "damaged"
     monkeypatch.setenv(consent.GIVEN_VARIABLE, consent.by_flag(other)[consent.GIVEN_VARIABLE])
     with pytest.raises(Problem, match="consent"):
         consent.require(capture, consent.sending(capture, False))
     agree(capture)
     consent.withdraw(capture)
-    assert not consent.given(capture, consent.sending(capture, False)) and not capture.consent.exists()
+    assert not consent.is_given(capture, consent.sending(capture, False)) and not capture.consent.exists()
     assert KEY not in json.dumps(consent.sending(capture, False).frames)
 
 

@@ -113,7 +113,7 @@ def test_background_takes_a_views_weight_outside_the_face_only(head, tmp_path, m
 
     def seen(person):
         monkeypatch.setattr(foreign.faces, "segment_person", lambda srgb: person)
-        observation = texture.Observation(SimpleNamespace(name="x", path=path), np.zeros((64, 64, 3), np.float32), pixels, ones, ones, ones)
+        observation = texture.UnwrappedView(SimpleNamespace(name="x", path=path), np.zeros((64, 64, 3), np.float32), pixels, ones, ones, ones)
         return foreign.leave_out_background([observation], Reporter("texture")), observation.weight
 
     person = np.ones((64, 64), np.float32)

@@ -16,6 +16,7 @@ from core.solve.prior import build, load
 from core.solve.skin_tone import GIVEN, SkinTone
 from core.synthetic import pigment
 from core.training import prior, skins
+from core.training.descent import TrainingRun
 from core.training.patches import Windows, mean_map, spread_about
 
 QUIET = Reporter("train", emit=lambda message: None)
@@ -138,13 +139,13 @@ def test_a_training_goes_on_where_it_stopped(carried, cache, tmp_path, monkeypat
     monkeypatch.setitem(prior.CONFIGS, "cpu", tiny)
     out = tmp_path / "prior.safetensors"
     with pytest.raises(Problem, match="no skin named z"):
-        prior.train_prior("cpu", out, QUIET, 0.01, carried, ["z"], cache)
-    first = prior.train_prior("cpu", out, QUIET, 0.01, carried, ["b"], cache)
-    second = prior.train_prior("cpu", out, QUIET, 0.02, carried, ["b"], cache)
+        prior.train_prior("cpu", out, QUIET, TrainingRun(0.01, cache), carried, ["z"])
+    first = prior.train_prior("cpu", out, QUIET, TrainingRun(0.01, cache), carried, ["b"])
+    second = prior.train_prior("cpu", out, QUIET, TrainingRun(0.02, cache), carried, ["b"])
     assert 0 < first["steps"] < second["steps"]
     assert second["skins"] == ["a"] and second["held_out_skins"] == ["b"] and second["notices"] == ["Theirs."]
     assert set(second["held_out"]["loss"]) == {"synthetic", "carried"} and not set(second["seeds"]) & set(second["held_out_seeds"])
     conditioned = load(out).of_tone(SkinTone((0.4, 0.3, 0.2), GIVEN))
     assert conditioned(torch.zeros(1, 7, 32, 32), 1.0, torch.zeros(1, 2, 32, 32) + torch.linspace(0, 0.1, 32)).isfinite().all()
     with pytest.raises(Problem, match="other data"):
-        prior.train_prior("cpu", out, QUIET, 0.03, None, [], cache)
+        prior.train_prior("cpu", out, QUIET, TrainingRun(0.03, cache))

@@ -115,7 +115,7 @@ def test_normals_are_turned_into_the_other_tangent_frame(source, target):
 
 def test_strips_do_not_show(source, target, monkeypatch):
     whole = places_of(target, (0, 0), source, 128)
-    monkeypatch.setattr(baking, "STRIP", 37)
+    monkeypatch.setattr(baking, "STRIP_ROWS", 37)
     strips = places_of(target, (0, 0), source, 128)
     assert np.allclose(whole.uv, strips.uv, atol=1e-5, equal_nan=True) and np.array_equal(whole.covered, strips.covered)
 

@@ -17,9 +17,10 @@ from core.contract.settings import from_json
 from core.face import template
 from core.imaging import images
 from core.training import fine_windows, upscaler
+from core.training.descent import TrainingRun
 from core.upscale import gloss, network
 from core.upscale.enlarge import enlarge, load_network
-from core.upscale.maps import Maps, read_maps
+from core.upscale.maps import HeadMaps, read_maps
 
 SMALL, LARGE = 256, 1024
 PLAIN = {"whole_head": False, "hair": False}  # test_whole_head.py and test_hair.py look at these
@@ -113,11 +114,11 @@ def test_a_cancel_between_maps_leaves_no_folder(capture):
     assert not capture.maps_4k.exists() and not list(capture.root.glob(".*"))
 
 
-def rough_maps(size: int) -> Maps:
+def rough_maps(size: int) -> HeadMaps:
     rng = np.random.default_rng(0)
     normal = rng.normal(0, 0.2, (size, size, 3)).astype(np.float32) + np.float32([0, 0, 1])
-    return Maps(rng.random((size, size, 3)).astype(np.float32), normal / np.linalg.norm(normal, axis=2, keepdims=True),
-                rng.random((size, size)).astype(np.float32), np.ones((size, size), np.float32), np.ones((size, size, 3), np.float32))
+    return HeadMaps(rng.random((size, size, 3)).astype(np.float32), normal / np.linalg.norm(normal, axis=2, keepdims=True),
+                    rng.random((size, size)).astype(np.float32), np.ones((size, size), np.float32), np.ones((size, size, 3), np.float32))
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +139,7 @@ def test_strips_are_the_whole(busy, monkeypatch):
         assert np.abs(stripped[rows] - stripped[70]).max() < 1e-5, rows
 
 
-def _with_strips(monkeypatch, rows: int, maps: Maps, net: network.Rcan) -> np.ndarray:
+def _with_strips(monkeypatch, rows: int, maps: HeadMaps, net: network.Rcan) -> np.ndarray:
     monkeypatch.setattr("core.upscale.enlarge.STRIP", rows)
     return enlarge(maps, lambda share: None, network=net)
 
@@ -162,7 +163,7 @@ def test_an_untrained_network_resamples(capture):
 
 def test_a_block_begins_as_the_identity():
     features = torch.randn(1, 16, 8, 8)
-    assert torch.equal(network.Block(16, 4)(features), features)
+    assert torch.equal(network.ChannelAttentionBlock(16, 4)(features), features)
 
 
 def test_the_stage_takes_the_network(capture, busy, monkeypatch):
@@ -194,13 +195,14 @@ def test_a_cancel_ends_the_writing_and_leaves_nothing(tmp_path):
             raise CancelledError("upscale")
 
     with pytest.raises(CancelledError):
-        upscale._write_together([partial(images.write_data, tmp_path / f"{i}.png", np.zeros((4 * images.ROWS, 8)), check=cancelled) for i in range(3)],
+        blank = np.zeros((4 * images.ROWS_BETWEEN_CHECKS, 8))
+        upscale._write_together([partial(images.write_data, tmp_path / f"{i}.png", blank, check=cancelled) for i in range(3)],
                                 lambda done: None)
     assert not list(tmp_path.iterdir()) and len(asked) <= 5, "what had not begun did not begin"
 
 
 def test_a_map_of_many_strips_is_whole(tmp_path):
-    for rows in (images.ROWS - 1, images.ROWS, 2 * images.ROWS + 7):
+    for rows in (images.ROWS_BETWEEN_CHECKS - 1, images.ROWS_BETWEEN_CHECKS, 2 * images.ROWS_BETWEEN_CHECKS + 7):
         truth = np.linspace(0, 1, 3 * rows * 5, dtype=np.float32).reshape(rows, 5, 3)
         images.write_data(tmp_path / "a.png", truth, bits=16)
         images.write_data(tmp_path / "a.exr", truth)
@@ -230,13 +232,13 @@ def test_a_training_goes_on_where_it_stopped(windows, tmp_path, monkeypatch):
             "training": {"patch": 8, "batch": 4, "rate": 5e-3, "minutes": 1, "skins": 2, "views": 1, "held_out": 1, "seed": 0, "workers": 0}}
     monkeypatch.setitem(upscaler.CONFIGS, "cpu", tiny)
     out = tmp_path / "upscaler.safetensors"
-    first = upscaler.train_upscaler("cpu", out, Reporter("train"), minutes=0.01, work=windows)
-    second = upscaler.train_upscaler("cpu", out, Reporter("train"), minutes=0.02, work=windows)
+    first = upscaler.train_upscaler("cpu", out, Reporter("train"), TrainingRun(0.01, windows))
+    second = upscaler.train_upscaler("cpu", out, Reporter("train"), TrainingRun(0.02, windows))
     assert second["steps"] > first["steps"] > 0 and second["parameters"] == sum(p.numel() for p in network.Rcan(**tiny["model"]).parameters())
     assert load_network(out).tail.weight.abs().max() > 0 and out.with_suffix(".json").is_file()
     monkeypatch.setitem(upscaler.CONFIGS, "gpu", tiny)
     with pytest.raises(Problem, match="other data or of another configuration"):
-        upscaler.train_upscaler("gpu", out, Reporter("train"), work=windows)
+        upscaler.train_upscaler("gpu", out, Reporter("train"), TrainingRun(work=windows))
 
 
 def test_degrading_keeps_the_mean_and_halves_a_relief_as_asked():

@@ -16,10 +16,10 @@ from core.solve import maps, prior
 from core.solve.initial import mean_tone
 from core.solve.light_fit import light_loss
 from core.solve.lighting import Lights, Shader, interpolation, shading_basis
-from core.solve.network import denoise
+from core.solve.network import Condition, denoise
 from core.solve.problem import Observation, State, albedo, blurred
 from core.solve.recipes import RECIPES, Recipe
-from core.solve.sampler import ancestral, karras, sample
+from core.solve.sampler import Sampler, ancestral, karras
 
 VECTORS = Path(os.environ.get("WILDCAP_VECTORS", Path(__file__).parents[2] / "shared" / "vectors"))
 pytestmark = pytest.mark.skipif(not VECTORS.is_dir(), reason=f"the parity vectors are not at {VECTORS}")
@@ -112,7 +112,7 @@ def test_vectors_released_prior(folder):
     if "inner_on_raw_input" in v:
         close(network(torch.cat([v["x"], v["cond"]], 1), v["sigma"], mapping), v["inner_on_raw_input"])
     x = v["x"].clone().requires_grad_(True)
-    denoised = denoise(network, x, v["sigma"], v["cond"], mapping)
+    denoised = denoise(network, x, v["sigma"], Condition(v["cond"], mapping))
     close(denoised.detach(), v["denoised"])
     close(torch.autograd.grad((denoised * v["w"]).sum(), x)[0], v["grad_x"], 2e-4)
 
@@ -150,7 +150,7 @@ def test_vectors_miniloop(run):
         close(state.lights.grid, v["grid"][k], 2e-4)
 
     first = Lights(v["gamma_main"][0][:, 0, 0].clone(), torch.zeros(3, 9, 8, 8), torch.ones(3))
-    last = sample(denoiser, {1: o}, State(0, None, reference, first), recipe, noise, compare)
+    last = Sampler(denoiser, recipe, noise).sample({1: o}, State(0, None, reference, first), compare)
     with torch.no_grad():
         close(albedo(last.denoised), v["out_diff"][0], 2e-4)
         close(blurred(albedo(last.denoised) * shader.total(last.lights)), v["out_shading"][0], 4e-4)

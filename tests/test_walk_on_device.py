@@ -10,14 +10,12 @@ import torch
 from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils._pytree import tree_leaves
 
-from core.solve import sampler
-from core.solve.light_fit import update_lights
 from core.solve.lighting import Lights, Shader, constant_light
-from core.solve.network import UNet
+from core.solve.network import UNet, UNetLayout
 from core.solve.prior import ConditionedPrior, Prior, ReleasedPrior, coordinates
 from core.solve.problem import Observation, State
 from core.solve.recipes import RECIPES
-from core.solve.sampler import seeded
+from core.solve.sampler import Sampler, seeded
 from core.solve.skin_tone import GIVEN, SkinTone
 
 SIZE = 32
@@ -60,12 +58,12 @@ def begun(size: int, cells: tuple[int, int] = (4, 4)) -> State:
 
 
 def our_prior() -> ConditionedPrior:
-    network = UNet(7, 2 + 4 * 2, 16, [1, 1], [16, 16], mapping_cond_dim=5, norm="pixel")
+    network = UNet(UNetLayout(7, 2 + 4 * 2, 16, [1, 1], [16, 16], mapping_cond_dim=5, norm="pixel"))
     return Prior(network, 2, torch.zeros(7, 8, 8), torch.ones(7)).of_tone(SkinTone((0.4, 0.3, 0.2), GIVEN))
 
 
 def released_prior() -> ConditionedPrior:
-    return ReleasedPrior(UNet(7, 2, 16, [1, 1], [16, 16], [False, True]), "coord", 0, None, None).of_tone()
+    return ReleasedPrior(UNet(UNetLayout(7, 2, 16, [1, 1], [16, 16], [False, True])), "coord", 0, None, None).of_tone()
 
 
 def walk(prior: ConditionedPrior, name: str, noise, device: str) -> State:
@@ -75,7 +73,7 @@ def walk(prior: ConditionedPrior, name: str, noise, device: str) -> State:
     prior(state.denoised, 1.0, o.coords)  # what the prior is told of a map is laid out once
     for i in range(2):
         with StaysOn(device):
-            sampler.step(prior, o, state, recipe, (2.0 - i, 1.0 - 0.5 * i), recipe.steps, noise(i), lambda x, s, draw: x, update_lights)
+            Sampler(prior, recipe, noise).step(o, state, (2.0 - i, 1.0 - 0.5 * i), recipe.steps, noise(i))
     return state
 
 

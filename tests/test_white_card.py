@@ -28,7 +28,7 @@ def test_a_click_on_a_card_gives_the_white_point_and_the_cross_takes_it_away(add
     bpy.ops.wildcap.pick_white_point(card=card, frame="00000.jpg", uv=(0.5, 0.75))
     found = [float(v) for v in item.solve.white_point.split(",")]
     assert np.allclose(found, [linear(v) / reflectance for v in (118, 110, 100)], rtol=0.01)
-    assert addon("properties").values(item)["solve"]["white_point"] == item.solve.white_point and len(bpy.data.images) == images_before
+    assert addon("properties").job_settings(item)["solve"]["white_point"] == item.solve.white_point and len(bpy.data.images) == images_before
     item.quality = "draft"
     assert item.solve.white_point != "auto", "a quality says nothing about the light"
     bpy.ops.wildcap.clear_white_point()
@@ -48,10 +48,10 @@ def test_the_chart_that_the_solver_finds_reaches_the_settings(addon, item, monke
         figures = {"white_point": [0.9, 0.8, 0.6]}
 
     started = []
-    monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **options: started.append(options) or Job())
+    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool, **options: started.append((tool, options)) or Job())
     bpy.ops.wildcap.find_color_checker()
-    assert started[0]["tool"] == "white_point"
-    started[0]["then"]()
+    assert started[0][0] == "white_point"
+    started[0][1]["then"]()
     assert item.solve.white_point == "0.9000,0.8000,0.6000"
 
 

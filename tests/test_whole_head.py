@@ -10,7 +10,7 @@ import pytest
 from core.contract.messages import Reporter
 from core.face import template
 from core.upscale import grain
-from core.upscale.maps import Maps
+from core.upscale.maps import HeadMaps
 from core.upscale.whole_head import complete, seen_well
 
 from .hairy_head import SIZE, painted, surface
@@ -20,12 +20,12 @@ WRONG = np.float32([1.4, 1.0, 0.8])
 
 
 @pytest.fixture(scope="module")
-def truth() -> Maps:
+def truth() -> HeadMaps:
     return painted()
 
 
 @pytest.fixture(scope="module")
-def cut(truth) -> Maps:
+def cut(truth) -> HeadMaps:
     """The same where only the face was seen: elsewhere one plain tone, flat and dull."""
     seen = template.mask("face", SIZE)
     hidden = seen < 0.5
@@ -35,7 +35,7 @@ def cut(truth) -> Maps:
 
 
 @pytest.fixture(scope="module")
-def done(cut) -> Maps:
+def done(cut) -> HeadMaps:
     return complete(cut, surface(), Reporter("upscale"))
 
 

@@ -16,7 +16,7 @@ from core.contract.messages import Done, Failed, Problem
 from core.worker import installation
 from core.worker.job import read_job, write_job
 from core.worker.locks import Lock
-from core.worker.pip_steps import Step
+from core.worker.pip_steps import PipStep
 from core.worker.runner import explained, run_job
 
 REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
@@ -88,9 +88,9 @@ def test_a_write_is_named_by_the_file_it_was_for():
 def test_an_installation_that_stops_says_why(tmp_path, monkeypatch, said, words):
     monkeypatch.setattr(installation, "lock_of", lambda *_: Lock("manylinux_x86_64-3.11", {}))
     monkeypatch.setattr(installation.bare_environment, "make", lambda *_, **__: None)
-    monkeypatch.setattr(installation, "steps", lambda *_: [Step((said,))])
-    monkeypatch.setattr(installation.Task, "run", lambda task, command, hear: hear(said) or (1, said if "ERROR" in said else ""))
-    task = installation.installation(tmp_path / "env", REQUIREMENTS, tmp_path / "env.log", base=Path(sys.executable))
+    monkeypatch.setattr(installation, "steps", lambda *_: [PipStep((said,))])
+    monkeypatch.setattr(installation.BackgroundTask, "run", lambda task, command, hear: hear(said) or (1, said if "ERROR" in said else ""))
+    task = installation.installation(tmp_path / "env", REQUIREMENTS, tmp_path / "env.log", Path(sys.executable), installation.PackageSource())
     assert words in finish(task).problem and said in (tmp_path / "env.log").read_text()
 
 

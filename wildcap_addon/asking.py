@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import bpy
 
-from ..core.worker.background import Task
+from ..core.worker.background import BackgroundTask
 from . import jobs
 
 _answers: dict[tuple, object] = {}
@@ -21,9 +21,9 @@ def forget(key: tuple) -> None:
     _answers.pop(key, None)
 
 
-def ask(key: tuple, work: Callable[[Task], object], operator: str) -> None:
+def ask(key: tuple, work: Callable[[BackgroundTask], object], operator: str) -> None:
     """Runs `work(task)` as a job that the tab shows, and then the operator as if it were clicked again."""
-    task = Task("setup", work)
+    task = BackgroundTask("setup", work)
 
     def then() -> None:
         _answers[key] = task.result

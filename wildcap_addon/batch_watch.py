@@ -13,8 +13,8 @@ from pathlib import Path
 
 from ..core.batch import gate, local, state
 from ..core.batch.known_hashes import known_hashes
-from ..core.batch.record import NAME, Batch, Face, read_batch
-from ..core.batch.state import STOPPED, State
+from ..core.batch.record import NAME, Batch, BatchFace, read_batch
+from ..core.batch.state import STOPPED, FaceState
 from ..core.contract import lease, unforeseen
 from ..core.contract.json_files import is_number, read_json
 from ..core.contract.messages import Problem
@@ -27,12 +27,12 @@ most. In the longest rest an artist would begin to wonder."""
 
 
 @dataclass(frozen=True)
-class View:
+class BatchView:
     """A batch as it was seen last. `states` has the faces that were looked at, by name; `runner` is the machine that runs it, '' for none; `progress` is what
     it says of its run meanwhile; `problem` is why it cannot be used."""
 
     batch: Batch | None = None
-    states: dict[str, State] = field(default_factory=dict)
+    states: dict[str, FaceState] = field(default_factory=dict)
     runner: str = ""
     progress: dict = field(default_factory=dict)
     problem: Problem | None = None
@@ -41,10 +41,10 @@ class View:
         return sum(each.state == which for each in self.states.values())
 
     @cached_property
-    def _faces(self) -> dict[str, Face]:
+    def _faces(self) -> dict[str, BatchFace]:
         return {str(face.root): face for face in self.batch.faces} if self.batch else {}
 
-    def face(self, root: str) -> Face | None:
+    def face(self, root: str) -> BatchFace | None:
         """The face whose capture lies in that folder."""
         return self._faces.get(root)
 
@@ -55,7 +55,7 @@ class Watch(threading.Thread):
     def __init__(self, root: Path | None, memory: Path):
         super().__init__(name="wildcap-batch", daemon=True)
         self.root, self._memory = root, memory
-        self.view, self.found, self.listed = View(), None, frozenset()
+        self.view, self.found, self.listed = BatchView(), None, frozenset()
         self._read: tuple[int, Batch | None] = 0, None  # when the record was changed that was read last, and what it said
         self._stamps: dict[str, tuple] = {}  # face -> what its state was derived from
         self._refreshed: tuple[int, float] = 0, 0.0  # the time of the lease's last refresh, and when that was first seen (time.monotonic)
@@ -75,9 +75,9 @@ class Watch(threading.Thread):
                 else:
                     self._look_at(self._read_batch())
             except Problem as problem:
-                self.view = View(problem=problem)
+                self.view = BatchView(problem=problem)
             except Exception as error:  # nobody is above a thread
-                self.view = View(problem=unforeseen.explain(error, "looking at the batch"))
+                self.view = BatchView(problem=unforeseen.explain(error, "looking at the batch"))
             self._ended.wait(EVERY_S)
 
     def _read_batch(self) -> Batch:
@@ -100,7 +100,7 @@ class Watch(threading.Thread):
                 self._look_at_face(batch, face)
         self._due = time.monotonic() + min(LONGEST_REST_S, REST * (time.monotonic() - began))
 
-    def _look_at_face(self, batch: Batch, face: Face) -> None:
+    def _look_at_face(self, batch: Batch, face: BatchFace) -> None:
         stamp = _stamp(face)
         if stamp[0] or self._stamps.get(face.name) != stamp or face.name not in self.view.states:  # who holds a lock may have ended
             found = _ask(batch, face)
@@ -112,7 +112,7 @@ class Watch(threading.Thread):
         """Who runs it and how far that is, also while a face takes long to look at."""
         runner, names = self._ask_runner(batch.root), {face.name for face in batch.faces}
         states = {name: each for name, each in self.view.states.items() if name in names}
-        self.view = View(batch, states, runner, _read_progress(batch.root) if runner else {})
+        self.view = BatchView(batch, states, runner, _read_progress(batch.root) if runner else {})
 
     def _ask_runner(self, root: Path) -> str:
         """As `_runner`; a machine that has refreshed its lease for a whole term no more has gone, and what it left is no obstacle."""
@@ -130,7 +130,7 @@ class Watch(threading.Thread):
             self.found = next((root for root in roots if listed & _captures_of(root)), None)
 
 
-def _stamp(face: Face) -> tuple:
+def _stamp(face: BatchFace) -> tuple:
     """What a face's state depends on, as far as one look at its folder tells."""
     capture = face.capture
     watched = (capture.json, capture.root / gate.NAME, capture.shadow_mask_auto, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved,
@@ -138,12 +138,13 @@ def _stamp(face: Face) -> tuple:
     return (os.path.lexists(capture.lock), *(_changed(path) for path in watched))
 
 
-def _ask(batch: Batch, face: Face) -> State:
+def _ask(batch: Batch, face: BatchFace) -> FaceState:
     """Where a face is; without a group where its folder does not answer, or changes under the look."""
     try:
         return state.derive_state(batch, face)
     except OSError as error:
-        return State(STOPPED, None, f"The capture folder {face.root} cannot be read ({error.strerror or error}).", "See that its disk or server is connected.")
+        return FaceState(STOPPED, None, f"The capture folder {face.root} cannot be read ({error.strerror or error}).",
+                         "See that its disk or server is connected.")
 
 
 def _changed(path: Path) -> int:

@@ -15,12 +15,12 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.batch import gate
 from ..core.batch.groups import GATE, group_named
-from ..core.batch.record import Face
-from ..core.batch.state import DONE, STOPPED, TO_DO, WAITING, WORKING, State
+from ..core.batch.record import BatchFace
+from ..core.batch.state import DONE, STOPPED, TO_DO, WAITING, WORKING, FaceState
 from ..core.contract.files import write_json
 from ..core.contract.messages import Problem
 from . import captures, extension
-from .batch_watch import View, Watch, remembered
+from .batch_watch import BatchView, Watch, remembered
 
 MOST = 10
 """Batches that are remembered."""
@@ -35,9 +35,9 @@ def current() -> Path | None:
     return _watch.root if _watch is not None else None
 
 
-def view() -> View:
+def view() -> BatchView:
     """As it was seen last; empty before."""
-    return _watch.view if current() else View()
+    return _watch.view if current() else BatchView()
 
 
 def choose(root: Path) -> None:
@@ -53,12 +53,12 @@ def close() -> None:
     _replace_watch(None)
 
 
-def state_of(root: str) -> State | None:
+def state_of(root: str) -> FaceState | None:
     """Of a capture that belongs to the batch."""
     face = view().face(root)
     found = view().states.get(face.name) if face else None
     if found is not None and found.state == WAITING and root in _accepted:
-        return State(TO_DO, group_named(GATE))
+        return FaceState(TO_DO, group_named(GATE))
     return found
 
 
@@ -68,7 +68,7 @@ def works_on(root: str) -> bool:
     return face is not None and (face.name in view().progress.get("working", {}) or found is not None and found.state == WORKING)
 
 
-def waiting() -> list[Face]:
+def waiting() -> list[BatchFace]:
     """The faces whose masks wait to be looked at, in the batch's order."""
     known = view()
     return [face for face in known.batch.faces if (found := state_of(str(face.root))) and found.state == WAITING] if known.batch else []
@@ -80,7 +80,7 @@ def ready() -> int:
     return sum(each is not None and each.state == TO_DO and each.group is not None and each.group.name == GATE for each in found)
 
 
-def accept(face: Face) -> None:
+def accept(face: BatchFace) -> None:
     """The mask is good as it is. Raises Problem where there is none."""
     gate.accept_mask(face.capture)
     _accepted.add(str(face.root))
@@ -103,7 +103,7 @@ def poll() -> bool:
     return before != _shown
 
 
-def line(known: View) -> str:
+def line(known: BatchView) -> str:
     """What is being done, and how long all of it takes: 'Anna: Cameras 40 %, about 20 min left'; '' where nothing is told."""
     words = [iface_("{}: {} {}").format(name, iface_(each["stage"]), f"{each['share']:.0%}") for name, each in known.progress.get("working", {}).items()][:3]
     if known.progress.get("left_s") is not None:
@@ -111,7 +111,7 @@ def line(known: View) -> str:
     return ", ".join(words)
 
 
-def share(known: View) -> float:
+def share(known: BatchView) -> float:
     """The part of a run's faces that have ended, in [0, 1]."""
     return min(1.0, known.progress["ended"] / known.progress["of"]) if known.progress.get("of") else 0.0
 

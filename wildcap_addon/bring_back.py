@@ -13,6 +13,6 @@ def begin(operator, item, *names: str) -> bool:
     capture = captures.folder(item)
     if all(capture.holds(name) or not capture.has(name) for name in names):
         return False
-    jobs.start(item, "tool", tool="bring_back")
+    jobs.start_tool(item, "bring_back")
     operator.warn(BEGUN)
     return True

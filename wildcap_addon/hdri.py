@@ -30,7 +30,7 @@ def items(self, context):
 
 def light(props) -> str | Hdri:
     """What the scene's settings ask for: a preset's name, or a picture."""
-    return chosen(props) if props.light == 'hdri' else props.light
+    return chosen_hdri(props) if props.light == 'hdri' else props.light
 
 
 def named(name: str) -> Hdri:
@@ -41,7 +41,7 @@ def named(name: str) -> Hdri:
     raise Problem(f"There is no light named {name}.", f"Blender's worlds here are {', '.join(sorted(Path(world.name).stem for world in _worlds()))}.")
 
 
-def chosen(props) -> Hdri:
+def chosen_hdri(props) -> Hdri:
     """What the scene's settings ask for. Raises Problem where there is no such picture."""
     path = Path(bpy.path.abspath(props.hdri_file)) if props.hdri_file else next((Path(light.path) for light in _worlds() if light.name == props.hdri), None)
     if path is None:

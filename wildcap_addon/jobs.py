@@ -19,7 +19,7 @@ from ..core.contract import messages, stages, unforeseen
 from ..core.contract.capture import Capture
 from ..core.contract.messages import Problem
 from ..core.contract.settings import Settings
-from ..core.worker.background import Task
+from ..core.worker.background import BackgroundTask
 from ..core.worker.client import Worker
 from ..core.worker.job import read_job, write_job
 from . import batches, captures, preferences, problems, properties, status, timings
@@ -33,7 +33,7 @@ class Job:
     """A worker at a capture, and the last thing it said. `previews` counts the preview pictures so far."""
 
     goal: str  # 'make', 'reconstruct', 'solve', 'install', 'test', or 'ask' for what is found out or tidied up in seconds
-    worker: Worker | Task
+    worker: Worker | BackgroundTask
     then: Callable[[], None] | None = None  # called when it ended well
     ended: Callable[[], None] | None = None  # called before that, however it ended
     well: bool = False
@@ -82,26 +82,58 @@ def can_start(operator, context) -> bool:
             and operator.allowed(not batches.works_on(root), "This capture is being worked on by a batch or another Blender: wait for it, or cancel it there"))
 
 
-def start(item, goal: str, *, first: str | None = None, last: str | None = None, tool: str = "", then: Callable[[], None] | None = None,
-          ended: Callable[[], None] | None = None, on_preview: Callable[[str], None] | None = None, on_stage: Callable[[str], object] | None = None,
-          at: Capture | None = None, **shared) -> Job:
-    """Starts the stages from `first` (or from what is not fresh) to `last`, or one of core.contract.stages.TOOLS, with `shared` settings for this once;
-    `at` is a capture that stands in for this one. Raises Problem when it cannot."""
-    capture, root = at or captures.folder(item), captures.root(item)
+def start(item, goal: str, *, first: str | None = None, last: str | None = None, then: Callable[[], None] | None = None,
+          on_stage: Callable[[str], object] | None = None, **shared) -> Job:
+    """Starts stages at a capture. Raises Problem when it cannot.
+
+    Parameters
+    ----------
+    item : the capture's
+    goal, then, on_stage : as Job has them
+    first, last : the stages to begin with (None: what is not fresh) and to end with (None: the last)
+    shared : settings for this once
+    """
+    capture = captures.folder(item)
+    job = _launch(item, goal, capture, then, lambda: write_job(capture, first=first, last=last, settings={**properties.job_settings(item), **shared}))
+    job.on_stage = on_stage
+    job.planned = stages.NAMES[stages.NAMES.index(first or stages.NAMES[0]):stages.NAMES.index(last or stages.NAMES[-1]) + 1]
+    return job
+
+
+def start_tool(item, tool: str, goal: str = "tool", *, then: Callable[[], None] | None = None, ended: Callable[[], None] | None = None,
+               at: Capture | None = None, **shared) -> Job:
+    """Starts one of core.contract.stages.TOOLS at a capture. Raises Problem when it cannot.
+
+    Parameters
+    ----------
+    item : the capture's
+    tool : its name
+    goal, then, ended : as Job has them
+    at : a capture that stands in for this one
+    shared : settings for this once
+    """
+    capture = at or captures.folder(item)
+    job = _launch(item, goal, capture, then, lambda: write_job(capture, tool=tool, settings={**properties.job_settings(item), **shared}))
+    job.ended = ended
+    return job
+
+
+def _launch(item, goal: str, capture: Capture, then: Callable[[], None] | None, write: Callable[[], Path]) -> Job:
+    """A job at `capture`, which is the item's or stands in for it; `write` writes its job.json."""
+    root = captures.root(item)
     if root in _jobs:
         raise Problem("This capture is being worked on already.", "Wait for it, or click Cancel.")
     python = preferences.require_python()
     for prepare in before_start:
         prepare()
-    path = write_job(capture, first=first, last=last, tool=tool, settings={**properties.values(item), **shared})
+    path = write()
     settings = read_job(path).settings
     job = begin(root, goal, Worker(python, ROOT, path, capture.logs / "worker.log", preferences.worker_environment(settings.delight.delighter)), then)
-    job.on_preview, job.settings, job.ended, job.on_stage = on_preview, settings, ended, on_stage
-    job.planned = () if tool else stages.NAMES[stages.NAMES.index(first or stages.NAMES[0]):stages.NAMES.index(last or stages.NAMES[-1]) + 1]
+    job.settings = settings
     return job
 
 
-def begin(root: str, goal: str, worker: Worker | Task, then: Callable[[], None] | None = None) -> Job:
+def begin(root: str, goal: str, worker: Worker | BackgroundTask, then: Callable[[], None] | None = None) -> Job:
     """Starts a worker, or puts it in line behind the one that runs, and listens to it. Raises Problem when it cannot."""
     waiting = root != "" and _busy()
     if not waiting:

@@ -29,7 +29,7 @@ class Facts:
 
 
 @dataclass(frozen=True)
-class Step:
+class NextStep:
     """One line of state, the large button below it (operator '' for none), and a small one for another way: (label, operator, icon)."""
 
     state: str
@@ -40,8 +40,8 @@ class Step:
 
 
 BEFORE_MASK = stages.NAMES[:stages.NAMES.index(stages.MASK_STAGE) + 1]
-SET_UP = Step("The solver is not set up on this machine.", "Install Solver", "wildcap.install_solver", 'IMPORT')
-ASK = Step("SwitchLight waits for your consent. Nothing was sent.", "Allow Sending", "wildcap.allow_sending", 'LOCKED')
+SET_UP = NextStep("The solver is not set up on this machine.", "Install Solver", "wildcap.install_solver", 'IMPORT')
+ASK = NextStep("SwitchLight waits for your consent. Nothing was sent.", "Allow Sending", "wildcap.allow_sending", 'LOCKED')
 MAKE = ("Make My Head", "wildcap.make_my_head", 'USER')
 WORDS = {"make": "Making your head ...", "reconstruct": "Reconstructing ...", "solve": "Solving ...",
          "tool": "Looking at the texture ...", "deliver": "Writing the maps ...", "wait": "Waiting for the job of another face ...",
@@ -49,32 +49,32 @@ WORDS = {"make": "Making your head ...", "reconstruct": "Reconstructing ...", "s
          "batch": "A batch or another Blender is working on this face ..."}
 
 
-def next_step(facts: Facts, translated: Callable[[str], str] = str) -> Step:
+def next_step(facts: Facts, translated: Callable[[str], str] = str) -> NextStep:
     """The one thing to do now. A stale stage never drags the artist back before the mask; its row says so. `translated` is for the sentences that names
     are put into; all others are translated as they are shown."""
     if facts.painting:
-        return Step("Red is shadow, green is protected. Paint adds, Ctrl takes away.", "Save Mask and Leave", "wildcap.finish_mask", 'CHECKMARK')
+        return NextStep("Red is shadow, green is protected. Paint adds, Ctrl takes away.", "Save Mask and Leave", "wildcap.finish_mask", 'CHECKMARK')
     if facts.running == "batch":
-        return Step(WORDS["batch"], "Cancel Batch", "wildcap.cancel_batch", 'CANCEL')
+        return NextStep(WORDS["batch"], "Cancel Batch", "wildcap.cancel_batch", 'CANCEL')
     if facts.running:
-        return Step(WORDS[facts.running], "Cancel", "wildcap.cancel", 'CANCEL')
+        return NextStep(WORDS[facts.running], "Cancel", "wildcap.cancel", 'CANCEL')
     if not facts.has_capture:
-        return Step("No face yet.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE') if facts.has_python else SET_UP
+        return NextStep("No face yet.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE') if facts.has_python else SET_UP
     status = facts.status
     if status is None:
-        return Step("Looking at the capture ...", "", "", 'TIME')
+        return NextStep("Looking at the capture ...", "", "", 'TIME')
     if status.missing:
-        return Step("The folder of this capture is not where it was.", "Locate Capture", "wildcap.locate_capture", 'VIEWZOOM')
+        return NextStep("The folder of this capture is not where it was.", "Locate Capture", "wildcap.locate_capture", 'VIEWZOOM')
     if status.problem is not None:
-        return Step("This capture cannot be used.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
+        return NextStep("This capture cannot be used.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
     return _step_of(facts, status, translated)
 
 
-def _step_of(facts: Facts, status: Status, translated: Callable[[str], str]) -> Step:
+def _step_of(facts: Facts, status: Status, translated: Callable[[str], str]) -> NextStep:
     # A capture without a source (the sample head) came finished up to its mask; there is nothing to reconstruct it from.
     missing = [name for name in BEFORE_MASK if status.stages[name] == "to do"] if status.source or not status.has_head else []
     if missing and not status.source:
-        return Step("This capture has no video yet.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
+        return NextStep("This capture has no video yet.", "Choose Video", "wildcap.choose_video", 'FILE_MOVIE')
     if missing[:1] == ["delight"] and status.sending and status.sending.frames and not status.agreed and facts.has_python:
         return ASK
     if missing:
@@ -83,21 +83,21 @@ def _step_of(facts: Facts, status: Status, translated: Callable[[str], str]) -> 
         by_hand = ("Continue Reconstruction" if begun else "Reconstruct", "wildcap.reconstruct", 'MESH_MONKEY')
         if not facts.has_python:
             return SET_UP
-        return Step(state, *by_hand, other=MAKE) if begun else Step(state, *MAKE, other=by_hand)
+        return NextStep(state, *by_hand, other=MAKE) if begun else NextStep(state, *MAKE, other=by_hand)
     if facts.head_time < status.head_time:
-        return Step("The head is ready.", "Bring In Head", "wildcap.bring_in_head", 'IMPORT')
+        return NextStep("The head is ready.", "Bring In Head", "wildcap.bring_in_head", 'IMPORT')
     solved = status.has_maps and status.stages["solve"] in (*FINISHED, "absent")
     if not solved and status.interrupted:
         words = "A solve was interrupted. It goes on from its last checkpoint, unless the settings changed."
-        step = Step(words, "Continue Solving", "wildcap.solve", 'LIGHT')
+        step = NextStep(words, "Continue Solving", "wildcap.solve", 'LIGHT')
         return step if facts.has_python else SET_UP
     if not solved and not status.has_mask:
         accept = ("Accept Proposal", "wildcap.accept_proposal", 'CHECKMARK') if facts.has_python else ()
-        return Step("Check the shadow mask, then Solve.", "Check Shadow Mask", "wildcap.paint_mask", 'BRUSH_DATA', accept)
+        return NextStep("Check the shadow mask, then Solve.", "Check Shadow Mask", "wildcap.paint_mask", 'BRUSH_DATA', accept)
     if not solved:
         state = "The mask or the settings changed since the last solve." if status.stages["solve"] == "stale" else "The shadow mask is painted."
-        return Step(state, "Solve", "wildcap.solve", 'LIGHT') if facts.has_python else SET_UP
+        return NextStep(state, "Solve", "wildcap.solve", 'LIGHT') if facts.has_python else SET_UP
     if facts.maps_time < status.maps_time:
-        return Step("The maps are ready.", "Assemble Material", "wildcap.assemble_material", 'MATERIAL')
+        return NextStep("The maps are ready.", "Assemble Material", "wildcap.assemble_material", 'MATERIAL')
     state = translated("Rendered to renders/{}.").format(status.render) if status.render else "The head can be relit."
-    return Step(state, "Render", "wildcap.render", 'RENDER_STILL')
+    return NextStep(state, "Render", "wildcap.render", 'RENDER_STILL')

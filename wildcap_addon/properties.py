@@ -154,7 +154,7 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
     )
 
 
-def values(item: WILDCAP_PG_capture) -> dict:
+def job_settings(item: WILDCAP_PG_capture) -> dict:
     """The settings of a capture as a job file holds them: stage -> {name: value}, seed, device. Paths are absolute."""
     found = {stage: {f.name: _value(getattr(item, stage), f) for f in fields(kind)} for stage, kind in STAGE_KINDS.items()}
     found["solve"]["skin_tone"] = _tone(item) if item.use_skin_tone else "auto"
@@ -200,7 +200,7 @@ def device(item: WILDCAP_PG_capture) -> str:
 
 
 def settings(item: WILDCAP_PG_capture) -> core_settings.Settings:
-    return core_settings.from_json(values(item))
+    return core_settings.from_json(job_settings(item))
 
 
 _register, _unregister = bpy.utils.register_classes_factory((*GROUPS.values(), WILDCAP_PG_capture, WILDCAP_PG_scene))

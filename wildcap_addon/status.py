@@ -115,7 +115,7 @@ def _sending(capture: Capture, settings) -> dict:
         plan = consent.sending(capture, settings.delight.switchlight_preview)
     except Problem:
         return {}
-    return {"sending": plan, "agreed": consent.given(capture, plan)}
+    return {"sending": plan, "agreed": consent.is_given(capture, plan)}
 
 
 def _whole_solve(capture: Capture, state: str, settings) -> str:
@@ -153,7 +153,7 @@ def _look(root: str, item) -> None:
 def _stamp(item) -> tuple[Capture, tuple]:
     """The capture, and what its status depends on: a few file times and the settings."""
     capture = captures.folder(item)
-    values = properties.values(item)
+    values = properties.job_settings(item)
     watched = (capture.json, capture.head, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved, capture.checkpoints,
                capture.frames_json, capture.consent, capture.switchlight,
                *delivered(capture), capture.renders)

@@ -29,7 +29,7 @@ def minutes(quality: str, device: str) -> float | None:
     return _rates[device] * work(preset(quality)) / 60 if device in _rates else None
 
 
-def words(device: str) -> str:
+def describe_minutes(device: str) -> str:
     """All qualities in one line; '' before the first solve."""
     return ", ".join(f"{quality.title()} {_spoken(minutes(quality, device))}" for quality in QUALITIES) if device in _rates else ""
 

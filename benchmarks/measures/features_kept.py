@@ -46,13 +46,13 @@ def contrasts(srgb: np.ndarray, points: np.ndarray, face: np.ndarray) -> dict[st
     return {**found, "chin": _contrast(value, chin, cheeks)}
 
 
-def kept(answer: dict[str, float | None], truth: dict[str, float | None]) -> dict[str, float]:
+def contrast_kept(answer: dict[str, float | None], truth: dict[str, float | None]) -> dict[str, float]:
     """Region -> share of the truth's contrast, of the regions where both are known and the truth has some."""
     return {name: answer[name] / true for name, true in truth.items() if true is not None and abs(true) > LEAST_CONTRAST and answer.get(name) is not None}
 
 
 def joint(answers: list[dict[str, float]], filmed: list[dict[str, float]]) -> dict[str, float | None]:
-    """Of one head under several lights, what `kept` gave for the answers and for the pictures as filmed:
+    """Of one head under several lights, what `contrast_kept` gave for the answers and for the pictures as filmed:
 
     lost: mean |1 - kept| of brows and eyes, each picture apart; between_lights: the deviation of kept between the lights over the filmed pictures' own
     (1: the light is still in it; None for a single light or none that differs).

@@ -27,7 +27,7 @@ STRIP = 0.004  # UV: how far into the neighbouring skin a ring of the inner rim 
 
 
 @dataclass(frozen=True)
-class OpenHead:
+class ActingHead:
     """V vertices of the head, C copies on the lower side of the seams, P inner ones; the order of every array with V + C + P rows."""
 
     copies: np.ndarray  # [C] the vertex that each copy doubles
@@ -50,7 +50,7 @@ class OpenHead:
         return np.stack([fine[:, 0], -fine[:, 2], fine[:, 1]], -1)
 
 
-def open_head(base: Base, builder: HeadBuilder, body: np.ndarray, uvs: np.ndarray) -> OpenHead:
+def open_head(base: Base, builder: HeadBuilder, body: np.ndarray, uvs: np.ndarray) -> ActingHead:
     """The open head of one body [N, 3]; uvs [V, 2] are the head's, any one of each vertex."""
     polygons, inner, parent, extended = _split(base, builder)
     used = np.unique([i for p in polygons + inner for i in p])
@@ -105,10 +105,10 @@ def open_head(base: Base, builder: HeadBuilder, body: np.ndarray, uvs: np.ndarra
     balls = [_ball(base, body, side) for side in "lr"]
     scale = _scale(base, body)
     balls = np.array([[*_placed(centre[None], body, base)[0], radius * scale] for centre, radius in balls])
-    return OpenHead(copies, np.stack([face, corner, outer[face, corner]], 1), np.concatenate(faces), np.concatenate(slot_rows), np.concatenate(uv_rows), kinds,
-                    np.pad(anchors, ((0, missing), (0, 0))), np.pad(weights, ((0, missing), (0, 0))), rest, _seam(rest, copies),
-                    np.searchsorted(builder.used, [[chain[0], chain[-1]] for chain in (builder._lips[0], *(upper for upper, _ in builder._lids.values()))]),
-                    sparse.vstack(matrices).tocsr(), balls)
+    return ActingHead(copies, np.stack([face, corner, outer[face, corner]], 1), np.concatenate(faces), np.concatenate(slot_rows), np.concatenate(uv_rows),
+                      kinds, np.pad(anchors, ((0, missing), (0, 0))), np.pad(weights, ((0, missing), (0, 0))), rest, _seam(rest, copies),
+                      np.searchsorted(builder.used, [[chain[0], chain[-1]] for chain in (builder._lips[0], *(upper for upper, _ in builder._lids.values()))]),
+                      sparse.vstack(matrices).tocsr(), balls)
 
 
 def _split(base: Base, builder: HeadBuilder) -> tuple[list, list, np.ndarray, sparse.csr_matrix]:

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from ..contract.files import replacing
 from ..face.template import ASSETS, load
-from .acting import LEFT_EYE, RIGHT_EYE, OpenHead, open_head
+from .acting import LEFT_EYE, RIGHT_EYE, ActingHead, open_head
 from .identities import SAMPLES, bodies
 from .makehuman import PUPIL_DISTANCE, Base, HeadBuilder, read_base
 
@@ -43,7 +43,7 @@ def main() -> None:
         np.savez_compressed(temporary, **stored(head, units, mirror))
 
 
-def face_units(base: Base, head: OpenHead, body: np.ndarray) -> dict[str, np.ndarray]:
+def face_units(base: Base, head: ActingHead, body: np.ndarray) -> dict[str, np.ndarray]:
     """Displacements [V + C + P, 3] in metres of each unit from the head at rest, by name; on eyes that are open where it is a unit of the eye."""
     pupils = [body[base.groups[f"joint-{side}-eye"]].mean(0) for side in "lr"]
     scale = PUPIL_DISTANCE / np.linalg.norm(pupils[0] - pupils[1])
@@ -63,7 +63,7 @@ def face_units(base: Base, head: OpenHead, body: np.ndarray) -> dict[str, np.nda
     return result
 
 
-def opening(base: Base, head: OpenHead, body: np.ndarray) -> np.ndarray:
+def opening(base: Base, head: ActingHead, body: np.ndarray) -> np.ndarray:
     """From the lids at rest to MakeHuman's open ones [V + C + P, 3], metres; zero away from the eyes."""
     pupils = [body[base.groups[f"joint-{side}-eye"]].mean(0) for side in "lr"]
     scale = PUPIL_DISTANCE / np.linalg.norm(pupils[0] - pupils[1])
@@ -76,7 +76,7 @@ def opening(base: Base, head: OpenHead, body: np.ndarray) -> np.ndarray:
     return moved * np.clip((0.036 - distance) / 0.008, 0, 1)[:, None]
 
 
-def apart(head: OpenHead, moved: np.ndarray) -> np.ndarray:
+def apart(head: ActingHead, moved: np.ndarray) -> np.ndarray:
     """A displacement whose rims do not cross: what each takes part in the crossing is taken from it, fading into its lip or lid."""
     first = head.rest.shape[0] - len(head.kind) - len(head.copies)
     below = np.arange(first, first + len(head.copies))
@@ -104,7 +104,7 @@ def apart(head: OpenHead, moved: np.ndarray) -> np.ndarray:
     return moved
 
 
-def _sides(head: OpenHead) -> np.ndarray:
+def _sides(head: ActingHead) -> np.ndarray:
     """-1 for what lies below its nearest seam, 1 above, 0 for balls, teeth and tongue; copies are below, what they double above."""
     count, inner = len(head.rest) - len(head.kind), head.kind
     first = count - len(head.copies)
@@ -115,12 +115,12 @@ def _sides(head: OpenHead) -> np.ndarray:
     return side
 
 
-def _side(head: OpenHead, sign: int) -> np.ndarray:
+def _side(head: ActingHead, sign: int) -> np.ndarray:
     """The share of one side, 1 where x has that sign, 0 on the other: eyes are far from the middle."""
     return (head.rest[:, 0] * sign > 0).astype(float)
 
 
-def _turn_eyes(base: Base, head: OpenHead, body: np.ndarray, offset: np.ndarray, moved: np.ndarray) -> None:
+def _turn_eyes(base: Base, head: ActingHead, body: np.ndarray, offset: np.ndarray, moved: np.ndarray) -> None:
     """Eyeballs turn about their middles as MakeHuman's eyes do."""
     for kind, side, ball in ((LEFT_EYE, "l", head.balls[0]), (RIGHT_EYE, "r", head.balls[1])):
         group = base.groups[f"helper-{side}-eye"]
@@ -136,7 +136,7 @@ def _turn_eyes(base: Base, head: OpenHead, body: np.ndarray, offset: np.ndarray,
         moved[rows] = arm @ turn.T - arm
 
 
-def mirrored(head: OpenHead, mirror: np.ndarray) -> np.ndarray:
+def mirrored(head: ActingHead, mirror: np.ndarray) -> np.ndarray:
     """The mirror image of each vertex [V + C + P]; the head's own [V] is known, of the others it is the nearest one of the other side."""
     first = len(mirror) + len(head.copies)
     number = np.full(len(mirror), -1)
@@ -150,7 +150,7 @@ def mirrored(head: OpenHead, mirror: np.ndarray) -> np.ndarray:
     return np.concatenate([mirror, number[mirror[head.copies]], first + image])
 
 
-def on_template(head: OpenHead, vertices: np.ndarray) -> tuple[OpenHead, np.ndarray]:
+def on_template(head: ActingHead, vertices: np.ndarray) -> tuple[ActingHead, np.ndarray]:
     """The open head with the template's vertices [V, 3], what lies inside moved along by one similarity; and its matrix [3, 3]."""
     count = len(vertices)
     front = (vertices[:, 1] < 0.045) & (vertices[:, 2] > -0.12)
@@ -166,7 +166,7 @@ def on_template(head: OpenHead, vertices: np.ndarray) -> tuple[OpenHead, np.ndar
     return replace(head, rest=rest, balls=balls), turn
 
 
-def stored(head: OpenHead, units: dict[str, np.ndarray], mirror: np.ndarray) -> dict[str, np.ndarray]:
+def stored(head: ActingHead, units: dict[str, np.ndarray], mirror: np.ndarray) -> dict[str, np.ndarray]:
     """The arrays of the file: lengths in counts of STEP. Of two units that mirror each other the left one is kept, of a symmetric one its half."""
     arrays = {
         "step": np.float32(STEP), "head_vertices": np.int32(len(head.rest) - len(head.kind) - len(head.copies)), "mirror": mirror.astype(np.int16),

@@ -16,7 +16,7 @@ DELIVER = "deliver"
 
 
 @dataclass(frozen=True)
-class Group:
+class StageGroup:
     """`first` and `last` name its stages; `memory_gb` is what a machine should have free for it (the largest stage of the table of costs, rounded up);
     `on_device` says that a GPU helps."""
 
@@ -33,15 +33,15 @@ class Group:
 
 
 GROUPS = (
-    Group("head", "Head", "frames", "registration", 2.0),
-    Group("mask", "Mask", "delight", MASK_STAGE, 3.0, on_device=True),
-    Group(GATE, "Solve", "solve", "upscale", 5.0, on_device=True),
-    Group(DELIVER, "Deliver", "transfer", "transfer", 2.0),
+    StageGroup("head", "Head", "frames", "registration", 2.0),
+    StageGroup("mask", "Mask", "delight", MASK_STAGE, 3.0, on_device=True),
+    StageGroup(GATE, "Solve", "solve", "upscale", 5.0, on_device=True),
+    StageGroup(DELIVER, "Deliver", "transfer", "transfer", 2.0),
 )
 """In their order; each begins where the one before has ended."""
 
 
-def group_named(name: str) -> Group:
+def group_named(name: str) -> StageGroup:
     """Raises Problem for an unknown name."""
     for group in GROUPS:
         if group.name == name:

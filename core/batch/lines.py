@@ -11,7 +11,7 @@ from pathlib import Path
 
 from .groups import GATE, GROUPS, group_named
 from .record import Batch
-from .state import DONE, WAITING, State, derive_state, waits
+from .state import DONE, WAITING, FaceState, derive_state, waits
 from .task import ROOT
 
 PARTS = ("all", "to the masks", "from the masks")
@@ -19,7 +19,7 @@ PARTS = ("all", "to the masks", "from the masks")
 
 
 @dataclass(frozen=True)
-class Task:
+class BatchTask:
     """`after` names the task that must have ended well before, '' for none; `words` is the command, which runs in any folder."""
 
     face: str
@@ -36,20 +36,20 @@ class Task:
         return f"{self.name}\t{self.after}\t{shlex.join(self.words)}"
 
 
-def list_tasks(batch: Batch, python: str = sys.executable, root: Path = ROOT) -> list[Task]:
+def list_tasks(batch: Batch, python: str = sys.executable, root: Path = ROOT) -> list[BatchTask]:
     """Every task that is left to do, in an order in which they could be done one by one; none beyond a mask that still has to be looked at. `python` and
     `root`, WildCap's folder, are those of the machines that will run them."""
     return [task for face in batch.faces for task in _of_face(batch, face.name, derive_state(batch, face), (python, str(root)))]
 
 
-def _of_face(batch: Batch, name: str, state: State, program: tuple[str, str]) -> list[Task]:
+def _of_face(batch: Batch, name: str, state: FaceState, program: tuple[str, str]) -> list[BatchTask]:
     if state.state in (DONE, WAITING) or state.group is None:
         return []
-    found: list[Task] = []
+    found: list[BatchTask] = []
     for group in GROUPS[GROUPS.index(state.group):]:
         if waits(batch, batch.face(name), group):
             break
-        found.append(Task(name, group.name, found[-1].name if found else "", (*program, "batch", "task", str(batch.root), name, group.name)))
+        found.append(BatchTask(name, group.name, found[-1].name if found else "", (*program, "batch", "task", str(batch.root), name, group.name)))
     return found
 
 

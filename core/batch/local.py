@@ -20,9 +20,9 @@ from pathlib import Path
 from ..contract.files import write_json
 from ..contract.messages import Cancelled, Done, Failed, Message, Problem, Progress
 from ..contract.stages import LABELS
-from .groups import GROUPS, Group
-from .record import Batch, Face
-from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, State, derive_state
+from .groups import GROUPS, StageGroup
+from .record import Batch, BatchFace
+from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, FaceState, derive_state
 from .task import run_task
 
 PROGRESS, STOP = "progress.json", "stop"
@@ -53,18 +53,18 @@ class Board:
         self._began = time.monotonic()
         self.tally = Tally()
 
-    def say(self, face: Face, words: str) -> None:
+    def say(self, face: BatchFace, words: str) -> None:
         with self._lock:
             self._tell(f"{face.name}: {words}")
 
-    def hear(self, face: Face, message: Message) -> None:
+    def hear(self, face: BatchFace, message: Message) -> None:
         """Keeps what a face's worker says of its progress."""
         if isinstance(message, Progress):
             share = message.done / message.of if message.of else 0.0
             self._working[face.name] = {"stage": LABELS[message.stage], "share": round(share, 3), "eta_s": message.eta_s}
             self.write()
 
-    def end(self, face: Face, state: str, words: str) -> None:
+    def end(self, face: BatchFace, state: str, words: str) -> None:
         self._working.pop(face.name, None)
         self.tally.ended[face.name] = state
         left = self.left_s()
@@ -87,7 +87,7 @@ class Board:
                                                          "working": dict(self._working)})
 
 
-def run_local(batch: Batch, faces: Iterable[Face], at_once: int, retry: bool, tell: Callable[[str], None],
+def run_local(batch: Batch, faces: Iterable[BatchFace], at_once: int, retry: bool, tell: Callable[[str], None],
               until: str | None = None) -> Tally:
     """Runs what is to be done of these faces, `at_once` at a time, up to the task `until` (None: all). A face that has stopped is left alone unless `retry`.
     The caller holds the batch's lease. Ends early by KeyboardInterrupt or the file `stop`; what was finished is kept."""
@@ -136,7 +136,7 @@ def forget_stop(root: Path) -> None:
         (root / STOP).unlink(missing_ok=True)
 
 
-def run_face(batch: Batch, face: Face, board: Board, retry: bool, cancelled: Callable[[], bool], until: str | None = None,
+def run_face(batch: Batch, face: BatchFace, board: Board, retry: bool, cancelled: Callable[[], bool], until: str | None = None,
              threads: int | None = None) -> None:
     """One face's tasks, one after the other, as far as they go."""
     names = [group.name for group in GROUPS]
@@ -144,7 +144,7 @@ def run_face(batch: Batch, face: Face, board: Board, retry: bool, cancelled: Cal
     while not cancelled():
         state = derive_state(batch, face)
         if state.state == STOPPED and retry and state.group is not None:
-            state, retry = State(TO_DO, state.group), False
+            state, retry = FaceState(TO_DO, state.group), False
         if state.state == DONE or (state.group is not None and names.index(state.group.name) > last and state.state != STOPPED):
             return board.end(face, DONE, "done")
         if state.state not in (TO_DO, WORKING):  # who works there may be a machine that has gone: the task finds out
@@ -157,7 +157,7 @@ def run_face(batch: Batch, face: Face, board: Board, retry: bool, cancelled: Cal
     board.end(face, CANCELLED, "cancelled; what was finished is kept")
 
 
-def _run(batch: Batch, face: Face, group: Group, board: Board, cancelled: Callable[[], bool], threads: int | None) -> Message:
+def _run(batch: Batch, face: BatchFace, group: StageGroup, board: Board, cancelled: Callable[[], bool], threads: int | None) -> Message:
     began = time.monotonic()
     board.tally.worked.add(face.name)
     final = run_task(batch, face, group, lambda message: board.hear(face, message), cancelled, threads)
@@ -169,7 +169,7 @@ def _run(batch: Batch, face: Face, group: Group, board: Board, cancelled: Callab
     return final
 
 
-def is_left(batch: Batch, face: Face, group: Group) -> bool:
+def is_left(batch: Batch, face: BatchFace, group: StageGroup) -> bool:
     """Whether the task that has just ended well is still, or again, to be done."""
     state = derive_state(batch, face)
     return state.state == TO_DO and state.group is group

@@ -17,11 +17,11 @@ from .. import __version__
 from ..contract import lease
 from ..contract.hashes import hash_file
 from ..contract.messages import Problem, from_line
-from .groups import GROUPS, Group
+from .groups import GROUPS, StageGroup
 from .local import CANCELLED, EVERY_S, Board, Tally, forget_stop, is_asked_to_stop
 from .ray_connection import connect
-from .record import NAME, Batch, Face
-from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, State, derive_state
+from .record import NAME, Batch, BatchFace
+from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, FaceState, derive_state
 from .task import ROOT
 
 CODE = "WILDCAP_CODE"
@@ -34,7 +34,7 @@ OUT_S = 1.6
 """How long tasks that are cancelled may take to give their captures back; those that are still there end with our connection."""
 
 
-def run_on_ray(batch: Batch, faces: Iterable[Face], retry: bool, tell: Callable[[str], None], until: str | None, address: str | None,
+def run_on_ray(batch: Batch, faces: Iterable[BatchFace], retry: bool, tell: Callable[[str], None], until: str | None, address: str | None,
                cores: int) -> Tally:
     """Runs what is to be done of these faces on the cluster whose head node is at `address` (HOST:PORT or auto), or, without one, on a cluster of this machine
     alone, up to the task `until` (None: all). Each task takes `cores` cores. The caller holds the batch's lease. Ends early by KeyboardInterrupt or the file
@@ -56,7 +56,7 @@ def run_on_ray(batch: Batch, faces: Iterable[Face], retry: bool, tell: Callable[
 class _Run:
     """Faces on their way through the cluster. `advance` until nothing is under way, then `end`."""
 
-    def __init__(self, ray, batch: Batch, faces: list[Face], retry: bool, board: Board, until: str | None, cores: int):
+    def __init__(self, ray, batch: Batch, faces: list[BatchFace], retry: bool, board: Board, until: str | None, cores: int):
         self._ray, self._batch, self._retry, self._cores = ray, batch, retry, cores
         self.board = board
         names = [group.name for group in GROUPS]
@@ -84,11 +84,11 @@ class _Run:
                 self._take(ref, *self._tasks.pop(ref))
         self._hear()
 
-    def _begin(self, face: Face, again: bool = False) -> bool:
+    def _begin(self, face: BatchFace, again: bool = False) -> bool:
         """Submits what is left of a face, `again` where we had it before; False where that is nothing."""
         state = derive_state(self._batch, face)
         if state.state == STOPPED and self._retry and state.group is not None:
-            state = State(TO_DO, state.group)
+            state = FaceState(TO_DO, state.group)
         if state.state == DONE or state.group not in self._groups and state.state != STOPPED:
             self.board.end(face, DONE, "done")
             return False
@@ -105,7 +105,7 @@ class _Run:
             self._tasks[before] = face, group, group is self._groups[-1]
         return True
 
-    def _take(self, ref, face: Face, group: Group, is_last: bool) -> None:
+    def _take(self, ref, face: BatchFace, group: StageGroup, is_last: bool) -> None:
         try:
             outcome = self._ray.get(ref)
         except self._ray.exceptions.RayTaskError:
@@ -137,7 +137,7 @@ class _Run:
                 self.board.hear(working[name], from_line(lines[name]))
             self._leave_dead_nodes(working)
 
-    def _leave_dead_nodes(self, working: dict[str, Face]) -> None:
+    def _leave_dead_nodes(self, working: dict[str, BatchFace]) -> None:
         """Has faces done elsewhere whose node has been given up. Ray does so by itself where a connection breaks; where one only falls silent, as at a power
         cut, it waits for five minutes, and its setting for that (RAY_grpc_client_keepalive_time_ms) has the other side take us for an attack."""
         alive = {node["NodeID"] for node in self._ray.nodes() if node["Alive"]}
@@ -161,7 +161,7 @@ class _Run:
         self.board.write(now=True)
 
 
-def _bytes(group: Group) -> int:
+def _bytes(group: StageGroup) -> int:
     return int(group.memory_gb * 2**30)
 
 

@@ -26,7 +26,7 @@ from ..contract.messages import Cancelled, Done, Failed, Message, Problem, Progr
 from .groups import group_named
 from .local import CANCELLED, EVERY_S, is_left
 from .record import NAME, Batch, read_batch
-from .state import DONE, STOPPED, WAITING, State, waits
+from .state import DONE, STOPPED, WAITING, FaceState, waits
 from .task import run_task
 
 BATCHES = "WILDCAP_BATCHES"
@@ -64,7 +64,7 @@ def do_task(root: str, name: str, group_name: str, threads: int, stranger: str, 
         batch, group = find_batch(root), group_named(group_name)
         face = batch.face(name)
         if waits(batch, face, group):
-            return {**outcome, "state": WAITING, "words": State(WAITING, group).words(), "seconds": 0.0}
+            return {**outcome, "state": WAITING, "words": FaceState(WAITING, group).words(), "seconds": 0.0}
         _outlast(face.capture, stranger, stopped)
         final = run_task(batch, face, group, _listener(batch, name, say), lambda: bool(stopped), threads)
         if isinstance(final, Done) and is_left(batch, face, group):

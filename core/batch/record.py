@@ -27,7 +27,7 @@ GATES = ("automatic", "artist")
 
 
 @dataclass(frozen=True)
-class Face:
+class BatchFace:
     """`source` is a video or a folder of photographs; `settings` ({stage: {name: value}, seed, device}) lie over the preset `quality`; paths are absolute."""
 
     name: str
@@ -50,12 +50,12 @@ class Batch:
     """`deliver` holds the settings of what is delivered of each face, None: nothing is; `blender` is the program that renders contact sheets, '': none."""
 
     root: Path
-    faces: tuple[Face, ...]
+    faces: tuple[BatchFace, ...]
     gate: str = GATES[0]
     deliver: dict | None = None
     blender: str = ""
 
-    def face(self, name: str) -> Face:
+    def face(self, name: str) -> BatchFace:
         """Raises Problem for an unknown name."""
         for face in self.faces:
             if face.name == name:
@@ -105,10 +105,10 @@ def _parse(root: Path, told: dict) -> Batch:
     return Batch(root, tuple(_parse_face(root, face) for face in told["faces"]), told["gate"], deliver, told["blender"])
 
 
-def _parse_face(root: Path, told: dict) -> Face:
+def _parse_face(root: Path, told: dict) -> BatchFace:
     if not plain_name(told["name"]):
         raise ValueError("a face's name is none")
-    face = Face(told["name"], read_portable(told["source"], root), read_portable(told["capture"], root), told["quality"],
-                convert_settings(told["settings"], lambda path: str(read_portable(path, root))))
+    face = BatchFace(told["name"], read_portable(told["source"], root), read_portable(told["capture"], root), told["quality"],
+                     convert_settings(told["settings"], lambda path: str(read_portable(path, root))))
     face.chosen()
     return face

@@ -28,9 +28,9 @@ from ..contract.capture import Capture
 from ..contract.files import replacing, storage_problem
 from ..contract.messages import Problem
 from .groups import GROUPS
-from .record import Batch, Face
+from .record import Batch, BatchFace
 from .review_page import MARK, PAGE, STYLE
-from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, State, derive_state
+from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, FaceState, derive_state
 
 NAME = "review.html"
 
@@ -70,11 +70,11 @@ STATES = {DONE: "done", TO_DO: "to do", WORKING: "being worked on", WAITING: "wa
 
 
 @dataclass(frozen=True)
-class Row:
+class ReviewRow:
     """One face: `values` by a measure's label, `ranks` the share of the others that are better, in [0, 1]; `findings` as `report.findings` gives them."""
 
-    face: Face
-    state: State
+    face: BatchFace
+    state: FaceState
     seconds: float
     values: dict[str, float]
     ranks: dict[str, float]
@@ -98,7 +98,7 @@ class Row:
         return f"{self.worst.lower()} {_shown(self, self.worst)}, worse than {others}"
 
 
-def write_review(batch: Batch) -> tuple[Path, list[Row]]:
+def write_review(batch: Batch) -> tuple[Path, list[ReviewRow]]:
     """Writes BATCH/review.html; its path, and the faces in its order. Raises Problem where it cannot be written, or something
     else is in its place."""
     path = batch.root / NAME
@@ -125,7 +125,7 @@ def _is_ours(path: Path) -> bool:
         raise storage_problem(error, path) from error
 
 
-def read_rows(batch: Batch) -> list[Row]:
+def read_rows(batch: Batch) -> list[ReviewRow]:
     """What the captures' own records say, in the batch's order; a record that cannot be read says nothing."""
     told = []
     for face in batch.faces:
@@ -138,7 +138,7 @@ def read_rows(batch: Batch) -> list[Row]:
         values = {label: value for label, value in values.items() if isinstance(value, int | float) and value == value}  # NaN says nothing
         told.append(({FINDINGS: len(found), **values} if stages else {}, sum(entry["seconds"] for entry in stages.values()), found))
     ranks = rank([values for values, _, _ in told])
-    return [Row(face, derive_state(batch, face), seconds, values, own, found)
+    return [ReviewRow(face, derive_state(batch, face), seconds, values, own, found)
             for face, (values, seconds, found), own in zip(batch.faces, told, ranks, strict=True)]
 
 
@@ -153,21 +153,21 @@ def rank(values: list[dict[str, float]]) -> list[dict[str, float]]:
     return ranks
 
 
-def sort_rows(rows: list[Row]) -> list[Row]:
+def sort_rows(rows: list[ReviewRow]) -> list[ReviewRow]:
     """Stopped, waiting, others; each the riskiest first, and by name where nothing tells them apart."""
-    def key(row: Row) -> tuple:
+    def key(row: ReviewRow) -> tuple:
         return ORDER.index(row.state.state) if row.state.state in ORDER else len(ORDER), *(-share for share in row.risk), row.face.name
 
     return sorted(rows, key=key)
 
 
-def _section(state: str, rows: list[Row], batch: Batch) -> str:
+def _section(state: str, rows: list[ReviewRow], batch: Batch) -> str:
     if not rows:
         return ""
     return f"<section><h2>{HEADINGS[state]} <small>{len(rows)}</small></h2>{''.join(_card(row, batch) for row in rows)}</section>"
 
 
-def _card(row: Row, batch: Batch) -> str:
+def _card(row: ReviewRow, batch: Batch) -> str:
     state, name = row.state, html.escape(row.face.name)
     link = _link(row.face.capture.report, batch.root)
     title = f'<a href="{link}">{name}</a>' if link else name
@@ -184,7 +184,7 @@ def _kind(state: str) -> str:
     return state.replace(" ", "-")
 
 
-def _bars(row: Row) -> str:
+def _bars(row: ReviewRow) -> str:
     """A line for each measure: its value, and a bar as long as the share of the others that are better."""
     lines = "".join(f'<tr title="{html.escape(measure.note)}"{" class=worst" if measure.label == row.worst else ""}><th>{measure.label}</th>'
                     f'<td>{_shown(row, measure.label)}</td><td class="bar"><i style="width:{row.ranks[measure.label]:.0%}"></i></td></tr>'
@@ -192,7 +192,7 @@ def _bars(row: Row) -> str:
     return f"<table>{lines}</table>" if len(row.values) > 1 else ""
 
 
-def _shown(row: Row, label: str) -> str:
+def _shown(row: ReviewRow, label: str) -> str:
     return f"{row.values[label]:.4g}{next(measure.unit for measure in MEASURES if measure.label == label)}"
 
 
@@ -241,9 +241,9 @@ def _duration(seconds: float) -> str:
     return f"{minutes} min" if minutes < 100 else f"{minutes / 60:.1f} h"
 
 
-def list_riskiest(rows: list[Row], most: int = 5) -> list[str]:
+def list_riskiest(rows: list[ReviewRow], most: int = 5) -> list[str]:
     """Lines for the terminal: the first faces of the page, each with why it comes first."""
-    def why(row: Row) -> str:
+    def why(row: ReviewRow) -> str:
         return row.state.words() if row.state.state in ORDER else row.words()
 
     return [f"{row.face.name:20} {why(row)}" for row in rows[:most]]

@@ -18,7 +18,7 @@ from ..contract.json_files import plain_name
 from ..contract.messages import Problem
 from ..contract.setting_values import absolute_path
 from ..worker.command_settings import read_file
-from .record import NAME, Face
+from .record import NAME, BatchFace
 
 COLUMNS = {"tone": ("solve", "skin_tone"), "white": ("solve", "white_point"), "template": ("registration", "template")}
 """Columns that are settings of their own: (stage, name)."""
@@ -29,7 +29,7 @@ MOST_BYTES = 16 << 20
 """Of a table: some hundred thousand rows."""
 
 
-def read_faces(shots: Path, root: Path, quality: str, shared: dict) -> tuple[list[Face], list[Problem]]:
+def read_faces(shots: Path, root: Path, quality: str, shared: dict) -> tuple[list[BatchFace], list[Problem]]:
     """The faces of a table or a folder, captures in the batch's folder `root`, and what is wrong with the rows that were left out. `shared` settings lie
     under each row's own. Raises Problem for a table that cannot be read, or has no usable row."""
     rows = _rows_of_folder(shots, root) if shots.is_dir() else _rows_of_table(shots)
@@ -104,7 +104,7 @@ def _check_headings(table: Path, names: list[str]) -> None:
         raise Problem(f"{table} has {wrong}.", f"Its first line names the columns: video, and any of {', '.join(HEADINGS[1:])}.")
 
 
-def _face(row: dict[str, str], folder: Path, root: Path, quality: str, shared: dict) -> Face:
+def _face(row: dict[str, str], folder: Path, root: Path, quality: str, shared: dict) -> BatchFace:
     """One row's face. Raises Problem."""
     if row.get(""):
         raise Problem("It has more cells than there are columns.", "A cell that holds the separator is put in quotation marks, as a tone is: \"0.8,0.6,0.5\".")
@@ -131,7 +131,7 @@ def _face(row: dict[str, str], folder: Path, root: Path, quality: str, shared: d
         raise Problem(f"There is no head mesh at {template}.", "Check its name, or leave the cell empty for the built-in head.")
     chosen = row.get("quality") or quality
     known.from_json(values, known.preset(chosen))
-    return Face(name, source, root / f"{name}.wildcap", chosen, values)
+    return BatchFace(name, source, root / f"{name}.wildcap", chosen, values)
 
 
 def _check_colour(column: str, text: str) -> None:

@@ -15,20 +15,20 @@ from ..contract.json_files import read_json
 from ..contract.messages import Problem
 from ..contract.settings import from_json, to_json
 from .gate import is_accepted
-from .groups import DELIVER, GATE, GROUPS, Group
-from .record import Batch, Face
+from .groups import DELIVER, GATE, GROUPS, StageGroup
+from .record import Batch, BatchFace
 
 DONE, TO_DO, WORKING, WAITING, STOPPED = "done", "to do", "working", "waiting", "stopped"
 SHEET = "contact_sheet.png"
 
 
 @dataclass(frozen=True)
-class State:
+class FaceState:
     """`state` is one of the five; `group` is the task that is next, or that works or has stopped, None where all are done; `problem` and `remedy` say why
     it stopped; `who` names the machine that works on it."""
 
     state: str
-    group: Group | None = None
+    group: StageGroup | None = None
     problem: str = ""
     remedy: str = ""
     who: str = ""
@@ -42,31 +42,31 @@ class State:
                 STOPPED: f"{label} stopped: {self.problem} {self.remedy}"}[self.state]
 
 
-def derive_state(batch: Batch, face: Face) -> State:
+def derive_state(batch: Batch, face: BatchFace) -> FaceState:
     """Where a face is. A record that cannot be read counts as stopped."""
     try:
         capture = face.capture
         group = next((group for group in GROUPS if not is_done(batch, face, group)), None)
         holder = lease.holder(capture.lock) if capture.root.is_dir() else None
         if holder is not None:
-            return State(WORKING, group or GROUPS[-1], who=str(holder.get("host", "another machine")).partition("/")[0])
+            return FaceState(WORKING, group or GROUPS[-1], who=str(holder.get("host", "another machine")).partition("/")[0])
         if group is None:
-            return State(DONE)
+            return FaceState(DONE)
         stopped = capture.read().get("stopped")
         if stopped and stopped["stage"] in {stage.name for stage in group.stages}:
-            return State(STOPPED, group, stopped["problem"], stopped["remedy"])
-        return State(WAITING if waits(batch, face, group) else TO_DO, group)
+            return FaceState(STOPPED, group, stopped["problem"], stopped["remedy"])
+        return FaceState(WAITING if waits(batch, face, group) else TO_DO, group)
     except (Problem, OSError) as error:
         problem = error if isinstance(error, Problem) else storage_problem(error, face.root)
-        return State(STOPPED, GROUPS[0], problem.problem, problem.remedy)
+        return FaceState(STOPPED, GROUPS[0], problem.problem, problem.remedy)
 
 
-def waits(batch: Batch, face: Face, group: Group) -> bool:
+def waits(batch: Batch, face: BatchFace, group: StageGroup) -> bool:
     """Whether a task waits for the artist."""
     return group.name == GATE and batch.gate == "artist" and not is_accepted(face.capture)
 
 
-def is_done(batch: Batch, face: Face, group: Group) -> bool:
+def is_done(batch: Batch, face: BatchFace, group: StageGroup) -> bool:
     """Whether all stages of a task are finished as this batch asks for them; of the last one, whether it is delivered, too. Raises Problem."""
     settings = face.chosen()
     if not all(face.capture.state(stage, settings) in FINISHED for stage in group.stages):
@@ -74,7 +74,7 @@ def is_done(batch: Batch, face: Face, group: Group) -> bool:
     return group.name != DELIVER or (batch.deliver is None or is_delivered(batch, face)) and (not batch.blender or has_sheet(face.capture))
 
 
-def deliver_settings(batch: Batch, face: Face) -> dict:
+def deliver_settings(batch: Batch, face: BatchFace) -> dict:
     """The settings of a face with those of the delivery, as a job has them: with its mesh, which is OBJ where no Blender writes it. In a folder that all
     deliver to each face has one of its own: plain names may be alike where names are not (delivery_plan.safe_name)."""
     asked = {"format": "obj", "whole": True, **(batch.deliver or {})}
@@ -82,7 +82,7 @@ def deliver_settings(batch: Batch, face: Face) -> dict:
     return {**to_json(face.chosen()), "deliver": {**asked, **folder}}
 
 
-def is_delivered(batch: Batch, face: Face) -> bool:
+def is_delivered(batch: Batch, face: BatchFace) -> bool:
     """Whether the delivery that is asked for is there, whole, and made of the stages as they stand now. Raises Problem for settings that do not fit."""
     plan = delivery_plan.plan(face.capture, from_json(deliver_settings(batch, face)).deliver)
     try:

@@ -20,15 +20,15 @@ from ..contract.capture import Capture
 from ..contract.messages import Cancelled, Done, Failed, Log, Message, Problem
 from ..worker.client import THREAD_VARIABLES, Worker
 from ..worker.job import read_job, write_job
-from .groups import DELIVER, GROUPS, Group
-from .record import Batch, Face
+from .groups import DELIVER, GROUPS, StageGroup
+from .record import Batch, BatchFace
 from .state import deliver_settings, has_sheet, is_delivered, waits
 
 ROOT = Path(__file__).resolve().parents[2]
 POLL_S = 0.1
 
 
-def run_task(batch: Batch, face: Face, group: Group, hear: Callable[[Message], None] = lambda message: None,
+def run_task(batch: Batch, face: BatchFace, group: StageGroup, hear: Callable[[Message], None] = lambda message: None,
              cancelled: Callable[[], bool] = lambda: False, threads: int | None = None) -> Message:
     """Runs a task, sends what its worker says through `hear`, and returns the final message: Done, Cancelled or Failed. `threads`: how many its libraries
     may start, where other tasks run beside it; None: as many as the worker takes by itself."""
@@ -90,7 +90,7 @@ def _paid_key(job: Path) -> dict[str, str]:
     return {switchlight_api.KEY_VARIABLE: key} if key and read_job(job).settings.delight.delighter == "switchlight" else {}
 
 
-def _deliver(batch: Batch, face: Face, hear: Callable[[Message], None], cancelled: Callable[[], bool], environment: dict[str, str]) -> Message:
+def _deliver(batch: Batch, face: BatchFace, hear: Callable[[Message], None], cancelled: Callable[[], bool], environment: dict[str, str]) -> Message:
     """What comes after the last stage: the delivery, and the contact sheet. Raises Problem."""
     capture, final = face.capture, Done(0.0)
     if batch.deliver is not None and not is_delivered(batch, face):

@@ -22,21 +22,21 @@ from ..imaging import images
 from . import coverage
 from .calibration import import_cameras
 from .drawing import draw_cameras
-from .joint import AGREE, WIDE, refine
+from .joint import AGREE_WIDTH_SHARES, WIDE_WIDTH_SHARES, refine
 from .landmarks import find_landmarks
 from .motion import expression_changes
 from .solving import LEAST_VIEWS, MOST_FACES, Solved, solve
-from .structure import ALL_PAIRS, solve_structure
+from .structure import ALL_PAIRS_FRAMES, solve_structure
 from .world import HeadFrame, find_head
 
 LEAST_COVERAGE_DEG = 15.0
-IMPORT_MISS = 0.05
+IMPORT_MISS_SHARE = 0.05
 """Share of the face's width by which landmarks may miss in imported cameras: those of another capture, or read by other conventions, miss by far more."""
-IMPORT_NEAR = 6.0
+IMPORT_NEAR_RATIO = 6.0
 """Cameras that miss by more than the next two figures, but not by so many times as much, are a few pixels off and can be refined."""
 IMPORT_UNLIKE_M = 0.004
 """How far a head may miss the landmarks in imported cameras; a person's does by 2 mm. Cameras in the wrong order may see a hollow face."""
-BLURRED = 0.6
+BLURRED_SHARPNESS_SHARE = 0.6
 """Sharpness, as a share of that of the frames that fit, below which a frame was left out for its blur."""
 
 
@@ -51,7 +51,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     model.transform(solved.head.world_from_model)
     centres = np.array([image.projection_center() for image in model.images.values() if image.has_pose])
     widest = coverage.widest_deg(centres)
-    records = solved.asked or frames.records
+    records = solved.to_place or frames.records
     if widest < LEAST_COVERAGE_DEG and frames.kind != PHOTOGRAPHS:
         raise Problem(f"The camera moved only {widest:.0f} degrees around the head; {LEAST_COVERAGE_DEG:.0f} are the least.",
                       "Film again while you walk around the face from one ear to the other.")
@@ -90,13 +90,13 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
     def checked(model) -> tuple[HeadFrame, float]:
         """The head, and by how many times what is allowed these cameras miss it."""
         head = find_head(model, found, settings.cameras.interpupillary_mm / 1000)
-        return head, max(head.miss / IMPORT_MISS, head.error_px / width / IMPORT_MISS, head.unlike_m / IMPORT_UNLIKE_M)
+        return head, max(head.miss / IMPORT_MISS_SHARE, head.error_px / width / IMPORT_MISS_SHARE, head.unlike_m / IMPORT_UNLIKE_M)
 
     head, off = checked(model)
-    if 1 <= off < IMPORT_NEAR and len(frames.records) <= ALL_PAIRS:
+    if 1 <= off < IMPORT_NEAR_RATIO and len(frames.records) <= ALL_PAIRS_FRAMES:
         report.log("The imported cameras are a little off; they are refined by what matches in these pictures.")
         matches = solve_structure(frames, capture, False, settings.cameras.matching, settings.seed, report)[1]
-        model = refine(model, found, matches, False, report, agree=WIDE + AGREE)
+        model = refine(model, found, matches, False, report, agree=WIDE_WIDTH_SHARES + AGREE_WIDTH_SHARES)
         head, off = checked(model)
     if not off < 1:
         raise Problem(f"The cameras in {path.name} do not fit these pictures: the face's landmarks miss each other by {head.error_px:.0f} px "
@@ -108,7 +108,7 @@ def _imported(path: Path, frames: Frames, capture: Capture, settings: Settings, 
 def _findings(solved: Solved, records: Sequence[FrameRecord], centres: np.ndarray, report: Reporter) -> None:
     """What is wrong with a capture that can be used, and how to shoot it again."""
     shown = {record.name: record.shown for record in records}
-    if solved.way == "face" and not solved.held and len(records) >= LEAST_VIEWS:
+    if solved.way == "face" and not solved.every_frame_held and len(records) >= LEAST_VIEWS:
         rough = "refined by what little matches" if solved.refined else "to ten degrees or so"
         report.finding(f"The frames do not overlap enough to be matched: the cameras come from the face's landmarks, {rough}. Expect a rough head.",
                        "Take a photograph every ten degrees around the face, from ear to ear, with a busy background.")
@@ -136,7 +136,7 @@ def _left_out(solved: Solved, records: Sequence[FrameRecord], shown: dict[str, s
     if not rest:
         return
     sharp = np.median([record.sharpness for record in records if record.name in fits])
-    blurred = sum(record.sharpness < BLURRED * sharp for record in rest)
+    blurred = sum(record.sharpness < BLURRED_SHARPNESS_SHARE * sharp for record in rest)
     why, remedy = ((f"; {blurred} of them are blurred", "Move the camera slower, or add light, so that each frame is sharp.") if blurred > len(rest) / 2
                    else ("", "Move the camera slower past the places where frames were lost, and keep the whole head in the picture."))
     report.finding(f"{len(rest)} of {len(records)} frames did not fit the others and were left out{why}.", remedy, [shown[record.name] for record in rest])

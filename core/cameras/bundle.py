@@ -17,11 +17,11 @@ from .landmarks import INDEPENDENT, SIGMA_M, template_landmarks
 
 OFFSET_M = 0.002
 """How far a landmark of a person strays from the nearest head of the identity space."""
-FOCAL_SPREAD = 0.35
+FOCAL_SIGMA_LOG = 0.35
 """Deviation of the logarithm of an unknown focal length from its prior: from a phone's wide to its portrait lens."""
 FEATURE_PX = 1.5
 """Deviation of a match in cameras that come from the face, where what agrees is little and may be wrong."""
-TURNED_AWAY = 0.15
+LEAST_LANDMARK_COSINE = 0.15
 """Cosine between a landmark's normal and the camera below which the landmark has slid onto the silhouette."""
 
 
@@ -41,7 +41,7 @@ class Bundle:
     coefficients: np.ndarray
     points: np.ndarray
     feature_px: float = FEATURE_PX
-    focal_spread: float = FOCAL_SPREAD
+    focal_spread: float = FOCAL_SIGMA_LOG
 
     def local(self, camera: np.ndarray, point: np.ndarray) -> np.ndarray:
         """Points in the frames of cameras [M, 3]."""
@@ -98,7 +98,7 @@ def _weights(bundle: Bundle, seen: Observations) -> np.ndarray:
     centres = -np.einsum("nij,ni->nj", bundle.rotations, bundle.translations)
     towards = centres[seen.camera[landmark]] - bundle.points[seen.point[landmark]]
     facing = (model.normals[seen.point[landmark]] * towards).sum(1) / np.linalg.norm(towards, axis=1)
-    trust[landmark] *= np.clip((facing - TURNED_AWAY) / 0.3, 0, 1)
+    trust[landmark] *= np.clip((facing - LEAST_LANDMARK_COSINE) / 0.3, 0, 1)
     return trust / (1 + (error / 3) ** 2) ** 2 / sigma**2
 
 

@@ -11,15 +11,16 @@ import pycolmap
 
 from ..contract.frame_records import VIDEO, FrameRecord, Frames
 from ..contract.messages import Problem, Reporter
-from ..geometry.mesh_checks import FARTHEST
+from ..geometry.mesh_checks import FARTHEST_UNITS
 from ..imaging import images
 from .calibrated import PIXELS, Calibrated
 from .importers import blender_cameras, colmap_folder, metashape, realityscan
 
-FEWEST = 3
-SHORTEST_FOCAL = 1e-3
+LEAST_CAMERAS = 3
+"""That must be of this capture's frames: with fewer, a file is taken for another capture's."""
+LEAST_FOCAL_SHARE = 1e-3
 """Of the picture's longer side: with less, what lies 45 degrees to the side would be a pixel from the middle."""
-MOST_BYTES = 256 << 20
+MOST_TEXT_BYTES = 256 << 20
 """Of another program's text file: a thousand cameras have one MB, and what Metashape writes of their points is left out by its export of cameras."""
 
 
@@ -28,7 +29,7 @@ def import_cameras(path: Path, frames: Frames, folder: Path, report: Reporter) -
     Raises Problem for what cannot be read, is no such file, or names fewer than three of the frames."""
     cameras = read_cameras(path)
     matched = _match(cameras, frames)
-    if len(matched) < FEWEST:
+    if len(matched) < LEAST_CAMERAS:
         here = ", ".join(_known_as(record)[0] for record in frames.records[:3])
         raise Problem(f"{path.name} has cameras for {len(matched)} of the {len(frames.records)} frames; three are the least. "
                       f"It names {', '.join(camera.name for camera in cameras[:3])}; the frames are {here}.",
@@ -56,8 +57,8 @@ def read_cameras(path: Path) -> list[Calibrated]:
         raise Problem(f"{path.name} is no kind of camera file that is known here.",
                       "Choose a COLMAP folder, Metashape's cameras (.xml), RealityScan's internal/external camera parameters (.csv), or Blender's (.json).")
     try:
-        if path.is_file() and path.stat().st_size > MOST_BYTES:
-            raise Problem(f"{path.name} is larger than {MOST_BYTES >> 20} MB, which is no list of cameras.", "Export the cameras without points.")
+        if path.is_file() and path.stat().st_size > MOST_TEXT_BYTES:
+            raise Problem(f"{path.name} is larger than {MOST_TEXT_BYTES >> 20} MB, which is no list of cameras.", "Export the cameras without points.")
         cameras = colmap_folder.read(path) if path.is_dir() else readers[path.suffix.lower()](path.read_text(encoding="utf-8-sig"), path.name)
     except Problem as problem:
         raise problem if path.name in problem.problem else Problem(f"{path.name} cannot be used: {problem.problem}", problem.remedy) from problem
@@ -67,9 +68,9 @@ def read_cameras(path: Path) -> list[Calibrated]:
         raise Problem(f"{path.name} holds no solved camera.", "Align the pictures in the program it comes from, then export the cameras again.")
     for camera in cameras:
         sized = (camera.width, camera.height) == (0, 0) or min(camera.width, camera.height) > 0
-        finite = all((np.abs(values) <= FARTHEST).all() for values in (camera.params, camera.rotation, camera.translation))  # false for NaN, too
+        finite = all((np.abs(values) <= FARTHEST_UNITS).all() for values in (camera.params, camera.rotation, camera.translation))  # false for NaN, too
         focal = min(camera.params[:PIXELS[camera.model] - 2], default=0.0)
-        if not (sized and finite and focal > SHORTEST_FOCAL * (max(camera.width, camera.height) or 1)
+        if not (sized and finite and focal > LEAST_FOCAL_SHARE * (max(camera.width, camera.height) or 1)
                 and np.allclose(camera.rotation @ camera.rotation.T, np.eye(3), atol=1e-4) and np.linalg.det(camera.rotation) > 0):
             raise Problem(f"The camera of {camera.name} in {path.name} is no camera: its rotation, focal length or size makes no sense.",
                           "Export the cameras again; a file that was edited by hand may be damaged.")

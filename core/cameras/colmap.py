@@ -25,11 +25,11 @@ CHOSEN = "chosen.json"
 PHONE = 1.0
 FOCALS = (PHONE, 2.0, 3.5)
 """Focal lengths that photographs whose files tell none are tried with, as shares of the longer side: 53, 28 and 16 degrees of view."""
-CHUNK = 24
+CHUNK_PICTURES = 24
 """Pictures handed to COLMAP at once: enough to keep its threads busy, few enough to show progress."""
 FILM_FEATURES, LEAST_FEATURES = 2000, 400
 """Of each frame of a film, whose neighbours share plenty; and below which (in the median frame) features are looked for at twice the frames' size."""
-CARRIED = 0.9
+LEAST_CARRIED_SHARE = 0.9
 """Share of the frames chosen to carry a film's structure that must fit together; else more are chosen."""
 
 
@@ -93,7 +93,7 @@ def _extract(job: dict, names: list[str], finer: bool, part: int = 1) -> list[st
         reader.existing_camera_id = camera_id
         options.max_image_size = -1 if part == 1 else max(group["width"], group["height"]) // part
         these = [name for name in group["names"] if name in missing and name in wanted]
-        for chunk in [these[start:start + CHUNK] for start in range(0, len(these), CHUNK)]:
+        for chunk in [these[start:start + CHUNK_PICTURES] for start in range(0, len(these), CHUNK_PICTURES)]:
             _aside(pycolmap.extract_features, job["database"], job["images"], chunk, pycolmap.CameraMode.SINGLE, reader, options, pycolmap.Device.cpu)
             done += len(chunk)
             _say("finding features", done, total)
@@ -158,7 +158,7 @@ def _map_film(job: dict, chosen: list[str]) -> list[pycolmap.Reconstruction]:
         best = max(models, key=_worth, default=None)
         if len(chosen) == len(film):
             return models
-        if best is not None and best.num_reg_images() >= CARRIED * len(chosen):
+        if best is not None and best.num_reg_images() >= LEAST_CARRIED_SHARE * len(chosen):
             break
         chosen = skeleton.choose(film, 2 * len(chosen))
     mapped = {image.name for image in best.images.values() if image.has_pose}

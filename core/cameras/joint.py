@@ -25,22 +25,22 @@ from .matches import Matches
 from .resection import LEAST_MATCHES, agreeing, place_by_matches
 from .world import agreeing_faces, find_head
 
-AGREE = (0.0125, 0.006, 0.004)
+AGREE_WIDTH_SHARES = (0.0125, 0.006, 0.004)
 """Shares of the face's width by which matches may miss, round by round."""
-WIDE = (0.06, 0.025)
+WIDE_WIDTH_SHARES = (0.06, 0.025)
 """What goes before for cameras that may be some pixels off."""
-FEATURE_SHARE = 1 / 3000
+FEATURE_SIGMA_SHARE = 1 / 3000
 """Deviation of a match, as a share of a picture's longer side: features are looked for at 2,000 pixels."""
-FREE, TOLD = 3.0, 0.03
+FREE_SIGMA_LOG, TOLD_SIGMA_LOG = 3.0, 0.03
 """Spreads of the logarithm of a focal length: of an unknown one, which what matches tells, and of one that a file told, which focusing changes."""
 FEWEST_TRACKS = 60
 
 
 def refine(model: pycolmap.Reconstruction, found: dict[str, faces.Face], matches: Matches, unknown_focal: bool, report: Reporter,
-           missing: Sequence[dict] = (), agree: Sequence[float] = AGREE) -> pycolmap.Reconstruction:
+           missing: Sequence[dict] = (), agree: Sequence[float] = AGREE_WIDTH_SHARES) -> pycolmap.Reconstruction:
     """The refined model, in the head's world (metres), or `model` itself where too little matches or the refined one explains less. found: name -> face.
     missing: [{names, width, height}] like camera groups, of frames that have no camera yet and may get one by their matches; they share the lens of
-    the frames of their size. agree: as AGREE, wider first where the cameras may be off. Raises Problem where no face is found."""
+    the frames of their size. agree: as AGREE_WIDTH_SHARES, wider first where the cameras may be off. Raises Problem where no face is found."""
     head = find_head(model, found, 0.063)
     model = pycolmap.Reconstruction(model)
     model.transform(head.world_from_model)
@@ -55,7 +55,7 @@ def refine(model: pycolmap.Reconstruction, found: dict[str, faces.Face], matches
     for step, share in enumerate(agree):
         report.progress(step, len(agree), "refining cameras by what matches")
         added, tracks, bundle = agreeing(bundle, names, straight, share * width)
-        before = before or (len(tracks) if share <= AGREE[0] else None)
+        before = before or (len(tracks) if share <= AGREE_WIDTH_SHARES[0] else None)
         if len(tracks) < FEWEST_TRACKS:
             return model
         seen = Observations(*(np.concatenate([a, b]) for a, b in zip((marks.camera, marks.point, marks.pixel), added, strict=True)))
@@ -80,8 +80,8 @@ def as_bundle(model: pycolmap.Reconstruction, registered: list, unknown_focal: b
     return Bundle(np.array([pose.rotation.matrix() for pose in poses]), np.array([pose.translation for pose in poses]), focal, focal.copy(),
                   np.zeros(len(numbers), bool), np.array([numbers.index(image.camera_id) for image in registered]),
                   np.array([[camera.principal_point_x, camera.principal_point_y] for camera in used]), np.zeros(len(template_landmarks().basis)),
-                  template_landmarks().mean.copy(), FEATURE_SHARE * max(max(camera.width, camera.height) for camera in used),
-                  FREE if unknown_focal else TOLD)
+                  template_landmarks().mean.copy(), FEATURE_SIGMA_SHARE * max(max(camera.width, camera.height) for camera in used),
+                  FREE_SIGMA_LOG if unknown_focal else TOLD_SIGMA_LOG)
 
 
 def _landmarks(model: pycolmap.Reconstruction, registered: list, found: dict[str, faces.Face]) -> Observations:
@@ -145,7 +145,7 @@ def rebuilt(model: pycolmap.Reconstruction, bundle: Bundle, registered: list, tr
     return rebuilt
 
 
-def held(model: pycolmap.Reconstruction) -> bool:
+def holds_every_frame(model: pycolmap.Reconstruction) -> bool:
     """Whether every registered frame sees as many matched points as its pose needs."""
     seen = Counter(element.image_id for point in model.points3D.values() for element in point.track.elements)
     return all(seen[number] >= LEAST_MATCHES for number, image in model.images.items() if image.has_pose)

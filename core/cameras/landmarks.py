@@ -34,7 +34,7 @@ INDEPENDENT = 120
 
 
 @dataclass(frozen=True)
-class Landmarks:
+class TemplateLandmarks:
     """The template's landmarks: mean [468, 3] and identity basis [K, 468, 3] in metres, outward normals [468, 3], trust [468] in [0, 1]."""
 
     mean: np.ndarray
@@ -48,15 +48,15 @@ class Landmarks:
 
 
 @cache
-def template_landmarks() -> Landmarks:
+def template_landmarks() -> TemplateLandmarks:
     mesh, (face, bary) = template.load(), template.landmarks()
 
     def at(values: np.ndarray) -> np.ndarray:
         return (values[..., mesh.faces[face], :] * bary[..., None]).sum(-2)
 
     normals = at(meshes.vertex_normals(mesh))
-    return Landmarks(at(mesh.vertices), at(template.identity()).astype(np.float64), normals / np.linalg.norm(normals, axis=1, keepdims=True),
-                     template.landmark_weights())
+    return TemplateLandmarks(at(mesh.vertices), at(template.identity()).astype(np.float64), normals / np.linalg.norm(normals, axis=1, keepdims=True),
+                             template.landmark_weights())
 
 
 def find_landmarks(records: Sequence[FrameRecord], folder: Path, report: Reporter, text: str = "finding the face") -> dict[str, faces.Face]:

@@ -17,11 +17,13 @@ from ..contract.messages import Reporter
 from ..face import faces
 from ..imaging import images
 
-SIDE = 640
-FEATURES = 1500
-LEAST = 20
+LONG_SIDE_PX = 640
+MOST_FEATURES = 1500
+"""Size of the pictures that are compared, and the features of each: it is asked only whether two match as they are or mirrored."""
+LEAST_MATCHES = 20
 """Matches on one epipolar geometry that two views of one scene have at least."""
 MOST_PAIRS = 60
+"""That are compared, spread over all."""
 
 
 def find_mirrored(suspects: list[str], trusted: list[str], folder: Path, report: Reporter, found: Mapping[str, faces.Face] = MappingProxyType({})) -> list[str]:
@@ -49,7 +51,7 @@ def find_mirrored(suspects: list[str], trusted: list[str], folder: Path, report:
         opposite = a in found and b in found and abs(found[a].yaw_deg + found[b].yaw_deg) < abs(found[a].yaw_deg - found[b].yaw_deg)
         plain, flipped = (_agreeing(*(_beside(features(name, turned), found[name], turned, sizes[name]) if opposite else features(name, turned)
                                       for name, turned in ((a, flip), (b, False)))) for flip in (False, True))
-        if max(plain, flipped) >= LEAST and max(plain, flipped) > 2 * min(plain, flipped):
+        if max(plain, flipped) >= LEAST_MATCHES and max(plain, flipped) > 2 * min(plain, flipped):
             relation[a, b] = 1 if plain > flipped else -1
     return _minority(relation, suspects, trusted)
 
@@ -74,17 +76,17 @@ def _beside(features: tuple, face: faces.Face, flip: bool, size: tuple[int, int]
     x0, y0, x1, y1 = face.box
     w, h = x1 - x0, y1 - y0
     x0, x1 = (size[0] - x1, size[0] - x0) if flip else (x0, x1)
-    at = points / min(1.0, SIDE / max(size))
+    at = points / min(1.0, LONG_SIDE_PX / max(size))
     off = (at[:, 0] < x0 - 0.6 * w) | (at[:, 0] > x1 + 0.6 * w) | (at[:, 1] < y0 - 0.7 * h) if len(points) else np.zeros(0, bool)
     return points[off], values[off]
 
 
 def _describe(srgb: np.ndarray, flip: bool) -> tuple[np.ndarray, np.ndarray]:
     """Keypoints [K, 2] and RootSIFT descriptors [K, 128] of a picture, mirrored first where `flip`."""
-    scale = min(1.0, SIDE / max(srgb.shape[:2]))
+    scale = min(1.0, LONG_SIDE_PX / max(srgb.shape[:2]))
     grey = images.resize(srgb @ np.array([0.299, 0.587, 0.114], np.float32), round(srgb.shape[1] * scale), round(srgb.shape[0] * scale))
     grey = np.ascontiguousarray((np.clip(grey[:, ::-1] if flip else grey, 0, 1) * 255).astype(np.uint8))
-    points, values = cv2.SIFT_create(FEATURES, contrastThreshold=0.02).detectAndCompute(grey, None)
+    points, values = cv2.SIFT_create(MOST_FEATURES, contrastThreshold=0.02).detectAndCompute(grey, None)
     if values is None:
         return np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32)
     return np.array([point.pt for point in points], np.float32), np.sqrt(values / np.maximum(values.sum(1, keepdims=True), 1e-9))
@@ -92,10 +94,10 @@ def _describe(srgb: np.ndarray, flip: bool) -> tuple[np.ndarray, np.ndarray]:
 
 def _agreeing(a: tuple, b: tuple) -> int:
     """How many matches between two pictures lie on one epipolar geometry."""
-    if min(len(a[0]), len(b[0])) < LEAST:
+    if min(len(a[0]), len(b[0])) < LEAST_MATCHES:
         return 0
     found = [pair[0] for pair in cv2.BFMatcher(cv2.NORM_L2).knnMatch(a[1], b[1], k=2) if len(pair) == 2 and pair[0].distance < 0.8 * pair[1].distance]
-    if len(found) < LEAST:
+    if len(found) < LEAST_MATCHES:
         return 0
     cv2.setRNGSeed(0)
     _, good = cv2.findFundamentalMat(a[0][[m.queryIdx for m in found]], b[0][[m.trainIdx for m in found]], cv2.FM_RANSAC, 1.5, 0.999)

@@ -20,12 +20,12 @@ from ..imaging import images
 from .matches import Matches
 
 TURNED_DEG = 12.0
-STILL = 0.004
+STILL_DIAGONAL_SHARE = 0.004
 """Share of the picture's diagonal by which a background may drift in a picture of a camera on a tripod."""
-LEAST = 20
+LEAST_MATCHES = 20
 """Background matches that say something of a pair."""
 MOUTH, CORNERS, EYES = (13, 14), (61, 291), (33, 263)
-OPENED, SMILED = 0.12, 0.15
+OPENED_SHARE, SMILED_SHARE = 0.12, 0.15
 """Changes of the mouth's opening and width, as shares of the distance of the eyes' outer corners, that a net's noise does not make."""
 
 
@@ -37,8 +37,8 @@ def camera_stood_still(matches: Matches, found: dict[str, faces.Face]) -> bool |
             continue
         a, b = matches.between(first, second)
         behind = in_background(a, found[first]) & in_background(b, found[second])
-        if behind.sum() >= LEAST:
-            reach = STILL * np.linalg.norm(np.concatenate([a, b]).max(0))
+        if behind.sum() >= LEAST_MATCHES:
+            reach = STILL_DIAGONAL_SHARE * np.linalg.norm(np.concatenate([a, b]).max(0))
             stayed.append(np.median(np.linalg.norm(a[behind] - b[behind], axis=1)) < reach)
     return bool(np.mean(stayed) > 0.6) if len(stayed) >= 2 else None
 
@@ -73,7 +73,7 @@ def expression_changes(found: dict[str, faces.Face]) -> list[str]:
     if len(names) < 3:
         return []
     shape = np.array([[_apart(found[name], pair) / _apart(found[name], EYES) for pair in (MOUTH, CORNERS)] for name in names])
-    off = np.abs(shape - np.median(shape, 0)) > (OPENED, SMILED)
+    off = np.abs(shape - np.median(shape, 0)) > (OPENED_SHARE, SMILED_SHARE)
     return [name for name, changed in zip(names, off.any(1), strict=True) if changed]
 
 

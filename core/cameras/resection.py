@@ -21,14 +21,14 @@ from .bundle import Bundle, Observations, adjust
 from .landmarks import template_landmarks
 from .matches import Matches, tracks
 
-FOCALS = np.geomspace(0.7, 3.0, 16)
+FOCAL_SHARES = np.geomspace(0.7, 3.0, 16)
 """Focal lengths that are tried where no file tells one, as shares of a picture's longer side: 71 to 19 degrees of view."""
-TYPICAL = 1.1
+PHONE_FOCAL_SHARE = 1.1
 """A phone's, in the same unit."""
-AGREE = (0.05, 0.025, 0.0125)
+AGREE_WIDTH_SHARES = (0.05, 0.025, 0.0125)
 """Shares of the face's width by which matches may miss, round by round, as the cameras get better."""
 MOST_TRACKS = 5000
-HELD = 30
+ENOUGH_TRACKS = 30
 """Tracks that a frame is seen in where they hold its camera better than the face does."""
 AGREED_SHARE = 0.5
 LEAST_ANGLE_DEG = 2.0
@@ -67,7 +67,7 @@ def resect(groups: list[dict], found: dict[str, faces.Face], matches: Matches, r
     landmarks = Observations(np.repeat(np.arange(len(names)), count), np.tile(np.arange(count), len(names)), np.concatenate([pixels[n] for n in names]))
     bundle = adjust(bundle, landmarks)
     seen, used = landmarks, []
-    for step, share in enumerate(AGREE, 1):
+    for step, share in enumerate(AGREE_WIDTH_SHARES, 1):
         report.progress(step, 5, "refining cameras by what matches")
         added, used, bundle = agreeing(bundle, names, matches, share * width)
         seen = Observations(*(np.concatenate([a, b]) for a, b in zip((landmarks.camera, landmarks.point, landmarks.pixel), added, strict=True)))
@@ -85,15 +85,15 @@ def _trusted(names: list[str], matches: Matches, used: list) -> bool:
     track_of = {member: number for number, track in enumerate(used) for member in track}
     pairs = [(a, b, index) for (a, b), index in matches.pairs.items() if a in names and b in names]
     agree = [track_of.get((a, i), -1) == track_of.get((b, j), -2) for a, b, index in pairs for i, j in index.tolist()]
-    return all(held[name] >= HELD for name in names) and np.mean(agree) > AGREED_SHARE
+    return all(held[name] >= ENOUGH_TRACKS for name in names) and np.mean(agree) > AGREED_SHARE
 
 
 def _first(groups: list[dict], group_of: dict, names: list[str], pixels: dict) -> Bundle:
-    """Poses of the template's mean head by PnP at each focal length of FOCALS, shared by all groups whose own is unknown; the one that fits best."""
+    """Poses of the template's mean head by PnP at each focal length of FOCAL_SHARES, shared by all groups whose own is unknown; the one that fits best."""
     model = template_landmarks()
     trusted = model.trust > 0.2
     best = None
-    for factor in FOCALS if any(not group["focal_px"] for group in groups) else (1.0,):
+    for factor in FOCAL_SHARES if any(not group["focal_px"] for group in groups) else (1.0,):
         focal = np.array([group["focal_px"] or factor * max(group["width"], group["height"]) for group in groups])
         poses, total = [], 0.0
         for name in names:
@@ -103,11 +103,11 @@ def _first(groups: list[dict], group_of: dict, names: list[str], pixels: dict) -
             there = cv2.projectPoints(model.mean[trusted], turn, shift, matrix, None)[0][:, 0]
             total += np.median(np.linalg.norm(there - pixels[name][trusted], axis=1)) / np.ptp(pixels[name][:, 0])
             poses.append((cv2.Rodrigues(turn)[0], shift[:, 0]))
-        total += len(names) * 0.002 * (np.log(factor / TYPICAL) / 0.35) ** 2  # a face far away looks much the same through any lens
+        total += len(names) * 0.002 * (np.log(factor / PHONE_FOCAL_SHARE) / 0.35) ** 2  # a face far away looks much the same through any lens
         if best is None or total < best[0]:
             best = total, focal, poses
     _, focal, poses = best
-    prior = np.array([group["focal_px"] or TYPICAL * max(group["width"], group["height"]) for group in groups])
+    prior = np.array([group["focal_px"] or PHONE_FOCAL_SHARE * max(group["width"], group["height"]) for group in groups])
     return Bundle(np.array([r for r, _ in poses]), np.array([t for _, t in poses]), focal, prior, np.array([bool(group["focal_px"]) for group in groups]),
                   np.array([group_of[name] for name in names]), np.array([[groups[group_of[n]][side] / 2 for side in ("width", "height")] for n in names]),
                   np.zeros(len(model.basis)), model.mean.copy())

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -27,56 +27,65 @@ from .matches import Matches
 from .resection import LEAST_MATCHES, agreeing, place_by_matches
 from .world import HeadFrame
 
-REACH = (0.025, 0.0125, 0.006)
+REACH_WIDTH_SHARES = (0.025, 0.0125, 0.006)
 """Shares of the face's width by which matches may miss, round by round."""
-SWAYED = 0.9
+MOST_LEFT_SHARE = 0.9
 """Share of the head's error that is left by cameras of its own, in tracks that had no say in these, below which the head moved before the room. Poses that fit
 one half of the tracks predict the other half no better where it kept still; a tenth is left to the scatter of the two medians."""
 LEAST_TRACKS = 200
 """Points on the head that several frames show, for poses of its own."""
 CHEST_M = -0.12
 """Height below the eyes where what moves with the head ends."""
-AIR = 0.05
-LEAST_PX = 64
+AIR_SHARE = 0.05
+LEAST_SIDE_PX = 64
 """Shares of the head's width and height around it in which its features are looked for; and the side of a part of a frame below which they are not."""
+
+
+@dataclass(frozen=True)
+class HeadCameras:
+    """Cameras with respect to the head: as a bundle, as the model that has them, and the tracks that told them."""
+
+    bundle: Bundle
+    model: pycolmap.Reconstruction
+    tracks: list
 
 
 def settle(model: pycolmap.Reconstruction, head: HeadFrame, matches: Matches, report: Reporter,
            by: Collection[str] | None = None) -> tuple[pycolmap.Reconstruction, float | None]:
-    """The model with its cameras placed with respect to the head, in the head's world (metres), and the share of the error that is left of the head's matches
-    (SWAYED); `model` itself where the head kept still, or where too little matches on it to tell (None). `by`: the frames that tell, all if not given; each of
-    the others is placed by the points of those."""
+    """The model with its cameras placed with respect to the head, in the head's world (metres), and the share of the error that is left of the head's
+    matches (see MOST_LEFT_SHARE); `model` itself where the head kept still, or where too little matches on it to tell (None). `by`: the frames that tell,
+    all if not given; each of the others is placed by the points of those."""
     room = pycolmap.Reconstruction(model)
     room.transform(head.world_from_model)
     everything = sorted((image for image in room.images.values() if image.has_pose), key=lambda image: image.name)
     registered = [image for image in everything if by is None or image.name in by]
     names, own, width = [image.name for image in registered], on_head(room, everything, matches), _face_width(room, registered)
-    straight, bundle, reach = straightened(room, everything, own), as_bundle(room, registered, False), REACH[0] * width
+    straight, bundle, reach = straightened(room, everything, own), as_bundle(room, registered, False), REACH_WIDTH_SHARES[0] * width
     _, tracks, still = agreeing(bundle, names, straight, reach)
     if len(tracks) < LEAST_TRACKS:
         return model, None
     fitted, held_out = _halves(straight, tracks)
-    followed, _, _ = _follow(room, registered, own, fitted, still, width, report)
-    left = _miss(followed, names, held_out, reach) / max(_miss(bundle, names, held_out, reach), 1e-9)
-    if left > SWAYED:
+    followed = _follow(room, registered, own, fitted, still, width, report)
+    left = _miss(followed.bundle, names, held_out, reach) / max(_miss(bundle, names, held_out, reach), 1e-9)
+    if left > MOST_LEFT_SHARE:
         return model, left
-    bundle, alone, tracks = _follow(room, registered, own, straight, still, width, report)
-    if len(tracks) < LEAST_TRACKS:
+    cameras = _follow(room, registered, own, straight, still, width, report)
+    if len(cameras.tracks) < LEAST_TRACKS:
         return model, left
-    return (_with_others(alone, room, everything, registered, bundle, tracks, own, straight) if len(everything) > len(registered) else alone), left
+    return (_with_others(cameras, room, everything, registered, own, straight) if len(everything) > len(registered) else cameras.model), left
 
 
 def _follow(room: pycolmap.Reconstruction, registered: list, own: Matches, straight: Matches, bundle: Bundle, width: float,
-            report: Reporter) -> tuple[Bundle, pycolmap.Reconstruction, list]:
-    """The cameras with respect to the head, by these of its matches (`straight`: of their pixels without the lens), the model that has them, and its tracks."""
+            report: Reporter) -> HeadCameras:
+    """The cameras with respect to the head, by these of its matches (`straight`: of their pixels without the lens)."""
     names = [image.name for image in registered]
-    for step, share in enumerate(REACH):
-        report.progress(step, len(REACH), "finding the cameras with respect to the head")
+    for step, share in enumerate(REACH_WIDTH_SHARES):
+        report.progress(step, len(REACH_WIDTH_SHARES), "finding the cameras with respect to the head")
         _, tracks, bundle = agreeing(bundle, names, straight, share * width)
         alone = rebuilt(room, bundle, registered, tracks, own)
         _adjust(alone)
         bundle = _with_poses(bundle, alone, names, tracks)
-    return bundle, alone, tracks
+    return HeadCameras(bundle, alone, tracks)
 
 
 def _halves(matches: Matches, tracks: list) -> tuple[Matches, Matches]:
@@ -93,9 +102,10 @@ def _miss(bundle: Bundle, names: list[str], matches: Matches, reach_px: float) -
     return float(np.median(np.linalg.norm(placed.project(camera, point) - pixel, axis=1))) if len(pixel) else np.inf
 
 
-def _with_others(alone: pycolmap.Reconstruction, room: pycolmap.Reconstruction, everything: list, registered: list, bundle: Bundle, tracks: list,
+def _with_others(cameras: HeadCameras, room: pycolmap.Reconstruction, everything: list, registered: list,
                  own: Matches, straight: Matches) -> pycolmap.Reconstruction:
     """The model of the frames `registered` with the others of `everything`: placed by its points, or where they were in the room if they show too few."""
+    alone, bundle, tracks = cameras.model, cameras.bundle, cameras.tracks
     names = [image.name for image in registered]
     found = {image.name: pose_of(image) for image in alone.images.values()}
     points = np.array([alone.points3D[number].xyz for number in sorted(alone.points3D)])
@@ -120,8 +130,8 @@ def head_boxes(model: pycolmap.Reconstruction, head: HeadFrame) -> dict[str, tup
         if outline is not None:
             camera = room.cameras[image.camera_id]
             low, high, frame = outline.min(0), outline.max(0), np.array([camera.width, camera.height])
-            low, high = (np.clip(corner, 0, frame).astype(int) for corner in (low - AIR * (high - low), high + AIR * (high - low)))
-            if (high - low).min() >= LEAST_PX:
+            low, high = (np.clip(corner, 0, frame).astype(int) for corner in (low - AIR_SHARE * (high - low), high + AIR_SHARE * (high - low)))
+            if (high - low).min() >= LEAST_SIDE_PX:
                 outlines[image.name] = low, high, frame
     sides = np.max([high - low for low, high, _ in outlines.values()], axis=0, initial=0)
     boxes = {}

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 
-SIZE = 40
+CARRYING_FRAMES = 40
 """Frames that carry an arc around a face: some four degrees from one to the next."""
 ENOUGH = 0.5
 NEIGHBOURS = 6
@@ -31,7 +31,7 @@ Film = Sequence[tuple[str, float, float | None]]
 def size(film: Film, richness: float = 1.0) -> int:
     """How many frames carry a film: all of a short one, and of a long one twice as many, as often as needed, where each shows little. richness: the median
     frame's features as a share of what a frame may have, of which ENOUGH will do. A plain head's frames cost less, and it takes more of them."""
-    count = SIZE * 2 ** max(0, math.ceil(math.log2(ENOUGH / max(richness, 1e-3))))
+    count = CARRYING_FRAMES * 2 ** max(0, math.ceil(math.log2(ENOUGH / max(richness, 1e-3))))
     return min(len(film), count)
 
 

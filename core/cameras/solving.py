@@ -18,23 +18,24 @@ from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import faces
 from . import skeleton
-from .joint import held, refine
+from .joint import holds_every_frame, refine
 from .landmarks import find_landmarks
 from .matches import Matches
 from .mirrored import find_mirrored
 from .motion import camera_stood_still, head_masks
 from .resection import resect
 from .settled import head_boxes, settle
-from .structure import ALL_PAIRS, camera_groups, film_of, match_crops, solve_structure
+from .structure import ALL_PAIRS_FRAMES, camera_groups, film_of, match_crops, solve_structure
 from .surroundings import spread_over, surroundings_stay
 from .world import HeadFrame, find_head, head_of_one
 
-LEAST_SHARE = 0.6
+LEAST_PLACED_SHARE = 0.6
 LEAST_VIEWS = 3
 MOST_ERROR_PX = 2.0
-MOST_LANDMARK_MISS = 0.06
+"""Cameras hold when this share of the frames, and so many, are placed, with this mean reprojection error at most."""
+MOST_LANDMARK_MISS_SHARE = 0.06
 """Share of the face's width by which landmarks may miss in cameras found from them."""
-FEW = 12
+FEW_PHOTOGRAPHS = 12
 """Up to this many photographs the face's landmarks are tried before the costly features."""
 MOST_FACES = 24
 """Frames in which the face is looked for where structure from motion has found the cameras."""
@@ -48,7 +49,7 @@ class Solved:
     before its background, and whether the camera stood still then; mirrored frames that were left out; tracks that refined a model from the face,
     and whether they are enough to trust it; the matches it comes from, where more is to be made of them; whether
     after that every frame is held by what matches; swayed: the share of the error of the head's matches that went when the room had no say;
-    asked: the frames that were to be placed, where those are not all."""
+    to_place: the frames that were to be placed, where those are not all."""
 
     model: pycolmap.Reconstruction
     way: str
@@ -60,28 +61,28 @@ class Solved:
     tracks: int = 0
     refined: bool = True
     matches: Matches = field(default_factory=Matches)
-    held: bool = False
+    every_frame_held: bool = False
     swayed: float = 0.0
-    asked: tuple[FrameRecord, ...] = ()
+    to_place: tuple[FrameRecord, ...] = ()
 
 
 def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
     """Raises Problem with what is wrong, as precisely as can be told."""
     records = frames.records
-    few = len(records) <= FEW
+    few = len(records) <= FEW_PHOTOGRAPHS
     found = find_landmarks(records if few else _spread(records), capture.frames, report)
     if frames.kind == VIDEO and not few and surroundings_stay(found, capture.frames):
         asked = spread_over(records)
         report.log(f"All but the head stays where it is: the camera stood still. Only the head's own matches count, in {len(asked)} of {len(records)} frames.")
         found = find_landmarks(_spread(asked), capture.frames, report)
-        return replace(_solve(Frames(asked, frames.kind), found, capture, settings, report, stood=True), asked=asked)
+        return replace(_solve(Frames(asked, frames.kind), found, capture, settings, report, stood=True), to_place=asked)
     return _solve(frames, found, capture, settings, report)
 
 
 def _solve(frames: Frames, found: dict[str, faces.Face], capture: Capture, settings: Settings, report: Reporter, stood: bool = False) -> Solved:
     """`solve` with these frames alone and the faces in some of them; `stood`: it is known that the camera stood still while the head turned."""
     records = frames.records
-    few = len(records) <= FEW
+    few = len(records) <= FEW_PHOTOGRAPHS
     ways = {"auto": ("plain", "face", "skin", "face") if few else ("plain", "skin", "face")}.get(settings.cameras.features, (settings.cameras.features,))
     if len(records) < LEAST_VIEWS:  # a draft
         ways = ("face",)
@@ -138,13 +139,13 @@ def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Setting
             return solved
         report.log(f"The head swayed before its surroundings: what matches on it misses by {100 * (1 - left):.0f} % less on its own; its cameras are taken.")
         return replace(solved, model=model, head=find_head(model, solved.found, apart), swayed=1 - left)
-    if frames.kind != PHOTOGRAPHS or len(frames.records) > ALL_PAIRS or not (solved.way != "face" or solved.refined):
+    if frames.kind != PHOTOGRAPHS or len(frames.records) > ALL_PAIRS_FRAMES or not (solved.way != "face" or solved.refined):
         return solved
     fits = {image.name for image in solved.model.images.values() if image.has_pose}
     missing = [record for record in frames.records if record.name not in fits and record.name not in solved.mirrored]
     unknown = any(record.focal_px is None for record in frames.records)
     model = refine(solved.model, solved.found, solved.matches, unknown, report, camera_groups(missing, capture.frames))
-    return replace(solved, model=model, head=find_head(model, solved.found, apart), held=held(model))
+    return replace(solved, model=model, head=find_head(model, solved.found, apart), every_frame_held=holds_every_frame(model))
 
 
 def _by_features(skin: bool, frames: Frames, capture: Capture, found: dict, settings: Settings, report: Reporter,
@@ -171,7 +172,7 @@ def shortcoming(model: pycolmap.Reconstruction | None, frames: int) -> str | Non
     registered = model.num_reg_images() if model else 0
     if registered < LEAST_VIEWS:
         return "The frames do not fit together: no common structure was found in three of them."
-    if registered < LEAST_SHARE * frames:
+    if registered < LEAST_PLACED_SHARE * frames:
         return f"Only {registered} of {frames} frames fit together."
     error = model.compute_mean_reprojection_error()
     if error > MOST_ERROR_PX:
@@ -181,13 +182,13 @@ def shortcoming(model: pycolmap.Reconstruction | None, frames: int) -> str | Non
 
 def _by_face(records: Sequence[FrameRecord], capture: Capture, found: dict, matches: Matches, settings: Settings,
              report: Reporter) -> tuple[Solved | None, str | None]:
-    mirrored = find_mirrored(sorted(found), [], capture.frames, report, found) if len(records) <= FEW else []
+    mirrored = find_mirrored(sorted(found), [], capture.frames, report, found) if len(records) <= FEW_PHOTOGRAPHS else []
     result = resect(camera_groups(records, capture.frames), {name: face for name, face in found.items() if name not in mirrored}, matches, report)
     registered = result.model.num_reg_images() if result else 0
     if registered < min(LEAST_VIEWS, len(records)):
         without = f"A face is found in only {len(found)} of {len(records)} frames" + (f", and {', '.join(mirrored)} is mirrored" if mirrored else "")
         return None, f"{without}; the landmarks of three could have placed the cameras."
-    if result.landmark_miss > MOST_LANDMARK_MISS:
+    if result.landmark_miss > MOST_LANDMARK_MISS_SHARE:
         return None, f"The face does not look like one still face in these frames: its landmarks miss by {100 * result.landmark_miss:.0f} % of its width."
     apart = settings.cameras.interpupillary_mm / 1000
     head = find_head(result.model, found, apart) if registered > 1 else head_of_one(result.coefficients, result.landmark_px, result.landmark_miss, apart)
@@ -197,7 +198,7 @@ def _by_face(records: Sequence[FrameRecord], capture: Capture, found: dict, matc
 
 def _mirrored(frames: Frames, rest: list[str], model: pycolmap.Reconstruction, found: dict, capture: Capture, report: Reporter) -> list[str]:
     """Among photographs that did not fit, those that are mirrored."""
-    if not rest or frames.kind == VIDEO or len(rest) > 2 * FEW:
+    if not rest or frames.kind == VIDEO or len(rest) > 2 * FEW_PHOTOGRAPHS:
         return []
     trusted = sorted(image.name for image in model.images.values() if image.has_pose)
     some = [trusted[i] for i in np.unique(np.linspace(0, len(trusted) - 1, min(8, len(trusted))).round().astype(int))]
@@ -216,7 +217,7 @@ def _explained(frames: Frames, faults: list[str], found: dict, moved: bool, stoo
     """The Problem that fits best what was tried."""
     records = frames.records
     names = {record.name: record.shown for record in records}
-    mirrored = find_mirrored(sorted(names), [], capture.frames, report, found) if frames.kind != VIDEO and len(names) <= FEW else []
+    mirrored = find_mirrored(sorted(names), [], capture.frames, report, found) if frames.kind != VIDEO and len(names) <= FEW_PHOTOGRAPHS else []
     if mirrored:
         they = "is mirrored: it fits" if len(mirrored) == 1 else "are mirrored: they fit"
         return Problem(f"{', '.join(names[name] for name in mirrored)} {they} the other pictures only when flipped left to right.",

@@ -25,10 +25,11 @@ from . import skeleton
 from .colmap import CHOSEN
 from .matches import Matches, read_matches
 
-ALL_PAIRS = 40
+ALL_PAIRS_FRAMES = 40
 """Up to this many frames all pairs are matched; beyond, those near each other in the video."""
 STEPS = {"finding features": (0.0, 0.4), "matching features": (0.4, 0.6), "placing cameras": (0.6, 1.0)}
 NO_MODEL = 3
+"""Exit code of the process that looks for a structure, where it finds none."""
 
 
 def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str, seed: int, report: Reporter,
@@ -37,10 +38,10 @@ def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str,
     and all matches. `masks`: folder with NAME.png, where black hides what moves otherwise. Photographs are looked at as large as they were kept,
     though not with masks; pixels are the frames' in any case."""
     records, folder = frames.records, capture.frames
-    sequential = matching == "sequential" or (matching == "auto" and frames.kind == VIDEO and len(records) > ALL_PAIRS)
+    sequential = matching == "sequential" or (matching == "auto" and frames.kind == VIDEO and len(records) > ALL_PAIRS_FRAMES)
     with capture.workspace() as work:
         groups = camera_groups(records, folder)
-        few = frames.kind == PHOTOGRAPHS and len(records) <= ALL_PAIRS
+        few = frames.kind == PHOTOGRAPHS and len(records) <= ALL_PAIRS_FRAMES
         looked_at = groups if masks else _enlarged(groups, folder)
         name_of = {PurePosixPath(name).name: name for group in looked_at for name in group["names"]}
         job = {"images": str(folder.resolve()), "groups": looked_at, "skin": skin,

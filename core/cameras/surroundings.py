@@ -13,13 +13,13 @@ import numpy as np
 from ..contract.frame_records import FrameRecord
 from ..face import faces
 from ..imaging import images
-from .motion import LEAST, STILL, TURNED_DEG
+from .motion import LEAST_MATCHES, STILL_DIAGONAL_SHARE, TURNED_DEG
 
-SIDE = 480
+LONG_SIDE_PX = 480
 """Long side, in pixels, at which the pictures are compared."""
-CORNERS, QUALITY = 400, 0.02
+MOST_CORNERS, LEAST_QUALITY_SHARE = 400, 0.02
 """The most corners of a picture, and the least of one as a share of the best: that is one of the face's, beside which the noise of a bare wall is none."""
-MOST = 72
+MOST_FRAMES = 72
 """Frames of a film of a turning head that its cameras are solved from, spread over it: only the head tells of its motion, and every frame has the whole
 of it."""
 
@@ -37,15 +37,15 @@ def surroundings_stay(found: dict[str, faces.Face], folder: Path) -> bool:
 
 
 def spread_over(records: Sequence[FrameRecord]) -> tuple[FrameRecord, ...]:
-    """MOST of a film's frames, evenly spread, and beside them those that the texture is made from."""
-    even = set(np.unique(np.linspace(0, len(records) - 1, min(MOST, len(records))).round().astype(int)).tolist())
+    """MOST_FRAMES of a film's frames, evenly spread, and beside them those that the texture is made from."""
+    even = set(np.unique(np.linspace(0, len(records) - 1, min(MOST_FRAMES, len(records))).round().astype(int)).tolist())
     return tuple(record for i, record in enumerate(records) if i in even or record.selected)
 
 
 def _read(path: Path) -> tuple[np.ndarray, float]:
     """A picture in grey levels, small, and by how much it was scaled."""
     picture = images.read_srgb(path)
-    scale = min(1.0, SIDE / max(picture.shape[:2]))
+    scale = min(1.0, LONG_SIDE_PX / max(picture.shape[:2]))
     picture = images.resize(picture, round(scale * picture.shape[1]), round(scale * picture.shape[0]))
     return np.round(255 * np.clip(picture.mean(-1), 0, 1)).astype(np.uint8), scale
 
@@ -53,16 +53,16 @@ def _read(path: Path) -> tuple[np.ndarray, float]:
 def _share_that_stays(one: tuple, other: tuple, face: faces.Face, turned: faces.Face) -> float | None:
     """Of the corners off both heads in one picture, how many are at the same place in the other; None where there are too few."""
     (first, scale), (second, _) = one, other
-    corners = cv2.goodFeaturesToTrack(first, CORNERS, QUALITY, 4)
+    corners = cv2.goodFeaturesToTrack(first, MOST_CORNERS, LEAST_QUALITY_SHARE, 4)
     if corners is None or first.shape != second.shape:
         return None
     at = corners.reshape(-1, 2)
     off = ~_on_head(at / scale, face) & ~_on_head(at / scale, turned)
-    if off.sum() < LEAST:
+    if off.sum() < LEAST_MATCHES:
         return None
     there, found, _ = cv2.calcOpticalFlowPyrLK(first, second, corners[off], None)
     back, again, _ = cv2.calcOpticalFlowPyrLK(second, first, there, None)
-    still = np.linalg.norm((there - corners[off]).reshape(-1, 2), axis=1) < STILL * np.hypot(*first.shape)
+    still = np.linalg.norm((there - corners[off]).reshape(-1, 2), axis=1) < STILL_DIAGONAL_SHARE * np.hypot(*first.shape)
     sure = (found.ravel() > 0) & (again.ravel() > 0) & (np.linalg.norm((back - corners[off]).reshape(-1, 2), axis=1) < 1)
     return float((still & sure).mean())
 

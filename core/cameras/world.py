@@ -16,14 +16,14 @@ from ..contract.messages import Problem
 from ..face import faces
 from .landmarks import fit_rays, pupils, template_landmarks
 
-ASTRAY, ASTRAY_WIDTH = 4.0, 0.1
+ASTRAY_RATIO, ASTRAY_WIDTH_SHARE = 4.0, 0.1
 """A frame whose landmarks miss those of the others by so many times the usual, and by such a share of the face's width, shows a face that the net did
 not find: a profile, mostly."""
-SURE = 0.8
+SURE_SCORE = 0.8
 """Score of a face that was found; the net gives one that is there 0.95 and more."""
 FRONTAL_DEG = 45.0
 """Landmarks slide along the silhouette of a turned head, so frames within this yaw are taken where there are enough."""
-MOVED = 0.08
+MOVED_WIDTH_SHARE = 0.08
 """Share of the face's width by which the landmarks' rays may miss each other in a quarter of the frames before the head counts as moved."""
 
 
@@ -42,7 +42,7 @@ class HeadFrame:
     @property
     def still(self) -> bool:
         """Whether the head kept still with respect to what the cameras were found from."""
-        return self.miss <= MOVED
+        return self.miss <= MOVED_WIDTH_SHARE
 
 
 def find_head(model: pycolmap.Reconstruction, found: dict[str, faces.Face], interpupillary_m: float) -> HeadFrame:
@@ -95,7 +95,7 @@ def agreeing_faces(model: pycolmap.Reconstruction, found: dict[str, faces.Face])
 
 def _together(errors: np.ndarray, width: float) -> np.ndarray:
     """bool [N]: frames whose landmarks miss by no more than the others'; errors [N] and the face's width in pixels."""
-    good = errors <= max(ASTRAY * np.median(errors), ASTRAY_WIDTH * width)
+    good = errors <= max(ASTRAY_RATIO * np.median(errors), ASTRAY_WIDTH_SHARE * width)
     return good if good.sum() >= 2 else np.ones(len(errors), bool)
 
 
@@ -129,7 +129,7 @@ def _sure(model: pycolmap.Reconstruction, found: dict[str, faces.Face]) -> list[
     """Registered images with their faces, without those that the net hardly believes itself, where there are others: in a profile it sees a face from in
     front that is none."""
     seen = [(image, found[image.name]) for image in sorted(model.images.values(), key=lambda image: image.name) if image.has_pose and image.name in found]
-    sure = [pair for pair in seen if pair[1].score > SURE]
+    sure = [pair for pair in seen if pair[1].score > SURE_SCORE]
     return sure if len(sure) >= 2 else seen
 
 

@@ -96,7 +96,7 @@ def withdraw(capture: Capture) -> None:
         raise storage_problem(error, capture.consent) from error
 
 
-def given(capture: Capture, plan: Sending) -> bool:
+def is_given(capture: Capture, plan: Sending) -> bool:
     """Whether all that would be sent was agreed to: these pictures, from this place, to this machine, for no more credits. Damaged records count as none."""
     try:
         record = read_json(capture.consent)
@@ -110,7 +110,7 @@ def require(capture: Capture, plan: Sending) -> None:
     """Raises Problem unless it was agreed to, here or by the terminal's flag, which this records."""
     if os.environ.get(GIVEN_VARIABLE) == _place(capture):
         give(capture, plan)
-    if not given(capture, plan):
+    if not is_given(capture, plan):
         raise Problem(f"SwitchLight waits for your consent: {len(plan.frames)} frames that show a person's face would go to {service.COMPANY} ({plan.host}) "
                       f"for {service.amount(plan.credits)}. Nothing was sent.",
                       "Click Allow Sending beside the delighter, or add --send-frames in the terminal; or choose another delighter, which sends nothing.")

@@ -33,7 +33,7 @@ FOLDERS = tuple(f"{name}/-" for name in (*GROUPS, "checkpoints", "comparison", "
 
 
 @dataclass(frozen=True)
-class Group:
+class FileGroup:
     """Files of one kind that go: how many, and their size together."""
 
     label: str
@@ -46,7 +46,7 @@ class Deletion:
     """What deleting a capture does: the files that go (paths in the capture), also by kind; and the files that stay."""
 
     going: tuple[str, ...]
-    groups: tuple[Group, ...]
+    groups: tuple[FileGroup, ...]
     staying: tuple[str, ...]
 
     @property
@@ -71,7 +71,7 @@ def plan(capture: Capture) -> Deletion:
     kinds: dict[str, list[int]] = {}
     for inside, size in going.items():
         kinds.setdefault(GROUPS.get(inside.partition("/")[0], REST), []).append(size)
-    groups = sorted((Group(label, len(sizes), sum(sizes)) for label, sizes in kinds.items()), key=lambda group: -group.size)
+    groups = sorted((FileGroup(label, len(sizes), sum(sizes)) for label, sizes in kinds.items()), key=lambda group: -group.size)
     return Deletion(tuple(going), tuple(groups), tuple(staying))
 
 

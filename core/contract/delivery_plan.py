@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .capture import Capture
-from .delivery_presets import FORMATS, PICTURES, PRESETS, Format, Preset
+from .delivery_presets import FORMATS, PICTURES, PRESETS, DeliveryPreset, Format
 from .files import storage_problem
 from .messages import Problem
 from .ownership import remove_empty_folders
@@ -30,13 +30,13 @@ MADE_BY = "WildCap for Blender"
 
 
 @dataclass(frozen=True)
-class Plan:
+class DeliveryPlan:
     """`name` begins every file's name; `pictures` is 'png8', 'png16' or 'exr'; `colour` 'srgb' or 'linear'; `normals` 'opengl' or 'directx'; `unit` 'm'
     or 'cm'; `target` is the folder, `staged` what it is until it is whole; `replace`: files of an older delivery that were changed since are given up."""
 
     name: str
     what: str
-    preset: Preset
+    preset: DeliveryPreset
     format: Format
     pictures: str
     colour: str
@@ -61,7 +61,7 @@ class Plan:
         return f"{self.name}_{tile}" if several else self.name
 
 
-def plan(capture: Capture, settings: DeliverSettings) -> Plan:
+def plan(capture: Capture, settings: DeliverSettings) -> DeliveryPlan:
     """Raises Problem for choices that do not go together. What lies at the target is judged by `check_target`."""
     preset = PRESETS[settings.preset]
     format_name = preset.format if settings.format == "preset" else settings.format
@@ -82,8 +82,8 @@ def plan(capture: Capture, settings: DeliverSettings) -> Plan:
     base = Path(settings.folder).expanduser() if settings.folder else capture.exports
     target = base / f"{name}_{settings.what}_{settings.preset}_{format_name}"
     numbered = preset.numbered if settings.udim == "preset" else settings.udim == "numbered"
-    return Plan(name, settings.what, preset, format, pictures, colour, format.normals or preset.normals, format.unit or preset.unit, numbered,
-                target, target.with_name(f".{target.name}.staged"), settings.replace)
+    return DeliveryPlan(name, settings.what, preset, format, pictures, colour, format.normals or preset.normals, format.unit or preset.unit, numbered,
+                        target, target.with_name(f".{target.name}.staged"), settings.replace)
 
 
 def safe_name(text: str) -> str:
@@ -103,7 +103,7 @@ def needs(capture: Capture, what: str) -> Path:
     return mesh
 
 
-def put_in_place(plan: Plan) -> None:
+def put_in_place(plan: DeliveryPlan) -> None:
     """The staged folder gets its name; an older delivery there goes only then, but for files that others put there: those stay. Raises Problem where that
     cannot be, and then everything is as it was."""
     old = plan.target.with_name(f".{plan.target.name}.old")
@@ -123,13 +123,13 @@ def put_in_place(plan: Plan) -> None:
         raise storage_problem(error, plan.target) from error
 
 
-def discard(plan: Plan) -> None:
+def discard(plan: DeliveryPlan) -> None:
     """Removes what a delivery that did not end has left."""
     for left in [plan.staged, *plan.target.parent.glob(f".{plan.staged.name}.*.tmp")]:
         shutil.rmtree(left, ignore_errors=True)
 
 
-def check_target(plan: Plan) -> None:
+def check_target(plan: DeliveryPlan) -> None:
     """Raises Problem for a folder that no delivery has made, for files of an older delivery that somebody changed since, unless the plan replaces those,
     and for files of others that are in the way."""
     target = plan.target

@@ -16,7 +16,7 @@ F0 = ("f0", "f0", "f0")
 
 
 @dataclass(frozen=True)
-class Picture:
+class MapPicture:
     """One file of a map set. `channels` are terms of core/deliver/maps.py or the constants "0" and "1"; COLOUR is stored in the chosen colour space,
     NORMAL as OpenGL or DirectX, DATA as it is. `slot` is the input of the exported material that the file is linked to, '' for none."""
 
@@ -40,7 +40,7 @@ class Format:
 
 
 @dataclass(frozen=True)
-class Preset:
+class DeliveryPreset:
     """A target. `hint` says in one sentence how it is brought in there; `open_eyes`: it wants the head with its lids open, and no shape keys. Y is up in every
     format but USD, which says its own axis."""
 
@@ -51,7 +51,7 @@ class Preset:
     normals: str
     pictures: str
     numbered: bool
-    maps: tuple[Picture, ...]
+    maps: tuple[MapPicture, ...]
     open_eyes: bool = False
 
 
@@ -73,66 +73,66 @@ FORMATS = {
 PICTURES = {"png8": "PNG, 8 bit", "png16": "PNG, 16 bit", "exr": "EXR, half float"}
 
 PRESETS = {
-    "blender": Preset(
+    "blender": DeliveryPreset(
         "Blender", "Import it: the maps are linked; for skin with scattering, Assemble Material in this add-on.", "glb", "m", "opengl", "png16", False, (
-            Picture("{name}_albedo", ALBEDO, COLOUR, "base_color"),
-            Picture("{name}_normal", TANGENT, NORMAL, "normal"),
-            Picture("{name}_roughness", ("roughness",), DATA, "roughness"),
-            Picture("{name}_specular_level", ("level",)),
+            MapPicture("{name}_albedo", ALBEDO, COLOUR, "base_color"),
+            MapPicture("{name}_normal", TANGENT, NORMAL, "normal"),
+            MapPicture("{name}_roughness", ("roughness",), DATA, "roughness"),
+            MapPicture("{name}_specular_level", ("level",)),
         )),
-    "metahuman": Preset(
+    "metahuman": DeliveryPreset(
         "MetaHuman from Mesh", "Import it as a static mesh for a MetaHuman Identity, which wants open eyes: the head has them, and no shape keys.",
         "fbx", "cm", "directx", "png8", False, (
-            Picture("T_{name}_Color", ALBEDO, COLOUR, "base_color"),
+            MapPicture("T_{name}_Color", ALBEDO, COLOUR, "base_color"),
         ), open_eyes=True),
-    "unreal": Preset(
+    "unreal": DeliveryPreset(
         "Unreal", "Leave Flip Green Channel off; switch sRGB off for all maps but BaseColor.", "fbx", "cm", "directx", "png8", False, (
-            Picture("T_{name}_BaseColor", ALBEDO, COLOUR, "base_color"),
-            Picture("T_{name}_N", TANGENT, NORMAL, "normal"),
-            Picture("T_{name}_ORM", ("1", "roughness", "0")),
-            Picture("T_{name}_Specular", ("unreal_specular",), DATA, "specular"),
+            MapPicture("T_{name}_BaseColor", ALBEDO, COLOUR, "base_color"),
+            MapPicture("T_{name}_N", TANGENT, NORMAL, "normal"),
+            MapPicture("T_{name}_ORM", ("1", "roughness", "0")),
+            MapPicture("T_{name}_Specular", ("unreal_specular",), DATA, "specular"),
         )),
-    "unity_hdrp": Preset(
+    "unity_hdrp": DeliveryPreset(
         "Unity HDRP", "A Lit material of the type Subsurface Scattering; reflectance at normal incidence comes from its diffusion profile (IOR 1.4).",
         "fbx", "cm", "opengl", "png8", False, (
-            Picture("{name}_BaseMap", ALBEDO, COLOUR, "base_color"),
-            Picture("{name}_NormalMap", TANGENT, NORMAL, "normal"),
-            Picture("{name}_MaskMap", ("0", "1", "1", "smoothness")),
+            MapPicture("{name}_BaseMap", ALBEDO, COLOUR, "base_color"),
+            MapPicture("{name}_NormalMap", TANGENT, NORMAL, "normal"),
+            MapPicture("{name}_MaskMap", ("0", "1", "1", "smoothness")),
         )),
-    "unity_urp": Preset(
+    "unity_urp": DeliveryPreset(
         "Unity URP", "A Lit material with the workflow Specular; its smoothness is in the specular map's alpha.", "fbx", "cm", "opengl", "png8", False, (
-            Picture("{name}_BaseMap", ALBEDO, COLOUR, "base_color"),
-            Picture("{name}_BumpMap", TANGENT, NORMAL, "normal"),
-            Picture("{name}_SpecGlossMap", (*F0, "smoothness"), COLOUR),
+            MapPicture("{name}_BaseMap", ALBEDO, COLOUR, "base_color"),
+            MapPicture("{name}_BumpMap", TANGENT, NORMAL, "normal"),
+            MapPicture("{name}_SpecGlossMap", (*F0, "smoothness"), COLOUR),
         )),
-    "character_creator": Preset(
+    "character_creator": DeliveryPreset(
         "Character Creator", "Give it to Headshot's mesh mode, or as a prop with the maps in its PBR channels.", "obj", "cm", "opengl", "png8", False, (
-            Picture("{name}_Diffuse", ALBEDO, COLOUR, "base_color"),
-            Picture("{name}_Normal", TANGENT, NORMAL, "normal"),
-            Picture("{name}_Roughness", ("roughness",), DATA, "roughness"),
-            Picture("{name}_Specular", ("weight",), DATA, "specular"),
+            MapPicture("{name}_Diffuse", ALBEDO, COLOUR, "base_color"),
+            MapPicture("{name}_Normal", TANGENT, NORMAL, "normal"),
+            MapPicture("{name}_Roughness", ("roughness",), DATA, "roughness"),
+            MapPicture("{name}_Specular", ("weight",), DATA, "specular"),
         )),
-    "arnold": Preset(
+    "arnold": DeliveryPreset(
         "Arnold", "The files are named after standard_surface's parameters: specular is a weight for specular_IOR 1.4.", "fbx", "cm", "opengl", "exr", True, (
-            Picture("{name}_base_color", ALBEDO, COLOUR, "base_color"),
-            Picture("{name}_normal_camera", TANGENT, NORMAL, "normal"),
-            Picture("{name}_specular", ("weight",), DATA, "specular"),
-            Picture("{name}_specular_roughness", ("roughness",), DATA, "roughness"),
-            Picture("{name}_displacement", ("displacement",)),
+            MapPicture("{name}_base_color", ALBEDO, COLOUR, "base_color"),
+            MapPicture("{name}_normal_camera", TANGENT, NORMAL, "normal"),
+            MapPicture("{name}_specular", ("weight",), DATA, "specular"),
+            MapPicture("{name}_specular_roughness", ("roughness",), DATA, "roughness"),
+            MapPicture("{name}_displacement", ("displacement",)),
         )),
-    "redshift": Preset(
+    "redshift": DeliveryPreset(
         "Redshift", "The files are named after the Standard Material's inputs: refl_weight is for refl_ior 1.4.", "fbx", "cm", "opengl", "exr", True, (
-            Picture("{name}_base_color", ALBEDO, COLOUR, "base_color"),
-            Picture("{name}_bump_input", TANGENT, NORMAL, "normal"),
-            Picture("{name}_refl_weight", ("weight",), DATA, "specular"),
-            Picture("{name}_refl_roughness", ("roughness",), DATA, "roughness"),
-            Picture("{name}_displacement", ("displacement",)),
+            MapPicture("{name}_base_color", ALBEDO, COLOUR, "base_color"),
+            MapPicture("{name}_bump_input", TANGENT, NORMAL, "normal"),
+            MapPicture("{name}_refl_weight", ("weight",), DATA, "specular"),
+            MapPicture("{name}_refl_roughness", ("roughness",), DATA, "roughness"),
+            MapPicture("{name}_displacement", ("displacement",)),
         )),
 }
 
 HAIR = (
-    Picture("{name}_brows_mask", ("brows",)), Picture("{name}_lashes_mask", ("lashes",)), Picture("{name}_beard_mask", ("beard",)),
-    Picture("{name}_clean_albedo", ("clean.r", "clean.g", "clean.b"), COLOUR),
+    MapPicture("{name}_brows_mask", ("brows",)), MapPicture("{name}_lashes_mask", ("lashes",)), MapPicture("{name}_beard_mask", ("beard",)),
+    MapPicture("{name}_clean_albedo", ("clean.r", "clean.g", "clean.b"), COLOUR),
 )
 """What goes along with every preset where the capture has it: masks to groom hair by, and the skin below."""
 
@@ -141,7 +141,7 @@ WHAT = {
     "own_mesh": ("My Mesh", "Your own head mesh, fitted to the face, with the maps in its UVs"),
     "scan": ("Scan", "The raw scan with UVs, as filmed and as albedo"),
 }
-SCAN_MAPS = (Picture("{name}_albedo", ALBEDO, COLOUR, "base_color"), Picture("{name}_lit", ("lit.r", "lit.g", "lit.b"), COLOUR))
+SCAN_MAPS = (MapPicture("{name}_albedo", ALBEDO, COLOUR, "base_color"), MapPicture("{name}_lit", ("lit.r", "lit.g", "lit.b"), COLOUR))
 """Of the scan, whatever the preset: it has no other maps."""
 
 

@@ -67,7 +67,7 @@ def judge(root: Path, record: dict, stage: Stage, settings: Settings) -> Verdict
 
 def _hash_inputs(root: Path, record: dict, stage: Stage, settings: Settings) -> dict:
     """Content hash by name: of the capture's files that the stage reads, of what its settings name elsewhere, and of the source for the first stage."""
-    names = (*stage.reads, *stage.wishes, *(("own_head.obj", "own_head.json") if stage.name == "solve" and settings.solve.prior else ()))
+    names = (*stage.reads, *stage.optional_reads, *(("own_head.obj", "own_head.json") if stage.name == "solve" and settings.solve.prior else ()))
     found = {name: _digest(hash_artefact(root, record, name)) for name in names}
     found |= {f"{stage.name}.{name}": _digest(_hash_place(name, path)) for name, path in result_paths(getattr(settings, stage.name)).items()}
     if not stage.reads:

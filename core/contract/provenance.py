@@ -20,7 +20,7 @@ from .. import __version__
 from . import stages
 from .capture import Capture
 from .code_key import data_files
-from .delivery_plan import MADE_BY, PROVENANCE, Plan
+from .delivery_plan import MADE_BY, PROVENANCE, DeliveryPlan
 from .files import write_json
 from .hashes import hash_source, same_source
 from .settings import Settings
@@ -29,7 +29,7 @@ HERE = Path(__file__).parents[1]
 CHUNK = 1 << 22
 
 
-def collect(capture: Capture, plan: Plan, settings: Settings, tick: Callable[[], None]) -> dict:
+def collect(capture: Capture, plan: DeliveryPlan, settings: Settings, tick: Callable[[], None]) -> dict:
     """Everything but the delivered files; `tick` is called between two pieces of work and may raise to stop."""
     record = capture.read()
     return {

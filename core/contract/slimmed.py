@@ -34,10 +34,10 @@ def is_back(root: Path, entry: dict) -> bool:
 def makers(record: dict, steps: Iterable[Stage]) -> list[Stage]:
     """The stages that must run before `steps` can, for what these read was slimmed away, in the chain's order. What a step itself writes does not count."""
     gone, steps = hashes_of(record), tuple(steps)
-    wanted = {name for step in steps for name in (*step.reads, *step.wishes)}
+    wanted = {name for step in steps for name in (*step.reads, *step.optional_reads)}
     found: list[Stage] = []
     for stage in reversed(STAGES):
         if stage not in steps and any(name in gone and name in wanted for name in stage.writes):
             found.insert(0, stage)
-            wanted |= {*stage.reads, *stage.wishes}
+            wanted |= {*stage.reads, *stage.optional_reads}
     return found

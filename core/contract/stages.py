@@ -17,7 +17,7 @@ from .messages import Problem
 class Stage:
     """One step of the chain: `module`'s `run(capture, settings, report)` turns `reads` into `writes`.
 
-    `wishes` are read when they are there. `shared` names the shared settings (seed, device) the result depends on; which code and which shipped
+    `optional_reads` are read when they are there. `shared` names the shared settings (seed, device) the result depends on; which code and which shipped
     files it depends on is read from the sources (code_key.py). `on_device` says that it computes on the device, where there is another than the CPU.
     """
 
@@ -26,7 +26,7 @@ class Stage:
     reads: tuple[str, ...]
     writes: tuple[str, ...]
     module: str
-    wishes: tuple[str, ...] = field(default=())
+    optional_reads: tuple[str, ...] = field(default=())
     shared: tuple[str, ...] = field(default=())
     on_device: bool = False
 
@@ -42,21 +42,22 @@ STAGES = (
     Stage("frames", "Frames", (), ("frames/",), "core.frames"),
     Stage("cameras", "Cameras", ("frames/",), ("cameras/",), "core.cameras", shared=("seed",)),
     Stage("scan", "Scan", ("frames/", "cameras/"), ("scan.ply",), "core.scan", shared=("device",), on_device=True),
-    Stage("registration", "Head", ("frames/", "cameras/", "scan.ply"), ("head.obj", "landmarks.json"), "core.registration", wishes=("landmarks_artist.json",)),
+    Stage("registration", "Head", ("frames/", "cameras/", "scan.ply"), ("head.obj", "landmarks.json"), "core.registration",
+          optional_reads=("landmarks_artist.json",)),
     Stage("delight", "Delight", ("frames/", "cameras/", "head.obj"), ("delit/",), "core.delight", shared=("device",),
           on_device=True),
     Stage("texture", "Texture", ("frames/", "delit/", "cameras/", "head.obj"), ("texture.exr", "texture.png", "texture_confidence.exr"), "core.texture",
-          on_device=True, wishes=OPEN_EYES),
+          on_device=True, optional_reads=OPEN_EYES),
     Stage("shadow_mask", "Shadow Mask", ("delit/", "cameras/", "head.obj", "texture.exr", "texture_confidence.exr"), ("shadow_mask_auto.png",),
-          "core.shadow_mask", wishes=("texture_filmed.png", PARTS, "frames/", *OPEN_EYES)),
+          "core.shadow_mask", optional_reads=("texture_filmed.png", PARTS, "frames/", *OPEN_EYES)),
     Stage("solve", "Solve", ("texture.exr", "texture_confidence.exr", "head.obj", "shadow_mask_auto.png"),
           tuple(f"maps/{name}" for name in MAPS), "core.solve", shared=("seed",), on_device=True,
-          wishes=("shadow_mask.png", "protect_mask.png", "texture_filmed.png", PARTS, "frames/", "cameras/", "delit/", *OPEN_EYES)),
+          optional_reads=("shadow_mask.png", "protect_mask.png", "texture_filmed.png", PARTS, "frames/", "cameras/", "delit/", *OPEN_EYES)),
     Stage("upscale", "4K Maps", ("head.obj", *(f"maps/{name}" for name in MAPS)), tuple(f"maps_4k/{name}" for name in MAPS), "core.upscale",
           shared=("seed", "device"), on_device=True,
-          wishes=("texture_detail.exr", PARTS)),
+          optional_reads=("texture_detail.exr", PARTS)),
     Stage("transfer", "Delivery", ("head.obj", *(f"maps/{name}" for name in MAPS)), ("delivery/",), "core.transfer",
-          wishes=(*(f"maps_4k/{name}" for name in MAPS), "own_head.obj", "own_head.json", "scan.ply", "frames/", "cameras/")),
+          optional_reads=(*(f"maps_4k/{name}" for name in MAPS), "own_head.obj", "own_head.json", "scan.ply", "frames/", "cameras/")),
 )
 
 SLIMMED = ("frames/", "delit/")

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import spsolve
 
-from .evening import Look
+from .evening import ShadingEstimate
 
 FEATURES = ("brows", "eyes")
 SURE = 0.3  # share of a cell from which it is not asked what its shading is
@@ -28,7 +28,7 @@ def without_features(shading: np.ndarray, share: np.ndarray) -> np.ndarray:
     return completed(shading, _covered(share)).astype(np.float32)
 
 
-def without_hair(look: Look, fitted: np.ndarray, share: np.ndarray) -> Look:
+def without_hair(look: ShadingEstimate, fitted: np.ndarray, share: np.ndarray) -> ShadingEstimate:
     """The look with the fitted log-shading [h, h, 3] below hair, whose `share` of the head is [h, h], at the level at which it meets the skin around; and the
     shadow that is seen there."""
     here = look.face >= 0

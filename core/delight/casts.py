@@ -12,14 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from .evening import Look
+from .evening import ShadingEstimate
 
 RIDGE = 0.01  # of the features' mean square, against pictures whose light hardly varies
 USUAL = 0.08  # natural log units of hue from which skin is something else: lips, make-up, a burnt highlight
 LEAST = 200  # cells of skin below which nothing is said
 
 
-def without_casts(looks: list[Look], skins: list[np.ndarray]) -> list[Look]:
+def without_casts(looks: list[ShadingEstimate], skins: list[np.ndarray]) -> list[ShadingEstimate]:
     """The looks with one hue of skin in light and shade. skins: [h, h] each, above 0.5 where a look shows bare skin."""
     where = [skin > 0.5 for skin in skins]
     if sum(int(w.sum()) for w in where) < LEAST:
@@ -37,7 +37,7 @@ def without_casts(looks: list[Look], skins: list[np.ndarray]) -> list[Look]:
     return [replace(look, shading=(look.shading + (f - centre) @ slopes).astype(np.float32)) for look, f in zip(looks, features, strict=True)]
 
 
-def _features(look: Look, middle: float) -> np.ndarray:
+def _features(look: ShadingEstimate, middle: float) -> np.ndarray:
     """What light may depend on [h, h, 4]: the shading's brightness, its square, the shadow, and both."""
     bright = np.clip(look.shading.mean(-1) - middle, -2.5, 2.5)
     return np.stack([bright, bright**2, look.shadow, bright * look.shadow], -1)

@@ -24,7 +24,7 @@ LEAST = 0.05  # weight from which a texel is known
 
 
 @dataclass(frozen=True)
-class Look:
+class ShadingEstimate:
     """What the network says of one picture. box: left, top and side in pixels of the square it saw; shading [h, h, 3] natural log, shadow [h, h] in
     [0, 1] and log [h, h, 3], the picture's own at that size; face int [h, h] and bary [h, h, 3]: the head there (-1: none), if it is known."""
 
@@ -36,7 +36,7 @@ class Look:
     bary: np.ndarray | None = None
 
 
-def even_out(head: LitHead, views: list[View], looks: list[Look]) -> list[Look]:
+def even_out(head: LitHead, views: list[View], looks: list[ShadingEstimate]) -> list[ShadingEstimate]:
     """The looks of these views with shadings that agree about the head's albedo."""
     if head.mesh.uvs is None or len(looks) < 2:
         return looks
@@ -54,7 +54,7 @@ def even_out(head: LitHead, views: list[View], looks: list[Look]) -> list[Look]:
     return [_agreeing(head, replace(look, shading=look.shading + off), albedo, known) for look, off in zip(looks, level, strict=True)]
 
 
-def _opinion(surface: Unfolded, view: View, look: Look) -> tuple[np.ndarray, np.ndarray]:
+def _opinion(surface: Unfolded, view: View, look: ShadingEstimate) -> tuple[np.ndarray, np.ndarray]:
     """Log-albedo [N, 3] that a look gives the surface's points, and how far it counts [N]."""
     points, normals = surface.points, surface.normals
     towards = view.centre - points
@@ -71,7 +71,7 @@ def _opinion(surface: Unfolded, view: View, look: Look) -> tuple[np.ndarray, np.
     return values, weight
 
 
-def _agreeing(head: LitHead, look: Look, albedo: np.ndarray, known: np.ndarray) -> Look:
+def _agreeing(head: LitHead, look: ShadingEstimate, albedo: np.ndarray, known: np.ndarray) -> ShadingEstimate:
     uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
     at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * UV_SIDE
     weight = sample(known, at).reshape(look.face.shape) * (look.face >= 0)

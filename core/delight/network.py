@@ -33,7 +33,7 @@ from ..imaging import images
 from .below_hair import FEATURES, without_features, without_hair
 from .casts import without_casts
 from .contract import Delit
-from .evening import Look, even_out
+from .evening import ShadingEstimate, even_out
 from .lift import lift, lift_share
 from .lit_head import BRIGHTEST, LitHead, lit_head
 from .second_opinion import beyond, coarse, of_both
@@ -110,7 +110,7 @@ def crop(picture: np.ndarray, box: tuple[float, float, float], size: int) -> np.
     return cv2.warpAffine(np.ascontiguousarray(picture, np.float32), to_crop, (size, size), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
-def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[Look, np.ndarray]:
+def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[ShadingEstimate, np.ndarray]:
     """What the network says of a frame, and the log-shading of the fitted light at the same size."""
     pixels, _ = view.project(_landmarks(head))
     box = face_box(pixels[np.isfinite(pixels).all(1)])
@@ -127,7 +127,7 @@ def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[Look, np.
 
 
 @torch.inference_mode()
-def _look(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray, geometry: tuple = ()) -> Look:
+def _look(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray, geometry: tuple = ()) -> ShadingEstimate:
     """The mean of what the network says of a square picture and of its mirror image."""
     layers, middle = network_input(picture, *geometry)
     mirrored = layers[:, :, ::-1].copy()
@@ -137,15 +137,15 @@ def _look(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray,
     shading, shadow = net(both)
     shading, shadow = ((part[0] + part[1].flip(-1)).cpu().numpy().transpose(1, 2, 0) / 2 for part in (shading, shadow.sigmoid()))
     small = cv2.resize(images.srgb_to_linear(picture), (SIDE // 2, SIDE // 2), interpolation=cv2.INTER_AREA)
-    return Look(box, shading + middle, shadow[..., 0], np.log(np.maximum(small, DARKEST)))
+    return ShadingEstimate(box, shading + middle, shadow[..., 0], np.log(np.maximum(small, DARKEST)))
 
 
-def _seen(head: LitHead, values: np.ndarray, look: Look) -> np.ndarray:
+def _seen(head: LitHead, values: np.ndarray, look: ShadingEstimate) -> np.ndarray:
     """Values [V] of the head where a look shows it, [h, h]."""
     return interpolate(values[:, None], head.mesh.faces, look.face, look.bary)[..., 0]
 
 
-def _hull(points: np.ndarray, look: Look) -> np.ndarray:
+def _hull(points: np.ndarray, look: ShadingEstimate) -> np.ndarray:
     """The face within its landmarks [N, 2] (pixels), [h, h] in {0, 1}. Brows, eyes and lips are in it: they are few, and unlike skin."""
     side = len(look.shading)
     inside = np.zeros((side, side), np.uint8)
@@ -153,7 +153,7 @@ def _hull(points: np.ndarray, look: Look) -> np.ndarray:
     return inside.astype(np.float32)
 
 
-def _divided(srgb: np.ndarray, look: Look, fitted: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
+def _divided(srgb: np.ndarray, look: ShadingEstimate, fitted: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
     """A picture without its shading, and its shadows at its own size. Beyond the square `fitted` (of light_in_frame) is taken; without it the shading is
     that of the square's border, and nothing is said of shadows."""
     linear = images.srgb_to_linear(srgb)

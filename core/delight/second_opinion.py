@@ -13,13 +13,13 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from .evening import Look
+from .evening import ShadingEstimate
 
 FITTED = 0.8  # weight of the fitted light's answer where the two agree ...
 DOUBT = 1.0  # ... and natural log units of luminance between them at which it is half of that
 
 
-def of_both(looks: list[Look], fitted: list[np.ndarray], skins: list[np.ndarray]) -> list[Look]:
+def of_both(looks: list[ShadingEstimate], fitted: list[np.ndarray], skins: list[np.ndarray]) -> list[ShadingEstimate]:
     """The looks moved towards the fitted log-shading [h, h, 3] of each, brought to their level over bare skin (skins [h, h], above 0.5 there)."""
     apart = [(log - look.shading)[skin > 0.5] for look, log, skin in zip(looks, fitted, skins, strict=True)]
     if not sum(map(len, apart)):
@@ -48,7 +48,7 @@ def coarse(light: np.ndarray, side: int) -> np.ndarray:
     return np.log(np.maximum(cv2.resize(np.asarray(light, np.float32), (side, side), interpolation=cv2.INTER_AREA), 1e-4))
 
 
-def _towards(look: Look, log: np.ndarray) -> Look:
+def _towards(look: ShadingEstimate, log: np.ndarray) -> ShadingEstimate:
     apart = log - look.shading
     weight = FITTED / (1 + (apart.mean(-1, keepdims=True) / DOUBT) ** 2) * (look.face >= 0)[..., None]
     return replace(look, shading=(look.shading + weight * apart).astype(np.float32))

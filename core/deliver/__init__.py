@@ -12,8 +12,8 @@ from pathlib import Path
 
 from ..contract import delivery_plan, provenance, stages
 from ..contract.capture import Capture
-from ..contract.delivery_plan import PACKING, TEXTURES, Plan
-from ..contract.delivery_presets import HAIR, SCAN_MAPS, Picture
+from ..contract.delivery_plan import PACKING, TEXTURES, DeliveryPlan
+from ..contract.delivery_presets import HAIR, SCAN_MAPS, MapPicture
 from ..contract.files import replacing_folder, write_json
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
@@ -73,17 +73,17 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.figure("delivered_to", str(plan.target))
 
 
-def _pictures(plan: Plan, settings: Settings) -> list[Picture]:
+def _pictures(plan: DeliveryPlan, settings: Settings) -> list[MapPicture]:
     """The preset's pictures and what goes along. Displacement has negative values, which no PNG holds."""
     if plan.what == "scan":
         return list(SCAN_MAPS)
     base = [picture for picture in plan.preset.maps if picture.channels != ("displacement",) or plan.pictures == "exr"]
     if plan.what == "head" and settings.deliver.clean:
-        base = [Picture(p.name, tuple(c.replace("albedo.", "clean.") for c in p.channels), p.kind, p.slot) for p in base]
+        base = [MapPicture(p.name, tuple(c.replace("albedo.", "clean.") for c in p.channels), p.kind, p.slot) for p in base]
     return base + (list(HAIR) if plan.what == "head" and settings.deliver.hair else [])
 
 
-def _tiles(capture: Capture, plan: Plan, settings: Settings) -> dict[int, dict[str, Path]]:
+def _tiles(capture: Capture, plan: DeliveryPlan, settings: Settings) -> dict[int, dict[str, Path]]:
     """UV tile -> its maps by the names of maps.Sources, those that are there. Raises Problem where there is no albedo."""
     delivery = capture.delivery
     if plan.what == "scan":

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from ..contract import skin_regions
-from ..contract.delivery_plan import Plan
-from ..contract.delivery_presets import COLOUR, NORMAL, Picture
+from ..contract.delivery_plan import DeliveryPlan
+from ..contract.delivery_presets import COLOUR, NORMAL, MapPicture
 from ..contract.messages import Problem
 from ..contract.stages import advise_remaking
 from ..face import template
@@ -39,7 +39,7 @@ class Sources:
         self.size = min([size, *stored])
         self._read: dict[str, np.ndarray] = {}
 
-    def has(self, picture: Picture) -> bool:
+    def has(self, picture: MapPicture) -> bool:
         """Whether all files are there that the picture's channels come from; roughness needs none."""
         return {_file_of(term) for term in picture.channels} - {"roughness", ""} <= set(self.paths)
 
@@ -71,7 +71,7 @@ class Sources:
         return self._read[name]
 
 
-def write(picture: Picture, sources: Sources, path: Path, plan: Plan) -> None:
+def write(picture: MapPicture, sources: Sources, path: Path, plan: DeliveryPlan) -> None:
     """One file of the set, atomically. The picture's files must be there (Sources.has)."""
     bits = {"png8": 8, "png16": 16, "exr": 16}[plan.pictures]
     as_it_is = picture.channels[0].endswith((".r", ".x")) and len(picture.channels) == 3 and _file_of(picture.channels[0])
@@ -115,7 +115,7 @@ def _file_of(term: str) -> str:
     return {"level": "specular", "weight": "specular", "f0": "specular", "unreal_specular": "specular", "smoothness": "roughness"}.get(name, name)
 
 
-def _stored_alike(picture: Picture, sources: Sources, plan: Plan, name: str) -> bool:
+def _stored_alike(picture: MapPicture, sources: Sources, plan: DeliveryPlan, name: str) -> bool:
     """Whether the capture's own file is the one that is wanted: 16 bit PNG of that size, sRGB or OpenGL."""
     source = sources.paths[name]
     right = plan.colour == "srgb" if picture.kind == COLOUR else plan.normals == "opengl"

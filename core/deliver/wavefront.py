@@ -10,14 +10,14 @@ from __future__ import annotations
 from math import floor
 from pathlib import Path
 
-from ..contract.delivery_plan import Plan
+from ..contract.delivery_plan import DeliveryPlan
 
 HEAD_TILE = 1001
 LINKS = {"base_color": "map_Kd", "normal": "norm", "roughness": "map_Pr", "specular": "map_Ks"}
 """Slot -> MTL statement; norm, map_Pr and Pr are its extension for physically based materials."""
 
 
-def write(source: Path, path: Path, plan: Plan, maps: list[dict], roughness: float) -> None:
+def write(source: Path, path: Path, plan: DeliveryPlan, maps: list[dict], roughness: float) -> None:
     """`path` and its .mtl from the capture's `source` (metres, Z up, face towards -Y); `maps` are the files that were made."""
     factor = {"m": 1.0, "cm": 100.0}[plan.unit]
     tiles = sorted({entry["tile"] for entry in maps})
@@ -55,7 +55,7 @@ def _tile(corners: list[str], uvs: list[tuple[float, float]], tiles: list[int]) 
     return tile if tile in tiles else tiles[0]
 
 
-def _material(plan: Plan, tile: int, maps: list[dict], roughness: float, several: bool) -> str:
+def _material(plan: DeliveryPlan, tile: int, maps: list[dict], roughness: float, several: bool) -> str:
     linked = {entry["slot"]: entry["file"] for entry in maps if entry["tile"] == tile and entry["slot"] in LINKS}
     lines = [f"newmtl {plan.material(tile, several)}", "Kd 1 1 1", "Ni 1.4", "illum 2", f"Pr {roughness:.3f}"]
     return "\n".join([*lines, *(f"{LINKS[slot]} {file}" for slot, file in linked.items())]) + "\n"

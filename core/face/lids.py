@@ -28,7 +28,7 @@ REST_M = -0.003, 0.010  # how far an eyeball may lie behind the place that its s
 
 
 @dataclass(frozen=True)
-class Ball:
+class PosedEyeball:
     """centre [3] metres; radius in metres; gaze [3] unit; mesh: its vertices, with UVs whose distance from the middle (0.5, 0.5) grows with the angle from
     the pupil: 0.5 (angle / pi)^0.6."""
 
@@ -44,7 +44,7 @@ class OpenHead:
     the left and the right lids as vertex numbers [N], from the inner corner outwards."""
 
     skin: Mesh
-    balls: tuple[Ball, Ball]
+    balls: tuple[PosedEyeball, PosedEyeball]
     rims: tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
@@ -55,7 +55,7 @@ def open_lids(head: Mesh, openness: float, gaze: np.ndarray) -> OpenHead:
     return open_around(head, tuple(place_ball(side, *carry_ball(head, side), turn @ FORWARD) for side in (0, 1)), (openness, openness))
 
 
-def open_around(head: Mesh, balls: tuple[Ball, Ball], openness: tuple[float, float], shift: np.ndarray | float = 0.0) -> OpenHead:
+def open_around(head: Mesh, balls: tuple[PosedEyeball, PosedEyeball], openness: tuple[float, float], shift: np.ndarray | float = 0.0) -> OpenHead:
     """The closed head with its lids open around given eyeballs; openness: of the left and of the right eye; shift [V + C + P, 3] metres: what all vertices are
     moved by besides, before the lids are pushed out of the balls."""
     unit = _asset()
@@ -90,12 +90,12 @@ def carry_ball(head: Mesh, side: int) -> tuple[np.ndarray, float]:
     return moved + [0, high, 0], float(radius)
 
 
-def place_ball(side: int, centre: np.ndarray, radius: float, gaze: np.ndarray) -> Ball:
+def place_ball(side: int, centre: np.ndarray, radius: float, gaze: np.ndarray) -> PosedEyeball:
     """The eyeball of a side (0: the left one) at a place, looking along the unit vector gaze [3]."""
     unit = _asset()
     mesh, (x, y, z, size) = unit.ball_meshes[side], unit.balls[side]
     vertices = centre + (mesh.vertices - [x, y, z]) @ _towards(gaze).T * (radius / size)
-    return Ball(np.asarray(centre, np.float64), float(radius), np.asarray(gaze, np.float64), mesh.moved(vertices))
+    return PosedEyeball(np.asarray(centre, np.float64), float(radius), np.asarray(gaze, np.float64), mesh.moved(vertices))
 
 
 @cache
@@ -160,7 +160,7 @@ def belongs_to(opened: Mesh, head: Mesh) -> bool:
     return bool(np.abs(opened.vertices[:len(moving)] - head.vertices)[~moving].max() < SAME_M)
 
 
-def push_out(points: np.ndarray, ball: Ball) -> np.ndarray:
+def push_out(points: np.ndarray, ball: PosedEyeball) -> np.ndarray:
     """Points [N, 3] pushed out of the front of an eyeball, CLEAR_M away from it."""
     v = points - ball.centre
     length = np.linalg.norm(v, axis=1, keepdims=True)

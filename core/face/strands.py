@@ -41,7 +41,7 @@ class Roots:
         return Roots(self.position[kept], self.normal[kept], self.direction[kept], self.at[kept])
 
 
-class Surface:
+class SkinSurface:
     """What hairs may not enter: the nearest of a mesh's vertices stands for the skin."""
 
     def __init__(self, mesh: Mesh):
@@ -59,7 +59,7 @@ class Surface:
         return ((points - foot) * normal).sum(1), normal
 
 
-def grow(roots: Roots, length: np.ndarray, lift: np.ndarray, skin: Surface, pull: np.ndarray, clearance: np.ndarray, steps: int) -> np.ndarray:
+def grow(roots: Roots, length: np.ndarray, lift: np.ndarray, skin: SkinSurface, pull: np.ndarray, clearance: np.ndarray, steps: int) -> np.ndarray:
     """Points float32 [M, steps, 3]: each hair of `length` [M] metres leaves the skin at angle `lift` [M] radians along its root's direction, is bent by `pull`
     [M, 3] or [3] (per length of the hair), and stays `clearance` [M] metres above the skin, less near its root."""
     lift = lift[:, None]

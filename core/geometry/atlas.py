@@ -14,10 +14,11 @@ import numpy as np
 from . import raster
 from .meshes import Mesh
 
-CHECK_SIZE = 512
-FULL = 0.6
+CHECK_SIDE_TEXELS = 512
+"""Of the map on which overlaps and packing are counted: shares of a quarter of a million texels."""
+FILLED_SHARE = 0.6
 """Share of the square that charts of a face with their margins are taken to fill: decides the scale at which they are packed."""
-MOST_OVERLAP = 0.01
+MOST_OVERLAP_SHARE = 0.01
 """Share of the covered texels that may lie under two triangles: charts touch, and fans of tiny triangles fold."""
 
 
@@ -31,7 +32,7 @@ def unwrap(mesh: Mesh, size: int, gap_px: int = 2) -> Mesh:
     atlas, charts, packing = xatlas.Atlas(), xatlas.ChartOptions(), xatlas.PackOptions()
     charts.fix_winding, packing.rotate_charts = True, False  # it turns a chart by swapping u and v, which makes a mirror image of it
     packing.padding, packing.bilinear = gap_px, True
-    packing.texels_per_unit = size * np.sqrt(FULL / _areas(mesh).sum())  # a fixed resolution would leave room for a third of the texels
+    packing.texels_per_unit = size * np.sqrt(FILLED_SHARE / _areas(mesh).sum())  # a fixed resolution would leave room for a third of the texels
     atlas.add_mesh(np.ascontiguousarray(mesh.vertices - mesh.vertices.mean(0), np.float32), np.ascontiguousarray(mesh.faces, np.uint32))
     atlas.generate(charts, packing)
     _, faces, uvs = atlas[0]
@@ -71,12 +72,12 @@ def faults(mesh: Mesh) -> list[str]:
     if collapsed > 0.05:
         found.append(f"{100 * collapsed:.0f} percent of its triangles have no area in the UVs.")
     overlap = overlap_share(mesh)
-    if overlap > MOST_OVERLAP:
+    if overlap > MOST_OVERLAP_SHARE:
         found.append(f"{100 * overlap:.0f} percent of its UVs overlap.")
     return found
 
 
-def overlap_share(mesh: Mesh, size: int = CHECK_SIZE) -> float:
+def overlap_share(mesh: Mesh, size: int = CHECK_SIDE_TEXELS) -> float:
     """Share of the covered texels that lie in two triangles or more."""
     of = tiles(mesh)
     covered = doubled = 0
@@ -90,7 +91,7 @@ def overlap_share(mesh: Mesh, size: int = CHECK_SIZE) -> float:
     return float(doubled / max(covered, 1))
 
 
-def packing(mesh: Mesh, size: int = CHECK_SIZE) -> float:
+def packing(mesh: Mesh, size: int = CHECK_SIDE_TEXELS) -> float:
     """Share of the first tile that its charts cover."""
     return float((raster.rasterize_uv(mesh, size)[0] >= 0).mean())
 

@@ -18,13 +18,14 @@ from ..imaging import images
 from . import atlas, raster, surfaces
 from .meshes import Mesh, vertex_normals
 
-STRIP = 128
+STRIP_ROWS = 128
+"""Rows of a map that are worked out at once: what they need beside the map stays small, and a cancel is heard."""
 BLEED_PX = 16
 """Bleed at a map of 4096; smaller maps have less in proportion, but no less than two."""
 
 
 @dataclass(frozen=True)
-class Places:
+class TexelPartners:
     """For each texel [S, S] of a tile where its partner lies in the source's maps.
 
     uv float32 [S, S, 2] (nan: no partner), turn float32 [S, S]: the angle in radians that takes directions of the source's tangent plane to the
@@ -50,7 +51,7 @@ class Source:
         self.tangent, self.hand = surfaces.tangents(self.mesh)
 
 
-def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick: Callable[[float], None], painted: np.ndarray | None = None) -> Places:
+def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick: Callable[[float], None], painted: np.ndarray | None = None) -> TexelPartners:
     """Partners, up to `farthest` metres away, of the texels of a tile (u, v) of the target's UVs, in a map of `size`.
 
     painted bool [F]: the triangles that count (all by default). `tick` is called with the share done, per strip.
@@ -63,9 +64,9 @@ def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick:
     low, high = _rows(part, size)
     uv = np.full((size, size, 2), np.nan, np.float32)
     turn, mirrored, covered = np.zeros((size, size), np.float32), np.zeros((size, size), bool), np.zeros((size, size), bool)
-    for row in range(0, size, STRIP):
+    for row in range(0, size, STRIP_ROWS):
         tick(row / size)
-        end = min(row + STRIP, size)
+        end = min(row + STRIP_ROWS, size)
         crossing = (high >= row) & (low <= end)
         if not crossing.any():
             continue
@@ -86,30 +87,30 @@ def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick:
             flat = view[inside]
             flat[found] = values
             view[inside] = flat
-    return Places(uv, turn, mirrored, covered)
+    return TexelPartners(uv, turn, mirrored, covered)
 
 
-def bake(image: np.ndarray, at: Places) -> np.ndarray:
+def bake(image: np.ndarray, at: TexelPartners) -> np.ndarray:
     """A source map [H, W(, C)] read at the places, bicubic, [S, S(, C)] float32; the gaps filled and bled."""
     image = _matched(np.asarray(image, np.float32), at)
     height, width = image.shape[:2]
     out = np.empty((*at.covered.shape, *image.shape[2:]), np.float32)
     low, high = image.min(), image.max()
-    for row in range(0, len(out), STRIP):
-        uv = np.nan_to_num(at.uv[row:row + STRIP])
+    for row in range(0, len(out), STRIP_ROWS):
+        uv = np.nan_to_num(at.uv[row:row + STRIP_ROWS])
         x, y = uv[..., 0] * width - 0.5, (1 - uv[..., 1]) * height - 0.5
-        out[row:row + STRIP] = np.clip(cv2.remap(image, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE), low, high)  # cubic overshoots at edges
+        out[row:row + STRIP_ROWS] = np.clip(cv2.remap(image, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE), low, high)  # cubic overshoots at edges
     return bled(out, at)
 
 
-def bake_normals(packed: np.ndarray, at: Places) -> np.ndarray:
+def bake_normals(packed: np.ndarray, at: TexelPartners) -> np.ndarray:
     """A tangent space normal map [H, W, 3] packed into [0, 1], OpenGL Y+, turned from the source's tangent frames into the target's.
 
     What it tells is how the skin leaves its own smooth surface; that is kept, for the target brings a smooth surface of its own.
     """
     out = bake(packed, at)
-    for row in range(0, len(out), STRIP):
-        part = np.s_[row:row + STRIP]
+    for row in range(0, len(out), STRIP_ROWS):
+        part = np.s_[row:row + STRIP_ROWS]
         vectors = out[part] * 2 - 1
         turn, known = at.turn[part], at.known[part]
         x, y = vectors[..., 0].copy(), vectors[..., 1] * np.where(at.mirrored[part], -1, 1)
@@ -120,7 +121,7 @@ def bake_normals(packed: np.ndarray, at: Places) -> np.ndarray:
     return bled(out, at)
 
 
-def bled(image: np.ndarray, at: Places) -> np.ndarray:
+def bled(image: np.ndarray, at: TexelPartners) -> np.ndarray:
     """The map with a margin around what is known that repeats its nearest texel, and a smooth continuation of it beyond, over the rest of the tile."""
     known = at.known
     if known.all() or not known.any():
@@ -147,7 +148,7 @@ def _continued(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
     return (weighted + coarse.reshape(weighted.shape) * (1 - weight[..., None])).astype(np.float32)
 
 
-def _matched(image: np.ndarray, at: Places) -> np.ndarray:
+def _matched(image: np.ndarray, at: TexelPartners) -> np.ndarray:
     """The source map made smaller where it is finer than the target's texels, lest they skip some of it."""
     step = np.linalg.norm(np.diff(at.uv[::2], axis=1) * [image.shape[1], image.shape[0]], axis=-1)
     step = float(np.nanmedian(step)) if np.isfinite(step).any() else 1.0

@@ -20,7 +20,7 @@ from .views import View, read_views
 
 KINDS = (".png", ".jpg", ".jpeg", ".exr", ".tif", ".tiff", ".webp")
 
-SMALLEST = 8
+MOST_REDUCTION = 8
 """How many times smaller than its frame a picture may be: of a face 600 pixels wide it has 75 left, too few for a texture, enough for its tones."""
 
 
@@ -42,7 +42,7 @@ def read_picture(path: Path, view: View, what: str) -> np.ndarray:
 def check_shape(path: Path, image: np.ndarray, view: View, what: str) -> None:
     """Raises Problem where a picture [H, W, ...] has another shape than its frame, or is too small to show the same."""
     height, width = image.shape[:2]
-    if abs(width / height - view.width / view.height) > 0.01 or width * SMALLEST < view.width:
+    if abs(width / height - view.width / view.height) > 0.01 or width * MOST_REDUCTION < view.width:
         raise Problem(f"{path} is {width} x {height}, but its frame is {view.width} x {view.height}.",
                       f"{what.title()} pictures are made from the frames in the capture's frames folder, without cropping or turning them.")
 

@@ -17,12 +17,13 @@ MOST_OBJ_BYTES = 512 << 20
 """As lists of words, an OBJ takes about ten times its size while it is read: 5 GB of memory. It holds five million triangles."""
 MOST_PLY_BYTES = 2 << 30
 """A scan of 50 million triangles; as arrays of doubles and of long integers it takes about three times its size."""
-FARTHEST = 1e9
+FARTHEST_UNITS = 1e9
 """In whatever units; a head in micrometres has 3e5. What lies farther off is damage, and its volume would overflow."""
 SIZES = {"char": 1, "uchar": 1, "int8": 1, "uint8": 1, "short": 2, "ushort": 2, "int16": 2, "uint16": 2, "int": 4, "uint": 4, "int32": 4, "uint32": 4,
          "float": 4, "float32": 4, "double": 8, "float64": 8}
 """Bytes of PLY's types."""
-LONGEST_HEADER = 1 << 16
+MOST_HEADER_BYTES = 1 << 16
+"""A PLY's header is a line per property; one that has not ended by then is none."""
 EXPORT_AGAIN = "Export it again, or choose another file."
 
 
@@ -48,8 +49,8 @@ def find_fault(vertices: np.ndarray, faces: np.ndarray, uvs: np.ndarray | None, 
     for values, width, what in ((vertices, 3, "vertex"), (uvs, 2, "UV")):
         if values is not None and (values.ndim != 2 or values.shape[1] != width):
             return f"not every {what} has {width} numbers"
-        if values is not None and values.size and not (values.min() >= -FARTHEST and values.max() <= FARTHEST):  # false for NaN, too
-            return f"it has a {what} of values that are no numbers (NaN), infinite or beyond {FARTHEST:g}"
+        if values is not None and values.size and not (values.min() >= -FARTHEST_UNITS and values.max() <= FARTHEST_UNITS):  # false for NaN, too
+            return f"it has a {what} of values that are no numbers (NaN), infinite or beyond {FARTHEST_UNITS:g}"
     for indices, count, what in ((faces, len(vertices), "vertex"), (face_uvs, 0 if uvs is None else len(uvs), "UV")):
         if indices is not None and indices.size and not (indices.min() >= 0 and indices.max() < count):
             return f"a face has a {what} that is not in it"
@@ -58,7 +59,7 @@ def find_fault(vertices: np.ndarray, faces: np.ndarray, uvs: np.ndarray | None, 
 
 def check_ply(path: Path, content: bytes) -> None:
     """Raises Problem for what has no PLY's header, and for one that promises more than the file holds."""
-    end = content.find(b"end_header", 0, LONGEST_HEADER)
+    end = content.find(b"end_header", 0, MOST_HEADER_BYTES)
     if not content.startswith(b"ply") or end < 0:
         raise damaged(path, "it has no PLY's header")
     text, least = content[:end].decode("ascii", "replace"), 0

@@ -20,11 +20,11 @@ from ..contract.regular_files import require_regular
 PARAMS = {int(number): len(pycolmap.Camera.create_from_model_id(0, number, 1.0, 1, 1).params)
           for name, number in pycolmap.CameraModelId.__members__.items() if name != "INVALID"}
 """How many parameters each camera model has, by its number."""
-MOST_BYTES = 1 << 30
+MOST_MODEL_BYTES = 1 << 30
 """Of one file, binary or text; a model of 300 frames has 0.1 GB, and pycolmap takes about five times a file's size."""
 NAME_BYTES = 4096
 """The longest path that a system has."""
-LONGEST_SIDE = 1 << 16
+LONGEST_SIDE_PX = 1 << 16
 """Pixels: beyond what any picture file here may have."""
 
 
@@ -98,8 +98,8 @@ def read_model(folder: Path) -> pycolmap.Reconstruction:
         file = folder / f"{name}.{ending}"
         if not file.exists() and name not in ("cameras", "images"):
             continue
-        if file.stat().st_size > MOST_BYTES:
-            raise ValueError(f"{file.name} is larger than {MOST_BYTES >> 30} GB")
+        if file.stat().st_size > MOST_MODEL_BYTES:
+            raise ValueError(f"{file.name} is larger than {MOST_MODEL_BYTES >> 30} GB")
         if ending == "bin":
             _walk(file, record)
     try:
@@ -114,7 +114,7 @@ def read_model(folder: Path) -> pycolmap.Reconstruction:
             raise ValueError(f"the pose of {image.name} is no place")
     for number, camera in model.cameras.items():
         lengths = [camera.params[i] for i in camera.focal_length_idxs()]
-        if not (0 < camera.width <= LONGEST_SIDE and 0 < camera.height <= LONGEST_SIDE and np.isfinite(camera.params).all() and min(lengths) > 0):
+        if not (0 < camera.width <= LONGEST_SIDE_PX and 0 < camera.height <= LONGEST_SIDE_PX and np.isfinite(camera.params).all() and min(lengths) > 0):
             raise ValueError(f"the lens of camera {number} makes no sense")
     return model
 

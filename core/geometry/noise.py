@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 from scipy.spatial.transform import Rotation
 
-LATTICE = 48  # nodes per side; the noise repeats after LATTICE wavelengths
+LATTICE_NODES = 48  # nodes per side; the noise repeats after so many wavelengths
 
 
 def noise(points: np.ndarray, wavelength: float, rng: np.random.Generator, smooth: bool = False) -> np.ndarray:
@@ -16,9 +16,9 @@ def noise(points: np.ndarray, wavelength: float, rng: np.random.Generator, smoot
 
     `smooth` takes cubic B-splines (for few points or large features), otherwise faded linear interpolation (eight times faster).
     """
-    lattice = rng.standard_normal((LATTICE,) * 3).astype(np.float32)
+    lattice = rng.standard_normal((LATTICE_NODES,) * 3).astype(np.float32)
     turn = Rotation.random(random_state=rng).as_matrix().astype(np.float32)  # hides the lattice's axes
-    at = (points.astype(np.float32) @ (turn / np.float32(wavelength))).T + rng.uniform(0, LATTICE, (3, 1)).astype(np.float32)
+    at = (points.astype(np.float32) @ (turn / np.float32(wavelength))).T + rng.uniform(0, LATTICE_NODES, (3, 1)).astype(np.float32)
     if smooth:
         return map_coordinates(lattice, at, np.float32, order=3, mode="grid-wrap", prefilter=False) * np.float32(3.03)  # 1 / mean deviation
     node = np.floor(at)

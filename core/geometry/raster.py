@@ -16,7 +16,7 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 from .meshes import Mesh
 from .views import View
 
-BENT = 0.01
+BENT_SIDE_SHARE = 0.01
 """Share of a picture's sides by which a lens may bend a mesh's edge out of the box of its vertices."""
 
 
@@ -114,7 +114,7 @@ def _box(mesh: Mesh, view: View, width: int, height: int) -> tuple[slice, slice]
     if not np.isfinite(pixels).all():
         return slice(0, height), slice(0, width)
     low, high = (edge * [width / view.width, height / view.height] for edge in (pixels.min(0), pixels.max(0)))
-    (left, top), (right, bottom) = np.floor(low - BENT * (width + height)), np.ceil(high + BENT * (width + height))
+    (left, top), (right, bottom) = np.floor(low - BENT_SIDE_SHARE * (width + height)), np.ceil(high + BENT_SIDE_SHARE * (width + height))
     return tuple(slice(int(np.clip(first, 0, size)), int(np.clip(end, 0, size))) for first, end, size in ((top, bottom, height), (left, right, width)))
 
 

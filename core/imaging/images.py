@@ -11,6 +11,7 @@ from __future__ import annotations
 import errno
 import shutil
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -21,7 +22,7 @@ from ..contract.files import replacing
 from ..contract.messages import Problem
 from ..contract.stages import advise_remaking
 from . import heif
-from .checks import MOST_BYTES, SAVE_ANEW, check_written, open_picture, read_pixels
+from .checks import MOST_PICTURE_BYTES, SAVE_ANEW, check_written, open_picture, read_pixels
 
 EXIF = {heif.FOCAL_LENGTH: "FocalLength", heif.FOCAL_35MM: "FocalLengthIn35mmFilm", heif.PLANE_RESOLUTION: "FocalPlaneXResolution",
         heif.PLANE_UNIT: "FocalPlaneResolutionUnit", heif.WIDTH: "PixelXDimension", heif.HEIGHT: "PixelYDimension"}
@@ -33,8 +34,20 @@ QUICK = {"level": 1, "filter": 0x20}
 """zlib's level and libpng's filter (each row less the one above it) of pictures that are not shipped: of what was tried on the solved maps
 (`python -m benchmarks.png_levels`) the quickest that is hardly larger than libpng's own choice of filters."""
 
-ROWS = 256
+ROWS_BETWEEN_CHECKS = 256
 """Rows that are encoded between two looks at a cancel: 0.3 s of a map of 4096; a multiple of what EXR packs together (16)."""
+
+
+@dataclass(frozen=True)
+class _Encoding:
+    """How pixels are stored. kind: uint8, uint16 or half; colour_space: OpenImageIO's name of it; quality: of a JPEG, in percent; straight: the fourth channel
+    multiplies no colour; small: packed as tightly as it goes."""
+
+    kind: str
+    colour_space: str
+    quality: int = 92
+    straight: bool = False
+    small: bool = False
 
 
 def _never() -> None:
@@ -128,7 +141,7 @@ def read_profile(path: Path) -> str:
 def write_packed(path: Path, channels: np.ndarray, bits: int = 8, srgb: bool = False) -> None:
     """Four channels [H, W, 4] in [0, 1] that have nothing to do with each other, to PNG or EXR, atomically: no colour is multiplied or divided by the
     fourth, as happens to what is written as a picture with alpha. `srgb`: the first three are colours encoded so."""
-    _write(path, channels, "half" if _is_linear(path) else f"uint{bits}", "sRGB" if srgb else "raw", straight=True)
+    _write(path, channels, _Encoding("half" if _is_linear(path) else f"uint{bits}", "sRGB" if srgb else "raw", straight=True))
 
 
 def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8, quality: int = 92, small: bool = False, check: Callable[[], None] = _never) -> None:
@@ -138,17 +151,17 @@ def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8, quality: int = 92, s
     `check` may raise to cancel, every few rows; then nothing is written.
     """
     check_written(Path(path), np.asarray(srgb), half=False)  # clipped, infinity would be white
-    _write(path, np.clip(srgb, 0, 1), f"uint{bits}", "sRGB", quality, small=small, check=check)
+    _write(path, np.clip(srgb, 0, 1), _Encoding(f"uint{bits}", "sRGB", quality, small=small), check)
 
 
 def write_linear(path: Path, linear: np.ndarray, small: bool = False, check: Callable[[], None] = _never) -> None:
     """Linear [H, W, C] to a half-float ZIP EXR, or in [0, 1] to a 16 bit PNG, atomically."""
-    _write(path, linear, "half" if _is_linear(path) else "uint16", "lin_srgb", small=small, check=check)
+    _write(path, linear, _Encoding("half" if _is_linear(path) else "uint16", "lin_srgb", small=small), check)
 
 
 def write_data(path: Path, data: np.ndarray, bits: int = 8, small: bool = False, check: Callable[[], None] = _never) -> None:
     """Data [H, W] or [H, W, C] in [0, 1] to PNG (8 or 16 bit), or to a half-float EXR, atomically; no colour space."""
-    _write(path, data, "half" if _is_linear(path) else f"uint{bits}", "raw", small=small, check=check)
+    _write(path, data, _Encoding("half" if _is_linear(path) else f"uint{bits}", "raw", small=small), check)
 
 
 def resize(image: np.ndarray, width: int, height: int) -> np.ndarray:
@@ -167,33 +180,32 @@ def _rgb(pixels: np.ndarray) -> np.ndarray:
 
 def _read(path: Path) -> np.ndarray:
     if heif.is_heif(path):
-        return heif.read_pixels(path, MOST_BYTES)
+        return heif.read_pixels(path, MOST_PICTURE_BYTES)
     pixels, turned = read_pixels(Path(path))
     lying, rows, columns = TURNS.get(turned, TURNS[1])
     return np.ascontiguousarray((pixels.swapaxes(0, 1) if lying else pixels)[::rows, ::columns])
 
 
-def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str, quality: int = 92, straight: bool = False, small: bool = False,
-           check: Callable[[], None] = _never) -> None:
+def _write(path: Path, pixels: np.ndarray, encoding: _Encoding, check: Callable[[], None] = _never) -> None:
     path = Path(path)
     pixels = np.ascontiguousarray(pixels if pixels.ndim == 3 else pixels[..., None], np.float32)
-    check_written(path, pixels, kind == "half")
+    check_written(path, pixels, encoding.kind == "half")
     height, width, channels = pixels.shape
-    spec = oiio.ImageSpec(width, height, channels, kind)
-    spec.attribute("oiio:ColorSpace", colour_space)
-    if straight:
+    spec = oiio.ImageSpec(width, height, channels, encoding.kind)
+    spec.attribute("oiio:ColorSpace", encoding.colour_space)
+    if encoding.straight:
         spec.attribute("oiio:UnassociatedAlpha", 1)
     spec.attribute("DateTime", "2000:01:01 00:00:00")  # an EXR would carry the hour, and the same pixels would not be the same file
     if _is_linear(path):
-        spec.attribute("compression", "dwaa:45" if small else "zip")
+        spec.attribute("compression", "dwaa:45" if encoding.small else "zip")
     elif path.suffix.lower() in (".jpg", ".jpeg"):
-        spec.attribute("Compression", f"jpeg:{quality}")
+        spec.attribute("Compression", f"jpeg:{encoding.quality}")
     else:
-        spec.attribute("png:compressionLevel", 9 if small else QUICK["level"])
-        if not small:
+        spec.attribute("png:compressionLevel", 9 if encoding.small else QUICK["level"])
+        if not encoding.small:
             spec.attribute("png:filter", QUICK["filter"])
     with replacing(path) as temporary:
-        _need_space(temporary.parent, pixels.size * (1 if kind == "uint8" else 2))
+        _need_space(temporary.parent, pixels.size * (1 if encoding.kind == "uint8" else 2))
         output = oiio.ImageOutput.create(str(temporary))
         if output is None or not output.open(str(temporary), spec) or not _write_rows(output, pixels, check) or not output.close():
             error = (output.geterror() if output else oiio.geterror()) or "unknown error"
@@ -208,9 +220,9 @@ def _write(path: Path, pixels: np.ndarray, kind: str, colour_space: str, quality
 
 def _write_rows(output: oiio.ImageOutput, pixels: np.ndarray, check: Callable[[], None]) -> bool:
     """Whether all rows could be written. A map of 4096 takes seconds, so `check` is asked in between."""
-    for row in range(0, len(pixels), ROWS):
+    for row in range(0, len(pixels), ROWS_BETWEEN_CHECKS):
         check()
-        if not output.write_scanlines(row, min(row + ROWS, len(pixels)), 0, pixels[row:row + ROWS]):
+        if not output.write_scanlines(row, min(row + ROWS_BETWEEN_CHECKS, len(pixels)), 0, pixels[row:row + ROWS_BETWEEN_CHECKS]):
             return False
     return True
 

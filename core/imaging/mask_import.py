@@ -12,7 +12,7 @@ from ..contract.messages import Problem
 from ..contract.settings import Settings
 from . import images
 
-MOST_STRETCH = 1.02
+MOST_STRETCH_RATIO = 1.02
 """How much more a mask may grow one way than the other: a pixel lost to rounding at 64 texels, not a picture of another shape."""
 
 
@@ -29,7 +29,7 @@ def import_mask(capture: Capture, picture: Path) -> Path:
     mask = images.read_mask(picture)
     width, height = _texture_size(capture)
     across, down = mask.shape[1] / width, mask.shape[0] / height
-    if max(across, down) > MOST_STRETCH * min(across, down):
+    if max(across, down) > MOST_STRETCH_RATIO * min(across, down):
         raise Problem(f"{picture} is {mask.shape[1]} x {mask.shape[0]}, but the texture is {width} x {height}: it would be stretched.",
                       "Paint the mask on the capture's texture.png, without cropping it.")
     if mask.shape != (height, width):

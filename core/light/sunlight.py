@@ -54,6 +54,16 @@ class Light:
         return bool(self.colour.max() > 0)
 
 
+@dataclass(frozen=True)
+class _SkinPoints:
+    """Points of skin: linear colours [N, 3] and their natural logarithm, transfer [N, 9] and weights [N]."""
+
+    colours: np.ndarray
+    log: np.ndarray
+    transfer: np.ndarray
+    weights: np.ndarray
+
+
 def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray, reaches: Callable[[np.ndarray], np.ndarray],
               weights: np.ndarray, step: Callable[[int, int], None] = lambda done, of: None) -> tuple[Light, np.ndarray, np.ndarray]:
     """The light that explains linear skin colours [N, 3] at points with unit normals [N, 3], transfer [N, 9] and weights [N].
@@ -61,8 +71,8 @@ def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray, re
     `reaches(direction)` -> [N] in [0, 1]: whether the head itself lets light from there through. `step` hears of progress.
     Returns the light, the posterior [N] that the sun reaches a point, and that a point is explained at all (an inlier) [N].
     """
-    log = np.log(np.maximum(colours, 1e-4))
-    best = _expectation_maximisation(log, colours, transfer, np.zeros(len(colours)), np.zeros(len(colours)), weights)
+    skin = _SkinPoints(colours, np.log(np.maximum(colours, 1e-4)), transfer, weights)
+    best = _expectation_maximisation(skin, np.zeros(len(colours)), np.zeros(len(colours)))
     none = best
     best_direction = np.array([0.0, 0.0, 1.0])
     candidates = fibonacci_sphere(160)
@@ -73,13 +83,13 @@ def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray, re
         for i, direction in enumerate(candidates):
             step(i, len(candidates))
             cosine = np.maximum(normals @ direction, 0)
-            found = _expectation_maximisation(log, colours, transfer, cosine, reaches(direction), weights, best[5] if spread else None)
+            found = _expectation_maximisation(skin, cosine, reaches(direction), best[5] if spread else None)
             if found[0] > best[0]:
                 best, best_direction = found, direction
     if best[0] - none[0] <= SUN_GAIN * weights.sum():
         best, best_direction = none, np.array([0.0, 0.0, 1.0])
     cosine, visible = (np.maximum(normals @ best_direction, 0), reaches(best_direction)) if best is not none else (np.zeros(len(colours)),) * 2
-    _, environment, sun, reached, inlier, _ = _expectation_maximisation(log, colours, transfer, cosine, visible, weights, best[5], iterations=30)
+    _, environment, sun, reached, inlier, _ = _expectation_maximisation(skin, cosine, visible, best[5], iterations=30)
     ambient = transfer @ environment
     return Light(environment, best_direction, sun, FLOOR * np.median(ambient, 0)), reached, inlier
 
@@ -103,8 +113,9 @@ def _around(direction: np.ndarray, spread: float) -> np.ndarray:
     return np.array([d / np.linalg.norm(d) for d in rings])
 
 
-def _expectation_maximisation(log, colours, transfer, cosine, visible, weights, start=None, iterations: int = 12):
+def _expectation_maximisation(skin: _SkinPoints, cosine: np.ndarray, visible: np.ndarray, start=None, iterations: int = 12):
     """-> (log likelihood, environment [9, 3], sun colour [3], reached [N], inlier [N], responsibilities to start another fit from)."""
+    log, colours, transfer, weights = skin.log, skin.colours, skin.transfer, skin.weights
     count = len(colours)
     prior = 0.03 + 0.67 * visible * (cosine > 0)  # that the sun reaches a point
     # a first guess of the two states: the sky gives the darker skin its colour, sky and sun the brightest

@@ -53,7 +53,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     subject = _subject(landmarks.with_artists(landmarks.onto_surface(found, views, surface), given), report)
     photographs = read_frames(capture).kind == PHOTOGRAPHS
     try:
-        head = _by_scan(capture, settings, views, surface, subject, quality.ENOUGH_SHARE if photographs else quality.LEAST_SHARE, report)
+        head = _by_scan(capture, settings, views, surface, subject, quality.LEAST_SHARE_OF_PHOTOGRAPHS if photographs else quality.LEAST_FOLLOWED_SHARE, report)
         if photographs:
             quality.tell_draft(report, views, head)
     except quality.Unlike as problem:
@@ -69,7 +69,7 @@ class Subject:
     `weights_of` gives them, without the lids where the eyes are open; trust [468]."""
 
     found: landmarks.Landmarks
-    model: alignment.Model
+    model: alignment.HeadModel
     follow: np.ndarray
     shaped: np.ndarray
     hold: np.ndarray
@@ -92,12 +92,12 @@ def _by_views(capture: Capture, settings: Settings, views: list[View], subject: 
     model, found = subject.model, subject.found
     seen = np.max([subject.follow, *(strength * _per_vertex(model.mesh, template.mask(name, 512)) for name, strength in SEEN.items())], axis=0)
     points = _on_skin(unscanned.Points(*read_points(capture)), views, subject, report)
-    fitted = unscanned.fit(model, views, found, subject.trust, points, seen, report, 10, 0.9 * STEPS)
+    fitted = unscanned.fit(model, unscanned.ShownByViews(views, found, subject.trust, points, seen), report, 10, 0.9 * STEPS)
     placed = model.mesh.moved(fitted.pose.apply(model.mesh.vertices))
     vertices = intersections.mended(placed, fitted.vertices, lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
     vertices = bust.level_edge(model.mesh, vertices)
     head, aligned = model.mesh.moved(vertices), model.mesh.moved(fitted.pose.apply(model.shape(fitted.coefficients)))
-    quality.figures(report, model, aligned, head, found, fitted.coefficients, np.zeros(0), subject.follow)
+    quality.figures(report, model, quality.HeadFit(head, aligned, fitted.coefficients, np.zeros(0)), found, subject.follow)
     quality.figures_of_views(report, fitted, views, head)
     quality.judge_views(report, views, head, fitted)
     quality.tell_draft(report, views, head)
@@ -111,13 +111,13 @@ def _on_skin(points: unscanned.Points, views: list[View], subject: Subject, repo
     pose, coefficients = alignment.fit_landmarks(subject.model, subject.found.points, subject.trust)
     head = subject.model.mesh.moved(pose.apply(subject.model.shape(coefficients)))
     share = np.nan_to_num(hair.hidden_share(points.places, points.towards, views, head, report))
-    return unscanned.Points(points.places[share <= hair.HAIR], points.towards[share <= hair.HAIR])
+    return unscanned.Points(points.places[share <= hair.HAIR_SHARE], points.towards[share <= hair.HAIR_SHARE])
 
 
 def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: meshes.Mesh, subject: Subject, least_share: float,
              report: Reporter) -> meshes.Mesh:
     found, model = subject.found, subject.model
-    follow, shaped, hold, trust = subject.follow, subject.shaped, subject.hold, subject.trust
+    follow, shaped, trust = subject.follow, subject.shaped, subject.trust
     report.progress(10, STEPS, "placing the head")
     pose, coefficients = alignment.fit_landmarks(model, found.points, trust)
     report.progress(12, STEPS, "telling hair from skin")
@@ -125,14 +125,16 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
     report.progress(15, STEPS, "finding the nearest head")
     pose, coefficients = alignment.fit_scan(model, pose, coefficients, found.points, trust, scan, shaped)
     start = pose.apply(model.shape(coefficients))
-    vertices = nonrigid.fit(model, start, scan, follow, hold, found.points, trust, settings.registration.iterations, report, 20, 0.9 * STEPS, found.put)
+    targets = nonrigid.LandmarkTargets(found.points, trust, subject.hold, found.put)
+    vertices = nonrigid.fit(model, start, scan, follow, targets, settings.registration.iterations,
+                            lambda share: report.progress(20 + (0.9 * STEPS - 20) * share, 0.9 * STEPS, "fitting the head to the scan"))
     placed = model.mesh.moved(pose.apply(model.mesh.vertices))
     vertices = intersections.mended(placed, vertices, lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
     vertices = bust.level_edge(model.mesh, vertices)  # last: where folds are smoothed at the edge, it would bend again
 
     head, aligned = model.mesh.moved(vertices), model.mesh.moved(start)
     distances = scan.distances(vertices[follow > 0.5], meshes.vertex_normals(head)[follow > 0.5])
-    quality.figures(report, model, aligned, head, found, coefficients, distances, follow)
+    quality.figures(report, model, quality.HeadFit(head, aligned, coefficients, distances), found, follow)
     quality.judge(report, head, scan, distances, follow, least_share)
     _finish(capture, settings, views, head, subject, report)
     return head
@@ -155,18 +157,18 @@ def _finish(capture: Capture, settings: Settings, views: list[View], head: meshe
     images.write_srgb(capture.picture("registration", "wireframe"), drawing.overlay(drawing.three_views(views, found), head, found))
 
 
-def load_model() -> alignment.Model:
+def load_model() -> alignment.HeadModel:
     """The built-in head with its identity space and landmarks."""
     face, bary = template.landmarks()
-    return alignment.Model(template.load(), template.identity(), face, bary, template.landmark_weights())
+    return alignment.HeadModel(template.load(), template.identity(), face, bary, template.landmark_weights())
 
 
-def trusting(model: alignment.Model, put: np.ndarray) -> alignment.Model:
+def trusting(model: alignment.HeadModel, put: np.ndarray) -> alignment.HeadModel:
     """The model with full weight on the landmarks [468] that the artist has put, the net's worst among them."""
     return replace(model, landmark_weight=np.where(put, 1.0, model.landmark_weight))
 
 
-def weights_of(model: alignment.Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def weights_of(model: alignment.HeadModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """follow [V] and shaped [V] in [0, 1]: how far the scan is believed at a vertex, by the last fit and by the identity's;
     hold [468]: how much longer a landmark counts than the others."""
     follow = _per_vertex(model.mesh, template.mask(FOLLOWED, 512))

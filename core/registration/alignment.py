@@ -18,6 +18,8 @@ from .correspondence import Scan, trimmed
 LANDMARK_SIGMA_M = 0.002
 SCAN_SIGMA_M = 0.002
 """No scan is that bad: this is how near the identity space comes to a person."""
+SCAN_ROUNDS = 15
+"""Gauss-Newton steps towards the scan; the reach shrinks over them."""
 INDEPENDENT = {"landmarks": 120, "scan": 100}
 """How many of each count as independent; neighbours err together, and a brow must not slide up a smooth forehead."""
 
@@ -33,7 +35,7 @@ class Similarity:
 
 
 @dataclass(frozen=True)
-class Model:
+class HeadModel:
     """The template's part of a fit: mesh, identity [K, V, 3], landmark anchors (face [468], bary [468, 3]) and their weights [468]."""
 
     mesh: Mesh
@@ -62,7 +64,7 @@ def similarity(source: np.ndarray, target: np.ndarray, weights: np.ndarray) -> S
     return Similarity(float(scale), rotation, b - scale * rotation @ a)
 
 
-def fit_landmarks(model: Model, points: np.ndarray, trust: np.ndarray, rounds: int = 12) -> tuple[Similarity, np.ndarray]:
+def fit_landmarks(model: HeadModel, points: np.ndarray, trust: np.ndarray, rounds: int = 12) -> tuple[Similarity, np.ndarray]:
     """Similarity and coefficients [K] that lay the model's landmarks over points [468, 3] (nan: unknown)."""
     known, weights = _usable(model, points, trust)
     coefficients = np.zeros(len(model.identity))
@@ -76,15 +78,15 @@ def fit_landmarks(model: Model, points: np.ndarray, trust: np.ndarray, rounds: i
     return pose, coefficients
 
 
-def fit_scan(model: Model, pose: Similarity, coefficients: np.ndarray, points: np.ndarray, trust: np.ndarray,
-             scan: Scan, shaped: np.ndarray, rounds: int = 15) -> tuple[Similarity, np.ndarray]:
+def fit_scan(model: HeadModel, pose: Similarity, coefficients: np.ndarray, points: np.ndarray, trust: np.ndarray,
+             scan: Scan, shaped: np.ndarray) -> tuple[Similarity, np.ndarray]:
     """As fit_landmarks, with point-to-plane distances of the vertices (weights shaped [V] in [0, 1]) to the scan."""
     index = np.flatnonzero(shaped > 0.05)
     index = index[:: max(1, len(index) // 4000)]
-    for step in range(rounds):
+    for step in range(SCAN_ROUNDS):
         vertices = pose.apply(model.shape(coefficients))
         normals = vertex_normals(model.mesh.moved(vertices))[index]
-        reach = np.interp(step, [0, rounds - 1], [0.030, 0.010])  # the identity space is no closer to a person than this
+        reach = np.interp(step, [0, SCAN_ROUNDS - 1], [0.030, 0.010])  # the identity space is no closer to a person than this
         signed, scan_normals = scan.match(vertices[index], normals, 1.5 * reach)
         weight = trimmed(signed, reach) * shaped[index]
         weight *= min(1.0, INDEPENDENT["scan"] / max(weight.sum(), 1)) / SCAN_SIGMA_M ** 2
@@ -92,7 +94,7 @@ def fit_scan(model: Model, pose: Similarity, coefficients: np.ndarray, points: n
     return pose, coefficients
 
 
-def _usable(model: Model, points: np.ndarray, trust: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _usable(model: HeadModel, points: np.ndarray, trust: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     known = np.isfinite(points).all(1) & (trust * model.landmark_weight > 0)
     return known, (trust * model.landmark_weight)[known]
 

@@ -9,9 +9,10 @@ from scipy.spatial import cKDTree
 
 from ..geometry.meshes import Mesh
 
-REACH = 0.2
+REACH_WIDTH_SHARE = 0.2
 """Share of the edge's width over which the skin above it follows: 2 cm on a neck of 10."""
 NEIGHBOURS = 6
+"""Vertices of the edge whose shifts a vertex above it follows, the nearer the more."""
 
 
 def level_edge(mesh: Mesh, vertices: np.ndarray) -> np.ndarray:
@@ -23,7 +24,7 @@ def level_edge(mesh: Mesh, vertices: np.ndarray) -> np.ndarray:
     middle = border.mean(0)
     normal = np.linalg.svd(border - middle)[2][2]
     moves = -((border - middle) @ normal)[:, None] * normal
-    reach = REACH * 2 * float(np.linalg.norm(border - middle, axis=1).mean())
+    reach = REACH_WIDTH_SHARE * 2 * float(np.linalg.norm(border - middle, axis=1).mean())
     distance, nearest = cKDTree(border).query(vertices, NEIGHBOURS, distance_upper_bound=reach)
     near = np.isfinite(distance[:, 0])
     weight = 1 / np.maximum(distance[near], 1e-4 * reach) ** 2

@@ -16,7 +16,8 @@ from ..contract.messages import Reporter
 from .alignment import similarity
 
 MOST_CENTRES = 2000
-ROUND = 0.06
+"""Places that a field of shifts is interpolated from: its matrix of doubles is of that side, 32 MB."""
+ROUND_RADIUS_SHARE = 0.06
 """Deviation from a sphere, as a share of its radius, below which a part is a ball."""
 
 
@@ -68,4 +69,4 @@ def _is_ball(points: np.ndarray) -> bool:
     centre = solution[:3]
     distance = np.linalg.norm(points - centre, axis=1)
     radius = np.median(distance)
-    return bool(np.std(distance) < ROUND * radius and np.ptp(points, axis=0).min() > radius)
+    return bool(np.std(distance) < ROUND_RADIUS_SHARE * radius and np.ptp(points, axis=0).min() > radius)

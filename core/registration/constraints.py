@@ -14,10 +14,10 @@ from scipy.spatial import cKDTree
 
 from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.views import View
-from .alignment import Model
+from .alignment import HeadModel
 from .landmarks import Landmarks
 
-TURNED_AWAY, SQUARE = 0.15, 0.45
+LEAST_COSINE, FULL_COSINE = 0.15, 0.45
 """Cosines between a landmark's normal and its view: below the first it has slid onto the outline and says nothing, from the second on it counts fully."""
 DEPTH_SHARE = 0.06
 """What a depth taken from the mean head counts for beside a landmark's place in the picture: people differ from it by a centimetre, and a net's mark errs by
@@ -49,7 +49,7 @@ def joined(parts: list[Constraints]) -> Constraints:
     return Constraints(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Constraints)))
 
 
-def from_landmarks(model: Model, vertices: np.ndarray, views: list[View], found: Landmarks, trust: np.ndarray, reach: float) -> Constraints:
+def from_landmarks(model: HeadModel, vertices: np.ndarray, views: list[View], found: Landmarks, trust: np.ndarray, reach: float) -> Constraints:
     """Two constraints per view and landmark that is seen squarely enough; trust [468]. What misses by much more than `reach` metres counts for little.
     A single view does not tell depths, so there each landmark is also held, loosely, to the depth that it was lifted to."""
     at = model.at_landmarks(vertices)
@@ -64,7 +64,7 @@ def from_landmarks(model: Model, vertices: np.ndarray, views: list[View], found:
         rays = view.rays(pixels)
         towards = view.centre - at
         towards /= np.linalg.norm(towards, axis=1, keepdims=True)
-        facing = np.clip(((normals * towards).sum(1) - TURNED_AWAY) / (SQUARE - TURNED_AWAY), 0, 1)
+        facing = np.clip(((normals * towards).sum(1) - LEAST_COSINE) / (FULL_COSINE - LEAST_COSINE), 0, 1)
         weight = facing * used * trust * model.landmark_weight
         index = np.flatnonzero(weight > 0.01)
         along = ((at - view.centre) * rays).sum(1, keepdims=True)

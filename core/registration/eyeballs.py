@@ -18,7 +18,7 @@ from ..face import lids
 from ..geometry.meshes import Mesh
 from ..geometry.views import View
 from .landmarks import Landmarks
-from .lid_marks import Rims, lift, usable
+from .lid_marks import LidMarks, lift, usable
 
 RIM_SIGMA_M, IRIS_SIGMA_M = 0.0006, 0.0010
 """How well an edge's mark tells where the eyeball ends, and the iris where its front is."""
@@ -52,7 +52,7 @@ class OpenEyes:
                      for ball, openness, iris, views in zip(self.opened.balls, self.openness, self.iris_radius, self.measured, strict=True))
 
 
-def lift_rims(views: list[View], found: Landmarks) -> tuple[Rims | None, Rims | None]:
+def lift_rims(views: list[View], found: Landmarks) -> tuple[LidMarks | None, LidMarks | None]:
     """The edges of the left and the right lids, from the frames that see each of them well."""
     seen = [view for view in views if view.name in found.eyes]
     rims = []
@@ -71,7 +71,7 @@ def figures(report: Reporter, eyes: OpenEyes) -> None:
         report.figure(f"{name}_iris_radius_mm", round(1e3 * float(radius), 2) if np.isfinite(radius) else None)
 
 
-def fit(head: Mesh, rims: tuple[Rims | None, Rims | None], opening: float) -> OpenEyes:
+def fit(head: Mesh, rims: tuple[LidMarks | None, LidMarks | None], opening: float) -> OpenEyes:
     """head: closed, in the template's topology; rims of the left and the right eye, where they could be lifted; opening: height over width of the eyes, for one
     that could not."""
     head = _with_corners(head, rims)
@@ -102,7 +102,7 @@ def _with_corners(head: Mesh, rims: tuple) -> Mesh:
     return replace(head, vertices=vertices)
 
 
-def _place(head: Mesh, side: int, found: Rims | None) -> lids.Ball:
+def _place(head: Mesh, side: int, found: LidMarks | None) -> lids.PosedEyeball:
     """The eyeball whose surface the edges of the lids lie on, and on whose front the iris does; by least squares, under what the head around tells."""
     centre, radius = lids.carry_ball(head, side)
     if found is None:
@@ -129,7 +129,7 @@ def _place(head: Mesh, side: int, found: Rims | None) -> lids.Ball:
     return lids.place_ball(side, centre, float(radius), ahead / np.linalg.norm(ahead))
 
 
-def _clearance(head: Mesh, side: int, ball: lids.Ball, found: Rims) -> np.ndarray:
+def _clearance(head: Mesh, side: int, ball: lids.PosedEyeball, found: LidMarks) -> np.ndarray:
     """How far the lids' edges lie before the eyeball of this head, metres, where the marks of `found` are, but for two at either end."""
     opened = lids.open_around(head, (ball, ball), (USUAL, USUAL))  # the other side's lids are not looked at
     outer, inner = (opened.skin.vertices[corner] for corner in lids.corners()[side])
@@ -146,7 +146,7 @@ def _along(points: np.ndarray, outer: np.ndarray, inner: np.ndarray) -> np.ndarr
     return (points - outer) @ (inner - outer) / ((inner - outer) ** 2).sum()
 
 
-def _openness(head: Mesh, balls: tuple, side: int, found: Rims | None, opening: float) -> float:
+def _openness(head: Mesh, balls: tuple, side: int, found: LidMarks | None, opening: float) -> float:
     """How far an eye is open, of MakeHuman's opening: that which brings the upper lid's edge nearest to the one seen, or the height between the lids to
     `opening` times the width."""
     steps = np.linspace(0.0, OPENEST, 29)
@@ -163,7 +163,7 @@ def _openness(head: Mesh, balls: tuple, side: int, found: Rims | None, opening: 
     return float(steps[np.argmin(miss)])
 
 
-def _aims(opened: lids.OpenHead, side: int, lid: int, found: Rims) -> np.ndarray:
+def _aims(opened: lids.OpenHead, side: int, lid: int, found: LidMarks) -> np.ndarray:
     """Where the vertices of an edge belong [N, 3]: on the curve through its marks, as far between the corners as they are on the head."""
     outer, inner = (opened.skin.vertices[corner] for corner in lids.corners()[side])
     share = np.clip(_along(opened.skin.vertices[opened.rims[side][lid]], outer, inner), 0, 1)
@@ -172,7 +172,7 @@ def _aims(opened: lids.OpenHead, side: int, lid: int, found: Rims) -> np.ndarray
     return PchipInterpolator(place, marks)(share)
 
 
-def _towards_rims(opened: lids.OpenHead, side: int, found: Rims) -> np.ndarray:
+def _towards_rims(opened: lids.OpenHead, side: int, found: LidMarks) -> np.ndarray:
     """What is left to the edges seen, on the edges and, fading, on the lids beside them [V + C + P, 3]; each lid follows its own edge."""
     vertices = opened.skin.vertices
     shift = np.zeros_like(vertices)

@@ -15,11 +15,12 @@ from ..imaging import images
 from .landmarks import spread
 
 MOST_VIEWS = 12
-FACING = 0.4
+"""That are parsed, spread over all: the network takes its time over each."""
+FACING_COSINE = 0.4
 """Least cosine between a surface and the way to the camera."""
-HAIR = 0.5
+HAIR_SHARE = 0.5
 """Share of the views that face a point and show it as hair or cloth, from which it is."""
-LEAST_LEFT = 0.2
+LEAST_LEFT_SHARE = 0.2
 """Share of a scan that must be left: less is a picture that the parser does not understand."""
 
 
@@ -28,10 +29,10 @@ def without_hair(scan: Mesh, views: list[View], head: Mesh, report: Reporter) ->
     normals, caster = vertex_normals(scan), raster.RayCaster(scan)
     share = hidden_share(scan.vertices, normals, views, head, report,
                          lambda view: raster.visible_from(caster, scan.vertices, normals, view.centre, offset=0.002))
-    hidden = np.nan_to_num(share) > HAIR
+    hidden = np.nan_to_num(share) > HAIR_SHARE
     kept = ~hidden[scan.faces].any(1)
     report.figure("hair_in_scan_percent", round(100 * float(1 - kept.mean()), 1))
-    return Mesh(scan.vertices, scan.faces[kept]) if LEAST_LEFT < kept.mean() < 1 else scan
+    return Mesh(scan.vertices, scan.faces[kept]) if LEAST_LEFT_SHARE < kept.mean() < 1 else scan
 
 
 def hidden_share(points: np.ndarray, normals: np.ndarray, views: list[View], head: Mesh, report: Reporter, visible=None) -> np.ndarray:
@@ -48,7 +49,7 @@ def hidden_share(points: np.ndarray, normals: np.ndarray, views: list[View], hea
         parts = parser.parse(srgb, pixels * scale)
         at, depth = view.project(points)
         towards = view.centre - points
-        facing = (towards * normals).sum(1) > FACING * np.linalg.norm(towards, axis=1)
+        facing = (towards * normals).sum(1) > FACING_COSINE * np.linalg.norm(towards, axis=1)
         there = facing & (depth > 0) & (at > 0).all(1) & (at < [view.width, view.height]).all(1)
         if visible is not None:
             there &= visible(view)

@@ -18,7 +18,8 @@ from ..imaging import images
 from . import eyes
 
 MOST_VIEWS = 32
-FEW = 6
+"""In which the face is looked for, spread over all."""
+FEW_VIEWS = 6
 """Of so few views two with a face will do: the others may be profiles."""
 BEHIND_FACE_M = 0.06
 """How far behind the mean landmark the middle of the head is taken to be; says which side of the face a view sees."""
@@ -53,7 +54,7 @@ def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
             scale = np.array([view.width / srgb.shape[1], view.height / srgb.shape[0]])
             found.append((view, face.landmarks[:, :2] * scale))
             seen[view.name] = (face.yaw_deg, *(eye.scaled(scale) for eye in faces.find_eyes(srgb, face)))
-    if len(found) < min(3 if len(chosen) > FEW else 2, len(chosen)):
+    if len(found) < min(3 if len(chosen) > FEW_VIEWS else 2, len(chosen)):
         raise Problem(f"A face was found in only {len(found)} of the {len(chosen)} frames that were looked at.",
                       "Film the face larger, in better light and from the front too, then start again from the video.")
     lifted = triangulate([view for view, _ in found], np.stack([pixels for _, pixels in found]))

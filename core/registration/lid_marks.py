@@ -19,7 +19,7 @@ ROBUST_PX = 1.0
 
 
 @dataclass(frozen=True)
-class Rims:
+class LidMarks:
     """Of one eye, metres: upper and lower edge of the lids [9, 3], from the outer corner to the inner one, the ends shared; centre of the iris [3] and its
     radius; views: how many it was lifted from."""
 
@@ -42,7 +42,7 @@ def usable(seen: list[tuple[float, Eye]], side: int) -> list[int]:
     return [i for i in there if seen[i][1].is_open_as(usual)]
 
 
-def lift(views: list[View], eyes: list[Eye]) -> Rims | None:
+def lift(views: list[View], eyes: list[Eye]) -> LidMarks | None:
     """The rims of one eye from its marks in several views; None where these are too few or too near to each other."""
     if len(views) < LEAST_VIEWS:
         return None
@@ -66,4 +66,4 @@ def lift(views: list[View], eyes: list[Eye]) -> Rims | None:
         weights = (width**2 / (width**2 + errors**2)) / depth**2
     upper, lower = points[:9], points[[0, *range(9, 16), 8]]
     radii = [eye.iris_radius * z / view.camera.mean_focal_length() for view, eye, z in zip(views, eyes, depth[16], strict=True)]
-    return Rims(upper, lower, points[16], float(np.median(radii)), len(views))
+    return LidMarks(upper, lower, points[16], float(np.median(radii)), len(views))

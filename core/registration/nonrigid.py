@@ -9,13 +9,15 @@ slides along the surface; where there is no data (ears, scalp, neck, holes) stif
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
-from ..contract.messages import Reporter
 from ..geometry.meshes import Mesh, vertex_normals
-from .alignment import Model
+from .alignment import HeadModel
 from .correspondence import Scan, trimmed
 from .intersections import flipped
 
@@ -34,21 +36,43 @@ PUT_AREA_M2 = 1e-3
 """The same for one that the artist has put, from the first step to the last."""
 
 
-def fit(model: Model, start: np.ndarray, scan: Scan, follow: np.ndarray, hold: np.ndarray, points: np.ndarray, trust: np.ndarray,
-        iterations: int, report: Reporter, first: float, steps: float, put: np.ndarray | None = None) -> np.ndarray:
-    """Vertices [V, 3] in metres. start [V, 3]: the aligned head; follow [V] in [0, 1]: how far the scan is believed;
-    hold [468]: how much longer a landmark counts than the others (lips and lids); points [468, 3], trust [468] as in Landmarks;
-    put bool [468]: landmarks that are where they are said to be, whatever the scan says. Nothing is known of what the mesh is but these arrays.
+@dataclass(frozen=True)
+class LandmarkTargets:
+    """Where landmarks should come to lie: points [468, 3] and trust [468] as in Landmarks; hold [468]: how much longer one counts than the others (lips and
+    lids); put bool [468]: those that are where they are said to be, whatever the scan says (None: none)."""
 
-    Progress goes from `first` to `steps`.
+    points: np.ndarray
+    trust: np.ndarray
+    hold: np.ndarray
+    put: np.ndarray | None = None
+
+
+def fit(model: HeadModel, start: np.ndarray, scan: Scan, follow: np.ndarray, targets: LandmarkTargets, iterations: int,
+        progress: Callable[[float], None] = lambda share: None) -> np.ndarray:
+    """A head drawn onto a scan. Nothing is known of what the mesh is but these arrays.
+
+    Parameters
+    ----------
+    model : the topology, and where the landmarks are on it
+    start : [V, 3] in metres, the aligned head
+    scan : in the same world
+    follow : [V] in [0, 1], how far the scan is believed
+    targets : of the landmarks
+    iterations : from stiff to soft
+    progress : hears the share that is done, in [0, 1)
+
+    Returns
+    -------
+    Vertices [V, 3] in metres.
     """
+    points, trust, hold, put = targets.points, targets.trust, targets.hold, targets.put
     area, laplacian = operators(model.mesh.moved(start))
     marks = anchors(model)
     known = np.isfinite(points).all(1) & (trust * model.landmark_weight > 0)
     put = np.zeros(len(points), bool) if put is None else put & known
     vertices = start.copy()
     for step in range(iterations):
-        report.progress(first + (steps - first) * step / iterations, steps, "fitting the head to the scan")
+        progress(step / iterations)
         part = step / max(iterations - 1, 1)
         length = STIFF_M * (SOFT_M / STIFF_M) ** part
         normals = vertex_normals(model.mesh.moved(vertices))
@@ -103,7 +127,7 @@ def operators(mesh: Mesh) -> tuple[np.ndarray, sparse.csr_matrix]:
     return np.maximum(area, floor), (sparse.diags(np.asarray(weights.sum(1)).ravel()) - weights).tocsr()
 
 
-def anchors(model: Model) -> sparse.csr_matrix:
+def anchors(model: HeadModel) -> sparse.csr_matrix:
     """[468, V]: takes vertices to landmarks."""
     corners = model.mesh.faces[model.landmark_face]
     rows = np.repeat(np.arange(len(corners)), 3)

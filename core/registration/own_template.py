@@ -29,24 +29,24 @@ from .correspondence import Scan
 ITERATIONS, COVER_ITERATIONS = 14, 8
 """Steps of the fit to the head, and of laying the built-in head over the artist's mesh."""
 SOURCE_SPACING_M = 0.0012
-OPEN = (0.25, 0.5)
+OPEN_SKY_SHARES = (0.25, 0.5)
 """Share of free sky over a vertex below which it lies inside the mouth, a nostril or a socket, and above which it is certainly outside."""
 REACH_M = (0.006, 0.015)
 """Distance of an aligned vertex to the head up to which it belongs to it, and from which it is another thing: shoulders, clothes."""
-SLIGHT = 0.05
+SLIGHT_TRUST_SHARE = 0.05
 """Share of their say that landmarks keep once two clean surfaces lie on each other: a net's marks are a millimetre or two off."""
 RIM_M = (0.005, 0.045)
 """Distance to the edge where the built-in head ends at which it begins to draw, and from which it draws fully: a neck must not show a step."""
 PAINTED_M = 0.010
 """Distance of the fitted skin to the head up to which the head's maps hold for it."""
-LOOSE_EARS = 0.15
+LOOSE_EARS_SHARE = 0.15
 """No two meshes fold an ear alike: it is drawn to the head by this much only."""
-SHUT = 0.12
+SHUT_WIDTH_SHARE = 0.12
 """Gap of the lids, as a share of the eye's width, under which an eye counts as closed."""
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedTemplate:
     """vertices [V, 3] metres, of all of the artist's mesh; skin bool [F]: triangles with a counterpart on the head; distances [M] in metres from the
     skin that was drawn to the head; flipped triangles; pictures (sRGB) in which the face was found."""
 
@@ -61,7 +61,7 @@ class Fitted:
 class BuiltIn:
     """The built-in head: its model, and per vertex and landmark the weights that registration uses (registration.weights_of)."""
 
-    model: alignment.Model
+    model: alignment.HeadModel
     follow: np.ndarray
     shaped: np.ndarray
     hold: np.ndarray
@@ -88,7 +88,7 @@ def run(capture: Capture, settings: Settings, head: Mesh, ours: BuiltIn, report:
     images.write_srgb(capture.picture("registration", "own_template"), _drawn(head, own.mesh.moved(fitted.vertices), fitted.pictures[0]))
 
 
-def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> Fitted:
+def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> FittedTemplate:
     """Lays the artist's mesh over the head. Raises Problem where no face is found on it or the fit does not hold."""
     whole, index = surfaces.welded(own.mesh)
     first = np.full(len(whole.vertices), -1)
@@ -109,7 +109,7 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     of_skin = np.cumsum(label[whole.faces[:, 0]] == main) - 1  # triangle of the whole -> of the skin
     weight, marks_at, marks_bary = np.zeros(len(found.points)), np.zeros(len(found.points), int), np.full((len(found.points), 3), 1 / 3)
     weight[known[good]], marks_at[known[good]], marks_bary[known[good]] = found.trust[known[good]], of_skin[at[good]], bary[good]
-    model = alignment.Model(skin, shapes[:, used], marks_at, marks_bary, weight)
+    model = alignment.HeadModel(skin, shapes[:, used], marks_at, marks_bary, weight)
 
     target = _at_landmarks(head)
     trust = template.landmark_weights().copy()
@@ -128,7 +128,8 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
         trust[_lid_marks()] = 0
     start = placed.apply(model.shape(coefficients))
     start = _matched(model, start, follow, head, ours, report)
-    vertices = nonrigid.fit(model, start, dense, follow, ours.hold, target, SLIGHT * trust, ITERATIONS, report, 0.5, 1)
+    vertices = nonrigid.fit(model, start, dense, follow, nonrigid.LandmarkTargets(target, SLIGHT_TRUST_SHARE * trust, ours.hold), ITERATIONS,
+                            lambda share: report.progress(0.5 + 0.5 * share, 1, "fitting the head to the scan"))
 
     final = skin.moved(vertices)
     drawn = follow > 0.5
@@ -140,11 +141,11 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     everything = carried.along(everything, whole.faces, label, used, vertices, report)
     counterpart = np.zeros(len(whole.vertices), bool)
     normals = vertex_normals(final)
-    counterpart[used] = (surface.nearest(vertices, normals, PAINTED_M)[0] >= 0) & (_free_sky(final, normals) > OPEN[0])
-    return Fitted(everything[index], counterpart[whole.faces].any(1), distances, nonrigid.flipped_triangles(skin.moved(start), final), pictures)
+    counterpart[used] = (surface.nearest(vertices, normals, PAINTED_M)[0] >= 0) & (_free_sky(final, normals) > OPEN_SKY_SHARES[0])
+    return FittedTemplate(everything[index], counterpart[whole.faces].any(1), distances, nonrigid.flipped_triangles(skin.moved(start), final), pictures)
 
 
-def _matched(model: alignment.Model, start: np.ndarray, follow: np.ndarray, head: Mesh, ours: BuiltIn, report: Reporter) -> np.ndarray:
+def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, head: Mesh, ours: BuiltIn, report: Reporter) -> np.ndarray:
     """The placed skin [V, 3], each vertex taken to the place on the head that it has on the built-in head laid over it.
 
     Between landmarks two faces say little about which point is which; the built-in head's identity space says it: it is laid over the
@@ -155,10 +156,11 @@ def _matched(model: alignment.Model, start: np.ndarray, follow: np.ndarray, head
     fine, faces = trimesh.remesh.subdivide(*trimesh.remesh.subdivide(skin.vertices, outside))
     cover, points = Scan(Mesh(fine, faces)), model.at_landmarks(start)
     pose, coefficients = alignment.fit_landmarks(ours.model, points, model.landmark_weight)
-    trust = SLIGHT * model.landmark_weight
+    trust = SLIGHT_TRUST_SHARE * model.landmark_weight
     pose, coefficients = alignment.fit_scan(ours.model, pose, coefficients, points, trust, cover, np.maximum(ours.shaped, 0.7))
-    over = nonrigid.fit(ours.model, pose.apply(ours.model.shape(coefficients)), cover, np.maximum(ours.follow, 0.5 * ours.shaped), ours.hold, points,
-                        trust, COVER_ITERATIONS, report, 0, 0.5)
+    targets = nonrigid.LandmarkTargets(points, trust, ours.hold)
+    over = nonrigid.fit(ours.model, pose.apply(ours.model.shape(coefficients)), cover, np.maximum(ours.follow, 0.5 * ours.shaped), targets,
+                        COVER_ITERATIONS, lambda share: report.progress(0.5 * share, 0.5, "fitting the head to the scan"))
     known = np.flatnonzero(follow > 0.1)
     face, bary = surfaces.Surface(ours.model.mesh.moved(over), SOURCE_SPACING_M).nearest(start[known], vertex_normals(skin)[known], REACH_M[1])
     known, face, bary = known[face >= 0], face[face >= 0], bary[face >= 0]
@@ -166,7 +168,7 @@ def _matched(model: alignment.Model, start: np.ndarray, follow: np.ndarray, head
     return start + carried.field(start[known], shift, start, report)
 
 
-def _follow(model: alignment.Model, placed: alignment.Similarity, coefficients: np.ndarray, surface: surfaces.Surface, eyes: bool) -> np.ndarray:
+def _follow(model: alignment.HeadModel, placed: alignment.Similarity, coefficients: np.ndarray, surface: surfaces.Surface, eyes: bool) -> np.ndarray:
     """How far each vertex of the placed skin is drawn to the head [V] in [0, 1]."""
     at = model.mesh.moved(placed.apply(model.shape(coefficients)))
     normals = vertex_normals(at)
@@ -174,11 +176,11 @@ def _follow(model: alignment.Model, placed: alignment.Similarity, coefficients: 
     there = face >= 0
     distance = np.full(len(face), np.inf)
     distance[there] = np.linalg.norm(raster.interpolate(surface.mesh.vertices, surface.mesh.faces, face[there], bary[there]) - at.vertices[there], axis=1)
-    follow = np.interp(distance, REACH_M, (1, 0)) * np.interp(_free_sky(at, normals), OPEN, (0, 1))
+    follow = np.interp(distance, REACH_M, (1, 0)) * np.interp(_free_sky(at, normals), OPEN_SKY_SHARES, (0, 1))
     follow *= np.interp(cKDTree(_rim(surface.mesh)).query(at.vertices)[0], RIM_M, (0, 1))
     uv = np.zeros((len(face), 2))
     uv[there] = (surface.mesh.uvs[surface.mesh.face_uvs[face[there]]] * bary[there, :, None]).sum(1)
-    for name, least in (("ears", LOOSE_EARS), *((("eyes", 0.0),) if eyes else ())):
+    for name, least in (("ears", LOOSE_EARS_SHARE), *((("eyes", 0.0),) if eyes else ())):
         masked = raster.sample(template.mask(name, 512), np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512)
         follow *= 1 - (1 - least) * masked
     return follow
@@ -235,7 +237,7 @@ def _lid_marks() -> list[int]:
 def _open_eyes(points: np.ndarray) -> bool:
     width = np.linalg.norm(points[263] - points[362]) + np.linalg.norm(points[133] - points[33])
     gap = sum(np.linalg.norm(points[upper] - points[lower]) for upper, lower in render_landmarks.EYE_LIDS)
-    return bool(np.isfinite(gap) and gap > SHUT * width)
+    return bool(np.isfinite(gap) and gap > SHUT_WIDTH_SHARE * width)
 
 
 def _dense(head: Mesh) -> Mesh:

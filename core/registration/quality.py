@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,20 +12,20 @@ from ..contract.messages import Problem, Reporter
 from ..geometry import atlas
 from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.views import View
-from .alignment import Model
+from .alignment import HeadModel
 from .correspondence import Scan
 from .intersections import flipped, intersecting
 from .landmarks import Landmarks
 
-LEAST_SHARE, FARTHEST_M = 0.3, 0.004
+LEAST_FOLLOWED_SHARE, FARTHEST_M = 0.3, 0.004
 """A fit holds when this share of the followed vertices finds a partner on the scan, at this distance or nearer in the median."""
-MOST_MISS = 0.05
+MOST_MISS_WIDTH_SHARE = 0.05
 """Share of the face's width by which landmarks may miss a head that is fitted without a scan."""
 APART_DEG, WANTED_VIEWS = 25.0, 3
 """So many photographs, so far apart as seen from the head, make a head; fewer a draft."""
-ENOUGH_SHARE = 0.6
+LEAST_SHARE_OF_PHOTOGRAPHS = 0.6
 """The same for photographs, which show a head without their scan as well: patches of one do not lay it better."""
-SHOWN = 0.75
+LEAST_SHOWN_SHARE = 0.75
 """Share of a side of the face that the scan should show."""
 
 
@@ -33,9 +33,20 @@ class Unlike(Problem):
     """A head that could not be laid over the scan."""
 
 
-def figures(report: Reporter, model: Model, aligned: Mesh, head: Mesh, found: Landmarks, coefficients: np.ndarray, distances: np.ndarray,
-            follow: np.ndarray) -> None:
-    """Reports a fit's figures. aligned: the head before the non-rigid fit; distances [M] of the followed vertices (follow [V] > 0.5) to the scan."""
+@dataclass(frozen=True)
+class HeadFit:
+    """What a fit came to: head; aligned, the same before the non-rigid fit; coefficients [K] of the identity; distances [M] in metres of the vertices that
+    are followed to the scan, none where there is no scan."""
+
+    head: Mesh
+    aligned: Mesh
+    coefficients: np.ndarray
+    distances: np.ndarray
+
+
+def figures(report: Reporter, model: HeadModel, fit: HeadFit, found: Landmarks, follow: np.ndarray) -> None:
+    """Reports a fit's figures. follow [V]: the vertices above 0.5 are drawn to the scan, where there is one."""
+    head, distances = fit.head, fit.distances
     known = np.isfinite(found.points).all(1)
     miss = np.linalg.norm(model.at_landmarks(head.vertices) - found.points, axis=1)
     face = (follow > 0.5)[head.faces].all(1)
@@ -47,16 +58,16 @@ def figures(report: Reporter, model: Model, aligned: Mesh, head: Mesh, found: La
     if found.put.any():
         report.figure("put_landmark_residual_mm", round(1e3 * float(miss[found.put].max()), 2))
     report.figure("eye_opening", round(found.opening, 2) if np.isfinite(found.opening) else None)
-    report.figure("identity_norm", round(float(np.linalg.norm(coefficients)), 2))
+    report.figure("identity_norm", round(float(np.linalg.norm(fit.coefficients)), 2))
     report.figure("head_to_scan_median_mm", round(1e3 * float(np.median(distances)), 3) if len(distances) else None)
     report.figure("head_to_scan_p90_mm", round(1e3 * float(np.percentile(distances, 90)), 3) if len(distances) else None)
     report.figure("face_with_scan_percent", round(100 * len(distances) / max(int((follow > 0.5).sum()), 1), 1))
-    report.figure("flipped_triangles", int(flipped(aligned, head.vertices).sum()))
+    report.figure("flipped_triangles", int(flipped(fit.aligned, head.vertices).sum()))
     report.figure("intersecting_triangles", len(intersecting(head.vertices, head.faces)))
     report.figure("uv_stretch_p95", round(float(np.percentile(stretched, 95)), 2))
 
 
-def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follow: np.ndarray, least_share: float = LEAST_SHARE) -> None:
+def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follow: np.ndarray, least_share: float = LEAST_FOLLOWED_SHARE) -> None:
     """Raises Problem where the fit does not hold; tells which side of the face the scan does not show."""
     wanted = follow > 0.5
     if len(distances) < least_share * wanted.sum():
@@ -68,7 +79,7 @@ def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follo
     signed, _ = scan.match(head.vertices, vertex_normals(head), 0.01)
     for name, where in _sides(head, wanted).items():
         shown = float(np.isfinite(signed[where]).mean())
-        if shown < SHOWN:
+        if shown < LEAST_SHOWN_SHARE:
             report.finding(f"The scan shows only {100 * shown:.0f} % of {name}; the rest was guessed from the shape of heads.",
                            f"Film once more and bring {name} well into view, in sharp frames.")
 
@@ -84,7 +95,7 @@ def figures_of_views(report: Reporter, fitted, views: list[View], head: Mesh) ->
 def judge_views(report: Reporter, views: list[View], head: Mesh, fitted) -> None:
     """Raises Problem where a head does not fit what the views show."""
     x = head.vertices[:, 0]
-    if not fitted.miss_m["landmarks"] < MOST_MISS * np.ptp(x):
+    if not fitted.miss_m["landmarks"] < MOST_MISS_WIDTH_SHARE * np.ptp(x):
         raise Problem(f"The head could not be laid over the face in these pictures: its features miss by {1e3 * fitted.miss_m['landmarks']:.0f} mm.",
                       "Use pictures of one still face, neither cropped nor mirrored; or give the cameras of a program that can solve them.")
 

@@ -23,11 +23,11 @@ from ..geometry.views import View
 from ..imaging import images
 from .landmarks import Landmarks, onto_surface, triangulate
 
-FIRST_SIZE, SIZE = 192, 460
+FIRST_SIDE_PX, SIDE_PX = 192, 460
 """Sides of the pictures in which the face is looked for, and in which its marks are found, pixels."""
-FOCAL = 2.2
+FOCAL_SIDES = 2.2
 """Focal length in picture sides: an angle of view of 26 degrees, as a portrait's."""
-SIDES = ((0, 0), (-18, 0), (18, 0), (-35, 0), (35, 0), (0, 12), (0, -12), (-18, 10), (18, 10))
+VIEWS_DEG = ((0, 0), (-18, 0), (18, 0), (-35, 0), (35, 0), (0, 12), (0, -12), (-18, 10), (18, 10))
 """Yaw and pitch of the views, degrees."""
 SKIN, LIPS, BROWS = (0.55, 0.36, 0.28), (0.42, 0.14, 0.13), (0.08, 0.05, 0.04)
 """Linear colours: plain heads are found, painted ones are marked better."""
@@ -38,7 +38,7 @@ EYE_LINES = ((263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 3
 EYE_LIDS = ((386, 374), (159, 145))
 """Middle of the upper and the lower lid of the person's left and right eye."""
 TEMPLES = (127, 162, 234, 356, 389, 454)
-SURE, PORTRAITS = 0.85, (2.6, 3.4)
+SURE_SCORE, PORTRAIT_SIDES_FACE_WIDTHS = 0.85, (2.6, 3.4)
 """Score with which a face is taken without looking further, and the sides of pictures of it, in widths of the face."""
 FACE_M = 0.11
 """How far apart the outermost marks at the temples lie on a person, metres: the first guess of the scale."""
@@ -61,13 +61,13 @@ def find(mesh: Mesh, report: Reporter | None = None) -> tuple[Pose, Landmarks, l
     posed = mesh.moved(to_ours(mesh.vertices, pose))
     colours, found, pictures = np.tile(SKIN, (len(mesh.vertices), 1)), None, []
     caster, normals = raster.RayCaster(posed), vertex_normals(posed)
-    for sides in (SIDES[:5], SIDES):
-        for portrait in PORTRAITS:
+    for sides in (VIEWS_DEG[:5], VIEWS_DEG):
+        for portrait in PORTRAIT_SIDES_FACE_WIDTHS:
             views, pixels, pictures = [], [], []
             for yaw, pitch in sides:
                 if report is not None:
                     report.progress(0, 1, "finding the face on the artist's mesh")
-                view = view_from(yaw, pitch, SIZE, FACE_M * portrait)
+                view = view_from(yaw, pitch, SIDE_PX, FACE_M * portrait)
                 picture = shaded(caster, normals, colours, view)
                 face = faces.detect(picture)
                 if face is not None:
@@ -109,10 +109,11 @@ def _find_pose(mesh: Mesh, report: Reporter | None) -> Pose:
                 if window < len(windows):
                     lift, side = windows[window]
                     seen = _look(caster, normals, turn, turn.T @ [0, 0, lift], side)
-                    for portrait in PORTRAITS if seen is not None else ():  # looked at again in a picture of its own: what was no face is none any more
+                    for portrait in PORTRAIT_SIDES_FACE_WIDTHS if seen is not None else ():
+                        # looked at again in a picture of its own: what was no face is none any more
                         closer = _look(caster, normals, turn, seen[1].face, portrait * seen[1].width)
                         best = closer if closer is not None and closer[0] > best[0] else best
-            if best[0] > SURE:
+            if best[0] > SURE_SCORE:
                 return Pose(best[1].turn, middle + size * best[1].face, size * best[1].width)
     if best[1] is None:
         raise _no_face()
@@ -130,7 +131,7 @@ def _windows(sides: np.ndarray) -> list[tuple[float, float]]:
 
 def _look(caster: raster.RayCaster, normals: np.ndarray, turn: np.ndarray, centre: np.ndarray, extent: float) -> tuple[float, Pose] | None:
     """How sure an upright face is seen in a square of side `extent` around `centre` [3], and where it is."""
-    front = view_from(0, 0, FIRST_SIZE, extent)
+    front = view_from(0, 0, FIRST_SIDE_PX, extent)
     rotation = front.rotation @ turn
     view = replace(front, rotation=rotation, translation=front.translation - rotation @ centre)
     face = faces.detect(shaded(caster, normals, np.tile(SKIN, (len(normals), 1)), view))
@@ -179,8 +180,8 @@ def view_from(yaw: float, pitch: float, size: int, extent: float) -> View:
     towards = np.array([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)])
     right = np.array([np.cos(yaw), np.sin(yaw), 0])
     rotation = np.stack([right, np.cross(-towards, right), -towards])
-    camera = pycolmap.Camera(model="SIMPLE_PINHOLE", width=size, height=size, params=[FOCAL * size, size / 2, size / 2])
-    return View("render", Path(), camera, rotation, -rotation @ (towards * extent * FOCAL), False)
+    camera = pycolmap.Camera(model="SIMPLE_PINHOLE", width=size, height=size, params=[FOCAL_SIDES * size, size / 2, size / 2])
+    return View("render", Path(), camera, rotation, -rotation @ (towards * extent * FOCAL_SIDES), False)
 
 
 def shaded(caster: raster.RayCaster, normals: np.ndarray, colours: np.ndarray, view: View) -> np.ndarray:

@@ -19,9 +19,9 @@ from ..geometry.views import View
 from ..imaging import images
 from .constraints import Constraints, none
 
-BINS = 12
+HISTOGRAM_BINS = 12
 """Of the colour histograms, per channel."""
-LEAST_STEP = 0.5
+LEAST_CERTAINTY_STEP = 0.5
 """How much surer of skin the inside must be than the outside, in shares of certainty."""
 COARSE_PX = 5.0
 """The person's mask is this uncertain in a picture of 960 pixels: a border of colours further from it is another one."""
@@ -52,8 +52,8 @@ def prepare(view: View, mesh: Mesh, follow: np.ndarray, scale: float = 1.0) -> O
     core = cv2.erode(inside, np.ones((1 + 2 * max(1, round(0.01 * width)),) * 2, np.uint8)) > 0
     around = cv2.dilate(inside, np.ones((1 + 2 * round(0.08 * width),) * 2, np.uint8)) > 0
     lab = cv2.cvtColor(picture.astype(np.float32), cv2.COLOR_RGB2Lab)
-    bins = np.clip((lab - [0, -40, -40]) / [100, 80, 80] * BINS, 0, BINS - 1).astype(int)
-    code = (bins[..., 0] * BINS + bins[..., 1]) * BINS + bins[..., 2]
+    bins = np.clip((lab - [0, -40, -40]) / [100, 80, 80] * HISTOGRAM_BINS, 0, HISTOGRAM_BINS - 1).astype(int)
+    code = (bins[..., 0] * HISTOGRAM_BINS + bins[..., 1]) * HISTOGRAM_BINS + bins[..., 2]
     skin, other = (_histogram(code[where]) for where in (core & (person > 0.8), around & (person < 0.2)))
     return Outline(view, (skin / (skin + other + 1e-6))[code].astype(np.float32), person, scale)
 
@@ -125,12 +125,12 @@ def _borders(outline: Outline, at: np.ndarray, outward: np.ndarray, reach: float
     best = change.argmax(1)
     step = change[np.arange(len(at)), best]
     inside_frame = ((where >= 1) & (where <= np.array(outline.skin.shape[::-1]) - 2)).all((1, 2))
-    return np.where((step > LEAST_STEP) & inside_frame, places[best], np.nan), np.clip(step, 0, 1)
+    return np.where((step > LEAST_CERTAINTY_STEP) & inside_frame, places[best], np.nan), np.clip(step, 0, 1)
 
 
 def _histogram(code: np.ndarray) -> np.ndarray:
-    """Smoothed shares [BINS**3] of the colours with these codes."""
-    counts = np.bincount(code, minlength=BINS**3).astype(np.float64).reshape(BINS, BINS, BINS)
+    """Smoothed shares [HISTOGRAM_BINS**3] of the colours with these codes."""
+    counts = np.bincount(code, minlength=HISTOGRAM_BINS**3).astype(np.float64).reshape(HISTOGRAM_BINS, HISTOGRAM_BINS, HISTOGRAM_BINS)
     for axis in range(3):
         counts = counts + 0.5 * (np.roll(counts, 1, axis) + np.roll(counts, -1, axis))
     return (counts / max(counts.sum(), 1.0)).ravel()

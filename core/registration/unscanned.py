@@ -18,7 +18,7 @@ from ..contract.messages import Reporter
 from ..geometry.meshes import Mesh
 from ..geometry.views import View
 from . import nonrigid, silhouettes
-from .alignment import Model, Similarity, fit_landmarks, stepped
+from .alignment import HeadModel, Similarity, fit_landmarks, stepped
 from .constraints import Constraints, from_landmarks, from_points, joined
 from .landmarks import Landmarks
 
@@ -51,7 +51,7 @@ class Points:
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedHead:
     """The pose and coefficients [K] of the identity fit; vertices [V, 3] after the relaxation; how many constraints of each kind it had, and by how much
     they miss in the median [m]."""
 
@@ -62,21 +62,62 @@ class Fitted:
     miss_m: dict[str, float]
 
 
-def fit(model: Model, views: list[View], found: Landmarks, trust: np.ndarray, points: Points, follow: np.ndarray, report: Reporter,
-        first: float, steps: float) -> Fitted:
-    """follow [V] in [0, 1]: which part of the head the pictures are believed about; trust [468]. Progress goes from `first` to `steps`."""
+@dataclass(frozen=True)
+class ShownByViews:
+    """What views show of a head: the landmarks found in them with their trust [468], matched points, and follow [V] in [0, 1]: which part of the head they are
+    believed about."""
+
+    views: list[View]
+    landmarks: Landmarks
+    trust: np.ndarray
+    points: Points
+    follow: np.ndarray
+
+
+@dataclass(frozen=True)
+class _ViewConstraints:
+    """What draws a head towards what its views show: with the outlines in them, and the mesh's edges."""
+
+    model: HeadModel
+    shown: ShownByViews
+    outlines: list
+    edges: np.ndarray
+
+    def of(self, mesh: Mesh, reach: float) -> dict[str, Constraints]:
+        """By kind, for a head as it lies now. reach: metres by which a point or outline may lie off."""
+        shown = self.shown
+        return {"landmarks": from_landmarks(self.model, mesh.vertices, shown.views, shown.landmarks, shown.trust, max(reach, 0.006)),
+                "points": from_points(mesh, shown.follow, shown.points.places, shown.points.towards, reach),
+                "outlines": joined([silhouettes.compare(outline, mesh, self.edges, shown.follow, reach) for outline in self.outlines])}
+
+
+def fit(model: HeadModel, shown: ShownByViews, report: Reporter, first: float, steps: float) -> FittedHead:
+    """The head that the views show.
+
+    Parameters
+    ----------
+    model : the template with its identity space
+    shown : what is to be explained, in metres
+    report : hears of progress, from `first` to `steps`
+    first, steps : where the progress of this part of the stage begins, and where it ends
+
+    Returns
+    -------
+    The fit, in the world of the views, metres.
+    """
+    views, found, trust, follow = shown.views, shown.landmarks, shown.trust, shown.follow
     pose, coefficients = fit_landmarks(model, found.points, trust)
     start = model.mesh.moved(pose.apply(model.shape(coefficients)))
     outlines = []
     for i, view in enumerate(views):
         report.progress(first + 0.4 * (steps - first) * i / len(views), steps, f"looking for the outline of the face in {view.name}")
         outlines.append(silhouettes.prepare(view, start, follow, min(1.0, OUTLINE_PX / max(view.width, view.height))))
-    edges = silhouettes.edges_of(model.mesh)
+    constraints = _ViewConstraints(model, shown, outlines, silhouettes.edges_of(model.mesh))
     parts: dict[str, Constraints] = {}
     for step in range(ROUNDS):
         report.progress(first + (steps - first) * (0.4 + 0.3 * step / ROUNDS), steps, "finding the nearest head")
         mesh = model.mesh.moved(pose.apply(model.shape(coefficients)))
-        parts = _constraints(model, mesh, views, found, trust, points, follow, outlines, edges, np.interp(step, [0, ROUNDS - 1], REACH_M))
+        parts = constraints.of(mesh, np.interp(step, [0, ROUNDS - 1], REACH_M))
         rows = []
         for name, part in parts.items():
             basis = part.at(model.identity)  # [K, M, 3]
@@ -84,21 +125,14 @@ def fit(model: Model, views: list[View], found: Landmarks, trust: np.ndarray, po
             rows.append((part.at(mesh.vertices), basis, part.direction, part.distance, weight))
         pose, coefficients = stepped(pose, coefficients, rows)
     vertices = pose.apply(model.shape(coefficients))
-    vertices = _relaxed(model, vertices, lambda mesh: _constraints(model, mesh, views, found, trust, points, follow, outlines, edges, REACH_M[1]),
+    vertices = _relaxed(model, vertices, lambda mesh: constraints.of(mesh, REACH_M[1]),
                         found, lambda step: report.progress(first + (steps - first) * (0.7 + 0.3 * step / STEPS), steps, "fitting the head to the views"))
-    parts = _constraints(model, model.mesh.moved(vertices), views, found, trust, points, follow, outlines, edges, REACH_M[1])
-    return Fitted(pose, coefficients, vertices, {name: len(part) for name, part in parts.items()},
-                  {name: float(np.median(np.abs(part.distance))) if len(part) else float("nan") for name, part in parts.items()})
+    parts = constraints.of(model.mesh.moved(vertices), REACH_M[1])
+    return FittedHead(pose, coefficients, vertices, {name: len(part) for name, part in parts.items()},
+                      {name: float(np.median(np.abs(part.distance))) if len(part) else float("nan") for name, part in parts.items()})
 
 
-def _constraints(model: Model, mesh: Mesh, views: list[View], found: Landmarks, trust: np.ndarray, points: Points, follow: np.ndarray, outlines: list,
-                 edges: np.ndarray, reach: float) -> dict[str, Constraints]:
-    return {"landmarks": from_landmarks(model, mesh.vertices, views, found, trust, max(reach, 0.006)),
-            "points": from_points(mesh, follow, points.places, points.towards, reach),
-            "outlines": joined([silhouettes.compare(outline, mesh, edges, follow, reach) for outline in outlines])}
-
-
-def _relaxed(model: Model, start: np.ndarray, constraints, found: Landmarks, tick) -> np.ndarray:
+def _relaxed(model: HeadModel, start: np.ndarray, constraints, found: Landmarks, tick) -> np.ndarray:
     """Vertices [V, 3]: thin-plate displacements of `start`, stiff to soft; constraints(mesh) -> {kind: Constraints}."""
     area, laplacian = nonrigid.operators(model.mesh.moved(start))
     bending = (laplacian.T @ sparse.diags(1 / area) @ laplacian).tocsr()

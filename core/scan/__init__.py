@@ -34,7 +34,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     views = read_views(capture)
     frames = read_frames(capture).by_name
     sharpness = np.array([frames[view.name].sharpness for view in views])
-    by_splats = splats.wanted(settings.scan.method, settings.compute_device)
+    by_splats = splats.use_splats(settings.scan.method, settings.compute_device)
     fused, maps = rounds.measure(views, sharpness, settings.scan.pairs, settings.scan.voxel_mm / 1000, HEAD_BOX, report)
     if fused is not None and by_splats:
         fused, maps = splats.measure(fused.mesh, views, settings.scan.voxel_mm / 1000, HEAD_BOX, settings.compute_device, report)

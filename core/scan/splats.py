@@ -38,7 +38,7 @@ LEAST_ALPHA = 0.5
 
 
 @dataclass(frozen=True)
-class Photograph:
+class UndistortedFrame:
     """A frame without lens distortion: picture sRGB float32 [H, W, 3]; mask bool [H, W], the person; pinhole as in DepthMap."""
 
     picture: np.ndarray
@@ -49,7 +49,7 @@ class Photograph:
     origin: np.ndarray
 
 
-def wanted(method: str, device: str) -> bool:
+def use_splats(method: str, device: str) -> bool:
     """Whether the scan is to be made by splats. Raises Problem where they were asked for and cannot run."""
     ready = device == "cuda" and torch.cuda.is_available() and importlib.util.find_spec("gsplat") is not None
     if method == "splats" and not ready:
@@ -72,7 +72,7 @@ def measure(start: Mesh, views: list[View], voxel: float, box: np.ndarray, devic
     return fuse(maps, box, voxel, lambda done: report.progress(STEPS, STEPS, "fusing depth")), maps
 
 
-def train(start: Mesh, photographs: list[Photograph], rasterize: Callable, device: str = "cuda", steps: int = STEPS,
+def train(start: Mesh, photographs: list[UndistortedFrame], rasterize: Callable, device: str = "cuda", steps: int = STEPS,
           tick: Callable[[int, float], None] = lambda step, loss: None) -> list[DepthMap]:
     """Depth maps of the trained surfels, one per photograph. `start`: a surface that is nearly right, its vertices as dense as the surfels shall be."""
     surfels = _surfels(start, photographs, device)
@@ -91,15 +91,15 @@ def train(start: Mesh, photographs: list[Photograph], rasterize: Callable, devic
         return [_depth_map(_render(surfels, p, rasterize, device), p) for p in photographs]
 
 
-def _photograph(view: View) -> Photograph:
+def _photograph(view: View) -> UndistortedFrame:
     focal, origin = view.camera.mean_focal_length(), -np.array([view.width, view.height]) / 2
     picture = images.read_srgb(view.path)
     person = faces.segment_person(picture) > 0.5
     shown, mask = warp(view, picture, person, view.rotation, focal, origin, np.zeros((view.height, view.width), np.float32))
-    return Photograph(shown.astype(np.float32) / 255, mask, view.rotation, view.centre, focal, origin)
+    return UndistortedFrame(shown.astype(np.float32) / 255, mask, view.rotation, view.centre, focal, origin)
 
 
-def _surfels(mesh: Mesh, photographs: list[Photograph], device: str) -> dict[str, Tensor]:
+def _surfels(mesh: Mesh, photographs: list[UndistortedFrame], device: str) -> dict[str, Tensor]:
     """Discs on the mesh's vertices, WIDTH of how far the vertices lie apart in deviation, with the mean colour of the frames that look at them."""
     normals = vertex_normals(mesh)
     spacing = cKDTree(mesh.vertices).query(mesh.vertices, 4)[0][:, 1:].mean(1)
@@ -111,7 +111,7 @@ def _surfels(mesh: Mesh, photographs: list[Photograph], device: str) -> dict[str
     return {name: torch.tensor(np.asarray(value), dtype=torch.float32, device=device, requires_grad=True) for name, value in start.items()}
 
 
-def _colours(mesh: Mesh, normals: np.ndarray, photographs: list[Photograph]) -> np.ndarray:
+def _colours(mesh: Mesh, normals: np.ndarray, photographs: list[UndistortedFrame]) -> np.ndarray:
     total, count = np.full((len(normals), 3), 0.05), np.full(len(normals), 0.1)
     for p in photographs:
         local = (mesh.vertices - p.centre) @ p.rotation.T
@@ -122,7 +122,7 @@ def _colours(mesh: Mesh, normals: np.ndarray, photographs: list[Photograph]) -> 
     return total / count[:, None]
 
 
-def _render(surfels: dict[str, Tensor], p: Photograph, rasterize: Callable, device: str) -> tuple:
+def _render(surfels: dict[str, Tensor], p: UndistortedFrame, rasterize: Callable, device: str) -> tuple:
     """colour [H, W, 3], depth, alpha, distortion [H, W, 1], normals of the surfels and of the depth [H, W, 3] (world)."""
     pose = torch.eye(4, device=device)
     pose[:3, :3] = torch.tensor(p.rotation, dtype=torch.float32)
@@ -137,7 +137,7 @@ def _render(surfels: dict[str, Tensor], p: Photograph, rasterize: Callable, devi
     return colours[0, ..., :3], colours[0, ..., 3:], alpha[0], distortion[0], normals[0], depth_normals
 
 
-def _loss(rendered: tuple, p: Photograph, device: str, geometry: bool) -> Tensor:
+def _loss(rendered: tuple, p: UndistortedFrame, device: str, geometry: bool) -> Tensor:
     colour, _, alpha, distortion, normals, depth_normals = rendered
     mask = torch.tensor(p.mask, dtype=torch.float32, device=device)[..., None]
     target = torch.tensor(p.picture, dtype=torch.float32, device=device) * mask
@@ -161,6 +161,6 @@ def _ssim(a: Tensor, b: Tensor, window: int = 7) -> Tensor:
     return ((2 * ma * mb + 1e-4) * (2 * cross + 9e-4) / ((ma * ma + mb * mb + 1e-4) * (va + vb + 9e-4))).mean()
 
 
-def _depth_map(rendered: tuple, p: Photograph) -> DepthMap:
+def _depth_map(rendered: tuple, p: UndistortedFrame) -> DepthMap:
     depth, alpha = (x[..., 0].cpu().numpy() for x in rendered[1:3])
     return DepthMap(p.rotation, p.centre, p.focal, p.origin, np.where((alpha > LEAST_ALPHA) & p.mask, depth, np.nan).astype(np.float32), 1.0, float("nan"))

@@ -35,7 +35,7 @@ UNLIKE_SKIN = ("lips", "brows", "eyes", "nostrils", "scalp")  # their darkness i
 
 
 @dataclass(frozen=True)
-class Evidence:
+class ShadowEvidence:
     """At the working size: texture (I_UV) and filmed (with its light) linear [S, S, 3]; normals [S, S, 3]; visible [S, S]: the sky's share that
     reaches the surface; judged bool [S, S]: texels of the face that somebody saw, and no beard or hair; skin, brows [S, S] in [0, 1]: plain skin, and
     brows."""
@@ -82,7 +82,7 @@ class Proposal:
     edges: np.ndarray
 
 
-def propose(evidence: Evidence, seen: np.ndarray, sensitivity: float, dilate_px: float) -> Proposal:
+def propose(evidence: ShadowEvidence, seen: np.ndarray, sensitivity: float, dilate_px: float) -> Proposal:
     """The proposal from the evidence and where the frames or the filmed texture show a shadow, bool [S, S]. dilate_px: at 1024 texels."""
     judged, skin = evidence.judged, evidence.skin
     texture = still_dark(evidence.texture, evidence.normals, judged, skin > 0.5, sensitivity)
@@ -103,7 +103,7 @@ def still_dark(texture: np.ndarray, normals: np.ndarray, judged: np.ndarray, ski
     return cohere(np.where(skin, np.clip(odds + 6 * (sensitivity - 0.5), -12, 12), 0), judged)  # what is not skin follows its neighbours
 
 
-def _evidence(capture: Capture, head: Unfolded, visible: np.ndarray) -> Evidence:
+def _evidence(capture: Capture, head: Unfolded, visible: np.ndarray) -> ShadowEvidence:
     """visible [V]: the sky's share that reaches the head's vertices."""
     size = len(head.face)
     texture = images.resize(images.read_linear(capture.texture), size, size)
@@ -115,11 +115,11 @@ def _evidence(capture: Capture, head: Unfolded, visible: np.ndarray) -> Evidence
     for name in UNLIKE_SKIN if built_in else ():
         skin = skin * (1 - template.mask(name, size))
     visible = interpolate(visible[:, None], head.mesh.faces, head.face, head.bary)[..., 0]
-    return Evidence(texture, filmed, bleed(head.spread(head.normals), head.covered), bleed(visible, head.covered).astype(np.float32),
-                    head.covered & (confidence > SEEN) & (face > 0.5) & (read_hidden_skin(capture, size) < 0.5), skin, brows)
+    return ShadowEvidence(texture, filmed, bleed(head.spread(head.normals), head.covered), bleed(visible, head.covered).astype(np.float32),
+                          head.covered & (confidence > SEEN) & (face > 0.5) & (read_hidden_skin(capture, size) < 0.5), skin, brows)
 
 
-def _leave_figures(capture: Capture, report: Reporter, source: str, evidence: Evidence, found: Proposal) -> None:
+def _leave_figures(capture: Capture, report: Reporter, source: str, evidence: ShadowEvidence, found: Proposal) -> None:
     def percent(part: np.ndarray) -> float:
         return round(100 * float(part[evidence.judged].mean()) if evidence.judged.any() else 0.0, 1)
 

@@ -32,15 +32,12 @@ from .memory import sample_within_memory, spare_memory
 from .prior import WEIGHTS, ConditionedPrior, Prior, load
 from .problem import State, unexplained
 from .recipes import RECIPES, Recipe, free
-from .sampler import seeded
+from .sampler import Sampler, seeded
 from .skin_tone import SkinTone
 from .together import read_others
 from .tone import resolve_skin_tone
 from .window import coarse
 from .witnesses import confirmed
-
-FACE_CROP = 768
-"""Texels at 1024 over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels."""
 
 FAINT = 2.0
 """After any delighter little of a shadow is left, and what M takes along of dark skin and beards is not to be explained by local light (Recipe.faint)."""
@@ -66,8 +63,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         elsewhere, prior = layout.fitted(capture, head, known, prior, report)
         evidence, recipe = elsewhere.evidence(known, recipe.released_boxes), free(recipe)  # the split knows its places on the built-in head
     _check_often(prior, report)
-    cell = FACE_CROP / options.grid_cells * REFERENCE / evidence.extent.side
-    part = solve_edited(capture, head, settings, recipe, prior, evidence, cell, report) if settings.edited_part and elsewhere is None else None
+    part = solve_edited(capture, head, settings, recipe, prior, evidence, report) if settings.edited_part and elsewhere is None else None
     if part is not None:
         iris.measure(capture, head, part[0].diffuse, report)
         _leave_figures(capture, evidence, *part, report)
@@ -76,33 +72,14 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     witness = (lambda marks: confirmed(capture, head, marks, evidence.size)) if elsewhere is None else list
     tone = resolve_skin_tone(capture, head, settings, known, evidence, prior.tones, report)
     others = read_others(capture, settings, report)
-    start = initial.start(prior, evidence, tone, cell, recipe, witness, others)
+    start = initial.start(prior, evidence, tone, evidence.cell_side(options.grid_cells), recipe, witness, others)
     if others and not start.recipe.linear:
         report.log("The other captures were not used: they help where a delighter has left a faint light, on the built-in head, by the default recipe.")
     denoiser = prior.of_tone(start.tone)
     report.figure("marks_kept_from_light", len(start.marks))
     images.write_srgb(capture.picture("solve", "edges_and_marks"), drawing.edges_and_marks(evidence, start.alpha, start.marks))
-    state, seen = start.state, {factor: o.to(denoiser.device) for factor, o in start.observations.items()}
-    stored, key = capture.checkpoints / "solve.safetensors", _key(evidence, settings, start)
-    stopped = checkpoint.read(stored, key)
-    if stopped is not None:
-        report.log(f"Going on after step {stopped.step} of {recipe.steps}.")
-        state = stopped
-
-    losses: list[tuple[int, float]] = []
-
-    def on_step(state: State, steps: int) -> None:
-        report.progress(state.step, steps, f"sampling, step {state.step} of {steps}")
-        losses.append((state.step, unexplained(state, seen)))
-        if state.step % options.checkpoint_every == 0:
-            checkpoint.write(stored, state, key)
-            maps.write_preview(capture, state, seen, report)
-            images.write_srgb(capture.preview / "loss.png", drawing.loss_curve(losses, steps))
-            report.preview("preview/loss.png")
-
-    state = sample_within_memory(denoiser, seen, state.to(denoiser.device), start.recipe, seeded(settings.seed, denoiser.device), on_step, report.log)
-    state.denoised = restored(denoiser, state.denoised, seen[1].coords, start.recipe, settings.seed)
-    state = state.to("cpu")
+    stored = capture.checkpoints / "solve.safetensors"
+    state = _sampled(capture, settings, start, denoiser, stored, _key(evidence, settings, start), report)
     result, found = _finished(denoiser, state, evidence, start, settings.seed, report)
     delivered = result if elsewhere is None else elsewhere.returned(result, known, state.lights, start.exposure, start.tone)
     maps.write(capture, delivered, found, conditions)
@@ -111,6 +88,30 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     maps.write_preview(capture, state, start.observations, report)
     _leave_figures(capture, evidence, result, start.tone, report)
     stored.unlink(missing_ok=True)
+
+
+def _sampled(capture: Capture, settings: Settings, start: initial.Start, denoiser: ConditionedPrior, stored: Path, key: str, report: Reporter) -> State:
+    """The last state of the walk, on the processor; goes on from the checkpoint `stored` where that is of this run, which `key` stands for."""
+    state, seen = start.state, {factor: o.to(denoiser.device) for factor, o in start.observations.items()}
+    stopped = checkpoint.read(stored, key)
+    if stopped is not None:
+        report.log(f"Going on after step {stopped.step} of {start.recipe.steps}.")
+        state = stopped
+    losses: list[tuple[int, float]] = []
+
+    def on_step(state: State, steps: int) -> None:
+        report.progress(state.step, steps, f"sampling, step {state.step} of {steps}")
+        losses.append((state.step, unexplained(state, seen)))
+        if state.step % settings.solve.checkpoint_every == 0:
+            checkpoint.write(stored, state, key)
+            maps.write_preview(capture, state, seen, report)
+            images.write_srgb(capture.preview / "loss.png", drawing.loss_curve(losses, steps))
+            report.preview("preview/loss.png")
+
+    sampler = Sampler(denoiser, start.recipe, seeded(settings.seed, denoiser.device))
+    state = sample_within_memory(sampler, seen, state.to(denoiser.device), on_step, report.log)
+    state.denoised = restored(denoiser, state.denoised, seen[1].coords, start.recipe, settings.seed)
+    return state.to("cpu")
 
 
 def _finished(prior: ConditionedPrior, state: State, evidence: Evidence, start: initial.Start, seed: int,

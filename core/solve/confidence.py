@@ -17,7 +17,7 @@ from .lighting import Lights
 from .prior import ConditionedPrior
 from .problem import Observation, State, albedo
 from .recipes import Recipe
-from .sampler import sample, seeded
+from .sampler import Sampler, seeded
 
 PER_SHARE, PER_UNLIKE, PER_SPREAD = 0.015, 0.55, 0.5
 """Error of the albedo in sRGB that is expected per share explained as light, per difference from the mean face, per spread of the short runs: what the
@@ -48,7 +48,7 @@ def spread(prior: ConditionedPrior, o: Observation, reference: torch.Tensor, lig
     device, runs = prior.device, []
     for run in range(RUNS):
         begun = State(0, None, reference.clone(), lights).to(device)
-        state = sample(prior, {1: o.to(device)}, begun, short, seeded(seed + 7919 * (run + 1), device), lambda state, steps: check())
+        state = Sampler(prior, short, seeded(seed + 7919 * (run + 1), device)).sample({1: o.to(device)}, begun, lambda state, steps: check())
         runs.append(shown(albedo(state.denoised)).mean(0).cpu())
     return torch.stack(runs).std(0)
 

@@ -26,12 +26,13 @@ from .window import Window, coarse, cropped, solve_inside, window
 from .witnesses import confirmed
 
 
-def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidence, cell: float,
+def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidence,
                  report: Reporter) -> tuple[maps.Maps, SkinTone] | None:
     """The maps with the edited part new, as they are now in maps/, and the skin tone; None, and the reason in the log, where the whole map is to be solved.
 
     Without an edit the maps stay as they are.
     """
+    cell = evidence.cell_side(settings.solve.grid_cells)
     conditions, obstacle = mask_edit.conditions(capture, settings), mask_edit.obstacle(capture, settings)
     earlier = None if obstacle else checkpoint.read_solution(capture.solved, conditions)
     try:
@@ -46,7 +47,7 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
     if part is not None:
         near[part.inside] = 1
     start = initial.again(prior, evidence, earlier, cell, recipe, near, lambda marks: confirmed(capture, head, marks, evidence.size))
-    found = earlier if part is None else _sampled(settings, start.recipe, prior.of_tone(earlier.tone), evidence, earlier, start, part, report)
+    found = earlier if part is None else _sampled(settings, prior.of_tone(earlier.tone), evidence, earlier, start, part, report)
     state = State(0, None, found.denoised, found.lights)
     result = maps.finished(state, evidence, start, found.spread, found.gain)
     if part is None:
@@ -59,17 +60,13 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
     return result, earlier.tone
 
 
-def _sampled(settings: Settings, recipe: Recipe, prior: ConditionedPrior, evidence: Evidence, earlier: Solution, start: initial.Start, part: Window,
+def _sampled(settings: Settings, prior: ConditionedPrior, evidence: Evidence, earlier: Solution, start: initial.Start, part: Window,
              report: Reporter) -> Solution:
-    def on_step(state: State, steps: int) -> None:
-        report.progress(state.step, steps, f"sampling the edited part, step {state.step} of {steps}")
-
-    denoised, lights = solve_inside(prior, start.observations, earlier.denoised, earlier.lights, part, recipe, settings.seed, on_step,
-                                    report.log)
+    denoised, lights = solve_inside(prior, start.observations, earlier, part, start.recipe, settings.seed, report)
     factor = max(start.observations)
     here = Lights(lights.glob, lights.grid[(..., *part.cells)], lights.chroma)
     reference = coarse(start.reference[(..., *part.seen)], factor)
-    patch = spread(prior, cropped(start.observations[factor], part, factor), reference, here, recipe, settings.seed, report.check)
+    patch = spread(prior, cropped(start.observations[factor], part, factor), reference, here, start.recipe, settings.seed, report.check)
     rows, columns = (slice(a.start // factor, a.stop // factor) for a in part.inside)
     whole = earlier.spread.clone()
     whole[rows, columns] = patch[tuple(slice((a.start - b.start) // factor, (a.stop - b.start) // factor) for a, b in zip(part.inside, part.seen, strict=True))]

@@ -27,6 +27,7 @@ TRUSTED = 0.2  # confidence from which a texel counts in full: below, it was see
 FEATURE_TRUST = 0.2  # of brows, lips, lids and hair: they vary between people more than skin does, and light must not explain them away
 BEARD_TRUST = 0.1  # of skin under a beard: the shade of a shaven one is as soft as a light's
 MASK_FADE = 2.0  # deviation in texels over which a hard mask's border fades
+FACE_CROP = 768  # texels of REFERENCE over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,10 @@ class Evidence:
     def texel(self) -> float:
         """Side of a texel in texels of REFERENCE."""
         return self.extent.side / self.size
+
+    def cell_side(self, grid_cells: int) -> float:
+        """The side of a cell of V, in texels where the whole map has REFERENCE, when settings.solve.grid_cells of them are asked for."""
+        return FACE_CROP / grid_cells * REFERENCE / self.extent.side
 
 
 def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:

@@ -45,8 +45,8 @@ class Layout:
     """there [C, C]: where the window's texels lie in the built-in head's maps; back [S, S]: where that head's texels lie in the window's maps;
     face: the mean face of our prior, in the built-in UVs."""
 
-    there: baking.Places
-    back: baking.Places
+    there: baking.TexelPartners
+    back: baking.TexelPartners
     face: torch.Tensor
 
     def mean_face(self) -> torch.Tensor:
@@ -141,7 +141,7 @@ def between(head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int, fa
     there = baking.places(own, (0, 0), baking.Source(head), size, FAR_M, tick, skin)
     top, left, side = (v * size // REFERENCE for v in (WINDOW.top, WINDOW.left, WINDOW.side))
     part = np.s_[top:top + side, left:left + side]
-    there = baking.Places(there.uv[part], there.turn[part], there.mirrored[part], there.covered[part])
+    there = baking.TexelPartners(there.uv[part], there.turn[part], there.mirrored[part], there.covered[part])
     source = baking.Source(replace(own, faces=own.faces[skin], face_uvs=own.face_uvs[skin]))
     back = baking.places(head, (0, 0), source, size, FAR_M, tick)
     uv = np.stack([(back.uv[..., 0] * size - left) / side, 1 - ((1 - back.uv[..., 1]) * size - top) / side], -1)

@@ -19,19 +19,25 @@ from ..contract.messages import Problem, out_of_memory
 from .lighting import Lights
 from .prior import ConditionedPrior, Prior
 from .problem import Observation, State
-from .recipes import Recipe
-from .sampler import sample
+from .sampler import Sampler
 
 MMAP_THRESHOLD, LARGE = -3, 8 << 20  # glibc's name for it, and the bytes from which on memory is asked of the system and given back to it
 SAYS = "There was not enough memory for step {} of {}: it is done again in the low-memory mode, which is slower and gives the same maps."
 
 
-def sample_within_memory(prior: ConditionedPrior, observations: dict[int, Observation], state: State, recipe: Recipe, noise: Callable[[int], Callable],
-                         on_step: Callable[[State, int], None] = lambda state, steps: None, log: Callable[[str], None] = lambda text: None,
-                         **options) -> State:
-    """`sample`, to the same bytes whether it had to fall back or not; `log` is told if it had to.
+def sample_within_memory(sampler: Sampler, observations: dict[int, Observation], state: State,
+                         on_step: Callable[[State, int], None] = lambda state, steps: None, log: Callable[[str], None] = lambda text: None) -> State:
+    """`Sampler.sample`, of a prior, to the same bytes whether it had to fall back or not.
 
-    Raises Problem where the low-memory mode does not fit either.
+    Parameters
+    ----------
+    sampler : its denoiser is a ConditionedPrior, whose network may be put into the low-memory mode
+    observations, state, on_step : as `Sampler.sample` takes them
+    log : is told if it had to fall back
+
+    Raises
+    ------
+    Problem : where the low-memory mode does not fit either
     """
     begun = _copied(state)
 
@@ -41,16 +47,16 @@ def sample_within_memory(prior: ConditionedPrior, observations: dict[int, Observ
         begun = _copied(state)
 
     try:
-        return sample(prior, observations, state, recipe, noise, keep, **options)
+        return sampler.sample(observations, state, keep)
     except (MemoryError, RuntimeError) as error:
         if not out_of_memory(error):
             raise
-        if prior.network.low_memory:
-            raise Problem(f"There was not enough memory for step {begun.step + 1} of {recipe.steps}, even in the low-memory mode.",
+        if sampler.denoiser.network.low_memory:
+            raise Problem(f"There was not enough memory for step {begun.step + 1} of {sampler.recipe.steps}, even in the low-memory mode.",
                           "Close other programs, choose a smaller map size for the solve, or the quality draft.") from error
-    log(SAYS.format(begun.step + 1, recipe.steps))  # past the except block, which holds on to all that the step had computed
-    spare_memory(prior)
-    return sample_within_memory(prior, observations, begun, recipe, noise, on_step, log, **options)
+    log(SAYS.format(begun.step + 1, sampler.recipe.steps))  # past the except block, which holds on to all that the step had computed
+    spare_memory(sampler.denoiser)
+    return sample_within_memory(sampler, observations, begun, on_step, log)
 
 
 def spare_memory(prior: Prior | ConditionedPrior) -> None:

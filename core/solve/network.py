@@ -9,6 +9,7 @@ One choice is ours: `norm: pixel` normalises each texel over its channels, so th
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import torch
 from torch import nn
@@ -22,54 +23,92 @@ STRIP = 64
 """Rows of a map inside the network that are shaped at once where that can be done in pieces."""
 
 
-def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: torch.Tensor, mapping_condition: torch.Tensor | None = None,
-            mean: torch.Tensor | None = None, spread: torch.Tensor | None = None, levels: torch.Tensor | None = None) -> torch.Tensor:
-    """D(x; sigma): the preconditioned denoiser. x float32 [N, C, H, W], sigma [N], condition [N, K, H, W] -> [N, C, H, W].
-    `levels` [N, C, 1, 1] are the noise levels of the channels where they differ; the network is told `sigma`.
+@dataclass(frozen=True)
+class Condition:
+    """What the network is told of maps [N, C, H, W]: of each texel `texels` [N, K, H, W], of each whole map `mapping` [N, D], where it takes that.
 
-    The released priors take data of mean 0 and deviation sigma_data, and scale the condition, which is not noised, by c_in like the data.
-    With `mean` [N, C, H, W] and `spread` [N, C, 1, 1] the network sees what differs from the mean in units of its spread, and the condition as it is:
-    where it has nothing to say, D is then the best estimate of a Gaussian of that mean and spread. Only the network itself runs in low precision.
+    The released priors take data of mean 0 and deviation sigma_data, and scale `texels`, which are not noised, by c_in like the data. With `mean`
+    [N, C, H, W] and `spread` [N, C, 1, 1] the network sees what differs from the mean in units of its spread, and the texels' condition as it is.
+    """
+
+    texels: torch.Tensor
+    mapping: torch.Tensor | None = None
+    mean: torch.Tensor | None = None
+    spread: torch.Tensor | None = None
+
+
+def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: Condition, levels: torch.Tensor | None = None) -> torch.Tensor:
+    """D(x; sigma): the preconditioned denoiser. Only the network itself runs in low precision.
+
+    Parameters
+    ----------
+    network : F
+    x : float32 [N, C, H, W], noised maps
+    sigma : [N], the noise level that the network is told
+    condition : with a mean and a spread D is the best estimate of a Gaussian of these where the network has nothing to say
+    levels : [N, C, 1, 1], the noise levels of the channels where they differ
+
+    Returns
+    -------
+    The expected clean maps [N, C, H, W].
     """
     s = sigma.reshape(-1, 1, 1, 1) if levels is None else levels
+    texels, mean, spread = condition.texels, condition.mean, condition.spread
     if mean is None:
         mean, spread = torch.zeros_like(x), torch.full((1, 1, 1, 1), network.sigma_data, device=x.device)
-        condition = condition / (s * s + spread**2).sqrt()
+        texels = texels / (s * s + spread**2).sqrt()
     total = (s * s + spread**2).sqrt()
     dtype = network.proj_in.weight.dtype
-    inner = network(torch.cat([((x - mean) / total).to(dtype), condition.to(dtype)], 1), sigma, mapping_condition)
+    inner = network(torch.cat([((x - mean) / total).to(dtype), texels.to(dtype)], 1), sigma, condition.mapping)
     return mean + inner.float() * (s * spread / total) + (x - mean) * (spread / total) ** 2
 
 
-class UNet(nn.Module):
-    """F(x, sigma): depths and channels per level, finest first. Input [N, data + condition, H, W], output [N, data, H, W].
+@dataclass(frozen=True)
+class UNetLayout:
+    """Depths and channels per level, finest first; which levels have attention, None: no one. Input [N, data + condition, H, W], output [N, data, H, W].
 
-    With `patch_size` p it works on p x p blocks of texels. The first `skip_stages` levels exist but are left out, and the next one takes the map as it
-    is (progressive growing). With `has_variance` the last channel estimates the loss, which sampling does not need.
+    With `patch_size` p the network works on p x p blocks of texels. The first `skip_stages` levels exist but are left out, and the next one takes the map
+    as it is (progressive growing). With `has_variance` the last channel estimates the loss, which sampling does not need.
     """
 
-    def __init__(self, data_channels: int, condition_channels: int, mapping_out: int, depths: list[int], channels: list[int],
-                 attention: list[bool] | None = None, patch_size: int = 1, mapping_cond_dim: int = 0, sigma_data: float = 0.5, norm: str = "group",
-                 skip_stages: int = 0, has_variance: bool = False):
+    data_channels: int
+    condition_channels: int
+    mapping_out: int
+    depths: list[int]
+    channels: list[int]
+    attention: list[bool] | None = None
+    patch_size: int = 1
+    mapping_cond_dim: int = 0
+    sigma_data: float = 0.5
+    norm: str = "group"
+    skip_stages: int = 0
+    has_variance: bool = False
+
+
+class UNet(nn.Module):
+    """F(x, sigma)."""
+
+    def __init__(self, layout: UNetLayout):
         super().__init__()
-        attention = attention or [False] * len(depths)
-        self.patch_size, self.sigma_data, self.skip_stages, self.has_variance = patch_size, sigma_data, skip_stages, has_variance
+        patch_size, skip_stages, mapping_out = layout.patch_size, layout.skip_stages, layout.mapping_out
+        depths, channels, attention = layout.depths, layout.channels, layout.attention or [False] * len(layout.depths)
+        self.patch_size, self.sigma_data, self.skip_stages, self.has_variance = patch_size, layout.sigma_data, skip_stages, layout.has_variance
         self.low_memory = False  # keeps a fifth of what the gradient needs, and computes the rest again
         self.multiple = patch_size * 2 ** (len(depths) - 1 - skip_stages)
         self.timestep_embed = _Fourier(mapping_out)
-        self.mapping_cond = nn.Linear(mapping_cond_dim, mapping_out, bias=False) if mapping_cond_dim else None
+        self.mapping_cond = nn.Linear(layout.mapping_cond_dim, mapping_out, bias=False) if layout.mapping_cond_dim else None
         self.mapping = nn.Sequential(nn.Linear(mapping_out, mapping_out), nn.GELU(), nn.Linear(mapping_out, mapping_out), nn.GELU())
         outer = channels[max(0, skip_stages - 1)]
-        self.proj_in = nn.Conv2d((data_channels + condition_channels) * patch_size**2, outer, 1)
-        self.proj_out = nn.Conv2d(outer, data_channels * patch_size**2 + has_variance, 1)
+        self.proj_in = nn.Conv2d((layout.data_channels + layout.condition_channels) * patch_size**2, outer, 1)
+        self.proj_out = nn.Conv2d(outer, layout.data_channels * patch_size**2 + layout.has_variance, 1)
         nn.init.zeros_(self.proj_out.weight)
         nn.init.zeros_(self.proj_out.bias)
         down, up = [], []
         for level, (depth, width) in enumerate(zip(depths, channels, strict=True)):
             above = channels[max(0, level - 1)]
             deepest, halved = level == len(depths) - 1, level > skip_stages
-            down.append(_block(mapping_out, [above] + [width] * (depth - 1), width, width, attention[level], norm, first=_Down() if halved else nn.Identity()))
-            up.append(_block(mapping_out, [width if deepest else 2 * width] + [width] * (depth - 1), width, above, attention[level], norm,
+            down.append(_block(layout, [above] + [width] * (depth - 1), width, width, attention[level], first=_Down() if halved else nn.Identity()))
+            up.append(_block(layout, [width if deepest else 2 * width] + [width] * (depth - 1), width, above, attention[level],
                              last=_Up() if halved else nn.Identity()))
         self.u_net = nn.ModuleDict({"d_blocks": nn.ModuleList(down), "u_blocks": nn.ModuleList(up[::-1])})
 
@@ -102,9 +141,10 @@ class UNet(nn.Module):
         return functional.pixel_shuffle(x, self.patch_size) if self.patch_size > 1 else x
 
 
-def _block(mapping: int, inputs: list[int], width: int, out: int, attention: bool, norm: str,
+def _block(layout: UNetLayout, inputs: list[int], width: int, out: int, attention: bool,
            first: nn.Module | None = None, last: nn.Module | None = None) -> nn.ModuleList:
     """Residual blocks (inputs[i] -> width, the last one -> out), each followed by attention if asked for; resampling first or last."""
+    mapping, norm = layout.mapping_out, layout.norm
     layers = [] if first is None else [first]
     for i, c_in in enumerate(inputs):
         c_out = out if last is not None and i == len(inputs) - 1 else width

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import copy
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -18,7 +19,7 @@ from safetensors import safe_open
 from ..contract import shipped_files
 from ..contract.messages import Problem
 from . import released
-from .network import UNet, denoise, from_state
+from .network import Condition, UNet, UNetLayout, denoise, from_state
 from .skin_tone import SkinTone
 
 BLIND = 80.0  # noise level of a channel of which nothing is seen
@@ -66,8 +67,8 @@ class Prior:
         given.mean_face, given.tones = mean_face.to(self.device), tones
         return given
 
-    def condition_at(self, coords: torch.Tensor, tone: torch.Tensor | None) -> dict[str, torch.Tensor]:
-        """`denoise`'s arguments by name for maps at coords [N, 2, H, W] of skins of tone [1, 3]."""
+    def condition_at(self, coords: torch.Tensor, tone: torch.Tensor | None) -> Condition:
+        """What `denoise` is told of maps at coords [N, 2, H, W] of skins of tone [1, 3]."""
         blind = torch.zeros(1, device=self.device) if self.network.mapping_cond.in_features == 5 else None
         return condition(coords, self.octaves, self.mean_face, self.spread, tone, blind)
 
@@ -75,8 +76,8 @@ class Prior:
         """`ConditionedPrior.respond` for a skin of tone [1, 3]."""
         known = condition(coords, self.octaves, self.mean_face, self.spread, tone, blind=torch.ones(1, device=self.device))
         levels = torch.tensor([CLEAR] * 3 + [BLIND] * 4, device=self.device)[None, :, None, None]
-        x = torch.where(levels < BLIND, maps, known["mean"]) + levels * noise
-        out = denoise(self.network, x, torch.full((1,), CLEAR, device=self.device), levels=levels, **known)
+        x = torch.where(levels < BLIND, maps, known.mean) + levels * noise
+        out = denoise(self.network, x, torch.full((1,), CLEAR, device=self.device), known, levels)
         return torch.cat([maps[:, :3], out[:, 3:]], 1)
 
 
@@ -85,17 +86,18 @@ class ConditionedPrior:
 
     def __init__(self, prior: Prior, tone: torch.Tensor | None):
         self.prior, self.tone, self.network, self.device = prior, tone, prior.network, prior.device
-        self._known: dict[str, torch.Tensor] = {}  # the last map's condition: it is the same at every noise level
+        self._coords: torch.Tensor | None = None  # of the last map, and its condition: it is the same at every noise level
+        self._condition: Condition | None = None
 
     def __call__(self, x: torch.Tensor, sigma: float, coords: torch.Tensor) -> torch.Tensor:
         """The expected clean map given x at noise level sigma. coords [N, 2, H, W] from `coordinates`, one texel apart in the map's own scale."""
-        if self._known.get("coords") is not coords:
+        if self._coords is not coords:
             known = self.prior.condition_at(coords, self.tone)
-            if "mean" in known:  # it goes in as it is: kept as the network takes it, at half the memory
-                known["condition"] = known["condition"].to(self.network.proj_in.weight.dtype)
-            self._known = {"coords": coords, **known}
+            if known.mean is not None:  # it goes in as it is: kept as the network takes it, at half the memory
+                known = replace(known, texels=known.texels.to(self.network.proj_in.weight.dtype))
+            self._coords, self._condition = coords, known
         sigmas = torch.full((len(x),), float(sigma), device=self.device)
-        return denoise(self.network, x, sigmas, **{k: v for k, v in self._known.items() if k != "coords"})
+        return denoise(self.network, x, sigmas, self._condition)
 
     def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor) -> torch.Tensor:
         """Maps [1, 7, H, W] with the normals and specular that are expected of their diffuse albedo; noise [1, 7, H, W] is standard normal.
@@ -135,13 +137,13 @@ class ReleasedPrior(Prior):
         """The maps as they are: a released prior was not taught to answer in one evaluation."""
         return maps
 
-    def condition_at(self, coords: torch.Tensor, tone: torch.Tensor | None) -> dict[str, torch.Tensor]:
+    def condition_at(self, coords: torch.Tensor, tone: torch.Tensor | None) -> Condition:
         """The encoded coordinates, or the fixed random map there. Raises Problem where that is missing."""
         self.check()
         if self.kind != "noise":
-            return {"condition": positional_encoding(coords, self.octaves)}
+            return Condition(positional_encoding(coords, self.octaves))
         columns, rows = ((coords + 1) / 2 * self.noise.shape[-1]).round().long().clamp(0, self.noise.shape[-1] - 1).unbind(1)
-        return {"condition": self.noise[0][:, rows, columns].transpose(0, 1)}
+        return Condition(self.noise[0][:, rows, columns].transpose(0, 1))
 
 
 def packed(maps: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -157,16 +159,15 @@ def unpacked(levels: torch.Tensor, limits: torch.Tensor) -> torch.Tensor:
 
 
 def condition(coords: torch.Tensor, octaves: int, mean_face: torch.Tensor, spread: torch.Tensor, tone: torch.Tensor,
-              blind: torch.Tensor | None) -> dict[str, torch.Tensor]:
-    """What our network is told of maps at coords [N, 2, H, W] of skins of tone [N, 3]: `denoise`'s arguments by name. blind [N] is 1 where the normals
+              blind: torch.Tensor | None) -> Condition:
+    """What our network is told of maps at coords [N, 2, H, W] of skins of tone [N, 3]. blind [N] is 1 where the normals
     and specular it gets are pure noise (`denoise`'s `levels` are BLIND there) and follow from the diffuse alone."""
     texel = 512 * (coords[:, 0, 0, 1] - coords[:, 0, 0, 0]).abs()  # side of a texel in texels of a 1024 map
     scale = torch.cat([spread[:3] * tone, spread[3:].expand(len(tone), -1)], 1)
     mapping = torch.cat([texel.log2()[:, None], tone.clamp_min(1e-3).log() / 2 + 0.6], 1)  # logarithms of about -1 to 1
     if blind is not None:
         mapping = torch.cat([mapping, blind.to(mapping)[:, None]], 1)
-    return {"condition": positional_encoding(coords, octaves), "mapping_condition": mapping,
-            "mean": mean_at(mean_face, coords, tone), "spread": scale[:, :, None, None]}
+    return Condition(positional_encoding(coords, octaves), mapping, mean_at(mean_face, coords, tone), scale[:, :, None, None])
 
 
 def mean_at(mean_face: torch.Tensor, coords: torch.Tensor, tone: torch.Tensor) -> torch.Tensor:
@@ -205,9 +206,9 @@ def build(config: dict) -> UNet:
     model, cond = config["model"], config.get("cond", {})
     channels = {"coord": 2, "posenc": 2 + 4 * int(cond.get("pos_enc_freq", 0)), "noise": 3}[cond.get("type", "coord")]
     augmented = 9 if model.get("augment_wrapper", True) else 0
-    return UNet(model["input_channels"], channels, model["mapping_out"], model["depths"], model["channels"], model.get("self_attn_depths"),
-                model.get("patch_size", 1), augmented + model.get("mapping_cond_dim", 0), model.get("sigma_data", 1.0), model.get("norm", "group"),
-                model.get("skip_stages", 0), model.get("has_variance", False))
+    return UNet(UNetLayout(model["input_channels"], channels, model["mapping_out"], model["depths"], model["channels"], model.get("self_attn_depths"),
+                           model.get("patch_size", 1), augmented + model.get("mapping_cond_dim", 0), model.get("sigma_data", 1.0),
+                           model.get("norm", "group"), model.get("skip_stages", 0), model.get("has_variance", False)))
 
 
 def coordinates(size: int, rows: slice, columns: slice, centred: bool = True) -> torch.Tensor:

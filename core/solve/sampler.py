@@ -11,12 +11,13 @@ A step stays on the device that the state, the observations and the prior lie on
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import torch
 
 from ..contract.messages import Problem
 from .light_fit import update_lights
-from .lighting import interpolation
+from .lighting import Lights, interpolation
 from .problem import Observation, State, albedo, blurred, photometric
 from .recipes import Recipe
 
@@ -30,56 +31,88 @@ def seeded(seed: int, device: torch.device | str = "cpu") -> Callable[[int], Cal
     return of_step
 
 
-def sample(prior: Callable, observations: dict[int, Observation], state: State, recipe: Recipe, noise: Callable[[int], Callable],
-           on_step: Callable[[State, int], None] = lambda state, steps: None,
-           known: Callable[[torch.Tensor, float, Callable], torch.Tensor] = lambda x, sigma, draw: x, fit: Callable[..., None] = update_lights) -> State:
-    """Runs the sampler from `state` to its end and returns the final state; `denoised` is the solved map, `lights` theta.
+@dataclass(frozen=True)
+class Sampler:
+    """How a map is sampled, whatever is observed of it.
 
-    prior(x, sigma, coords) is the denoiser; `observations` maps a coarsening factor to what is known at that size; `noise` is `seeded`'s, of their device;
-    `known` puts what is known of the map for sure into x_t (window.py); `fit` moves theta after each step (light_fit.update_lights, or another light model's).
-    Raises Problem when the numbers leave all bounds.
+    denoiser(x, sigma, coords) is the prior; noise is `seeded`'s, of the observations' device; known(x, sigma, draw) puts what is known of the map for sure
+    into x_t (window.py); fit moves theta after each step (light_fit.update_lights, or another light model's).
     """
-    sigmas = schedule(recipe)
-    steps = len(sigmas) - 1
-    for i in range(state.step, steps):
-        s = sigmas[i]
-        draw = noise(i)
-        o = observations[_factor(s, recipe, observations)]
-        if state.x is None or state.x.shape[-2:] != o.weight.shape:  # the start, or a finer map from here on
-            clean = _resized(state.denoised, *o.weight.shape)
-            state.x = clean + s * draw(*clean.shape)
-        step(prior, o, state, recipe, (s, sigmas[i + 1]), steps, draw, known, fit)
-        if not state.x.abs().max() <= 1e3 * (1 + s):  # nor where it is no number
-            raise Problem(f"The solver diverged at step {i + 1} of {steps}.",
-                          "Check that the texture and the mask are those of this head, or choose the proximal guidance.")
-        on_step(state, steps)
-    return state
 
+    denoiser: Callable
+    recipe: Recipe
+    noise: Callable[[int], Callable]
+    known: Callable[[torch.Tensor, float, Callable], torch.Tensor] = lambda x, sigma, draw: x
+    fit: Callable[..., None] = update_lights
 
-def step(prior: Callable, o: Observation, state: State, recipe: Recipe, levels: tuple[float, float], steps: int, draw: Callable,
-         known: Callable[[torch.Tensor, float, Callable], torch.Tensor], fit: Callable[..., None]) -> None:
-    """One step of `sample`, in place, between two noise levels: x_t becomes x_{t-1}, theta follows, all on their device."""
-    s, s_next = levels
-    x = known(state.x, s, draw).requires_grad_(recipe.guidance == "dps")
-    denoised = prior(x, s, o.coords)  # equation 6
-    with torch.no_grad():
-        shading = o.shader.total(state.lights)
-    guided, gradient = denoised.detach(), 0.0
-    if recipe.guidance == "dps":
-        loss = photometric(denoised, shading, o, o.weight, recipe.blur)  # equation 1
-        scale = recipe.zeta * (1 + s * s if recipe.preserving else 1.0)
-        gradient = clipped(torch.autograd.grad(loss, x)[0] * o.weight * scale, recipe)
-    else:
-        guided = proximal(guided, shading, o, s, recipe.residual)
-    fit(state, denoised.detach(), o, recipe, state.step, steps)  # equation 9
+    def sample(self, observations: dict[int, Observation], state: State, on_step: Callable[[State, int], None] = lambda state, steps: None) -> State:
+        """Samples from `state` to the end and returns the final state; `denoised` is the solved map, `lights` theta.
 
-    with torch.no_grad():
-        s_down, s_up = ancestral(s, s_next)
-        x = x.detach()
-        x_prime = x + (x - guided) / s * (s_down - s)  # equation 7, its mean
-        x_prime = x_prime - gradient  # equation 8
-        state.x = x_prime if s_up == 0 else _noised(x_prime, x, s_up, s_down / s, o, state, recipe, draw)
-    state.denoised, state.step = guided, state.step + 1
+        `observations` maps a coarsening factor to what is known at that size. Raises Problem when the numbers leave all bounds.
+        """
+        sigmas = schedule(self.recipe)
+        steps = len(sigmas) - 1
+        for i in range(state.step, steps):
+            s = sigmas[i]
+            draw = self.noise(i)
+            o = observations[_factor(s, self.recipe, observations)]
+            if state.x is None or state.x.shape[-2:] != o.weight.shape:  # the start, or a finer map from here on
+                clean = _resized(state.denoised, *o.weight.shape)
+                state.x = clean + s * draw(*clean.shape)
+            self.step(o, state, (s, sigmas[i + 1]), steps, draw)
+            if not state.x.abs().max() <= 1e3 * (1 + s):  # nor where it is no number
+                raise Problem(f"The solver diverged at step {i + 1} of {steps}.",
+                              "Check that the texture and the mask are those of this head, or choose the proximal guidance.")
+            on_step(state, steps)
+        return state
+
+    def step(self, o: Observation, state: State, levels: tuple[float, float], steps: int, draw: Callable) -> None:
+        """One step of `sample`, in place, between two noise levels: x_t becomes x_{t-1}, theta follows, all on their device.
+
+        Parameters
+        ----------
+        o : what is known of the map at the size of the state's x
+        state : [1, 7, H, W] maps and theta; changed
+        levels : sigma before and after the step, the second one smaller
+        steps : how many the whole walk has
+        draw : draw(*shape), the step's standard normal noise
+        """
+        (s, s_next), recipe = levels, self.recipe
+        x = self.known(state.x, s, draw).requires_grad_(recipe.guidance == "dps")
+        denoised = self.denoiser(x, s, o.coords)  # equation 6
+        with torch.no_grad():
+            shading = o.shader.total(state.lights)
+        guided, gradient = denoised.detach(), 0.0
+        if recipe.guidance == "dps":
+            loss = photometric(denoised, shading, o, o.weight, recipe.blur)  # equation 1
+            scale = recipe.zeta * (1 + s * s if recipe.preserving else 1.0)
+            gradient = clipped(torch.autograd.grad(loss, x)[0] * o.weight * scale, recipe)
+        else:
+            guided = proximal(guided, shading, o, s, recipe.residual)
+        self.fit(state, denoised.detach(), o, recipe, state.step, steps)  # equation 9
+
+        with torch.no_grad():
+            s_down, s_up = ancestral(s, s_next)
+            x = x.detach()
+            x_prime = x + (x - guided) / s * (s_down - s)  # equation 7, its mean
+            x_prime = x_prime - gradient  # equation 8
+            state.x = x_prime if s_up == 0 else self._noised(x_prime, x, (s_up, s_down / s), o, state.lights, draw)
+        state.denoised, state.step = guided, state.step + 1
+
+    def _noised(self, mean: torch.Tensor, x: torch.Tensor, shares: tuple[float, float], o: Observation, lights: Lights, draw: Callable) -> torch.Tensor:
+        """x_{t-1}: the mean with fresh noise; of several draws the one whose rendering is nearest to where x_t's should go (diffusion proximal posterior
+        sampling, as in the released code). shares: the level of the fresh noise, and the share of x_t's noise that the step keeps."""
+        s_up, kept = shares
+        if self.recipe.candidates == 1:
+            return mean + s_up * draw(*mean.shape)
+        shading = o.shader.total(lights)
+        target = kept * blurred(albedo(x) * shading) + (1 - kept) * o.texture
+        best, least = mean, torch.full((), torch.inf, device=mean.device)
+        for _ in range(self.recipe.candidates):
+            candidate = mean + s_up * draw(*mean.shape)
+            error = ((o.weight * (shading * albedo(candidate) - target)) ** 2).sum()
+            best, least = torch.where(error < least, candidate, best), torch.minimum(error, least)
+        return best
 
 
 def schedule(recipe: Recipe) -> list[float]:
@@ -119,21 +152,6 @@ def proximal(denoised: torch.Tensor, shading: torch.Tensor, o: Observation, s: f
     out = denoised.clone()
     out[0, :3] = (half * wanted + ratio * denoised[0, :3]) / (half * half + ratio)
     return out
-
-
-def _noised(mean: torch.Tensor, x: torch.Tensor, s_up: float, kept: float, o: Observation, state: State, recipe: Recipe, draw: Callable) -> torch.Tensor:
-    """x_{t-1}: the mean with fresh noise; of several draws the one whose rendering is nearest to where x_t's should go
-    (diffusion proximal posterior sampling, as in the released code). `kept` is the share of x_t's noise that the step keeps."""
-    if recipe.candidates == 1:
-        return mean + s_up * draw(*mean.shape)
-    shading = o.shader.total(state.lights)
-    target = kept * blurred(albedo(x) * shading) + (1 - kept) * o.texture
-    best, least = mean, torch.full((), torch.inf, device=mean.device)
-    for _ in range(recipe.candidates):
-        candidate = mean + s_up * draw(*mean.shape)
-        error = ((o.weight * (shading * albedo(candidate) - target)) ** 2).sum()
-        best, least = torch.where(error < least, candidate, best), torch.minimum(error, least)
-    return best
 
 
 def _factor(s: float, recipe: Recipe, observations: dict[int, Observation]) -> int:

@@ -116,7 +116,7 @@ class Places:
 
 
 @dataclass(frozen=True)
-class Model:
+class Covariances:
     """The covariances of places with others, without their scales, each [N, M]; level: 1 for two of one capture."""
 
     traits: np.ndarray
@@ -169,7 +169,7 @@ def seen_together(captures: list[Cells]) -> tuple[Places, np.ndarray]:
         np.concatenate([cells.values for cells in captures])
 
 
-def model(these: Places, others: Places) -> Model:
+def model(these: Places, others: Places) -> Covariances:
     """The covariances of places with others; each capture has a light of its own."""
     same = (these.own[:, None] == others.own[None]).astype(np.float64)
     apart = np.linalg.norm(these.at[:, None] - others.at[None], axis=-1)
@@ -177,10 +177,10 @@ def model(these: Places, others: Places) -> Model:
     variances = [1 + ALIKE * np.exp(-2 * np.abs(places.at[:, 0]) / REACH_M) for places in (these, others)]  # higher where a place is its own mirror image
     traits = (np.exp(-apart / REACH_M) + ALIKE * np.exp(-mirrored / REACH_M)) / np.sqrt(np.multiply.outer(*variances))
     light = (VISIBLE**2 * sh_basis(these.normal) * OF_ORDERS**2) @ sh_basis(others.normal).T
-    return Model(traits, light * same, np.exp(-apart / LOCAL_REACH_M) * same, np.exp(-apart / NOISE_REACH_M) * same, same)
+    return Covariances(traits, light * same, np.exp(-apart / LOCAL_REACH_M) * same, np.exp(-apart / NOISE_REACH_M) * same, same)
 
 
-def find_scales(together: Model, values: np.ndarray, typical: Scales = TYPICAL) -> Scales:
+def find_scales(together: Covariances, values: np.ndarray, typical: Scales = TYPICAL) -> Scales:
     """The most probable scales, by a search along one of them after the other."""
     best, most = typical, log_probability(together, values, typical, typical)
     for step in (2.0, 1.4, 1.2):
@@ -196,7 +196,7 @@ def find_scales(together: Model, values: np.ndarray, typical: Scales = TYPICAL) 
     return best
 
 
-def log_probability(together: Model, values: np.ndarray, scales: Scales, typical: Scales = TYPICAL) -> float:
+def log_probability(together: Covariances, values: np.ndarray, scales: Scales, typical: Scales = TYPICAL) -> float:
     """Of values [K, 3] under the scales, and of the scales themselves, but for a constant."""
     total = -0.5 * sum((np.log(found / usual) / VARIED) ** 2 for found, usual in zip(scales, typical, strict=True))
     for axis in range(3):

@@ -15,13 +15,15 @@ from dataclasses import dataclass, fields, replace
 import torch
 from torch.nn import functional
 
+from ..contract.messages import Reporter
+from .checkpoint import Solution
 from .draft import restored
 from .lighting import Lights
 from .memory import sample_within_memory
 from .prior import ConditionedPrior
 from .problem import Observation, State
 from .recipes import Recipe
-from .sampler import seeded
+from .sampler import Sampler, seeded
 
 MARGIN = 64
 """Texels of a 1024 map around the touched box that are sampled again."""
@@ -76,11 +78,25 @@ def window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int], mult
     return Window(tuple(inside), tuple(seen), tuple(cells_seen), moving[0][:, None] & moving[1][None])
 
 
-def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], denoised: torch.Tensor, lights: Lights, part: Window, recipe: Recipe, seed: int,
-                 on_step: Callable[[State, int], None] = lambda state, steps: None,
-                 log: Callable[[str], None] = lambda text: None) -> tuple[torch.Tensor, Lights]:
-    """The map [1, 7, S, S] and the lights of an earlier solve with the window sampled anew under `observations` of the whole map, by coarsening factor."""
-    device = prior.device
+def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], earlier: Solution, part: Window, recipe: Recipe, seed: int,
+                 report: Reporter) -> tuple[torch.Tensor, Lights]:
+    """The map and the lights of an earlier solve with a window of it sampled anew.
+
+    Parameters
+    ----------
+    prior : of the earlier solve's skin tone
+    observations : of the whole map, by coarsening factor
+    earlier : what goes on around the window; stays as it is
+    part : the window
+    recipe : the earlier solve's; the walk is its, with at most STEPS steps
+    seed : of the noise
+    report : hears each step
+
+    Returns
+    -------
+    The map [1, 7, S, S] and theta, on the processor.
+    """
+    device, denoised, lights = prior.device, earlier.denoised, earlier.lights
     here = {factor: cropped(o, part, factor).to(device) for factor, o in observations.items()}
     known = denoised[(..., *part.seen)].to(device)
     grid = lights.grid[(..., *part.cells)].to(device)
@@ -95,11 +111,11 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
 
     def keep_frozen(state: State, steps: int) -> None:
         state.lights.grid = torch.where(moving, state.lights.grid, grid)
-        on_step(state, steps)
+        report.progress(state.step, steps, f"sampling the edited part, step {state.step} of {steps}")
 
     last = max(end for _, _, end in recipe.phases)
     local = replace(recipe, steps=min(recipe.steps, STEPS), phases=(("cells", 0.0, last),), refit=0.0)
-    state = sample_within_memory(prior, here, state, local, seeded(seed, device), keep_frozen, log, known=with_known)
+    state = sample_within_memory(Sampler(prior, local, seeded(seed, device), with_known), here, state, keep_frozen, report.log)
     found = restored(prior, state.denoised, observations[1].coords.to(device), recipe, seed, part.seen)
     solved, moved = denoised.clone(), lights.grid.clone()
     moved[(..., *part.cells)] = state.lights.grid.cpu()

@@ -73,7 +73,7 @@ def made_environment(rng: np.random.Generator) -> Environment:
     return _normalised(_gathered(panorama), np.array([0.0, -0.6, 0.8]), np.zeros(3), panorama)
 
 
-def seen(environment: Environment, directions: np.ndarray) -> np.ndarray:
+def background_radiance(environment: Environment, directions: np.ndarray) -> np.ndarray:
     """The background's radiance [..., 3] in unit directions [..., 3]."""
     height, width = environment.panorama.shape[:2]
     column = (0.5 + np.arctan2(directions[..., 0], -directions[..., 1]) / (2 * np.pi)) * width

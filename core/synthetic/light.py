@@ -8,7 +8,7 @@ The sky is precomputed radiance transfer in second-order spherical harmonics (Sl
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -44,24 +44,35 @@ class UvProblem:
     covered: np.ndarray
 
 
+@dataclass(frozen=True)
+class SkyAndSun:
+    """sky [9, 3]: coefficients of its radiance; sun [3]: unit direction to it; colour [3]: the shading of a surface that faces it, zeros for no sun; radius: of
+    the sun, in radians."""
+
+    sky: np.ndarray
+    sun: np.ndarray
+    colour: np.ndarray
+    radius: float
+
+
 def uv_problem(seed: int, size: int = 512, shadows: str | None = None) -> UvProblem:
     """A random subject under random light. `shadows`: none, self, leaves, blinds or edge; drawn from the seed if not given."""
     rng = np.random.default_rng([seed, 7])
     kind = shadows or str(rng.choice(["self", "leaves", "blinds", "edge"]))
     skin = make_skin(sample_parameters(seed), size)
-    sky, sun, colour, radius = random_light(rng)
+    light = random_light(rng)
     if kind == "none":
-        colour = colour * 0
-    shading, shadow, world_normal = bake(template.load(), size, sky, sun, colour, radius, kind, rng)
+        light = replace(light, colour=light.colour * 0)
+    shading, shadow, world_normal = bake(template.load(), size, light, kind, rng)
     bright = np.percentile((skin.diffuse * shading)[skin.covered].max(-1), 99.5)
     exposure = min(rng.uniform(0.7, 1.1) / np.percentile(shading[skin.covered].mean(-1), 90), 1 / bright)
     shading = shading * exposure
     return UvProblem(skin.diffuse * shading, skin.diffuse, skin.normal, world_normal, shading, shadow,
-                     sky * exposure, sun, colour * exposure, skin.covered)
+                     light.sky * exposure, light.sun, light.colour * exposure, skin.covered)
 
 
-def random_light(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Sky [9, 3] (coefficients of radiance), unit direction to the sun [3], its colour [3], its angular radius in radians."""
+def random_light(rng: np.random.Generator) -> SkyAndSun:
+    """Broad lights from anywhere but below, and a sun before the face."""
     sky = np.zeros((9, 3))
     for _ in range(4):  # broad lights from anywhere but below
         towards = rng.normal(size=3) * [1, 1, 0.6] + [0, -0.3, 0.5]
@@ -72,12 +83,24 @@ def random_light(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.n
     sun = np.array([np.sin(azimuth) * np.cos(elevation), -np.cos(azimuth) * np.cos(elevation), np.sin(elevation)])
     warmth = rng.uniform(0, 1)
     colour = rng.uniform(0.5, 2.0) * np.array([1.0, 1 - 0.15 * warmth, 1 - 0.4 * warmth])
-    return sky, sun, colour, float(np.exp(rng.uniform(np.log(0.005), np.log(0.12))))
+    return SkyAndSun(sky, sun, colour, float(np.exp(rng.uniform(np.log(0.005), np.log(0.12)))))
 
 
-def bake(mesh: Mesh, size: int, sky: np.ndarray, sun: np.ndarray, colour: np.ndarray, radius: float, shadows: str,
-         rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Shading [S, S, 3], shadow [S, S] and world normals [S, S, 3] of a mesh in its UVs, bled beyond the charts, under the light of `random_light`."""
+def bake(mesh: Mesh, size: int, light: SkyAndSun, shadows: str, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What a light makes of a mesh, in its UVs, bled beyond the charts.
+
+    Parameters
+    ----------
+    mesh : in metres
+    size : S, texels along a side
+    light : sky and sun
+    shadows : what throws them: none, self (the mesh alone), leaves, blinds or edge
+    rng : of what stands before the sun, and of the rays to it
+
+    Returns
+    -------
+    Shading [S, S, 3], the blocked share [S, S] of the sun where the surface faces it, and world normals [S, S, 3].
+    """
     face, bary = raster.rasterize_uv(mesh, size)
     covered = face >= 0
     face, bary = face[covered], bary[covered]
@@ -85,11 +108,11 @@ def bake(mesh: Mesh, size: int, sky: np.ndarray, sun: np.ndarray, colour: np.nda
     normals = raster.interpolate(vertex_normals(mesh), mesh.faces, face, bary)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
     caster = raster.RayCaster(mesh)
-    ambient = raster.interpolate(_transfer_of(mesh, caster) @ sky, mesh.faces, face, bary)
-    seen = _sun_seen(caster, points, normals, sun, radius, shadows, rng)
-    cosine = np.maximum(normals @ sun, 0)
-    shading = np.maximum(ambient, 0.005) + (cosine * seen)[:, None] * colour
-    shadow = np.where(cosine > 0.02, 1 - seen, 0) * (colour.sum() > 0)
+    ambient = raster.interpolate(_transfer_of(mesh, caster) @ light.sky, mesh.faces, face, bary)
+    seen = _sun_seen(caster, points, normals, light, shadows, rng)
+    cosine = np.maximum(normals @ light.sun, 0)
+    shading = np.maximum(ambient, 0.005) + (cosine * seen)[:, None] * light.colour
+    shadow = np.where(cosine > 0.02, 1 - seen, 0) * (light.colour.sum() > 0)
 
     def spread(values: np.ndarray) -> np.ndarray:
         picture = np.zeros((size, size, *values.shape[1:]), np.float32)
@@ -104,9 +127,10 @@ def transfer(points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster, 
     return radiance_transfer(caster, points, normals, rays)
 
 
-def _sun_seen(caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray, sun: np.ndarray, radius: float, shadows: str,
+def _sun_seen(caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray, light: SkyAndSun, shadows: str,
               rng: np.random.Generator) -> np.ndarray:
     """The share [N] of the sun's disc that each point sees past the head and past whatever else throws a shadow."""
+    sun, radius = light.sun, light.radius
     right = np.cross(sun, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     up = np.cross(right, sun)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..imaging import images
 from ..light.spherical_harmonics import sh_basis
-from .environments import Environment, made_environment, panorama_environment, seen
+from .environments import Environment, background_radiance, made_environment, panorama_environment
 from .identities import subject_mesh
 from .light import in_the_way
 from .olat import BASIS, DIRECTIONS, LIGHTS, LightStage, light_stage, mirrored, transport
@@ -28,7 +28,7 @@ GOBOS = ("none", "none", "none", "leaves", "leaves", "blinds", "edge")
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedLight:
     """The light as a fit to the registered head would find it, up to its usual errors, times the skin's tone: ambient [P, 3] of a second-order sky,
     sunlit [P, 3] the same and a sun that only the head itself blocks; smooth normals [P, 3] of the registered head; direct [P, 3]: what the sun would add
     where nothing blocks it, None where nobody asks for it."""
@@ -37,6 +37,15 @@ class Fitted:
     sunlit: np.ndarray
     normal: np.ndarray
     direct: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class LampOnHead:
+    """A lamp as it falls on a head: towards [3], unit direction to it; colour [3]: irradiance over pi; reach [P]: what the head itself lets through of it."""
+
+    towards: np.ndarray
+    colour: np.ndarray
+    reach: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -55,7 +64,7 @@ class Portrait:
     head: np.ndarray
     face: np.ndarray
     skin: np.ndarray
-    fitted: Fitted
+    fitted: FittedLight
 
 
 def portrait(seed: int, size: int = 256, light: int = 0, panoramas: list[np.ndarray] = (), texels: int = 1024) -> Portrait:
@@ -100,7 +109,7 @@ def relit(sight: Sight, stage: LightStage, rng: np.random.Generator, panoramas: 
     return Portrait(develop(picture, rng), truth, shading * (head * bare)[..., None], (images.srgb_to_linear(even) / tone).astype(np.float32),
                     sight.picture(shadow), strong, head * bare, face * bare,
                     sight.picture(sight.masks[:, MASKS.index("skin")] * (1 - sight.masks[:, MASKS.index("eyes")])) * bare,
-                    _fitted(sight, carried, environment, lamps, colours, albedo, gains, rng))
+                    _fitted(sight, carried, environment, lamps, colours, _tone(sight, albedo) * gains, rng))
 
 
 def _under(environment: Environment, sight: Sight, stage: LightStage, carried: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -178,7 +187,7 @@ def _background(environment: Environment, sight: Sight, light: float, rng: np.ra
     """What lies behind the head [S, S, 3]: the panorama out of focus, a dark studio, or cloth and walls of any colour."""
     kind = rng.random()
     if kind < 0.45:
-        return seen(environment, sight.rays) * np.float32(np.exp(rng.normal(0, 0.3)))
+        return background_radiance(environment, sight.rays) * np.float32(np.exp(rng.normal(0, 0.3)))
     if kind < 0.6:
         ground = np.full((sight.size, sight.size, 3), 0.02, np.float32)
     else:
@@ -224,11 +233,11 @@ def _shadow(sight: Sight, lamps: list, colours: list, reach: list, ambient: np.n
     return (lost / strength.sum()).astype(np.float32), float(strength.sum() / (strength.sum() + ambient.mean()))
 
 
-def _fitted(sight: Sight, carried: np.ndarray, environment: Environment, lamps: list, colours: list, albedo: np.ndarray, gains: np.ndarray,
-            rng: np.random.Generator) -> Fitted:
+def _fitted(sight: Sight, carried: np.ndarray, environment: Environment, lamps: list, colours: list, tone: np.ndarray,
+            rng: np.random.Generator) -> FittedLight:
     transfer = sight.at_pixels(carried @ BASIS.astype(np.float32))
-    reach = [sight.reach[np.argmax(sight.lamps @ lamp)] for lamp in lamps]
-    return fitted_light(transfer, sight.smooth, reach, environment, lamps, colours, _tone(sight, albedo) * gains, rng)
+    shining = [LampOnHead(lamp, colour, sight.reach[np.argmax(sight.lamps @ lamp)]) for lamp, colour in zip(lamps, colours, strict=True)]
+    return fitted_light(transfer, sight.smooth, shining, environment, tone, rng)
 
 
 def _tone(sight: Sight, albedo: np.ndarray) -> np.ndarray:
@@ -237,20 +246,27 @@ def _tone(sight: Sight, albedo: np.ndarray) -> np.ndarray:
     return (albedo[skin] if skin.any() else albedo).mean(0)
 
 
-def fitted_light(transfer: np.ndarray, smooth: np.ndarray, reach: list[np.ndarray], environment: Environment, lamps: list, colours: list, tone: np.ndarray,
-                 rng: np.random.Generator) -> Fitted:
+def fitted_light(transfer: np.ndarray, smooth: np.ndarray, lamps: list[LampOnHead], environment: Environment, tone: np.ndarray,
+                 rng: np.random.Generator) -> FittedLight:
     """What core/light/sunlight.py would find, without its search: the second-order sky and the strongest lamp, each a little off.
 
-    transfer [P, 9] and smooth normals [P, 3] of the head; reach: of each lamp what the head itself lets through [P]; tone [3]: of the exposed skin.
+    Parameters
+    ----------
+    transfer : [P, 9] of the head
+    smooth : [P, 3], its normals without pores
+    lamps : those beside the environment
+    environment : the light from everywhere
+    tone : [3], of the exposed skin
+    rng : of the fit's errors
     """
-    main = int(np.argmax([c.mean() for c in colours])) if lamps else -1
+    main = int(np.argmax([lamp.colour.mean() for lamp in lamps])) if lamps else -1
     sky = BASIS.T @ environment.radiance * (4 * np.pi / LIGHTS)
-    for k, (lamp, colour) in enumerate(zip(lamps, colours, strict=True)):
+    for k, lamp in enumerate(lamps):
         if k != main:
-            sky = sky + sh_basis(lamp)[:, None] * colour * np.pi
+            sky = sky + sh_basis(lamp.towards)[:, None] * lamp.colour * np.pi
     found = main >= 0 and rng.random() < 0.85
     if main >= 0 and not found:
-        sky = sky + sh_basis(lamps[main])[:, None] * colours[main] * np.pi
+        sky = sky + sh_basis(lamps[main].towards)[:, None] * lamps[main].colour * np.pi
     sky = sky * np.exp(rng.normal(0, 0.1, 3)) + rng.normal(0, 0.08, sky.shape) * np.abs(sky[:1])
     lit = transfer @ sky
     lit = np.maximum(lit, 0.15 * np.median(lit, 0))
@@ -259,11 +275,11 @@ def fitted_light(transfer: np.ndarray, smooth: np.ndarray, reach: list[np.ndarra
     tone = tone * np.exp(rng.normal(0, 0.08) + rng.normal(0, 0.03, 3))
     direct = np.zeros_like(lit)
     if found:
-        towards = lamps[main] + rng.normal(0, 0.06, 3)
+        towards = lamps[main].towards + rng.normal(0, 0.06, 3)
         towards /= np.linalg.norm(towards)
-        direct = np.maximum(normal @ towards, 0)[:, None] * colours[main] * np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.05, 3))
-    sunlit = lit + direct * reach[main][:, None] if found else lit
-    return Fitted(*((part * tone).astype(np.float32) for part in (lit, sunlit)), normal.astype(np.float32), (direct * tone).astype(np.float32))
+        direct = np.maximum(normal @ towards, 0)[:, None] * lamps[main].colour * np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.05, 3))
+    sunlit = lit + direct * lamps[main].reach[:, None] if found else lit
+    return FittedLight(*((part * tone).astype(np.float32) for part in (lit, sunlit)), normal.astype(np.float32), (direct * tone).astype(np.float32))
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -53,21 +53,28 @@ def main() -> None:
     asked = parser.parse_args()
     wanted = [int(n) for n in asked.only.split(",")] if asked.only else list(range(asked.frames))
     skin = make_skin(sample_parameters(asked.seed), MAPS)
-    render_frames(asked.work, asked.seed, skin, scene.camera_path(asked.seed, asked.frames), wanted, asked.samples)
+    render_frames(asked.work, asked.seed, skin, scene.Shot(scene.camera_path(asked.seed, asked.frames), wanted, asked.samples))
     if not asked.only:
         write_sample(asked.out, asked.work, asked.seed, skin, asked.frames)
 
 
-def render_frames(work: Path, seed: int, skin: Skin, cameras: np.ndarray, frames: list[int], samples: int, scale: float = 1.0,
-                  leaves: bool = True, room: bool = True, light: scene.Light | None = None, suffix: str = ".png") -> None:
-    """work/NNNNN.png of these frames (numbers into cameras [N, 4, 4]) by Cycles in a process of its own; files that exist are kept.
+def render_frames(work: Path, seed: int, skin: Skin, shot: scene.Shot, leaves: bool = True, light: scene.SceneLight | None = None,
+                  suffix: str = ".png") -> None:
+    """Renders a bald subject to work/NNNNN.png by Cycles in a process of its own; files that exist are kept.
 
-    `scale`: of the pictures' size; `leaves`: whether they stand between the sun and the head; `room`: whether there is anything behind it; `light`: instead
-    of the sample's sun, sky and leaves; `suffix`: .exr for linear light.
+    Parameters
+    ----------
+    work : folder of the job and its pictures
+    seed : the subject
+    skin : its maps
+    shot : frames, cameras and quality; the head keeps still, and the focal length is the sample's
+    leaves : whether they stand between the sun and the head
+    light : instead of the sample's sun, sky and leaves
+    suffix : .exr for linear light
     """
     work.mkdir(parents=True, exist_ok=True)
     sun = scene.sun_of(seed)
-    light = light or scene.Light(scene.SKY, sun, scene.leaves(seed, sun) if leaves else None)
+    light = light or scene.SceneLight(scene.SKY, sun, scene.leaves(seed, sun) if leaves else None)
     meshes.write_obj(work / "head.obj", subject_mesh(seed))
     if light.blockers:
         meshes.write_obj(work / "leaves.obj", light.blockers)
@@ -79,12 +86,12 @@ def render_frames(work: Path, seed: int, skin: Skin, cameras: np.ndarray, frames
     images.write_data(work / "specular.png", skin.specular, bits=16)
     images.write_data(work / "normal.png", skin.normal / 2 + 0.5, bits=16)
     write_json(work / "job.json", {
-        "seed": seed, "room": room, "head": str(work / "head.obj"), "leaves": str(work / "leaves.obj") if light.blockers else None,
-        "suffix": suffix, "out": str(work), "frames": frames, "samples": samples,
-        "maps": {name: str(work / f"{name}.png") for name in ("diffuse", "specular", "normal")}, "cameras": cameras.tolist(),
+        "seed": seed, "room": shot.room, "head": str(work / "head.obj"), "leaves": str(work / "leaves.obj") if light.blockers else None,
+        "suffix": suffix, "out": str(work), "frames": shot.frames, "samples": shot.samples,
+        "maps": {name: str(work / f"{name}.png") for name in ("diffuse", "specular", "normal")}, "cameras": shot.cameras.tolist(),
         "sun": asdict(light.sun) | {"direction": light.sun.direction.tolist()} if light.sun else None, "sky": sky,
         "lamps": [asdict(lamp) for lamp in light.lamps], "flash": light.flash,
-        "width": round(scene.WIDTH * scale), "height": round(scene.HEIGHT * scale), "focal_px": scene.FOCAL * scale})
+        "width": round(scene.WIDTH * shot.scale), "height": round(scene.HEIGHT * shot.scale), "focal_px": scene.FOCAL * shot.scale})
     subprocess.run([sys.executable, "-m", "core.synthetic.render", str(work / "job.json")], cwd=Path(__file__).parents[2], check=True)
 
 

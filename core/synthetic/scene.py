@@ -7,6 +7,7 @@ World: metres, +Z up, the head's middle at the origin, its face towards -Y. The 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +33,7 @@ SKY = (0.42, 0.55, 0.80)
 
 
 @dataclass(frozen=True)
-class Lamp:
+class AreaLamp:
     """A square area lamp that shines at the head: where it is [3] and its side in metres, its power in watts, its colour in linear sRGB."""
 
     position: tuple[float, float, float]
@@ -42,15 +43,30 @@ class Lamp:
 
 
 @dataclass(frozen=True)
-class Light:
+class SceneLight:
     """All that lights a subject. sky: its radiance everywhere, [3], or an equirectangular panorama [H, W, 3] as Blender reads one (its middle column is +X);
     blockers: what stands between the lights and the head, unseen by the camera; flash: watts of a small lamp in the camera's own place, that goes with it."""
 
     sky: tuple[float, float, float] | np.ndarray = SKY
     sun: Sun | None = None
     blockers: Mesh | None = None
-    lamps: tuple[Lamp, ...] = ()
+    lamps: tuple[AreaLamp, ...] = ()
     flash: float = 0.0
+
+
+@dataclass(frozen=True)
+class Shot:
+    """What is rendered of a scene, and how well. cameras [N, 4, 4]: camera to world; frames: numbers into them; samples: of Cycles, a pixel; scale: of the
+    pictures' size; poses [N, 4, 4]: where the head is in each frame, head to world, None: still; room: whether there is anything behind the person; focal:
+    factor on the focal length, for close-ups."""
+
+    cameras: np.ndarray
+    frames: Sequence[int]
+    samples: int
+    scale: float = 1.0
+    poses: np.ndarray | None = None
+    room: bool = True
+    focal: float = 1.0
 
 
 def sun_of(seed: int) -> Sun:

@@ -32,7 +32,7 @@ from .fill import fill
 from .filmed import filmed
 from .foreign import clothes, leave_out_background, leave_out_hair
 from .parts_shown import GROWTHS, PartsShown, tell_parts
-from .projection import Observation, observe
+from .projection import UnwrappedView, observe
 
 OBSERVED = 1024
 """Side of the maps on which views are looked at, aligned and weighed: all of that is smooth, and all views are held at once. Of a larger texture one view
@@ -87,7 +87,7 @@ class Built:
     losses: dict
 
 
-def observe_all(capture: Capture, head: Head, size: int, report: Reporter) -> tuple[list[Observation], Unfolded, PartsShown]:
+def observe_all(capture: Capture, head: Head, size: int, report: Reporter) -> tuple[list[UnwrappedView], Unfolded, PartsShown]:
     """What each delit view sees of the head on a map of `size`, the frame's own sharpness counted, and which parts of the person they show. Raises Problem
     where no view was delit."""
     frames = read_frames(capture).by_name
@@ -116,7 +116,7 @@ def _delit(path: Path, view: View) -> np.ndarray:
     return linear
 
 
-def build(observations: list[Observation], surface: Unfolded, settings: Settings, report: Reporter, size: int | None = None,
+def build(observations: list[UnwrappedView], surface: Unfolded, settings: Settings, report: Reporter, size: int | None = None,
           aligned: bool = True) -> Built:
     """One map from what the views see, of `size` or of the observations' own; changes the observations (gains, warps, weights). `aligned`: off for
     measurements only."""
@@ -142,7 +142,7 @@ def build(observations: list[Observation], surface: Unfolded, settings: Settings
 
         features = load_features(settings.texture.perceptual_network, settings.compute_device)
         wanted = (confidence > 0.3) & (template.mask("face", len(confidence)) > 0.5 if built_in else True)
-        log_texture, losses = refine(log_texture, observations, surface, wanted, features, settings.texture.perceptual, report, settings.compute_device)
+        log_texture, losses = refine(log_texture, observations, surface, wanted, features, settings.texture.perceptual, report)
         report.figure("perceptual_network", features.name)
     return Built(log_texture, confidence, gains, shift, losses)
 

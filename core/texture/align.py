@@ -16,7 +16,7 @@ from ..face.head import Unfolded
 from ..geometry import raster
 from ..geometry.views import lengths
 from .blend import blurred, weighted_mean
-from .projection import Observation
+from .projection import UnwrappedView
 
 ROUNDS = 2
 LARGEST = 10 / 1024
@@ -25,7 +25,7 @@ SMOOTH = 24 / 1024
 """Gaussian sigma of the warp's smoothing, as a part of the map's side."""
 
 
-def align(observations: list[Observation], surface: Unfolded, report: Reporter) -> float:
+def align(observations: list[UnwrappedView], surface: Unfolded, report: Reporter) -> float:
     """Resamples every observation along its warp. Returns the mean length of the last warps in texels, where they count."""
     if len(observations) < 2:
         return 0.0
@@ -51,7 +51,7 @@ def align(observations: list[Observation], surface: Unfolded, report: Reporter) 
     return float(np.concatenate(moved).mean())
 
 
-def _detail(observation: Observation) -> np.ndarray:
+def _detail(observation: UnwrappedView) -> np.ndarray:
     """[S, S] band-passed log luminance: what can be matched whatever the light."""
     grey = observation.log_colour.mean(-1)
     seen = (observation.weight > 0).astype(np.float32)

@@ -13,13 +13,13 @@ import cv2
 import numpy as np
 
 from ..contract.messages import Reporter
-from .projection import Observation
+from .projection import UnwrappedView
 
 BANDS = ((2.0, 12.0), (8.0, 5.0), (24.0, 2.0), (np.inf, 1.0))
 """(sigma in texels of a 1024 map up to which a band reaches, exponent of the weights in it): details come from the best view, tone from all."""
 
 
-def equalise(observations: list[Observation], rounds: int = 6) -> np.ndarray:
+def equalise(observations: list[UnwrappedView], rounds: int = 6) -> np.ndarray:
     """Brings all views to one exposure and white balance; returns the log gains [views, 3] that were added (weighted mean zero).
 
     Alternates between the mean over views and each view's weighted median difference from it, which no highlight moves.
@@ -44,7 +44,7 @@ def equalise(observations: list[Observation], rounds: int = 6) -> np.ndarray:
     return gains
 
 
-def robust_weights(observations: list[Observation], tolerance: float = 0.10) -> None:
+def robust_weights(observations: list[UnwrappedView], tolerance: float = 0.10) -> None:
     """Takes weight from views whose tone disagrees with the weighted median of all (a highlight, a passing shadow, hair in front).
 
     tolerance: log difference of local tone at which a view keeps half of its weight.
@@ -64,7 +64,7 @@ def robust_weights(observations: list[Observation], tolerance: float = 0.10) -> 
         o.weight = o.weight * cv2.resize(factor, o.weight.shape[::-1], interpolation=cv2.INTER_LINEAR)
 
 
-def blend(observations: list[Observation], covered: np.ndarray, size: int, report: Reporter, what: str = "delit", done: int = 2) -> np.ndarray:
+def blend(observations: list[UnwrappedView], covered: np.ndarray, size: int, report: Reporter, what: str = "delit", done: int = 2) -> np.ndarray:
     """One log texture [size, size, 3] of observations of the texels `covered` [S, S], each enlarged when its turn comes; zero weight everywhere leaves zeros.
     `what` is blended, and how much was `done` before, are for the progress."""
     largest = np.full_like(observations[0].weight, 1e-12)

@@ -13,14 +13,14 @@ from ..face import faces, lids
 from ..face.head import Unfolded
 from ..geometry.views import View
 from ..imaging import images
-from .projection import Observation
+from .projection import UnwrappedView
 
 REACH = 1.7
 """Radii of the eyeball around its centre within which the skin moves with the lids."""
 MARKS = 9
 
 
-def leave_out_blinks(capture: Capture, observations: list[Observation], surface: Unfolded, report: Reporter) -> list[str]:
+def leave_out_blinks(capture: Capture, observations: list[UnwrappedView], surface: Unfolded, report: Reporter) -> list[str]:
     """Takes quality and weight from the texels around an eye in the views whose frame shows it more or less open than the head would look there, next to what
     the other frames show; returns their names.
 

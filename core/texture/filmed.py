@@ -9,10 +9,10 @@ import numpy as np
 from ..contract.messages import Reporter
 from ..imaging import images
 from .blend import blend
-from .projection import Observation, log_colours
+from .projection import UnwrappedView, log_colours
 
 
-def filmed(observations: list[Observation], covered: np.ndarray, size: int, report: Reporter) -> np.ndarray | None:
+def filmed(observations: list[UnwrappedView], covered: np.ndarray, size: int, report: Reporter) -> np.ndarray | None:
     """Linear [size, size, 3] with the light in it, in the frames' exposure; 1 where no view sees anything. The observations, of the texels `covered`, show the
     frames from then on. None where a frame is gone: it is only looked at."""
     if not all(o.view.path.is_file() for o in observations):

@@ -17,7 +17,7 @@ from ..face.head import Unfolded
 from ..geometry import raster
 from ..imaging import images
 from .parts_shown import ASKED, PartsShown
-from .projection import Observation
+from .projection import UnwrappedView
 
 COLOUR = 0.35
 """How far the logarithms of R/G and B/G of a cloth lie from the face's skin; light that a delighter left does not reach that far."""
@@ -35,7 +35,7 @@ LEAST_HAIR = 0.005
 """Share of the map below which nothing is hair: the parser's doubts."""
 
 
-def leave_out_hair(observations: list[Observation], shown: PartsShown, surface: Unfolded) -> np.ndarray:
+def leave_out_hair(observations: list[UnwrappedView], shown: PartsShown, surface: Unfolded) -> np.ndarray:
     """Takes quality and weight from texels that lie under hair of the head or cloth, and returns how surely they do, float32 [S, S] in [0, 1].
 
     What most views show so counts in all of them; what one view shows so (a strand before a cheek) counts in that one.
@@ -53,7 +53,7 @@ def leave_out_hair(observations: list[Observation], shown: PartsShown, surface: 
     return np.clip((usual - low) / (high - low), 0, 1).astype(np.float32)
 
 
-def leave_out_background(observations: list[Observation], report: Reporter) -> int:
+def leave_out_background(observations: list[UnwrappedView], report: Reporter) -> int:
     """Takes quality and weight from texels that a view sees outside the person (segmented in its frame). Returns how many views were so cut.
 
     A frame that is not there, or whose segmentation misses the face, changes nothing.

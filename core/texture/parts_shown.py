@@ -15,7 +15,7 @@ from ..face.head import Head, Unfolded
 from ..face.parts import GROWTHS
 from ..geometry.views import View
 from ..imaging import images
-from .projection import Observation
+from .projection import UnwrappedView
 
 ASKED = (*GROWTHS, "clothes")
 
@@ -30,7 +30,7 @@ class PartsShown:
     hidden: list[np.ndarray | None]
 
 
-def tell_parts(observations: list[Observation], surface: Unfolded, report: Reporter) -> PartsShown:
+def tell_parts(observations: list[UnwrappedView], surface: Unfolded, report: Reporter) -> PartsShown:
     """Asks the parser in every view. Raises Problem where its weights are damaged."""
     total = np.zeros(surface.covered.shape, np.float32)
     votes, hidden = np.zeros((*total.shape, len(ASKED)), np.float32), []
@@ -48,7 +48,7 @@ def tell_parts(observations: list[Observation], surface: Unfolded, report: Repor
     return PartsShown(votes / np.maximum(total, 1e-9)[..., None], total > 0, hidden)
 
 
-def _look(observation: Observation, surface: Unfolded) -> tuple[np.ndarray, np.ndarray] | None:
+def _look(observation: UnwrappedView, surface: Unfolded) -> tuple[np.ndarray, np.ndarray] | None:
     """The shares of ASKED at each texel of a view, float32 [S, S, len(ASKED)], and where they are known [S, S]; None where nobody tells."""
     if not observation.view.path.is_file():
         return None

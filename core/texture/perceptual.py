@@ -22,7 +22,7 @@ from ..geometry import raster
 from ..imaging import images
 from .blend import blurred
 from .features import Features
-from .projection import DARKEST, Observation
+from .projection import DARKEST, UnwrappedView
 
 TILE = 288
 """Pixels along a side of the part of a view that one step looks at: bounds memory and seconds whatever the frames' size; a multiple of 16."""
@@ -46,12 +46,25 @@ class Target:
     trust: np.ndarray  # float32 [h, w] in [0, 1]: how far a pixel may pull; zero off the head
 
 
-def refine(log_texture: np.ndarray, observations: list[Observation], surface: Unfolded, wanted: np.ndarray, features: Features, steps: int,
-           report: Reporter, device: str = "cpu") -> tuple[np.ndarray, dict]:
-    """The blend log_texture [S, S, 3] with its detail optimised, and {"before", "after"}: the mean loss over the same tiles.
+def refine(log_texture: np.ndarray, observations: list[UnwrappedView], surface: Unfolded, wanted: np.ndarray, features: Features, steps: int,
+           report: Reporter) -> tuple[np.ndarray, dict]:
+    """The blend with its detail optimised; same machine, same map.
 
-    wanted: bool [S, S], texels worth looking at (the face). Same machine, same map.
+    Parameters
+    ----------
+    log_texture : [S, S, 3], natural log of linear colour
+    observations : the views
+    surface : of the head, unfolded at their size
+    wanted : bool [S, S], texels worth looking at (the face)
+    features : what tells the perceptual distance; its device is computed on
+    steps : of the optimisation
+    report : hears of progress
+
+    Returns
+    -------
+    The texture as `log_texture` is, and {"before", "after"}: the mean loss over the same tiles.
     """
+    device = features.device
     targets = []
     for i, observation in enumerate(observations):
         report.progress(i, len(observations), f"perceptual step: looking through {observation.name}")
@@ -83,7 +96,7 @@ def refine(log_texture: np.ndarray, observations: list[Observation], surface: Un
     return result.astype(np.float32), {"before": before, "after": after}
 
 
-def _target(observation: Observation, surface: Unfolded, wanted: np.ndarray) -> Target | None:
+def _target(observation: UnwrappedView, surface: Unfolded, wanted: np.ndarray) -> Target | None:
     """A view's pixels that see wanted texels; None where there are none. Follows the alignment, so all views pull at the same texels."""
     seen = (observation.weight > 0) & wanted
     if seen.sum() < 64:

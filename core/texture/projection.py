@@ -24,7 +24,7 @@ POINTS = 1 << 18
 
 
 @dataclass
-class Observation:
+class UnwrappedView:
     """One view in UV space, float32 [S, S, ...]; zero weight where it sees nothing."""
 
     view: View
@@ -46,7 +46,7 @@ class Observation:
             self.pixels, self.warp = pixels, warp
         self.log_colour = log_colours(self.picture, pixels)
 
-    def enlarged(self, size: int, covered: np.ndarray) -> Observation:
+    def enlarged(self, size: int, covered: np.ndarray) -> UnwrappedView:
         """The same on a map of `size`, `covered` [S, S] being the texels of this one: where each texel is seen, and how well, vary smoothly; the picture is
         read anew."""
         if size == len(self.weight):
@@ -60,7 +60,7 @@ class Observation:
         return replace(self, pixels=pixels, log_colour=log_colours(self.picture, pixels), quality=larger(self.quality), weight=larger(self.weight), warp=warp)
 
 
-def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float) -> Observation:
+def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float) -> UnwrappedView:
     """Projects every texel into a linear picture [H, W, 3] of any size of that view. sharpness in [0, 1] scales its weight."""
     count, scale = len(surface.points), [picture.shape[1] / view.width, picture.shape[0] / view.height]
     pixels, quality, distance = np.empty((count, 2), np.float32), np.empty(count), np.empty(count)
@@ -72,7 +72,7 @@ def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float
     pixels = surface.spread(pixels)
     reference = np.median(distance[seen]) if seen.any() else 1.0
     weight = quality ** 2 * sharpness * (reference / distance) ** 2
-    return Observation(view, picture, pixels, log_colours(picture, pixels), surface.spread(quality), surface.spread(weight))
+    return UnwrappedView(view, picture, pixels, log_colours(picture, pixels), surface.spread(quality), surface.spread(weight))
 
 
 def _look(view: View, surface: Unfolded, part: slice, silhouette: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

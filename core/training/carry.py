@@ -58,7 +58,7 @@ def carry(folder: Path, out: Path, mesh: Path | None, size: int, report: Reporte
     return told
 
 
-def _places(own: own_mesh.OwnMesh, size: int, report: Reporter) -> tuple[baking.Places, own_template.Fitted]:
+def _places(own: own_mesh.OwnMesh, size: int, report: Reporter) -> tuple[baking.TexelPartners, own_template.FittedTemplate]:
     """Where each texel of the built-in head's map lies in the other head's."""
     if own.mesh.uvs is None:
         raise Problem(f"{own.path.name} has no UVs.", "Name the mesh whose UVs the colour maps are in.")

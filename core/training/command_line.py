@@ -7,9 +7,11 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 
 from ..contract.messages import Log, Reporter
+from .descent import TrainingRun
 
 
 def parser(training: str, description: str, configs: dict, out: Path) -> argparse.ArgumentParser:
@@ -31,8 +33,8 @@ def add_skins(options: argparse.ArgumentParser) -> None:
 
 def carry_out(options: argparse.ArgumentParser, arguments: list[str] | None, train: Callable[..., dict], export: Callable[[Path, Path], dict],
               prepare: Callable[[str, Path, Reporter], None] | None = None) -> int:
-    """Trains, or exports an earlier training: the options are `train`'s keyword arguments. Returns the exit code. `prepare` answers to --prepare, where a
-    training has that option."""
+    """Trains, or exports an earlier training: those options that no TrainingRun has are `train`'s keyword arguments. Returns the exit code. `prepare` answers
+    to --prepare, where a training has that option."""
     asked = vars(options.parse_args(arguments))
     report = Reporter("train", emit=lambda message: print(message.text, flush=True) if isinstance(message, Log) else None)
     exports, prepares = asked.pop("export"), asked.pop("prepare", False)
@@ -41,5 +43,6 @@ def carry_out(options: argparse.ArgumentParser, arguments: list[str] | None, tra
     elif prepares:
         prepare(asked["config"], asked["work"], report)
     else:
-        train(report=report, **asked)
+        run = TrainingRun(**{field.name: asked.pop(field.name) for field in fields(TrainingRun) if field.name in asked})
+        train(report=report, run=run, **asked)
     return 0

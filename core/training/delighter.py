@@ -29,9 +29,9 @@ from ..solve.prior import fast_dtype
 from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
 from .people import People, is_prepared, prepare_people
-from .portraits import Batch, Portraits, mirrored, prepare
+from .portraits import PortraitBatch, Portraits, mirrored, prepare
 from .prior import FIRST_SEED, HELD_OUT_SEED, named_data
-from .release import again, release
+from .release import TrainingCard, again, release
 from .shading_errors import disagreement, mean_deviation, mean_size, slope_error, split_tone
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "delighter.safetensors"
@@ -52,20 +52,35 @@ TONE, SLOPE, AGREEMENT, SHADOW = 0.25, 1.0, 0.25, 0.3
 """Weights beside the log-shading's error: its mean over the face, its slopes, the albedo of one face under two lights, the shadows."""
 
 
-def train_delighter(config: str, out: Path, report: Reporter, minutes: float | None = None, hdri: Path | None = None, skins: Path | None = None,
-                    held_out: list[str] = (), start: Path | None = None, growing: bool = False, work: Path | None = None) -> dict:
-    """Trains for `minutes` in all (those of earlier runs included, preparation not), writes `out` (safetensors, fp16) and its card, returns the card.
+def train_delighter(config: str, out: Path, report: Reporter, run: descent.TrainingRun, skins: Path | None = None,
+                    held_out: list[str] = ()) -> dict:
+    """Trains the delighter; preparation does not count into its minutes.
 
-    Raises Problem where the work folder holds a training on other data, or, growing, no people yet.
+    Parameters
+    ----------
+    config : one of CONFIGS
+    out : safetensors, fp16; its card is written beside it
+    report : hears of progress
+    run : minutes, folders, what it begins with
+    skins : folder of skins that `train carry` brought into our UVs
+    held_out : skins of that folder that are kept from training
+
+    Returns
+    -------
+    The card.
+
+    Raises
+    ------
+    Problem : where the work folder holds a training on other data, or, growing, no people yet
     """
-    work = Path(work or Path(tempfile.gettempdir()) / "wildcap_delighter")
+    hdri, start = run.hdri, run.start
+    work = Path(run.work or Path(tempfile.gettempdir()) / "wildcap_delighter")
     work.mkdir(parents=True, exist_ok=True)
     t = CONFIGS[config]["training"]
-    minutes = minutes or t["minutes"]
     device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
     data = named_data(t, skins, held_out) | {"panoramas": sorted(p.name for p in Path(hdri).glob("*.hdr")) if hdri else [],
                                              "people": _people(t), "started": "the weights before" if start else "random weights"}
-    if not growing:
+    if not run.growing:
         prepare_delighter(config, work, report)
     if not all(any(is_prepared(seed, t["views"], work) for seed in data[kind]) for kind in ("people", "held_out_seeds")):
         raise Problem(f"There are no people in {work} yet.", "Wait for `train delighter --prepare`, or train without --growing.")
@@ -78,12 +93,14 @@ def train_delighter(config: str, out: Path, report: Reporter, minutes: float | N
     if start:
         network.load_state_dict({name: value.float() for name, value in load_file(start).items()})
     state = descent.resumed(work, descent.beginning(config, data, network))
-    recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
-                            betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"], save_every=600)
-    descent.descend(network, state, _Steps(Portraits(data["seeds"], t["views"], work, hdri), People(data["people"], t["views"], work, hdri), t),
-                    lambda batch, step, share: sum(losses(network, batch, device).values()),
-                    lambda average: {kind + name: value for kind, batch in unseen.items() for name, value in figures(average, config, batch, device).items()},
-                    recipe, minutes, work, device, report)
+    recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
+                                    rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
+                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"], save_every=600)
+    objective = descent.Objective(
+        _DelighterSteps(Portraits(data["seeds"], t["views"], work, hdri), People(data["people"], t["views"], work, hdri), t),
+        lambda batch, step, share: sum(losses(network, batch, device).values()),
+        lambda average: {kind + name: value for kind, batch in unseen.items() for name, value in figures(average, config, batch, device).items()})
+    descent.descend(network, state, objective, recipe, work, device, report)
     return export(work, out)
 
 
@@ -99,7 +116,7 @@ def _people(t: dict) -> list[int]:
     return [seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * t["people"]) if seed not in reserved_seeds()][:t["people"]]
 
 
-def losses(network: DelightNet, batch: Batch, device: str) -> dict[str, torch.Tensor]:
+def losses(network: DelightNet, batch: PortraitBatch, device: str) -> dict[str, torch.Tensor]:
     """The terms of the loss, each a scalar."""
     with torch.autocast(device, torch.bfloat16, enabled=_fast(device)):
         shading, shadow = network(batch.layers.to(device, memory_format=torch.channels_last))
@@ -119,7 +136,7 @@ def _fast(device: str) -> bool:
 
 
 @torch.no_grad()
-def figures(average: dict, config: str, batch: Batch, device: str) -> dict[str, float]:
+def figures(average: dict, config: str, batch: PortraitBatch, device: str) -> dict[str, float]:
     """The averaged network on held-out portraits: deviation of the log-albedo about its mean over the skin, with and without geometry, beside that of the
     picture as it is (natural log units), and the intersection over union of the shadows."""
     network = DelightNet(**CONFIGS[config]["model"])
@@ -155,18 +172,18 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
             "told the geometry or the picture only, beside the picture as it is; intersection over union of the shadows")
     command = again("delighter", state) + (" --hdri hdri" if data["panoramas"] else "")
     ready = sum(is_prepared(seed, CONFIGS[state["config"]]["training"]["views"], work) for seed in data["people"])  # the others were not there yet
-    return release(out, state, CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what}, panoramas=data["panoramas"],
-                   people=data["people"][:ready], started=data["started"])
+    more = {"panoramas": data["panoramas"], "people": data["people"][:ready], "started": data["started"]}
+    return release(out, state, TrainingCard(CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what}, more))
 
 
-class _Steps(Dataset):
+class _DelighterSteps(Dataset):
     """The batch of each step: it depends on the step alone, so a resumed training draws what an unbroken one would have."""
 
     def __init__(self, portraits: Portraits, people: People, options: dict):
         self.portraits, self.people, self.options = portraits, people, options
-        self.drawn: tuple[int, Batch | None] = -1, None
+        self.drawn: tuple[int, PortraitBatch | None] = -1, None
 
-    def __getitem__(self, step: int) -> Batch:
+    def __getitem__(self, step: int) -> PortraitBatch:
         torch.set_num_threads(1)
         index = step // self.options["echo"]
         rng = np.random.default_rng((self.options["seed"], index))

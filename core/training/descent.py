@@ -23,10 +23,34 @@ STATE = "state.pt"
 
 
 @dataclass(frozen=True)
-class Recipe:
-    """rate(step, share of the time) -> learning rate; averaging: the longest memory of the averaged weights; workers: processes that make batches;
-    save_every: seconds between checkpoints."""
+class TrainingRun:
+    """What a command line asks of any training. minutes: in all, those of earlier runs included (None: the configuration's); work: the folder that it goes on
+    from (None: one among the temporary ones); hdri: a folder of panoramas; start: weights to begin with, in place of random ones; growing: it learns from
+    what is prepared already, while another process prepares more."""
 
+    minutes: float | None = None
+    work: Path | None = None
+    hdri: Path | None = None
+    start: Path | None = None
+    growing: bool = False
+
+
+@dataclass(frozen=True)
+class Objective:
+    """What is learnt. `batches[step]` depends on the step alone, so a resumed training draws what an unbroken one would have; loss(batch, step, share of the
+    time) is a scalar; figures(averaged weights) are what the history keeps of held-out data."""
+
+    batches: Dataset
+    loss: Callable[..., torch.Tensor]
+    figures: Callable[[dict], object]
+
+
+@dataclass(frozen=True)
+class TrainingRecipe:
+    """minutes: in all, those of earlier runs included; rate(step, share of the time) -> learning rate; averaging: the longest memory of the averaged weights;
+    workers: processes that make batches; save_every: seconds between checkpoints."""
+
+    minutes: float
     rate: Callable[[int, float], float]
     betas: tuple[float, float]
     weight_decay: float
@@ -60,13 +84,19 @@ def read_state(work: Path) -> dict:
     return torch.load(path, weights_only=True, map_location="cpu")
 
 
-def descend(network: torch.nn.Module, state: dict, batches: Dataset, loss: Callable, figures: Callable[[dict], object], recipe: Recipe, minutes: float,
-            work: Path, device: str, report: Reporter) -> None:
-    """Trains until `minutes` are over, those of earlier runs included; `state` is changed, and written to `work`.
+def descend(network: torch.nn.Module, state: dict, objective: Objective, recipe: TrainingRecipe, work: Path, device: str, report: Reporter) -> None:
+    """Trains until the recipe's minutes are over.
 
-    `batches[step]` depends on the step alone, so a resumed training draws what an unbroken one would have. loss(batch, step, share) is a scalar;
-    figures(averaged weights) are what the history keeps of held-out data.
+    Parameters
+    ----------
+    network : takes the state's weights, and moves to `device`
+    state : as `resumed` gives it; changed
+    objective, recipe : what is learnt, and how
+    work : the folder that the state is written to
+    device : cpu or cuda
+    report : hears of progress in seconds
     """
+    minutes = recipe.minutes
     network.load_state_dict(state["network"])
     network.to(device, memory_format=torch.channels_last)
     optimiser = torch.optim.AdamW(network.parameters(), lr=recipe.rate(0, 0.0), betas=recipe.betas, weight_decay=recipe.weight_decay)
@@ -74,13 +104,13 @@ def descend(network: torch.nn.Module, state: dict, batches: Dataset, loss: Calla
         optimiser.load_state_dict(state["optimiser"])
     average = {name: value.to(device) for name, value in state["average"].items()}
     began, before, saved_at = time.monotonic(), state["seconds"], state["seconds"]
-    loader = DataLoader(batches, batch_size=None, sampler=range(state["step"], 10**9), num_workers=recipe.workers,
+    loader = DataLoader(objective.batches, batch_size=None, sampler=range(state["step"], 10**9), num_workers=recipe.workers,
                         prefetch_factor=3 if recipe.workers else None)
     for step, batch in zip(range(state["step"], 10**9), loader, strict=False):
         share = min(1.0, state["seconds"] / (60 * minutes))
         for group in optimiser.param_groups:
             group["lr"] = recipe.rate(step, share)
-        value = loss(batch, step, share)
+        value = objective.loss(batch, step, share)
         optimiser.zero_grad(set_to_none=True)
         value.backward()
         torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
@@ -92,7 +122,7 @@ def descend(network: torch.nn.Module, state: dict, batches: Dataset, loss: Calla
         ended = state["seconds"] >= 60 * minutes
         report.progress(min(state["seconds"], 60 * minutes), 60 * minutes, f"step {step + 1}")
         if state["seconds"] - saved_at > recipe.save_every or ended:
-            state["history"].append([state["step"], round(state["seconds"]), figures(average)])
+            state["history"].append([state["step"], round(state["seconds"]), objective.figures(average)])
             report.log(f"step {step + 1}, {state['seconds'] / 60:.1f} min, loss {value.item():.4f}, held out {state['history'][-1][2]}")
             state |= {"network": network.state_dict(), "optimiser": optimiser.state_dict(), "average": average}
             with replacing(Path(work) / STATE) as temporary:

@@ -27,8 +27,8 @@ from ..face.parts import PARTS
 from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
 from .prior import FIRST_SEED, HELD_OUT_SEED
-from .release import again, release
-from .snapshots import Batch, Snapshots, is_prepared, prepare
+from .release import TrainingCard, again, release
+from .snapshots import SnapshotBatch, Snapshots, is_prepared, prepare
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "parser.safetensors"
 _MODEL = {"widths": [40, 64, 112, 144], "depths": [1, 1, 1, 2]}
@@ -44,19 +44,31 @@ SMALL = ("lips", "brows", "eyes", "beard")
 NEAR, REACH = 3.0, 7
 
 
-def train_parser(config: str, out: Path, report: Reporter, minutes: float | None = None, hdri: Path | None = None, growing: bool = False,
-                 work: Path | None = None) -> dict:
-    """Trains for `minutes` in all (those of earlier runs included, preparation not), writes `out` (safetensors, fp16) and its card, returns the card.
+def train_parser(config: str, out: Path, report: Reporter, run: descent.TrainingRun) -> dict:
+    """Trains the parser; preparation does not count into its minutes.
 
-    Raises Problem where the work folder holds a training on other data, or, growing, none of its figures yet.
+    Parameters
+    ----------
+    config : one of CONFIGS
+    out : safetensors, fp16; its card is written beside it
+    report : hears of progress
+    run : minutes and folders; it always begins with random weights
+
+    Returns
+    -------
+    The card.
+
+    Raises
+    ------
+    Problem : where the work folder holds a training on other data, or, growing, none of its figures yet
     """
-    work = Path(work or Path(tempfile.gettempdir()) / "wildcap_parser")
+    hdri = run.hdri
+    work = Path(run.work or Path(tempfile.gettempdir()) / "wildcap_parser")
     work.mkdir(parents=True, exist_ok=True)
     t = CONFIGS[config]["training"]
-    minutes = minutes or t["minutes"]
     device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
     data = named_figures(t) | {"panoramas": sorted(p.name for p in Path(hdri).iterdir() if p.suffix.lower() in (".hdr", ".exr")) if hdri else []}
-    if not growing:
+    if not run.growing:
         prepare_figures(config, work, report)
     if not all(any(is_prepared(seed, t["views"], work) for seed in data[kind]) for kind in ("seeds", "held_out_seeds")):
         raise Problem(f"There are no figures in {work} yet.", "Wait for `train parser --prepare`, or train without --growing.")
@@ -64,10 +76,12 @@ def train_parser(config: str, out: Path, report: Reporter, minutes: float | None
     torch.manual_seed(t["seed"])
     network = ParseNet(**CONFIGS[config]["model"])
     state = descent.resumed(work, descent.beginning(config, data, network))
-    recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 100) * max(0.02, 0.5 + 0.5 * math.cos(math.pi * share)),
-                            betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.995, workers=t["workers"], save_every=150)
-    descent.descend(network, state, Steps(Snapshots(data["seeds"], t["views"], work, hdri), t), lambda batch, step, share: loss(network, batch, device),
-                    lambda average: figures(average, config, unseen, device), recipe, minutes, work, device, report)
+    recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
+                                    rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 100) * max(0.02, 0.5 + 0.5 * math.cos(math.pi * share)),
+                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.995, workers=t["workers"], save_every=150)
+    objective = descent.Objective(Steps(Snapshots(data["seeds"], t["views"], work, hdri), t), lambda batch, step, share: loss(network, batch, device),
+                                  lambda average: figures(average, config, unseen, device))
+    descent.descend(network, state, objective, recipe, work, device, report)
     return export(work, out)
 
 
@@ -85,7 +99,7 @@ def prepare_figures(config: str, work: Path, report: Reporter) -> None:
     prepare(named["held_out_seeds"] + named["seeds"], t["views"], work, report)
 
 
-def loss(network: ParseNet, batch: Batch, device: str) -> torch.Tensor:
+def loss(network: ParseNet, batch: SnapshotBatch, device: str) -> torch.Tensor:
     """The cross-entropy of the shares, of which pixels near small parts have more than their number."""
     with torch.autocast(device, torch.bfloat16, enabled=device == "cuda"):
         logits = network(batch.layers.to(device, memory_format=torch.channels_last))
@@ -97,7 +111,7 @@ def loss(network: ParseNet, batch: Batch, device: str) -> torch.Tensor:
 
 
 @torch.no_grad()
-def figures(average: dict, config: str, batch: Batch, device: str) -> dict[str, float]:
+def figures(average: dict, config: str, batch: SnapshotBatch, device: str) -> dict[str, float]:
     """The averaged network on photographs of held-out figures: intersection over union of each part, where a part is what most of a pixel is."""
     network = ParseNet(**CONFIGS[config]["model"])
     network.load_state_dict(average)
@@ -121,7 +135,8 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     command = again("parser", state) + (" --hdri hdri" if state["data"]["panoramas"] else "")
     config, named = CONFIGS[state["config"]], state["data"]
     ready = sum(is_prepared(seed, config["training"]["views"], work) for seed in named["seeds"])  # the others were not there yet
-    return release(out, state, config, told, command, {**state["history"][-1][2], "what": what}, panoramas=named["panoramas"], prepared=ready)
+    more = {"panoramas": named["panoramas"], "prepared": ready}
+    return release(out, state, TrainingCard(config, told, command, {**state["history"][-1][2], "what": what}, more))
 
 
 class Steps(Dataset):
@@ -129,9 +144,9 @@ class Steps(Dataset):
 
     def __init__(self, snapshots: Snapshots, options: dict):
         self.snapshots, self.options = snapshots, options
-        self.drawn: tuple[int, list[Batch]] = -1, []
+        self.drawn: tuple[int, list[SnapshotBatch]] = -1, []
 
-    def __getitem__(self, step: int) -> Batch:
+    def __getitem__(self, step: int) -> SnapshotBatch:
         torch.set_num_threads(1)
         index, turn = divmod(step, self.options["echo"])
         if self.drawn[0] != index:

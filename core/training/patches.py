@@ -21,7 +21,7 @@ REACH, DARK_REACH = 1.2, 0.4
 
 
 @dataclass(frozen=True)
-class Batch:
+class PatchBatch:
     """clean [N, 7, P, P], known [N, 7, P, P]: 1 where `clean` is true; coords [N, 2, P, P], tone [N, 3], scale [N]; float32."""
 
     clean: torch.Tensor
@@ -44,10 +44,10 @@ class Windows:
         some = np.flatnonzero(bare > 0.9)[::29]  # enough texels of facial skin for its mean
         self.sparse = [m[:, some // bare.shape[1], some % bare.shape[1]].float().numpy()[:, None] for m in skins.maps[SCALES[-1]]]
 
-    def draw(self, count: int, patch: int, rng: np.random.Generator, augment: bool = True) -> Batch:
+    def draw(self, count: int, patch: int, rng: np.random.Generator, augment: bool = True) -> PatchBatch:
         """`count` random windows: a third of each scale, three quarters of them on the face; mirrored and re-toned when `augment`."""
         drawn = [self._one(patch, rng, augment) for _ in range(count)]
-        return Batch(*(torch.stack(parts) for parts in zip(*drawn, strict=True)))
+        return PatchBatch(*(torch.stack(parts) for parts in zip(*drawn, strict=True)))
 
     def _one(self, patch: int, rng: np.random.Generator, augment: bool) -> tuple[torch.Tensor, ...]:
         scale = SCALES[rng.integers(len(SCALES))]

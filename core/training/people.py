@@ -18,7 +18,7 @@ from ..contract.messages import Reporter
 from ..synthetic.environments import read_panoramas
 from ..synthetic.people import portraits
 from ..synthetic.people.figure import make_figure
-from .portraits import Batch, example, stacked
+from .portraits import PortraitBatch, example, stacked
 
 TEXELS = 512  # of a figure's maps: pixels of a crop are larger than theirs
 
@@ -44,7 +44,7 @@ class People:
         self.seeds, self.views, self.work = seeds, views, work
         self.panoramas = read_panoramas(panoramas)
 
-    def draw(self, pairs: int, rng: np.random.Generator) -> Batch:
+    def draw(self, pairs: int, rng: np.random.Generator) -> PortraitBatch:
         """`pairs` sights under two lights each, of one colouring."""
         ready = [seed for seed in self.seeds if is_prepared(seed, self.views, self.work)]
         drawn = []

@@ -38,7 +38,7 @@ CARRIED = 0.35
 
 
 @dataclass(frozen=True)
-class Batch:
+class PortraitBatch:
     """layers [N, CHANNELS, SIDE, SIDE]; at half the size: shading [N, 3, ...] the true log-shading less the picture's middle, weight [N, 1, ...] of its error,
     shadow [N, 1, ...] and shadow_weight [N, 1, ...]. 2 k and 2 k + 1 are the same sight under two lights."""
 
@@ -71,7 +71,7 @@ class Portraits:
         self.panoramas = read_panoramas(panoramas)
         self.heads: dict[int, LightStage] = {}
 
-    def draw(self, pairs: int, rng: np.random.Generator, augment: bool = True) -> Batch:
+    def draw(self, pairs: int, rng: np.random.Generator, augment: bool = True) -> PortraitBatch:
         """`pairs` sights under two lights each."""
         return stacked([example(portrait, geometry, rng) for portrait, geometry in self.portraits(pairs, rng, augment)])
 
@@ -95,13 +95,13 @@ class Portraits:
         return self.heads[seed]
 
 
-def stacked(examples: list[tuple[np.ndarray, ...]]) -> Batch:
+def stacked(examples: list[tuple[np.ndarray, ...]]) -> PortraitBatch:
     """Examples as one batch, in their order."""
-    return Batch(*(torch.from_numpy(np.stack(part)) for part in zip(*examples, strict=True)))
+    return PortraitBatch(*(torch.from_numpy(np.stack(part)) for part in zip(*examples, strict=True)))
 
 
 def example(portrait: Portrait, known: tuple[np.ndarray, ...], rng: np.random.Generator) -> tuple[np.ndarray, ...]:
-    """What a Batch holds of a portrait. known: ambient, sunlit and normal [S, S, 3] (camera coordinates) of the registered head, and where it is [S, S]."""
+    """What a batch holds of a portrait. known: ambient, sunlit and normal [S, S, 3] (camera coordinates) of the registered head, and where it is [S, S]."""
     geometry = ()
     if rng.random() < WITH_GEOMETRY:
         slip = np.float32([[1, 0, rng.normal(0, 0.8)], [0, 1, rng.normal(0, 0.8)]])  # a registered head lies a pixel off
@@ -117,7 +117,7 @@ def example(portrait: Portrait, known: tuple[np.ndarray, ...], rng: np.random.Ge
     return tuple(parts)
 
 
-def mirrored(batch: Batch) -> Batch:
+def mirrored(batch: PortraitBatch) -> PortraitBatch:
     """Left and right exchanged; a normal's x changes its sign."""
     layers = batch.layers.flip(-1)  # a copy
     layers[:, 12] *= -1

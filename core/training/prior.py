@@ -24,8 +24,8 @@ from ..solve.network import UNet, denoise
 from ..solve.prior import BLIND, WEIGHTS, build, condition, fast_dtype, packed
 from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
-from .patches import Batch, Windows, mean_map, reference_skins, spread_about
-from .release import again, release
+from .patches import PatchBatch, Windows, mean_map, reference_skins, spread_about
+from .release import TrainingCard, again, release
 from .skins import SCALES, Skins, carried_names, carried_skins, clusters, synthetic_skins
 
 OCTAVES = 6
@@ -50,16 +50,30 @@ of which more is then to be seen (ln sigma lower by CLEARER)."""
 CLEARER = 1.5
 
 
-def train_prior(config: str, out: Path, report: Reporter, minutes: float | None = None, skins: Path | None = None, held_out: list[str] = (),
-                work: Path | None = None) -> dict:
-    """Trains for `minutes` in all (those of earlier runs included), writes `out` (safetensors, fp16) and its card, returns the card.
+def train_prior(config: str, out: Path, report: Reporter, run: descent.TrainingRun, skins: Path | None = None,
+                held_out: list[str] = ()) -> dict:
+    """Trains the solver's prior.
 
-    Raises Problem where `skins` is no carried folder, or the work folder holds a training on other data.
+    Parameters
+    ----------
+    config : one of CONFIGS
+    out : safetensors, fp16; its card is written beside it
+    report : hears of progress
+    run : minutes and the work folder; no light falls on its maps, and it always begins with random weights
+    skins : folder of skins that `train carry` brought into our UVs
+    held_out : skins of that folder that are kept from training
+
+    Returns
+    -------
+    The card.
+
+    Raises
+    ------
+    Problem : where `skins` is no carried folder, or the work folder holds a training on other data
     """
-    work = Path(work or Path(tempfile.gettempdir()) / "wildcap_prior")
+    work = Path(run.work or Path(tempfile.gettempdir()) / "wildcap_prior")
     work.mkdir(parents=True, exist_ok=True)
     t = CONFIGS[config]["training"]
-    minutes = minutes or t["minutes"]
     device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
     data = named_data(t, skins, held_out)
     windows, seen, unseen = _windows(data, skins, work, report)
@@ -68,16 +82,17 @@ def train_prior(config: str, out: Path, report: Reporter, minutes: float | None 
     network = build(CONFIGS[config])
     statistics = {name: value.to(device) for name, value in state["statistics"].items()}
 
-    def loss(batch: Batch, step: int, share: float) -> torch.Tensor:
+    def loss(batch: PatchBatch, step: int, share: float) -> torch.Tensor:
         return _loss(network, statistics, batch, np.random.default_rng((t["seed"], step, 1)), device).mean()
 
     def figures(average: dict) -> dict:
         return {kind: _held_out_loss(average, statistics, config, b, device) for kind, b in held_out_windows.items()}
 
     # constant, then linear to zero over the second half
-    recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.02, min(1.0, 2 * (1 - share))),
-                            betas=(0.9, 0.99), weight_decay=1e-3, averaging=0.9995, workers=t["workers"], save_every=120)
-    descent.descend(network, state, _Steps(windows, t), loss, figures, recipe, minutes, work, device, report)
+    recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
+                                    rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.02, min(1.0, 2 * (1 - share))),
+                                    betas=(0.9, 0.99), weight_decay=1e-3, averaging=0.9995, workers=t["workers"], save_every=120)
+    descent.descend(network, state, descent.Objective(_PriorSteps(windows, t), loss, figures), recipe, work, device, report)
     return export(work, out)
 
 
@@ -92,8 +107,9 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
         told += f"; {len(data['skins'])} skins of {data['from']}, carried into the built-in UVs, diffuse only"
     losses = {kind: dict(zip((f"scale_{scale}" for scale in SCALES), of, strict=True)) for kind, of in state["history"][-1][2].items()}
     what = "mean squared error of the network's output on fixed patches and noise of held-out skins; 1 is that of the mean face"
-    return release(out, state, {**CONFIGS[state["config"]], "scales": list(SCALES)}, told, again("prior", state), {"loss": losses, "what": what},
-                   {**statistics, "references": levels, "references_range": limits}, tones=[[round(v, 4) for v in tone] for tone in state["tones"]])
+    card = TrainingCard({**CONFIGS[state["config"]], "scales": list(SCALES)}, told, again("prior", state), {"loss": losses, "what": what},
+                        {"tones": [[round(v, 4) for v in tone] for tone in state["tones"]]})
+    return release(out, state, card, {**statistics, "references": levels, "references_range": limits})
 
 
 def named_data(t: dict, skins: Path | None, held_out: list[str]) -> dict:
@@ -131,19 +147,19 @@ def _begin(config: str, data: dict, skins: Skins, windows: Windows) -> dict:
                              statistics={"mean_face": mean, "spread": spread_about(windows, mean, t["patch"])})
 
 
-class _Steps(Dataset):
+class _PriorSteps(Dataset):
     """The batch of each step: it depends on the step alone, so a resumed training draws what an unbroken one would have."""
 
     def __init__(self, windows: Windows, options: dict):
         self.windows, self.options = windows, options
 
-    def __getitem__(self, step: int) -> Batch:
+    def __getitem__(self, step: int) -> PatchBatch:
         t = self.options
         wide = 2 if step % t["wide_every"] == 0 else 1
         return self.windows.draw(t["batch"] // wide**2, t["patch"] * wide, np.random.default_rng((t["seed"], step, 0)))
 
 
-def _loss(network: UNet, statistics: dict[str, torch.Tensor], batch: Batch, rng: np.random.Generator, device: str) -> torch.Tensor:
+def _loss(network: UNet, statistics: dict[str, torch.Tensor], batch: PatchBatch, rng: np.random.Generator, device: str) -> torch.Tensor:
     """EDM's weighted denoising error per sample [N] (Karras et al. 2022, table 1): the squared error of F itself, where the truth is known.
     What is not known goes in as pure noise."""
     mean, deviation = (torch.tensor([SIGMA[int(scale)][i] for scale in batch.scale]) for i in (0, 1))
@@ -154,18 +170,18 @@ def _loss(network: UNet, statistics: dict[str, torch.Tensor], batch: Batch, rng:
     sigma = (torch.from_numpy(rng.standard_normal(len(mean))).float() * deviation).to(device).add(mean).exp().clamp(0.005, BLIND)
     noise = torch.from_numpy(rng.standard_normal(batch.clean.shape, dtype=np.float32)).to(device)
     told = condition(batch.coords.to(device), OCTAVES, **statistics, tone=batch.tone.to(device), blind=blind)
-    s, spread = sigma[:, None, None, None].expand(-1, 7, -1, -1).clone(), told["spread"]
+    s, spread = sigma[:, None, None, None].expand(-1, 7, -1, -1).clone(), told.spread
     s[:, 3:][blind > 0] = BLIND
-    noisy = torch.where(known > 0, clean + s * noise, told["mean"] + (s**2 + spread**2).sqrt() * noise)
+    noisy = torch.where(known > 0, clean + s * noise, told.mean + (s**2 + spread**2).sqrt() * noise)
     low = device == "cuda" or fast_dtype("cpu") == torch.bfloat16
     with torch.autocast(device, torch.bfloat16, enabled=low):
-        denoised = denoise(network, noisy, sigma, levels=s, **told)
+        denoised = denoise(network, noisy, sigma, told, s)
     weight = known * (s**2 + spread**2) / (s * spread) ** 2
     return (weight * (denoised - clean) ** 2).sum((1, 2, 3)) / known.sum((1, 2, 3)).clamp_min(1)
 
 
 @torch.no_grad()
-def _held_out_loss(average: dict, statistics: dict, config: str, batch: Batch, device: str) -> list[float]:
+def _held_out_loss(average: dict, statistics: dict, config: str, batch: PatchBatch, device: str) -> list[float]:
     """The averaged network's loss per scale, always on the same patches and noise."""
     network = build(CONFIGS[config])
     network.load_state_dict(average)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import torch
@@ -13,21 +14,42 @@ from safetensors.torch import save_file
 from ..contract.files import replacing
 
 
-def release(out: Path, state: dict, config: dict, data: str, command: str, held_out: dict, tensors: dict[str, torch.Tensor] | None = None, **more) -> dict:
-    """Writes the averaged weights of a training's `state` (descent.py) and their card, which is returned.
+@dataclass(frozen=True)
+class TrainingCard:
+    """What a training's card says beside what its state tells: its configuration; data: in words what was learnt from; command: what makes these weights
+    again; held_out: the last figures on held-out data and what they are; more: entries that only this training's card has."""
 
-    `tensors` go into the file beside the weights as they are, `more` into the card; `data` says in words what was learnt from, `command` what makes these
-    weights again, `held_out` the last figures on held-out data and what they are.
+    config: dict
+    data: str
+    command: str
+    held_out: dict
+    more: dict = field(default_factory=dict)
+
+
+def release(out: Path, state: dict, card: TrainingCard, tensors: dict[str, torch.Tensor] | None = None) -> dict:
+    """Writes the averaged weights of a training and their card.
+
+    Parameters
+    ----------
+    out : safetensors, fp16; the card is written beside it, as JSON
+    state : the training's (descent.py)
+    card : what the state does not tell
+    tensors : go into the file beside the weights, as they are
+
+    Returns
+    -------
+    The card as it is written.
     """
     out, named = Path(out), state["data"]
     with replacing(out) as temporary:
         save_file({**{name: value.half().contiguous() for name, value in state["average"].items()}, **(tensors or {})}, temporary)
-    card = {**config, "data": data, "licence": "GPL-3.0-or-later", "notices": named["notices"], "command": command, "steps": state["step"],
+    told = {**card.config, "data": card.data, "licence": "GPL-3.0-or-later", "notices": named["notices"], "command": card.command, "steps": state["step"],
             "minutes": round(state["seconds"] / 60, 1), "parameters": sum(v.numel() for v in state["average"].values()), "seeds": named["seeds"],
-            "held_out_seeds": named["held_out_seeds"], "skins": named["skins"], "held_out_skins": named["held_out_skins"], "held_out": held_out, **more}
+            "held_out_seeds": named["held_out_seeds"], "skins": named["skins"], "held_out_skins": named["held_out_skins"],
+            "held_out": card.held_out, **card.more}
     with replacing(out.with_suffix(".json")) as temporary:
-        temporary.write_text(json.dumps(card, indent=1), encoding="utf-8")
-    return card
+        temporary.write_text(json.dumps(told, indent=1), encoding="utf-8")
+    return told
 
 
 def again(training: str, state: dict) -> str:

@@ -28,7 +28,7 @@ SHIFT, SCALE, TURN = 0.04, 0.09, 6.0
 
 
 @dataclass(frozen=True)
-class Batch:
+class SnapshotBatch:
     """layers [N, CHANNELS, SIDE, SIDE]; shares [N, len(PARTS), SIDE, SIDE] add up to one wherever known [N, 1, SIDE, SIDE] is 1."""
 
     layers: torch.Tensor
@@ -55,7 +55,7 @@ class Snapshots:
         self.seeds, self.views, self.work = seeds, views, work
         self.panoramas = read_panoramas(panoramas)
 
-    def draw(self, count: int, echo: int, rng: np.random.Generator, augment: bool = True) -> list[Batch]:
+    def draw(self, count: int, echo: int, rng: np.random.Generator, augment: bool = True) -> list[SnapshotBatch]:
         """`echo` batches of `count` crops each: the same photographs, cropped and spoilt in other ways."""
         ready = [seed for seed in self.seeds if is_prepared(seed, self.views, self.work)]
         batches: list[list[tuple]] = [[] for _ in range(echo)]
@@ -64,7 +64,7 @@ class Snapshots:
             srgb, shares = photograph(sight, rng, self.panoramas)
             for batch in batches:
                 batch.append(example(srgb, shares, sight.landmarks, rng, augment))
-        return [Batch(*(torch.from_numpy(np.stack(part)) for part in zip(*batch, strict=True))) for batch in batches]
+        return [SnapshotBatch(*(torch.from_numpy(np.stack(part)) for part in zip(*batch, strict=True))) for batch in batches]
 
 
 def example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np.random.Generator, augment: bool = True) -> tuple[np.ndarray, ...]:

@@ -36,7 +36,7 @@ from ..synthetic.environments import read_panoramas
 from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
 from .prior import FIRST_SEED, HELD_OUT_SEED
-from .release import again, release
+from .release import TrainingCard, again, release
 from .shading_errors import disagreement, mean_deviation, mean_size, slope_error, split_tone
 from .unfolded import LitPerson, light_up
 
@@ -102,20 +102,32 @@ def mirrored(batch: TexelBatch) -> TexelBatch:
     return replace(batch, layers=layers, **{name: getattr(batch, name).flip(-1) for name in ("light", "shading", "weight", "shadow", "shadow_weight")})
 
 
-def train_texels(config: str, out: Path, report: Reporter, minutes: float | None = None, hdri: Path | None = None, start: Path | None = None,
-                 growing: bool = False, work: Path | None = None) -> dict:
-    """Trains for `minutes` in all (those of earlier runs included, preparation not), writes `out` (safetensors, fp16) and its card, returns the card.
+def train_texels(config: str, out: Path, report: Reporter, run: descent.TrainingRun) -> dict:
+    """Trains the network of the texels; preparation does not count into its minutes.
 
-    Raises Problem where the work folder holds a training on other data, or, growing, no people yet.
+    Parameters
+    ----------
+    config : one of CONFIGS
+    out : safetensors, fp16; its card is written beside it
+    report : hears of progress
+    run : minutes, folders, what it begins with
+
+    Returns
+    -------
+    The card.
+
+    Raises
+    ------
+    Problem : where the work folder holds a training on other data, or, growing, no people yet
     """
-    work = Path(work or Path(tempfile.gettempdir()) / "wildcap_texels")
+    hdri, start = run.hdri, run.start
+    work = Path(run.work or Path(tempfile.gettempdir()) / "wildcap_texels")
     work.mkdir(parents=True, exist_ok=True)
     t = CONFIGS[config]["training"]
-    minutes = minutes or t["minutes"]
     device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
     data = {"seeds": _people(t), "held_out_seeds": _held_out(t), "panoramas": sorted(p.name for p in Path(hdri).glob("*.hdr")) if hdri else [],
             "started": "the weights before" if start else "random weights", "from": "", "skins": [], "held_out_skins": [], "notices": []}
-    if not growing:
+    if not run.growing:
         prepare(config, work, report)
     if not all(any(_path(work, seed).is_file() for seed in data[kind]) for kind in ("seeds", "held_out_seeds")):
         raise Problem(f"There are no people in {work} yet.", "Wait for `train texels --prepare`, or train without --growing.")
@@ -125,11 +137,13 @@ def train_texels(config: str, out: Path, report: Reporter, minutes: float | None
     if start:
         network.load_state_dict({name: value.float() for name, value in load_file(start).items()})
     state = descent.resumed(work, descent.beginning(config, data, network))
-    recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
-                            betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"], save_every=180)
-    descent.descend(network, state, _Steps(UnfoldedPeople(data["seeds"], work, hdri), t),
-                    lambda batch, step, share: sum(losses(network, batch, device).values()),
-                    lambda average: figures(average, config, unseen, device), recipe, minutes, work, device, report)
+    recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
+                                    rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
+                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"], save_every=180)
+    objective = descent.Objective(_TexelSteps(UnfoldedPeople(data["seeds"], work, hdri), t),
+                                  lambda batch, step, share: sum(losses(network, batch, device).values()),
+                                  lambda average: figures(average, config, unseen, device))
+    descent.descend(network, state, objective, recipe, work, device, report)
     return export(work, out)
 
 
@@ -212,11 +226,11 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
             "colours as they are; gain_N: nats by which its own sizes of the error in bands of N texels foretell it better than the best constant")
     command = again("texels", state) + (" --hdri hdri" if data["panoramas"] else "")
     ready = sum(_path(work, seed).is_file() for seed in data["seeds"])
-    return release(out, state, CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what}, panoramas=data["panoramas"],
-                   people=ready, started=data["started"])
+    more = {"panoramas": data["panoramas"], "people": ready, "started": data["started"]}
+    return release(out, state, TrainingCard(CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what}, more))
 
 
-class _Steps(Dataset):
+class _TexelSteps(Dataset):
     """`[step]` is the step's batch, whichever process asks for it; mirrored at every other one."""
 
     def __init__(self, people: UnfoldedPeople, t: dict):

@@ -36,7 +36,7 @@ LIGHTS = 3  # of each subject
 
 
 @dataclass(frozen=True)
-class Scene:
+class LitSkin:
     """The subject of a seed under a light. colours [N, 3]: skin on a camera whose 1 is white in unit light, its sheen included; normals [N, 3] and weight
     [N] as `look` takes them; tone [3]: the true mean albedo of the facial skin; light [3]: of a white surface, the mean over the face; card [3]: of a white
     surface held before the face."""
@@ -67,7 +67,7 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def scenes_of(seed: int) -> list[Scene]:
+def scenes_of(seed: int) -> list[LitSkin]:
     """A random subject under a few random lights, in what light reaches its head past itself, with the sheen that is on all skin."""
     skin_map = make_skin(sample_parameters(seed), SIZE).diffuse
     facial = template.mask("skin", SIZE) * template.mask("face", SIZE) * (1 - template.mask("eyes", SIZE))
@@ -77,8 +77,9 @@ def scenes_of(seed: int) -> list[Scene]:
     found = []
     for k in range(LIGHTS):
         rng = np.random.default_rng([seed, k, 31])
-        sky, sun, colour, _ = light.random_light(rng)
-        colour = colour * (rng.random() < 0.7)  # else the sun is behind clouds, or there is none
+        drawn = light.random_light(rng)
+        sky, sun = drawn.sky, drawn.sun
+        colour = drawn.colour * (rng.random() < 0.7)  # else the sun is behind clouds, or there is none
         cosine = np.maximum(normals @ sun, 0)
         facing = np.flatnonzero(cosine > 0.02)
         reach = np.zeros(len(points))
@@ -91,7 +92,7 @@ def scenes_of(seed: int) -> list[Scene]:
         turned /= np.linalg.norm(turned)
         card = np.maximum((sh_basis(turned) * per_function(LAMBERT)) @ sky, 0.005) + max(turned @ sun, 0) * colour
         used = (weight > 0.05) & ~shadowed
-        found.append(Scene(seed, (skin_map[where] * shading + sheen)[used], normals[used], weight[used], tone, bright, card))
+        found.append(LitSkin(seed, (skin_map[where] * shading + sheen)[used], normals[used], weight[used], tone, bright, card))
     return found
 
 
@@ -108,7 +109,7 @@ def _head():
             raster.RayCaster(mesh))
 
 
-def photographed(shown: Scene, rng: np.random.Generator) -> tuple[Look, np.ndarray]:
+def photographed(shown: LitSkin, rng: np.random.Generator) -> tuple[Look, np.ndarray]:
     """What a phone shows of a scene, and of its card (linear [3])."""
     exposure = phone_exposure(rng, shown.colours, shown.light)
     colours = np.clip(shown.colours * exposure.gain, 0, None)
@@ -117,7 +118,7 @@ def photographed(shown: Scene, rng: np.random.Generator) -> tuple[Look, np.ndarr
     return look(colours, shown.normals, weight, exposure.surroundings), shown.card * exposure.gain
 
 
-def fitted(scenes: list[Scene]) -> dict:
+def fitted(scenes: list[LitSkin]) -> dict:
     """The population's file: the tones, and the linear Gaussian model of what phones show of them."""
     true, shown = [], []
     for each in scenes:
@@ -134,7 +135,7 @@ def fitted(scenes: list[Scene]) -> dict:
     return {name: np.round(values, 5).tolist() for name, values in result.items()}
 
 
-def beyond(scenes: list[Scene]) -> np.ndarray:
+def beyond(scenes: list[LitSkin]) -> np.ndarray:
     """Tones [K, 3] a little lighter and darker than the outermost subjects', by their melanin: else the ends of the population would be drawn inwards."""
     found = []
     for each in scenes:

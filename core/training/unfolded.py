@@ -21,7 +21,7 @@ from ..light.skylight import ambient_occlusion
 from ..synthetic.environments import Environment, made_environment, panorama_environment
 from ..synthetic.olat import BASIS, DIRECTIONS, LightStage, mirrored, transport
 from ..synthetic.people.snapshot import highlight
-from ..synthetic.portrait import GOBOS, fitted_light, gobo
+from ..synthetic.portrait import GOBOS, LampOnHead, fitted_light, gobo
 from ..synthetic.response import curve, expose
 from ..synthetic.unfolded import LAMPS, SIDE, UnlitPerson, reach_of, template_raster, unit
 
@@ -43,6 +43,16 @@ class LitPerson:
     shadow: np.ndarray
     strong: float
     albedo: np.ndarray
+
+
+@dataclass(frozen=True)
+class SeenTexels:
+    """What the views of a capture give of S x S texels: natural log of linear colour [S, S, 3], how far apart the views are
+    [S, S], and how well they see [S, S]."""
+
+    log: np.ndarray
+    apart: np.ndarray
+    weight: np.ndarray
 
 
 def light_up(person: UnlitPerson, albedo: np.ndarray, rng: np.random.Generator, panoramas: list[np.ndarray] = ()) -> LitPerson:
@@ -78,22 +88,22 @@ def light_up(person: UnlitPerson, albedo: np.ndarray, rng: np.random.Generator, 
     log += _drift(side, rng) + 0.01 * rng.standard_normal(log.shape, np.float32)
     lost = _lost(tints, facing, arrives, covered)
     strong = sum(float(tint.mean()) for tint in tints)
-    texels = _as_captured(person, stage, carried, environment, chosen, tints, tone * gains, (log, apart, seen), rng)
+    lamps = [LampOnHead(person.lamps[k], tint, reach_of(person, k, side)[covered]) for k, tint in zip(chosen, tints, strict=True)]
+    texels = _as_captured(stage, carried, environment, lamps, tone * gains, SeenTexels(log, apart, seen), rng)
     light = float(diffuse[where].mean()) if strong else 1.0
     return LitPerson(texels, even - np.log(np.maximum(tone, DARKEST)).astype(np.float32), lost, min(1.0, 0.6 * strong / max(light, 1e-6)), albedo)
 
 
-def _as_captured(person: UnlitPerson, stage: LightStage, carried: np.ndarray, environment: Environment, chosen: list[int], tints: list, tone: np.ndarray,
-                 seen: tuple, rng: np.random.Generator) -> Texels:
+def _as_captured(stage: LightStage, carried: np.ndarray, environment: Environment, lamps: list[LampOnHead], tone: np.ndarray, seen: SeenTexels,
+                 rng: np.random.Generator) -> Texels:
     """What a capture would know: the light as a fit would find it, and all that comes from the head's shape moved by how far registration is off."""
-    log, apart, weight = seen
+    log, apart, weight = seen.log, seen.apart, seen.weight
     side = len(log)
     face, bary = template_raster(side)
     covered = face >= 0
     transfer = raster.interpolate((carried @ BASIS).astype(np.float32), stage.mesh.faces, face, bary)[covered]
     smooth = raster.interpolate(stage.normals, stage.mesh.faces, face, bary)[covered]
-    reach = [reach_of(person, k, side)[covered] for k in chosen]
-    fitted = fitted_light(transfer, smooth, reach, environment, [person.lamps[k] for k in chosen], tints, tone, rng)
+    fitted = fitted_light(transfer, smooth, lamps, environment, tone, rng)
     free = (fitted.sunlit - fitted.ambient).max(-1) / np.maximum(fitted.direct.max(-1), 1e-6)
     field = _displacement(side, np.exp(rng.uniform(np.log(0.4), np.log(2.5))), rng)
 

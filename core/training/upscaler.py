@@ -25,7 +25,7 @@ from ..upscale.network import MISSED, Rcan, bicubic
 from . import command_line, descent
 from .fine_windows import FineWindows, prepare
 from .prior import named_data
-from .release import again, release
+from .release import TrainingCard, again, release
 
 _MODEL = {"groups": 5, "blocks": 10, "width": 64}
 CONFIGS = {
@@ -45,12 +45,25 @@ KEPT = 3
 """Blocks of each group that are shipped: the first two learn first, and those that were added as the identity change little."""
 
 
-def train_upscaler(config: str, out: Path, report: Reporter, minutes: float | None = None, work: Path | None = None) -> dict:
-    """Trains for `minutes` in all (those of earlier runs included, preparation not), writes `out` (safetensors, fp16) and its card, returns the card.
+def train_upscaler(config: str, out: Path, report: Reporter, run: descent.TrainingRun) -> dict:
+    """Trains the upscaler; preparation does not count into its minutes.
 
-    Raises Problem where the work folder holds a training of another configuration.
+    Parameters
+    ----------
+    config : one of CONFIGS
+    out : safetensors, fp16; its card is written beside it
+    report : hears of progress
+    run : minutes and the work folder; no light falls on its maps, and it always begins with random weights
+
+    Returns
+    -------
+    The card.
+
+    Raises
+    ------
+    Problem : where the work folder holds a training of another configuration
     """
-    work = Path(work or Path(tempfile.gettempdir()) / "wildcap_upscaler")
+    work = Path(run.work or Path(tempfile.gettempdir()) / "wildcap_upscaler")
     work.mkdir(parents=True, exist_ok=True)
     t = CONFIGS[config]["training"]
     device = "cuda" if config != "cpu" and torch.cuda.is_available() else "cpu"
@@ -65,10 +78,12 @@ def train_upscaler(config: str, out: Path, report: Reporter, minutes: float | No
     def loss(batch, step, share):
         return _error(network, batch, device, max(growth for growth in GROWTH if growth[0] <= share)[1]).mean()
 
-    recipe = descent.Recipe(rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 100) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
-                            betas=(0.9, 0.99), weight_decay=1e-4, averaging=0.995, workers=t["workers"], save_every=180)
-    descent.descend(network, state, _Steps(FineWindows(data["seeds"], t["views"], work), t), loss,
-                    lambda average: figures(average, config, held_out, device), recipe, minutes or t["minutes"], work, device, report)
+    recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
+                                    rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 100) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
+                                    betas=(0.9, 0.99), weight_decay=1e-4, averaging=0.995, workers=t["workers"], save_every=180)
+    objective = descent.Objective(_UpscalerSteps(FineWindows(data["seeds"], t["views"], work), t), loss,
+                                  lambda average: figures(average, config, held_out, device))
+    descent.descend(network, state, objective, recipe, work, device, report)
     return export(work, out)
 
 
@@ -100,7 +115,7 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     state, config = state | {"average": shallow(state["average"], KEPT)}, config | {"model": config["model"] | {"blocks": min(KEPT, config["model"]["blocks"])}}
     told = "Windows of procedural skins of core/synthetic at 4096 on the built-in head, which derives from the MakeHuman base mesh (CC0)"
     what = "mean absolute error on degraded patches of held-out skins, as a share of bicubic resampling's, with all blocks that were trained"
-    return release(out, state, config, told, again("upscaler", state), {**state["history"][-1][2], "what": what}, growth=GROWTH)
+    return release(out, state, TrainingCard(config, told, again("upscaler", state), {**state["history"][-1][2], "what": what}, {"growth": GROWTH}))
 
 
 def shallow(weights: dict[str, torch.Tensor], blocks: int) -> dict[str, torch.Tensor]:
@@ -108,7 +123,7 @@ def shallow(weights: dict[str, torch.Tensor], blocks: int) -> dict[str, torch.Te
     return {name: value for name, value in weights.items() if not (name.startswith("groups.") and int(name.split(".")[2]) >= blocks)}
 
 
-class _Steps(Dataset):
+class _UpscalerSteps(Dataset):
     """The batch of each step, which depends on the step alone."""
 
     def __init__(self, windows: FineWindows, options: dict):

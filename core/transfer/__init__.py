@@ -9,6 +9,7 @@ with its maps is head.obj and maps_4k/.
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -34,20 +35,30 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """head.obj and its maps, scan.ply, own_head.obj where there is one -> delivery/, whole or not at all."""
     head = read_head(capture).mesh
     maps = capture.maps_4k if all((capture.maps_4k / name).is_file() for name in stages.MAPS) else capture.maps
-    source = baking.Source(head)
+    solved = SolvedHead(head, baking.Source(head), maps)
     with replacing_folder(capture.delivery) as folder:
         told = {}
         if capture.own_head.is_file():
-            told["own_head"] = _own(capture, folder, source, maps, settings.transfer.size, report)
+            told["own_head"] = _own(capture, folder, solved, settings.transfer.size, report)
         full = meshes.read_ply(capture.scan, or_points=True) if settings.transfer.scan and capture.scan.is_file() else None
         if full is not None and len(full.faces):
-            told["scan"] = _scan(capture, folder, head, full, source, maps, settings, report)
+            told["scan"] = _scan(capture, folder, solved, full, settings, report)
         (folder / "delivery.json").write_text(json.dumps({"maps": maps.name, **told}, indent=1), encoding="utf-8")
     report.figure("maps_from", maps.name)
 
 
-def _own(capture: Capture, folder: Path, source: baking.Source, maps: Path, size: int, report: Reporter) -> dict:
+@dataclass(frozen=True)
+class SolvedHead:
+    """The built-in head, the same ready to be searched, and the folder of its maps."""
+
+    mesh: Mesh
+    source: baking.Source
+    maps: Path
+
+
+def _own(capture: Capture, folder: Path, solved: SolvedHead, size: int, report: Reporter) -> dict:
     """own_head.obj and its maps, one set per UV tile that its skin lies in."""
+    source, maps = solved.source, solved.maps
     own, told = meshes.read_obj(capture.own_head), {}
     skin = np.zeros(len(own.faces), bool)
     for first, end in read_skin(capture, len(own.faces))[1]:
@@ -84,23 +95,23 @@ def _own(capture: Capture, folder: Path, source: baking.Source, maps: Path, size
     return told
 
 
-def _scan(capture: Capture, folder: Path, head: Mesh, full: Mesh, source: baking.Source, maps: Path, settings: Settings, report: Reporter) -> dict:
+def _scan(capture: Capture, folder: Path, solved: SolvedHead, full: Mesh, settings: Settings, report: Reporter) -> dict:
     """scan.obj with a lit and an albedo texture, and the head's displacement."""
     size = settings.transfer.scan_size
     report.progress(0, 10, "unwrapping the scan")
     mesh = scan.unwrapped(full, settings.transfer.scan_detail_mm / 1000, size)
     meshes.write_obj(folder / "scan.obj", mesh)
-    at = baking.places(mesh, (0, 0), source, size, scan.FAR_M, lambda done: report.progress(1 + 3 * done, 10, "finding the head under the scan"))
+    at = baking.places(mesh, (0, 0), solved.source, size, scan.FAR_M, lambda done: report.progress(1 + 3 * done, 10, "finding the head under the scan"))
     views = [view for view in read_views(capture) if view.selected] or read_views(capture)
     colours = scan.lit(mesh, at, views, lambda done: report.progress(4 + 3 * done, 10, "colouring the scan"))
-    albedo = scan.continued(baking.bake(images.read_linear(maps / "diffuse_albedo.exr"), at), colours, at)
-    seen = baking.Places(np.where((colours.max(2) > 0)[..., None], 0, np.nan).astype(np.float32), at.turn, at.mirrored, at.covered)
-    either = baking.Places(np.where((at.known | seen.known)[..., None], 0, np.nan).astype(np.float32), at.turn, at.mirrored, at.covered)
+    albedo = scan.continued(baking.bake(images.read_linear(solved.maps / "diffuse_albedo.exr"), at), colours, at)
+    seen = baking.TexelPartners(np.where((colours.max(2) > 0)[..., None], 0, np.nan).astype(np.float32), at.turn, at.mirrored, at.covered)
+    either = baking.TexelPartners(np.where((at.known | seen.known)[..., None], 0, np.nan).astype(np.float32), at.turn, at.mirrored, at.covered)
     colours, albedo = baking.bled(colours, seen), baking.bled(albedo, either)
     images.write_srgb(folder / "scan_lit.png", images.linear_to_srgb(colours))
     images.write_srgb(folder / "scan_albedo.png", images.linear_to_srgb(albedo), bits=16)
     images.write_data(folder / "scan_albedo_known.png", at.known.astype(np.float32))
-    height = scan.displacement(head, full, size, lambda done: report.progress(7 + 3 * done, 10, "measuring the displacement"))
+    height = scan.displacement(solved.mesh, full, size, lambda done: report.progress(7 + 3 * done, 10, "measuring the displacement"))
     images.write_data(folder / "displacement.exr", height)
     drawing.scan_sheet(capture, mesh, colours, albedo, views)
     figures = {"triangles": len(mesh.faces), "packing_percent": round(100 * float(at.covered.mean()), 1),

@@ -14,7 +14,7 @@ import numpy as np
 import trimesh
 
 from ..geometry import atlas, raster, surfaces
-from ..geometry.baking import STRIP, Places
+from ..geometry.baking import STRIP_ROWS, TexelPartners
 from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.views import View
 from ..imaging import images
@@ -67,7 +67,7 @@ def _two_sided(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
         faces, area = faces[keep], area[keep]
 
 
-def lit(scan: Mesh, at: Places, views: list[View], tick: Callable[[float], None]) -> np.ndarray:
+def lit(scan: Mesh, at: TexelPartners, views: list[View], tick: Callable[[float], None]) -> np.ndarray:
     """Linear colours [S, S, 3] of the unwrapped scan as the views show them, zero where none does. `at` gives the covered texels."""
     size = len(at.covered)
     face, bary = raster.rasterize_uv(scan, size)
@@ -99,7 +99,7 @@ def lit(scan: Mesh, at: Places, views: list[View], tick: Callable[[float], None]
     return colours
 
 
-def continued(albedo: np.ndarray, lit_map: np.ndarray, at: Places) -> np.ndarray:
+def continued(albedo: np.ndarray, lit_map: np.ndarray, at: TexelPartners) -> np.ndarray:
     """The albedo [S, S, 3] where the head's maps reach; elsewhere the colours as filmed, times the gain per channel that makes both meet."""
     seen = lit_map.max(2) > 0
     both = at.known & seen & (lit_map.min(2) > 0.01)
@@ -113,9 +113,9 @@ def displacement(head: Mesh, scan: Mesh, size: int, tick: Callable[[float], None
     """How far the scan lies outside the head, along the head's normals, in metres: float32 [S, S] in the head's UVs; zero where there is no scan."""
     surface, normals = surfaces.Surface(scan, 0.01), vertex_normals(head)
     out, known = np.zeros((size, size), np.float32), np.zeros((size, size), bool)
-    for row in range(0, size, STRIP):
+    for row in range(0, size, STRIP_ROWS):
         tick(row / size)
-        end = min(row + STRIP, size)
+        end = min(row + STRIP_ROWS, size)
         face, bary = raster.rasterize_uv(head, size, (row, end))
         inside = face >= 0
         points = raster.interpolate(head.vertices, head.faces, face[inside], bary[inside].astype(np.float64))

@@ -23,7 +23,7 @@ from ..face.shown_parts import read_parts
 from ..face.strands import Strands
 from ..imaging import images
 from . import detail, drawing, gloss, grooming, hair
-from .maps import Maps, read_maps
+from .maps import HeadMaps, read_maps
 from .surface import lay_out
 from .whole_head import complete
 
@@ -67,7 +67,7 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.progress(1, 1)
 
 
-def _whole(capture: Capture, maps: Maps, settings: Settings, report: Reporter) -> tuple[Maps, tuple | None, dict[str, Strands]]:
+def _whole(capture: Capture, maps: HeadMaps, settings: Settings, report: Reporter) -> tuple[HeadMaps, tuple | None, dict[str, Strands]]:
     """The maps of the whole head; the hair's masks, the albedo without it and where that differs, or None where they are not asked for; single hairs."""
     options = settings.upscale
     if not (options.whole_head or options.hair):
@@ -99,7 +99,7 @@ def _whole(capture: Capture, maps: Maps, settings: Settings, report: Reporter) -
     return maps, (found, cleaned, share), hairs
 
 
-def enlarged(maps: Maps, size: int, method: str, device: str, progress) -> np.ndarray:
+def enlarged(maps: HeadMaps, size: int, method: str, device: str, progress) -> np.ndarray:
     """Diffuse (sRGB), unit normal and specular at `size`: float32 [size, size, 7]. `progress` hears the share done.
 
     The network makes four times as many texels of a side; more or fewer than that are resampled.

@@ -10,7 +10,7 @@ from ..geometry import raster, surfaces
 from ..geometry.meshes import vertex_normals
 from ..imaging import images
 from .hair import Hair
-from .maps import Maps
+from .maps import HeadMaps
 from .surface import HeadSurface
 
 SIDES = {"left": (1, 0.1, 0), "back": (0.25, 1, 0.2), "below": (0.35, -0.6, -0.75)}
@@ -25,7 +25,7 @@ TINTS = {"brows": (1.0, 0.1, 0.1), "lashes": (0.1, 0.9, 0.2), "beard": (0.1, 0.3
 FACE = 0.04, 0.96  # rows and columns of the map that the face fills
 
 
-def turned(surface: HeadSurface, several: list[Maps], side: int = 240) -> np.ndarray:
+def turned(surface: HeadSurface, several: list[HeadMaps], side: int = 240) -> np.ndarray:
     """sRGB picture: a row for each of `several`, the head from SIDES under three lamps."""
     caster, normals, tangent = raster.RayCaster(surface.mesh), vertex_normals(surface.mesh), surfaces.tangents(surface.mesh)
     columns = []
@@ -67,7 +67,7 @@ def _axes(direction) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return towards, right, np.cross(towards, right)
 
 
-def _lit(maps: Maps, texel: np.ndarray, axes, eye) -> np.ndarray:
+def _lit(maps: HeadMaps, texel: np.ndarray, axes, eye) -> np.ndarray:
     """Linear colours [N, 3] at texels [N, 2] (x, y) with tangent frames `axes`: Lambert, and Blinn's highlights (a picture, not a measurement)."""
     albedo, tilted, level = (raster.sample(picture, texel) for picture in (maps.diffuse, maps.normal, maps.specular))
     normal = sum(tilted[:, i:i + 1] * axis for i, axis in enumerate(axes))

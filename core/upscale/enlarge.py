@@ -17,7 +17,7 @@ from safetensors.torch import load_file
 from ..contract import shipped_files
 from ..contract.messages import Problem
 from ..imaging import images
-from .maps import Maps
+from .maps import HeadMaps
 from .network import CHANNELS, FACTOR, HALO, Rcan, bicubic
 
 DATA_FILES = ("weights/upscaler.safetensors", "weights/upscaler.json")
@@ -27,7 +27,7 @@ STRIP = 64
 
 
 @torch.no_grad()
-def enlarge(maps: Maps, progress: Callable[[float], None], device: str = "cpu", network: Rcan | None = None) -> np.ndarray:
+def enlarge(maps: HeadMaps, progress: Callable[[float], None], device: str = "cpu", network: Rcan | None = None) -> np.ndarray:
     """Diffuse (sRGB), unit normal and specular of `maps` [S, S], four times as large: float32 [4S, 4S, 7]. `progress` hears the share done."""
     network = network or load_network()
     network = network.to(device, memory_format=torch.channels_last)
@@ -43,7 +43,7 @@ def enlarge(maps: Maps, progress: Callable[[float], None], device: str = "cpu", 
     return large
 
 
-def channels_of(maps: Maps) -> torch.Tensor:
+def channels_of(maps: HeadMaps) -> torch.Tensor:
     """What the network reads: [1, 7, S, S]."""
     stacked = np.concatenate([images.linear_to_srgb(np.clip(maps.diffuse, 0, 1)), maps.normal, maps.specular[..., None]], -1)
     return torch.from_numpy(np.ascontiguousarray(stacked.transpose(2, 0, 1), np.float32))[None]

@@ -21,7 +21,7 @@ from ..face import lids, strands, template
 from ..face.strands import Roots, Strands
 from . import strokes, ways
 from .hair import Hair
-from .maps import Maps
+from .maps import HeadMaps
 from .strokes import HairTexels
 from .surface import HeadSurface
 
@@ -70,7 +70,7 @@ OFF_SEAM = 0.0003
 """Metres from where the lids meet, so that each lash is nearest to its own lid."""
 
 
-def groom(maps: Maps, hair: Hair, cleaned: np.ndarray, surface: HeadSurface, seed: int = 0, trust: float = TRUST,
+def groom(maps: HeadMaps, hair: Hair, cleaned: np.ndarray, surface: HeadSurface, seed: int = 0, trust: float = TRUST,
           check: Callable[[], None] = lambda: None) -> dict[str, Strands]:
     """The hairs of each part that has any, by its name; metres, on the head with closed lids. cleaned: linear albedo [S, S, 3] of the skin below; trust: how
     clear strokes must be to outweigh the usual direction. `check` may raise to cancel."""
@@ -118,7 +118,7 @@ def _grown(kind: HairKind, cover: np.ndarray, colours: np.ndarray, texels: HairT
     place = (texels.position[root] + texels.raise_up(rng.uniform(-0.5, 0.5, (len(root), 2)) * texel[root, None], root)) / 1000
     normal = texels.normal[root]
     roots = Roots(place, normal, _turned(way[root], normal, rng.normal(0, UNLIKE, len(root))), place)
-    skin = strands.Surface(surface.mesh.moved(surface.mesh.vertices / 1000))
+    skin = strands.SkinSurface(surface.mesh.moved(surface.mesh.vertices / 1000))
     lift = rng.normal(kind.lift, 0.3 * kind.lift, len(root)).clip(0.05)
     points = strands.grow(roots, length, lift, skin, way[tip] - way[root] - kind.bend * normal, np.full(len(root), CLEARANCE), STEPS)
     colour = np.clip(colours[middle] * np.exp(rng.normal(0, 0.15, (len(root), 1))), DARKEST, 0.8)

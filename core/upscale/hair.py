@@ -18,7 +18,7 @@ from ..face import beard, template
 from ..imaging import images
 from . import grain, growth
 from .growth import Growth
-from .maps import Maps
+from .maps import HeadMaps
 from .surface import HeadSurface
 from .whole_head import FEATURES, apart, seen_well
 
@@ -44,7 +44,7 @@ class Hair:
     hidden: np.ndarray
 
 
-def find(maps: Maps, surface: HeadSurface, parts: np.ndarray | None = None, check: Callable[[], None] = lambda: None) -> Hair:
+def find(maps: HeadMaps, surface: HeadSurface, parts: np.ndarray | None = None, check: Callable[[], None] = lambda: None) -> Hair:
     """The hair of a face. parts: what read_parts gives. `check` may raise to cancel, here and below."""
     channels, _ = apart(maps)
     light = channels[..., :3].mean(2)
@@ -61,7 +61,7 @@ def find(maps: Maps, surface: HeadSurface, parts: np.ndarray | None = None, chec
     return Hair(_behind(brows, grown, surface), lashes, bearded, grown.head)
 
 
-def clean(maps: Maps, hair: Hair, surface: HeadSurface, seed: int = 0, check: Callable[[], None] = lambda: None) -> tuple[np.ndarray, np.ndarray]:
+def clean(maps: HeadMaps, hair: Hair, surface: HeadSurface, seed: int = 0, check: Callable[[], None] = lambda: None) -> tuple[np.ndarray, np.ndarray]:
     """Linear albedo [S, S, 3] without the hair, and how far each texel was replaced [S, S]; 0 leaves the albedo's bytes."""
     channels, slopes = apart(maps)
     zones, texel = _zones(surface), float(np.median(surface.texel))

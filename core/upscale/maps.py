@@ -14,7 +14,7 @@ from ..imaging import images
 
 
 @dataclass(frozen=True)
-class Maps:
+class HeadMaps:
     """All float32 on S x S texels. diffuse [S, S, 3]: albedo, linear sRGB; normal [S, S, 3]: unit, tangent space, OpenGL Y+; specular [S, S]: Principled
     BSDF's Specular IOR Level; confidence [S, S] in [0, 1]; shading [S, S, 3]: linear, albedo x shading = texture."""
 
@@ -25,13 +25,13 @@ class Maps:
     shading: np.ndarray
 
 
-def read_maps(folder: Path) -> Maps:
+def read_maps(folder: Path) -> HeadMaps:
     """The maps that the solver wrote. Raises Problem where one is damaged or of another size than the others."""
     paths = {"diffuse": folder / "diffuse_albedo.exr", "normal": folder / "normal.png", "specular": folder / "specular_albedo.png",
              "confidence": folder / "confidence.png", "shading": folder / "shading.exr"}
     normal = images.read_normals(paths["normal"])
-    found = Maps(images.read_linear(paths["diffuse"]), normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
-                 images.read_mask(paths["specular"]), images.read_mask(paths["confidence"]), images.read_linear(paths["shading"]))
+    found = HeadMaps(images.read_linear(paths["diffuse"]), normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
+                     images.read_mask(paths["specular"]), images.read_mask(paths["confidence"]), images.read_linear(paths["shading"]))
     side = len(found.diffuse)
     for name, pixels in vars(found).items():
         if pixels.shape[:2] != (side, side):

@@ -25,7 +25,7 @@ HALO = 2
 """Texels of the small map that the tail reads around a strip: 1 + 1/2 + 1/4 by three 3 x 3 convolutions on ever finer grids, two by the bicubic kernel."""
 
 
-class Attention(nn.Module):
+class ChannelAttention(nn.Module):
     """Scales each channel by what its mean over the map says."""
 
     def __init__(self, width: int, squeeze: int):
@@ -37,12 +37,12 @@ class Attention(nn.Module):
         return x * torch.sigmoid(self.outer(functional.relu(self.inner(mean))))
 
 
-class Block(nn.Module):
+class ChannelAttentionBlock(nn.Module):
     """Residual channel-attention block; begins as the identity, so that a network can grow while it learns."""
 
     def __init__(self, width: int, squeeze: int):
         super().__init__()
-        self.first, self.second, self.attention = nn.Conv2d(width, width, 3, padding=1), nn.Conv2d(width, width, 3, padding=1), Attention(width, squeeze)
+        self.first, self.second, self.attention = nn.Conv2d(width, width, 3, padding=1), nn.Conv2d(width, width, 3, padding=1), ChannelAttention(width, squeeze)
         nn.init.zeros_(self.second.weight)
         nn.init.zeros_(self.second.bias)
 
@@ -56,7 +56,7 @@ class Rcan(nn.Module):
     def __init__(self, groups: int, blocks: int, width: int, squeeze: int = 16):
         super().__init__()
         self.head = nn.Conv2d(CHANNELS, width, 3, padding=1)
-        self.groups = nn.ModuleList(nn.ModuleList(Block(width, squeeze) for _ in range(blocks)) for _ in range(groups))
+        self.groups = nn.ModuleList(nn.ModuleList(ChannelAttentionBlock(width, squeeze) for _ in range(blocks)) for _ in range(groups))
         self.joins = nn.ModuleList(nn.Conv2d(width, width, 3, padding=1) for _ in range(groups))
         self.join = nn.Conv2d(width, width, 3, padding=1)
         self.widen = nn.ModuleList(nn.Conv2d(width, 4 * width, 3, padding=1) for _ in range(2))

@@ -20,7 +20,7 @@ from ..contract.messages import Reporter
 from ..face import template
 from ..geometry.noise import noise
 from . import grain
-from .maps import Maps
+from .maps import HeadMaps
 from .surface import HeadSurface
 
 UNSEEN, SEEN = 0.05, 0.30
@@ -41,7 +41,7 @@ FEATURES = ("brows", "lips", "eyes", "nostrils")
 DARKEST = 0.004
 
 
-def complete(maps: Maps, surface: HeadSurface, report: Reporter, seed: int = 0) -> Maps:
+def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int = 0) -> HeadMaps:
     """The maps with what was not seen replaced; shading and confidence as they were. Texels whose `seen_well` is 1 keep their bytes, but for stray ones
     beyond the face."""
     report.check()
@@ -93,13 +93,13 @@ def _without_strays(seen: np.ndarray, confidence: np.ndarray, off: np.ndarray) -
     return np.where(missing > 0, seen * sure**2 / np.maximum(sure**2 + missing**2, 1e-12), seen).astype(np.float32)
 
 
-def apart(maps: Maps) -> tuple[np.ndarray, np.ndarray]:
+def apart(maps: HeadMaps) -> tuple[np.ndarray, np.ndarray]:
     """Log albedo and specular [S, S, 4], and the normal's slopes [S, S, 2]."""
     channels = np.concatenate([np.log(np.maximum(maps.diffuse, DARKEST)), maps.specular[..., None]], 2)
     return channels, maps.normal[..., :2] / np.maximum(maps.normal[..., 2:], 0.1)
 
 
-def joined(maps: Maps, where: np.ndarray, channels: np.ndarray, slopes: np.ndarray | None = None) -> Maps:
+def joined(maps: HeadMaps, where: np.ndarray, channels: np.ndarray, slopes: np.ndarray | None = None) -> HeadMaps:
     """`maps` with new values at the texels of bool [S, S]: what `apart` makes of them, [N, 4] and [N, 2]."""
     diffuse, specular, normal = maps.diffuse.copy(), maps.specular.copy(), maps.normal.copy()
     diffuse[where] = np.clip(np.exp(channels[:, :3]), DARKEST, 1)

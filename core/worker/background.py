@@ -23,10 +23,10 @@ GRACE_S = 1.0
 """How long a cancelled task's thread may take to end before it is waited for no longer."""
 
 
-class Task:
+class BackgroundTask:
     """`work(task)` in a thread. It may call `task.say` and `task.run`; what it returns is `result`, and a Problem it raises ends it as Failed."""
 
-    def __init__(self, name: str, work: Callable[[Task], object]):
+    def __init__(self, name: str, work: Callable[[BackgroundTask], object]):
         self.name = name
         self.result: object = None
         self.running = False

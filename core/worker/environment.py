@@ -15,7 +15,7 @@ from pathlib import Path
 
 from ..contract.files import storage_problem
 from ..contract.messages import Problem
-from .background import Task
+from .background import BackgroundTask
 
 PYTHONS = ((3, 11), (3, 12), (3, 13))
 """Versions of Python for which every direct requirement has a wheel; locks.py has those that an environment is made for."""
@@ -97,13 +97,13 @@ def check_removable(folder: Path) -> None:
         raise Problem(f"{folder} is no environment that WildCap made, so it is not deleted.", "Choose the folder that the solver was installed to.")
 
 
-def removal(folder: Path) -> Task:
+def removal(folder: Path) -> BackgroundTask:
     """`remove` in the background: an environment has tens of thousands of files."""
-    def work(task: Task) -> None:
+    def work(task: BackgroundTask) -> None:
         task.say(0, 1, "deleting the solver")
         remove(folder)
 
-    return Task("environment", work)
+    return BackgroundTask("environment", work)
 
 
 _SURVEY = """

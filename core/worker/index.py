@@ -33,7 +33,7 @@ RETRIES = ("--retries", "1")
 
 
 @dataclass(frozen=True)
-class Plan:
+class InstallationPlan:
     """The packages by name and version, the hosts they come from ('this disk' for files), bytes to download and bytes once unpacked."""
 
     packages: dict[str, str]
@@ -48,7 +48,7 @@ class Plan:
 
 
 def plan(requirements: Path, base: Path, compute: str, source: str, run: Callable[[list[str]], tuple[int, str]],
-         say: Callable[[float, float, str], None] = lambda *_: None, wheels: Path | None = None) -> Plan:
+         say: Callable[[float, float, str], None] = lambda *_: None, wheels: Path | None = None) -> InstallationPlan:
     """What an installation would bring (see installation.py). `base` is the Python to make it from, `run` runs a command and gives its exit code and last
     error, `say` takes how far it is. Raises Problem when there is no solver for this machine, or the index cannot be reached or lacks a package."""
     lock = pip_steps.lock_of(base, requirements)
@@ -77,10 +77,11 @@ def plan(requirements: Path, base: Path, compute: str, source: str, run: Callabl
         with ThreadPoolExecutor(8) as pool:
             sizes = list(pool.map(wheel_size, [url for _, url in found.values()]))
     hosts = sorted({urllib.parse.urlsplit(url).hostname or "this disk" for _, url in found.values()})
-    return Plan({name: version for name, (version, _) in found.items()}, tuple(hosts), sum(size for size, _ in sizes), sum(disk for _, disk in sizes))
+    return InstallationPlan({name: version for name, (version, _) in found.items()}, tuple(hosts),
+                            sum(size for size, _ in sizes), sum(disk for _, disk in sizes))
 
 
-def check_space(plan: Plan, folder: Path) -> int:
+def check_space(plan: InstallationPlan, folder: Path) -> int:
     """Bytes free on the disk of a folder that need not be there yet. Raises Problem when the plan does not fit."""
     free = free_space(folder)
     if free < plan.needed:

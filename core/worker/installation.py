@@ -11,40 +11,64 @@ import contextlib
 import os
 import shutil
 import sys
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..contract.files import storage_problem
 from ..contract.messages import Problem
 from . import bare_environment, locks
-from .background import Task
+from .background import BackgroundTask
 from .environment import COMPUTE_FILE, answer, python_of, required, verify
 from .pip_steps import carry_out, compute_of, lock_of, steps
 
 
-def installation(folder: Path, requirements: Path, log: Path, base: Path | None = None, compute: str = "auto", source: str = "pytorch",
-                 wheels: Path | None = None, packages: int = 0) -> Task:
-    """Makes an environment in the background. One in the same folder as a broken or cancelled one continues that; where that does not work, it is made anew.
+@dataclass(frozen=True)
+class PackageSource:
+    """Which packages come, and from where: compute is 'auto', 'cpu', 'cuda' or 'apple', what PyTorch is built for; source is one of pip_steps.SOURCES, and
+    wheels the folder of 'folder'."""
 
-    `folder` is new, empty, or one that an earlier installation began; `base` is the Python to make it from (None: found); `compute` is 'auto', 'cpu',
-    'cuda' or 'apple'; `source` is one of pip_steps.SOURCES, `wheels` the folder of 'folder'; `packages` is how many will come (0: guessed). The task's
-    progress counts packages; what pip says goes to `log`. What a cancel leaves stays, and what was downloaded is in pip's cache. Raises Problem when the
-    folder is somebody else's.
+    compute: str = "auto"
+    source: str = "pytorch"
+    wheels: Path | None = None
+
+
+def installation(folder: Path, requirements: Path, log: Path, base: Path | None, chosen: PackageSource, packages: int = 0) -> BackgroundTask:
+    """Makes an environment in the background. One in the same folder as a broken or cancelled one continues that; where that does not work, it is made anew.
+    What a cancel leaves stays, and what was downloaded is in pip's cache.
+
+    Parameters
+    ----------
+    folder : new, empty, or one that an earlier installation began
+    requirements : the folder of requirements and locks
+    log : takes what pip says
+    base : the Python to make it from, None: found
+    chosen : which packages, and from where
+    packages : how many will come, 0: guessed
+
+    Returns
+    -------
+    The task, not started; its progress counts packages.
+
+    Raises
+    ------
+    Problem : when the folder is somebody else's
     """
-    folder, compute = Path(folder), compute_of(compute)
+    folder, compute = Path(folder), compute_of(chosen.compute)
     if folder.is_dir() and any(folder.iterdir()) and not (folder / COMPUTE_FILE).is_file():
         raise Problem(f"{folder} holds other files.", "Choose an empty folder.")
     expected = packages or 3 * len(required(requirements))  # each brings about two more
-    wheels = Path(wheels) if source == "folder" else None
+    chosen = PackageSource(compute, chosen.source, Path(chosen.wheels) if chosen.source == "folder" else None)
 
-    def work(task: Task) -> None:
+    def work(task: BackgroundTask) -> None:
         try:
             log.parent.mkdir(parents=True, exist_ok=True)
             with open(log, "w", encoding="utf-8") as file:
-                _install(task, folder, requirements, base or base_python(), compute, source, wheels, _listener(task, file, expected), log)
+                _Installing(task, folder, requirements, base or base_python(), chosen, _listener(task, file, expected), log).run()
         except OSError as error:
             raise storage_problem(error, folder) from error
 
-    return Task("environment", work)
+    return BackgroundTask("environment", work)
 
 
 def find_python() -> Path | None:
@@ -71,16 +95,45 @@ def base_python() -> Path:
     return found
 
 
-def _install(task: Task, folder: Path, requirements: Path, base: Path, compute: str, source: str, wheels: Path | None, hear, log: Path) -> None:
-    lock = lock_of(base, requirements)
-    locks.check_path(lock, folder, limited=os.name == "nt")
-    made_for = " ".join((compute, source, lock.name))
-    continued = _begun(folder, made_for)
-    problems = _bring(task, folder, requirements, lock, base, compute, source, wheels, hear, log, made_for, anew=not continued)
-    if problems and continued:  # pip believes what an environment says of itself, though files of it may be gone or cut
-        problems = _bring(task, folder, requirements, lock, base, compute, source, wheels, hear, log, made_for, anew=True)
-    if problems:
-        raise Problem(problems[0], f"Install again; the log is {log}.")
+@dataclass(frozen=True)
+class _Installing:
+    """What an installation works with; `hear` takes each line that pip says."""
+
+    task: BackgroundTask
+    folder: Path
+    requirements: Path
+    base: Path
+    chosen: PackageSource
+    hear: Callable[[str], None]
+    log: Path
+
+    def run(self) -> None:
+        lock = lock_of(self.base, self.requirements)
+        locks.check_path(lock, self.folder, limited=os.name == "nt")
+        made_for = " ".join((self.chosen.compute, self.chosen.source, lock.name))
+        continued = _begun(self.folder, made_for)
+        problems = self._bring(lock, made_for, anew=not continued)
+        if problems and continued:  # pip believes what an environment says of itself, though files of it may be gone or cut
+            problems = self._bring(lock, made_for, anew=True)
+        if problems:
+            raise Problem(problems[0], f"Install again; the log is {self.log}.")
+
+    def _bring(self, lock: locks.Lock, made_for: str, anew: bool) -> list[str]:
+        """One try of all steps; what is wrong then."""
+        task, folder, requirements, chosen = self.task, self.folder, self.requirements, self.chosen
+        if anew:
+            task.say(0, 100, "making the solver's folder")
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / COMPUTE_FILE).write_text("", encoding="utf-8")
+            bare_environment.make(folder, self.base, requirements, lambda command: task.run(command, self.hear), chosen.wheels, keep=COMPUTE_FILE)
+            (folder / COMPUTE_FILE).write_text(made_for, encoding="utf-8")
+        pip = [python_of(folder), "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--progress-bar", "off"]
+        todo = steps(requirements, lock, chosen.compute, chosen.source, folder, chosen.wheels)
+        code, error = carry_out(todo, lambda words: task.run([*pip, *words], self.hear))
+        if code:
+            raise _failure(error, folder, self.log)
+        task.say(99, 100, "trying every package")
+        return verify(python_of(folder), requirements, importing=True)
 
 
 def _begun(folder: Path, made_for: str) -> bool:
@@ -89,24 +142,7 @@ def _begun(folder: Path, made_for: str) -> bool:
     return mark.is_file() and mark.read_text(encoding="utf-8") == made_for and answer(python_of(folder), "import pip; print('pip')") == "pip"
 
 
-def _bring(task: Task, folder: Path, requirements: Path, lock: locks.Lock, base: Path, compute: str, source: str, wheels: Path | None, hear, log: Path,
-           made_for: str, anew: bool) -> list[str]:
-    """One try of all steps; what is wrong then."""
-    if anew:
-        task.say(0, 100, "making the solver's folder")
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / COMPUTE_FILE).write_text("", encoding="utf-8")
-        bare_environment.make(folder, base, requirements, lambda command: task.run(command, hear), wheels, keep=COMPUTE_FILE)
-        (folder / COMPUTE_FILE).write_text(made_for, encoding="utf-8")
-    pip = [python_of(folder), "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--progress-bar", "off"]
-    code, error = carry_out(steps(requirements, lock, compute, source, folder, wheels), lambda words: task.run([*pip, *words], hear))
-    if code:
-        raise _failure(error, folder, log)
-    task.say(99, 100, "trying every package")
-    return verify(python_of(folder), requirements, importing=True)
-
-
-def _listener(task: Task, log, expected: int):
+def _listener(task: BackgroundTask, log, expected: int):
     """What hears pip's lines: into the log, and package by package into the task's progress."""
     seen = 0
 

@@ -21,7 +21,7 @@ from ..contract.settings import Settings, from_json, preset
 
 
 @dataclass(frozen=True)
-class Job:
+class JobRequest:
     """`source` is a video or a folder of photographs ('': the one the capture has); `chain` are the stages to run, in order;
     `force` says that they run even where they are fresh."""
 
@@ -55,7 +55,7 @@ def write_job(capture: Capture, *, source: str | Path = "", first: str | None = 
     return capture.job
 
 
-def read_job(path: Path) -> Job:
+def read_job(path: Path) -> JobRequest:
     """The job of a file. Raises Problem when it is damaged or asks for what there is not."""
     try:
         return _job(read_json(path), Path(path).parent)
@@ -76,7 +76,7 @@ def _check_names(root: Path, source: str | Path) -> None:
                           "Rename the file or folder: it may come from an old disk or archive.") from None
 
 
-def _job(values: dict, folder: Path) -> Job:
+def _job(values: dict, folder: Path) -> JobRequest:
     """`folder` is where the job file lies; its paths are relative to that where they can be."""
     first, last = (stages.NAMES.index(stages.by_name(name).name) if name else default
                    for name, default in ((values.get("from"), 0), (values.get("until"), len(stages.NAMES) - 1)))
@@ -88,4 +88,4 @@ def _job(values: dict, folder: Path) -> Job:
     if values.get("tool") and tool is None:
         raise Problem(f"There is no tool named {values['tool']!r}.", f"The tools are {', '.join(each.name for each in stages.TOOLS)}.")
     source = str(read_portable(values["source"], folder)) if values.get("source") else ""
-    return Job(Capture(read_portable(values["capture"], folder)), source, stages.STAGES[first:last + 1], bool(values.get("from")), settings, tool)
+    return JobRequest(Capture(read_portable(values["capture"], folder)), source, stages.STAGES[first:last + 1], bool(values.get("from")), settings, tool)

@@ -44,14 +44,14 @@ def lock_of(base: Path, requirements: Path) -> locks.Lock:
 
 
 @dataclass(frozen=True)
-class Step:
+class PipStep:
     """The arguments of one `pip install` or `pip download`, and those of the ones to run in its place where pip cannot carry it out."""
 
     words: tuple[str, ...]
     otherwise: tuple[tuple[str, ...], ...] = ()
 
 
-def steps(requirements: Path, lock: locks.Lock, compute: str, source: str, scratch: Path, wheels: Path | None = None) -> list[Step]:
+def steps(requirements: Path, lock: locks.Lock, compute: str, source: str, scratch: Path, wheels: Path | None = None) -> list[PipStep]:
     """What pip is to do in turn. `compute`: 'cpu', 'cuda' or 'apple'; `source`: one of SOURCES; `wheels`: the folder of 'folder'; files that pip is to read
     are written to the folder `scratch`."""
     system = {"win_amd64": "win32", "macosx_arm64": "darwin"}.get(lock.platform, "linux")
@@ -61,16 +61,16 @@ def steps(requirements: Path, lock: locks.Lock, compute: str, source: str, scrat
     cuda = locks.beside(requirements, lock.name, "cuda")
     libraries = ((*checked, "-r", str(cuda)),) if system == "linux" and cuda is not None else ()  # the index's PyTorch for Linux needs them
     if own is None or not build:
-        return [Step((*checked, "-r", whole)), *map(Step, libraries)]
+        return [PipStep((*checked, "-r", whole)), *map(PipStep, libraries)]
     rest = str(_write(Path(scratch) / "wildcap_packages.txt", (line for name, line in lock.lines.items() if name != "torch")))
     torch = str(_write(Path(scratch) / "wildcap_torch.txt", [lock.lines["torch"]]))
     hashes = ("--require-hashes",) if locks.read(requirements, f"{lock.name}-{compute}").verified else ()
     links = ("--find-links", f"{TORCH}{build}/torch/") if source == "pytorch" else where
     instead = () if source == "pytorch" else ((*checked, "-r", torch), *libraries)  # an index that is not PyTorch's may have its build or not
-    return [Step((*checked, "-r", rest)), Step((*PINNED, *hashes, *links, "-r", str(own)), instead)]
+    return [PipStep((*checked, "-r", rest)), PipStep((*PINNED, *hashes, *links, "-r", str(own)), instead)]
 
 
-def carry_out(todo: list[Step], run: Callable[[tuple[str, ...]], tuple[int, str]], say: Callable[[int], None] = lambda done: None) -> tuple[int, str]:
+def carry_out(todo: list[PipStep], run: Callable[[tuple[str, ...]], tuple[int, str]], say: Callable[[int], None] = lambda done: None) -> tuple[int, str]:
     """Runs steps in turn until one fails; the exit code and the last error of the last. `say` takes how many are done."""
     code, error = 0, ""
     for done, step in enumerate(todo):

@@ -26,7 +26,7 @@ from ..contract.messages import Cancelled, CancelledError, Done, Failed, Log, Me
 from ..contract.portable_paths import convert_settings, read_portable
 from ..contract.settings import Settings, from_json
 from ..contract.stages import Stage
-from .job import Job, read_job
+from .job import JobRequest, read_job
 
 
 def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None, cancelled: Callable[[], bool] = lambda: False) -> Message:
@@ -65,7 +65,7 @@ def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None, 
     return Done(round(time.monotonic() - started, 2))
 
 
-def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> str:
+def run_stage(stage: Stage, job: JobRequest, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> str:
     """Runs one stage, records it, and rebuilds the report, unless the stage is finished: done, or made by older code, which is not ours to replace.
     Returns the state it was found in. Raises whatever the stage raises."""
     capture, settings = job.capture, job.settings
@@ -95,7 +95,7 @@ def run_stage(stage: Stage, job: Job, emit: Callable[[Message], None], cancelled
     return state
 
 
-def run_tool(tool: Stage, job: Job, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
+def run_tool(tool: Stage, job: JobRequest, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
     """Runs one of stages.TOOLS and sends its figures. Raises whatever it raises."""
     started = time.monotonic()
     with _at_work(tool, job.capture, emit, cancelled) as reporter:
@@ -104,7 +104,7 @@ def run_tool(tool: Stage, job: Job, emit: Callable[[Message], None], cancelled: 
     emit(StageDone(tool.name, round(time.monotonic() - started, 2), False, reporter.figures))
 
 
-def bring_back(step: Stage, job: Job, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
+def bring_back(step: Stage, job: JobRequest, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
     """Has made again what a stage or tool reads and was slimmed away, with the settings that it was made with. Where the same comes out, it is as if it had
     never gone; where not, for the code is another or what it is made from has changed, it counts as new. Raises whatever the stages raise."""
     capture = job.capture
@@ -125,7 +125,7 @@ def bring_back(step: Stage, job: Job, emit: Callable[[Message], None], cancelled
         capture.drop_hashes(stage)
 
 
-def _as_before(stage: Stage, entry: dict, job: Job) -> Settings:
+def _as_before(stage: Stage, entry: dict, job: JobRequest) -> Settings:
     """The settings that a stage was last run with, by its entry in capture.json, on the same device where this machine has it."""
     then = convert_settings({stage.name: entry["settings"]}, lambda path: str(read_portable(path, job.capture.root)))[stage.name]
     known = asdict(getattr(job.settings, stage.name))
@@ -145,7 +145,7 @@ def _make(stage: Stage, capture: Capture, settings: Settings, reporter: Reporter
         raise RuntimeError(f"the stage {stage.name} ended without writing {lost[0]}")
 
 
-def _check_slimmed(job: Job) -> None:
+def _check_slimmed(job: JobRequest) -> None:
     """Raises Problem, before anything is changed, where the job needs what was slimmed away and the source that it is made from is gone."""
     capture = job.capture
     record = capture.read()
@@ -177,7 +177,7 @@ def explained(error: Exception, stage: str, log: Path) -> Problem:
     return unforeseen.explain(error, during, log)
 
 
-def _take_source(job: Job, emit: Callable[[Message], None]) -> None:
+def _take_source(job: JobRequest, emit: Callable[[Message], None]) -> None:
     """Records the source where the job begins with the stage that reads it. Raises Problem when there is none, or another one than before."""
     if job.chain[0].reads:
         return

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..contract.messages import Done, Failed, Problem, Progress
 from . import index, installation, locks, wheels
-from .background import Task
+from .background import BackgroundTask
 from .environment import answer, python_of
 
 REQUIREMENTS = Path(__file__).resolve().parents[2] / "requirements"
@@ -41,8 +41,8 @@ def _add_build(parser: argparse.ArgumentParser) -> None:
 
 def _install(options: argparse.Namespace) -> int:
     folder = options.folder.absolute()
-    task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), Path(sys.executable), options.compute,
-                                     "folder" if options.wheels else options.packages, options.wheels)
+    task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), Path(sys.executable),
+                                     installation.PackageSource(options.compute, "folder" if options.wheels else options.packages, options.wheels))
     _follow(task)
     print(f"The solver is ready: {python_of(folder)}")
     return 0
@@ -53,20 +53,20 @@ def _wheels(options: argparse.Namespace) -> int:
     compute = "cpu" if options.compute == "auto" else options.compute
     if compute == ("cuda" if name.startswith("macosx") else "apple"):
         raise Problem(f"There is no solver for {compute} on {name}.", "Leave --compute out, or choose another.")
-    task = Task("wheels", lambda task: wheels.download(REQUIREMENTS, name, compute, options.packages, options.folder,
-                                                       lambda command: task.run(command, lambda line: _hear(task, line))))
+    task = BackgroundTask("wheels", lambda task: wheels.download(REQUIREMENTS, name, compute, options.packages, options.folder,
+                                                                 lambda command: task.run(command, lambda line: _hear(task, line))))
     _follow(task)
     print(f"{len(task.result)} wheels for {name} in {options.folder}, {index.gigabytes(sum(path.stat().st_size for path in task.result))}; "
           f"`python -m core install FOLDER --wheels {options.folder}` installs from them, and so does Install Solver")
     return 0
 
 
-def _hear(task: Task, line: str) -> None:
+def _hear(task: BackgroundTask, line: str) -> None:
     if line.startswith(("Collecting", "  Downloading", "Saved")):
         task.say(0, 1, line.strip().split(" (from")[0][:80])
 
 
-def _follow(task: Task) -> None:
+def _follow(task: BackgroundTask) -> None:
     """Runs a task to its end, its progress on stderr. Raises the Problem that it ends with."""
     task.start()
     try:

@@ -25,7 +25,7 @@ def download(requirements: Path, name: str, compute: str, source: str, folder: P
         raise Problem(f"{folder} is no folder.", "Choose a folder for the wheels.")
     pip = [sys.executable, "-m", "pip", "download", "--disable-pip-version-check", "--no-input", "--progress-bar", "off", "--dest", folder, *tags(name)]
     with tempfile.TemporaryDirectory(prefix="wildcap_wheels_") as scratch:
-        own_pip = pip_steps.Step(("--no-deps", "--require-hashes", "-r", str(Path(requirements) / "locks" / "pip.txt")))
+        own_pip = pip_steps.PipStep(("--no-deps", "--require-hashes", "-r", str(Path(requirements) / "locks" / "pip.txt")))
         code, error = pip_steps.carry_out([*pip_steps.steps(requirements, lock, compute, source, Path(scratch)), own_pip], lambda words: run([*pip, *words]))
     if code:
         raise Problem(f"Not all wheels for {name} could be had ({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",

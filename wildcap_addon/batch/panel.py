@@ -51,7 +51,7 @@ class WILDCAP_PT_batch(WildcapPanel, bpy.types.Panel):
             problems.draw(layout, Problem(found.problem, found.remedy), width)
 
 
-def count_words(known: batches.View) -> str:
+def count_words(known: batches.BatchView) -> str:
     """How far the faces are: 'Masks waiting: 5, done: 3, to do: 4'."""
     of, seen = len(known.batch.faces), len(known.states)
     waiting = len(batches.waiting())

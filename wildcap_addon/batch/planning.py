@@ -6,7 +6,7 @@ import itertools
 import time
 from pathlib import Path
 
-from ...core.batch.record import GATES, Batch, Face, read_batch, write_batch
+from ...core.batch.record import GATES, Batch, BatchFace, read_batch, write_batch
 from ...core.contract.files import storage_problem
 from ...core.contract.json_files import plain_name
 from ...core.contract.messages import Problem
@@ -39,7 +39,7 @@ def is_planned(batch: Batch) -> bool:
     return any(face.root.parent == batch.root for face in batch.faces)
 
 
-def _list_faces(context) -> tuple[list[Face], list[str]]:
+def _list_faces(context) -> tuple[list[BatchFace], list[str]]:
     faces, left_out, taken = [], [], set()
     for item in context.scene.wildcap.captures:
         capture = captures.folder(item)
@@ -50,7 +50,7 @@ def _list_faces(context) -> tuple[list[Face], list[str]]:
         if source is None:
             left_out.append(item.name)
         else:
-            faces.append(Face(_name(capture.root.stem, taken), source, capture.root, item.quality, properties.values(item)))
+            faces.append(BatchFace(_name(capture.root.stem, taken), source, capture.root, item.quality, properties.job_settings(item)))
     return faces, left_out
 
 

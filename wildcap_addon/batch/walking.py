@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.batch.record import Face
+from ...core.batch.record import BatchFace
 from .. import batches, captures, head, local_view, problems, properties
 
 
@@ -14,7 +14,7 @@ def painting() -> bool:
     return bpy.ops.wildcap.finish_mask.poll()
 
 
-def following(root: str) -> Face | None:
+def following(root: str) -> BatchFace | None:
     """The face whose mask waits next after that of the capture `root`, round the batch; None where no other waits."""
     waiting, known = batches.waiting(), batches.view()
     others = [face for face in waiting if str(face.root) != root]
@@ -29,7 +29,7 @@ def leave(root: str) -> None:
         _click(bpy.ops.wildcap.finish_mask, root)
 
 
-def go(context, face: Face) -> None:
+def go(context, face: BatchFace) -> None:
     """Brings a face in, alone, and begins to paint its mask. Raises Problem, as the clicks do that an artist would do it by."""
     before = captures.active(context)
     leave(captures.root(before))
@@ -44,7 +44,7 @@ def go(context, face: Face) -> None:
     _click(bpy.ops.wildcap.paint_mask, str(face.root))
 
 
-def list_face(context, face: Face):
+def list_face(context, face: BatchFace):
     """The face's item of the scene's list, now the active one; one that is new to it has the batch's settings."""
     known = {captures.root(item) for item in context.scene.wildcap.captures}
     item = captures.add(context, face.root)

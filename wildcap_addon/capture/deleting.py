@@ -7,7 +7,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.contract import deletion
 from ...core.contract.capture import Capture
-from ...core.worker.background import Task
+from ...core.worker.background import BackgroundTask
 from .. import asking, batches, captures, jobs
 from ..base_operator import Dialog
 
@@ -38,15 +38,15 @@ class WILDCAP_OT_delete_face(Dialog, bpy.types.Operator):
 
     def work(self, context):
         capture = captures.folder(captures.require(context))
-        jobs.begin("", "ask", Task("setup", lambda task: delete(task, capture)), lambda: forget(str(capture.root)))
+        jobs.begin("", "ask", BackgroundTask("setup", lambda task: delete(task, capture)), lambda: forget(str(capture.root)))
 
 
-def look_at(task: Task, capture: Capture) -> deletion.Deletion:
+def look_at(task: BackgroundTask, capture: Capture) -> deletion.Deletion:
     task.say(0, 1, "looking at every file of the face")
     return deletion.plan(capture)
 
 
-def delete(task: Task, capture: Capture) -> deletion.Deletion:
+def delete(task: BackgroundTask, capture: Capture) -> deletion.Deletion:
     task.say(0, 1, "deleting the face")
     return deletion.delete(capture)
 

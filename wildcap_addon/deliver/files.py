@@ -10,7 +10,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.contract.delivery_plan import Plan
+from ...core.contract.delivery_plan import DeliveryPlan
 from ...core.contract.messages import Problem
 
 ADDONS = {".glb": "gltf", ".gltf": "gltf", ".fbx": "fbx"}
@@ -30,7 +30,7 @@ def has_usd() -> bool:
     return bool(bpy.app.build_options.usd)
 
 
-def export(plan: Plan) -> Path:
+def export(plan: DeliveryPlan) -> Path:
     """Writes the selected object of the window's scene to plan.staged. Raises Problem when no file came of it."""
     path = plan.staged / plan.mesh
     {".glb": _gltf, ".gltf": _gltf, ".usdc": _usd, ".fbx": _fbx, ".obj": _obj}[plan.format.suffix](path)

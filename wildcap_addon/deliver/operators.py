@@ -8,7 +8,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.contract import delivery_plan
-from ...core.contract.delivery_plan import Plan
+from ...core.contract.delivery_plan import DeliveryPlan
 from ...core.contract.messages import Problem
 from ...core.worker import read_only
 from .. import captures, jobs, properties
@@ -38,11 +38,11 @@ class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
         plan, root = planned(context), captures.root(item)
         delivery_plan.check_target(plan)
         stand.require_eyes(plan, captures.head(context, item))
-        chosen = {**properties.values(item)["deliver"], "roughness": roughness(captures.head(context, item)), "whole": False}
+        chosen = {**properties.job_settings(item)["deliver"], "roughness": roughness(captures.head(context, item)), "whole": False}
         until_it_ends = ExitStack()
         at = until_it_ends.enter_context(read_only.stand_in(captures.folder(item), chosen["folder"]))
         try:
-            jobs.start(item, "deliver", tool="deliver", then=lambda: waiting.maps_made(root, plan), at=at, ended=until_it_ends.close, deliver=chosen)
+            jobs.start_tool(item, "deliver", "deliver", then=lambda: waiting.maps_made(root, plan), at=at, ended=until_it_ends.close, deliver=chosen)
         except BaseException:
             until_it_ends.close()
             raise
@@ -83,7 +83,7 @@ class WILDCAP_OT_open_delivery(BaseOperator, bpy.types.Operator):
         bpy.ops.wm.path_open(filepath=str(folder))
 
 
-def planned(context) -> Plan:
+def planned(context) -> DeliveryPlan:
     """The delivery that the settings ask for. Raises Problem where it cannot be made."""
     item = captures.require(context)
     settings = properties.settings(item).deliver

@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...core.contract.delivery_plan import PACKING, Plan
+from ...core.contract.delivery_plan import PACKING, DeliveryPlan
 from ...core.contract.messages import Problem
 from .. import captures, colours, head, node_trees
 
@@ -32,7 +32,7 @@ SOCKETS = {"base_color": "Base Color", "roughness": "Roughness", "specular": "Sp
 
 
 @contextmanager
-def standing(context, plan: Plan, source: bpy.types.Object | Path) -> Iterator[bpy.types.Object]:
+def standing(context, plan: DeliveryPlan, source: bpy.types.Object | Path) -> Iterator[bpy.types.Object]:
     """The copy to export, selected and active in a scene of its own; `source` is the object in the scene, or the mesh file. The packing in plan.staged says
     which maps there are."""
     packing = json.loads((plan.staged / PACKING).read_text(encoding="utf-8"))
@@ -68,7 +68,7 @@ def standing(context, plan: Plan, source: bpy.types.Object | Path) -> Iterator[b
                 kept.remove(thing)
 
 
-def _hairs(plan: Plan, source: bpy.types.Object, obj) -> list[bpy.types.Object]:
+def _hairs(plan: DeliveryPlan, source: bpy.types.Object, obj) -> list[bpy.types.Object]:
     """Copies of the head's hair at rest, children of the copy `obj`, in one plain colour each: USD's preview material reads no attribute."""
     found = []
     for hair in captures.hair(source):
@@ -92,7 +92,7 @@ def _mean_colour(data: bpy.types.Curves) -> list[float]:
     return colours_of.reshape(-1, 4)[:, :3].mean(0).tolist()
 
 
-def require_eyes(plan: Plan, obj: bpy.types.Object | None) -> None:
+def require_eyes(plan: DeliveryPlan, obj: bpy.types.Object | None) -> None:
     """Raises Problem where the target wants open eyes and the head has lids that cannot open."""
     if plan.what == "head" and plan.preset.open_eyes and (obj is None or not _lids(obj.data)):
         raise Problem(f"{plan.preset.title} wants a head with open eyes, and this one's lids are closed.",
@@ -129,7 +129,7 @@ def _at_rest(mesh) -> None:
             key.value, key.mute = 0.0, False
 
 
-def _materials(mesh, plan: Plan, packing: dict) -> None:
+def _materials(mesh, plan: DeliveryPlan, packing: dict) -> None:
     """The skin's slot becomes the delivered material, one per UV tile where there are several; other slots (eyes) plain ones of the same name and colour."""
     several, tiles = packing["several"], sorted({entry["tile"] for entry in packing["maps"]})
     slots, others = [polygon.material_index for polygon in mesh.polygons], list(mesh.materials)[1:]
@@ -149,7 +149,7 @@ def _materials(mesh, plan: Plan, packing: dict) -> None:
             polygon.material_index = tiles.index(tile) if tile in tiles else 0
 
 
-def _skin(name: str, plan: Plan, maps: list[dict], roughness: float, uv_map: str) -> bpy.types.Material:
+def _skin(name: str, plan: DeliveryPlan, maps: list[dict], roughness: float, uv_map: str) -> bpy.types.Material:
     material, shader = _new(name)
     shader.inputs["Roughness"].default_value = roughness
     shader.inputs["IOR"].default_value = 1.4
@@ -173,7 +173,7 @@ def _skin(name: str, plan: Plan, maps: list[dict], roughness: float, uv_map: str
     return material
 
 
-def _plain(other, plan: Plan) -> bpy.types.Material:
+def _plain(other, plan: DeliveryPlan) -> bpy.types.Material:
     """A plain material in another's place, with its name, its colour in the viewport and the picture of its colour, if that is packed (the eyes')."""
     material, shader = _new(f"{other.name} Delivered" if other is not None else "Plain")
     if other is None:

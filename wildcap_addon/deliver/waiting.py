@@ -10,16 +10,16 @@ from pathlib import Path
 import bpy
 
 from ...core.contract import delivery_plan, provenance
-from ...core.contract.delivery_plan import PACKING, Plan
+from ...core.contract.delivery_plan import PACKING, DeliveryPlan
 from ...core.contract.messages import Problem
 from .. import captures, problems
 from . import files, stand
 
-_ready: dict[str, Plan] = {}
+_ready: dict[str, DeliveryPlan] = {}
 _last: dict[str, Path] = {}
 
 
-def ready(root: str) -> Plan | None:
+def ready(root: str) -> DeliveryPlan | None:
     """The capture's delivery that lacks its mesh alone."""
     return _ready.get(root)
 
@@ -29,7 +29,7 @@ def last(root: str) -> Path | None:
     return _last.get(root)
 
 
-def maps_made(root: str, plan: Plan) -> None:
+def maps_made(root: str, plan: DeliveryPlan) -> None:
     """What follows the worker. Raises Problem as `finish` does."""
     _ready[root] = plan
     window = next(iter(bpy.context.window_manager.windows), None)

@@ -7,7 +7,7 @@ import bpy
 from .. import jobs, terminal
 from . import command, operators, results
 
-RESULTS = jobs.Results(results.take, results.wanted)
+RESULTS = jobs.Results(results.take, results.has_news)
 _register, _unregister = bpy.utils.register_classes_factory(operators.CLASSES)
 
 

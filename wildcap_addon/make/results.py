@@ -41,7 +41,7 @@ def forget() -> None:
     _making.clear()
 
 
-def wanted(root: str) -> bool:
+def has_news(root: str) -> bool:
     """Whether there is something of a capture that `take` has not taken in."""
     made = _making.get(root)
     return made is not None and bool(made.ended or made.stages & NEWS or jobs.of(root) is None)

@@ -46,7 +46,7 @@ def load(capture: Capture, which: str = 'SHADOW') -> bpy.types.Image:
     # The proposal is never overwritten: should Blender save the image itself, it goes where masks of artists go.
     image.filepath_raw = str(kept)
     if which == 'PROTECT' and not kept.is_file():
-        set_values(image, np.zeros_like(values(image)))
+        set_values(image, np.zeros_like(mask_values(image)))
     return image
 
 
@@ -55,7 +55,7 @@ def settle(image: bpy.types.Image, capture: Capture, which: str) -> None:
     path = file_of(capture, which)
     if image.packed_file is None or not bpy.data.filepath or not image.size[0]:
         return
-    packed = grey_png(values(image))
+    packed = grey_png(mask_values(image))
     if path.is_file() and path.read_bytes() == packed:
         return
     if not path.is_file() or Path(bpy.data.filepath).stat().st_mtime > path.stat().st_mtime:
@@ -76,13 +76,13 @@ def refresh(image: bpy.types.Image, capture: Capture, which: str) -> None:
         image.reload()
     elif capture.shadow_mask_auto.is_file():
         image.source = 'FILE'
-        set_values(image, proposal(image, capture.shadow_mask_auto) if which == 'SHADOW' else np.zeros_like(values(image)))
+        set_values(image, proposal(image, capture.shadow_mask_auto) if which == 'SHADOW' else np.zeros_like(mask_values(image)))
     colours.as_data(image)
     if not image.size[0]:
         raise Problem("The mask that was being painted is gone.", "Click Paint Mask: it is looked for again.")
 
 
-def values(image: bpy.types.Image) -> np.ndarray:
+def mask_values(image: bpy.types.Image) -> np.ndarray:
     """The mask float32 [H, W] in [0, 1], rows from the top."""
     return from_top(pixels(image))
 
@@ -118,14 +118,14 @@ def proposal(image: bpy.types.Image, path: Path) -> np.ndarray:
         colours.as_data(other)
         if tuple(other.size) != tuple(image.size):
             other.scale(*image.size)
-        return values(other).copy()
+        return mask_values(other).copy()
     finally:
         bpy.data.images.remove(other)
 
 
 def save(image: bpy.types.Image, capture: Capture, which: str = 'SHADOW', keep: bool = True) -> bool:
     """As `store`, of an image."""
-    return store(values(image), capture, which, keep)
+    return store(mask_values(image), capture, which, keep)
 
 
 def store(mask: np.ndarray, capture: Capture, which: str, keep: bool) -> bool:

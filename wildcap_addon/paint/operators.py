@@ -77,10 +77,10 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
         capture = Capture(session.root())
         if self.kind == 'SNAPPED' and session.offered() != 'SNAPPED':
             raise Problem("There is no snapped mask.", "Click Snap to Edges first, and wait until it is done.")
-        if self.kind == 'PROPOSAL' and session.which() == 'PROTECT':
+        if self.kind == 'PROPOSAL' and session.painted_kind() == 'PROTECT':
             raise Problem("What is to be protected is never proposed.", "Paint it by hand, or click Clear.")
         image = session.mask()
-        mask = mask_image.values(image)
+        mask = mask_image.mask_values(image)
         files = {"PROPOSAL": capture.shadow_mask_auto, "SNAPPED": capture.shadow_mask_edges}
         changed = mask_image.proposal(image, files[self.kind]) if self.kind in files else EDITS[self.kind](mask)
         if not image.is_dirty or bpy.app.version >= (5, 0, 0):  # what Ctrl-Z comes back to: Blender 5 keeps what was before a step, not what was after it
@@ -96,7 +96,7 @@ class ToolOperator(BaseOperator):
 
     @classmethod
     def poll(cls, context):
-        return (cls.allowed(session.which() == 'SHADOW', "Click Paint Mask first, and choose Shadow: it is the shadow mask that is found by itself")
+        return (cls.allowed(session.painted_kind() == 'SHADOW', "Click Paint Mask first, and choose Shadow: it is the shadow mask that is found by itself")
                 and jobs.can_start(cls, context))
 
 
@@ -124,7 +124,7 @@ class WILDCAP_OT_snap_mask(ToolOperator, bpy.types.Operator):
 
     def work(self, context):
         item = captures.require(context)
-        jobs.start(item, "tool", tool="mask_edges", then=lambda: session.offer('SNAPPED'))
+        jobs.start_tool(item, "mask_edges", then=lambda: session.offer('SNAPPED'))
 
 
 CLASSES = (WILDCAP_OT_paint_mask, WILDCAP_OT_finish_mask, WILDCAP_OT_edit_mask, WILDCAP_OT_detect_mask, WILDCAP_OT_snap_mask)

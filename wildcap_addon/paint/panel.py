@@ -26,8 +26,8 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
         for name, values in (("mask", (("Shadow", 'SHADOW'), ("Protect", 'PROTECT'))), ("on", (("On the Head", 'HEAD'), ("On the Flat Sheet", 'SHEET')))):
             row = column.row(align=True)
             for text, value in values:
-                options = {"mask": session.which(), "on": here, name: value}
-                button = row.operator("wildcap.paint_mask", text=text, depress=options == {"mask": session.which(), "on": here})
+                options = {"mask": session.painted_kind(), "on": here, name: value}
+                button = row.operator("wildcap.paint_mask", text=text, depress=options == {"mask": session.painted_kind(), "on": here})
                 button.mask, button.on = options["mask"], options["on"]
         brush = context.scene.tool_settings.image_paint.brush
         if brush is not None:
@@ -42,7 +42,7 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
         for kind in EDITS:
             grid.operator("wildcap.edit_mask", text=kind.capitalize()).kind = kind
-        if session.which() == 'SHADOW':
+        if session.painted_kind() == 'SHADOW':
             row = layout.row(align=True)
             row.operator("wildcap.detect_mask", icon='VIEWZOOM')
             row.operator("wildcap.snap_mask", icon='SNAP_ON')

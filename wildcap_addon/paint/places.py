@@ -11,7 +11,7 @@ from . import sheet, view
 
 def turn(context, session, use_sheet: bool) -> None:
     """From the head to the sheet or back."""
-    if use_sheet != sheet.there():
+    if use_sheet != sheet.is_there():
         leave(context, session)
         enter(context, session, use_sheet)
 
@@ -35,7 +35,7 @@ def leave(context, session) -> None:
     """Back to Object Mode on the head, the sheet gone."""
     if context.mode != 'OBJECT':
         bpy.ops.object.mode_set(mode='OBJECT')
-    if sheet.there():
+    if sheet.is_there():
         sheet.remove(bpy.data.objects.get(session.head))
     face(session, False)
     obj = bpy.data.objects.get(session.head)

@@ -52,10 +52,10 @@ def active() -> bool:
 
 
 def on_sheet() -> bool:
-    return _session is not None and sheet.there()
+    return _session is not None and sheet.is_there()
 
 
-def which() -> str:
+def painted_kind() -> str:
     """The mask that is painted: SHADOW or PROTECT; '' for none."""
     return _session.which if _session else ""
 
@@ -134,7 +134,7 @@ def end(context) -> None:
         return
     save()  # a Problem here leaves the session open, and nothing is lost
     if context.mode != 'PAINT_TEXTURE' and session.head in context.scene.objects:  # only in this mode does Blender let go of a brush
-        places.enter(context, session, sheet.there())
+        places.enter(context, session, sheet.is_there())
     brush.restore(context, session.brush)
     _keep_tint(context)
     places.leave(context, session)
@@ -154,7 +154,7 @@ def after_undo(context) -> None:
     if _session is not None and context.mode == 'OBJECT':  # undone past its start: the watch ends it, and what was saved before goes to the history
         _session.written = ()
     elif _session is not None:
-        places.face(_session, sheet.there())
+        places.face(_session, sheet.is_there())
     elif _ended is not None and context.mode == 'PAINT_TEXTURE' and active is not None and active.name in (_ended.head, sheet.NAME):
         places.leave(context, _ended)
         before.put_back(context, _ended.before)
@@ -172,7 +172,7 @@ def save() -> None:
     wait()
     image = bpy.data.images.get(_session.mask) if _session else None
     if image is not None:
-        _session.written = keeping.store(mask_image.values(image), Capture(_session.root), _session.which, _session.written)
+        _session.written = keeping.store(mask_image.mask_values(image), Capture(_session.root), _session.which, _session.written)
 
 
 def keep_up(stroking: bool) -> None:

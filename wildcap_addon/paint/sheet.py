@@ -16,7 +16,7 @@ NAME = "WildCap Mask Sheet"
 HIDDEN_KEY = "wildcap_hidden"
 
 
-def there() -> bool:
+def is_there() -> bool:
     """Whether there is a sheet: by an undo it may come and go."""
     return NAME in bpy.data.objects
 
@@ -51,7 +51,7 @@ def remove(head: bpy.types.Object | None = None) -> None:
     """Takes the sheet and all it is made of away, and shows what it hid; the symmetry that was set on it goes over to the head."""
     if head is not None and NAME in bpy.data.meshes:
         head.data.use_mirror_x = bpy.data.meshes[NAME].use_mirror_x
-    hidden = json.loads(bpy.data.objects[NAME].get(HIDDEN_KEY, "[]")) if there() else []
+    hidden = json.loads(bpy.data.objects[NAME].get(HIDDEN_KEY, "[]")) if is_there() else []
     for collection in (bpy.data.objects, bpy.data.meshes, bpy.data.materials):
         block = collection.get(NAME)
         if block is not None:

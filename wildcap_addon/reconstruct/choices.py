@@ -107,7 +107,7 @@ class WILDCAP_OT_compare_delit(BaseOperator, bpy.types.Operator):
             return
         capture = captures.folder(item)
         names = delighters.frames(capture)
-        before = delighters.shown(capture)
+        before = delighters.shown_frame(capture)
         following = names.index(before) + 1 if before in names else len(names) // 2
         delighters.show(capture, self.which if self.which >= 0 else following, context.window_manager.wildcap_wipe)
 

@@ -41,7 +41,7 @@ def show(capture: Capture, which: int, wipe: float) -> None:
     move(wipe)
 
 
-def shown(capture: Capture) -> str:
+def shown_frame(capture: Capture) -> str:
     """Name of the frame that the wipe shows for this capture, '' for none."""
     return _pair[1] if _pair is not None and _pair[0] == str(capture.root) else ""
 

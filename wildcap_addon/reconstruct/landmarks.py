@@ -54,14 +54,15 @@ def show(context, item) -> int:
     return len(collection.objects)
 
 
-def shown() -> list[bpy.types.Object]:
+def shown_landmarks() -> list[bpy.types.Object]:
     collection = bpy.data.collections.get(COLLECTION)
     return [o for o in collection.objects if INDEX_KEY in o] if collection else []
 
 
 def keep_moved(item) -> int:
     """Writes the landmarks that were moved to the capture, where they win over what the frames say. Returns how many."""
-    moved = {o[INDEX_KEY]: tuple(o.location) for o in shown() if o.get(captures.HEAD_KEY) == item.path and (o.location - Vector(o[FOUND_KEY])).length > MOVED_M}
+    moved = {o[INDEX_KEY]: tuple(o.location) for o in shown_landmarks()
+             if o.get(captures.HEAD_KEY) == item.path and (o.location - Vector(o[FOUND_KEY])).length > MOVED_M}
     if moved:
         artist_landmarks.put(captures.folder(item), moved)
     return len(moved)
@@ -69,7 +70,7 @@ def keep_moved(item) -> int:
 
 def hide() -> None:
     """Takes the empties off the scene."""
-    for empty in shown():
+    for empty in shown_landmarks():
         bpy.data.objects.remove(empty)
     collection = bpy.data.collections.get(COLLECTION)
     if collection is not None and not collection.objects:

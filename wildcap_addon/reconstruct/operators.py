@@ -135,7 +135,7 @@ class WILDCAP_OT_hide_landmarks(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return cls.in_object_mode(context) and cls.allowed(landmarks.shown(), "No landmarks are shown: click Show Landmarks first")
+        return cls.in_object_mode(context) and cls.allowed(landmarks.shown_landmarks(), "No landmarks are shown: click Show Landmarks first")
 
     def work(self, context):
         landmarks.hide()
@@ -149,7 +149,7 @@ class WILDCAP_OT_fit_landmarks(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        shown = cls.in_object_mode(context) and cls.allowed(landmarks.shown(), "No landmarks are shown: click Show Landmarks first")
+        shown = cls.in_object_mode(context) and cls.allowed(landmarks.shown_landmarks(), "No landmarks are shown: click Show Landmarks first")
         return shown and jobs.can_start(cls, context)
 
     def work(self, context):

@@ -53,7 +53,7 @@ def skin(context) -> bpy.types.Material | None:
     return found if found is not None and material.KEY in found and ALBEDO in found.node_tree.nodes else None
 
 
-def shown(context) -> str:
+def shown_picture(context) -> str:
     """Which of SHOWN the head shows."""
     found = skin(context)
     image = found.node_tree.nodes[ALBEDO].image if found is not None else None

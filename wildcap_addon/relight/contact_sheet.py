@@ -13,7 +13,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.contract.files import place_file
 from ..properties import LIGHTS
-from . import captions, lights, output, reel
+from . import captions, lights, output, picture, reel
 
 NAME = "contact_sheet.png"
 COLUMNS = 3
@@ -21,15 +21,30 @@ GROUND = 0.07
 """Of the caption rows, sRGB"""
 
 
-def render(obj: bpy.types.Object, folder: Path, wait: bool, **look) -> Path:
-    """Renders the head in every preset and joins the pictures. `look`: as picture.set_up takes it. wait=False returns at once. Raises Problem when the
-    folder cannot be written."""
+def render(obj: bpy.types.Object, folder: Path, wait: bool, settings: picture.RenderSettings) -> Path:
+    """Renders the head in every preset and joins the pictures.
+
+    Parameters
+    ----------
+    obj : the head
+    folder : of the pictures and the sheet
+    wait : False returns at once
+    settings : of each picture
+
+    Returns
+    -------
+    The sheet's path.
+
+    Raises
+    ------
+    Problem : when the folder cannot be written
+    """
     presets = tuple(name for name, *_ in LIGHTS if name in lights.PRESETS)
-    scene = reel.each_light(obj, presets, **look)
-    size = look["resolution"]
+    scene = reel.each_light(obj, presets, settings)
+    size = settings.resolution
     names = {name: iface_(label) for name, label, *_ in LIGHTS}
     rows = [[names[p] for p in presets[i:i + COLUMNS]] for i in range(0, len(presets), COLUMNS)]
-    about = [iface_("{} · {} · Cycles, {} samples").format(obj.name, output.view_label(scene), look["samples"])]
+    about = [iface_("{} · {} · Cycles, {} samples").format(obj.name, output.view_label(scene), settings.samples)]
     paths, sheet = [folder / f"{name}.png" for name in presets], folder / NAME
     output.make_room(sheet)
     strips = captions.draw([*rows, about], COLUMNS * size, max(size // 14, 8))

@@ -3,6 +3,7 @@
 """Relit pictures without a window: the same functions as the buttons, in a bpy process in which the extension is enabled."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -10,7 +11,8 @@ import bpy
 from ...core.contract.messages import Problem
 from .. import captures, colours, hdri, head
 from ..hdri import Hdri
-from . import contact_sheet, lights, material, output, picture, reel
+from . import contact_sheet, lights, material, output, reel
+from .picture import RenderSettings
 
 ALL = tuple(lights.PRESETS)
 FRAMES_PER_SECOND = 24
@@ -24,13 +26,13 @@ def render_relit(capture_folder: Path, names: Iterable[str | Hdri] = ALL, resolu
     """
     chosen = [light_of(name) for name in names]
     obj, item = open_head(capture_folder)
-    return [render_light(obj, captures.folder(item).renders, light, resolution, samples) for light in chosen]
+    return [render_light(obj, captures.folder(item).renders, light, RenderSettings(resolution, samples)) for light in chosen]
 
 
 def render_contact_sheet(capture_folder: Path, resolution: int = 512, samples: int = 32, view: str = colours.VIEWS[0]) -> Path:
     """As `render_relit`, in all presets, joined to renders/contact_sheet.png, which is returned."""
     obj, item = open_head(capture_folder)
-    return contact_sheet.render(obj, captures.folder(item).renders, True, resolution=resolution, samples=samples, view=view)
+    return contact_sheet.render(obj, captures.folder(item).renders, True, RenderSettings(resolution, samples, view=view))
 
 
 def render_turntable(
@@ -39,18 +41,45 @@ def render_turntable(
     """The 'HEAD' or the 'LIGHT' once around, to renders/turntable/, which is returned: PNG frames, or one film. Raises Problem as `render_relit` does."""
     light = light_of(name)
     obj, item = open_head(capture_folder)
-    return turntable(obj, captures.folder(item).renders, light, turns, frames, film, True, resolution=resolution, samples=samples)
+    return turntable(obj, captures.folder(item).renders, light, Turn(turns, frames, film), RenderSettings(resolution, samples), True)
 
 
-def turntable(obj, renders: Path, light: str | Hdri, turns: str, frames: int, film: bool, wait: bool, **look) -> Path:
-    """renders/turntable/. `look`: as picture.set_up takes it. Raises Problem where a film is asked of a Blender that cannot write one."""
-    if film and not reel.can_film():
+@dataclass(frozen=True)
+class Turn:
+    """Once around: turns is 'HEAD' or 'LIGHT', in so many frames; film: as one MP4, not as PNG frames."""
+
+    turns: str
+    frames: int
+    film: bool
+
+
+def turntable(obj, renders: Path, light: str | Hdri, turn: Turn, settings: RenderSettings, wait: bool) -> Path:
+    """Renders a head, or its light, once around.
+
+    Parameters
+    ----------
+    obj : the head
+    renders : the folder that gets turntable/
+    light : a preset's name, or a picture of surroundings
+    turn : what turns, and what becomes of it
+    settings : of each frame
+    wait : False returns at once
+
+    Returns
+    -------
+    The folder of the frames or the film.
+
+    Raises
+    ------
+    Problem : where a film is asked of a Blender that cannot write one
+    """
+    if turn.film and not reel.can_film():
         raise Problem("This Blender was built without FFmpeg: it cannot write MP4.", "Choose PNG frames.")
-    scene = reel.turning(obj, light, turns, frames, **look)
-    if film:
+    scene = reel.turning(obj, light, turn.turns, turn.frames, settings)
+    if turn.film:
         reel.as_film(scene, FRAMES_PER_SECOND)
     folder = renders / "turntable"
-    output.frames(scene, folder, "turntable.mp4" if film else "####.png", frames, wait)
+    output.frames(scene, folder, "turntable.mp4" if turn.film else "####.png", turn.frames, wait)
     return folder
 
 
@@ -68,10 +97,21 @@ def open_head(capture_folder: Path):
     return obj, item
 
 
-def render_light(
-    obj, folder: Path, light: str | Hdri, resolution: int, samples: int, turn: float = 0.0, view: str = colours.VIEWS[0], wait: bool = True,
-) -> Path:
-    """One light: folder/PRESET.png and folder/PRESET.exr, or those of the surroundings' picture."""
+def render_light(obj, folder: Path, light: str | Hdri, settings: RenderSettings, wait: bool = True) -> Path:
+    """Renders a head under one light.
+
+    Parameters
+    ----------
+    obj : the head
+    folder : takes PRESET.png and PRESET.exr, or those of the surroundings' picture
+    light : a preset's name, or a picture of surroundings
+    settings : of the picture
+    wait : False returns at once
+
+    Returns
+    -------
+    The PNG's path.
+    """
     path = folder / f"{light if isinstance(light, str) else light.path.stem}.png"
-    output.still(picture.set_up(obj, light, resolution, samples, turn, view), path, wait)
+    output.still(settings.scene(obj, light), path, wait)
     return path

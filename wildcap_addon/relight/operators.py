@@ -7,6 +7,7 @@ import bpy
 from .. import captures, colours, hdri
 from ..base_operator import BaseOperator
 from . import contact_sheet, headless, material, output
+from .picture import RenderSettings
 
 
 class WILDCAP_OT_assemble_material(BaseOperator, bpy.types.Operator):
@@ -54,7 +55,7 @@ class WILDCAP_OT_render(Render, bpy.types.Operator):
     bl_label = "Render"
 
     def render(self, obj, folder, props):
-        headless.render_light(obj, folder, hdri.light(props), wait=bpy.app.background, **look(props))
+        headless.render_light(obj, folder, hdri.light(props), look(props), bpy.app.background)
 
 
 class WILDCAP_OT_contact_sheet(Render, bpy.types.Operator):
@@ -64,7 +65,7 @@ class WILDCAP_OT_contact_sheet(Render, bpy.types.Operator):
     bl_label = "Contact Sheet"
 
     def render(self, obj, folder, props):
-        contact_sheet.render(obj, folder, bpy.app.background, **look(props))
+        contact_sheet.render(obj, folder, bpy.app.background, look(props))
 
 
 class WILDCAP_OT_turntable(Render, bpy.types.Operator):
@@ -74,12 +75,13 @@ class WILDCAP_OT_turntable(Render, bpy.types.Operator):
     bl_label = "Turntable"
 
     def render(self, obj, folder, props):
-        headless.turntable(obj, folder, hdri.light(props), props.turns, props.turn_frames, props.turn_file == 'MP4', bpy.app.background, **look(props))
+        turn = headless.Turn(props.turns, props.turn_frames, props.turn_file == 'MP4')
+        headless.turntable(obj, folder, hdri.light(props), turn, look(props), bpy.app.background)
 
 
-def look(props) -> dict:
-    """What the scene's settings ask of picture.set_up."""
-    return {"resolution": props.resolution, "samples": props.samples, "turn": props.hdri_rotation, "view": props.view}
+def look(props) -> RenderSettings:
+    """What the scene's settings ask of a picture."""
+    return RenderSettings(props.resolution, props.samples, props.hdri_rotation, props.view)
 
 
 CLASSES = (WILDCAP_OT_assemble_material, WILDCAP_OT_render, WILDCAP_OT_contact_sheet, WILDCAP_OT_turntable)

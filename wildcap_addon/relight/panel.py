@@ -20,7 +20,7 @@ class WILDCAP_PT_relight(CapturePanel, bpy.types.Panel):
         props = context.scene.wildcap
         layout.operator("wildcap.assemble_material")
         buttons = side_by_side(layout, tight)
-        now = compare.shown(context)
+        now = compare.shown_picture(context)
         for kind, (label, _, _) in compare.SHOWN.items():
             if kind == 'SKIN':  # stands with the hair
                 continue

@@ -5,6 +5,7 @@
 The artist's scene (camera, world, lights, render settings) is not touched.
 """
 
+from dataclasses import dataclass
 from math import tan
 
 import bpy
@@ -17,6 +18,21 @@ from .output import SCENE, view_label
 
 CAMERA_DIRECTION = (-0.28, -1.0, 0.05)
 FOCAL_LENGTH_MM = 85.0
+
+
+@dataclass(frozen=True)
+class RenderSettings:
+    """How pictures are rendered: resolution, pixels of a side; samples of Cycles; turn: of the light about the head, in radians; view: the view transform that
+    they are shown by."""
+
+    resolution: int
+    samples: int
+    turn: float = 0.0
+    view: str = colours.VIEWS[0]
+
+    def scene(self, obj: bpy.types.Object, light: str | Hdri) -> bpy.types.Scene:
+        """The relight scene with this head."""
+        return set_up(obj, light, self.resolution, self.samples, self.turn, self.view)
 
 
 def set_up(obj: bpy.types.Object, light: str | Hdri | None, resolution: int, samples: int, turn: float = 0.0, view: str = colours.VIEWS[0]) -> bpy.types.Scene:

@@ -14,12 +14,12 @@ from ..hdri import Hdri
 from . import lights, picture, sky
 
 
-def each_light(obj: bpy.types.Object, presets: tuple[str, ...], **look) -> bpy.types.Scene:
-    """The relight scene in which frame i, from 1 on, has the light presets[i - 1]. `look`: as picture.set_up takes it."""
-    scene = picture.set_up(obj, presets[0], **look)
+def each_light(obj: bpy.types.Object, presets: tuple[str, ...], settings: picture.RenderSettings) -> bpy.types.Scene:
+    """The relight scene in which frame i, from 1 on, has the light presets[i - 1]."""
+    scene = settings.scene(obj, presets[0])
     lights.clear(scene)
     frame, radius = picture.frame_of(obj)
-    frame = frame @ Matrix.Rotation(look.get("turn", 0.0), 4, 'Z')
+    frame = frame @ Matrix.Rotation(settings.turn, 4, 'Z')
     for i, name in enumerate(presets, 1):
         preset = lights.preset(name)
         for lamp in lights.add_lamps(scene, preset.lamps, frame, radius):
@@ -32,9 +32,9 @@ def each_light(obj: bpy.types.Object, presets: tuple[str, ...], **look) -> bpy.t
     return scene
 
 
-def turning(obj: bpy.types.Object, light: str | Hdri, turns: str, frames: int, **look) -> bpy.types.Scene:
+def turning(obj: bpy.types.Object, light: str | Hdri, turns: str, frames: int, settings: picture.RenderSettings) -> bpy.types.Scene:
     """The relight scene in which, over the frames 1 to `frames`, the 'HEAD' or the 'LIGHT' goes once around, counter-clockwise from above."""
-    scene = picture.set_up(obj, light, **look)
+    scene = settings.scene(obj, light)
     frame, _ = picture.frame_of(obj)
     rig, camera = lights.rig(scene), scene.camera
     moved = [o for o in (rig, camera if turns == 'HEAD' else None) if o is not None]

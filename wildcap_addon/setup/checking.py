@@ -11,12 +11,12 @@ import bpy
 
 from ...core.contract.messages import Problem
 from ...core.worker import environment
-from ...core.worker.background import Task
+from ...core.worker.background import BackgroundTask
 from .. import jobs, preferences, problems, status
 
 REQUIREMENTS = jobs.ROOT / "requirements"
 FIRST_S, INTERVAL_S = 2.0, 0.5
-_checks: list[Task] = []  # the one under way or done, if any
+_checks: list[BackgroundTask] = []  # the one under way or done, if any
 
 
 def judge(python: Path, importing: bool) -> tuple[str, str]:
@@ -46,7 +46,7 @@ def look() -> float | None:
     if python is None:
         return None
     if not _checks:
-        _checks.append(Task("setup", lambda task: judge(python, importing=not preferences.get().device)))
+        _checks.append(BackgroundTask("setup", lambda task: judge(python, importing=not preferences.get().device)))
         _checks[0].start()
     for message in _checks[0].poll():
         if hasattr(message, "problem"):

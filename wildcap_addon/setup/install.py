@@ -29,20 +29,20 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
 
     @staticmethod
     def tell() -> tuple[str, ...] | None:
-        compute, source, wheels, folder = *chosen(), preferences.environment_folder()
+        compute, source, wheels, folder = *chosen_packages(), preferences.environment_folder()
         plan = asking.answer(("plan", compute, source, wheels))
         if plan is None:
             asking.ask(("plan", compute, source, wheels), lambda task: look_up(task, compute, source, wheels, folder), "install_solver")
             return None
-        return told(plan, compute, folder, index.check_space(plan, folder))
+        return describe_plan(plan, compute, folder, index.check_space(plan, folder))
 
     def work(self, context):
-        compute, source, wheels, folder = *chosen(), preferences.environment_folder()
+        compute, source, wheels, folder = *chosen_packages(), preferences.environment_folder()
         plan = asking.answer(("plan", compute, source, wheels))
         if plan is not None:
             index.check_space(plan, folder)
-        task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), compute=compute, source=source,
-                                         wheels=wheels, packages=len(plan.packages) if plan is not None else 0)
+        task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), None,
+                                         installation.PackageSource(compute, source, wheels), len(plan.packages) if plan is not None else 0)
         asking.forget(("size", str(folder)))
         jobs.begin("", "install", task, lambda: accept(environment.python_of(folder)))
 
@@ -77,7 +77,7 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
         jobs.begin("", "ask", environment.removal(folder))
 
 
-def told(plan: index.Plan, compute: str, folder: Path, free: int) -> tuple[str, ...]:
+def describe_plan(plan: index.InstallationPlan, compute: str, folder: Path, free: int) -> tuple[str, ...]:
     """What an installation means, before the artist says yes; `free` bytes are on the folder's disk."""
     return (iface_("PyTorch {} for {} and {} more packages.").format(plan.packages.get("torch", ""), iface_(COMPUTES[compute]), len(plan.packages) - 1),
             iface_("{} to download from {}.").format(index.gigabytes(plan.download), ", ".join(plan.hosts)),
@@ -85,7 +85,7 @@ def told(plan: index.Plan, compute: str, folder: Path, free: int) -> tuple[str, 
             "You can go on working meanwhile, cancel, and continue later.")
 
 
-def chosen() -> tuple[str, str, Path | None]:
+def chosen_packages() -> tuple[str, str, Path | None]:
     """(compute, source, wheels) of the preferences, with what Automatic means here. Raises Problem for what cannot be here, and while Blender is to stay off
     a network that is needed."""
     source = preferences.get().packages
@@ -94,7 +94,7 @@ def chosen() -> tuple[str, str, Path | None]:
     return pip_steps.compute_of(preferences.get().compute), source, preferences.wheels_folder()
 
 
-def look_up(task, compute: str, source: str, wheels: Path | None, folder: Path) -> index.Plan:
+def look_up(task, compute: str, source: str, wheels: Path | None, folder: Path) -> index.InstallationPlan:
     """The plan of an installation, asked of the package index."""
     task.say(0, 4, "looking for a Python to begin with")
     base = installation.base_python()

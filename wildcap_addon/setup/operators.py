@@ -9,7 +9,7 @@ import bpy
 
 from ...core.contract.messages import Problem
 from ...core.worker import environment
-from ...core.worker.background import Task
+from ...core.worker.background import BackgroundTask
 from .. import jobs, preferences
 from ..base_operator import BaseOperator
 from . import checking
@@ -34,13 +34,13 @@ class WILDCAP_OT_use_python(BaseOperator, bpy.types.Operator):
     def work(self, context):
         python = interpreter(Path(bpy.path.abspath(self.filepath)))
         if self.options.is_invoke:
-            jobs.begin("", "ask", Task("setup", lambda task: try_out(task, python)), lambda: checking.accept(python))
+            jobs.begin("", "ask", BackgroundTask("setup", lambda task: try_out(task, python)), lambda: checking.accept(python))
         else:  # a script waits for the answer
             checking.judge(python, importing=False)
             preferences.set_python(python)
 
 
-def try_out(task: Task, python: Path) -> None:
+def try_out(task: BackgroundTask, python: Path) -> None:
     """Raises Problem where a Python lacks something."""
     task.say(0, 1, "asking that Python what it has")
     checking.judge(python, importing=False)

@@ -10,7 +10,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.contract.messages import Problem
 from ...core.worker import problem_report
-from ...core.worker.background import Task
+from ...core.worker.background import BackgroundTask
 from .. import captures, jobs, preferences, problems
 from ..base_operator import BaseOperator
 
@@ -40,11 +40,11 @@ class WILDCAP_OT_save_report(BaseOperator, bpy.types.Operator):
         item = captures.active(context)
         capture = captures.folder(item) if item is not None else None
         blender = bpy.app.version_string
-        task = Task("setup", lambda task: save(task, target, python, capture, blender))
+        task = BackgroundTask("setup", lambda task: save(task, target, python, capture, blender))
         jobs.begin("", "ask", task, lambda: tell(task.result))
 
 
-def save(task: Task, target: Path, python, capture, blender: str) -> Path:
+def save(task: BackgroundTask, target: Path, python, capture, blender: str) -> Path:
     task.say(0, 1, "writing the report")
     return problem_report.write(target, jobs.ROOT, python, capture, Blender=blender)
 

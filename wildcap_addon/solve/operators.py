@@ -58,12 +58,12 @@ class WILDCAP_OT_estimate_skin_tone(BaseOperator, bpy.types.Operator):
 
     def work(self, context):
         root = captures.root(captures.require(context))
-        job = jobs.start(captures.require(context), "tool", tool="skin_tone", then=lambda: set_tone(root, job.figures))
+        job = jobs.start_tool(captures.require(context), "skin_tone", then=lambda: set_tone(root, job.figures))
 
 
 def begin(context, item, **shared) -> None:
     """Starts a capture's solve, or puts it in line, and makes its head ready to show how far it is. Raises Problem when it cannot."""
-    jobs.start(item, "solve", first="solve", on_preview=live.update, **shared)
+    jobs.start(item, "solve", first="solve", **shared).on_preview = live.update
     preview.forget()
     live.prepare(context, item)
 

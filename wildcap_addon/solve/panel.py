@@ -34,7 +34,7 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         layout.use_property_split = True
         item = captures.active(context)
         layout.prop(item, "quality")
-        times = timings.words(properties.device(item).replace("auto", "cpu"))  # not tried yet: the CPU is there in any case
+        times = timings.describe_minutes(properties.device(item).replace("auto", "cpu"))  # not tried yet: the CPU is there in any case
         if times:
             layout.label(text=times, icon='TIME')
         layout.prop(item, "use_skin_tone")

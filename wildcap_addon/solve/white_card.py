@@ -28,7 +28,7 @@ class WILDCAP_OT_find_color_checker(BaseOperator, bpy.types.Operator):
 
     def work(self, context):
         root = captures.root(captures.require(context))
-        job = jobs.start(captures.require(context), "tool", tool="white_point", then=lambda: set_white(root, job.figures["white_point"]))
+        job = jobs.start_tool(captures.require(context), "white_point", then=lambda: set_white(root, job.figures["white_point"]))
 
 
 class WILDCAP_OT_pick_white_point(BaseOperator, bpy.types.Operator):

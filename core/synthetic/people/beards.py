@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...face.strands import Strands, Surface, clumped, coloured, grow, waved
+from ...face.strands import SkinSurface, Strands, clumped, coloured, grow, waved
 from ...geometry.noise import octaves
 from ..canvas import Canvas
 from ..regions import regions
@@ -18,7 +18,7 @@ SIDEBURNS = [[162, 127, 234, 93], [389, 356, 454, 323]]  # from the temples down
 RADIUS_M = {"stubble": 0.00004, "moustache": 0.00005, "full": 0.00006}
 
 
-def beard(person: Person, ground: Ground, skin: Surface, rng: np.random.Generator) -> Strands:
+def beard(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
     """Hairs that leave the mouth aside and fall; a longer beard is bent down and clumps."""
     on, kind = ground.canvas, person.beard
     roots = strewn(ground, DENSITY[kind] * beard_density(kind, on, np.random.default_rng([person.seed, 65])), _ways(on), rng)

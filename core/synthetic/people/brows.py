@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...face.lids import OpenHead
-from ...face.strands import Roots, Strands, Surface, coloured, grow
+from ...face.strands import Roots, SkinSurface, Strands, coloured, grow
 from ..regions import regions
 from .ground import Ground, strewn, turned
 from .person import Person
@@ -16,7 +16,7 @@ RADIUS_M = 0.000045
 UPPER, LOWER = (110, 0.0085), (60, 0.0050)  # lashes on a lid, and their length in metres
 
 
-def brows(person: Person, ground: Ground, skin: Surface, rng: np.random.Generator) -> Strands:
+def brows(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
     """Near the nose hairs stand up, then they lie along the brow, and at the tail they point down."""
     on = ground.canvas
     region = regions(on)["brows"]

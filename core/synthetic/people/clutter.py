@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from ...face.parts import PARTS
-from ..environments import Environment, seen
+from ..environments import Environment, background_radiance
 from .person import BROWS
 
 LIP_CORNERS, LIP_RIM = (78, 308), (13, 14)
@@ -22,7 +22,7 @@ def backdrop(directions: np.ndarray, environment: Environment, light: float, rng
     size = len(directions)
     kind = rng.random()
     if kind < 0.4:
-        ground = seen(environment, directions) * np.float32(np.exp(rng.normal(0, 0.3)))
+        ground = background_radiance(environment, directions) * np.float32(np.exp(rng.normal(0, 0.3)))
         ground = cv2.resize(ground, (size, size))
     else:
         ground = np.broadcast_to(rng.uniform(0.02, 0.8) * np.exp(rng.normal(0, 0.3, 3)), (size, size, 3)).astype(np.float32) * light

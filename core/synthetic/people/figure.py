@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...face.lids import OpenHead, open_lids
-from ...face.strands import Strands, Surface
+from ...face.strands import SkinSurface, Strands
 from ...geometry.meshes import Mesh, joined
 from ..canvas import canvas
 from ..regions import regions
@@ -75,12 +75,12 @@ def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.nda
 
 def grown(person: Person, head: Mesh, opened: OpenHead, cloth: Mesh) -> tuple[Strands, ...]:
     """All hairs of a person: brows, lashes, and beard and hair where there are any."""
-    ground, skin = ground_of(head), Surface(head)
+    ground, skin = ground_of(head), SkinSurface(head)
     found = [brows.brows(person, ground, skin, _rng(person, 0)), brows.lashes(person, opened, _rng(person, 1))]
     if person.beard != "none":
         found.append(beards.beard(person, ground, skin, _rng(person, 2)))
     if person.hair != "none":
-        found.append(head_hair.head_hair(person, ground, Surface(joined([head, cloth])), _rng(person, 3)))
+        found.append(head_hair.head_hair(person, ground, SkinSurface(joined([head, cloth])), _rng(person, 3)))
     return tuple(found)
 
 

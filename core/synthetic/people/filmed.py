@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
@@ -23,12 +22,17 @@ TRACED = f"{__package__}.render"
 """The module that traces every frame's light anew."""
 
 
-def render(work: Path, figure: Figure, light: scene.Light, cameras: np.ndarray, frames: Iterable[int], samples: int, scale: float = 1.0,
-           poses: np.ndarray | None = None, room: bool = True, bare: bool = False, focal: float = 1.0, module: str = TRACED) -> None:
-    """work/NNNNN.exr, linear, of these frames (numbers into cameras [N, 4, 4], camera to world); files that exist are kept.
+def render(work: Path, figure: Figure, light: scene.SceneLight, shot: scene.Shot, bare: bool = False, module: str = TRACED) -> None:
+    """Renders a person to work/NNNNN.exr, linear; files that exist are kept.
 
-    poses: where the head is in each frame, head to world [N, 4, 4], or still; scale: of the pictures' size; room: whether there is anything behind the person;
-    bare: without hair, lashes and clothes; focal: factor on the focal length, for close-ups; module: what is run to do the job.
+    Parameters
+    ----------
+    work : folder of the job and its pictures
+    figure : the person
+    light : all that lights it
+    shot : frames, cameras and quality
+    bare : without hair, lashes and clothes
+    module : what is run to do the job
     """
     parts = {"skin": skin_part(work, figure.opened.skin, figure.skin.diffuse if bare else figure.seen, figure.skin.specular, figure.skin.normal)}
     for side, ball in zip(("left", "right"), figure.opened.balls, strict=True):
@@ -37,12 +41,20 @@ def render(work: Path, figure: Figure, light: scene.Light, cameras: np.ndarray, 
     if not bare:
         parts["shirt"] = _written(work, "shirt", figure.shirt, "cloth", np.full((2, 2, 3), figure.person.clothes, np.float32))
         strands = [_write_strands(work, growth) for growth in figure.strands]
-    render_parts(work, figure.person.seed, parts, strands, light, cameras, frames, samples, scale, poses, room, focal, module)
+    render_parts(work, figure.person.seed, parts, strands, light, shot, module)
 
 
-def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Path], light: scene.Light, cameras: np.ndarray, frames: Iterable[int],
-                 samples: int, scale: float = 1.0, poses: np.ndarray | None = None, room: bool = True, focal: float = 1.0, module: str = TRACED) -> None:
-    """As `render`, of meshes and strands that are files already."""
+def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Path], light: scene.SceneLight, shot: scene.Shot,
+                 module: str = TRACED) -> None:
+    """As `render`, of meshes and strands that are files already.
+
+    Parameters
+    ----------
+    work, light, shot, module : as `render` takes them
+    seed : of the room behind the person
+    parts : by name what the job says of a mesh, as `skin_part` gives it
+    strands : files of hair
+    """
     work.mkdir(parents=True, exist_ok=True)
     if light.blockers:
         meshes.write_obj(work / "leaves.obj", light.blockers)
@@ -50,14 +62,16 @@ def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Pa
     if isinstance(sky, np.ndarray):
         images.write_linear(work / "sky.exr", sky)
         sky = str(work / "sky.exr")
-    still = np.tile(np.eye(4), (len(cameras), 1, 1))
+    still = np.tile(np.eye(4), (len(shot.cameras), 1, 1))
     write_json(work / "job.json", {
-        "seed": seed, "room": room, "meshes": parts, "strands": [str(path) for path in strands],
-        "leaves": str(work / "leaves.obj") if light.blockers else None, "suffix": ".exr", "out": str(work), "frames": list(frames), "samples": samples,
-        "cameras": cameras.tolist(), "poses": (still if poses is None else poses).tolist(),
+        "seed": seed, "room": shot.room, "meshes": parts, "strands": [str(path) for path in strands],
+        "leaves": str(work / "leaves.obj") if light.blockers else None, "suffix": ".exr", "out": str(work), "frames": list(shot.frames),
+        "samples": shot.samples,
+        "cameras": shot.cameras.tolist(), "poses": (still if shot.poses is None else shot.poses).tolist(),
         "sun": asdict(light.sun) | {"direction": light.sun.direction.tolist()} if light.sun else None, "sky": sky,
         "lamps": [asdict(lamp) for lamp in light.lamps], "flash": light.flash,
-        "width": round(scene.WIDTH * scale), "height": round(scene.HEIGHT * scale), "focal_px": scene.FOCAL * scale * focal})
+        "width": round(scene.WIDTH * shot.scale), "height": round(scene.HEIGHT * shot.scale),
+        "focal_px": scene.FOCAL * shot.scale * shot.focal})
     subprocess.run([sys.executable, "-m", module, str(work / "job.json")], cwd=Path(__file__).parents[3], check=True,
                    stdout=subprocess.DEVNULL)
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...face.strands import Strands, Surface, clumped, coloured, grow, waved
+from ...face.strands import SkinSurface, Strands, clumped, coloured, grow, waved
 from ...geometry.noise import octaves
 from ..canvas import Canvas
 from ..regions import regions
@@ -42,7 +42,7 @@ def _before_the_ears(on: Canvas) -> np.ndarray:
     return band * np.clip((z - SIDEBURN_MM[2]) / 8, 0, 1) * np.clip((SIDEBURN_MM[3] - z) / 8, 0, 1) * (1 - regions(on)["ears"])
 
 
-def head_hair(person: Person, ground: Ground, skin: Surface, rng: np.random.Generator) -> Strands:
+def head_hair(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
     on, style = ground.canvas, person.hair
     density = scalp_density(on, person.seed)
     roots = strewn(ground, density * COUNT[style] / float((density * on.area).sum()), _ways(on, person), rng)

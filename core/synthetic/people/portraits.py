@@ -23,7 +23,7 @@ from ...light.skylight import radiance_transfer
 from ...light.spherical_harmonics import LAMBERT, per_function, sh_basis
 from ..environments import Environment, made_environment, panorama_environment
 from ..olat import BASIS, LIGHTS
-from ..portrait import GOBOS, Fitted, Portrait, fitted_light, gobo
+from ..portrait import GOBOS, FittedLight, LampOnHead, Portrait, fitted_light, gobo
 from ..response import curve, develop, expose
 from .clutter import backdrop, cover, with_open_mouth
 from .figure import Figure
@@ -42,7 +42,7 @@ BARE = ("skin", "lips", "clothes")
 
 
 @dataclass(frozen=True)
-class Stage:
+class RelightableView:
     """A sight of a person with what any light needs. unlit: what is seen; position float16 [S, S, 3] of it in metres about the head's middle; and of the
     bare head alone, as a capture would register it: here bool [S, S], normal int8 [S, S, 3] of 127, transfer float16 [S, S, 9] of the sky's coefficients and
     reach uint8 [S, S, LAMPS] of 255, what it lets through to itself."""
@@ -72,7 +72,7 @@ class Sitter:
         self.normals = vertex_normals(figure.head)
         self.transfer = radiance_transfer(self.bald, figure.head.vertices, self.normals, RAYS)
 
-    def stage(self, rng: np.random.Generator) -> Stage:
+    def stage(self, rng: np.random.Generator) -> RelightableView:
         """A sight from anywhere before the person."""
         view = random_view(self.scene.figure, rng, SIDE, rng.uniform(CLOSEST, WIDEST))
         unlit = see(self.scene, view, rng)
@@ -86,8 +86,8 @@ class Sitter:
         normal[here], transfer[here] = towards, raster.interpolate(self.transfer, mesh.faces, face[here], bary[here])
         for k, lamp in enumerate(unlit.lamps):
             reach[here, k] = ~self.bald.blocked(points, np.repeat(lamp[None], len(points), 0))
-        return Stage(unlit, self._position(view), here, np.round(127 * normal).astype(np.int8), transfer.astype(np.float16),
-                     np.round(255 * reach).astype(np.uint8))
+        return RelightableView(unlit, self._position(view), here, np.round(127 * normal).astype(np.int8), transfer.astype(np.float16),
+                               np.round(255 * reach).astype(np.uint8))
 
     def _position(self, view: View) -> np.ndarray:
         face, bary, _ = raster.render_view(self.scene.whole, view, 1)
@@ -96,20 +96,20 @@ class Sitter:
         return np.where(face[..., None] >= 0, points, 0).astype(np.float16)
 
 
-def save(path: Path, stage: Stage) -> None:
-    arrays = {f.name: getattr(stage, f.name) for f in fields(Stage) if f.name != "unlit"}
+def save(path: Path, stage: RelightableView) -> None:
+    arrays = {f.name: getattr(stage, f.name) for f in fields(RelightableView) if f.name != "unlit"}
     arrays |= {f"unlit_{f.name}": getattr(stage.unlit, f.name) for f in fields(Unlit)}
     with replacing(path) as temporary, open(temporary, "wb") as file:
         np.savez_compressed(file, **arrays)
 
 
-def load(path: Path) -> Stage:
+def load(path: Path) -> RelightableView:
     with np.load(path, allow_pickle=False) as stored:
         unlit = Unlit(**{f.name: stored[f"unlit_{f.name}"] for f in fields(Unlit)})
-        return Stage(unlit, **{f.name: stored[f.name] for f in fields(Stage) if f.name != "unlit"})
+        return RelightableView(unlit, **{f.name: stored[f.name] for f in fields(RelightableView) if f.name != "unlit"})
 
 
-def colours_of(stage: Stage, rng: np.random.Generator) -> Colours:
+def colours_of(stage: RelightableView, rng: np.random.Generator) -> Colours:
     """The person's colours moved far: other skin and hair, stains with and without an edge, moles, an open mouth."""
     shares = stage.unlit.shares.astype(np.float32) / 255
     shares /= np.maximum(shares.sum(-1, keepdims=True), 1e-6)
@@ -128,7 +128,7 @@ def colours_of(stage: Stage, rng: np.random.Generator) -> Colours:
     return Colours(*with_open_mouth(albedo, shares, stage.unlit.landmarks, rng))
 
 
-def portray(stage: Stage, colours: Colours, rng: np.random.Generator, panoramas: list[np.ndarray] = ()) -> Portrait:
+def portray(stage: RelightableView, colours: Colours, rng: np.random.Generator, panoramas: list[np.ndarray] = ()) -> Portrait:
     """A person under a random light. Where hair grows, and on the eyes, `even` is that of the bare head; `fitted` is that of all pixels, row by row, and 0
     off the bare head."""
     sight, (albedo, shares) = stage.unlit, (colours.albedo, colours.shares)
@@ -159,7 +159,7 @@ def portray(stage: Stage, colours: Colours, rng: np.random.Generator, panoramas:
                     _fitted(stage, environment, lamps, tints, tone * gains, rng))
 
 
-def _lamps(stage: Stage, environment: Environment, rng: np.random.Generator) -> tuple[list[int], list[np.ndarray], list]:
+def _lamps(stage: RelightableView, environment: Environment, rng: np.random.Generator) -> tuple[list[int], list[np.ndarray], list]:
     """Which of the sight's lamps shine, their colours [3] as irradiance over pi, and what gobos let through [S, S] or 1."""
     chosen, tints, before = [], [], []
     side = len(stage.position)
@@ -189,7 +189,7 @@ class _Surface:
     reflectance: np.ndarray
 
 
-def _surfaces(stage: Stage, shares: np.ndarray, sky: np.ndarray, rng: np.random.Generator) -> tuple[_Surface, _Surface]:
+def _surfaces(stage: RelightableView, shares: np.ndarray, sky: np.ndarray, rng: np.random.Generator) -> tuple[_Surface, _Surface]:
     """What is seen, and the bare head below."""
     sight, lambert = stage.unlit, np.float32(per_function(LAMBERT))
     normal, smooth = sight.normal.astype(np.float32) / 127, stage.normal.astype(np.float32) / 127
@@ -209,7 +209,8 @@ def _surfaces(stage: Stage, shares: np.ndarray, sky: np.ndarray, rng: np.random.
                      skin[..., 1:] * brighter))
 
 
-def _lit(stage: Stage, surface: _Surface, sky: np.ndarray, lamps: list[int], tints: list, before: list, radius: float) -> tuple[np.ndarray, np.ndarray]:
+def _lit(stage: RelightableView, surface: _Surface, sky: np.ndarray, lamps: list[int], tints: list, before: list,
+         radius: float) -> tuple[np.ndarray, np.ndarray]:
     """Irradiance over pi [S, S, 3] of a surface, and what shines on it [S, S, 3]; radius: in pixels, how far red light spreads in it."""
     towards = -directions(stage.unlit)
     cosine = np.clip((surface.normal * towards).sum(-1, keepdims=True), 0, 1)
@@ -233,7 +234,7 @@ def _softened(direct: np.ndarray, there: np.ndarray, radius: float) -> np.ndarra
     return np.stack(channels, -1)
 
 
-def _shadow(stage: Stage, lamps: list[int], tints: list, before: list, grown: np.ndarray, diffuse: np.ndarray) -> tuple[np.ndarray, float]:
+def _shadow(stage: RelightableView, lamps: list[int], tints: list, before: list, grown: np.ndarray, diffuse: np.ndarray) -> tuple[np.ndarray, float]:
     """The lost share [S, S] of the lamps' light, weighted by their strength, and how much of all light they are."""
     side = len(stage.here)
     if not lamps:
@@ -250,12 +251,13 @@ def _shadow(stage: Stage, lamps: list[int], tints: list, before: list, grown: np
     return lost / np.float32(strength.sum()), float(np.clip(strength.sum() / (strength.sum() + 2 * max(seen - 0.5 * strength.sum(), 0.05)), 0, 1))
 
 
-def _fitted(stage: Stage, environment: Environment, lamps: list[int], tints: list, tone: np.ndarray, rng: np.random.Generator) -> Fitted:
+def _fitted(stage: RelightableView, environment: Environment, lamps: list[int], tints: list, tone: np.ndarray, rng: np.random.Generator) -> FittedLight:
     here = stage.here.ravel()
     transfer, smooth = stage.transfer.reshape(-1, 9).astype(np.float32), stage.normal.reshape(-1, 3).astype(np.float32) / 127
-    reach = [stage.reach[..., k].ravel().astype(np.float32)[here] / 255 for k in lamps]
-    found = fitted_light(transfer[here], smooth[here], reach, environment, [stage.unlit.lamps[k] for k in lamps], tints, tone, rng)
+    shining = [LampOnHead(stage.unlit.lamps[k], tint, stage.reach[..., k].ravel().astype(np.float32)[here] / 255)
+               for k, tint in zip(lamps, tints, strict=True)]
+    found = fitted_light(transfer[here], smooth[here], shining, environment, tone, rng)
     whole = [np.zeros((len(here), 3), np.float32) for _ in range(3)]
     for target, values in zip(whole, (found.ambient, found.sunlit, found.normal), strict=True):
         target[here] = values
-    return Fitted(*whole)
+    return FittedLight(*whole)

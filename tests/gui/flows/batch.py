@@ -52,7 +52,7 @@ def plan(root: Path) -> Path:
         addon.unsolved(root / f"{name}.wildcap")
         capture = batch_faces.filmed(root, name)
         batch_faces.finish_up_to_mask(capture, settings)
-        faces.append(record.Face(name, capture.source, capture.root, "draft", QUICK))
+        faces.append(record.BatchFace(name, capture.source, capture.root, "draft", QUICK))
     record.write_batch(record.Batch(root, tuple(faces), "artist"))
     return root
 

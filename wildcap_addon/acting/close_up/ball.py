@@ -16,7 +16,7 @@ WHITE = 0.6
 
 
 @dataclass(frozen=True)
-class Ball:
+class RiggedEyeball:
     """centre [3] and radius in metres, in the head's axes; pitch and yaw in radians: where it looks at rest, upwards and to the person's left;
     turns: what each look unit at 1 adds to them."""
 
@@ -28,7 +28,7 @@ class Ball:
 
 
 @dataclass(frozen=True)
-class Rims:
+class LidRims:
     """Of one eye, from the nose outwards: vertices of the upper rim [N] and of the lower one [N], opposite one another, and the inner corner's."""
 
     upper: np.ndarray
@@ -36,7 +36,7 @@ class Rims:
     corner: int
 
 
-def of(obj, number: int) -> Ball:
+def of(obj, number: int) -> RiggedEyeball:
     """The left (0) or the right ball of a head at rest."""
     asset, keys = load(), obj.data.shape_keys.key_blocks
     inner = np.flatnonzero(asset.kind == LEFT_EYE + number)
@@ -47,10 +47,10 @@ def of(obj, number: int) -> Ball:
     centre, pupil = fit[:3], rows[out.argmin()]
     pitch, yaw = _angles(rest[pupil] - centre)
     turned = {way: _angles(places(keys[f"eyeLook{way}{SIDES[number]}"])[pupil] - centre) for way in WAYS}
-    return Ball(centre, float(np.sqrt(fit[3] + centre @ centre)), pitch, yaw, {way: (a - pitch, b - yaw) for way, (a, b) in turned.items()})
+    return RiggedEyeball(centre, float(np.sqrt(fit[3] + centre @ centre)), pitch, yaw, {way: (a - pitch, b - yaw) for way, (a, b) in turned.items()})
 
 
-def rims(asset: FaceUnits, number: int) -> Rims:
+def rims(asset: FaceUnits, number: int) -> LidRims:
     """Of the left (0) or the right lids, as rows of the head cut open."""
     seam = np.flatnonzero(asset.seam == 1 + number)
     seam = seam[np.abs(asset.template[asset.copies[seam], 0]).argsort()]
@@ -58,7 +58,7 @@ def rims(asset: FaceUnits, number: int) -> Rims:
     triangles[asset.corners[:, 0], asset.corners[:, 1]] = asset.corners[:, 2]
     upper, lower = asset.copies[seam], len(asset.template) + seam
     around = [set(triangles[(triangles == rim).any(1)].ravel().tolist()) for rim in (upper[0], lower[0])]
-    return Rims(upper, lower, (around[0] & around[1]).pop())
+    return LidRims(upper, lower, (around[0] & around[1]).pop())
 
 
 def places(key) -> np.ndarray:

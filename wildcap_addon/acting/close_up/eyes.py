@@ -67,7 +67,7 @@ def _turned(name: str, shape: shapes.Turned, number: int):
     return mesh
 
 
-def _wet(name: str, rims: ball.Rims):
+def _wet(name: str, rims: ball.LidRims):
     """Two strips, along the upper and the lower lid; where its vertices lie, geometry nodes find."""
     rim = np.concatenate([rims.upper, rims.lower])
     opposite = np.concatenate([rims.lower, rims.upper])
@@ -77,7 +77,7 @@ def _wet(name: str, rims: ball.Rims):
                                                  "reach": np.full(len(across), REACH_M)})
 
 
-def _caruncle(name: str, rims: ball.Rims, asset: FaceUnits):
+def _caruncle(name: str, rims: ball.LidRims, asset: FaceUnits):
     """A sheet from the inner corner outwards, as wide as the lids are open."""
     away = np.linalg.norm(asset.template[rims.upper] - asset.template[rims.corner], axis=1)
     count = int((away < CARUNCLE_M).sum())
@@ -112,7 +112,7 @@ def _strip(name: str, faces: np.ndarray, attributes: dict[str, np.ndarray]):
     return mesh
 
 
-def _place(thing, obj, eye: ball.Ball, side: str) -> None:
+def _place(thing, obj, eye: ball.RiggedEyeball, side: str) -> None:
     """At the ball's middle, turned by the head's look units: sums of products, which need no script."""
     thing.location, thing.rotation_mode = eye.centre, 'XYZ'
     for axis, rest, share in ((0, -eye.pitch, 0), (2, eye.yaw, 1)):
