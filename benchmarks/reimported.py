@@ -113,7 +113,7 @@ def deliver(item, preset: str, kind: str) -> Path:
     operators, waiting, captures, properties = (import_module(f"{ADDON}.{name}") for name in ("deliver.operators", "deliver.waiting", "captures", "properties"))
     item.deliver.preset, item.deliver.format = preset, kind
     capture = Capture(Path(captures.root(item)))
-    settings = {**properties.values(item)["deliver"], "roughness": operators.roughness(captures.head(bpy.context, item)), "whole": False}
+    settings = {**properties.job_settings(item)["deliver"], "roughness": operators.roughness(captures.head(bpy.context, item)), "whole": False}
     plan = operators.planned(bpy.context)
     ended = run_job(write_job(capture, tool="deliver", settings={"deliver": settings}))
     if not isinstance(ended, Done):
