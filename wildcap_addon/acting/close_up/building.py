@@ -60,7 +60,7 @@ def remove(obj) -> None:
     _drop(bpy.data.meshes, data)
     _drop(bpy.data.materials, made)
     _drop(bpy.data.images, [image for image in map(bpy.data.images.get, (pictures.IRIS, pictures.WHITE)) if image is not None])
-    _drop(bpy.data.node_groups, [tree for tree in map(bpy.data.node_groups.get, (nodes.LIDS, nodes.WET, nodes.CARUNCLE)) if tree is not None])
+    _drop(bpy.data.node_groups, [tree for tree in map(bpy.data.node_groups.get, (nodes.LIDS, nodes.MARGIN, nodes.WET, nodes.CARUNCLE)) if tree is not None])
 
 
 def keep_up(obj, _capture) -> None:
