@@ -190,15 +190,15 @@ def test_nothing_of_the_mouth_comes_through_the_skin_at_rest_and_in_any_unit(clo
 
 def test_a_tongue_comes_out_as_far_as_the_jaw_is_open_and_between_teeth_and_lips(close_up, addon):
     tongue, teeth = things(close_up)["Tongue"], things(close_up)["Teeth"]
-    at_rest = seen(tongue)[:, 1].min()
     for jaw in (0.3, 0.6, 1.0):
-        ways = []
+        set_face(close_up, 0.0, jawOpen=jaw)
+        within, ways = seen(tongue)[:, 1].min(), []
         for out in (0.25 * jaw, 0.5 * jaw, 0.75 * jaw, 1.0):
             set_face(close_up, 0.0, jawOpen=jaw, tongueOut=out)
             assert not tree_of(tongue).overlap(about_the_mouth(close_up, addon)), (jaw, out, "the lips")
             if out > 0.2:  # before, it lies against their backs
                 assert not tree_of(tongue).overlap(tree_of(teeth)), (jaw, out, "the teeth")
-            ways.append(at_rest - seen(tongue)[:, 1].min())
+            ways.append(within - seen(tongue)[:, 1].min())
         assert ways == sorted(ways) and ways[-1] > 0.02 * jaw
     for curve in tongue.data.shape_keys.animation_data.drivers:
         assert curve.driver.is_valid and curve.driver.is_simple_expression

@@ -3,9 +3,7 @@
 """Hair that was grown goes along with a USD, as another reader finds it; no other format has it, and nothing of it stays in the .blend. A close-up's eyes and
 mouth go along with none."""
 
-import shutil
 from importlib import util
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +11,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("OpenImageIO", reason="the worker's part needs its packages")
 
-from . import delivered  # noqa: E402
-from .test_deliver import by_another_reader, capture, deliver, glb  # noqa: E402, F401  (capture is a fixture)
+from .test_deliver import by_another_reader, capture, deliver, glb, with_face_units  # noqa: E402, F401  (capture is a fixture)
 
 POINTS = np.array([[[0, -0.1, 0.02], [0, -0.103, 0.021], [0, -0.106, 0.023]], [[0.01, -0.1, 0.02], [0.01, -0.104, 0.02], [0.011, -0.107, 0.02]]], np.float32)
 
@@ -44,12 +41,7 @@ def test_other_formats_have_the_head_alone(hairy):
 
 
 def test_a_close_up_stays_with_the_artist(capture):  # noqa: F811
-    head = bpy.context.view_layer.objects.active
-    head.shape_key_clear()
-    shutil.copyfile(Path(__file__).resolve().parent.parent / "core/assets/head.obj", capture.head)
-    delivered.record_solve(capture)
-    bpy.ops.wildcap.bring_in_head()
-    bpy.ops.wildcap.add_face_units()
+    head = with_face_units(capture)
     bpy.ops.wildcap.close_up()
     worn = len(head.children)
     document, _ = glb(deliver(capture, format="glb") / "face.glb")

@@ -82,4 +82,4 @@ def keys():
     return addon.head().data.shape_keys
 
 
-d.play(flow(), limit_s=300)
+d.play(flow(), limit_s=600)
