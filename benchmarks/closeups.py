@@ -23,7 +23,7 @@ LIGHTS = ("three_point", "overcast", "sun")
 SEAMS = {"mouth": 0, "eye": 1}
 """Where the camera looks: the middle of what the face units cut open there (the eye on the person's left)."""
 AWAY_M = 0.45
-EEVEE_SAMPLES = 64
+EEVEE_SAMPLES = 32
 
 
 @dataclass(frozen=True)

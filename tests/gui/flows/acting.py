@@ -13,14 +13,18 @@ import addon  # noqa: E402
 import driver as d  # noqa: E402
 
 SIDE, SAMPLES = 160, 4
+END = 40
+"""Turns of the wheel from one end of the sidebar to the other"""
 
 
 def flow():
-    addon.unfold("WILDCAP_PT_acting", "WILDCAP_PT_groom")
+    addon.unfold("WILDCAP_PT_relight", "WILDCAP_PT_acting", "WILDCAP_PT_groom")
     root = yield from addon.open_sample_head()
+    yield from d.scroll(END)
     d.screenshot("acting_before")
     yield from d.press("wildcap.add_face_units")
     yield from d.until(lambda: keys() is not None and len(keys().key_blocks) == 55, "the face units", 60)
+    yield from d.scroll(END)
     d.screenshot("acting_closed")
     keys()["eyesOpen"], keys().key_blocks["jawOpen"].value = 1.0, 0.6
     keys().update_tag()
@@ -61,8 +65,7 @@ def close_up():
 def render(root: Path):
     props, path = bpy.context.scene.wildcap, root / "renders" / "three_point.png"
     props.light, props.resolution, props.samples = 'three_point', SIDE, SAMPLES
-    addon.unfold("WILDCAP_PT_relight")
-    yield 0.5
+    yield from d.scroll(-END)
     yield from d.press("wildcap.render")
     yield from d.until(path.is_file, "the render", 120)
     shown = set(bpy.data.scenes["WildCap Relight"].collection.objects)

@@ -183,6 +183,7 @@ def _new(name: str, kind: str, colour: tuple, roughness: float) -> tuple:
 
 def _told(tree, image):
     picture = add(tree, 'ShaderNodeTexImage', interpolation='Cubic', image=image)
+    picture.show_texture = False  # it is no colour: Solid shading shows the material's own
     return add(tree, 'ShaderNodeSeparateColor', (picture.outputs["Color"],)).outputs
 
 

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ..asset import FaceUnits, load
-from . import ball, materials, mouth_shapes
+from . import ball, materials, mouth_shapes, nodes
 
 SHOWN_M, FARTHEST_M = 0.001, 0.006
 """How far the upper teeth end below where the lips meet, as most people's do, and how far they are moved for it at most: the bands of the built-in head
@@ -43,6 +43,7 @@ def build(obj, keep) -> None:
     teeth = keep("Teeth", _data(f"{obj.name} Teeth and Gums", placed, shape.faces, shape.slots))
     front = float(placed[:, 1].min())
     materials.fill(teeth, materials.teeth(obj.name, front), materials.gums(obj.name, front))
+    nodes.modify(obj, nodes.lids_on_eyes(), Lining=materials.gums(obj.name, front))
     _keyed(teeth, obj, placed, turned)
     faces = [[int(where) for where in np.searchsorted(tongue, [i - first for i in face if i >= 0])] for face in _faces(asset, first, tongue)]
     flesh = keep("Tongue", _data(f"{obj.name} Tongue", rest[tongue] + lower_by, faces, np.zeros(len(faces))))

@@ -15,6 +15,8 @@ SUNK_M = 0.0004
 """How far the caruncle begins within the rims of the lids, and ends within the ball."""
 FOOT_M = 0.0001
 """How far a lid's margin goes on within the ball."""
+MOUTH_SLOT = 2
+"""Of the head's materials, the one of its mouth's inside (acting/materials.py)."""
 
 
 def add(tree, kind: str, inputs: dict | tuple = (), **settings):
@@ -74,8 +76,9 @@ def modify(obj, tree, **inputs) -> None:
 
 
 def lids_on_eyes() -> bpy.types.NodeTree:
-    """Moves lids out of the eyes, and takes away what the close-up's own objects stand for: vertices from First on, which are the head's last ones."""
-    return group(LIDS, {"Left": 'NodeSocketObject', "Right": 'NodeSocketObject', "First": 'NodeSocketInt'}, _lids)
+    """Moves lids out of the eyes, takes away what the close-up's own objects stand for (vertices from First on, which are the head's last ones), and gives the
+    inside of the cheeks the material Lining."""
+    return group(LIDS, {"Left": 'NodeSocketObject', "Right": 'NodeSocketObject', "First": 'NodeSocketInt', "Lining": 'NodeSocketMaterial'}, _lids)
 
 
 def lid_margin() -> bpy.types.NodeTree:
@@ -109,7 +112,9 @@ def _lids(tree, inputs):
         lid = math(tree, 'MULTIPLY', lid, math(tree, 'LESS_THAN', index, inputs["First"]))
         geometry = add(tree, 'GeometryNodeSetPosition', {"Geometry": geometry, "Selection": lid, "Offset": scaled(tree, out, short)}).outputs[0]
     beyond = math(tree, 'GREATER_THAN', index, math(tree, 'SUBTRACT', inputs["First"], 0.5))
-    return add(tree, 'GeometryNodeDeleteGeometry', {"Geometry": geometry, "Selection": beyond}, domain='POINT').outputs[0]
+    kept = add(tree, 'GeometryNodeDeleteGeometry', {"Geometry": geometry, "Selection": beyond}, domain='POINT').outputs[0]
+    mouth = math(tree, 'COMPARE', add(tree, 'GeometryNodeInputMaterialIndex').outputs[0], float(MOUTH_SLOT), 0.5)
+    return add(tree, 'GeometryNodeSetMaterial', {"Geometry": kept, "Selection": mouth, "Material": inputs["Lining"]}).outputs[0]
 
 
 def _margin(tree, inputs):
