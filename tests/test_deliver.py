@@ -266,19 +266,8 @@ def test_a_blender_without_an_exporter_says_so(addon, capture, monkeypatch, tmp_
         files._call(bpy.ops.export_scene.fbx, tmp_path / "none" / "x.fbx", use_selection=True)
 
 
-def with_face_units(capture):
-    """The built-in head in place of the capture's own, with its units."""
-    head = bpy.context.view_layer.objects.active
-    head.shape_key_clear()
-    shutil.copyfile(Path(__file__).resolve().parent.parent / "core/assets/head.obj", capture.head)
-    delivered.record_solve(capture)
-    bpy.ops.wildcap.bring_in_head()
-    bpy.ops.wildcap.add_face_units()
-    return head
-
-
 def test_a_head_with_face_units_keeps_their_names_their_moves_and_its_eyes(capture):
-    head = with_face_units(capture)
+    head = delivered.with_face_units(capture)
     keys = head.data.shape_keys
     keys["eyesOpen"] = 1.0  # posed: the neutral head is delivered all the same
     document, binary = glb(deliver(capture) / "face.glb")

@@ -11,7 +11,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("OpenImageIO", reason="the worker's part needs its packages")
 
-from .test_deliver import by_another_reader, capture, deliver, glb, with_face_units  # noqa: E402, F401  (capture is a fixture)
+from . import delivered  # noqa: E402
+from .test_deliver import by_another_reader, capture, deliver, glb  # noqa: E402, F401  (capture is a fixture)
 
 POINTS = np.array([[[0, -0.1, 0.02], [0, -0.103, 0.021], [0, -0.106, 0.023]], [[0.01, -0.1, 0.02], [0.01, -0.104, 0.02], [0.011, -0.107, 0.02]]], np.float32)
 
@@ -41,7 +42,7 @@ def test_other_formats_have_the_head_alone(hairy):
 
 
 def test_a_close_up_stays_with_the_artist(capture):  # noqa: F811
-    head = with_face_units(capture)
+    head = delivered.with_face_units(capture)
     bpy.ops.wildcap.close_up()
     worn = len(head.children)
     document, _ = glb(deliver(capture, format="glb") / "face.glb")

@@ -20,7 +20,7 @@ WIDE_M = 0.009
 LEAST_M = 3e-4
 """A unit that moves jaw and tongue by less moves the lips alone."""
 OUT, OVER = "tongueOut", "tongueOver"
-RISE_M, OVER_M = 0.004, 0.010
+RISE_M, OVER_M = 0.004, 0.006
 """How much higher than by the unit the tip lies when the tongue is out, and how far it rises on its way: over the lower teeth and the lip."""
 OUT_BY = "min(tongueOut, jawOpen)"
 """Through closed lips no tongue comes: it goes as far as the jaw is open."""
