@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import addon  # noqa: E402
 import driver as d  # noqa: E402
 
-SIDE, SAMPLES = 160, 4
+SIDE, SAMPLES = 160, 16
 END = 40
 """Turns of the wheel from one end of the sidebar to the other"""
 

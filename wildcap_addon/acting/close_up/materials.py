@@ -183,7 +183,7 @@ def _new(name: str, kind: str, colour: tuple, roughness: float) -> tuple:
 
 def _told(tree, image):
     picture = add(tree, 'ShaderNodeTexImage', interpolation='Cubic', image=image)
-    picture.show_texture = False  # it is no colour: Solid shading shows the material's own
+    tree.nodes.active = add(tree, 'ShaderNodeTexImage', label="None")  # what Solid shading shows: no picture, so the material's own colour
     return add(tree, 'ShaderNodeSeparateColor', (picture.outputs["Color"],)).outputs
 
 
