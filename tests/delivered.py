@@ -3,6 +3,7 @@
 """A solved capture with known tiny maps, to be delivered, and what of a PNG's own bytes tells how it was written."""
 
 import json
+import shutil
 import struct
 from pathlib import Path
 
@@ -47,6 +48,19 @@ def make(root: Path) -> Capture:
     images.write_data(capture.maps / "confidence.png", np.ones((SIDE, SIDE)))
     record_solve(capture)
     return capture
+
+
+def with_face_units(capture: Capture):
+    """In Blender, the built-in head in place of the capture's own, which is the active object, with its units."""
+    import bpy
+
+    head = bpy.context.view_layer.objects.active
+    head.shape_key_clear()
+    shutil.copyfile(Path(__file__).resolve().parent.parent / "core/assets/head.obj", capture.head)
+    record_solve(capture)
+    bpy.ops.wildcap.bring_in_head()
+    bpy.ops.wildcap.add_face_units()
+    return head
 
 
 def record_solve(capture: Capture) -> None:

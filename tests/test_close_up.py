@@ -12,7 +12,7 @@ BVHTree = pytest.importorskip("mathutils.bvhtree").BVHTree
 from tests.test_acting import COPIES, HEAD, coordinates, head, shown, write_head  # noqa: E402, F401  (head is a fixture)
 from tests.test_gaze import degrees  # noqa: E402
 
-KINDS = {f"{side} {what}" for side in ("Left", "Right") for what in ("Eye", "Cornea", "Wet Line", "Caruncle")} | {"Teeth", "Tongue"}
+KINDS = {f"{side} {what}" for side in ("Left", "Right") for what in ("Eye", "Cornea", "Lid Margin", "Wet Line", "Caruncle")} | {"Teeth", "Tongue"}
 OPENINGS = (0.0, 0.3, 0.6, 1.0)
 LOOKS = ("Up", "Down", "In", "Out")
 
@@ -113,11 +113,14 @@ def test_lids_and_tears_keep_to_an_eye_however_it_is_opened_and_turned(close_up,
                 near, normal, _, _ = shell.find_nearest(place.tolist())
                 assert (mathutils.Vector(place) - near).dot(normal) > 0, (opened, units, side)
             wet = coordinates(things(close_up)[f"{side} Wet Line"].evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices)
-            skin_tree = BVHTree.FromPolygons(skin.tolist(), [list(p.vertices) for p in close_up.data.polygons if max(p.vertices) < len(skin)])
-            from_lid = np.array([skin_tree.find_nearest(place.tolist())[3] for place in wet])
+            margin = seen(things(close_up)[f"{side} Lid Margin"])
+            from_rim = np.array([np.linalg.norm(margin - place, axis=1).min() for place in skin[rim]])
+            assert from_rim.max() < 1e-5, "the margin begins at the rim"
+            lid = tree_of(things(close_up)[f"{side} Lid Margin"])
+            from_lid = np.array([lid.find_nearest(place.tolist())[3] for place in wet])
             from_ball = np.array([shell.find_nearest(place.tolist())[3] for place in wet])
-            assert min(from_lid.min(), from_ball.min()) < 1e-4
-            assert np.minimum(from_lid, from_ball).max() < 3e-4 + 0.25 * from_ball.max(), "it spans the gap"
+            assert from_lid.min() < 1e-4 and from_ball.min() < 1e-4, "it joins both"
+            assert np.minimum(from_lid, from_ball).max() < 3e-4
 
 
 def test_it_goes_as_it_came_and_an_undo_takes_it_back(head, addon):  # noqa: F811
@@ -171,15 +174,44 @@ def test_both_engines_have_an_output_that_shows_something(close_up):
     assert not cornea.visible_shadow, "it would leave the iris in the dark"
 
 
+def test_solid_shading_shows_no_relief_for_a_colour(close_up):
+    for slot in things(close_up)["Left Eye"].material_slots:
+        pictures = [node for node in slot.material.node_tree.nodes if node.type == 'TEX_IMAGE']
+        assert [node.image for node in pictures if node.show_texture] == [None] * bool(pictures), "the picture holds no colour"
+
+
 def test_nothing_of_the_mouth_comes_through_the_skin_at_rest_and_in_any_unit(close_up, addon):
-    asset = addon("acting.asset").load()
-    outer = [list(p.vertices) for p in close_up.data.polygons[:len(asset.triangles)]]
+    units = [name for name in addon("acting.asset").load().units]
+    poses = [{}, *({name: 1.0} for name in units), *({"jawOpen": jaw, "mouthClose": jaw} for jaw in (0.3, 0.6, 1.0))]
+    assert {"jawOpen", "mouthClose", "tongueOut"} < set(units)
     through = {}
-    for unit in ("", *(name for name in asset.units if name != "mouthClose")):  # which alone is no pose: it undoes an open jaw
-        set_face(close_up, 0.0, **({unit: 1.0} if unit else {}))
-        skin = BVHTree.FromPolygons(shown(close_up).tolist(), outer)
-        for kind in ("Teeth", "Tongue") if unit != "tongueOut" else ("Teeth",):
-            crossed = len(tree_of(things(close_up)[kind]).overlap(skin))
-            if crossed:
-                through[unit, kind] = crossed
+    for pose in poses:
+        set_face(close_up, 0.0, **pose)
+        skin = about_the_mouth(close_up, addon)
+        for kind in ("Teeth", "Tongue"):
+            if crossed := len(tree_of(things(close_up)[kind]).overlap(skin)):
+                through[str(pose), kind] = crossed
     assert not through
+
+
+def test_a_tongue_comes_out_as_far_as_the_jaw_is_open_and_between_teeth_and_lips(close_up, addon):
+    tongue, teeth = things(close_up)["Tongue"], things(close_up)["Teeth"]
+    for jaw in (0.3, 0.6, 1.0):
+        set_face(close_up, 0.0, jawOpen=jaw)
+        within, ways = seen(tongue)[:, 1].min(), []
+        for out in (0.25 * jaw, 0.5 * jaw, 0.75 * jaw, 1.0):
+            set_face(close_up, 0.0, jawOpen=jaw, tongueOut=out)
+            assert not tree_of(tongue).overlap(about_the_mouth(close_up, addon)), (jaw, out, "the lips")
+            if out > 0.2:  # before, it lies against their backs
+                assert not tree_of(tongue).overlap(tree_of(teeth)), (jaw, out, "the teeth")
+            ways.append(within - seen(tongue)[:, 1].min())
+        assert ways == sorted(ways) and ways[-1] > 0.02 * jaw
+    for curve in tongue.data.shape_keys.animation_data.drivers:
+        assert curve.driver.is_valid and curve.driver.is_simple_expression
+
+
+def about_the_mouth(head, addon) -> BVHTree:  # noqa: F811
+    """The skin on the outside as far as teeth and tongue reach, within 8 cm of the lips."""
+    asset, places = addon("acting.asset").load(), shown(head)
+    near = np.linalg.norm(places - places[asset.copies[asset.seam == 0]].mean(0), axis=1) < 0.08
+    return BVHTree.FromPolygons(places.tolist(), [list(p.vertices) for p in head.data.polygons[:len(asset.triangles)] if near[p.vertices[0]]])

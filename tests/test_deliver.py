@@ -267,12 +267,7 @@ def test_a_blender_without_an_exporter_says_so(addon, capture, monkeypatch, tmp_
 
 
 def test_a_head_with_face_units_keeps_their_names_their_moves_and_its_eyes(capture):
-    head = bpy.context.view_layer.objects.active
-    head.shape_key_clear()
-    shutil.copyfile(Path(__file__).resolve().parent.parent / "core/assets/head.obj", capture.head)
-    delivered.record_solve(capture)
-    bpy.ops.wildcap.bring_in_head()
-    bpy.ops.wildcap.add_face_units()
+    head = delivered.with_face_units(capture)
     keys = head.data.shape_keys
     keys["eyesOpen"] = 1.0  # posed: the neutral head is delivered all the same
     document, binary = glb(deliver(capture) / "face.glb")

@@ -3,9 +3,7 @@
 """Hair that was grown goes along with a USD, as another reader finds it; no other format has it, and nothing of it stays in the .blend. A close-up's eyes and
 mouth go along with none."""
 
-import shutil
 from importlib import util
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -44,12 +42,7 @@ def test_other_formats_have_the_head_alone(hairy):
 
 
 def test_a_close_up_stays_with_the_artist(capture):  # noqa: F811
-    head = bpy.context.view_layer.objects.active
-    head.shape_key_clear()
-    shutil.copyfile(Path(__file__).resolve().parent.parent / "core/assets/head.obj", capture.head)
-    delivered.record_solve(capture)
-    bpy.ops.wildcap.bring_in_head()
-    bpy.ops.wildcap.add_face_units()
+    head = delivered.with_face_units(capture)
     bpy.ops.wildcap.close_up()
     worn = len(head.children)
     document, _ = glb(deliver(capture, format="glb") / "face.glb")

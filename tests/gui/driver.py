@@ -160,12 +160,12 @@ def park():
 
 
 def scroll(steps: int):
-    """Turns the wheel over the sidebar, and has it drawn."""
+    """Turns the wheel over the sidebar, back for negative steps, and has it drawn."""
     sidebar = region('UI')
     position = sidebar.x + sidebar.width // 3, sidebar.y + sidebar.height // 2
     yield from move(position)
-    for _ in range(steps):
-        event('WHEELDOWNMOUSE', 'PRESS', position)
+    for _ in range(abs(steps)):
+        event('WHEELDOWNMOUSE' if steps > 0 else 'WHEELUPMOUSE', 'PRESS', position)
         yield 0.05
     sidebar.tag_redraw()
     yield from park()

@@ -65,34 +65,33 @@ class WILDCAP_OT_rest_face(_OnHead, bpy.types.Operator):
         mesh.rest(_acting(context))
 
 
-class WILDCAP_OT_gaze(_OnHead, bpy.types.Operator):
+class _Toggle(_OnHead):
+    """Mixin: adds to the head what the module `switched` makes, or takes it away again."""
+
+    bl_options = {'REGISTER', 'UNDO'}
+
+    def work(self, context):
+        obj = _acting(context)
+        if self.switched.of(obj):
+            self.switched.remove(obj)
+        else:
+            self.switched.add(context, obj)
+
+
+class WILDCAP_OT_gaze(_Toggle, bpy.types.Operator):
     """Have both eyes look at an empty before the face, to be moved and animated; again to have the sliders back"""
 
     bl_idname = "wildcap.gaze"
     bl_label = "Gaze"
-    bl_options = {'REGISTER', 'UNDO'}
-
-    def work(self, context):
-        obj = _acting(context)
-        if gaze.of(obj) is None:
-            gaze.add(context, obj)
-        else:
-            gaze.remove(obj)
+    switched = gaze
 
 
-class WILDCAP_OT_close_up(_OnHead, bpy.types.Operator):
+class WILDCAP_OT_close_up(_Toggle, bpy.types.Operator):
     """Give the head eyes and a mouth worth a close-up, as objects of their own that go along with its face units; again to have its plain ones back"""
 
     bl_idname = "wildcap.close_up"
     bl_label = "Close-Up Eyes"
-    bl_options = {'REGISTER', 'UNDO'}
-
-    def work(self, context):
-        obj = _acting(context)
-        if building.of(obj):
-            building.remove(obj)
-        else:
-            building.add(context, obj)
+    switched = building
 
 
 def filmed_open(capture) -> str:

@@ -51,6 +51,7 @@ def remove(obj) -> None:
     """Takes away what `add` made, and what of its materials, pictures and nodes nobody else uses."""
     modifier = obj.modifiers.get(nodes.LIDS)
     if modifier is not None:
+        nodes.modify(obj, modifier.node_group, Lining=None)  # Blender 5.2 would go on counting it as a user
         obj.modifiers.remove(modifier)
     things = of(obj)
     made = {slot.material for thing in things for slot in thing.material_slots if slot.material is not None and of_the_head.KEY in slot.material}
@@ -60,7 +61,7 @@ def remove(obj) -> None:
     _drop(bpy.data.meshes, data)
     _drop(bpy.data.materials, made)
     _drop(bpy.data.images, [image for image in map(bpy.data.images.get, (pictures.IRIS, pictures.WHITE)) if image is not None])
-    _drop(bpy.data.node_groups, [tree for tree in map(bpy.data.node_groups.get, (nodes.LIDS, nodes.WET, nodes.CARUNCLE)) if tree is not None])
+    _drop(bpy.data.node_groups, [tree for tree in map(bpy.data.node_groups.get, (nodes.LIDS, nodes.MARGIN, nodes.WET, nodes.CARUNCLE)) if tree is not None])
 
 
 def keep_up(obj, _capture) -> None:

@@ -14,9 +14,9 @@ from ..asset import LEFT_EYE, SIDES, FaceUnits, load
 from . import ball, materials, nodes, shapes
 
 REACH_M = 0.00042
-"""How far tears climb onto the ball before a lid."""
+"""How far tears climb onto the ball and up the margin of a lid."""
 ACROSS = 5
-"""Vertices of the wet line from the lid to the ball."""
+"""Vertices of the margin and of the wet line from the lid to the ball."""
 CARUNCLE_M = 0.0054
 """From the inner corner outwards, over which the caruncle comes down to the ball: life's is some 5 mm wide, and its fold follows."""
 BOWED = 0.5
@@ -40,14 +40,17 @@ def build(obj, keep, iris_m: tuple[float, float]) -> None:
         materials.fill(shell, materials.cornea(obj.name))
         _let_light_in(shell)
         rims = ball.rims(asset, number)
-        wet = keep(f"{side} Wet Line", _wet(f"{obj.name} {side} Wet Line", rims))
+        margin = keep(f"{side} Lid Margin", _margin(f"{obj.name} {side} Lid Margin", rims, obj.data))
+        materials.fill(margin, obj.data.materials[0])  # the head's skin, in the colour of the rim
+        wet = keep(f"{side} Wet Line", _along_lids(f"{obj.name} {side} Wet Line", rims, {"reach": REACH_M}))
         materials.fill(wet, materials.tears(obj.name))
         _let_light_in(wet)
         flesh = keep(f"{side} Caruncle", _caruncle(f"{obj.name} {side} Caruncle", rims, asset))
         materials.fill(flesh, materials.flesh(obj.name))
-        for thing, tree in ((wet, nodes.wet_line()), (flesh, nodes.caruncle())):
+        for thing, tree in ((margin, nodes.lid_margin()), (wet, nodes.wet_line()), (flesh, nodes.caruncle())):
             nodes.modify(thing, tree, Head=obj, Shell=shell)
-            _smoothed(thing)
+            if thing is not margin:  # which ends at the rim's own vertices
+                _smoothed(thing)
         shells.append(shell)
     first = len(asset.template) + len(asset.copies) + int(np.flatnonzero(asset.kind == LEFT_EYE)[0])
     nodes.modify(obj, nodes.lids_on_eyes(), Left=shells[0], Right=shells[1], First=first)
@@ -67,14 +70,29 @@ def _turned(name: str, shape: shapes.Turned, number: int):
     return mesh
 
 
-def _wet(name: str, rims: ball.LidRims):
+def _along_lids(name: str, rims: ball.LidRims, constant: dict[str, float]):
     """Two strips, along the upper and the lower lid; where its vertices lie, geometry nodes find."""
     rim = np.concatenate([rims.upper, rims.lower])
     opposite = np.concatenate([rims.lower, rims.upper])
     across = np.tile(np.linspace(0, 1, ACROSS), len(rim))
     strips = [_grid(len(rims.upper), ACROSS, flipped=True), len(rims.upper) * ACROSS + _grid(len(rims.lower), ACROSS)]
     return _strip(name, np.concatenate(strips), {"rim": rim.repeat(ACROSS), "opposite": opposite.repeat(ACROSS), "across": across,
-                                                 "reach": np.full(len(across), REACH_M)})
+                                                 **{key: np.full(len(across), value) for key, value in constant.items()}})
+
+
+def _margin(name: str, rims: ball.LidRims, head):
+    """The same with the UVs of the rims, all the way down."""
+    mesh = _along_lids(name, rims, {})
+    corners, uv = np.empty(len(head.loops), np.int32), np.empty(2 * len(head.loops), np.float32)
+    head.loops.foreach_get("vertex_index", corners)
+    head.uv_layers[0].data.foreach_get("uv", uv)
+    known = np.zeros((len(head.vertices), 2), np.float32)
+    known[corners] = uv.reshape(-1, 2)
+    of_rim = known[np.concatenate([rims.upper, rims.lower])].repeat(ACROSS, 0)
+    own = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", own)
+    mesh.uv_layers.new(name=head.uv_layers[0].name).data.foreach_set("uv", of_rim[own].ravel())
+    return mesh
 
 
 def _caruncle(name: str, rims: ball.LidRims, asset: FaceUnits):

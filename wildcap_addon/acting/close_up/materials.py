@@ -19,6 +19,8 @@ WARM = (1.5, 1.05, 0.55)
 """Times the iris' colour around the pupil."""
 FADED = 0.08
 """v of the white's UVs at which it is opaque: over the limbus it fades to the iris' rim."""
+DEEP_M, DEEP_DARK = 0.035, 0.92
+"""Metres behind the front teeth where the mouth is darkest in EEVEE, and how dark: without ray tracing it lights a mouth as if nothing were before it."""
 FLESH, FOLD, GUMS, TONGUE = (0.50, 0.20, 0.17), (0.60, 0.39, 0.35), (0.44, 0.135, 0.125), (0.42, 0.15, 0.135)
 ENAMEL = (0.80, 0.735, 0.62)
 
@@ -72,7 +74,7 @@ def flesh(name: str) -> bpy.types.Material:
         tree = material.node_tree
         on_ball = add(tree, 'ShaderNodeAttribute', attribute_name="onto").outputs["Fac"]
         tree.links.new(_mixed(tree, on_ball, (*FLESH, 1), (*FOLD, 1)), shader.inputs["Base Color"])
-        _uneven(tree, shader, 900.0, 0.8, 0.0008)
+        _uneven(tree, shader, 900.0, 0.3, 0.0005)
         _moist(shader, 0.4, (1.0, 0.4, 0.3), 0.0015, 0.8)
     return material
 
@@ -104,30 +106,33 @@ def tears(name: str) -> bpy.types.Material:
     return material
 
 
-def teeth(name: str) -> bpy.types.Material:
-    """Enamel over dentine: some light goes in, and the surface is moist."""
+def teeth(name: str, front: float) -> bpy.types.Material:
+    """Enamel over dentine: some light goes in, and the surface is moist. front, here and below: y of the front teeth."""
     material, shader = _new(f"{name} Enamel", "enamel", ENAMEL, 0.22)
     if shader is not None:
+        _shaded_by_lips(material.node_tree, shader, front)
         _moist(shader, 0.5, (1.0, 0.75, 0.5), 0.0012, 0.5)
     return material
 
 
-def gums(name: str) -> bpy.types.Material:
+def gums(name: str, front: float) -> bpy.types.Material:
     material, shader = _new(f"{name} Gums", "gums", GUMS, 0.35)
     if shader is not None:
+        _shaded_by_lips(material.node_tree, shader, front)
         _uneven(material.node_tree, shader, 700.0, 0.35, 0.0003)
         _moist(shader, 0.4, (1.0, 0.35, 0.25), 0.0015, 0.7)
     return material
 
 
-def tongue(name: str) -> bpy.types.Material:
+def tongue(name: str, front: float) -> bpy.types.Material:
     """Rough with papillae, and wet."""
     material, shader = _new(f"{name} Tongue", "tongue", TONGUE, 0.42)
     if shader is not None:
         tree = material.node_tree
         place = add(tree, 'ShaderNodeTexCoord').outputs["Object"]
         knobs = add(tree, 'ShaderNodeTexVoronoi', {"Vector": place, "Scale": 900.0}).outputs["Distance"]
-        _bumped(tree, shader, math(tree, 'SUBTRACT', 1.0, knobs), 0.5, 0.0005)
+        _bumped(tree, shader, math(tree, 'SUBTRACT', 1.0, knobs), 0.25, 0.0005)
+        _shaded_by_lips(tree, shader, front)
         _moist(shader, 0.4, (1.0, 0.35, 0.25), 0.002, 0.6)
     return material
 
@@ -145,6 +150,16 @@ def _moist(shader, inside: float, radius: tuple[float, float, float], scale: flo
     shader.inputs["Subsurface Radius"].default_value = radius
     shader.inputs["Coat Weight"].default_value, shader.inputs["Coat Roughness"].default_value = coat, 0.08
     shader.inputs["Coat IOR"].default_value = TEARS_IOR
+
+
+def _shaded_by_lips(tree, shader, front: float) -> None:
+    """In EEVEE the deeper the darker, by an output of its own; Cycles finds it out."""
+    _output(tree).target = 'CYCLES'
+    depth = add(tree, 'ShaderNodeSeparateXYZ', (add(tree, 'ShaderNodeTexCoord').outputs["Object"],)).outputs[1]
+    dark = add(tree, 'ShaderNodeMapRange', {"Value": depth, "From Min": front, "From Max": front + DEEP_M, "To Max": DEEP_DARK}).outputs[0]
+    black = add(tree, 'ShaderNodeBsdfDiffuse', {"Color": (0, 0, 0, 1)}).outputs[0]
+    mixed = add(tree, 'ShaderNodeMixShader', (dark, shader.outputs[0], black)).outputs[0]
+    add(tree, 'ShaderNodeOutputMaterial', {"Surface": mixed}, target='EEVEE').location = (300, -200)
 
 
 def _uneven(tree, shader, scale: float, strength: float, distance: float) -> None:
@@ -168,6 +183,7 @@ def _new(name: str, kind: str, colour: tuple, roughness: float) -> tuple:
 
 def _told(tree, image):
     picture = add(tree, 'ShaderNodeTexImage', interpolation='Cubic', image=image)
+    tree.nodes.active = add(tree, 'ShaderNodeTexImage', label="None")  # what Solid shading shows: no picture, so the material's own colour
     return add(tree, 'ShaderNodeSeparateColor', (picture.outputs["Color"],)).outputs
 
 

@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
+import re
+
 import bpy
 import numpy as np
 
 from ..asset import FaceUnits, load
-from . import ball, materials, mouth_shapes
+from . import ball, materials, mouth_shapes, nodes
 
 SHOWN_M, FARTHEST_M = 0.001, 0.006
 """How far the upper teeth end below where the lips meet, as most people's do, and how far they are moved for it at most: the bands of the built-in head
@@ -17,6 +19,11 @@ WIDE_M = 0.009
 """Half the width of the upper front teeth that are looked at for it."""
 LEAST_M = 3e-4
 """A unit that moves jaw and tongue by less moves the lips alone."""
+OUT, OVER = "tongueOut", "tongueOver"
+RISE_M, OVER_M = 0.004, 0.006
+"""How much higher than by the unit the tip lies when the tongue is out, and how far it rises on its way: over the lower teeth and the lip."""
+OUT_BY = "min(tongueOut, jawOpen)"
+"""Through closed lips no tongue comes: it goes as far as the jaw is open."""
 
 
 def build(obj, keep) -> None:
@@ -34,14 +41,24 @@ def build(obj, keep) -> None:
     placed = placed + lower_by
     turned = {name: np.where(shape.lower[:, None], _affine(rest[lower], moved[lower], placed), 0) for name, moved in moves.items()}
     teeth = keep("Teeth", _data(f"{obj.name} Teeth and Gums", placed, shape.faces, shape.slots))
-    materials.fill(teeth, materials.teeth(obj.name), materials.gums(obj.name))
+    front = float(placed[:, 1].min())
+    materials.fill(teeth, materials.teeth(obj.name, front), materials.gums(obj.name, front))
+    nodes.modify(obj, nodes.lids_on_eyes(), Lining=materials.gums(obj.name, front))
     _keyed(teeth, obj, placed, turned)
     faces = [[int(where) for where in np.searchsorted(tongue, [i - first for i in face if i >= 0])] for face in _faces(asset, first, tongue)]
     flesh = keep("Tongue", _data(f"{obj.name} Tongue", rest[tongue] + lower_by, faces, np.zeros(len(faces))))
-    materials.fill(flesh, materials.tongue(obj.name))
-    _keyed(flesh, obj, rest[tongue] + lower_by, {name: moved[tongue] for name, moved in moves.items()})
+    materials.fill(flesh, materials.tongue(obj.name, front))
+    _keyed(flesh, obj, rest[tongue] + lower_by, _tongue_moves(moves, tongue), {OUT: OUT_BY, OVER: f"4 * {OUT_BY} * (1 - {OUT_BY})"})
     modifier = flesh.modifiers.get("Subdivision") or flesh.modifiers.new("Subdivision", 'SUBSURF')
     modifier.levels, modifier.render_levels = 1, 2
+
+
+def _tongue_moves(moves: dict[str, np.ndarray], tongue: np.ndarray) -> dict[str, np.ndarray]:
+    """What each unit adds to the tongue's vertices; the one that puts it out has a second key, which is there half way alone."""
+    moves = {name: moved[tongue] for name, moved in moves.items()}
+    ahead = np.clip(-moves[OUT][:, 1:2], 0, None)
+    up = ahead / ahead.max() * [0, 0, 1.0]
+    return moves | {OUT: moves[OUT] + RISE_M * up, OVER: OVER_M * up}
 
 
 def _lowering(asset: FaceUnits, head: np.ndarray, upper: np.ndarray) -> np.ndarray:
@@ -72,8 +89,8 @@ def _data(name: str, vertices: np.ndarray, faces: list, slots: np.ndarray):
     return mesh
 
 
-def _keyed(thing, obj, rest: np.ndarray, moves: dict[str, np.ndarray]) -> None:
-    """Shape keys of the units that move it, driven by the head's own."""
+def _keyed(thing, obj, rest: np.ndarray, moves: dict[str, np.ndarray], led_by: dict[str, str] | None = None) -> None:
+    """Shape keys of the units that move it, driven by the head's own. led_by: expressions of units for keys that more than one unit leads."""
     thing.shape_key_add(name="Basis", from_mix=False)
     for name, moved in moves.items():
         if np.abs(moved).max() < LEAST_M:
@@ -82,7 +99,10 @@ def _keyed(thing, obj, rest: np.ndarray, moves: dict[str, np.ndarray]) -> None:
         key.slider_min, key.slider_max = -10, 10  # the head's own sliders are the limit
         key.data.foreach_set("co", (rest + moved).astype(np.float32).ravel())
         driver = key.driver_add("value").driver
-        driver.type = 'SUM'
-        variable = driver.variables.new()
-        variable.targets[0].id_type, variable.targets[0].id = 'KEY', obj.data.shape_keys
-        variable.targets[0].data_path = f'key_blocks["{name}"].value'
+        driver.type = 'SCRIPTED'
+        driver.expression = (led_by or {}).get(name, name)
+        for unit in sorted(set(re.findall(r"[a-z]+[A-Z]\w*", driver.expression))):
+            variable = driver.variables.new()
+            variable.name = unit
+            variable.targets[0].id_type, variable.targets[0].id = 'KEY', obj.data.shape_keys
+            variable.targets[0].data_path = f'key_blocks["{unit}"].value'

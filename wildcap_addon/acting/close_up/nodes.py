@@ -4,7 +4,7 @@
 
 import bpy
 
-LIDS, WET, CARUNCLE = "WildCap Lids on Eyes", "WildCap Wet Line", "WildCap Caruncle"
+LIDS, MARGIN, WET, CARUNCLE = "WildCap Lids on Eyes", "WildCap Lid Margin", "WildCap Wet Line", "WildCap Caruncle"
 CLEAR_M = 0.00015
 """At which lids stay from the clear shell: the film of tears."""
 MOST_M = 0.004
@@ -13,6 +13,10 @@ AHEAD_M = 0.003
 """Before an eye's middle: what is farther back no lid shows."""
 SUNK_M = 0.0004
 """How far the caruncle begins within the rims of the lids, and ends within the ball."""
+FOOT_M = 0.0001
+"""How far a lid's margin goes on within the ball."""
+MOUTH_SLOT = 2
+"""Of the head's materials, the one of its mouth's inside (acting/materials.py)."""
 
 
 def add(tree, kind: str, inputs: dict | tuple = (), **settings):
@@ -72,13 +76,19 @@ def modify(obj, tree, **inputs) -> None:
 
 
 def lids_on_eyes() -> bpy.types.NodeTree:
-    """Moves lids out of the eyes, and takes away what the close-up's own objects stand for: vertices from First on, which are the head's last ones."""
-    return group(LIDS, {"Left": 'NodeSocketObject', "Right": 'NodeSocketObject', "First": 'NodeSocketInt'}, _lids)
+    """Moves lids out of the eyes, takes away what the close-up's own objects stand for (vertices from First on, which are the head's last ones), and gives the
+    inside of the cheeks the material Lining."""
+    return group(LIDS, {"Left": 'NodeSocketObject', "Right": 'NodeSocketObject', "First": 'NodeSocketInt', "Lining": 'NodeSocketMaterial'}, _lids)
+
+
+def lid_margin() -> bpy.types.NodeTree:
+    """The edge of a lid, from its rim down to the ball. Attributes: rim, opposite: vertices of the head; across: from the rim (0) to the ball (1)."""
+    return group(MARGIN, {"Head": 'NodeSocketObject', "Shell": 'NodeSocketObject'}, _margin)
 
 
 def wet_line() -> bpy.types.NodeTree:
-    """A strip of fluid from the rim of a lid onto the ball. Attributes: rim, opposite: vertices of the head; reach: how far onto the ball, metres;
-    across: from the lid (0) to the ball (1)."""
+    """A strip of fluid in the corner between a lid's margin and the ball. Attributes: rim, opposite: vertices of the head; reach: how far up the margin and
+    onto the ball, metres; across: from the margin (0) to the ball (1)."""
     return group(WET, {"Head": 'NodeSocketObject', "Shell": 'NodeSocketObject'}, _wet)
 
 
@@ -102,15 +112,26 @@ def _lids(tree, inputs):
         lid = math(tree, 'MULTIPLY', lid, math(tree, 'LESS_THAN', index, inputs["First"]))
         geometry = add(tree, 'GeometryNodeSetPosition', {"Geometry": geometry, "Selection": lid, "Offset": scaled(tree, out, short)}).outputs[0]
     beyond = math(tree, 'GREATER_THAN', index, math(tree, 'SUBTRACT', inputs["First"], 0.5))
-    return add(tree, 'GeometryNodeDeleteGeometry', {"Geometry": geometry, "Selection": beyond}, domain='POINT').outputs[0]
+    kept = add(tree, 'GeometryNodeDeleteGeometry', {"Geometry": geometry, "Selection": beyond}, domain='POINT').outputs[0]
+    mouth = math(tree, 'COMPARE', add(tree, 'GeometryNodeInputMaterialIndex').outputs[0], float(MOUTH_SLOT), 0.5)
+    return add(tree, 'GeometryNodeSetMaterial', {"Geometry": kept, "Selection": mouth, "Material": inputs["Lining"]}).outputs[0]
+
+
+def _margin(tree, inputs):
+    lid, _, across = _lid(tree, inputs["Head"])
+    below, out, _ = _on_shell(tree, inputs["Shell"], lid)
+    foot = vector(tree, 'SUBTRACT', below, scaled(tree, out, FOOT_M))
+    return add(tree, 'GeometryNodeSetPosition', {"Geometry": inputs["Geometry"], "Position": _between(tree, lid, foot, across)}).outputs[0]
 
 
 def _wet(tree, inputs):
-    lid, other, across = _lid(tree, inputs["Head"])
-    towards = vector(tree, 'NORMALIZE', vector(tree, 'SUBTRACT', other, lid))
-    below, _, _ = _on_shell(tree, inputs["Shell"], lid)
-    onto = vector(tree, 'ADD', lid, scaled(tree, towards, _attribute(tree, "reach", 'FLOAT')))
-    ball, out, _ = _on_shell(tree, inputs["Shell"], onto)
+    rim, other, across = _lid(tree, inputs["Head"])
+    reach = _attribute(tree, "reach", 'FLOAT')
+    towards = vector(tree, 'NORMALIZE', vector(tree, 'SUBTRACT', other, rim))
+    below, _, _ = _on_shell(tree, inputs["Shell"], rim)
+    down = math(tree, 'MAXIMUM', 0.0, math(tree, 'SUBTRACT', 1.0, math(tree, 'DIVIDE', reach, vector(tree, 'DISTANCE', rim, below))))
+    lid = _between(tree, rim, below, down)
+    ball, out, _ = _on_shell(tree, inputs["Shell"], vector(tree, 'ADD', lid, scaled(tree, towards, reach)))
     ball = vector(tree, 'SUBTRACT', ball, scaled(tree, out, 0.00003))  # its edge lies below the shell, not above it
     bent = _between(tree, _between(tree, lid, ball, 0.5), below, 0.55)  # hollow, as tears climb lid and ball
     curve = _between(tree, _between(tree, lid, bent, across), _between(tree, bent, ball, across), across)
