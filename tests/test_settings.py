@@ -79,8 +79,8 @@ def test_a_place_in_the_home_folder_is_found(monkeypatch, tmp_path):
 
 def test_a_quality_leaves_alone_what_is_about_the_face():
     left = {f"{stage}.{field.name}" for stage, field in EVERY if field.name not in quality_settings(STAGE_KINDS[stage])}
-    assert left == {*PATHS, "frames.mirrored", "cameras.interpupillary_mm", "registration.new_atlas", "delight.delighter", "delight.switchlight_preview",
-                    "solve.skin_tone", "solve.white_point"}
+    assert left == {*PATHS, "frames.mirrored", "frames.no_glasses", "cameras.interpupillary_mm", "registration.new_atlas", "delight.delighter",
+                    "delight.switchlight_preview", "solve.skin_tone", "solve.white_point"}
 
 
 @pytest.mark.parametrize("quality", QUALITIES)

@@ -30,6 +30,8 @@ class FramesSettings:
     """Sharp, evenly spread frames chosen for the texture (V in the paper)"""
     mirrored: bool = setting(False, per_face=True)
     """The pictures are mirrored, as a front camera may save them: flip them back. A head alone cannot show which way round it was"""
+    no_glasses: bool = setting(False, per_face=True)
+    """The person wears no glasses, whatever the frames look like: a capture with glasses is refused"""
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,12 @@ from ..contract.frame_records import FULL, PHOTOGRAPHS, VIDEO, FrameRecord, Fram
 from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 from ..face import faces
+from ..face.glasses import sureness
 from ..imaging import images
 from .doctor import FEW, blurred, diagnose, examine
 from .drift import content_of, gains_of
 from .eyes import blinks
+from .glasses import judge
 from .photographs import read_photographs
 from .select import select_views, sharpness, turns
 from .source import Picture
@@ -50,8 +52,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     if settings.frames.mirrored:
         pictures = (replace(picture, srgb=_flipped(picture.srgb), full=_flipped(picture.full)) for picture in pictures)
     with replacing_folder(capture.frames) as folder:
-        records, thumbnails, contents = _write_frames(pictures, folder, report)
+        records, thumbnails, contents, glasses = _write_frames(pictures, folder, report)
         _check(path, records, thumbnails, photographs)
+        judge(glasses, settings.frames.no_glasses, report)
         records, contents, dropped = _drop_blurred(records, contents, folder)
         records = _even_out(records, contents, folder, report)
         shut = blinks([r.eyes_open for r in records], [r.time_s for r in records])
@@ -63,9 +66,9 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     _report(capture, records, dropped, report)
 
 
-def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[FrameRecord], np.ndarray, list]:
-    """Consumes the pictures; their records, thumbnails [N, 32, 32] and what the exposure is compared by."""
-    records, thumbnails, contents, last = [], [], [], None
+def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[FrameRecord], np.ndarray, list, list[float]]:
+    """Consumes the pictures; their records, thumbnails [N, 32, 32], what the exposure is compared by, and how surely the face wears glasses."""
+    records, thumbnails, contents, glasses, last = [], [], [], [], None
     for picture in pictures:
         name = f"{picture.index:05d}.jpg"
         images.write_srgb(folder / name, picture.srgb, quality=95)
@@ -76,8 +79,9 @@ def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[FrameR
         records.append(_record(picture, name, face, last, rival))
         thumbnails.append(images.resize(picture.srgb.mean(-1), 32, 32))
         contents.append(content_of(picture.srgb))
+        glasses.append(sureness(picture.srgb, face) if face else float("nan"))
         report.progress(READING * picture.done, picture.of, f"frame {len(records)}, {'face found' if face else 'no face'}")
-    return records, np.array(thumbnails), contents
+    return records, np.array(thumbnails), contents, glasses
 
 
 def _flipped(picture: np.ndarray | None) -> np.ndarray | None:

@@ -15,6 +15,7 @@ LIP_CORNERS, LIP_RIM = (78, 308), (13, 14)
 """Landmarks at the corners of the mouth's opening, and at its upper and lower rim in the middle."""
 SKINS = np.array([[0.62, 0.42, 0.33], [0.45, 0.27, 0.18], [0.22, 0.12, 0.075], [0.07, 0.04, 0.027]])
 EYES = ((33, 133), (362, 263))
+RIMS = 0.1
 
 
 def backdrop(directions: np.ndarray, environment: Environment, light: float, rng: np.random.Generator) -> np.ndarray:
@@ -36,8 +37,9 @@ def backdrop(directions: np.ndarray, environment: Environment, light: float, rng
     return cv2.GaussianBlur(np.maximum(ground, 0), (0, 0), blur)
 
 
-def cover(radiance: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, light: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Things before the person, a hat or the rims of glasses, now and then: they are background."""
+def cover(radiance: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, light: float, rng: np.random.Generator,
+          rims: float = RIMS) -> tuple[np.ndarray, np.ndarray]:
+    """Things before the person, a hat or, in a share `rims` of pictures, the rims of glasses, now and then: they are background."""
     size, face = len(radiance), float(np.ptp(landmarks[:, 1]))
     hidden = np.zeros((size, size), np.float32)
     if rng.random() < 0.25:
@@ -49,7 +51,7 @@ def cover(radiance: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, light
         up = (crown - chin) / max(np.linalg.norm(crown - chin), 1e-6)
         radiance, over = _thing(radiance, crown + up * face * rng.uniform(0.15, 0.6), face * rng.uniform(0.4, 0.75), light, rng, kind="ellipse")
         hidden = np.maximum(hidden, over)
-    if rng.random() < 0.1:
+    if rng.random() < rims:
         radiance, over = _glasses(radiance, landmarks, light, rng)
         hidden = np.maximum(hidden, over)
     shares = shares * (1 - hidden[..., None])

@@ -7,6 +7,8 @@ Colours are varied far beyond the figures' own: a parser is to know hair by wher
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 
@@ -16,7 +18,7 @@ from ...light.spherical_harmonics import LAMBERT, per_function, sh_basis
 from ..environments import Environment, made_environment, panorama_environment
 from ..olat import BASIS, LIGHTS
 from ..response import curve, develop, expose
-from .clutter import backdrop, cover, with_open_mouth
+from .clutter import RIMS, backdrop, cover, with_open_mouth
 from .person import BROWS
 from .unlit import Unlit
 
@@ -26,8 +28,9 @@ GLOSS = {"skin": (0.45, 0.028), "lips": (0.3, 0.05), "brows": (0.4, 0.03), "bear
 SKIN, HAIR, BROW, BEARD, LIPS, CLOTHES = (PARTS.index(name) for name in ("skin", "hair", "brows", "beard", "lips", "clothes"))
 
 
-def photograph(sight: Unlit, rng: np.random.Generator, panoramas: list[np.ndarray] = ()) -> tuple[np.ndarray, np.ndarray]:
-    """An sRGB picture [S, S, 3] of a sight and the shares of its parts [S, S, len(PARTS)], float32 in [0, 1]."""
+def photograph(sight: Unlit, rng: np.random.Generator, panoramas: list[np.ndarray] = (), worn: Callable | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """An sRGB picture [S, S, 3] of a sight and the shares of its parts [S, S, len(PARTS)], float32 in [0, 1]. worn(radiance [S, S, 3], light) -> radiance
+    puts on what the person wears, of which the shares know nothing; otherwise some wear the rims of glasses."""
     shares = sight.shares.astype(np.float32) / 255
     shares /= np.maximum(shares.sum(-1, keepdims=True), 1e-6)
     albedo = recoloured(images.srgb_to_linear(sight.albedo.astype(np.float32) / 255), shares, rng)
@@ -36,7 +39,9 @@ def photograph(sight: Unlit, rng: np.random.Generator, panoramas: list[np.ndarra
     radiance, light = _lit(sight, albedo, shares, environment, rng)
     behind = shares[..., -1:]
     radiance = radiance * (1 - behind) + backdrop(directions(sight), environment, light, rng) * behind
-    radiance, shares = cover(radiance, shares, sight.landmarks, light, rng)
+    if worn:
+        radiance = worn(radiance, light)
+    radiance, shares = cover(radiance, shares, sight.landmarks, light, rng, 0.0 if worn else RIMS)
     face = shares[..., SKIN] > 0.5
     linear, _ = expose(radiance, face if face.sum() > 50 else behind[..., 0] < 0.5, rng)
     return develop(curve(linear, rng), rng), shares

@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Photographs of a face dropped into an empty Blender, Make My Head clicked, and nothing else: a relit head that looks back. The photographs are of a synthetic
+person with open eyes; photographed.py made them."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import addon  # noqa: E402
+import driver as d  # noqa: E402
+import own_head  # noqa: E402
+
+PHOTOGRAPHS = Path(__file__).resolve().parents[1] / "photographs"
+
+
+def flow():
+    yield from d.open_tab("WildCap")
+    addon.use_solver()
+    root = yield from drop(Path.home() / "Documents" / "face")
+    quick()
+    yield from own_head.begin("wildcap.make_my_head", root)
+    yield from d.until(lambda: own_head.head() is not None or addon.job(root) is None, "the head in the scene", 1200)
+    assert addon.job(root) is not None, addon.problem(root)
+    d.say("the head comes in while it is solved")
+    yield from own_head.ended("wildcap.make_my_head", root)
+    assert addon.problem(root).startswith("Your head is ready."), addon.problem(root)
+    yield from own_head.lit_face(root)
+    looks_back()
+    d.screenshot("photographs_3_rendered")
+
+
+def drop(folder: Path):
+    """All photographs dropped at once on the tab, by the operator that Blender calls for it; returns the capture's folder."""
+    shutil.copytree(PHOTOGRAPHS, folder)
+    d.act()
+    with d.in_view('UI'):
+        bpy.ops.wm.drop_import_file('INVOKE_DEFAULT', directory=str(folder), files=[{"name": path.name} for path in sorted(folder.iterdir())])
+    yield 1.0
+    d.screenshot("photographs_1_drop_menu")
+    yield from d.key('C')  # Blender asks: a reference, or Choose Video
+    yield from d.until(lambda: len(bpy.context.scene.wildcap.captures) == 1, "one capture of all the photographs", 10)
+    yield 1.0
+    d.screenshot("photographs_2_dropped")
+    return Path(addon.module("captures").root(addon.settings()))
+
+
+def quick() -> None:
+    own_head.quick(addon.settings())
+    bpy.context.scene.wildcap.resolution, bpy.context.scene.wildcap.samples = 512, 16
+
+
+def looks_back() -> None:
+    """The head's lids are open as they were photographed, and its eyeballs lie behind them."""
+    head = own_head.head()
+    keys = head.data.shape_keys.key_blocks
+    assert min(keys[f"eyesOpen{side}"].value for side in ("Left", "Right")) > 0.9, "the lids are closed"
+    assert any("Eyes" in material.name for material in head.data.materials if material), "there are no eyes behind the lids"
+
+
+d.play(flow(), limit_s=1700)
