@@ -26,15 +26,15 @@ FIRST_SEED = 930001
 AZIMUTHS, HEIGHTS = (-54, -36, -18, 0, 18, 36, 54), (4, 10, 2, 8, 3, 11, 5)
 """Degrees: 0 is before the face."""
 SCALE, SAMPLES = 0.75, 6
-WINDOW = scene.Lamp((-1.1, -1.0, 0.6), 0.9, 28.0, (1.0, 0.97, 0.92))
+WINDOW = scene.AreaLamp((-1.1, -1.0, 0.6), 0.9, 28.0, (1.0, 0.97, 0.92))
 
 
 def main() -> None:
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).with_name("photographs"))
     folder.mkdir(parents=True, exist_ok=True)
-    light = scene.Light((0.42, 0.42, 0.42), lamps=(WINDOW,))
+    light = scene.SceneLight((0.42, 0.42, 0.42), lamps=(WINDOW,))
     with tempfile.TemporaryDirectory() as work:
-        filmed.render(Path(work), make_figure(somebody()), light, cameras(), range(len(AZIMUTHS)), SAMPLES, SCALE)
+        filmed.render(Path(work), make_figure(somebody()), light, scene.Shot(cameras(), range(len(AZIMUTHS)), SAMPLES, SCALE))
         linear = [images.read_linear(Path(work) / f"{k:05d}.exr")[..., :3] for k in range(len(AZIMUTHS))]
     gain = 0.75 / np.percentile(linear[len(linear) // 2], 95)
     for k, picture in enumerate(linear):
