@@ -83,4 +83,6 @@ def test_with_a_capture_each_operator_works_or_says_why_not(operators, capture, 
 def test_every_operator_has_a_tooltip_and_a_label(operators):
     for name in operators:
         kind = getattr(bpy.types, f"WILDCAP_OT_{name}")
-        assert kind.bl_rna.name and len(kind.__doc__ or "") > 15 and not kind.__doc__.endswith("."), name
+        tooltip = kind.bl_rna.description
+        assert kind.bl_rna.name and len(tooltip) > 15 and not tooltip.endswith("."), name
+        assert "\n" not in tooltip and "  " not in tooltip, name

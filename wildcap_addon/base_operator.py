@@ -20,6 +20,12 @@ class BaseOperator:
 
     bl_options = {'REGISTER'}
 
+    def __init_subclass__(cls, **options):
+        """The docstring is the tooltip, in one line: Blender would show its breaks and its indentation."""
+        super().__init_subclass__(**options)
+        if cls.__doc__:
+            cls.bl_description = " ".join(cls.__doc__.split())
+
     @classmethod
     def allowed(cls, condition, why_not: str) -> bool:
         """For `poll`: whether the condition holds; where it does not, the tooltip of the greyed-out button says why."""

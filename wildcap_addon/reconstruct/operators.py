@@ -23,7 +23,7 @@ class WILDCAP_OT_reconstruct(BaseOperator, bpy.types.Operator):
     @classmethod
     def description(cls, context, properties):
         if properties.first not in stages.NAMES:
-            return cls.__doc__
+            return cls.bl_description
         after_mask = stages.NAMES.index(properties.first) > stages.NAMES.index(stages.MASK_STAGE)
         return f"Run from the stage {stages.by_name(properties.first).label}, also where it is done, {'to the end' if after_mask else 'up to the mask'}"
 
