@@ -1,15 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each part of the solver is worth, on UV-space problems with known truth (benchmarks/uv_problems.py): subjects that no training saw.
+"""What each part of the solver is worth, on UV-space problems with known truth (benchmarks/uv_problems.py): subjects
+that no training saw.
 
-    python -m benchmarks.ablation OUT.json [--rows NAME ...] [--skins FOLDER] [--kind raw|delit] [--size 256] [--steps 20] [--jobs 2]
-    python -m benchmarks.ablation OUT.json --table [--json docs/figures/ablation.json]
+    python -m benchmarks.ablation OUT.json [--rows NAME ...] [--skins FOLDER] [--kind raw|delit] [--size 256] [--steps
+    20] [--jobs 2] python -m benchmarks.ablation OUT.json --table [--json docs/figures/ablation.json]
     python -m benchmarks.ablation OUT.json --pictures FOLDER
 
-Six subjects x three shadows for the rows that carry the method (KEY), the full method with two seeds, whose spread says what a tie is; the other rows run on
-one shadow per subject, the 600 steps of the paper and of the released code on one problem each; every row is compared with the full method on its own
-problems only. OUT.json keeps every finished solve, so the command goes on where it was stopped. --skins names a folder of skins carried into our UVs
-(`python -m core train carry`); those in the prior's card under held_out_skins are added to the subjects. The pictures are of synthetic subjects only.
+Six subjects x three shadows for the rows that carry the method (KEY), the full method with two seeds, whose spread says
+what a tie is; the other rows run on one shadow per subject, the 600 steps of the paper and of the released code on one
+problem each; every row is compared with the full method on its own problems only. OUT.json keeps every finished solve,
+so the command goes on where it was stopped. --skins names a folder of skins carried into our UVs (`python -m core train
+carry`); those in the prior's card under held_out_skins are added to the subjects. The pictures are of synthetic
+subjects only.
 """
 
 from __future__ import annotations
@@ -82,7 +85,8 @@ ROWS: dict[str, tuple[dict, int, str, bool]] = {
     "recipe released": ({}, CELLS, "painted", True),
 }
 NAMED = {"recipe paper": "paper", "recipe released": "released"}
-TONES = ((0.95, 0.80, 0.72), (0.85, 0.67, 0.56), (0.76, 0.57, 0.45), (0.62, 0.43, 0.32), (0.47, 0.31, 0.23), (0.30, 0.20, 0.16))
+TONES = ((0.95, 0.80, 0.72), (0.85, 0.67, 0.56), (0.76, 0.57, 0.45), (0.62, 0.43, 0.32), (0.47, 0.31, 0.23),
+         (0.30, 0.20, 0.16))
 """sRGB, light to dark: asked for of one subject after the other, whatever its own is."""
 
 
@@ -111,7 +115,8 @@ def main() -> None:
     differences = [r["tone"] for r in done.values() if "tone" in r]
     if differences:
         found["tone"] = {"delivered": max(a for a, _ in differences), "sampled": max(b for _, b in differences)}
-        print("Skin tone, largest CIEDE2000 of the solved mean to the request over six tones, as delivered and by the sampling alone:", found["tone"])
+        print("Skin tone, largest CIEDE2000 of the solved mean to the request over six tones, as delivered and by the "
+              "sampling alone:", found["tone"])
     if options.json:
         figures.write(options.json, "ablation", "python -m benchmarks.ablation OUT.json", found)
 
@@ -138,7 +143,8 @@ def solve_all(options: argparse.Namespace, done: dict) -> None:
 
 
 def _belongs(row: str, subject: int, shadows: int, seed: int) -> bool:
-    """Whether a row is solved on a problem: key rows on all, others on one shadow per subject, the 600 steps on one problem each; two seeds of the first."""
+    """Whether a row is solved on a problem: key rows on all, others on one shadow per subject, the 600 steps on one
+    problem each; two seeds of the first."""
     if seed and row != FULL:
         return False
     if row in NAMED:
@@ -161,7 +167,8 @@ def _solve_problem(subject: str, shadows: str, wanted: list[tuple[str, int]], op
             about["tone"] = tone_error(given, TONES[int(row[5:])], options.steps)
         else:
             albedo = solve_row(given, row, seed, options.steps)
-            about |= {"seconds": round(time.monotonic() - began, 1), **measure(albedo, given.albedo, given.face, given.regions())}
+            about |= {"seconds": round(time.monotonic() - began, 1),
+                      **measure(albedo, given.albedo, given.face, given.regions())}
         found[_key(row, subject, shadows, options, seed)] = about
     return found
 
@@ -177,15 +184,16 @@ def solve_row(given: MaskedUvProblem, row: str, seed: int, steps: int) -> np.nda
     return solved(given, recipe, tone, seed, cells, mask, with_prior)
 
 
-def solved(given: MaskedUvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0, cells: int = CELLS, mask: str = "painted",
-           with_prior: bool = True) -> np.ndarray:
+def solved(given: MaskedUvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0, cells: int = CELLS,
+           mask: str = "painted", with_prior: bool = True) -> np.ndarray:
     """The linear albedo [S, S, 3] under a recipe and a requested tone."""
     size, prior = len(given.albedo), _prior()
     with tempfile.TemporaryDirectory() as folder:
         capture = Capture(folder)
         images.write_linear(capture.texture, given.texture)
         images.write_data(capture.texture_confidence, np.ones((size, size), np.float32))
-        images.write_data(capture.shadow_mask_auto, {"painted": given.mask, "empty": 0 * given.mask, "full": 0 * given.mask + 1}[mask])
+        images.write_data(capture.shadow_mask_auto,
+                          {"painted": given.mask, "empty": 0 * given.mask, "full": 0 * given.mask + 1}[mask])
         meshes.write_obj(capture.head, template.load())
         evidence = read_evidence(capture, read_head(capture), size)
     start = initial.start(prior, evidence, tone, FACE_CROP / cells, recipe)
@@ -196,10 +204,12 @@ def solved(given: MaskedUvProblem, recipe: Recipe, tone: SkinTone, seed: int = 0
     return maps.finished(state, evidence, start).diffuse
 
 
-def texels_alone(start: initial.Start, recipe: Recipe, updates: int = 600, fit: Callable[..., None] = update_lights, smooth: float = 0.0) -> State:
-    """No prior: the albedo's texels and the lights follow the photometric loss alone, under Adam (the paper's ablation); `smooth`: weight of the albedo's L1
-    variation."""
-    recipe = replace(recipe, phases=tuple((which, 0.0, 1.0) for which, _, _ in recipe.phases), refit=0.0, updates=updates)
+def texels_alone(start: initial.Start, recipe: Recipe, updates: int = 600, fit: Callable[..., None] = update_lights,
+                 smooth: float = 0.0) -> State:
+    """No prior: the albedo's texels and the lights follow the photometric loss alone, under Adam (the paper's
+    ablation); `smooth`: weight of the albedo's L1 variation."""
+    recipe = replace(recipe, phases=tuple((which, 0.0, 1.0) for which, _, _ in recipe.phases), refit=0.0,
+                     updates=updates)
     o, state = start.observations[1], start.state
     x = state.denoised.clone().requires_grad_(True)
     adam = torch.optim.Adam([x], lr=0.01)
@@ -218,7 +228,8 @@ def texels_alone(start: initial.Start, recipe: Recipe, updates: int = 600, fit: 
 
 
 def tone_error(given: MaskedUvProblem, tone: tuple[float, float, float], steps: int) -> tuple[float, float]:
-    """CIEDE2000 between a requested skin tone and the mean of the solved facial skin: as it is delivered, and before the mean is brought to the request."""
+    """CIEDE2000 between a requested skin tone and the mean of the solved facial skin: as it is delivered, and before
+    the mean is brought to the request."""
     skin, found = _skin(len(given.albedo)), []
     for rescale in (OURS.rescale, "none"):
         albedo = solved(given, replace(OURS, steps=steps, rescale=rescale), np.array(tone))

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the ablation measures of a solved albedo, region by region, and the table it makes of many (benchmarks/ablation.py)."""
+"""What the ablation measures of a solved albedo, region by region, and the table it makes of many
+(benchmarks/ablation.py)."""
 
 from __future__ import annotations
 
@@ -22,28 +23,36 @@ REGIONS = ("shadow", "band", "outside")
 FIGURES = ("psnr", "ssim", "flip", "features")
 
 
-def measure(albedo: np.ndarray, truth: np.ndarray, face: np.ndarray, regions: dict[str, np.ndarray]) -> dict[str, dict[str, float]]:
-    """Region -> figures: PSNR in dB, SSIM, FLIP and the feature distance (where its network is installed), in sRGB after the gain per channel (linear)
-    that is best for the whole face. albedo, truth linear [S, S, 3]; face and regions bool [S, S]."""
+def measure(albedo: np.ndarray, truth: np.ndarray, face: np.ndarray,
+            regions: dict[str, np.ndarray]) -> dict[str, dict[str, float]]:
+    """Region -> figures: PSNR in dB, SSIM, FLIP and the feature distance (where its network is installed), in sRGB
+    after the gain per channel (linear) that is best for the whole face. albedo, truth linear [S, S, 3]; face and
+    regions bool [S, S]."""
     gain = (albedo[face] * truth[face]).sum(0) / (albedo[face] ** 2).sum(0)
-    ours, theirs = images.linear_to_srgb(albedo * gain).astype(np.float32), images.linear_to_srgb(truth).astype(np.float32)
+    ours, theirs = images.linear_to_srgb(albedo
+                                         * gain).astype(np.float32), images.linear_to_srgb(truth).astype(np.float32)
     _, ssim = structural_similarity(theirs, ours, channel_axis=2, data_range=1.0, full=True)
     flip, _, _ = flip_evaluate(theirs, ours, "LDR", applyMagma=False, computeMeanError=False)
-    pictures = {"ssim": ssim.mean(-1), "flip": np.squeeze(flip), "features": feature_distance(ours * face[..., None], theirs * face[..., None])}
+    pictures = {"ssim": ssim.mean(-1), "flip": np.squeeze(flip),
+                "features": feature_distance(ours * face[..., None], theirs * face[..., None])}
     return {name: {"psnr": round(float(-10 * np.log10(((ours - theirs)[where] ** 2).mean())), 3),
-                   **{figure: round(float(picture[where].mean()), 4) for figure, picture in pictures.items() if picture is not None}}
+                   **{figure: round(float(picture[where].mean()), 4) for figure, picture in pictures.items()
+                      if picture is not None}}
             for name, where in regions.items()}
 
 
 def feature_distance(one: np.ndarray, other: np.ndarray) -> np.ndarray | None:
-    """[S, S]: squared difference of a network's unit features, summed over its layers (Zhang et al. 2018); None where requirements/perceptual.txt is not
-    installed. Not LPIPS: the network is EfficientNet-Lite0 without learned weights per channel. sRGB [S, S, 3]."""
+    """[S, S]: squared difference of a network's unit features, summed over its layers (Zhang et al. 2018); None where
+    requirements/perceptual.txt is not installed. Not LPIPS: the network is EfficientNet-Lite0 without learned weights
+    per channel. sRGB [S, S, 3]."""
     if (network := _network()) is None:
         return None
     with torch.no_grad():
-        layers = [network.layers(torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1)))[None]) for image in (one, other)]
-        total = sum(functional.interpolate(((functional.normalize(a, dim=1) - functional.normalize(b, dim=1)) ** 2).sum(1, keepdim=True), one.shape[:2],
-                                           mode="bilinear") for a, b in zip(*layers, strict=True))
+        layers = [network.layers(torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1)))[None])
+                  for image in (one, other)]
+        total = sum(functional.interpolate(((functional.normalize(a, dim=1)
+                                             - functional.normalize(b, dim=1)) ** 2).sum(1, keepdim=True),
+                                           one.shape[:2], mode="bilinear") for a, b in zip(*layers, strict=True))
     return total[0, 0].numpy()
 
 
@@ -56,8 +65,9 @@ def _network():
 
 
 def summary(done: dict[str, dict], rows: list[str], first: str) -> dict[str, dict]:
-    """Region -> row -> the means of FIGURES and seconds over the problems that the row was solved on, problems, seeds, and `to_first`: its PSNR's distance
-    to row `first` on just these problems and seeds, in dB (None for itself); and under "spread" half the difference between two seeds of that row, in dB."""
+    """Region -> row -> the means of FIGURES and seconds over the problems that the row was solved on, problems, seeds,
+    and `to_first`: its PSNR's distance to row `first` on just these problems and seeds, in dB (None for itself); and
+    under "spread" half the difference between two seeds of that row, in dB."""
     by_row = {row: {_problem(r): r for r in done.values() if r["row"] == row} for row in rows}
     full = by_row.get(first, {})
     found: dict[str, dict] = {region: {} for region in REGIONS}
@@ -65,7 +75,8 @@ def summary(done: dict[str, dict], rows: list[str], first: str) -> dict[str, dic
         shared = [p for p in results if p in full]
         for region in REGIONS if shared else ():
             mine, best = ([of[p][region] for p in shared] for of in (results, full))
-            means = {figure: float(np.mean([r[figure] for r in mine])) if figure in mine[0] else None for figure in FIGURES}
+            means = {figure: float(np.mean([r[figure] for r in mine])) if figure in mine[0] else None
+                     for figure in FIGURES}
             distance = float(np.mean([a["psnr"] - b["psnr"] for a, b in zip(mine, best, strict=True)]))
             problems, seeds = len({p[:-1] for p in shared}), len({p[-1] for p in shared})
             found[region][row] = {"problems": problems, "seeds": seeds, "to_first": None if row == first else distance,
@@ -74,15 +85,19 @@ def summary(done: dict[str, dict], rows: list[str], first: str) -> dict[str, dic
 
 
 def table(figures: dict[str, dict]) -> str:
-    """Markdown of `summary`: per region a line per row. A distance to the first row that is smaller than the spread over its seeds is a tie."""
+    """Markdown of `summary`: per region a line per row. A distance to the first row that is smaller than the spread
+    over its seeds is a tie."""
     if not figures[REGIONS[0]]:
         return "The first row was not solved yet."
     tables = []
     for region in REGIONS:
         spread, first = figures["spread"][region], next(iter(figures[region]))
-        tables.append(markdown([region, "problems x seeds", "PSNR", f"to {first}", "SSIM", "FLIP", "features", "seconds"], [
-            [row, f"{r['problems']} x {r['seeds']}", f"{r['psnr']:.2f}", "" if row == first else _compared(r["to_first"], spread),
-             *(None if r[figure] is None else f"{r[figure]:.3f}" for figure in FIGURES[1:]), f"{r['seconds']:.0f}"] for row, r in figures[region].items()]))
+        tables.append(markdown([region, "problems x seeds", "PSNR", f"to {first}", "SSIM", "FLIP", "features",
+                                "seconds"], [
+            [row, f"{r['problems']} x {r['seeds']}", f"{r['psnr']:.2f}",
+             "" if row == first else _compared(r["to_first"], spread),
+             *(None if r[figure] is None else f"{r[figure]:.3f}" for figure in FIGURES[1:]), f"{r['seconds']:.0f}"]
+             for row, r in figures[region].items()]))
     return "\n\n".join(tables)
 
 

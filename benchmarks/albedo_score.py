@@ -4,12 +4,12 @@
 
     python -m benchmarks.albedo_score CAPTURE TRUTH [--json OUT.json]
 
-TRUTH holds capture.mp4, albedo/NNNN.png (sRGB with alpha), face/NNNN.png and, under hard light, shadow/NNNN.png, numbered
-by video frame. Figures per capture, each the mean over the frames with truth that were registered:
-  psnr, ssim, flip   as they are, and after one gain per channel in linear light, which removes what a skin tone would supply
-  detail             correlation of log green between 1 and 3 px with the truth's: 1 keeps each pore, 0 is another skin
-  shadow_step        log(predicted / true) 4 to 12 px on the lit side of the true shadow's edge, minus the dark side; 0 is clean
-  face_coverage      share of the face masks that the solved head covers
+TRUTH holds capture.mp4, albedo/NNNN.png (sRGB with alpha), face/NNNN.png and, under hard light, shadow/NNNN.png,
+numbered by video frame. Figures per capture, each the mean over the frames with truth that were registered:
+  psnr, ssim, flip   as they are, and after one gain per channel in linear light, which removes what a skin tone would
+  supply detail             correlation of log green between 1 and 3 px with the truth's: 1 keeps each pore, 0 is
+  another skin shadow_step        log(predicted / true) 4 to 12 px on the lit side of the true shadow's edge, minus the
+  dark side; 0 is clean face_coverage      share of the face masks that the solved head covers
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ LABELS = {"WildCap": "**WildCap**", "raw video": "the raw video", "flat true ton
 
 @dataclass(frozen=True)
 class AlbedoTruth:
-    """One frame's truth: albedo sRGB [H, W, 3], facial skin bool [H, W], and where the sun does not reach, bool [H, W] or None."""
+    """One frame's truth: albedo sRGB [H, W, 3], facial skin bool [H, W], and where the sun does not reach, bool [H, W]
+    or None."""
 
     frame: int
     albedo: np.ndarray
@@ -53,7 +54,8 @@ def read_truth(folder: Path) -> list[AlbedoTruth]:
     frames = []
     for path in sorted((folder / "albedo").glob("*.png")):
         shadow = folder / "shadow" / path.name
-        frames.append(AlbedoTruth(int(path.stem), images.read_srgb(path), images.read_mask(folder / "face" / path.name) > 0.5,
+        frames.append(AlbedoTruth(int(path.stem), images.read_srgb(path),
+                                  images.read_mask(folder / "face" / path.name) > 0.5,
                                   images.read_mask(shadow) > 0.5 if shadow.exists() else None))
     if not frames:
         raise Problem(f"{folder} holds no true albedo.", "Name a folder with albedo/NNNN.png and face/NNNN.png.")
@@ -62,7 +64,8 @@ def read_truth(folder: Path) -> list[AlbedoTruth]:
 
 @dataclass(frozen=True)
 class HeadInView:
-    """What a view with truth sees of a head: hit bool [H, W], and for each pixel that hits where on the map it lies, [N, 2], u and v."""
+    """What a view with truth sees of a head: hit bool [H, W], and for each pixel that hits where on the map it lies,
+    [N, 2], u and v."""
 
     true: AlbedoTruth
     hit: np.ndarray
@@ -77,17 +80,20 @@ class HeadInView:
 
 def score_capture(capture: Capture, truth: Path, pictures: Path | None = None, texture: Path | None = None) -> dict:
     """The figures of a solved capture; `texture` replaces its albedo map (any picture in the head's UVs)."""
-    albedo = images.read_srgb(texture or next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists()))
+    albedo = images.read_srgb(texture
+                              or next(p / "diffuse_albedo.png" for p in (capture.maps_4k, capture.maps) if p.exists()))
     seen, missing = looks(capture, truth)
     if pictures:
         for look in seen:
             mask = (look.true.face & look.hit)[..., None]
-            images.write_srgb(pictures / f"{look.true.frame:04d}.jpg", np.hstack([look.true.albedo * mask, look.picture(albedo) * mask]))
+            images.write_srgb(pictures / f"{look.true.frame:04d}.jpg",
+                              np.hstack([look.true.albedo * mask, look.picture(albedo) * mask]))
     return {"frames_not_registered": missing, **score_map(albedo, seen)}
 
 
 def looks(capture: Capture, truth: Path) -> tuple[list[HeadInView], list[int]]:
-    """The registered frames with truth as they see the capture's head, and the numbers of those that were not registered. Raises Problem where none was."""
+    """The registered frames with truth as they see the capture's head, and the numbers of those that were not
+    registered. Raises Problem where none was."""
     whole = read_head(capture)
     head, caster = whole.mesh, whole.caster
     frames = read_frames(capture).by_name
@@ -101,7 +107,8 @@ def looks(capture: Capture, truth: Path) -> tuple[list[HeadInView], list[int]]:
         hit = face >= 0
         seen.append(HeadInView(true, hit, raster.interpolate(head.uvs, head.face_uvs, face[hit], bary[hit])))
     if not seen:
-        raise Problem("None of the frames with a known albedo was registered.", "Look at the cameras stage in the report.")
+        raise Problem("None of the frames with a known albedo was registered.",
+                      "Look at the cameras stage in the report.")
     return seen, missing
 
 
@@ -135,7 +142,8 @@ def compare(predicted: np.ndarray, true: AlbedoTruth, mask: np.ndarray) -> dict:
     box = face_box(mask)
     predicted, mask = predicted[box], mask[box]
     true = AlbedoTruth(true.frame, true.albedo[box], true.face[box], None if true.shadow is None else true.shadow[box])
-    figures = {"raw": differences(predicted, true.albedo, mask), "gain": differences(with_gain(predicted, true.albedo, mask), true.albedo, mask)}
+    figures = {"raw": differences(predicted, true.albedo, mask),
+               "gain": differences(with_gain(predicted, true.albedo, mask), true.albedo, mask)}
     log_true, log = log_green(true.albedo), log_green(predicted)
     figures["detail"] = detail(log, log_true, mask)
     figures["shadow_step"] = shadow_step(log - log_true, mask, true.shadow) if true.shadow is not None else math.nan
@@ -144,7 +152,8 @@ def compare(predicted: np.ndarray, true: AlbedoTruth, mask: np.ndarray) -> dict:
 
 def mean_scores(results: list[dict]) -> dict:
     """The mean over frames of what `compare` gives."""
-    figures = {kind: {name: float(np.mean([r[kind][name] for r in results])) for name in results[0][kind]} for kind in ("raw", "gain")}
+    figures = {kind: {name: float(np.mean([r[kind][name] for r in results])) for name in results[0][kind]}
+               for kind in ("raw", "gain")}
     for name in ("detail", "shadow_step"):
         values = [r[name] for r in results if not math.isnan(r[name])]
         figures[name] = float(np.mean(values)) if values else None
@@ -152,15 +161,18 @@ def mean_scores(results: list[dict]) -> dict:
 
 
 def rows(scores: dict[str, dict]) -> dict[str, dict]:
-    """Row -> PSNR in dB as it is and after the gain, SSIM, FLIP, detail and shadow step, of what `score_capture` and `score_floors` give."""
-    return {name: {"psnr": score["raw"]["psnr"], "psnr_after_gain": score["gain"]["psnr"], "ssim": score["raw"]["ssim"], "flip": score["raw"]["flip"],
+    """Row -> PSNR in dB as it is and after the gain, SSIM, FLIP, detail and shadow step, of what `score_capture` and
+    `score_floors` give."""
+    return {name: {"psnr": score["raw"]["psnr"], "psnr_after_gain": score["gain"]["psnr"], "ssim": score["raw"]["ssim"],
+                   "flip": score["raw"]["flip"],
                    "detail": score["detail"], "shadow_step": score["shadow_step"]} for name, score in scores.items()}
 
 
 def table(figures: dict) -> str:
     """Markdown of figures["rows"], as `rows` gives them."""
     return markdown(["taken for albedo", "PSNR", "after one gain", "SSIM", "FLIP", "detail", "shadow step"], [
-        [LABELS.get(name, name), f"{r['psnr']:.2f} dB", f"{r['psnr_after_gain']:.2f} dB", f"{r['ssim']:.3f}", f"{r['flip']:.3f}", f"{r['detail']:.2f}",
+        [LABELS.get(name, name), f"{r['psnr']:.2f} dB", f"{r['psnr_after_gain']:.2f} dB", f"{r['ssim']:.3f}",
+         f"{r['flip']:.3f}", f"{r['detail']:.2f}",
          None if r["shadow_step"] is None else f"{r['shadow_step']:.2f}"] for name, r in figures["rows"].items()])
 
 
@@ -168,11 +180,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("capture", type=Path)
     parser.add_argument("truth", type=Path)
-    parser.add_argument("--texture", type=Path, help="score this picture in the head's UVs instead of the solved albedo")
+    parser.add_argument("--texture", type=Path,
+                        help="score this picture in the head's UVs instead of the solved albedo")
     parser.add_argument("--pictures", type=Path, help="folder for truth and result side by side")
     parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/scan_albedo.json")
     arguments = parser.parse_args()
-    scores = {"WildCap": score_capture(Capture(arguments.capture), arguments.truth, arguments.pictures, arguments.texture), **score_floors(arguments.truth)}
+    scores = {"WildCap": score_capture(Capture(arguments.capture), arguments.truth, arguments.pictures,
+                                       arguments.texture), **score_floors(arguments.truth)}
     print(json.dumps(scores, indent=1))
     if arguments.json:
         ours = scores["WildCap"]

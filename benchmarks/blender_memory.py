@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender itself takes with all maps of a capture loaded, and how long a save of a painted mask holds its main thread, in a process of its own.
+"""What Blender itself takes with all maps of a capture loaded, and how long a save of a painted mask holds its main
+thread, in a process of its own.
 
     python -m benchmarks.blender_memory CAPTURE [--resolution 64]
 
-Memory is the process's resident set, GiB, with its peak so far (Linux): of the empty Blender, with the head and the assembled material, after Cycles has
-rendered it (which loads every map), and with a mask of 4096 texels opened and read. The time is that of `keeping.Saving`, the main thread's part of a save;
-beside it that of copying as many bytes, which says how loaded the machine is. The capture is copied first and not changed.
+Memory is the process's resident set, GiB, with its peak so far (Linux): of the empty Blender, with the head and the
+assembled material, after Cycles has rendered it (which loads every map), and with a mask of 4096 texels opened and
+read. The time is that of `keeping.Saving`, the main thread's part of a save; beside it that of copying as many bytes,
+which says how loaded the machine is. The capture is copied first and not changed.
 """
 
 from __future__ import annotations
@@ -67,7 +69,8 @@ def measure(capture: Path, resolution: int) -> None:
         if image.size[0]:
             image.pixels[0]  # loads it, as a viewport that shows it does
     loaded = [image for image in bpy.data.images if image.size[0]]
-    say("every picture loaded: " + ", ".join(f"{Path(image.filepath).name or image.name} {image.size[0]}" for image in loaded))
+    say("every picture loaded: "
+        + ", ".join(f"{Path(image.filepath).name or image.name} {image.size[0]}" for image in loaded))
     save_a_mask(Path(capture))
     say(f"a mask of {MASK} read")
 
@@ -92,13 +95,15 @@ def save_a_mask(folder: Path) -> None:
     started = time.perf_counter()
     into[:] = other
     copying = time.perf_counter() - started
-    print(f"a save of a mask of {MASK} holds Blender for {min(held) * 1e3:.0f} ms (the first time {held[0] * 1e3:.0f} ms); "
+    print(f"a save of a mask of {MASK} holds Blender for {min(held) * 1e3:.0f} ms (the first time {held[0] * 1e3:.0f} "
+          "ms); "
           f"copying as many bytes takes {copying * 1e3:.0f} ms", flush=True)
 
 
 def say(what: str) -> None:
     now = int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 2**30
-    print(f"{now:5.2f} GiB now, {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:5.2f} GiB at most: {what}", flush=True)
+    print(f"{now:5.2f} GiB now, {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:5.2f} GiB at most: {what}",
+          flush=True)
 
 
 if __name__ == "__main__":

@@ -4,8 +4,8 @@
 
     python -m benchmarks.blender_versions CAPTURE [--lights three_point overcast] [--resolution 192] [--samples 64]
 
-Each Blender module (.blenders/* of `make test-blenders`, and the one in .venv) renders in a process of its own, from a copy of the capture, through
-the add-on's own functions. Exit code 1 when a pair differs by more than LIMITS.
+Each Blender module (.blenders/* of `make test-blenders`, and the one in .venv) renders in a process of its own, from a
+copy of the capture, through the add-on's own functions. Exit code 1 when a pair differs by more than LIMITS.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from core.imaging import images
 ROOT = Path(__file__).resolve().parent.parent
 USED = ("capture.json", "head.obj", "maps", "maps_4k", "delivery/displacement.exr")
 LIMITS = {"mean": 0.01, "rmse": 0.05}
-"""Of the difference of the means, and of the pixels' root mean square difference (noise included), over the mean of the picture"""
+"""Of the difference of the means, and of the pixels' root mean square difference (noise included), over the mean of the
+picture"""
 
 
 def main() -> int:
@@ -51,7 +52,8 @@ def main() -> int:
 
 def rendered(python: Path, asked: argparse.Namespace, folder: Path) -> tuple[str, dict[str, np.ndarray]]:
     """The version of that Python's Blender, and its linear pictures by light."""
-    version = subprocess.run([python, "-c", "import bpy; print(bpy.app.version_string, flush=True); import os; os._exit(0)"],
+    version = subprocess.run([python, "-c",
+                              "import bpy; print(bpy.app.version_string, flush=True); import os; os._exit(0)"],
                              check=True, capture_output=True, text=True).stdout.splitlines()[-1].split()[0]
     copy = Capture(folder / f"{version}.wildcap")
     for name in USED:
@@ -61,8 +63,10 @@ def rendered(python: Path, asked: argparse.Namespace, folder: Path) -> tuple[str
             shutil.copytree(source, target)
         elif source.is_file():
             shutil.copyfile(source, target)
-    subprocess.run([python, "-m", "benchmarks.render_capture", copy.root, *asked.lights, "--resolution", str(asked.resolution),
-                    "--samples", str(asked.samples)], cwd=ROOT, stdout=subprocess.DEVNULL)  # the oldest module crashes at its exit
+    subprocess.run([python, "-m", "benchmarks.render_capture", copy.root, *asked.lights, "--resolution",
+                    str(asked.resolution),
+                    # the oldest module crashes at its exit
+                    "--samples", str(asked.samples)], cwd=ROOT, stdout=subprocess.DEVNULL)
     return version, {light: images.read_data(copy.renders / f"{light}.exr")[..., :3] for light in asked.lights}
 
 

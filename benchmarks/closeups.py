@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Close-ups of the six people of benchmarks/people.py by the add-on's own buttons: what hair_closeups.py and eyes_closeups.py share.
+"""Close-ups of the six people of benchmarks/people.py by the add-on's own buttons: what hair_closeups.py and
+eyes_closeups.py share.
 
-Maps and heads are the true ones, so the pictures show what hair, eyes and mouth do and nothing of a solve's errors. Cycles's linear light under the sRGB
-curve (Blender's view transform Standard).
+Maps and heads are the true ones, so the pictures show what hair, eyes and mouth do and nothing of a solve's errors.
+Cycles's linear light under the sRGB curve (Blender's view transform Standard).
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ EEVEE_SAMPLES = 32
 
 @dataclass(frozen=True)
 class Shot:
-    """What a picture shows: opened: how far the eyes are open; units: face units and their values; at: one of SEAMS, `above_m` metres above it, seen from
-    the side `way` [3] in the head's axes through a lens of `lens_mm`."""
+    """What a picture shows: opened: how far the eyes are open; units: face units and their values; at: one of SEAMS,
+    `above_m` metres above it, seen from the side `way` [3] in the head's axes through a lens of `lens_mm`."""
 
     light: str
     at: str
@@ -48,7 +49,8 @@ Shots = Callable[[str], dict[str, Shot]]
 
 
 def run(module: str, told: str, shots: Shots, resolution: int, samples: int) -> None:
-    """The command of `module`, whose docstring is `told`: a row for each person, its pictures those of `shots`, name -> Shot for the name of a person."""
+    """The command of `module`, whose docstring is `told`: a row for each person, its pictures those of `shots`, name ->
+    Shot for the name of a person."""
     parser = argparse.ArgumentParser(description=told, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="keeps captures and renders; finished renders are taken as they are")
     parser.add_argument("out", type=Path)
@@ -61,12 +63,16 @@ def run(module: str, told: str, shots: Shots, resolution: int, samples: int) -> 
     from .gallery import write_small
     from .people import PEOPLE
 
-    captures = [prepare(asked.folder, person.name, person.seed) for person in PEOPLE if person.name in (asked.only or [person.name])]
+    captures = [prepare(asked.folder, person.name, person.seed) for person in PEOPLE
+                if person.name in (asked.only or [person.name])]
     rows = []
-    for capture in captures:  # each in a process of its own: what EEVEE has compiled for one head, it does not give back
+    # each in a process of its own: what EEVEE has compiled for one head, it does not give back
+    for capture in captures:
         words = [str(capture), str(asked.resolution), str(asked.samples)]
-        subprocess.run([sys.executable, "-m", "benchmarks.closeups", f"benchmarks.{module}", *words], cwd=ROOT, check=True)
-        rows.append(np.concatenate([images.read_srgb(capture / "renders" / f"{name}.png") for name in shots(capture.stem)], 1))
+        subprocess.run([sys.executable, "-m", "benchmarks.closeups", f"benchmarks.{module}", *words], cwd=ROOT,
+                       check=True)
+        rows.append(np.concatenate([images.read_srgb(capture / "renders" / f"{name}.png")
+                                    for name in shots(capture.stem)], 1))
     write_small(asked.out, np.concatenate(rows))
 
 
@@ -93,7 +99,8 @@ def prepare(folder: Path, name: str, seed: int) -> Path:
         images.write_linear(capture.maps / "diffuse_albedo.exr", skin.diffuse)
         images.write_linear(capture.maps / "shading.exr", np.ones_like(skin.diffuse))
         images.write_data(capture.maps / "confidence.png", 0.9 * template.mask("face", len(skin.diffuse)))
-        upscale.run(capture, from_json({"upscale": {"size": 2048, "method": "lanczos", "whole_head": False}}), Reporter("upscale"))
+        upscale.run(capture, from_json({"upscale": {"size": 2048, "method": "lanczos", "whole_head": False}}),
+                    Reporter("upscale"))
     return capture.root
 
 

@@ -1,17 +1,20 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Albedo against truth, the paper's protocol for Digital Emily: our light beside other methods' light models, on delit and on raw frames.
+"""Albedo against truth, the paper's protocol for Digital Emily: our light beside other methods' light models, on delit
+and on raw frames.
 
-    python -m benchmarks.comparison FOLDER [--only NAME ...] [--scan CAPTURE TRUTH] [--size 512] [--jobs 2] [--json OUT.json]
+    python -m benchmarks.comparison FOLDER [--only NAME ...] [--scan CAPTURE TRUTH] [--size 512] [--jobs 2] [--json
+    OUT.json]
 
-FOLDER was made and solved by benchmarks/people.py; CAPTURE is a solved one of another subject, TRUTH its folder. Rows of INPUT: METHOD over one texture:
-  wildcap                  the texel grid of local light in the shadow mask, with two seeds, whose spread says what a tie is
-  regions 5, regions 10    soft regions with a light each (light_models.py)      environment    one environment cubemap
-  environment, no prior    the same, and texels that follow the frames alone, smoothly
-  over its blur            the texture divided by its own blur, what one does by hand in Blender
+FOLDER was made and solved by benchmarks/people.py; CAPTURE is a solved one of another subject, TRUTH its folder. Rows
+  of INPUT: METHOD over one texture: wildcap                  the texel grid of local light in the shadow mask, with two
+  seeds, whose spread says what a tie is regions 5, regions 10    soft regions with a light each (light_models.py)
+  environment    one environment cubemap environment, no prior    the same, and texels that follow the frames alone,
+  smoothly over its blur            the texture divided by its own blur, what one does by hand in Blender
   texture                  taken for albedo as it is
-All but the last three sample the same prior with the same guidance; all are told the true skin tone. Raw rows get the mask that the chain proposes for
-raw frames. Maps are kept in FOLDER/comparison (benchmarks/rerender.py reads them), so that a second run goes on where the first stopped.
+All but the last three sample the same prior with the same guidance; all are told the true skin tone. Raw rows get the
+mask that the chain proposes for raw frames. Maps are kept in FOLDER/comparison (benchmarks/rerender.py reads them), so
+that a second run goes on where the first stopped.
 """
 
 from __future__ import annotations
@@ -81,12 +84,14 @@ def main() -> None:
         subjects["scan"] = tuple(path.resolve() for path in asked.scan)
     found = {}
     with ProcessPoolExecutor(asked.jobs, get_context("spawn")) as pool:
-        running = {pool.submit(compare_methods, *paths, folder / "comparison" / name, asked.size): name for name, paths in subjects.items()}
+        running = {pool.submit(compare_methods, *paths, folder / "comparison" / name, asked.size): name
+                   for name, paths in subjects.items()}
         for future in as_completed(running):
             found[running[future]] = future.result()
             print(f"{running[future]} compared", flush=True)
     found = {"size": asked.size, "subjects": {name: found[name] for name in subjects}}
-    found |= {"people": means([rows for name, rows in found["subjects"].items() if name != "scan"])} if set(found["subjects"]) - {"scan"} else {}
+    found |= {"people": means([rows for name, rows in found["subjects"].items()
+                               if name != "scan"])} if set(found["subjects"]) - {"scan"} else {}
     found |= {"scan": means([found["subjects"]["scan"]])} if "scan" in subjects else {}
     if asked.json:
         figures.write(asked.json, "comparison", "python -m benchmarks.comparison FOLDER --scan CAPTURE TRUTH", found)
@@ -98,7 +103,8 @@ def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[st
     torch.set_num_threads(1)
     found: dict[str, dict] = {given: {} for given in INPUTS}
     for given in INPUTS:
-        settings = from_json({"solve": {"skin_tone": skin_tone(truth), "size": size}, "delight": {"delighter": "none"} if given == "raw" else {}},
+        settings = from_json({"solve": {"skin_tone": skin_tone(truth), "size": size},
+                              "delight": {"delighter": "none"} if given == "raw" else {}},
                              preset("standard"))
         capture = Capture(source) if given == "delit" else _raw(Capture(source), work / "raw.wildcap", settings)
         seen = None
@@ -108,7 +114,8 @@ def compare_methods(source: Path, truth: Path, work: Path, size: int) -> dict[st
                 if not (row / "score.json").is_file():
                     seen = seen or looks(capture, truth)[0]
                     _keep(row, *solved(capture, settings, method, seed), seen)
-                found[given].setdefault(method, {})[str(seed)] = json.loads((row / "score.json").read_text(encoding="utf-8"))
+                found[given].setdefault(method,
+                                        {})[str(seed)] = json.loads((row / "score.json").read_text(encoding="utf-8"))
     return found
 
 
@@ -127,7 +134,8 @@ def solved(capture: Capture, settings: Settings, method: str, seed: int) -> tupl
     prior = _prior()
     cell = evidence.cell_side(settings.solve.grid_cells)
     tone = parse_skin_tone(settings.solve.skin_tone)
-    start = initial.start(prior, evidence, tone, cell, recipe_of(settings, prior), lambda marks: confirmed(capture, head, marks, evidence.size))
+    start = initial.start(prior, evidence, tone, cell, recipe_of(settings, prior),
+                          lambda marks: confirmed(capture, head, marks, evidence.size))
     fit, recipe = {}, start.recipe
     if method in LIGHTS:
         start, recipe, move = LIGHTS[method](start, recipe)
@@ -146,7 +154,8 @@ def _by_hand(capture: Capture, evidence: Evidence, settings: Settings, method: s
     texture = np.maximum(images.resize(images.read_linear(capture.texture), size, size), 0)
     shading = np.ones_like(texture)
     if method != "texture":
-        blurred, share = (cv2.GaussianBlur(a, (0, 0), BLUR * len(texture)) for a in (texture * weight, np.repeat(weight, 3, 2)))
+        blurred, share = (cv2.GaussianBlur(a, (0, 0), BLUR * len(texture))
+                          for a in (texture * weight, np.repeat(weight, 3, 2)))
         shading = np.maximum(blurred / np.maximum(share, 1e-3), 1e-3)
     skin = weight * evidence.skin.numpy()[..., None]
     tone = np.array(parse_skin_tone(settings.solve.skin_tone).linear, np.float32)
@@ -163,11 +172,14 @@ def _keep(row: Path, diffuse: np.ndarray, shading: np.ndarray, seconds: float, s
 
 
 def _raw(source: Capture, folder: Path, settings: Settings) -> Capture:
-    """A copy of a capture whose texture is the frames' as filmed, with the mask that the chain proposes for it; made once."""
+    """A copy of a capture whose texture is the frames' as filmed, with the mask that the chain proposes for it; made
+    once."""
     copy = Capture(folder)
     if not copy.shadow_mask_auto.is_file():
         shutil.rmtree(folder, ignore_errors=True)
-        shutil.copytree(source.root, folder, ignore=shutil.ignore_patterns("maps*", "preview", "checkpoints", "renders", "delivery", "delit", "lock",
+        shutil.copytree(source.root, folder,
+                        ignore=shutil.ignore_patterns("maps*", "preview", "checkpoints", "renders", "delivery", "delit",
+                                                      "lock",
                                                                           "shadow_mask*", "mask_history", "texture*"))
         for stage in ("delight", "texture", "shadow_mask"):
             import_module(f"core.{stage}").run(copy, settings, Reporter(stage))
@@ -179,22 +191,29 @@ def _prior():
     return load()
 
 
-COLUMNS = {"PSNR": lambda s: s["raw"]["psnr"], "after one gain": lambda s: s["gain"]["psnr"], "SSIM": lambda s: s["gain"]["ssim"],
-           "FLIP": lambda s: s["gain"]["flip"], "detail": lambda s: s["detail"], "shadow step": lambda s: s["shadow_step"]}
-FORMATS = {"PSNR": "{:.2f}", "after one gain": "{:.2f}", "SSIM": "{:.3f}", "FLIP": "{:.3f}", "detail": "{:.2f}", "shadow step": "{:.2f}"}
+COLUMNS = {"PSNR": lambda s: s["raw"]["psnr"], "after one gain": lambda s: s["gain"]["psnr"],
+           "SSIM": lambda s: s["gain"]["ssim"],
+           "FLIP": lambda s: s["gain"]["flip"], "detail": lambda s: s["detail"],
+           "shadow step": lambda s: s["shadow_step"]}
+FORMATS = {"PSNR": "{:.2f}", "after one gain": "{:.2f}", "SSIM": "{:.3f}", "FLIP": "{:.3f}", "detail": "{:.2f}",
+           "shadow step": "{:.2f}"}
 
 
 def means(subjects: list[dict]) -> dict:
-    """Of several subjects' figures: input -> method -> column -> mean of the first seed; and 'spread': half of what two seeds of ours differ by."""
-    out: dict = {given: {method: {column: _mean([value(one[given][method]["0"]) for one in subjects]) for column, value in COLUMNS.items()}
+    """Of several subjects' figures: input -> method -> column -> mean of the first seed; and 'spread': half of what two
+    seeds of ours differ by."""
+    out: dict = {given: {method: {column: _mean([value(one[given][method]["0"]) for one in subjects])
+                                  for column, value in COLUMNS.items()}
                          for method in subjects[0][given]} for given in subjects[0]}
     two = [one["delit"][OURS] for one in subjects]
-    return out | {"spread": {column: _mean([abs(value(s["0"]) - value(s["1"])) / 2 for s in two if value(s["0"]) is not None])
+    return out | {"spread": {column: _mean([abs(value(s["0"]) - value(s["1"])) / 2 for s in two
+                                            if value(s["0"]) is not None])
                              for column, value in COLUMNS.items()}}
 
 
 def table(found: dict) -> str:
-    """Markdown: a line per row with the means over the people, of each input's rows the best of each column and what ties with it in bold; then the scan's."""
+    """Markdown: a line per row with the means over the people, of each input's rows the best of each column and what
+    ties with it in bold; then the scan's."""
     parts = []
     for key, title in (("people", "mean of the people"), ("scan", "head scan")):
         if key not in found:
@@ -203,7 +222,8 @@ def table(found: dict) -> str:
         for given in INPUTS:
             rows = found[key].get(given, {})
             for method, cells in rows.items():
-                line = [_cell(column, cells[column], [r[column] for r in rows.values()], spread[column]) for column in COLUMNS]
+                line = [_cell(column, cells[column], [r[column] for r in rows.values()], spread[column])
+                        for column in COLUMNS]
                 lines.append([f"{given}: {method}", *line])
         lines.append(["*spread over seeds*", *(_text(column, spread[column]) for column in COLUMNS)])
         parts.append(figures.markdown([title, *COLUMNS], lines))

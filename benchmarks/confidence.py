@@ -1,12 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the confidence map knows where the solved albedo is wrong, on UV-space problems of held-out synthetic subjects.
+"""Whether the confidence map knows where the solved albedo is wrong, on UV-space problems of held-out synthetic
+subjects.
 
-    python -m benchmarks.confidence [--subjects 9000 ... 9005] [--size 256] [--steps 20] [--picture PATH] [--json OUT.json]
+    python -m benchmarks.confidence [--subjects 9000 ... 9005] [--size 256] [--steps 20] [--picture PATH] [--json
+    OUT.json]
 
-Prints, per subject, Spearman's correlation of 1 - confidence with the true error over the texels of the face (absolute difference in sRGB, mean of the
-channels, after the gain per channel that is best for the whole face), and the error of the more confident half over that of the rest. All of the texture
-was seen here: what visibility adds is not measured. The constants of core/solve/confidence.py were fitted to the subjects 9100 to 9104.
+Prints, per subject, Spearman's correlation of 1 - confidence with the true error over the texels of the face (absolute
+difference in sRGB, mean of the channels, after the gain per channel that is best for the whole face), and the error of
+the more confident half over that of the rest. All of the texture was seen here: what visibility adds is not measured.
+The constants of core/solve/confidence.py were fitted to the subjects 9100 to 9104.
 """
 
 from __future__ import annotations
@@ -55,7 +58,8 @@ def main() -> None:
     print(f"mean             {rho:8.3f} {'':31} {ratio:6.2f}")
     if options.json:
         write(options.json, "confidence", "python -m benchmarks.confidence",
-              {"subjects": len(rows), "correlation": {"mean": rho, "best": max(each for each, _ in rows)}, "error_of_confident_half": ratio})
+              {"subjects": len(rows), "correlation": {"mean": rho, "best": max(each for each, _ in rows)},
+               "error_of_confident_half": ratio})
     if options.picture:
         images.write_srgb(options.picture, np.repeat(np.vstack(shown)[..., None], 3, 2))
 
@@ -66,7 +70,8 @@ def solved(subject: int, shadows: str, size: int, steps: int) -> tuple[np.ndarra
     skin = template.mask("skin", size) * (1 - template.mask("eyes", size))
     tone = SkinTone.from_linear((truth * skin[..., None]).sum((0, 1)) / skin.sum(), GIVEN)
     settings = from_json({"delight": {"delighter": "none"},
-                          "solve": {"size": size, "steps": steps, "skin_tone": format_skin_tone(tone), "checkpoint_every": 600}})
+                          "solve": {"size": size, "steps": steps, "skin_tone": format_skin_tone(tone),
+                                    "checkpoint_every": 600}})
     with tempfile.TemporaryDirectory() as folder:
         capture = Capture(folder)
         images.write_linear(capture.texture, texture)
@@ -74,17 +79,21 @@ def solved(subject: int, shadows: str, size: int, steps: int) -> tuple[np.ndarra
         images.write_data(capture.shadow_mask_auto, mask)
         meshes.write_obj(capture.head, template.load())
         solve.run(capture, settings, Reporter("solve"))
-        albedo, confidence = images.read_linear(capture.maps / "diffuse_albedo.exr"), images.read_mask(capture.maps / "confidence.png")
+        albedo, confidence = images.read_linear(capture.maps
+                                                / "diffuse_albedo.exr"), images.read_mask(capture.maps
+                                                                                          / "confidence.png")
     face = template.mask("face", size) > 0.5
     gain = (albedo[face] * truth[face]).sum(0) / (albedo[face] ** 2).sum(0)
     return np.abs(images.linear_to_srgb(albedo * gain) - images.linear_to_srgb(truth)).mean(-1), confidence, face
 
 
 def judged(error: np.ndarray, confidence: np.ndarray) -> tuple[float, float, float]:
-    """Spearman's correlation of doubt with error [N], and the mean error of the more confident half and of the other."""
+    """Spearman's correlation of doubt with error [N], and the mean error of the more confident half and of the
+    other."""
     order = np.argsort(-confidence, kind="stable")
     half = len(order) // 2
-    return float(spearmanr(1 - confidence, error)[0]), float(error[order[:half]].mean()), float(error[order[half:]].mean())
+    return float(spearmanr(1 - confidence,
+                           error)[0]), float(error[order[:half]].mean()), float(error[order[half:]].mean())
 
 
 if __name__ == "__main__":

@@ -1,16 +1,19 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an in-the-wild capture loses to a controlled one, and what the solve adds to a studio's even light: the same people, their true albedo known.
+"""What an in-the-wild capture loses to a controlled one, and what the solve adds to a studio's even light: the same
+people, their true albedo known.
 
     python -m benchmarks.controlled FOLDER [--only NAME ...] [--json OUT.json] [--pictures FOLDER]
 
-FOLDER was made by benchmarks/people.py (--places wild flash studio) and its wild captures are solved. Rows, each an albedo map in the same UVs:
-  wild             the chain's own                             wild_texture    its texture taken for the albedo
-  flash            dark room, lamp at the camera: the known light divided out (flash_light.py), solved over the same prior with that light held
-  flash_texture    the same, before the solve                  limit           the true albedo frames as a texture: what geometry and texture leave
-  studio           sixteen cameras in even light, no delighter, empty mask, solved by the stage      studio_texture    its texture taken for the albedo
-All are scored in the wild capture's frames that have a truth; all share head, prior, quality and true skin tone. FOLDER/controlled keeps maps and figures,
-so that a second run goes on where the first stopped. A set that has not been made is left out; what OUT.json has and FOLDER has not stays in it.
+FOLDER was made by benchmarks/people.py (--places wild flash studio) and its wild captures are solved. Rows, each an
+  albedo map in the same UVs: wild             the chain's own                             wild_texture    its texture
+  taken for the albedo flash            dark room, lamp at the camera: the known light divided out (flash_light.py),
+  solved over the same prior with that light held flash_texture    the same, before the solve                  limit
+        the true albedo frames as a texture: what geometry and texture leave studio           sixteen cameras in even
+        light, no delighter, empty mask, solved by the stage      studio_texture    its texture taken for the albedo
+All are scored in the wild capture's frames that have a truth; all share head, prior, quality and true skin tone.
+FOLDER/controlled keeps maps and figures, so that a second run goes on where the first stopped. A set that has not been
+made is left out; what OUT.json has and FOLDER has not stays in it.
 """
 
 from __future__ import annotations
@@ -38,11 +41,11 @@ from .people import PEOPLE, skin_tone
 from .texture import looks_of, score
 
 COMMAND = "python -m benchmarks.controlled FOLDER"
-GAP = {"wild_texture": "in the wild, texture", "wild": "in the wild, solved", "flash_texture": "flash, texture", "flash": "flash, solved",
-       "limit": "true frames, texture"}
+GAP = {"wild_texture": "in the wild, texture", "wild": "in the wild, solved", "flash_texture": "flash, texture",
+       "flash": "flash, solved", "limit": "true frames, texture"}
 STUDIO = {"studio_texture": "studio, texture", "studio": "studio, solved"}
-COLUMNS = {"psnr": ("PSNR", 2), "psnr_after_gain": ("after one gain", 2), "ssim_after_gain": ("SSIM", 3), "flip_after_gain": ("FLIP", 3),
-           "detail": ("detail", 2), "mole_contrast": ("mole contrast", 2)}
+COLUMNS = {"psnr": ("PSNR", 2), "psnr_after_gain": ("after one gain", 2), "ssim_after_gain": ("SSIM", 3),
+           "flip_after_gain": ("FLIP", 3), "detail": ("detail", 2), "mole_contrast": ("mole contrast", 2)}
 
 
 def main() -> int:
@@ -50,7 +53,8 @@ def main() -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", choices=[p.name for p in PEOPLE], default=[p.name for p in PEOPLE])
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--pictures", type=Path, help="folder for NAME.jpg: frontal cut of the maps wild, flash, studio, and the truth")
+    parser.add_argument("--pictures", type=Path,
+                        help="folder for NAME.jpg: frontal cut of the maps wild, flash, studio, and the truth")
     asked = parser.parse_args()
     folder = asked.folder.resolve()
     if not folder.is_dir():
@@ -60,7 +64,8 @@ def main() -> int:
         parser.error(f"{folder} holds no capture of benchmarks/people.py.")
     for name in found if asked.pictures else ():
         images.write_srgb(asked.pictures / f"{name}.jpg", side_by_side(folder, name))
-    known = figures.read(asked.json.stem, asked.json.parent)["figures"]["people"] if asked.json and asked.json.exists() else {}
+    known = (figures.read(asked.json.stem, asked.json.parent)["figures"]["people"] if asked.json and asked.json.exists()
+             else {})
     everyone = figures.merged(known, found)
     people = {p.name: everyone[p.name] for p in PEOPLE if p.name in everyone}
     summary = {"people": people, "mean": means(people)}
@@ -76,14 +81,21 @@ def measure(folder: Path, name: str) -> dict[str, dict]:
     if not (truth / "skin_tone.txt").is_file():
         return {}
     settings = from_json({"solve": {"skin_tone": skin_tone(truth)}}, preset("standard"))
-    sets = {"wild": Capture(kept / "limit.wildcap"), "flash": Capture(kept / "flash.wildcap"), "studio": Capture(kept / "studio.wildcap")}
+    sets = {"wild": Capture(kept / "limit.wildcap"), "flash": Capture(kept / "flash.wildcap"),
+            "studio": Capture(kept / "studio.wildcap")}
     makers: dict[str, tuple[str, Callable[[], tuple[np.ndarray, dict]]]] = {
         "wild_texture": ("solved", lambda: (as_albedo(wild, settings), {})),
         "wild": ("solved", lambda: (images.read_srgb(wild.maps / "diffuse_albedo.png"), {})),
-        "flash_texture": ("flash", lambda: (as_albedo(flash(_set(folder, name, "flash"), sets["flash"], settings), settings), {})),
-        "flash": ("flash", lambda: under_even_light(flash(_set(folder, name, "flash"), sets["flash"], settings), settings)),
-        "studio_texture": ("studio", lambda: (as_albedo(studio(_set(folder, name, "studio"), sets["studio"], settings), settings), {})),
-        "studio": ("studio", lambda: by_the_stage(studio(_set(folder, name, "studio"), sets["studio"], settings), settings)),
+        "flash_texture": ("flash",
+                          lambda: (as_albedo(flash(_set(folder, name, "flash"), sets["flash"], settings), settings),
+                                   {})),
+        "flash": ("flash",
+                  lambda: under_even_light(flash(_set(folder, name, "flash"), sets["flash"], settings), settings)),
+        "studio_texture": ("studio",
+                           lambda: (as_albedo(studio(_set(folder, name, "studio"), sets["studio"], settings), settings),
+                                    {})),
+        "studio": ("studio",
+                   lambda: by_the_stage(studio(_set(folder, name, "studio"), sets["studio"], settings), settings)),
         "limit": ("wild", lambda: (as_albedo(true_frames(wild, truth, sets["wild"], settings), settings), {})),
     }
     there = {"wild": True, "solved": (wild.maps / "diffuse_albedo.png").is_file(),
@@ -104,9 +116,11 @@ def measure(folder: Path, name: str) -> dict[str, dict]:
 
 
 def side_by_side(folder: Path, name: str, size: int = 512) -> np.ndarray:
-    """The front of the face in the maps wild, flash, studio and the true one, sRGB; those that are missing are left out."""
+    """The front of the face in the maps wild, flash, studio and the true one, sRGB; those that are missing are left
+    out."""
     kept = folder / "controlled" / name
-    paths = [*(kept / f"{row}.png" for row in ("wild", "flash", "studio")), folder / name / "maps" / "diffuse_albedo.png"]
+    paths = [*(kept / f"{row}.png" for row in ("wild", "flash", "studio")),
+             folder / name / "maps" / "diffuse_albedo.png"]
     rows, columns = (np.flatnonzero(template.mask("face", size).max(axis) > 0.5) for axis in (1, 0))
     box = np.s_[rows[0]:rows[-1] + 1, columns[0]:columns[-1] + 1]
     return np.hstack([images.resize(images.read_srgb(path), size, size)[box] for path in paths if path.is_file()])
@@ -117,7 +131,8 @@ def means(found: dict[str, dict]) -> dict[str, dict]:
     out = {}
     for table_rows in (GAP, STUDIO):
         people = whole(found, table_rows)
-        out |= {row: {figure: round(float(np.mean([rows[row][figure] for rows in people])), 4) for figure in people[0][row]
+        out |= {row: {figure: round(float(np.mean([rows[row][figure] for rows in people])), 4)
+                      for figure in people[0][row]
                       if all(rows[row].get(figure) is not None for rows in people)} for row in table_rows if people}
     return out
 
@@ -136,23 +151,30 @@ def table(found: dict) -> str:
         parts.append((head, [[label, *(_text(mean[row].get(figure), digits) for figure, (_, digits) in COLUMNS.items())]
                              for row, label in rows.items() if row in mean]))
     three = ("wild", "flash", "limit")
-    head = ["dB after one gain", "in the wild", "flash", "true frames", "gap to flash", "moles, in the wild", "moles, flash", "moles, true frames"]
+    head = ["dB after one gain", "in the wild", "flash", "true frames", "gap to flash", "moles, in the wild",
+            "moles, flash", "moles, true frames"]
     parts.append((head, [[name.replace("_", " "), *(_text(rows[row]["psnr_after_gain"], 2) for row in three),
                           f"{rows['flash']['psnr_after_gain'] - rows['wild']['psnr_after_gain']:+.2f}",
-                          *(_text(rows[row].get("mole_contrast"), 2) for row in three)] for name, rows in everyone.items() if {*three} <= {*rows}]))
-    head = ["dB after one gain", "texture", "solved", "the solve adds", "detail, texture", "detail, solved", "proposed mask, % of the face", "seconds"]
+                          *(_text(rows[row].get("mole_contrast"), 2) for row in three)]
+                         for name, rows in everyone.items() if {*three} <= {*rows}]))
+    head = ["dB after one gain", "texture", "solved", "the solve adds", "detail, texture", "detail, solved",
+            "proposed mask, % of the face", "seconds"]
     parts.append((head, [[name.replace("_", " "), *(_text(rows[row]["psnr_after_gain"], 2) for row in STUDIO),
                           f"{rows['studio']['psnr_after_gain'] - rows['studio_texture']['psnr_after_gain']:+.2f}",
-                          *(_text(rows[row]["detail"], 2) for row in STUDIO), _text(rows["studio"]["proposed_mask_percent"], 2),
-                          _text(rows["studio"]["seconds"], 0)] for name, rows in everyone.items() if {*STUDIO} <= {*rows}]))
+                          *(_text(rows[row]["detail"], 2) for row in STUDIO),
+                          _text(rows["studio"]["proposed_mask_percent"], 2),
+                          _text(rows["studio"]["seconds"], 0)] for name, rows in everyone.items()
+                         if {*STUDIO} <= {*rows}]))
     return "\n\n".join(figures.markdown(head, lines) for head, lines in parts if lines)
 
 
 def _set(folder: Path, name: str, place: str) -> Capture:
-    """The person's capture at a place. Raises Problem where its head is not the wild capture's, in whose frames all is scored."""
+    """The person's capture at a place. Raises Problem where its head is not the wild capture's, in whose frames all is
+    scored."""
     capture = Capture(folder / f"{name}_{place}.wildcap")
     if capture.head.read_bytes() != (folder / f"{name}.wildcap" / "head.obj").read_bytes():
-        raise Problem(f"{capture.root} has another head than {name}.wildcap.", "Make both by the same version of benchmarks/people.py.")
+        raise Problem(f"{capture.root} has another head than {name}.wildcap.",
+                      "Make both by the same version of benchmarks/people.py.")
     return capture
 
 

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The captures of benchmarks/controlled.py and their solves: a flash in the dark, a studio's even light, and the true albedo for frames.
+"""The captures of benchmarks/controlled.py and their solves: a flash in the dark, a studio's even light, and the true
+albedo for frames.
 
-Each begins from frames, cameras and head of a capture of benchmarks/people.py, works in a copy that is made once, and leaves an albedo map in the same UVs.
+Each begins from frames, cameras and head of a capture of benchmarks/people.py, works in a copy that is made once, and
+leaves an albedo map in the same UVs.
 """
 
 from __future__ import annotations
@@ -39,19 +41,24 @@ def flash(source: Capture, work: Capture, settings: Settings) -> Capture:
     if not work.texture_confidence.is_file():
         _copy(source, work)
         write_delit(work, work.root / "without_lamp")
-        _run(work, from_json({"delight": {"delighter": "folder", "folder": str(work.root / "without_lamp")}}, settings), "delight", "texture")
+        _run(work, from_json({"delight": {"delighter": "folder", "folder": str(work.root / "without_lamp")}}, settings),
+             "delight", "texture")
     images.write_data(work.shadow_mask_auto, EMPTY)
     return work
 
 
 def under_even_light(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict]:
-    """The solver's albedo, sRGB [S, S, 3], where the light is known and gone: even, one colour, held throughout; and the seconds."""
+    """The solver's albedo, sRGB [S, S, 3], where the light is known and gone: even, one colour, held throughout; and
+    the seconds."""
     began, prior = time.monotonic(), _prior()
     recipe = replace(recipe_of(settings, prior), fitted=False, phases=(), refit=0.0, linear=0.0)
     evidence = read_evidence(capture, read_head(capture), settings.solve.size)
-    start = initial.start(prior, evidence, parse_skin_tone(settings.solve.skin_tone), evidence.cell_side(settings.solve.grid_cells), recipe)
-    state = Sampler(prior.of_tone(start.tone), start.recipe, seeded(settings.seed)).sample(start.observations, start.state)
-    return images.linear_to_srgb(maps.finished(state, evidence, start).diffuse), {"seconds": round(time.monotonic() - began, 1)}
+    start = initial.start(prior, evidence, parse_skin_tone(settings.solve.skin_tone),
+                          evidence.cell_side(settings.solve.grid_cells), recipe)
+    state = Sampler(prior.of_tone(start.tone), start.recipe,
+                    seeded(settings.seed)).sample(start.observations, start.state)
+    return images.linear_to_srgb(maps.finished(state, evidence,
+                                               start).diffuse), {"seconds": round(time.monotonic() - began, 1)}
 
 
 def studio(source: Capture, work: Capture, settings: Settings) -> Capture:
@@ -64,7 +71,8 @@ def studio(source: Capture, work: Capture, settings: Settings) -> Capture:
 
 
 def by_the_stage(capture: Capture, settings: Settings) -> tuple[np.ndarray, dict]:
-    """The solve stage's albedo, sRGB [S, S, 3]; its seconds, and the share of the seen face that the proposed mask would have covered, in percent."""
+    """The solve stage's albedo, sRGB [S, S, 3]; its seconds, and the share of the seen face that the proposed mask
+    would have covered, in percent."""
     began = time.monotonic()
     _run(capture, from_json({"delight": {"delighter": "none"}}, settings), "solve")
     seconds, proposed = time.monotonic() - began, images.read_mask(capture.shadow_mask_auto)
@@ -77,13 +85,15 @@ def true_frames(source: Capture, truth: Path, work: Capture, settings: Settings)
     """The wild capture with its true albedo frames for delit ones, up to the texture; made once."""
     if not work.texture_confidence.is_file():
         _copy(source, work)
-        _run(work, from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings), "delight", "texture")
+        _run(work, from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings),
+             "delight", "texture")
     return work
 
 
 def as_albedo(capture: Capture, settings: Settings) -> np.ndarray:
     """The texture whose confident facial skin has been brought to the skin tone, sRGB [S, S, 3]."""
-    texture, tone = images.read_linear(capture.texture), np.array(parse_skin_tone(settings.solve.skin_tone).linear, np.float32)
+    texture, tone = images.read_linear(capture.texture), np.array(parse_skin_tone(settings.solve.skin_tone).linear,
+                                                                  np.float32)
     skin = images.read_data(capture.texture_confidence)[..., 0] * template.mask("skin", len(texture))
     return images.linear_to_srgb(toned(texture, tone, skin))
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Synthetic portraits with their truth for benchmarks/delight.py: subjects of all skin tones that no training sees, each under several lights."""
+"""Synthetic portraits with their truth for benchmarks/delight.py: subjects of all skin tones that no training sees,
+each under several lights."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ PICTURES = ("srgb", "albedo", "skin", "shadow")
 
 
 def portraits(work: Path, subjects: int = 6, lights: int = 2, every: int = 1) -> Photographs:
-    """`lights` pictures of each of `subjects` people per group of skin tone; what was made before lies in the folder `work`. Every n-th of each group."""
+    """`lights` pictures of each of `subjects` people per group of skin tone; what was made before lies in the folder
+    `work`. Every n-th of each group."""
     found = []
     for group, seeds in subjects_by_tone(subjects).items():
         taken = [(seed, light) for seed in seeds for light in range(lights)][::every]
@@ -45,7 +47,8 @@ def subjects_by_tone(count: int) -> dict[str, list[int]]:
     seed = FIRST_SEED
     while min(map(len, seeds.values())) < count:
         p = sample_parameters(seed)
-        angle = float(pigment.typology_angle(pigment.reflectance(np.float32([p.melanin]), np.float32([p.blood]), p.oxygen, p.scattering, p.slope))[0])
+        angle = float(pigment.typology_angle(pigment.reflectance(np.float32([p.melanin]), np.float32([p.blood]),
+                                                                 p.oxygen, p.scattering, p.slope))[0])
         seeds[next(name for name, above in TONES if angle > above)].append(seed)
         seed += 1
     return {name: found[:count] for name, found in seeds.items()}
@@ -58,8 +61,10 @@ def _photograph(seed: int, light: int, group: str, work: Path) -> Photograph:
         stage, sight = portrait_parts(seed, SIZE)
         made = relit(sight, stage, np.random.default_rng([seed, 41, light]))
         with replacing(path) as temporary:
-            np.savez_compressed(temporary, **{name: np.round(255 * np.clip(p, 0, 1)).astype(np.uint8) if name == "srgb" else np.float16(p)
-                                              for name in PICTURES for p in [getattr(made, name)]})
+            np.savez_compressed(temporary,
+                                **{name: np.round(255 * np.clip(p, 0, 1)).astype(np.uint8) if name == "srgb"
+                                   else np.float16(p)
+                                   for name in PICTURES for p in [getattr(made, name)]})
     stored = np.load(path)
     srgb, albedo, skin, shadow = (stored[name].astype(np.float32) for name in PICTURES)
     truth = AlbedoTruth(0, images.linear_to_srgb(albedo), skin > 0.5, shadow > 0.5)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What benchmarks/delight.py measures on: photographs with a known albedo, single ones and those of a registered capture."""
+"""What benchmarks/delight.py measures on: photographs with a known albedo, single ones and those of a registered
+capture."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ from .albedo_score import AlbedoTruth, read_truth
 
 @dataclass(frozen=True)
 class Photograph:
-    """sRGB [H, W, 3] under some light, with its truth; group: what it is also averaged over; frame: its file's name where it belongs to a capture."""
+    """sRGB [H, W, 3] under some light, with its truth; group: what it is also averaged over; frame: its file's name
+    where it belongs to a capture."""
 
     name: str
     srgb: np.ndarray
@@ -41,7 +43,8 @@ class Photographs:
 
 
 def light_stage(folder: Path, every: int = 1) -> Photographs:
-    """align_image/PERSON/CAM/NNN.png with align_diffuse/PERSON_CAM.png and align_mask_face/PERSON_CAM.png; every n-th light of each.
+    """align_image/PERSON/CAM/NNN.png with align_diffuse/PERSON_CAM.png and align_mask_face/PERSON_CAM.png; every n-th
+    light of each.
 
     Raises Problem where a picture's truth is missing, or there is no picture at all.
     """
@@ -50,16 +53,20 @@ def light_stage(folder: Path, every: int = 1) -> Photographs:
         name = f"{camera.parent.name}_{camera.name}"
         albedo, mask = (folder / kind / f"{name}.png" for kind in ("align_diffuse", "align_mask_face"))
         if not (albedo.is_file() and mask.is_file()):
-            raise Problem(f"{folder} lacks align_diffuse/{name}.png or align_mask_face/{name}.png.", "Add it, or leave that camera out.")
+            raise Problem(f"{folder} lacks align_diffuse/{name}.png or align_mask_face/{name}.png.",
+                          "Add it, or leave that camera out.")
         truth = AlbedoTruth(0, images.read_srgb(albedo), images.read_mask(mask) > 0.5, None)
-        found += [Photograph(f"{name}/{path.stem}", images.read_srgb(path), truth, camera.parent.name) for path in sorted(camera.glob("*.png"))[::every]]
+        found += [Photograph(f"{name}/{path.stem}", images.read_srgb(path), truth, camera.parent.name)
+                  for path in sorted(camera.glob("*.png"))[::every]]
     if not found:
-        raise Problem(f"{folder} holds no photographs with a known albedo.", "It needs align_image/PERSON/CAM/NNN.png, align_diffuse and align_mask_face.")
+        raise Problem(f"{folder} holds no photographs with a known albedo.",
+                      "It needs align_image/PERSON/CAM/NNN.png, align_diffuse and align_mask_face.")
     return Photographs(found)
 
 
 def frames(truth: Path, capture: Capture, work: Path, every: int = 1) -> Photographs:
-    """The frames of a registered capture that have a truth (benchmarks/albedo_score.py says how it is laid out), selected in a copy in the folder `work`.
+    """The frames of a registered capture that have a truth (benchmarks/albedo_score.py says how it is laid out),
+    selected in a copy in the folder `work`.
 
     Raises Problem where the capture is not registered or none of its frames has a truth.
     """
@@ -74,8 +81,10 @@ def frames(truth: Path, capture: Capture, work: Path, every: int = 1) -> Photogr
     registered = {view.name: view for view in read_views(copy)}
     having = [frame for frame in listed.records if frame.video_frame in known and frame.name in registered]
     if not having:
-        raise Problem(f"No registered frame of {capture.root} has a true albedo in {truth}.", "Check that the two belong together.")
-    chosen = tuple(replace(frame, selected=frame in having) for frame in listed.records)  # the light is fitted to all, also where only some are scored
+        raise Problem(f"No registered frame of {capture.root} has a true albedo in {truth}.",
+                      "Check that the two belong together.")
+    # the light is fitted to all, also where only some are scored
+    chosen = tuple(replace(frame, selected=frame in having) for frame in listed.records)
     write_frames(copy.frames, replace(listed, records=chosen))
     found = []
     for frame in having[::every]:
@@ -88,10 +97,12 @@ def frames(truth: Path, capture: Capture, work: Path, every: int = 1) -> Photogr
 
 
 def registered(truth: Path, work: Path) -> Capture:
-    """The capture of `truth`/capture.mp4 in the folder `work`, run until its head is registered; kept there for the next time."""
+    """The capture of `truth`/capture.mp4 in the folder `work`, run until its head is registered; kept there for the
+    next time."""
     capture = Capture(work / f"{truth.name}.wildcap")
     if not capture.head.is_file():
-        command = [sys.executable, "-m", "core", "run", str(truth / "capture.mp4"), str(capture.root), "--until", "registration"]
+        command = [sys.executable, "-m", "core", "run", str(truth / "capture.mp4"), str(capture.root), "--until",
+                   "registration"]
         if subprocess.run(command, stdout=sys.stderr, check=False).returncode != 0:
             raise Problem(f"{truth / 'capture.mp4'} could not be registered.", f"Look at {capture.report}.")
     return capture

@@ -38,25 +38,29 @@ def main() -> int:
     capture = Capture(arguments.folder.resolve() / "sample.wildcap")
     started = time.monotonic()
     tone = skin_tone(SAMPLE)
-    code = subprocess.call([sys.executable, "-m", "core", "run", str(SAMPLE / "capture.mp4"), str(capture.root), "--quality", arguments.quality,
-                            "--skin-tone", tone], cwd=ROOT)
+    code = subprocess.call([sys.executable, "-m", "core", "run", str(SAMPLE / "capture.mp4"), str(capture.root),
+                            "--quality", arguments.quality, "--skin-tone", tone], cwd=ROOT)
     if code:
         return code
     print("Rendering the head under three lights with Cycles ...", flush=True)
-    code = subprocess.call([sys.executable, "-m", "benchmarks.render_capture", str(capture.root), *LIGHTS], cwd=ROOT, stdout=subprocess.DEVNULL)
+    code = subprocess.call([sys.executable, "-m", "benchmarks.render_capture", str(capture.root), *LIGHTS], cwd=ROOT,
+                           stdout=subprocess.DEVNULL)
     if code:  # Cycles fills standard output with its progress; what went wrong is on standard error
         return code
     rows = {"WildCap": albedo_score.score_capture(capture, SAMPLE), **albedo_score.score_floors(SAMPLE)}
     write_json(capture.root / "score.json", rows)
-    report.write(capture, from_json({"solve": {"skin_tone": tone}}, preset(arguments.quality)))  # once more, with the renders
+    # once more, with the renders
+    report.write(capture, from_json({"solve": {"skin_tone": tone}}, preset(arguments.quality)))
     print(f"\n{'':16}{'PSNR':>9}{'SSIM':>8}{'FLIP':>8}{'detail':>8}{'shadow_step':>13}")
     for name, row in rows.items():
         raw = row["raw"]
-        print(f"{name:16}{raw['psnr']:6.2f} dB{raw['ssim']:8.3f}{raw['flip']:8.3f}{row['detail']:8.2f}{row['shadow_step']:13.2f}")
+        print(f"{name:16}{raw['psnr']:6.2f} "
+              f"dB{raw['ssim']:8.3f}{raw['flip']:8.3f}{row['detail']:8.2f}{row['shadow_step']:13.2f}")
     print(f"\nFinished after {(time.monotonic() - started) / 60:.1f} minutes.\nThe report: {capture.report}")
     if arguments.json:
         size = sum(path.stat().st_size for path in capture.root.rglob("*") if path.is_file())
-        figures.write(arguments.json, "demo", "make demo", {"views": rows["WildCap"]["views"], "rows": albedo_score.rows(rows), "capture_gb": size / 1e9})
+        figures.write(arguments.json, "demo", "make demo",
+                      {"views": rows["WildCap"]["views"], "rows": albedo_score.rows(rows), "capture_gb": size / 1e9})
     beaten = all(rows["WildCap"]["raw"]["psnr"] > rows[name]["raw"]["psnr"] for name in ("raw video", "flat true tone"))
     if not beaten:
         print("The result does not beat both floors.", file=sys.stderr)

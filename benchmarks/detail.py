@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of a person's own marks a texture keeps: moles one by one (freckles and dots of stubble among them), pores by their band.
+"""How much of a person's own marks a texture keeps: moles one by one (freckles and dots of stubble among them), pores
+by their band.
 
-Both are measured against true albedo frames, in the picture, on the logarithm of linear green, so no tone or gain counts. The texture is rendered
-with several rays per pixel, as the truth was: one ray would count aliasing for or against it.
+Both are measured against true albedo frames, in the picture, on the logarithm of linear green, so no tone or gain
+counts. The texture is rendered with several rays per pixel, as the truth was: one ray would count aliasing for or
+against it.
 """
 
 from __future__ import annotations
@@ -35,8 +37,8 @@ PORE_PX = (0.7, 2.0)
 class FaceRays:
     """What a view's rays meet, cut to the face; worked out once, for any number of textures.
 
-    true: the frame's truth, cut alike; at float32 [RAYS * h, RAYS * w, 2]: where on the map, from its upper left, in [0, 1];
-    hit bool of the same; bare bool [h, w]: pixels off brows, lips, eyes and nostrils.
+    true: the frame's truth, cut alike; at float32 [RAYS * h, RAYS * w, 2]: where on the map, from its upper left, in
+    [0, 1]; hit bool of the same; bare bool [h, w]: pixels off brows, lips, eyes and nostrils.
     """
 
     true: AlbedoTruth
@@ -49,19 +51,23 @@ def look(caster: raster.RayCaster, view: View, true: AlbedoTruth, margin: int = 
     """A view's rays into the head around the face of `true` (any size of that view)."""
     height, width = true.face.shape
     rows, columns = (np.flatnonzero(true.face.any(axis)) for axis in (1, 0))
-    box = tuple(slice(max(side[0] - margin, 0), min(side[-1] + margin, end)) for side, end in ((rows, height), (columns, width)))
+    box = tuple(slice(max(side[0] - margin, 0), min(side[-1] + margin, end))
+                for side, end in ((rows, height), (columns, width)))
     y, x = np.mgrid[RAYS * box[0].start:RAYS * box[0].stop, RAYS * box[1].start:RAYS * box[1].stop]
     pixels = (np.stack([x.ravel(), y.ravel()], -1) + 0.5) / RAYS * [view.width / width, view.height / height]
     face, bary, _ = caster.first_hits(np.repeat(view.centre[None], len(pixels), 0), view.rays(pixels))
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
-    at, hit = np.stack([uv[:, 0], 1 - uv[:, 1]], 1).astype(np.float32).reshape(*x.shape, 2), (face >= 0).reshape(x.shape)
+    at, hit = np.stack([uv[:, 0], 1 - uv[:, 1]],
+                       1).astype(np.float32).reshape(*x.shape, 2), (face >= 0).reshape(x.shape)
     covers = np.maximum.reduce([template.mask(name, 512) for name in ("brows", "lips", "eyes", "nostrils")])
     bare = _shrunk(raster.sample(covers, at.reshape(-1, 2) * 512).reshape(x.shape) * hit) < 0.1
-    return FaceRays(AlbedoTruth(true.frame, true.albedo[box], true.face[box], None if true.shadow is None else true.shadow[box]), at, hit, bare)
+    return FaceRays(AlbedoTruth(true.frame, true.albedo[box], true.face[box],
+                                None if true.shadow is None else true.shadow[box]), at, hit, bare)
 
 
 def centre_rays(seen: FaceRays, texture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The map sRGB [S, S, 3] by one ray per pixel, as albedo_score renders it: sRGB [h, w, 3] and the pixels that hit."""
+    """The map sRGB [S, S, 3] by one ray per pixel, as albedo_score renders it: sRGB [h, w, 3] and the pixels that
+    hit."""
     at, hit = (x[RAYS // 2::RAYS, RAYS // 2::RAYS] for x in (seen.at, seen.hit))
     return raster.sample(texture, at.reshape(-1, 2) * len(texture)).reshape(*hit.shape, 3) * hit[..., None], hit
 
@@ -69,10 +75,12 @@ def centre_rays(seen: FaceRays, texture: np.ndarray) -> tuple[np.ndarray, np.nda
 def marks(seen: FaceRays, texture: np.ndarray) -> dict | None:
     """Figures of one frame for a texture sRGB [S, S, 3] in the head's UVs.
 
-    mole_contrast: regression of the rendered moles on the true ones, 1 keeps their depth and place, 0 lost them all; moles: how many;
-    pore_contrast: ratio of deviations in the band; pore_correlation. None where nothing is left to judge.
+    mole_contrast: regression of the rendered moles on the true ones, 1 keeps their depth and place, 0 lost them all;
+    moles: how many; pore_contrast: ratio of deviations in the band; pore_correlation. None where nothing is left to
+    judge.
     """
-    linear = raster.sample(images.srgb_to_linear(texture), seen.at.reshape(-1, 2) * len(texture)).reshape(*seen.hit.shape, 3) * seen.hit[..., None]
+    linear = raster.sample(images.srgb_to_linear(texture),
+                           seen.at.reshape(-1, 2) * len(texture)).reshape(*seen.hit.shape, 3) * seen.hit[..., None]
     whole = _shrunk(seen.hit.astype(np.float32))
     known = seen.true.face & (whole > 0.99)
     inner = cv2.erode((known & seen.bare).astype(np.uint8), np.ones((17, 17))) > 0
@@ -84,7 +92,8 @@ def marks(seen: FaceRays, texture: np.ndarray) -> dict | None:
     (pores, true_pores), (spots, true_spots) = ([_band(log, *sigmas) for log in logs] for sigmas in (PORE_PX, MOLE_PX))
     slopes = [_slope(spots, true_spots, y, x) for y, x in moles(true_spots, inner)]
     return {"mole_contrast": float(np.mean(slopes)) if slopes else None, "moles": len(slopes),
-            "pore_contrast": float(pores[inner].std() / true_pores[inner].std()), "pore_correlation": float(np.corrcoef(pores[inner], true_pores[inner])[0, 1])}
+            "pore_contrast": float(pores[inner].std() / true_pores[inner].std()),
+            "pore_correlation": float(np.corrcoef(pores[inner], true_pores[inner])[0, 1])}
 
 
 def moles(band: np.ndarray, inner: np.ndarray) -> list[tuple[int, int]]:
@@ -94,7 +103,8 @@ def moles(band: np.ndarray, inner: np.ndarray) -> list[tuple[int, int]]:
     xx, yy, xy = (cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((2, 0), (0, 2), (1, 1)))
     spread = np.sqrt((xx - yy) ** 2 / 4 + xy ** 2)
     mean = (xx + yy) / 2
-    round_ones = lowest & (mean - spread > 0.4 * (mean + spread))  # the Hessian's eigenvalues are alike: no wrinkle, no hair
+    # the Hessian's eigenvalues are alike: no wrinkle, no hair
+    round_ones = lowest & (mean - spread > 0.4 * (mean + spread))
     places = np.argwhere(round_ones)
     return [(int(y), int(x)) for y, x in places[np.argsort(band[round_ones])][:MOLES]]
 

@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""EEVEE beside Cycles on the lit cheek of the sample head, rendered in a real Blender window: tests/gui/by_name/engines.py.
+"""EEVEE beside Cycles on the lit cheek of the sample head, rendered in a real Blender window:
+tests/gui/by_name/engines.py.
 
     python -m benchmarks.engines [--json OUT.json]
 
-Needs root and a Debian mirror, as `make test-gui` does. EEVEE has no window of its own in the bpy wheel, so this is no process of Python alone.
+Needs root and a Debian mirror, as `make test-gui` does. EEVEE has no window of its own in the bpy wheel, so this is no
+process of Python alone.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ from . import figures
 ROOT = Path(__file__).resolve().parent.parent
 FOUND = ROOT / "dist" / "gui" / "engines.json"
 COMMAND = "python -m benchmarks.engines"
-SHOWN = {"surface": "no subsurface", "random_walk_skin": "WildCap Skin", "random_walk": "the same, Random Walk, as in 0.1.0"}
+SHOWN = {"surface": "no subsurface", "random_walk_skin": "WildCap Skin",
+         "random_walk": "the same, Random Walk, as in 0.1.0"}
 
 
 def main() -> None:
@@ -38,7 +41,8 @@ def main() -> None:
 def table(found: dict) -> str:
     """Rows: lights. Columns: EEVEE over Cycles in red, green and blue, linear."""
     return figures.markdown(["light", *SHOWN.values()],
-                            [[light.replace("_", " "), *(", ".join(f"{ratio:.3f}" for ratio in ratios[what].values()) for what in SHOWN)]
+                            [[light.replace("_", " "),
+                              *(", ".join(f"{ratio:.3f}" for ratio in ratios[what].values()) for what in SHOWN)]
                              for light, ratios in found.items()])
 
 

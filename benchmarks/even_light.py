@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of its albedo skin gives back under even light in Cycles: a sphere as large as a head, of six tones, without gloss.
+"""How much of its albedo skin gives back under even light in Cycles: a sphere as large as a head, of six tones, without
+gloss.
 
     python -m benchmarks.even_light [--page PAGE.md --json OUT.json]
 
-Rendered in Blender's Python module with the node group WildCap Skin as it comes, and with both of Cycles's random walks and the albedo as the Base Color.
-1 is all of it: what a capture measured as albedo is what a renderer then shows.
+Rendered in Blender's Python module with the node group WildCap Skin as it comes, and with both of Cycles's random walks
+and the albedo as the Base Color. 1 is all of it: what a capture measured as albedo is what a renderer then shows.
 """
 
 from __future__ import annotations
@@ -21,16 +22,18 @@ from . import figures
 from .pages import write_page
 from .render_capture import extension
 
-TONES = {"very light": (0.58, 0.40, 0.33), "light": (0.48, 0.31, 0.24), "intermediate": (0.38, 0.23, 0.16), "tan": (0.29, 0.165, 0.105),
-         "brown": (0.17, 0.085, 0.052), "dark": (0.075, 0.042, 0.029)}
+TONES = {"very light": (0.58, 0.40, 0.33), "light": (0.48, 0.31, 0.24), "intermediate": (0.38, 0.23, 0.16),
+         "tan": (0.29, 0.165, 0.105), "brown": (0.17, 0.085, 0.052), "dark": (0.075, 0.042, 0.029)}
 """Linear albedo of skin of the six groups of ITA, rounded (benchmarks/skin_tone.py has the groups)."""
 WAYS = ("random walk", "random walk (skin)", "WildCap Skin")
-WORDS = """Red, green and blue light from the middle of a sphere as large as a head over its albedo, in Cycles, under even light from everywhere and without
-gloss: 1 is all of it. *Random walk*: Cycles's method of that name, which the material had in 0.1.0, with the albedo as the Base Color. *Random walk (skin)*:
-the other one. *WildCap Skin*: the material as it is, which multiplies the albedo by what the second one loses in the mean over the tones, as far as
-*Subsurface* is on; the map itself stays as it was measured."""
+WORDS = """Red, green and blue light from the middle of a sphere as large as a head over its albedo, in Cycles, under
+even light from everywhere and without gloss: 1 is all of it. *Random walk*: Cycles's method of that name,
+which the material had in 0.1.0, with the albedo as the Base Color. *Random walk (skin)*: the other one.
+*WildCap Skin*: the material as it is, which multiplies the albedo by what the second one loses in the mean
+over the tones, as far as *Subsurface* is on; the map itself stays as it was measured."""
 RADIUS_M, SEEN_M = 0.09, 0.012
-"""The sphere's radius and the side of what is seen of it: Cycles takes scattering that is shorter than a pixel for none."""
+"""The sphere's radius and the side of what is seen of it: Cycles takes scattering that is shorter than a pixel for
+none."""
 SIDE, SAMPLES = 32, 256
 
 
@@ -41,7 +44,8 @@ def main() -> int:
     arguments = parser.parse_args()
     command = f"python -m benchmarks.even_light --page {arguments.page} --json {arguments.json}"
     with extension():
-        found = {way: {tone: dict(zip(("red", "green", "blue"), given_back(way, albedo), strict=True)) for tone, albedo in TONES.items()} for way in WAYS}
+        found = {way: {tone: dict(zip(("red", "green", "blue"), given_back(way, albedo), strict=True))
+                       for tone, albedo in TONES.items()} for way in WAYS}
     if arguments.json:
         figures.write(arguments.json, "even_light", command, found)
     if arguments.page:
@@ -99,7 +103,9 @@ def _tree(owner):
 
 
 def table(found: dict) -> str:
-    return figures.markdown(["tone", *WAYS], [[tone, *(", ".join(f"{share:.3f}" for share in found[way][tone].values()) for way in WAYS)] for tone in TONES])
+    return figures.markdown(["tone", *WAYS],
+                            [[tone, *(", ".join(f"{share:.3f}" for share in found[way][tone].values()) for way in WAYS)]
+                             for tone in TONES])
 
 
 if __name__ == "__main__":

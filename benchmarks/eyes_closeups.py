@@ -4,8 +4,9 @@
 
     python -m benchmarks.eyes_closeups FOLDER OUT.jpg [--resolution 192] [--samples 16]
 
-A row for each person: the eye open, half closed and looking aside, and the mouth open. Cycles and EEVEE take turns as the squares of a chessboard do, Cycles
-first. The first and the fourth row are under Three-Point, the second and the fifth under Overcast, the third and the sixth under Sun.
+A row for each person: the eye open, half closed and looking aside, and the mouth open. Cycles and EEVEE take turns as
+the squares of a chessboard do, Cycles first. The first and the fourth row are under Three-Point, the second and the
+fifth under Overcast, the third and the sixth under Sun.
 """
 
 from .closeups import LIGHTS, Shot, run
@@ -28,7 +29,8 @@ def shots(name: str) -> dict[str, Shot]:
     """Picture -> what it shows."""
     number = [person.name for person in PEOPLE].index(name)
     light, iris = LIGHTS[number % len(LIGHTS)], IRISES[number]
-    return {face: Shot(light, engine=ENGINES[(number + place) % 2], close_up=True, iris=iris, **told) for place, (face, told) in enumerate(FACES.items())}
+    return {face: Shot(light, engine=ENGINES[(number + place) % 2], close_up=True, iris=iris, **told)
+            for place, (face, told) in enumerate(FACES.items())}
 
 
 if __name__ == "__main__":

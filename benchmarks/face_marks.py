@@ -4,9 +4,10 @@
 
     python -m benchmarks.face_marks CAPTURE [MARKS] [--held-out] [--json PATH]
 
-MARKS: face_marks.json beside this file, of data/photographs: up to seventeen points per view, those that are seen and well defined there; numbers, no
-likeness. A miss is told in percent of the face's width in that view: the distance of the landmarks at the temples (234, 454) at the depth of the head.
---held-out also fits the head again to the first three photographs alone, and to all but each profile, and judges it in the others, whose cameras stay.
+MARKS: face_marks.json beside this file, of data/photographs: up to seventeen points per view, those that are seen and
+well defined there; numbers, no likeness. A miss is told in percent of the face's width in that view: the distance of
+the landmarks at the temples (234, 454) at the depth of the head. --held-out also fits the head again to the first three
+photographs alone, and to all but each profile, and judges it in the others, whose cameras stay.
 """
 
 from __future__ import annotations
@@ -38,13 +39,15 @@ PROFILE_DEG = 70.0
 
 
 def places(head: meshes.Mesh, points: dict[str, list[float]]) -> dict[str, np.ndarray]:
-    """Where on a head [3] the points lie that are told on the built-in one at rest: on the nearest place of its nearest triangle."""
+    """Where on a head [3] the points lie that are told on the built-in one at rest: on the nearest place of its nearest
+    triangle."""
     rest, found = template.load(), {}
     for name, point in points.items():
         near = np.linalg.norm(rest.vertices - point, axis=1).argsort()[:3]
         faces = rest.faces[np.isin(rest.faces, near).any(1)]
         a, b, c = (rest.vertices[faces[:, i]] for i in range(3))
-        bary = np.clip(trimesh.triangles.points_to_barycentric(np.stack([a, b, c], 1), np.tile(point, (len(faces), 1)), method="cramer"), 0, 1)
+        bary = np.clip(trimesh.triangles.points_to_barycentric(np.stack([a, b, c], 1), np.tile(point, (len(faces), 1)),
+                                                               method="cramer"), 0, 1)
         bary /= bary.sum(1, keepdims=True)
         best = np.linalg.norm((rest.vertices[faces] * bary[..., None]).sum(1) - point, axis=1).argmin()
         found[name] = bary[best] @ head.vertices[faces[best]]
@@ -70,8 +73,10 @@ def misses(head: meshes.Mesh, views: dict[str, View], marks: dict) -> dict[str, 
 
 def summary(found: dict[str, dict[str, float]], names: Collection[str] | None = None) -> dict:
     """Over the views `names` (None: all): points, median, 90th percentile [% of the face's width], share under 3 %."""
-    values = np.array([value for name, points in found.items() if names is None or name in names for value in points.values()])
-    return {"points": len(values), "median_percent": round(float(np.median(values)), 2), "p90_percent": round(float(np.percentile(values, 90)), 2),
+    values = np.array([value for name, points in found.items() if names is None or name in names
+                       for value in points.values()])
+    return {"points": len(values), "median_percent": round(float(np.median(values)), 2),
+            "p90_percent": round(float(np.percentile(values, 90)), 2),
             "under_3_percent": round(100 * float((values < 3).mean()), 1)}
 
 
@@ -81,7 +86,8 @@ def by_photograph(capture: Capture) -> dict[str, View]:
 
 
 def fitted_to(capture: Capture, names: Collection[str], folder: Path) -> meshes.Mesh:
-    """The head of the capture's photographs `names` (as frames) alone, under the cameras that all have given; `folder` is filled."""
+    """The head of the capture's photographs `names` (as frames) alone, under the cameras that all have given; `folder`
+    is filled."""
     part = Capture(folder)
     shutil.copytree(capture.frames, part.frames)
     model, whole = pycolmap.Reconstruction(), read_model(capture.cameras)
@@ -93,7 +99,8 @@ def fitted_to(capture: Capture, names: Collection[str], folder: Path) -> meshes.
             kept = pycolmap.Image(name=image.name, camera_id=image.camera_id, image_id=number, keypoints=keypoints)
             model.add_image_with_trivial_frame(kept, pose_of(image))
     for point in whole.points3D.values():
-        seen = [pycolmap.TrackElement(e.image_id, e.point2D_idx) for e in point.track.elements if e.image_id in model.images]
+        seen = [pycolmap.TrackElement(e.image_id, e.point2D_idx) for e in point.track.elements
+                if e.image_id in model.images]
         if len(seen) > 1:
             model.add_point3D(point.xyz, pycolmap.Track(seen), point.color)
     part.cameras.mkdir()
@@ -107,11 +114,13 @@ def held_out(capture: Capture, marks: dict) -> dict:
     """The figures of heads fitted to some photographs and judged in the others."""
     views, rows = by_photograph(capture), {}
     order = [name for name in marks["views"] if name in views]
-    sides = [name for name in order if abs(np.degrees(np.arctan2(views[name].centre[0], -views[name].centre[1]))) > PROFILE_DEG]
+    sides = [name for name in order
+             if abs(np.degrees(np.arctan2(views[name].centre[0], -views[name].centre[1]))) > PROFILE_DEG]
     plans = {"first three": order[3:]} | {f"without {name}": [name] for name in sides}
     for title, judged in plans.items():
         with tempfile.TemporaryDirectory() as folder:
-            head = fitted_to(capture, [views[name].name for name in order if name not in judged], Path(folder) / "part.wildcap")
+            head = fitted_to(capture, [views[name].name for name in order if name not in judged],
+                             Path(folder) / "part.wildcap")
         rows[title] = summary(misses(head, views, marks), judged)
     return rows
 
@@ -126,7 +135,8 @@ def main() -> None:
     capture, marks = Capture(args.capture), json.loads(args.marks.read_text(encoding="utf-8"))
     found = misses(meshes.read_obj(capture.head), by_photograph(capture), marks)
     figures = {"all": summary(found), "views": {name: summary(found, [name]) for name in found}}
-    figures["points"] = {point: round(float(np.median([seen[point] for seen in found.values() if point in seen])), 2) for point in marks["points"]
+    figures["points"] = {point: round(float(np.median([seen[point] for seen in found.values() if point in seen])), 2)
+                         for point in marks["points"]
                          if any(point in seen for seen in found.values())}
     if args.held_out:
         figures["held_out"] = held_out(capture, marks)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the farm of benchmarks/farm.py works on, and what is made of it afterwards: the films, the two batches, equal bytes, and the account of every stage."""
+"""What the farm of benchmarks/farm.py works on, and what is made of it afterwards: the films, the two batches, equal
+bytes, and the account of every stage."""
 
 from __future__ import annotations
 
@@ -28,16 +29,20 @@ FRAMES = 12
 KINDS = 4
 """How many different captures there are: each is another cut of the sample video with another seed."""
 SETTINGS = {
-    "device": "cpu", "frames": {"max_frames": FRAMES, "long_side": 320, "views": 3}, "scan": {"pairs": 3, "voxel_mm": 5.0}, "registration": {"iterations": 2},
-    "delight": {"delighter": "shading"}, "texture": {"size": 256}, "solve": {"size": 128, "steps": 4, "guidance": "proximal", "grid_cells": 4},
-    "upscale": {"size": 1024, "method": "lanczos", "frames_detail": False}, "transfer": {"size": 256, "scan_size": 256, "scan_detail_mm": 10.0},
+    "device": "cpu", "frames": {"max_frames": FRAMES, "long_side": 320, "views": 3},
+    "scan": {"pairs": 3, "voxel_mm": 5.0}, "registration": {"iterations": 2},
+    "delight": {"delighter": "shading"}, "texture": {"size": 256},
+    "solve": {"size": 128, "steps": 4, "guidance": "proximal", "grid_cells": 4},
+    "upscale": {"size": 1024, "method": "lanczos", "frames_detail": False},
+    "transfer": {"size": 256, "scan_size": 256, "scan_detail_mm": 10.0},
 }
 """As little work as every stage takes."""
 
 
 @dataclass(frozen=True)
 class Begun:
-    """A stage as a node's account has it; `finished` is when it ended, None where it did not. Seconds of the clock that all nodes share."""
+    """A stage as a node's account has it; `finished` is when it ended, None where it did not. Seconds of the clock that
+    all nodes share."""
 
     host: str
     pid: int
@@ -48,8 +53,9 @@ class Begun:
 
 
 def lay_out(folder: Path, count: int) -> None:
-    """FOLDER/code with WildCap as it is now, FOLDER/films, and FOLDER/serial with each kind once and FOLDER/farm with `count` faces, planned; made again, it
-    leaves what is there, the code among it: a trial of hours is one of one version."""
+    """FOLDER/code with WildCap as it is now, FOLDER/films, and FOLDER/serial with each kind once and FOLDER/farm with
+    `count` faces, planned; made again, it leaves what is there, the code among it: a trial of hours is one of one
+    version."""
     if not code(folder).is_dir():
         with replacing_folder(code(folder)) as copied:
             shutil.copytree(ROOT / "core", copied / "core", ignore=shutil.ignore_patterns("__pycache__", "training"))
@@ -61,9 +67,11 @@ def lay_out(folder: Path, count: int) -> None:
         with replacing(films / f"{kind}.json") as temporary:
             temporary.write_text(json.dumps({**SETTINGS, "seed": kind}), encoding="utf-8")
     for batch, names in (("serial", twin_names()), ("farm", face_names(count))):
-        rows = [f"{film(folder, number % KINDS).name},{name},{number % KINDS}.json" for number, name in enumerate(names)]
+        rows = [f"{film(folder, number % KINDS).name},{name},{number % KINDS}.json"
+                for number, name in enumerate(names)]
         (films / f"{batch}.csv").write_text("\n".join(["video,name,settings", *rows]) + "\n", encoding="utf-8")
-        subprocess.run([*core(), "plan", str(films / f"{batch}.csv"), str(folder / batch)], check=True, stdout=subprocess.DEVNULL, cwd=code(folder))
+        subprocess.run([*core(), "plan", str(films / f"{batch}.csv"), str(folder / batch)], check=True,
+                       stdout=subprocess.DEVNULL, cwd=code(folder))
 
 
 def code(folder: Path) -> Path:
@@ -102,19 +110,22 @@ def _cut(path: Path, kind: int) -> None:
 
 
 def unequal(folder: Path, count: int) -> list[str]:
-    """The files of the farm's captures that are not the bytes of their twins', as FACE/FILE; a capture that is not finished misses some."""
+    """The files of the farm's captures that are not the bytes of their twins', as FACE/FILE; a capture that is not
+    finished misses some."""
     twins, found = {}, []
     for number, name in enumerate(face_names(count)):
         twin = twin_names()[number % KINDS]
         if twin not in twins:
             twins[twin] = _written(folder / "serial" / f"{twin}.wildcap")
         made = _written(folder / "farm" / f"{name}.wildcap")
-        found += [f"{name}/{file}" for file in sorted(made.keys() | twins[twin].keys()) if made.get(file) != twins[twin].get(file)]
+        found += [f"{name}/{file}" for file in sorted(made.keys() | twins[twin].keys())
+                  if made.get(file) != twins[twin].get(file)]
     return found
 
 
 def _written(root: Path) -> dict[str, str]:
-    return {name: content for stage in stages.STAGES for name, content in same_maps.written(Capture(root), stage).items()}
+    return {name: content for stage in stages.STAGES
+            for name, content in same_maps.written(Capture(root), stage).items()}
 
 
 def count_files(folder: Path) -> int:
@@ -144,13 +155,15 @@ def read_account(folder: Path) -> list[Begun]:
 
 
 def judge_account(account: list[Begun], kills: list[dict]) -> dict:
-    """{"stages": runs that were finished, "twice": stages of a face that were finished again, "interrupted": runs that were begun and not finished,
-    "unexplained": those of them that no kill of their process, or of their node, explains}. A kill is {"at", "host", "pid"}, with None for all of them."""
+    """{"stages": runs that were finished, "twice": stages of a face that were finished again, "interrupted": runs that
+    were begun and not finished, "unexplained": those of them that no kill of their process, or of their node,
+    explains}. A kill is {"at", "host", "pid"}, with None for all of them."""
     done = collections.Counter((each.face, each.stage) for each in account if each.finished is not None)
     broken = [each for each in account if each.finished is None]
 
     def explained(each: Begun) -> bool:
-        return any(kill["at"] >= each.at and kill["host"] in (None, each.host) and kill["pid"] in (None, each.pid) for kill in kills)
+        return any(kill["at"] >= each.at and kill["host"] in (None, each.host) and kill["pid"] in (None, each.pid)
+                   for kill in kills)
 
-    return {"stages": sum(done.values()), "twice": sum(count - 1 for count in done.values()), "interrupted": len(broken),
-            "unexplained": sum(not explained(each) for each in broken)}
+    return {"stages": sum(done.values()), "twice": sum(count - 1 for count in done.values()),
+            "interrupted": len(broken), "unexplained": sum(not explained(each) for each in broken)}

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Three machines on one: nodes of Ray in namespaces of their own, with a hostname, a network and process numbers that nobody else has, on the same disk.
+"""Three machines on one: nodes of Ray in namespaces of their own, with a hostname, a network and process numbers that
+nobody else has, on the same disk.
 
-The network is a bridge in the head node's namespace with a cable (veth) to each of the others; nothing of it reaches this machine's own network. A machine is
-pulled from it as by hand: its cable first, then all of its processes at once. Linux, as root, with iproute2 and util-linux.
+The network is a bridge in the head node's namespace with a cable (veth) to each of the others; nothing of it reaches
+this machine's own network. A machine is pulled from it as by hand: its cable first, then all of its processes at once.
+Linux, as root, with iproute2 and util-linux.
 """
 
 from __future__ import annotations
@@ -39,8 +41,10 @@ STARTED = b"Ray runtime started"
 def refuse_elsewhere() -> None:
     """Raises Problem where no such machines can be made."""
     if not sys.platform.startswith("linux") or os.getuid() != 0:
-        raise Problem("The nodes of this benchmark are namespaces, which take Linux and root.", "Run it as root on Linux, as in a container with all rights.")
-    for program, package in (("ip", "iproute2"), ("unshare", "util-linux"), ("nsenter", "util-linux"), ("mount", "mount"), ("taskset", "util-linux")):
+        raise Problem("The nodes of this benchmark are namespaces, which take Linux and root.",
+                      "Run it as root on Linux, as in a container with all rights.")
+    for program, package in (("ip", "iproute2"), ("unshare", "util-linux"), ("nsenter", "util-linux"),
+                             ("mount", "mount"), ("taskset", "util-linux")):
         if shutil.which(program) is None:
             raise Problem(f"There is no program {program} here.", f"Install it: apt-get install {package}.")
 
@@ -62,16 +66,17 @@ class Node:
 
     def start(self) -> None:
         """Raises Problem where it does not begin."""
-        common = [str(Path(sys.executable).with_name("ray")), "start", f"--node-ip-address={ADDRESSES[self.name]}", "--block", "--disable-usage-stats",
-                  f"--object-store-memory={STORE}"]
+        common = [str(Path(sys.executable).with_name("ray")), "start", f"--node-ip-address={ADDRESSES[self.name]}",
+                  "--block", "--disable-usage-stats", f"--object-store-memory={STORE}"]
         own = (["--head", f"--port={PORT}", "--num-cpus=0", "--include-dashboard=false"] if self.name == HEAD
                else [f"--address={ADDRESSES[HEAD]}:{PORT}", "--num-cpus=1", f"--memory={MEMORY}"])
         script = f"hostname {self.host} && mkdir -p /tmp/ray && mount -t tmpfs tmpfs /tmp/ray && exec \"$@\""
-        command = ["ip", "netns", "exec", PREFIX + self.name, "unshare", "--uts", "--pid", "--mount", "--fork", "--kill-child", "--mount-proc",
-                   "sh", "-c", script, "sh", *on_core(self.core), *common, *own]
+        command = ["ip", "netns", "exec", PREFIX + self.name, "unshare", "--uts", "--pid", "--mount", "--fork",
+                   "--kill-child", "--mount-proc", "sh", "-c", script, "sh", *on_core(self.core), *common, *own]
         path = self.folder / f"{self.name}.log"
         with open(path, "wb") as log:
-            self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=self.environment, preexec_fn=join_account)
+            self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
+                                            env=self.environment, preexec_fn=join_account)
         deadline = time.monotonic() + START_S
         while STARTED not in path.read_bytes():
             if self.process.poll() is not None or time.monotonic() > deadline:
@@ -89,7 +94,8 @@ class Node:
 
     def enter(self, folder: Path) -> list[str]:
         """Words before a command that has it run on this node, in a folder."""
-        return ["nsenter", f"--target={self._first()}", "--mount", "--uts", "--net", "--pid", f"--wd={folder}", *on_core(self.core)]
+        return ["nsenter", f"--target={self._first()}", "--mount", "--uts", "--net", "--pid", f"--wd={folder}",
+                *on_core(self.core)]
 
     def tasks(self) -> list[tuple[int, int, str]]:
         """The processes of Ray's that work on a task: number here, number on the node, and the task's name."""
@@ -98,7 +104,8 @@ class Node:
             with contextlib.suppress(OSError, ValueError, IndexError):
                 words = (folder / "cmdline").read_bytes().partition(b"\0")[0].decode()
                 if words.startswith("ray::") and "." in words and os.readlink(folder / "ns" / "pid") == self.space:
-                    inside = next(line for line in (folder / "status").read_text().splitlines() if line.startswith("NSpid:")).split()[-1]
+                    inside = next(line for line in (folder / "status").read_text().splitlines()
+                                  if line.startswith("NSpid:")).split()[-1]
                     found.append((int(folder.name), int(inside), words.removeprefix("ray::")))
         return found
 
@@ -114,7 +121,8 @@ class Node:
     def stop(self) -> None:
         if self.process is not None:
             with contextlib.suppress(OSError):
-                os.kill(self._first() or self.process.pid, signal.SIGKILL)  # with the first process of a space all others end
+                # with the first process of a space all others end
+                os.kill(self._first() or self.process.pid, signal.SIGKILL)
             self.process.kill()
             self.process.wait()
             self.process = None
@@ -122,16 +130,19 @@ class Node:
 
 @contextlib.contextmanager
 def farm(folder: Path):
-    """The head node and two others, by name, running; whatever an earlier run left of them is ended first. Raises Problem."""
+    """The head node and two others, by name, running; whatever an earlier run left of them is ended first. Raises
+    Problem."""
     folder.mkdir(parents=True, exist_ok=True)
     clear()
     token = folder / "token"
     if not token.is_file():
         token.write_text(secrets.token_hex(32))
         token.chmod(0o600)
-    environment = {**os.environ, "RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN_PATH": str(token), "RAY_USAGE_STATS_ENABLED": "0", "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = {**os.environ, "RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN_PATH": str(token),
+                   "RAY_USAGE_STATS_ENABLED": "0", "PYTHONDONTWRITEBYTECODE": "1"}
     environment = {name: value for name, value in environment.items() if name not in (*THREAD_VARIABLES, "RAY_ADDRESS")}
-    nodes = {name: Node(name, folder, core, environment=environment) for name, core in zip((HEAD, *WORKING), (None, *cores()), strict=True)}
+    nodes = {name: Node(name, folder, core, environment=environment)
+             for name, core in zip((HEAD, *WORKING), (None, *cores()), strict=True)}
     try:
         _lay_cables()
         for node in nodes.values():
@@ -186,8 +197,8 @@ def _ip(*words: str) -> None:
 
 
 def keep_pace() -> None:
-    """Has all that is counted compete as any other process: a worker steps back for whoever sits at its machine, and at these nobody does. On a machine that
-    others use they would stand still for minutes."""
+    """Has all that is counted compete as any other process: a worker steps back for whoever sits at its machine, and at
+    these nobody does. On a machine that others use they would stand still for minutes."""
     with contextlib.suppress(OSError):
         for number in (ACCOUNT / PREFIX.rstrip("_") / "cgroup.procs").read_text().split():
             with contextlib.suppress(OSError):
@@ -206,7 +217,8 @@ def join_account() -> None:
 
 
 def counted_s() -> float | None:
-    """Seconds of the processor that were counted so far, of all that have joined, those that were killed among them; None where nothing is counted."""
+    """Seconds of the processor that were counted so far, of all that have joined, those that were killed among them;
+    None where nothing is counted."""
     try:
         return int((ACCOUNT / PREFIX.rstrip("_") / "cpuacct.usage").read_text()) / 1e9
     except (OSError, ValueError):

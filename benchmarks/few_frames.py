@@ -1,11 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head from a few frames of a video that lie far apart, taken as photographs and without a dense scan, against the true mesh.
+"""A head from a few frames of a video that lie far apart, taken as photographs and without a dense scan, against the
+true mesh.
 
     python -m benchmarks.few_frames VIDEO TRUTH MESH CAPTURE [--frames N,N,...] [--scan]
 
-TRUTH and MESH as in head_against_truth.py. By default five frames of the head scan's video (data/lps_sun) that lie 28 to 39 degrees apart, as wide as it goes,
-three of them with a mask of the face. --scan: with whatever surface the stage Scan measures.
+TRUTH and MESH as in head_against_truth.py. By default five frames of the head scan's video (data/lps_sun) that lie 28
+to 39 degrees apart, as wide as it goes, three of them with a mask of the face. --scan: with whatever surface the stage
+Scan measures.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ def photographs_of(video: Path, numbers: tuple[int, ...], folder: Path) -> None:
     with av.open(str(video)) as container:
         for number, frame in enumerate(container.decode(video=0)):
             if number in numbers:
-                images.write_srgb(folder / f"{number:04d}.png", frame.to_ndarray(format="rgb24").astype(np.float32) / 255)
+                images.write_srgb(folder / f"{number:04d}.png",
+                                  frame.to_ndarray(format="rgb24").astype(np.float32) / 255)
 
 
 def truth_of(truth: Path, numbers: tuple[int, ...], folder: Path) -> None:

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The record that a benchmark leaves behind: {"benchmark", "command", "commit", "date", "machine", "figures"}, one JSON file each.
+"""The record that a benchmark leaves behind: {"benchmark", "command", "commit", "date", "machine", "figures"}, one JSON
+file each.
 
-Benchmarks write it where their --json says; what is published lies in docs/figures/NAME.json, and the pages of docs/results and the README's
-figures come from there (benchmarks/results). Figures are nested dicts of plain numbers; null is one that was not measured. Rows of a table are
-printed in the order in which they were written.
+Benchmarks write it where their --json says; what is published lies in docs/figures/NAME.json, and the pages of
+docs/results and the README's figures come from there (benchmarks/results). Figures are nested dicts of plain numbers;
+null is one that was not measured. Rows of a table are printed in the order in which they were written.
 """
 
 from __future__ import annotations
@@ -43,8 +44,9 @@ class Figures(dict):
 def write(path: Path, benchmark: str, command: str, figures: dict, keep: bool = False) -> None:
     """Writes a record; `benchmark` is the module's name, `command` as the docs have it (folders as CAPITALS).
 
-    `keep`: figures of a record that is there stay where they were not measured anew, as of other captures or rows. Raises ValueError for a figure that is
-    no finite number, string, bool or None, Problem where `keep` finds another file than a record. The commit is HEAD's, None outside of git.
+    `keep`: figures of a record that is there stay where they were not measured anew, as of other captures or rows.
+    Raises ValueError for a figure that is no finite number, string, bool or None, Problem where `keep` finds another
+    file than a record. The commit is HEAD's, None outside of git.
     """
     path, figures = Path(path), plain(figures)
     if keep and path.is_file():
@@ -54,7 +56,8 @@ def write(path: Path, benchmark: str, command: str, figures: dict, keep: bool = 
 
 
 def read(name: str, folder: Path = PUBLISHED) -> dict:
-    """The record `name` of a folder; "date" and "machine" are None in older ones. Raises Problem where it is missing or is no record."""
+    """The record `name` of a folder; "date" and "machine" are None in older ones. Raises Problem where it is missing or
+    is no record."""
     path = Path(folder) / f"{name}.json"
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
@@ -65,22 +68,27 @@ def read(name: str, folder: Path = PUBLISHED) -> dict:
     if isinstance(record, dict):
         record = {"date": None, "machine": None, **record}
     if not isinstance(record, dict) or set(record) != KEYS or not isinstance(record["figures"], dict):
-        raise Problem(f"{path} is not a benchmark's record.", 'It holds "benchmark", "command", "commit" and "figures"; benchmarks/figures.py writes it.')
+        raise Problem(f"{path} is not a benchmark's record.",
+                      'It holds "benchmark", "command", "commit" and "figures"; benchmarks/figures.py writes it.')
     return record
 
 
 def markdown(head: list[str], rows: list[list]) -> str:
     """A Markdown table, without a newline at its end; None is a dash."""
-    return "\n".join("| " + " | ".join("-" if cell is None else str(cell) for cell in row) + " |" for row in (head, ["---"] * len(head), *rows))
+    return "\n".join("| " + " | ".join("-" if cell is None else str(cell) for cell in row) + " |"
+                     for row in (head, ["---"] * len(head), *rows))
 
 
 def merged(old: dict, new: dict) -> dict:
     """Nested figures: `new` over `old`."""
-    return {**old, **{key: merged(old[key], value) if isinstance(value, dict) and isinstance(old.get(key), dict) else value for key, value in new.items()}}
+    return {**old,
+            **{key: merged(old[key], value) if isinstance(value, dict) and isinstance(old.get(key), dict) else value
+               for key, value in new.items()}}
 
 
 def plain(figures, name: str = "figures"):
-    """The same with NumPy's numbers as Python's, rounded to six decimals. Raises ValueError that names the figure JSON cannot hold."""
+    """The same with NumPy's numbers as Python's, rounded to six decimals. Raises ValueError that names the figure JSON
+    cannot hold."""
     if isinstance(figures, dict):
         return {str(key): plain(value, f"{name}.{key}") for key, value in figures.items()}
     if isinstance(figures, np.generic):
@@ -95,7 +103,8 @@ def plain(figures, name: str = "figures"):
 def commit() -> str | None:
     """HEAD's short hash; None where this is no checkout or git is not installed."""
     try:
-        found = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True)
+        found = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True,
+                               check=True)
     except (OSError, subprocess.CalledProcessError):
         return None
     return found.stdout.strip()

@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The known light of a dark room with one lamp at the camera, taken out of the frames: what benchmarks/controlled.py solves a controlled capture from.
+"""The known light of a dark room with one lamp at the camera, taken out of the frames: what benchmarks/controlled.py
+solves a controlled capture from.
 
-The lamp is in the camera's own place, so a point at distance r with normal n gets n.l / r^2, and the half vector is the viewing direction: the highlight
-depends on n.l alone. Every point is lit from another side in every frame, so how its brightness changes tells the highlight from the albedo: a strength
-per place and channel over one roughness, by least squares. Bounces between nose and cheek are not known light and stay.
+The lamp is in the camera's own place, so a point at distance r with normal n gets n.l / r^2, and the half vector is the
+viewing direction: the highlight depends on n.l alone. Every point is lit from another side in every frame, so how its
+brightness changes tells the highlight from the albedo: a strength per place and channel over one roughness, by least
+squares. Bounces between nose and cheek are not known light and stay.
 """
 
 from __future__ import annotations
@@ -42,7 +44,8 @@ class Highlight:
 
 @dataclass(frozen=True)
 class Lit:
-    """One frame and its light. linear [H, W, 3]; per pixel hit bool [H, W], cosine n.l [H, W], shading [H, W] (n.l / r^2, r in metres), uv [H, W, 2]."""
+    """One frame and its light. linear [H, W, 3]; per pixel hit bool [H, W], cosine n.l [H, W], shading [H, W] (n.l /
+    r^2, r in metres), uv [H, W, 2]."""
 
     view: View
     linear: np.ndarray
@@ -53,19 +56,24 @@ class Lit:
 
     @property
     def unshaded(self) -> np.ndarray:
-        """[H, W, 3]: the picture over its shading, zero beside the head: albedo and highlight, times one unknown gain."""
+        """[H, W, 3]: the picture over its shading, zero beside the head: albedo and highlight, times one unknown
+        gain."""
         return np.where(self.hit[..., None], self.linear / self.shading[..., None], 0).astype(np.float32)
 
 
 def write_delit(capture: Capture, folder: Path) -> Highlight:
-    """folder/NNNNN.png of every registered frame of a capture with a lamp at the camera: sRGB, 16 bit, without the known light, all in one exposure."""
+    """folder/NNNNN.png of every registered frame of a capture with a lamp at the camera: sRGB, 16 bit, without the
+    known light, all in one exposure."""
     head = read_head(capture)
     frames = [lit(view, images.read_linear(view.path), head) for view in read_views(capture)]
     found = highlight(frames, head.unfold(SIZE))
     pictures = [matte(frame, found) for frame in frames]
-    gain = BRIGHT[1] / np.percentile(np.concatenate([picture[frame.hit].max(1) for picture, frame in zip(pictures, frames, strict=True)]), BRIGHT[0])
+    gain = BRIGHT[1] / np.percentile(np.concatenate([picture[frame.hit].max(1)
+                                                     for picture, frame in zip(pictures, frames, strict=True)]),
+                                     BRIGHT[0])
     for frame, picture in zip(frames, pictures, strict=True):
-        images.write_srgb(folder / Path(frame.view.name).with_suffix(".png").name, images.linear_to_srgb(picture * gain), bits=16)
+        images.write_srgb(folder / Path(frame.view.name).with_suffix(".png").name,
+                          images.linear_to_srgb(picture * gain), bits=16)
     return found
 
 
@@ -83,8 +91,8 @@ def lit(view: View, linear: np.ndarray, head: Head) -> Lit:
 
 
 def highlight(frames: list[Lit], surface: Unfolded) -> Highlight:
-    """Least squares over the frames at every texel: picture over shading = albedo + strength x lobe(n.l), neighbours sharing the strength; of all ROUGHNESSES
-    the one that leaves least."""
+    """Least squares over the frames at every texel: picture over shading = albedo + strength x lobe(n.l), neighbours
+    sharing the strength; of all ROUGHNESSES the one that leaves least."""
     seen = [_observed(frame, surface) for frame in frames]
     fits = [_fit(seen, roughness) for roughness in ROUGHNESSES]
     best = min(range(len(fits)), key=lambda i: fits[i][1])
@@ -99,19 +107,23 @@ def matte(frame: Lit, found: Highlight) -> np.ndarray:
 
 
 def lobe(cosine: np.ndarray, roughness: float) -> np.ndarray:
-    """The GGX highlight under a lamp at the camera over a white diffuse surface's brightness, for a normal reflectance F0 of 1: D G2 pi / (4 c^2), [...]
-    (Walter et al. 2007; h = l = v, so Fresnel's term is constant and the strength of a real surface is F0 itself)."""
+    """The GGX highlight under a lamp at the camera over a white diffuse surface's brightness, for a normal reflectance
+    F0 of 1: D G2 pi / (4 c^2), [...] (Walter et al. 2007; h = l = v, so Fresnel's term is constant and the strength of
+    a real surface is F0 itself)."""
     alpha2, c2 = roughness**4, np.clip(cosine, LEAST, 1) ** 2
     distribution = alpha2 / (np.pi * (c2 * (alpha2 - 1) + 1) ** 2)
-    smith = np.sqrt(1 + alpha2 * (1 - c2) / c2)  # 1 + 2 Lambda; both directions are one, and their masking is correlated
+    # 1 + 2 Lambda; both directions are one, and their masking is correlated
+    smith = np.sqrt(1 + alpha2 * (1 - c2) / c2)
     return np.pi * distribution / (4 * c2 * smith)
 
 
 def _observed(frame: Lit, surface: Unfolded) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What a frame shows of each texel: its unshaded colour [S, S, 3], n.l [S, S], and how far that counts [S, S]."""
     seen = observe(frame.view, frame.unshaded, surface, 1.0)
-    burnt = cv2.dilate((images.linear_to_srgb(frame.linear).max(-1) > BURNT).astype(np.uint8), np.ones((5, 5))).astype(np.float32)
-    weight = seen.quality * (cv2.remap(burnt, seen.pixels[..., 0] - 0.5, seen.pixels[..., 1] - 0.5, cv2.INTER_LINEAR) == 0)
+    burnt = cv2.dilate((images.linear_to_srgb(frame.linear).max(-1) > BURNT).astype(np.uint8),
+                       np.ones((5, 5))).astype(np.float32)
+    weight = seen.quality * (cv2.remap(burnt, seen.pixels[..., 0] - 0.5, seen.pixels[..., 1] - 0.5, cv2.INTER_LINEAR)
+                             == 0)
     towards = frame.view.centre - surface.points
     cosine = np.zeros(surface.covered.shape, np.float32)
     cosine[surface.covered] = np.clip((towards * surface.normals).sum(1) / np.linalg.norm(towards, axis=1), 0, 1)
@@ -126,7 +138,8 @@ def _fit(seen: list[tuple], roughness: float) -> tuple[np.ndarray, float]:
     mean_lobe = sum(w * f for w, f in zip(weights, lobes, strict=True)) / total
     mean = sum(w * colour for w, (colour, *_) in zip(weights, seen, strict=True)) / total
     spread = sum(w * (f - mean_lobe) ** 2 for w, f in zip(weights, lobes, strict=True))
-    together = sum(w * (f - mean_lobe) * (colour - mean) for w, f, (colour, *_) in zip(weights, lobes, seen, strict=True))
+    together = sum(w * (f - mean_lobe) * (colour - mean)
+                   for w, f, (colour, *_) in zip(weights, lobes, seen, strict=True))
     squares = sum(float((w * (colour - mean) ** 2).sum()) for w, (colour, *_) in zip(weights, seen, strict=True))
     everywhere = np.maximum(together.sum((0, 1)) / max(float(spread.sum()), 1e-9), 0)
     near_spread, near_together = (cv2.GaussianBlur(a, (0, 0), SMOOTH).reshape(a.shape) for a in (spread, together))

@@ -1,13 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps what a solve begins with, of many captures, as one version of the code made it: so that a new solver is judged on the old delighter's textures.
+"""Keeps what a solve begins with, of many captures, as one version of the code made it: so that a new solver is judged
+on the old delighter's textures.
 
     python -m benchmarks.freeze FOLDER OUT [--only PREFIX ...]     keeps NAME.wildcap of FOLDER as OUT/NAME.wildcap
     python -m benchmarks.freeze --check OUT                        whether all is as it was kept
 
-Kept are the frames, cameras, head, delit frames, textures and masks, and the solved maps for comparison; OUT/frozen.json has each file's hash, and
-of each stage the version and the code's key. OUT lies outside of the repository. What was kept is never replaced: a capture that has changed since is
-named, and ends the run with code 1. Solve a copy of it; benchmarks/state.py measures OUT as it is, with --truths FOLDER.
+Kept are the frames, cameras, head, delit frames, textures and masks, and the solved maps for comparison;
+OUT/frozen.json has each file's hash, and of each stage the version and the code's key. OUT lies outside of the
+repository. What was kept is never replaced: a capture that has changed since is named, and ends the run with code 1.
+Solve a copy of it; benchmarks/state.py measures OUT as it is, with --truths FOLDER.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ from core.contract.messages import Problem
 from .figures import ROOT, commit
 
 RECORD = "frozen.json"
-FILES = ("capture.json", "head.obj", "texture.exr", "texture_filmed.png", "texture_confidence.exr", "texture_detail.exr", "shadow_mask_auto.png",
+FILES = ("capture.json", "head.obj", "texture.exr", "texture_filmed.png", "texture_confidence.exr",
+         "texture_detail.exr", "shadow_mask_auto.png",
          "shadow_mask.png", "maps/diffuse_albedo.png", "maps/confidence.png")
 FOLDERS = ("frames", "cameras", "delit")
 STAGES = ("delight", "texture", "shadow_mask", "solve")
@@ -56,13 +59,15 @@ def main() -> int:
 
 
 def freeze(folder: Path, out: Path, only: tuple[str, ...] = ("",)) -> list[str]:
-    """Keeps the captures of a folder that have a texture; the names of those that were kept before and have changed since.
+    """Keeps the captures of a folder that have a texture; the names of those that were kept before and have changed
+    since.
 
     Raises Problem where `out` lies in the repository, or nothing is there to keep.
     """
     if out.is_relative_to(ROOT):
         raise Problem(f"{out} lies in the repository.", "Name a folder outside of it.")
-    captures = [path for path in sorted(folder.glob("*.wildcap")) if path.stem.startswith(only) and (path / "texture.exr").is_file()]
+    captures = [path for path in sorted(folder.glob("*.wildcap")) if path.stem.startswith(only)
+                and (path / "texture.exr").is_file()]
     if not captures:
         raise Problem(f"{folder} holds no capture with a texture.", "Run the chain until texture first.")
     record, changed = read_record(out), []
@@ -78,7 +83,9 @@ def freeze(folder: Path, out: Path, only: tuple[str, ...] = ("",)) -> list[str]:
                 (kept / path).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(source / path, kept / path)
         stages = Capture(source).read()["stages"]
-        record[name] = {"commit": commit(), "stages": {stage: {key: stages[stage].get(key) for key in STAGE_KEYS} for stage in STAGES if stage in stages},
+        record[name] = {"commit": commit(),
+                        "stages": {stage: {key: stages[stage].get(key) for key in STAGE_KEYS} for stage in STAGES
+                                   if stage in stages},
                         "files": hashes}
         write_json(out / RECORD, record)
         print(f"{name}: {len(hashes)} files kept", flush=True)
@@ -91,14 +98,19 @@ def differences(out: Path) -> list[str]:
     for name, kept in read_record(out).items():
         root = out / f"{name}.wildcap"
         there = {path: read_hash(root / path) for path in inputs(root)}
-        found += [f"{name}: {path} {'is missing' if path not in there else 'was added' if path not in kept['files'] else 'has changed'}."
-                  for path in sorted(there.keys() | kept["files"].keys()) if there.get(path) != kept["files"].get(path)]
+        found += [
+            f"{name}: {path} "
+            f"{'is missing' if path not in there else 'was added' if path not in kept['files'] else 'has changed'}."
+            for path in sorted(there.keys() | kept["files"].keys())
+            if there.get(path) != kept["files"].get(path)
+        ]
     return found
 
 
 def inputs(root: Path) -> list[str]:
     """The files of a capture that are kept, relative to it."""
-    inside = [path for folder in FOLDERS for path in sorted((root / folder).rglob("*")) if path.is_file() and not path.name.startswith(".")]
+    inside = [path for folder in FOLDERS for path in sorted((root / folder).rglob("*")) if path.is_file()
+              and not path.name.startswith(".")]
     return [name for name in FILES if (root / name).is_file()] + [path.relative_to(root).as_posix() for path in inside]
 
 

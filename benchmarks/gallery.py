@@ -4,10 +4,11 @@
 
     python -m benchmarks.gallery CAPTURE OUT.jpg [--truth MAPS]
 
-captured frame, delit frame, texture, shadow mask over it, diffuse albedo, true albedo (of the folder MAPS; black without it), specular albedo;
-normals, shading, a close-up of the albedo beside the nose, the head under four lights of the add-on: three lamps, a window, the sun, a city.
-Relit pictures are Cycles's linear light under the sRGB curve, clipped: Blender's view transform Standard, no look, exposure as the presets have it.
-Renders that are newer than the maps are taken as they are.
+captured frame, delit frame, texture, shadow mask over it, diffuse albedo, true albedo (of the folder MAPS; black
+without it), specular albedo; normals, shading, a close-up of the albedo beside the nose, the head under four lights of
+the add-on: three lamps, a window, the sun, a city. Relit pictures are Cycles's linear light under the sRGB curve,
+clipped: Blender's view transform Standard, no look, exposure as the presets have it. Renders that are newer than the
+maps are taken as they are.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ from core.imaging import images
 ROOT = Path(__file__).resolve().parent.parent
 LIGHTS = ("three_point", "window", "sun", "city.exr")
 TILE, RESOLUTION, SAMPLES = 224, 320, 24  # pixels, pixels, rays per pixel
-CHEEK, CLOSE_UP = 203, 0.11  # MediaPipe's landmark beside the nose, on the person's right; side of the close-up as a share of the map
+# MediaPipe's landmark beside the nose, on the person's right; side of the close-up as a share of the map
+CHEEK, CLOSE_UP = 203, 0.11
 MOST_BYTES = 180_000
 QUALITIES = (90, 86, 82, 78, 74, 70, 64)  # of the JPEG, the first that is small enough
 
@@ -48,9 +50,11 @@ def captured(capture: Capture) -> list[np.ndarray]:
     """Frame and delit frame about the face, texture, and mask over the texture: sRGB, square."""
     views = read_views(capture, selected_only=True)
     head = meshes.read_obj(capture.head)
-    view = max((v for v in views if (capture.delit / f"{Path(v.name).stem}.png").is_file()), key=lambda v: v.axis[1])  # from the front
+    # from the front
+    view = max((v for v in views if (capture.delit / f"{Path(v.name).stem}.png").is_file()), key=lambda v: v.axis[1])
     box = face_square(view, head)
-    cover = (raster.render_view(raster.RayCaster(head), view)[0] >= 0)[..., None]  # a delighter knows nothing of what is behind the head
+    # a delighter knows nothing of what is behind the head
+    cover = (raster.render_view(raster.RayCaster(head), view)[0] >= 0)[..., None]
     texture = images.read_srgb(capture.texture_png)
     mask = images.read_mask(capture.shadow_mask if capture.shadow_mask.exists() else capture.shadow_mask_auto)
     mask = images.resize(mask, texture.shape[1], texture.shape[0])[..., None]
@@ -60,7 +64,8 @@ def captured(capture: Capture) -> list[np.ndarray]:
 
 
 def solved(capture: Capture, truth: Path | None) -> list[np.ndarray]:
-    """Albedo, true albedo, specular, normal, shading and a close-up of the albedo at the delivered size: sRGB, square."""
+    """Albedo, true albedo, specular, normal, shading and a close-up of the albedo at the delivered size: sRGB,
+    square."""
     maps = capture.maps_4k if (capture.maps_4k / "shading.exr").is_file() else capture.maps
     albedo = images.read_srgb(maps / "diffuse_albedo.png")
     true = images.read_srgb(truth / "diffuse_albedo.png") if truth else np.zeros((8, 8, 3), np.float32)
@@ -69,17 +74,20 @@ def solved(capture: Capture, truth: Path | None) -> list[np.ndarray]:
     shading = images.linear_to_srgb(shading * (0.6 / max(float(np.percentile(shading, 95)), 1e-6)))
     side = round(CLOSE_UP * len(albedo))
     column, row = np.round(landmark_uv(CHEEK) * len(albedo) - side / 2).astype(int)
-    return [albedo, true, np.repeat(specular[..., :1], 3, 2), normal[..., :3], shading, albedo[row:row + side, column:column + side]]
+    return [albedo, true, np.repeat(specular[..., :1], 3, 2), normal[..., :3], shading,
+            albedo[row:row + side, column:column + side]]
 
 
 def relit(capture: Capture) -> list[np.ndarray]:
     """The head under LIGHTS, rendered where that is not done: sRGB, square."""
     paths = [capture.renders / f"{Path(light).stem}.exr" for light in LIGHTS]
-    made = max(path.stat().st_mtime for folder in (capture.maps, capture.maps_4k) if folder.is_dir() for path in folder.glob("*.png"))
-    stale = [light for light, path in zip(LIGHTS, paths, strict=True) if not path.is_file() or path.stat().st_mtime < made]
+    made = max(path.stat().st_mtime for folder in (capture.maps, capture.maps_4k) if folder.is_dir()
+               for path in folder.glob("*.png"))
+    stale = [light for light, path in zip(LIGHTS, paths, strict=True) if not path.is_file()
+             or path.stat().st_mtime < made]
     if stale:
-        subprocess.run([sys.executable, "-m", "benchmarks.render_capture", str(capture.root), *stale, "--resolution", str(RESOLUTION),
-                        "--samples", str(SAMPLES)], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([sys.executable, "-m", "benchmarks.render_capture", str(capture.root), *stale, "--resolution",
+                        str(RESOLUTION), "--samples", str(SAMPLES)], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
     return [images.linear_to_srgb(images.read_linear(path)) for path in paths]
 
 

@@ -1,15 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the video to the textured head, measured: cameras, scan, head and texture of several captures, with what each stage cost.
+"""From the video to the textured head, measured: cameras, scan, head and texture of several captures, with what each
+stage cost.
 
-    python -m benchmarks.geometry FOLDER [--captures NAME ...] [--data FOLDER] [--fresh] [--json docs/figures/geometry.json]
+    python -m benchmarks.geometry FOLDER [--captures NAME ...] [--data FOLDER] [--fresh] [--json
+    docs/figures/geometry.json]
 
-Captures: `sample` (part of this repository), `lps_sun` and `bust` (in --data). FOLDER gets NAME.wildcap, NAME.json, pictures/NAME.jpg (scan, wireframe and
-texture beside the frame) and geometry.json. What is finished is not done again without --fresh: stages that are fresh, captures that came through.
-Captures that are in --json's record and were not measured here stay there. The perceptual row needs `pip install --no-deps -r
-requirements/perceptual.txt`; without it the table says so. Every stage runs in a process of its own, so its peak memory (of the largest of its processes,
-as getrusage tells) is its own.
-docs/pictures/geometry.jpg is FOLDER/pictures/sample.jpg: pictures of people never go into the documentation.
+Captures: `sample` (part of this repository), `lps_sun` and `bust` (in --data). FOLDER gets NAME.wildcap, NAME.json,
+pictures/NAME.jpg (scan, wireframe and texture beside the frame) and geometry.json. What is finished is not done again
+without --fresh: stages that are fresh, captures that came through. Captures that are in --json's record and were not
+measured here stay there. The perceptual row needs `pip install --no-deps -r requirements/perceptual.txt`; without it
+the table says so. Every stage runs in a process of its own, so its peak memory (of the largest of its processes, as
+getrusage tells) is its own. docs/pictures/geometry.jpg is FOLDER/pictures/sample.jpg: pictures of people never go into
+the documentation.
 """
 
 from __future__ import annotations
@@ -40,7 +43,8 @@ LAST = "texture"
 
 @dataclass(frozen=True)
 class ScannedSubject:
-    """What is captured, and what is known of it: `truth` laid out as benchmarks/albedo_score.py says, `mesh` the true surface where it is not `truth`'s own."""
+    """What is captured, and what is known of it: `truth` laid out as benchmarks/albedo_score.py says, `mesh` the true
+    surface where it is not `truth`'s own."""
 
     source: Path
     truth: Path | None = None
@@ -51,20 +55,22 @@ def subjects(data: Path) -> dict[str, ScannedSubject]:
     """The captures by name; those of `data` that are not there are left out."""
     sample = ROOT / "core" / "synthetic" / "sample"
     found = {"sample": ScannedSubject(sample / "capture.mp4", sample),
-             "lps_sun": ScannedSubject(data / "lps_sun" / "capture.mp4", data / "lps_sun", data / "lee_perry_smith" / "LeePerrySmith.glb"),
+             "lps_sun": ScannedSubject(data / "lps_sun" / "capture.mp4", data / "lps_sun",
+                                       data / "lee_perry_smith" / "LeePerrySmith.glb"),
              "bust": ScannedSubject(data / "bust")}
     return {name: subject for name, subject in found.items() if subject.source.exists()}
 
 
 def measure(name: str, subject: ScannedSubject, folder: Path, fresh: bool = False) -> dict:
-    """One capture's figures: run, compared with the truth where there is one, drawn. What stops it is told in "stopped"."""
+    """One capture's figures: run, compared with the truth where there is one, drawn. What stops it is told in
+    "stopped"."""
     capture = Capture(folder / f"{name}.wildcap")
     if fresh:
         shutil.rmtree(capture.root, ignore_errors=True)
     costs, stopped = run_stages(capture, subject.source)
     figures = {"stages": costs, "stopped": stopped}
-    for part, made, compare in (("cameras", capture.cameras, _cameras), ("scan", capture.scan, _surface), ("head", capture.head, _surface),
-                                ("texture", capture.head, _texture)):
+    for part, made, compare in (("cameras", capture.cameras, _cameras), ("scan", capture.scan, _surface),
+                                ("head", capture.head, _surface), ("texture", capture.head, _texture)):
         if not made.exists():  # "stopped" says why
             continue
         print(f"{name}: {part}", flush=True)
@@ -84,7 +90,8 @@ def measure(name: str, subject: ScannedSubject, folder: Path, fresh: bool = Fals
 
 
 def run_stages(capture: Capture, source: Path) -> tuple[dict, dict | None]:
-    """Per stage its seconds and peak memory in MB; and the problem and remedy that ended the run, or None. Costs of stages that were fresh are kept."""
+    """Per stage its seconds and peak memory in MB; and the problem and remedy that ended the run, or None. Costs of
+    stages that were fresh are kept."""
     path = capture.root / "costs.json"
     costs = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
     for stage in stages.NAMES[:stages.NAMES.index(LAST) + 1]:
@@ -110,7 +117,9 @@ def _cameras(capture: Capture, subject: ScannedSubject, part: str) -> dict:
     views = read_views(capture)
     figures = {"frames": frames, "registered_percent": 100 * len(views) / frames,
                "reprojection_px": pycolmap.Reconstruction(str(capture.cameras)).compute_mean_reprojection_error()}
-    return {**figures, **({"against_truth": {k: float(v) for k, v in compare(capture, subject.truth).items()}} if subject.truth else {})}
+    return {**figures,
+            **({"against_truth": {k: float(v) for k, v in compare(capture, subject.truth).items()}} if subject.truth
+               else {})}
 
 
 def _surface(capture: Capture, subject: ScannedSubject, part: str) -> dict:
@@ -119,7 +128,9 @@ def _surface(capture: Capture, subject: ScannedSubject, part: str) -> dict:
     figures = capture.read()["stages"].get({"scan": "scan", "head": "registration"}[part], {}).get("figures", {})
     if subject.truth is None:
         return {"own": figures}
-    return {"own": figures, "against_truth": compare(capture, subject.truth, subject.mesh, {"scan": "scan.ply", "head": "head.obj"}[part])}
+    return {"own": figures,
+            "against_truth": compare(capture, subject.truth, subject.mesh,
+                                     {"scan": "scan.ply", "head": "head.obj"}[part])}
 
 
 def _texture(capture: Capture, subject: ScannedSubject, part: str) -> dict:
@@ -132,7 +143,8 @@ def _texture(capture: Capture, subject: ScannedSubject, part: str) -> dict:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--captures", nargs="+", metavar="NAME", help="of sample, lps_sun, bust; all that are there by default")
+    parser.add_argument("--captures", nargs="+", metavar="NAME",
+                        help="of sample, lps_sun, bust; all that are there by default")
     parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data")
     parser.add_argument("--fresh", action="store_true", help="do everything again")
     parser.add_argument("--json", type=Path, help="where the tables' figures go")
@@ -149,7 +161,8 @@ def main() -> None:
         started = time.monotonic()
         figures = measure(name, known[name], folder, options.fresh)
         write_json(result, {**figures, "minutes": round((time.monotonic() - started) / 60, 1)})
-    everything = {name: json.loads((folder / f"{name}.json").read_text(encoding="utf-8")) for name in known if (folder / f"{name}.json").is_file()}
+    everything = {name: json.loads((folder / f"{name}.json").read_text(encoding="utf-8")) for name in known
+                  if (folder / f"{name}.json").is_file()}
     write_json(folder / "geometry.json", everything)
     if options.json:
         others = read(options.json.stem, options.json.parent)["figures"] if options.json.is_file() else {}

@@ -16,7 +16,8 @@ HEIGHT = 480
 
 
 def sheet(capture: Capture, views: int = 3) -> np.ndarray:
-    """sRGB [views * HEIGHT, W, 3]: a row for each of the leftmost, middle and rightmost views; what the capture lacks is left grey."""
+    """sRGB [views * HEIGHT, W, 3]: a row for each of the leftmost, middle and rightmost views; what the capture lacks
+    is left grey."""
     head = meshes.read_obj(capture.head) if capture.head.is_file() else None
     scan = meshes.read_ply(capture.scan) if capture.scan.is_file() else None
     texture = images.read_srgb(capture.texture_png) if capture.texture_png.is_file() else None
@@ -44,7 +45,8 @@ def _shaded(caster: raster.RayCaster, view: View, scale: float) -> np.ndarray:
     """Grey, lit from the camera."""
     face, _, _ = raster.render_view(caster, view, scale)
     cosine = np.abs(meshes.face_normals(caster.mesh) @ view.axis)
-    return np.repeat(np.where(face >= 0, 0.15 + 0.75 * cosine[np.maximum(face, 0)], 0.95)[..., None], 3, 2).astype(np.float32)
+    return np.repeat(np.where(face >= 0, 0.15 + 0.75 * cosine[np.maximum(face, 0)], 0.95)[..., None], 3,
+                     2).astype(np.float32)
 
 
 def _wires(mesh: meshes.Mesh, caster: raster.RayCaster, view: View, frame: np.ndarray, scale: float) -> np.ndarray:
@@ -61,5 +63,7 @@ def _wires(mesh: meshes.Mesh, caster: raster.RayCaster, view: View, frame: np.nd
 def _painted(caster: raster.RayCaster, view: View, texture: np.ndarray, scale: float) -> np.ndarray:
     face, bary, _ = raster.render_view(caster, view, scale)
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
-    colour = raster.sample(texture, np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(texture)).reshape(*face.shape, 3)
+    colour = raster.sample(texture,
+                           np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2)
+                           * len(texture)).reshape(*face.shape, 3)
     return np.where((face >= 0)[..., None], colour, 0.95).astype(np.float32)

@@ -1,14 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that is grown from pictures of people whose every hair is known: where it covers the face, and which way it lies.
+"""Hair that is grown from pictures of people whose every hair is known: where it covers the face, and which way it
+lies.
 
-    python -m benchmarks.groomed FOLDER [--seeds 3 ...] [--page docs/results/hair.md] [--sheet docs/pictures/hair.jpg] [--json docs/figures/groomed.json]
+    python -m benchmarks.groomed FOLDER [--seeds 3 ...] [--page docs/results/hair.md] [--sheet docs/pictures/hair.jpg]
+    [--json docs/figures/groomed.json]
 
-The people of core/synthetic/people seen by rays from nine sides, lit by one lamp and a sky without shadows, through a phone's pipeline; cameras, head and the
-albedo's texture are the true ones, and the face parser is asked in these pictures as the chain asks it, so that nothing but finding hair, its strokes and its
-growth is judged. Coverage: pixels of the frames in which hair covers more than a tenth of a millimetre's surroundings, by the true and by the grown hairs.
-Parser: texels to which it gives more than half, against those where hair grows. Direction: each true hair against the nearest grown one within 3 mm, from root
-to tip, on the skin; beside it what the usual directions alone give. FOLDER keeps the pictures.
+The people of core/synthetic/people seen by rays from nine sides, lit by one lamp and a sky without shadows, through a
+phone's pipeline; cameras, head and the albedo's texture are the true ones, and the face parser is asked in these
+pictures as the chain asks it, so that nothing but finding hair, its strokes and its growth is judged. Coverage: pixels
+of the frames in which hair covers more than a tenth of a millimetre's surroundings, by the true and by the grown hairs.
+Parser: texels to which it gives more than half, against those where hair grows. Direction: each true hair against the
+nearest grown one within 3 mm, from root to tip, on the skin; beside it what the usual directions alone give. FOLDER
+keeps the pictures.
 """
 
 from __future__ import annotations
@@ -51,19 +55,29 @@ NAMES = {person.seed: person.name for person in LIKENESSES}
 JUDGED = (3, 5)
 """Views in which coverage is compared: either side of the front."""
 COVERED, NEAR_MM = 0.1, 3.0
-COMMAND = "python -m benchmarks.groomed FOLDER --page docs/results/hair.md --sheet docs/pictures/hair.jpg --json docs/figures/groomed.json"
-WORDS = ("Four people whose every hair is known, from nine sides through a phone's pipeline (1,440 x 1,920). No other step of the chain lies between: cameras, "
-         "head and texture are the true ones, and the face parser is asked in these pictures. *IoU*: of the pixels that hair covers, by the true and by the "
-         "grown hairs, seen from either side of the front. *Parser*: of the texels to which the parser gives more than half, and those where hair grows, "
-         "whether a fringe hides them or not. *Off*: the median angle on the skin between each true hair and the nearest grown one, from root to tip; *off, "
-         "usual*: the same of hair that lies as anatomy has it, whatever the strokes say. Wanted: an IoU of 0.7, and 20 degrees. Nothing was chosen on these "
-         "four. How clear strokes must be to outweigh the usual direction was, on seeds 3, 5 and 13, and there the rule that joins the parser's answer with "
+COMMAND = ("python -m benchmarks.groomed FOLDER --page docs/results/hair.md --sheet docs/pictures/hair.jpg --json "
+           "docs/figures/groomed.json")
+WORDS = ("Four people whose every hair is known, from nine sides through a phone's pipeline (1,440 x 1,920). No other "
+         "step of the chain lies between: cameras, "
+         "head and texture are the true ones, and the face parser is asked in these pictures. *IoU*: of the pixels "
+         "that hair covers, by the true and by the "
+         "grown hairs, seen from either side of the front. *Parser*: of the texels to which the parser gives more than "
+         "half, and those where hair grows, "
+         "whether a fringe hides them or not. *Off*: the median angle on the skin between each true hair and the "
+         "nearest grown one, from root to tip; *off, "
+         "usual*: the same of hair that lies as anatomy has it, whatever the strokes say. Wanted: an IoU of 0.7, and "
+         "20 degrees. Nothing was chosen on these "
+         "four. How clear strokes must be to outweigh the usual direction was, on seeds 3, 5 and 13, and there the "
+         "rule that joins the parser's answer with "
          "the strokes was looked at, too. A beard's length is no part of it: its hairs are 6 mm long on everybody.\n\n"
-         "Where it falls short: stubble is found, but grown like a beard, far denser and longer than it is (*Beard Length* and *Share* are the artist's), "
-         "and not in its colour. Where both brows lie behind a fringe, usual ones are grown, in no colour of the person's. Dark brows become a little wider "
+         "Where it falls short: stubble is found, but grown like a beard, far denser and longer than it is (*Beard "
+         "Length* and *Share* are the artist's), "
+         "and not in its colour. Where both brows lie behind a fringe, usual ones are grown, in no colour of the "
+         "person's. Dark brows become a little wider "
          "than by dark strokes alone (an IoU of 0.88 and 0.87 before on the bearded and the stubbled man).")
 CHOSEN_ON, TRUSTS, TURNS = (3, 5, 13), (0.03, 0.1, 0.3, 1.0, 3.0), (-40, 0, 40)
-"""People on whom the trust in strokes was chosen; degrees by which the usual directions are turned, for nobody's hair is all as usual."""
+"""People on whom the trust in strokes was chosen; degrees by which the usual directions are turned, for nobody's hair
+is all as usual."""
 USUAL_ALONE = 1e6
 """Trust in the usual directions that no stroke outweighs."""
 
@@ -71,14 +85,17 @@ USUAL_ALONE = 1e6
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", metavar="FOLDER", type=Path)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[person.seed for person in LIKENESSES], help="the four reserved people, where none are named")
-    parser.add_argument("--trust", action="store_true", help="how far hair is off for how clear strokes must be (seeds 3, 5, 13)")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[person.seed for person in LIKENESSES],
+                        help="the four reserved people, where none are named")
+    parser.add_argument("--trust", action="store_true",
+                        help="how far hair is off for how clear strokes must be (seeds 3, 5, 13)")
     parser.add_argument("--page", type=Path, help="where the page goes")
     parser.add_argument("--sheet", type=Path, help="a picture of true and grown hair")
     parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/groomed.json")
     options = parser.parse_args()
     if options.trust:
-        print(figures.markdown(["person", "part", *map(str, TRUSTS)], [row for seed in CHOSEN_ON for row in try_trusts(options.folder, seed)]))
+        print(figures.markdown(["person", "part", *map(str, TRUSTS)],
+                               [row for seed in CHOSEN_ON for row in try_trusts(options.folder, seed)]))
         return
     rows, pictures = {}, []
     for seed in options.seeds:
@@ -88,17 +105,21 @@ def main() -> None:
     if options.sheet:
         images.write_srgb(options.sheet, np.concatenate(pictures))
     if options.page:
-        picture = f"![From left to right a frame, the true hairs, the grown hairs](../pictures/{options.sheet.name})" if options.sheet else ""
-        write_page(options.page, "Hair that is grown from pictures", COMMAND, [("", WORDS), ("", to_table(rows)), ("", picture)])
+        picture = (f"![From left to right a frame, the true hairs, the grown hairs](../pictures/{options.sheet.name})"
+                   if options.sheet else "")
+        write_page(options.page, "Hair that is grown from pictures", COMMAND,
+                   [("", WORDS), ("", to_table(rows)), ("", picture)])
     if options.json:
         figures.write(options.json, "groomed", COMMAND, {"people": rows})
 
 
 def to_table(rows: dict[str, dict]) -> str:
     """Markdown: a line for each part of each person."""
-    lines = [[name, part, row["true_hairs"], row["grown_hairs"], row["iou"], row["parser_iou"], row.get("degrees"), row.get("usual_degrees")]
+    lines = [[name, part, row["true_hairs"], row["grown_hairs"], row["iou"], row["parser_iou"], row.get("degrees"),
+              row.get("usual_degrees")]
              for name, parts in rows.items() for part, row in parts.items()]
-    return figures.markdown(["person", "part", "true hairs", "grown hairs", "IoU", "parser", "off, degrees", "off, usual"], lines)
+    return figures.markdown(["person", "part", "true hairs", "grown hairs", "IoU", "parser", "off, degrees",
+                             "off, usual"], lines)
 
 
 def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
@@ -116,18 +137,22 @@ def judge(folder: Path, seed: int) -> tuple[dict, np.ndarray]:
     for part in ("brows", "beard"):
         if part in true or part in grown:
             row[part] = {"true_hairs": _count(true.get(part)), "grown_hairs": _count(grown.get(part)),
-                                  "iou": _overlap(figure, views, true.get(part), grown.get(part)), "parser_iou": _told(figure, shown, part)}
+                                  "iou": _overlap(figure, views, true.get(part), grown.get(part)),
+                         "parser_iou": _told(figure, shown, part)}
             if part in true and part in grown:
-                row[part] |= {"degrees": _off(true[part], grown[part], figure), "usual_degrees": _off(true[part], usual[part], figure)}
+                row[part] |= {"degrees": _off(true[part], grown[part], figure),
+                              "usual_degrees": _off(true[part], usual[part], figure)}
     return row, _picture(figure, views[VIEWS // 2], true, grown)
 
 
 def try_trusts(folder: Path, seed: int) -> list[list]:
-    """For each part of a person: degrees by which the found directions are off the true hairs' in the median, for each of TRUSTS, the mean over TURNS."""
+    """For each part of a person: degrees by which the found directions are off the true hairs' in the median, for each
+    of TRUSTS, the mean over TURNS."""
     figure = make_figure(seed, SIZE)
     views, seen = photograph(folder / str(seed), figure)
     surface, (maps, shown) = lay_out(figure.head, SIZE), _maps(figure, views, seen)
-    found, landmarks, rows = hair.find(maps, surface, shown.shares[..., :len(GROWTHS)]), template.landmark_points(surface.mesh), []
+    found, landmarks, rows = hair.find(maps, surface,
+                                       shown.shares[..., :len(GROWTHS)]), template.landmark_points(surface.mesh), []
     for true in (hairs for hairs in figure.strands if hairs.part in ("brows", "beard")):
         where = (getattr(found, true.part) > grooming.LEAST_COVER) & surface.covered
         if where.sum() < grooming.FEWEST:
@@ -163,7 +188,8 @@ def photograph(folder: Path, figure: Figure) -> tuple[list[View], list[np.ndarra
             colour, normal = _look(world, view)
             lit = colour * (0.5 + 0.7 * np.clip(normal @ lamp, 0, None))[..., None]
             gain = np.full(3, 0.6 / max(np.percentile(lit[normal.any(-1)], 95), 1e-6))
-            images.write_srgb(path, phone.develop(lit.astype(np.float32), taken, gain, np.random.default_rng([seed, 92, k])))
+            images.write_srgb(path,
+                              phone.develop(lit.astype(np.float32), taken, gain, np.random.default_rng([seed, 92, k])))
             with replacing(albedo) as temporary, open(temporary, "wb") as file:
                 np.savez_compressed(file, colour=colour.astype(np.float16))
         with np.load(albedo) as stored:
@@ -184,7 +210,8 @@ def _look(world: Scene, view: View) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _maps(figure: Figure, views: list[View], seen: list[np.ndarray]) -> tuple[HeadMaps, PartsShown]:
-    """The texture that the true albedo of the views makes, as maps (what none of them sees has the bare skin's), and what the parser says of the views."""
+    """The texture that the true albedo of the views makes, as maps (what none of them sees has the bare skin's), and
+    what the parser says of the views."""
     surface = Head(figure.head).unfold(SIZE)
     total, weights = np.zeros((SIZE, SIZE, 3)), np.zeros((SIZE, SIZE, 1))
     looks = [observe(view, colour, surface, 1.0) for view, colour in zip(views, seen, strict=True)]
@@ -194,7 +221,8 @@ def _maps(figure: Figure, views: list[View], seen: list[np.ndarray]) -> tuple[He
     bare = images.resize(figure.skin.diffuse, SIZE, SIZE)
     diffuse = np.where(weights > 1e-4, np.exp(total / np.maximum(weights, 1e-9)), bare).astype(np.float32)
     one = np.ones((SIZE, SIZE), np.float32)
-    maps = HeadMaps(diffuse, one[..., None] * [0, 0, 1], 0.35 * one, np.clip(weights[..., 0], 0, 1).astype(np.float32), np.repeat(one[..., None], 3, 2))
+    maps = HeadMaps(diffuse, one[..., None] * [0, 0, 1], 0.35 * one, np.clip(weights[..., 0], 0, 1).astype(np.float32),
+                    np.repeat(one[..., None], 3, 2))
     return maps, tell_parts(looks, surface, Reporter("texture"))
 
 
@@ -207,7 +235,8 @@ def _off(true: Strands, grown: Strands, figure: Figure) -> float:
     distance, nearest = cKDTree(grown.points[:, 0]).query(true.points[:, 0])
     close = distance < NEAR_MM / 1000
     normals = vertex_normals(figure.head)[cKDTree(figure.head.vertices).query(true.points[close, 0])[1]]
-    one, other = (hairs.points[index, -1] - hairs.points[index, 0] for hairs, index in ((true, np.flatnonzero(close)), (grown, nearest[close])))
+    one, other = (hairs.points[index, -1] - hairs.points[index, 0]
+                  for hairs, index in ((true, np.flatnonzero(close)), (grown, nearest[close])))
     return round(_median_angle(one, other, normals), 1)
 
 
@@ -228,8 +257,10 @@ def _overlap(figure: Figure, views: list[View], true: Strands | None, grown: Str
 
 
 def _told(figure: Figure, shown: PartsShown, part: str) -> float:
-    """Intersection over union of the texels to which the parser gives more than half and of those where such hair grows, as far as a view shows them."""
-    grows = images.resize(figure.growth[part], SIZE, SIZE) > 0.25 if part in figure.growth else np.zeros((SIZE, SIZE), bool)
+    """Intersection over union of the texels to which the parser gives more than half and of those where such hair
+    grows, as far as a view shows them."""
+    grows = (images.resize(figure.growth[part], SIZE, SIZE) > 0.25 if part in figure.growth
+             else np.zeros((SIZE, SIZE), bool))
     told, grows = (where[shown.told] for where in (shown.shares[..., GROWTHS.index(part)] > 0.5, grows))
     return round(float((told & grows).sum() / max((told | grows).sum(), 1)), 3)
 
@@ -254,15 +285,18 @@ def _picture(figure: Figure, view: View, true: dict, grown: dict) -> np.ndarray:
     for hairs in (true, grown):
         chosen = [hairs[part] for part in ("brows", "lashes", "beard") if part in hairs]
         meshes = [figure.opened.skin, *(prisms(h) for h in chosen)]
-        flat = np.concatenate([np.zeros((len(meshes[0].faces), 3)), *(np.repeat(h.colour, len(m.faces) // len(h.colour), 0)
-                                                                      for h, m in zip(chosen, meshes[1:], strict=True))])
+        flat = np.concatenate([np.zeros((len(meshes[0].faces), 3)),
+                               *(np.repeat(h.colour, len(m.faces) // len(h.colour), 0)
+                                 for h, m in zip(chosen, meshes[1:], strict=True))])
         whole = joined(meshes)
         face, bary, _ = raster.render_view(raster.RayCaster(whole), view, OVER)
         hit = face >= 0
         normal = raster.interpolate(vertex_normals(whole), whole.faces, face[hit], bary[hit])
         skin = face[hit] < len(meshes[0].faces)
         colour = flat[face[hit]]
-        colour[skin] = 0.35 * (0.4 + 0.6 * np.clip(-normal[skin, 1:2] / np.linalg.norm(normal[skin], axis=1, keepdims=True), 0, 1))
+        colour[skin] = 0.35 * (0.4 + 0.6
+                               * np.clip(-normal[skin, 1:2] / np.linalg.norm(normal[skin], axis=1, keepdims=True), 0,
+                                         1))
         picture = np.ones((*hit.shape, 3), np.float32)
         picture[hit] = colour
         shown.append(images.linear_to_srgb(_shrunk(picture))[crop])

@@ -4,8 +4,8 @@
 
     python -m benchmarks.hair_closeups FOLDER OUT.jpg [--resolution 256] [--samples 32]
 
-A row for each person: the albedo with its painted brow under the first light, then with brows and lashes grown over the skin below under all three, the eyes
-half open in the last.
+A row for each person: the albedo with its painted brow under the first light, then with brows and lashes grown over the
+skin below under all three, the eyes half open in the last.
 """
 
 from .closeups import LIGHTS, Shot, run

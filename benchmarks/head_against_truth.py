@@ -1,11 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Distance of a capture's head (or scan) to the true mesh, in the facial skin, after a similarity of the camera centres.
+"""Distance of a capture's head (or scan) to the true mesh, in the facial skin, after a similarity of the camera
+centres.
 
     python benchmarks/head_against_truth.py CAPTURE TRUTH [MESH] [--surface head.obj|scan.ply]
 
-TRUTH holds cameras.json ({"cameras": [{"frame", "matrix_world"}]}, Blender's convention) and face/NNNN.png. MESH is an OBJ or PLY in
-that world, or a glTF in it turned Y up: (x, -z, y) of it is the world of cameras.json. Without MESH the truth is the sample's subject.
+TRUTH holds cameras.json ({"cameras": [{"frame", "matrix_world"}]}, Blender's convention) and face/NNNN.png. MESH is an
+OBJ or PLY in that world, or a glTF in it turned Y up: (x, -z, y) of it is the world of cameras.json. Without MESH the
+truth is the sample's subject.
 """
 
 import argparse
@@ -29,20 +31,24 @@ from core.synthetic.sample import RESERVED  # noqa: E402
 
 
 def compare(capture: Capture, truth: Path, mesh: Path | None, surface: str = "head.obj") -> dict:
-    """Median, 90th and 95th percentile in mm over the face's pixels, as placed by the cameras and after ICP beside it."""
+    """Median, 90th and 95th percentile in mm over the face's pixels, as placed by the cameras and after ICP beside
+    it."""
     views = read_views(capture)
     frames = {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()}
-    cameras = {c["frame"]: np.array(c["matrix_world"])[:3, 3] for c in json.loads((truth / "cameras.json").read_text())["cameras"]}
+    cameras = {c["frame"]: np.array(c["matrix_world"])[:3, 3]
+               for c in json.loads((truth / "cameras.json").read_text())["cameras"]}
     shared = [v for v in views if frames[v.name] in cameras]
     ours, theirs = np.stack([v.centre for v in shared]), np.stack([cameras[frames[v.name]] for v in shared])
     pose = similarity(theirs, ours, np.ones(len(ours)))
 
     points, normals = _surface(mesh)
     points, normals = pose.apply(points), normals @ pose.rotation.T
-    ours_mesh = meshes.read_obj(capture.root / surface) if surface.endswith(".obj") else meshes.read_ply(capture.root / surface)
+    ours_mesh = (meshes.read_obj(capture.root / surface) if surface.endswith(".obj")
+                 else meshes.read_ply(capture.root / surface))
     hits = _face_points(ours_mesh, shared, frames, truth)
     tree = cKDTree(points)
-    figures = {"camera_centres_mm": _round(1e3 * np.median(np.linalg.norm(pose.apply(theirs) - ours, axis=1))), "points": len(hits)}
+    figures = {"camera_centres_mm": _round(1e3 * np.median(np.linalg.norm(pose.apply(theirs) - ours, axis=1))),
+               "points": len(hits)}
     figures["by_cameras"] = _percentiles(_distances(hits, tree, points, normals))
     for _ in range(20):
         index = tree.query(hits, workers=-1)[1]
@@ -94,7 +100,8 @@ def _moved(hits, targets, normals, used):
 
 
 def _percentiles(distances: np.ndarray) -> dict:
-    return {f"{name}_mm": _round(1e3 * np.percentile(distances, percent)) for name, percent in (("median", 50), ("p90", 90), ("p95", 95))}
+    return {f"{name}_mm": _round(1e3 * np.percentile(distances, percent))
+            for name, percent in (("median", 50), ("p90", 90), ("p95", 95))}
 
 
 def _round(value: float) -> float:

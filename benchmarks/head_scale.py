@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How well the distance of the pupils is found: `python -m benchmarks.head_scale [SEED ...]`.
 
-Synthetic heads of known size, photographed by known cameras; printed is by how much too large each comes out and how far it leans, which is what
-PUPILS_PER_LIDS in core/cameras/landmarks.py was set by (its 1.019 divides out; the heads it was set on are the default seeds).
+Synthetic heads of known size, photographed by known cameras; printed is by how much too large each comes out and how
+far it leans, which is what PUPILS_PER_LIDS in core/cameras/landmarks.py was set by (its 1.019 divides out; the heads it
+was set on are the default seeds).
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ def measure(seed: int) -> tuple[float, float]:
     origins, directions = np.array(origins), np.array(directions)
     scale, rotation, _, coefficients = fit_rays(origins, directions, intersect_rays(origins, directions)[0])
     right, left = pupils(coefficients)
-    return 100 * (scale * np.linalg.norm(left - right) / true - 1), float(np.degrees(np.arctan2(rotation[1, 2], rotation[2, 2])))
+    return 100 * (scale * np.linalg.norm(left - right) / true
+                  - 1), float(np.degrees(np.arctan2(rotation[1, 2], rotation[2, 2])))
 
 
 def main() -> None:

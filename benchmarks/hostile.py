@@ -2,12 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Throws spoiled files and odd names at the chain, and judges by itself whether each was met as it should be.
 
-    python -m benchmarks.hostile [--count 1000] [--seed 0] [--only K] [--until transfer] [--json docs/figures/hostile.json]
+    python -m benchmarks.hostile [--count 1000] [--seed 0] [--only K] [--until transfer] [--json
+    docs/figures/hostile.json]
 
-A case is a copy of a small finished capture (eight frames of the sample video) with files of the user's in it, one thing spoiled, and the stage or command
-that reads it, in a process forked from one in which everything is imported. It has to end well, with outputs that are finite and complete, or with exit
-code 2 and two sentences of which the first names the spoiled file: no traceback, no "error inside WildCap", no signal, no hang, no memory without end,
-none of the user's files lost or changed. Exit code 0 only where all of that held in every case. Linux.
+A case is a copy of a small finished capture (eight frames of the sample video) with files of the user's in it, one
+thing spoiled, and the stage or command that reads it, in a process forked from one in which everything is imported. It
+has to end well, with outputs that are finite and complete, or with exit code 2 and two sentences of which the first
+names the spoiled file: no traceback, no "error inside WildCap", no signal, no hang, no memory without end, none of the
+user's files lost or changed. Exit code 0 only where all of that held in every case. Linux.
 """
 
 from __future__ import annotations
@@ -55,15 +57,18 @@ def table(recorded: dict) -> str:
         rows.setdefault(STAGES_FILES if kind.startswith("stage ") else kind, Counter()).update(row)
     rows["all"] = Counter(recorded["all"])
     return markdown(["what was spoiled", "cases", "refused by name", "accepted, with sound results", "faults"],
-                    [[kind, *(row[name] for name in ("cases", "refused", "accepted", "faults"))] for kind, row in rows.items()])
+                    [[kind, *(row[name] for name in ("cases", "refused", "accepted", "faults"))]
+                     for kind, row in rows.items()])
 
 
 def _run(arguments: argparse.Namespace, work: Path) -> int:
-    from . import figures, hostile_cases, hostile_run, kills_capture, kills_worker  # numerical libraries ask for the number of threads when they are loaded
+    # numerical libraries ask for the number of threads when they are loaded
+    from . import figures, hostile_cases, hostile_run, kills_capture, kills_worker
 
     began = time.monotonic()
     kills_worker.warm_up()
-    undisturbed = kills_capture.run_undisturbed(work / "undisturbed", arguments.until, arguments.delighter, tell=lambda text: None)
+    undisturbed = kills_capture.run_undisturbed(work / "undisturbed", arguments.until, arguments.delighter,
+                                                tell=lambda text: None)
     stock = hostile_cases.Stock(undisturbed, work / "stock")
     print(f"A capture was made in {time.monotonic() - began:.0f} s.", flush=True)
     kinds = hostile_cases.kinds(undisturbed.names)
@@ -85,20 +90,23 @@ def _run(arguments: argparse.Namespace, work: Path) -> int:
             faulty.append((number, kind, case.said, faults))
             print(f"{number:5} {kind}: {case.said}", *(f"      {fault}" for fault in faults), sep="\n", flush=True)
         if arguments.only is not None:
-            print(f"{kind}: {case.said}\nexit code {ended.code} after {ended.seconds:.1f} s and {ended.peak / 1e9:.2f} GB\n{ended.output}")
+            print(f"{kind}: {case.said}\nexit code {ended.code} after {ended.seconds:.1f} s and {ended.peak / 1e9:.2f} "
+                  f"GB\n{ended.output}")
         shutil.rmtree(place, ignore_errors=True)
     print(f"\n{'':24}{'cases':>8}{'refused':>9}{'accepted':>10}{'faults':>8}")
     total = sum(rows.values(), Counter())
     for name, row in (*sorted(rows.items()), ("all", total)):
         print(f"{name:24}{row['cases']:8}{row['refused']:9}{row['accepted']:10}{row['faults']:8}")
     for number, *_ in faulty[:20]:
-        print(f"Again: python -m benchmarks.hostile --seed {arguments.seed} --count {arguments.count} --until {arguments.until} "
+        print(f"Again: python -m benchmarks.hostile --seed {arguments.seed} --count {arguments.count} --until "
+              f"{arguments.until} "
               f"--delighter {arguments.delighter} --only {number}")
     seconds = time.monotonic() - began
     print(f"{total['cases']} cases in {seconds / 60:.1f} minutes, seed {arguments.seed}.")
     if arguments.json:
         figures.write(arguments.json, "hostile", "python -m benchmarks.hostile --count COUNT --seed SEED",
-                      {"rows": {name: dict(row) for name, row in rows.items()}, "all": dict(total), "seed": arguments.seed, "minutes": seconds / 60})
+                      {"rows": {name: dict(row) for name, row in rows.items()}, "all": dict(total),
+                       "seed": arguments.seed, "minutes": seconds / 60})
     return 0 if total["cases"] and not total["faults"] else 1
 
 

@@ -28,7 +28,8 @@ NAMES = ("Zoë et moi", "a b'c\"d", "-rf", "%s{0}$HOME`id`", "tab\there", "line\
 
 @dataclass
 class Case:
-    """A command line, what was spoiled (the path as it was given, and the names by which a refusal may call it), and what is new if it is accepted."""
+    """A command line, what was spoiled (the path as it was given, and the names by which a refusal may call it), and
+    what is new if it is accepted."""
 
     place: Path
     command: list[str] = field(default_factory=list)
@@ -48,7 +49,8 @@ class Kind:
 
 
 class Stock:
-    """The undisturbed run, and files as users bring them: a film, photographs, a mask, landmarks, cameras, a mesh, delit pictures."""
+    """The undisturbed run, and files as users bring them: a film, photographs, a mask, landmarks, cameras, a mesh,
+    delit pictures."""
 
     def __init__(self, undisturbed: Undisturbed, folder: Path):
         self.undisturbed, self.folder = undisturbed, folder
@@ -58,7 +60,8 @@ class Stock:
         shutil.copytree(end.frames, folder / "photographs", ignore=shutil.ignore_patterns("*.json", "*.psd", ".*"))
         shutil.copytree(end.cameras, folder / "model", ignore=shutil.ignore_patterns("*.txt"))
         shutil.copy(SAMPLE / "cameras.json", folder / "cameras.json")
-        (folder / "landmarks.json").write_text(json.dumps({"points": {"152": [0.0, -0.1, -0.1], "1": [0.0, -0.13, -0.03]}}))
+        (folder
+         / "landmarks.json").write_text(json.dumps({"points": {"152": [0.0, -0.1, -0.1], "1": [0.0, -0.13, -0.03]}}))
         (folder / "settings.json").write_text(json.dumps({"frames": {"views": 3}, "scan": {"pairs": 4}, "seed": 7}))
         if end.head.is_file():
             shutil.copy(end.head, folder / "mesh.obj")
@@ -77,7 +80,8 @@ class Stock:
 def kinds(names: tuple[str, ...]) -> dict[str, Kind]:
     """All that can be tried on a capture in which these stages were run."""
     found = {f"stage {name}": Kind(_of_stage(stages.by_name(name)), CHEAP.get(name, 1)) for name in names[1:]}
-    found |= {"books": Kind(_book, 8), "video": Kind(_video), "photographs": Kind(_photographs), "mask": Kind(_mask, 6), "landmarks": Kind(_landmarks),
+    found |= {"books": Kind(_book, 8), "video": Kind(_video), "photographs": Kind(_photographs), "mask": Kind(_mask, 6),
+              "landmarks": Kind(_landmarks),
               "settings": Kind(_settings), "cameras": Kind(_cameras), "names": Kind(_names)}
     if "registration" in names:
         found["own mesh"] = Kind(_own_mesh, 1)
@@ -99,17 +103,21 @@ def make(kind: Kind, place: Path, stock: Stock, rng: random.Random) -> Case:
 
 
 def _spoil(case: Case, path: Path, rng: random.Random) -> None:
-    way, said = in_fork(lambda: list(mutate(path, rng)))  # picture libraries start threads, which no process that forks may have
+    # picture libraries start threads, which no process that forks may have
+    way, said = in_fork(lambda: list(mutate(path, rng)))
     case.spoiled, case.said = path, f"{path.relative_to(case.place)}: {way}, {said}"
-    case.named = (path.name, path.parent.name) if path.parent.name in ("cameras", "model", "frames", "delit", "photographs") else (path.name,)
+    case.named = ((path.name, path.parent.name)
+                  if path.parent.name in ("cameras", "model", "frames", "delit", "photographs") else (path.name,))
 
 
 def _run(case: Case, stage: str, source: str = "-", forced: bool = True, **settings: dict) -> None:
     """A run of one stage of the case's capture, with the settings of the undisturbed run and others."""
     job = json.loads(capture_at(case.place).job.read_text())["settings"] if capture_at(case.place).job.is_file() else {}
     chosen = case.place / "chosen.json"
-    chosen.write_text(json.dumps({**job, **{name: {**job.get(name, {}), **values} for name, values in settings.items()}}))
-    case.command = ["run", source, str(capture_at(case.place).root), "--settings", str(chosen), "--until", stage, *(["--from", stage] if forced else [])]
+    chosen.write_text(json.dumps({**job,
+                                  **{name: {**job.get(name, {}), **values} for name, values in settings.items()}}))
+    case.command = ["run", source, str(capture_at(case.place).root), "--settings", str(chosen), "--until", stage,
+                    *(["--from", stage] if forced else [])]
     case.outputs = stages.by_name(stage).writes
 
 
@@ -117,8 +125,10 @@ def _of_stage(stage: stages.Stage) -> Callable:
     def make(case: Case, stock: Stock, rng: random.Random) -> None:
         root = capture_at(case.place).root
         names = (*stage.reads, *stage.optional_reads)
-        files = [file for name in names for file in ([root / name] if (root / name).is_file() else sorted((root / name).glob("*.*")))]
-        ours = [file for file in files if file.name not in ("retouched.psd", "rig.txt") and not file.name.startswith(".") and file.is_file()]
+        files = [file for name in names
+                 for file in ([root / name] if (root / name).is_file() else sorted((root / name).glob("*.*")))]
+        ours = [file for file in files if file.name not in ("retouched.psd", "rig.txt")
+                and not file.name.startswith(".") and file.is_file()]
         _run(case, stage.name)
         _spoil(case, rng.choice(ours), rng)
         if stage.name == "cameras":
@@ -156,13 +166,15 @@ def _photographs(case: Case, stock: Stock, rng: random.Random) -> None:
 
 def _mask(case: Case, stock: Stock, rng: random.Random) -> None:
     picture = stock.bring(rng.choice(["mask.png", "mask.exr", "mask.jpg"]), case)
-    case.command, case.outputs = ["mask", "import", str(capture_at(case.place).root), str(picture)], ("shadow_mask.png",)
+    case.command, case.outputs = ["mask", "import", str(capture_at(case.place).root),
+                                  str(picture)], ("shadow_mask.png",)
     _spoil(case, picture, rng)
 
 
 def _landmarks(case: Case, stock: Stock, rng: random.Random) -> None:
     marks = stock.bring("landmarks.json", case)
-    case.command, case.outputs = ["landmarks", "import", str(capture_at(case.place).root), str(marks)], ("landmarks_artist.json",)
+    case.command, case.outputs = ["landmarks", "import", str(capture_at(case.place).root),
+                                  str(marks)], ("landmarks_artist.json",)
     _spoil(case, marks, rng)
 
 
@@ -174,10 +186,17 @@ def _settings(case: Case, stock: Stock, rng: random.Random) -> None:
         _spoil(case, chosen, rng)
         case.named = (chosen.name, "--settings", "frames.", "scan.", "seed")
     else:
-        name = rng.choice(["frames.views", "solve.skin_tone", "delight.delighter", "scan.voxel_mm", "none.such", "registration.template", "", "seed", "frames"])
-        value = rng.choice([*map(str, VALUES[3:-1]), "nan", "1e999", "0,0,0", "-5", "on"]).encode("utf-8", "replace").decode().replace("\0", "")
+        name = rng.choice(["frames.views", "solve.skin_tone", "delight.delighter", "scan.voxel_mm", "none.such",
+                           "registration.template", "", "seed", "frames"])
+        value = (
+            rng.choice([*map(str, VALUES[3:-1]), "nan", "1e999", "0,0,0", "-5", "on"])
+            .encode("utf-8", "replace")
+            .decode()
+            .replace("\0", "")
+        )
         case.command = ["run", "-", root, "--until", "frames", f"--set={name}={value[:500]}"]
-        case.said, case.named = f"--set {name}={value[:60]!r}", (name or "''", "--set", name.rpartition(".")[2] or "--set")
+        case.said, case.named = f"--set {name}={value[:60]!r}", (name or "''", "--set",
+                                                                 name.rpartition(".")[2] or "--set")
 
 
 def _cameras(case: Case, stock: Stock, rng: random.Random) -> None:
@@ -201,9 +220,11 @@ def _delit(case: Case, stock: Stock, rng: random.Random) -> None:
 
 def _deliver(case: Case, stock: Stock, rng: random.Random) -> None:
     capture = capture_at(case.place)
-    files = [capture.head, *(path for folder in (capture.maps, capture.maps_4k) for path in sorted(folder.glob("*.*")) if path.suffix in (".png", ".exr"))]
-    case.command = ["deliver", str(capture.root), "--to", str(case.place / "out"), "--set=deliver.format=obj", f"--set=deliver.preset={DELIVERY['preset']}",
-                    "--set=deliver.size=1024"]
+    files = [capture.head,
+             *(path for folder in (capture.maps, capture.maps_4k) for path in sorted(folder.glob("*.*"))
+               if path.suffix in (".png", ".exr"))]
+    case.command = ["deliver", str(capture.root), "--to", str(case.place / "out"), "--set=deliver.format=obj",
+                    f"--set=deliver.preset={DELIVERY['preset']}", "--set=deliver.size=1024"]
     _spoil(case, rng.choice(files), rng)
 
 
@@ -211,7 +232,8 @@ def _names(case: Case, stock: Stock, rng: random.Random) -> None:
     name, which = rng.choice(NAMES), rng.choice(["capture", "photographs", "photograph"])
     folder = stock.bring("photographs", case)
     shutil.rmtree(capture_at(case.place).root)
-    case.said, case.named = f"the {which} is named {name!r}", (name, ascii(name)[1:-1], ascii(name)[1:-1].replace("\\", "\\\\"))
+    case.said, case.named = f"the {which} is named {name!r}", (name, ascii(name)[1:-1],
+                                                               ascii(name)[1:-1].replace("\\", "\\\\"))
     if which == "photograph":
         first = sorted(folder.iterdir())[0]
         first.rename(first.with_name(f"{name[:200]}.jpg"))

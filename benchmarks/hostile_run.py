@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A hostile case in a process of its own, with limits of memory and time, and the judgement of how it ended. Each fault is a sentence."""
+"""A hostile case in a process of its own, with limits of memory and time, and the judgement of how it ended. Each fault
+is a sentence."""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ MOST_BYTES = 3 << 30
 
 @dataclass(frozen=True)
 class Ended:
-    """Exit code, negative for a signal; what was printed to both streams, and to the second alone; seconds; the most memory in bytes; whether it hung."""
+    """Exit code, negative for a signal; what was printed to both streams, and to the second alone; seconds; the most
+    memory in bytes; whether it hung."""
 
     code: int
     output: str
@@ -42,7 +44,8 @@ class Ended:
 
 
 def run(case: Case) -> Ended:
-    """Runs the case's command line as `python -m core` does, but for the worker, which is this process's own fork and not a new Python."""
+    """Runs the case's command line as `python -m core` does, but for the worker, which is this process's own fork and
+    not a new Python."""
     told = case.place.with_suffix(".out"), case.place.with_suffix(".err")
     sys.stdout.flush()
     began = time.monotonic()
@@ -75,7 +78,8 @@ def run(case: Case) -> Ended:
     output, errors = (path.read_text(encoding="utf-8", errors="replace") for path in told)
     for path in told:
         path.unlink()
-    return Ended(os.waitstatus_to_exitcode(status), output + errors, errors, time.monotonic() - began, used.ru_maxrss * 1024, hung)
+    return Ended(os.waitstatus_to_exitcode(status), output + errors, errors, time.monotonic() - began,
+                 used.ru_maxrss * 1024, hung)
 
 
 def _command(words: list[str]) -> int:
@@ -100,7 +104,9 @@ def judge(case: Case, ended: Ended) -> list[str]:
     if ended.hung:
         faults.append(f"it did not end within {LIMIT_S:.0f} s")
     elif ended.code not in (0, 2):
-        faults.append(f"it ended with {signal.Signals(-ended.code).name if ended.code < 0 else f'exit code {ended.code}'}: {ended.errors[-300:]}")
+        faults.append(f"it ended with "
+                      f"{signal.Signals(-ended.code).name if ended.code < 0 else f'exit code {ended.code}'}: "
+                      f"{ended.errors[-300:]}")
     if "Traceback" in ended.output:
         faults.append(f"a traceback was shown: {ended.output[-300:]}")
     if "An error inside WildCap" in ended.output:
@@ -119,7 +125,8 @@ def _refusal(case: Case, ended: Ended) -> list[str]:
     if len(lines) < 2 or not all(line.rstrip().endswith((".", ")")) for line in lines[-2:]):
         return [f"the refusal is no problem and remedy: {ended.errors[-300:]!r}"]
     text = " ".join(lines[-2:])
-    return [] if any(name in text for name in case.named) else [f"the refusal does not name {case.named[0]}: {text[:400]}"]
+    return ([] if any(name in text for name in case.named)
+            else [f"the refusal does not name {case.named[0]}: {text[:400]}"])
 
 
 def find_unsound(case: Case) -> list[str]:
@@ -152,10 +159,12 @@ def _unsound(file: Path) -> str:
     if file.suffix in (".png", ".exr", ".jpg"):
         picture = oiio.ImageInput.open(str(file))
         pixels = picture.read_image("float") if picture else None
-        return "cannot be read" if pixels is None else "" if np.isfinite(pixels).all() else "holds what is no finite number"
+        return ("cannot be read" if pixels is None else "" if np.isfinite(pixels).all()
+                else "holds what is no finite number")
     if file.suffix == ".obj":
         numbers = re.findall(r"^vt? (.*)$", file.read_text(encoding="utf-8"), re.MULTILINE)
-        return "" if numbers and all(math.isfinite(float(word)) for line in numbers for word in line.split()) else "holds what is no finite number"
+        return ("" if numbers and all(math.isfinite(float(word)) for line in numbers for word in line.split())
+                else "holds what is no finite number")
     if file.suffix == ".json":
         text = file.read_text(encoding="utf-8")
         json.loads(text)
@@ -178,5 +187,6 @@ def _lost(case: Case) -> list[str]:
         places = [case.spoiled, *((root / ownership.KEPT).rglob(f"{case.spoiled.stem}*") if inside else ())]
         if not any(path.is_file() and path.read_bytes() == case.content for path in places):
             found.append(f"{case.spoiled.relative_to(case.place)}, as it was spoiled, is nowhere any more")
-    elsewhere = {path.name for path in case.place.iterdir()} - {root.name, BESIDE, "brought", "out", "chosen.json", *(Path(word).name for word in case.command)}
+    elsewhere = {path.name for path in case.place.iterdir()} - {root.name, BESIDE, "brought", "out", "chosen.json",
+                                                                *(Path(word).name for word in case.command)}
     return found + [f"{name} lies beside the capture" for name in sorted(elsewhere)]

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The small capture that is killed: eight frames of the sample video with their true cameras, run once through the real stages, undisturbed.
+"""The small capture that is killed: eight frames of the sample video with their true cameras, run once through the real
+stages, undisturbed.
 
-A place is a folder with the capture face.wildcap, a file of the user's beside it, and deliveries. Kept are the place as it was before each stage, the one at
-the end, and, where they are asked for, the one in which a stage was run with other settings.
+A place is a folder with the capture face.wildcap, a file of the user's beside it, and deliveries. Kept are the place as
+it was before each stage, the one at the end, and, where they are asked for, the one in which a stage was run with other
+settings.
 """
 
 from __future__ import annotations
@@ -32,32 +34,38 @@ SETTINGS = {
     "upscale": {"size": 1024, "method": "lanczos"}, "transfer": {"scan_size": 256, "scan_detail_mm": 10.0},
 }
 """As little work as every stage takes."""
-OTHER = {"frames": {"long_side": 352}, "cameras": {"interpupillary_mm": 64.0}, "scan": {"voxel_mm": 4.0}, "registration": {"iterations": 4},
-         "delight": {"delighter": "shading"}, "texture": {"size": 288}, "shadow_mask": {"sensitivity": 0.8}, "solve": {"steps": 5},
-         "upscale": {"hair": False}, "transfer": {"scan_size": 288}}
+OTHER = {"frames": {"long_side": 352}, "cameras": {"interpupillary_mm": 64.0}, "scan": {"voxel_mm": 4.0},
+         "registration": {"iterations": 4},
+         "delight": {"delighter": "shading"}, "texture": {"size": 288}, "shadow_mask": {"sensitivity": 0.8},
+         "solve": {"steps": 5}, "upscale": {"hair": False}, "transfer": {"scan_size": 288}}
 """What a stage was run with before, where it is run again."""
 DELIVERY = {"preset": "blender", "format": "obj", "whole": True, "size": "1024"}
 EARLIER = {**DELIVERY, "hair": False, "roughness": 60}
 """The delivery that is there already."""
 STRANGERS = {name: f"This is {name}, and not WildCap's.\n".encode() for name in (
-    "shopping.txt", ".mine.tmp", "notes/list.txt", "frames/retouched.psd", "frames/.mine.1.tmp.jpg", "cameras/rig.txt", "delit/look/a.txt", "maps/painted.psd",
-    "maps_4k/painted.psd", "delivery/notes.txt", "report/notes.txt", "mask_history/notes.txt", "preview/notes.txt", "logs/mine.txt")}
+    "shopping.txt", ".mine.tmp", "notes/list.txt", "frames/retouched.psd", "frames/.mine.1.tmp.jpg", "cameras/rig.txt",
+    "delit/look/a.txt", "maps/painted.psd",
+    "maps_4k/painted.psd", "delivery/notes.txt", "report/notes.txt", "mask_history/notes.txt", "preview/notes.txt",
+    "logs/mine.txt")}
 """Files of the user's in the capture: name -> content."""
-GUESTS = {name: f"This is {name}, and no delivery's.\n".encode() for name in ("render.txt", "textures/painted.psd", ".look/shader.ma")}
+GUESTS = {name: f"This is {name}, and no delivery's.\n".encode()
+          for name in ("render.txt", "textures/painted.psd", ".look/shader.ma")}
 """The same in a folder of a delivery."""
 BESIDE = "anna.txt"
 
 
 @dataclass
 class Undisturbed:
-    """One run of the chain with nothing in its way. `folder` holds the places; `names` are the stages that were run, in order."""
+    """One run of the chain with nothing in its way. `folder` holds the places; `names` are the stages that were run, in
+    order."""
 
     folder: Path
     settings: dict
     names: tuple[str, ...]
     seconds: dict[str, float] = field(default_factory=dict)
     changes: dict[str, int] = field(default_factory=dict)  # of files in the capture, as kills_worker counts them
-    known: dict[str, set[str]] = field(default_factory=dict)  # name in the capture -> hashes of all complete contents it can have
+    # name in the capture -> hashes of all complete contents it can have
+    known: dict[str, set[str]] = field(default_factory=dict)
 
     @property
     def end(self) -> Capture:
@@ -75,9 +83,10 @@ class Undisturbed:
         return place
 
     def job(self, stage: str, resumed: bool = False, **changed: dict) -> dict:
-        """The job that runs a stage whatever there is, or the one that goes on up to it from what there is; `changed` lies over the settings."""
-        return {"source": SAMPLE / "capture.mp4" if stage == stages.NAMES[0] else "", "first": None if resumed else stage, "last": stage,
-                "settings": {**self.settings, **changed}}
+        """The job that runs a stage whatever there is, or the one that goes on up to it from what there is; `changed`
+        lies over the settings."""
+        return {"source": SAMPLE / "capture.mp4" if stage == stages.NAMES[0] else "",
+                "first": None if resumed else stage, "last": stage, "settings": {**self.settings, **changed}}
 
     def delivered(self) -> Path:
         """The finished place with a delivery in the capture and one beside it, and files of the user's in both."""
@@ -113,8 +122,10 @@ class Undisturbed:
                 self.known.setdefault(path.relative_to(capture.root).as_posix(), set()).add(read_hash(path))
 
 
-def run_undisturbed(folder: Path, until: str = stages.NAMES[-1], delighter: str = "network", tell: Callable[[str], None] = print) -> Undisturbed:
-    """Runs the chain up to a stage. Raises AssertionError where a stage does not end well, and the machine's own errors."""
+def run_undisturbed(folder: Path, until: str = stages.NAMES[-1], delighter: str = "network",
+                    tell: Callable[[str], None] = print) -> Undisturbed:
+    """Runs the chain up to a stage. Raises AssertionError where a stage does not end well, and the machine's own
+    errors."""
     names = stages.NAMES[:stages.NAMES.index(until) + 1]
     found = Undisturbed(folder, {**SETTINGS, "delight": {"delighter": delighter}}, names)
     place = folder / "end"
@@ -133,9 +144,11 @@ def capture_at(place: Path) -> Capture:
     return Capture(place / "face.wildcap")
 
 
-def start(place: Path, moment: Moment | None = None, *, told: str = "told", limits: dict | None = None, **job) -> Forked:
+def start(place: Path, moment: Moment | None = None, *, told: str = "told", limits: dict | None = None,
+          **job) -> Forked:
     """Writes a job and starts a worker at it."""
-    return fork_worker(write_job(capture_at(place), **job), place.with_name(f"{place.name}.{told}"), moment, **(limits or {}))
+    return fork_worker(write_job(capture_at(place), **job), place.with_name(f"{place.name}.{told}"), moment,
+                       **(limits or {}))
 
 
 def run(place: Path, **job) -> Forked:
@@ -161,7 +174,8 @@ def _plant(place: Path) -> None:
     for name, content in STRANGERS.items():
         (capture.root / name).parent.mkdir(parents=True, exist_ok=True)
         (capture.root / name).write_bytes(content)
-    in_fork(lambda: [_paint(path, shift) for path, shift in ((capture.shadow_mask, 0), (capture.protect_mask, 9))] and None)
+    in_fork(lambda: [_paint(path, shift) for path, shift in ((capture.shadow_mask, 0), (capture.protect_mask, 9))]
+            and None)
 
 
 def _paint(path: Path, shift: int) -> None:

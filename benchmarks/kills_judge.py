@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What has to hold of a capture after a kill, and after the run that goes on from it. Each fault is a sentence; no sentence, no fault."""
+"""What has to hold of a capture after a kill, and after the run that goes on from it. Each fault is a sentence; no
+sentence, no fault."""
 
 from __future__ import annotations
 
@@ -26,15 +27,17 @@ PASSING = ("preview/", "checkpoints/")
 
 def after_kill(place: Path, known: Mapping[str, Collection[str]], masks: Mapping[str, Collection[bytes]] | None = None,
                within: Collection[str] = ()) -> list[str]:
-    """Faults of a place in which something was killed: `known` are the complete contents that each file may have (hashes), `masks` those of the
-    masks that were being painted. `within`: folders in which files are new in every run, of which only the user's are judged."""
+    """Faults of a place in which something was killed: `known` are the complete contents that each file may have
+    (hashes), `masks` those of the masks that were being painted. `within`: folders in which files are new in every run,
+    of which only the user's are judged."""
     root = capture_at(place).root
     found = find_lost(place, aside=True)
     for name, contents in (masks or {}).items():
         if not (root / name).is_file() or (root / name).read_bytes() not in contents:
             found.append(f"{name} is neither the old mask nor a new one")
     for path, name in _named(root):
-        if name in (*STRANGERS, *(masks or {}), ownership.RECORD, "lock") or name.startswith(("lock.", "logs/", "mask_history/", *within)):
+        if name in (*STRANGERS, *(masks or {}), ownership.RECORD,
+                    "lock") or name.startswith(("lock.", "logs/", "mask_history/", *within)):
             continue
         if name in TOLD:
             fault = _told(path)
@@ -48,15 +51,17 @@ def after_kill(place: Path, known: Mapping[str, Collection[str]], masks: Mapping
 
 def after_resume(place: Path, undisturbed: Undisturbed, last: str, masks: Mapping[str, Collection[bytes]] | None = None,
                  unlike: Collection[str] = (), within: Collection[str] = ()) -> list[str]:
-    """Faults of a place in which the run that goes on has ended: every stage up to `last` has the undisturbed run's bytes, all of the user's is in its
-    place, and nothing else is left. `unlike`: stages whose bytes differ from run to run; `within` as of `after_kill`."""
+    """Faults of a place in which the run that goes on has ended: every stage up to `last` has the undisturbed run's
+    bytes, all of the user's is in its place, and nothing else is left. `unlike`: stages whose bytes differ from run to
+    run; `within` as of `after_kill`."""
     capture, expected = capture_at(place), undisturbed.end
     found = after_kill(place, undisturbed.known, masks, within) + find_lost(place) + _left(place)
     for stage in stages.STAGES[:stages.NAMES.index(last) + 1]:
         if stage.name in unlike:
             continue
         ours, theirs = written(capture, stage), written(expected, stage)
-        found += [f"{name} is not as in the undisturbed run" for name in sorted(ours.keys() | theirs.keys()) if ours.get(name) != theirs.get(name)]
+        found += [f"{name} is not as in the undisturbed run" for name in sorted(ours.keys() | theirs.keys())
+                  if ours.get(name) != theirs.get(name)]
         if stage.name not in capture.read()["stages"]:
             found.append(f"the stage {stage.name} is not on record")
     return found
@@ -64,11 +69,13 @@ def after_resume(place: Path, undisturbed: Undisturbed, last: str, masks: Mappin
 
 def tree(folder: Path) -> dict[str, str]:
     """Every file below a folder: name -> content hash."""
-    return {path.relative_to(folder).as_posix(): read_hash(path) for path in sorted(folder.rglob("*")) if path.is_file()}
+    return {path.relative_to(folder).as_posix(): read_hash(path) for path in sorted(folder.rglob("*"))
+            if path.is_file()}
 
 
 def find_lost(place: Path, aside: bool = False) -> list[str]:
-    """The user's files that are gone or changed. `aside`: one may lie in the folder that was just being put aside for a new one (.NAME.old)."""
+    """The user's files that are gone or changed. `aside`: one may lie in the folder that was just being put aside for a
+    new one (.NAME.old)."""
     root, found = capture_at(place).root, []
     for name, content in STRANGERS.items():
         first, _, rest = name.partition("/")
@@ -81,13 +88,17 @@ def find_lost(place: Path, aside: bool = False) -> list[str]:
 
 
 def _left(place: Path) -> list[str]:
-    """What should have gone with the run: temporary files, locks, processes, what was kept aside though nobody had changed it, and files elsewhere."""
+    """What should have gone with the run: temporary files, locks, processes, what was kept aside though nobody had
+    changed it, and files elsewhere."""
     capture = capture_at(place)
-    found = [f"{path.relative_to(place)} is left" for path in sorted(place.rglob(".*")) if path.relative_to(capture.root.parent).as_posix()
+    found = [f"{path.relative_to(place)} is left" for path in sorted(place.rglob(".*"))
+             if path.relative_to(capture.root.parent).as_posix()
              not in {f"{capture.root.name}/{name}" for name in STRANGERS} and ".look" not in path.parts]
     found += [f"{path.name} is left" for path in capture.root.glob("lock*")]
-    found += [f"{name} was kept aside, and nobody had changed it" for name in sorted(ownership.kept_files(capture.root))]
-    found += [f"{path.name} lies beside the capture" for path in sorted(place.iterdir()) if path.name not in (BESIDE, capture.root.name, "out")]
+    found += [f"{name} was kept aside, and nobody had changed it"
+              for name in sorted(ownership.kept_files(capture.root))]
+    found += [f"{path.name} lies beside the capture" for path in sorted(place.iterdir())
+              if path.name not in (BESIDE, capture.root.name, "out")]
     found += [f"process {pid} still runs there" for pid in running_at(place)]
     try:
         capture.check_free()
@@ -99,7 +110,8 @@ def _left(place: Path) -> list[str]:
 def _named(root: Path) -> list[tuple[Path, str]]:
     """The files under final names: no part of those begins with a dot."""
     files = ((path, path.relative_to(root)) for path in sorted(root.rglob("*")) if path.is_file())
-    return [(path, inside.as_posix()) for path, inside in files if not any(part.startswith(".") for part in inside.parts)]
+    return [(path, inside.as_posix()) for path, inside in files
+            if not any(part.startswith(".") for part in inside.parts)]
 
 
 def _read(path: Path) -> str:

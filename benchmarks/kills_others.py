@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Trials of what is no stage: the add-on's saving of a mask, a delivery over an older one, and COLMAP's process beside the worker."""
+"""Trials of what is no stage: the add-on's saving of a mask, a delivery over an older one, and COLMAP's process beside
+the worker."""
 
 from __future__ import annotations
 
@@ -32,17 +33,21 @@ PARTING_S = 5.0
 
 
 def saving(trial: KillTrial) -> None:
-    """The add-on is killed while it saves a mask several times, in half of the trials while a worker is at the capture: the mask is the old one or one of
-    the new, and the old one is in the history where it was replaced."""
-    early = [name for name in trial.undisturbed.names if stages.NAMES.index(name) <= stages.NAMES.index(stages.MASK_STAGE)]  # no mask is an input of theirs
+    """The add-on is killed while it saves a mask several times, in half of the trials while a worker is at the capture:
+    the mask is the old one or one of the new, and the old one is in the history where it was replaced."""
+    # no mask is an input of theirs
+    early = [name for name in trial.undisturbed.names
+             if stages.NAMES.index(name) <= stages.NAMES.index(stages.MASK_STAGE)]
     stage, which, busy = trial.rng.choice(early), trial.rng.choice(list(MASKS)), trial.rng.random() < 0.5
     trial.undisturbed.copy(trial.undisturbed.folder / "end", trial.place)
     capture, name = capture_at(trial.place), MASKS[which]
     old, painted = (capture.root / name).read_bytes(), trial.place.with_name(f"{trial.place.name}.painted")
-    moment = Moment(write=trial.rng.randint(1, SAVE_CHANGES), late_s=trial.rng.choice((0.0, trial.rng.uniform(0, 0.01))))
+    moment = Moment(write=trial.rng.randint(1, SAVE_CHANGES),
+                    late_s=trial.rng.choice((0.0, trial.rng.uniform(0, 0.01))))
     trial.where = f"{which.lower()} mask, {moment}{f', while {stage} is run' if busy else ''}"
     seed = trial.rng.randrange(2**31)
-    addon = Forked(lambda: _save_masks(capture.root, which, seed, painted), trial.place, trial.place.with_name(f"{trial.place.name}.addon"), moment)
+    addon = Forked(lambda: _save_masks(capture.root, which, seed, painted), trial.place,
+                   trial.place.with_name(f"{trial.place.name}.addon"), moment)
     worker = None
     if busy:
         wait_until(lambda: painted.is_dir() or addon.ended(), 60)
@@ -86,11 +91,13 @@ def _save_masks(root: Path, which: str, seed: int, painted: Path) -> None:
 
 
 def delivering(trial: KillTrial) -> None:
-    """A delivery over an older one is killed, up to twice, and then made: the folder holds the old one or the new one, and the user's files stay."""
+    """A delivery over an older one is killed, up to twice, and then made: the folder holds the old one or the new one,
+    and the user's files stay."""
     base = trial.undisturbed.delivered()
     trial.undisturbed.copy(base, trial.place)
     beside, writing = trial.rng.random() < 0.5, trial.rng.random() < 0.7
-    target, earlier, new = (delivery_folders(place)[beside] for place in (trial.place, base, base.with_name("delivered_again")))
+    target, earlier, new = (delivery_folders(place)[beside]
+                            for place in (trial.place, base, base.with_name("delivered_again")))
     job, known = trial.undisturbed.delivery_job(trial.place, target), (_delivery(earlier), _delivery(new))
     trial.where = "beside the capture" if beside else "in the capture"
     for _ in range(1 + (trial.rng.random() < 0.3)):
@@ -117,7 +124,8 @@ def _gone(*folders: Path) -> list[str]:
 
 
 def _delivery(target: Path) -> dict[str, str]:
-    """The files of a delivery but the user's: name -> content hash. Provenance tells times: it is whole where it can be read."""
+    """The files of a delivery but the user's: name -> content hash. Provenance tells times: it is whole where it can be
+    read."""
     found = {name: digest for name, digest in tree(target).items() if name not in GUESTS}
     if PROVENANCE in found:
         found[PROVENANCE] = ",".join(sorted(json.loads((target / PROVENANCE).read_text(encoding="utf-8"))))
@@ -125,7 +133,8 @@ def _delivery(target: Path) -> dict[str, str]:
 
 
 def colmap(trial: KillTrial) -> None:
-    """While COLMAP places the cameras: its process is killed, or the worker's alone, or both. The one that is left ends, and the next run finds cameras."""
+    """While COLMAP places the cameras: its process is killed, or the worker's alone, or both. The one that is left
+    ends, and the next run finds cameras."""
     trial.undisturbed.copy(trial.undisturbed.base("cameras", again=trial.rng.random() < 0.5), trial.place)
     victim, after = trial.rng.choice(("COLMAP", "worker", "both")), trial.rng.uniform(0, COLMAP_S)
     trial.where = f"{victim}, {after:.3f} s after COLMAP's start"
@@ -139,7 +148,8 @@ def colmap(trial: KillTrial) -> None:
         for pid in {"COLMAP": running, "worker": [worker.pid], "both": [*running, worker.pid]}[victim]:
             os.kill(pid, signal.SIGKILL)
     ended = worker.wait()
-    if running and victim == "COLMAP" and not (isinstance(ended, Failed) and "camera solver stopped" in ended.problem or isinstance(ended, Done)):
+    if running and victim == "COLMAP" and not (isinstance(ended, Failed) and "camera solver stopped" in ended.problem
+                                               or isinstance(ended, Done)):
         trial.fault(f"the worker without its COLMAP ended with {ended}")
     wait_until(lambda: not running_at(trial.place), PARTING_S)
     trial.faults += [f"process {pid} outlived its worker" for pid in running_at(trial.place)]

@@ -78,7 +78,8 @@ class KillTrial:
         self.faults += kills_judge.after_resume(self.place, self.undisturbed, stage, masks, unlike, unlike_folders)
 
     def judge_kill(self, masks: dict | None = None, within: tuple = ()) -> None:
-        self.faults += [f"after the kill: {fault}" for fault in kills_judge.after_kill(self.place, self.undisturbed.known, masks, within)]
+        self.faults += [f"after the kill: {fault}"
+                        for fault in kills_judge.after_kill(self.place, self.undisturbed.known, masks, within)]
 
 
 def killed(trial: KillTrial, writing: bool) -> None:
@@ -99,7 +100,8 @@ def command(trial: KillTrial) -> None:
     trial.begin(stage)
     capture, after = capture_at(trial.place), trial.rng.uniform(0, 4 + trial.undisturbed.seconds[stage])
     trial.where += f", after {after:.3f} s"
-    worker = Worker(Path(sys.executable), ROOT, write_job(capture, **trial.undisturbed.job(stage)), capture.logs / "worker.log")
+    worker = Worker(Path(sys.executable), ROOT, write_job(capture, **trial.undisturbed.job(stage)),
+                    capture.logs / "worker.log")
     worker.start()
     deadline = time.monotonic() + after
     while worker.running and time.monotonic() < deadline:
@@ -115,7 +117,8 @@ def command(trial: KillTrial) -> None:
 
 
 def full(trial: KillTrial) -> None:
-    """The disk is full at a random byte of what a stage writes; then there is room again. Without disks of our own: no file may be longer than some size."""
+    """The disk is full at a random byte of what a stage writes; then there is room again. Without disks of our own: no
+    file may be longer than some size."""
     stage = trial.stage()
     again, share = trial.rng.random() < 0.5, trial.rng.random()
     base, sizes = trial.undisturbed.base(stage, again), _sizes(trial.undisturbed.end.root, stage)
@@ -136,7 +139,8 @@ def full(trial: KillTrial) -> None:
     trial.struck += isinstance(ended, Failed)
     if not isinstance(ended, Failed | Done):
         trial.fault("the worker ended without a word")
-    elif isinstance(ended, Failed) and ("disk is full" if trial.private else "could not be written") not in ended.problem:
+    elif isinstance(ended,
+                    Failed) and ("disk is full" if trial.private else "could not be written") not in ended.problem:
         trial.fault(f"a full disk is told as {ended.problem!r}")
     trial.judge_kill()
     if trial.private:
@@ -150,7 +154,8 @@ def _sizes(root: Path, stage: str) -> list[int]:
 
 
 def asleep(trial: KillTrial) -> None:
-    """A worker is stopped, a second one takes its place after the lease's term, and the first one awakes, meanwhile or afterwards: it changes nothing."""
+    """A worker is stopped, a second one takes its place after the lease's term, and the first one awakes, meanwhile or
+    afterwards: it changes nothing."""
     stage = trial.stage()
     trial.begin(stage)
     moment, meanwhile = trial.moment(stage, writing=False), trial.rng.random() < 0.5
@@ -161,7 +166,8 @@ def asleep(trial: KillTrial) -> None:
         return
     trial.struck += 1
     capture = capture_at(trial.place)
-    second = fork_worker(capture.job, trial.place.with_name(f"{trial.place.name}.second"), Moment(write=10**9), term_s=SHORT_TERM_S)
+    second = fork_worker(capture.job, trial.place.with_name(f"{trial.place.name}.second"), Moment(write=10**9),
+                         term_s=SHORT_TERM_S)
     if meanwhile:
         wait_until(lambda: second.pid == _holder(capture.lock) or second.ended())
         time.sleep(trial.rng.uniform(0, trial.undisturbed.seconds[stage]))
@@ -173,7 +179,8 @@ def asleep(trial: KillTrial) -> None:
     if not meanwhile:
         first.send(signal.SIGCONT)
     awake = first.wait()
-    changed = {name for name, digest in kills_judge.tree(capture.root).items() if before.get(name) != digest} - {"written.jsonl", f"logs/{stage}.log"}
+    changed = {name for name, digest in kills_judge.tree(capture.root).items()
+               if before.get(name) != digest} - {"written.jsonl", f"logs/{stage}.log"}
     if changed:
         trial.fault(f"the first worker changed {', '.join(sorted(changed))} after it had been replaced")
     if not isinstance(awake, Failed | Done) or isinstance(awake, Failed) and "nother worker" not in awake.problem:
@@ -196,7 +203,8 @@ def wait_until(true: Callable[[], object], limit_s: float = 10 * SHORT_TERM_S) -
 
 
 def at_once(trial: KillTrial) -> None:
-    """Two workers are started at the same job: one does it, the other one is refused by name, or finds it done when it comes late."""
+    """Two workers are started at the same job: one does it, the other one is refused by name, or finds it done when it
+    comes late."""
     stage = trial.stage()
     trial.begin(stage)
     job = write_job(capture_at(trial.place), **trial.undisturbed.job(stage))

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Processes that are forked from this one, in which torch and the rest are imported already, and struck by a signal at a chosen moment.
+"""Processes that are forked from this one, in which torch and the rest are imported already, and struck by a signal at
+a chosen moment.
 
-A worker that is forked is `core.worker.__main__.main`, as `python -m core.worker JOB.json` runs it. What a process writes is counted by an audit hook
-(PEP 578) in that process alone: the product has no part in it.
+A worker that is forked is `core.worker.__main__.main`, as `python -m core.worker JOB.json` runs it. What a process
+writes is counted by an audit hook (PEP 578) in that process alone: the product has no part in it.
 """
 
 from __future__ import annotations
@@ -29,12 +30,14 @@ LIMIT_S = 300.0
 """After which a process counts as hanging."""
 LOOK_S = 0.0005
 CHANGES = {"os.rename": 2, "os.remove": 1, "os.mkdir": 1, "os.rmdir": 1, "os.chmod": 1, "os.truncate": 1}
-"""Audit events that change a folder or a file -> how many of their first arguments are paths; `open` is judged by its flags."""
+"""Audit events that change a folder or a file -> how many of their first arguments are paths; `open` is judged by its
+flags."""
 
 
 @dataclass(frozen=True)
 class Moment:
-    """When a process is struck: `after_s` from its start, or before its `write`-th change of a file in its place (from 1) and `late_s` after that."""
+    """When a process is struck: `after_s` from its start, or before its `write`-th change of a file in its place (from
+    1) and `late_s` after that."""
 
     after_s: float | None = None
     write: int | None = None
@@ -55,7 +58,8 @@ def warm_up() -> None:
 
 
 class Forked:
-    """A forked process that does `work`, in a group of its own, and what strikes it. Its output goes to `told`, its errors beside that."""
+    """A forked process that does `work`, in a group of its own, and what strikes it. Its output goes to `told`, its
+    errors beside that."""
 
     def __init__(self, work: Callable[[], None], root: Path, told: Path, moment: Moment | None = None):
         self.moment, self.told, self.code = moment, told, None
@@ -86,13 +90,18 @@ class Forked:
         return struct.unpack_from("q", self._shared, 0)[0]
 
     def strike(self, number: int = signal.SIGKILL) -> bool:
-        """Waits for the moment and sends the signal to the group; waits for the end of what was killed. False where the process ended before."""
+        """Waits for the moment and sends the signal to the group; waits for the end of what was killed. False where the
+        process ended before."""
         reached = None
         while not self.ended():
             now = time.monotonic()
             if reached is None and self.moment.write is not None and self.changes >= self.moment.write:
                 reached = now
-            if now - self.began >= self.moment.after_s if self.moment.write is None else reached is not None and now - reached >= self.moment.late_s:
+            if (
+                now - self.began >= self.moment.after_s
+                if self.moment.write is None
+                else reached is not None and now - reached >= self.moment.late_s
+            ):
                 self.send(number)
                 struct.pack_into("q", self._shared, 8, 1)
                 return number != signal.SIGKILL or self.wait() is None
@@ -137,7 +146,8 @@ class Forked:
         return hook
 
 
-def fork_worker(job: Path, told: Path, moment: Moment | None = None, *, term_s: float = lease.TERM_S, most_bytes: int | None = None) -> Forked:
+def fork_worker(job: Path, told: Path, moment: Moment | None = None, *, term_s: float = lease.TERM_S,
+                most_bytes: int | None = None) -> Forked:
     """A worker at a job file. `term_s`: its lease's; `most_bytes`: of a single file that it writes."""
     def work() -> None:
         main = importlib.import_module("core.worker.__main__")
@@ -163,7 +173,8 @@ def last_message(told: Path) -> Message | None:
 
 
 def in_fork(work: Callable[[], object]):
-    """What `work` returns, as JSON holds it, computed in a process of its own: this one starts no threads. Raises RuntimeError where it raised."""
+    """What `work` returns, as JSON holds it, computed in a process of its own: this one starts no threads. Raises
+    RuntimeError where it raised."""
     read, write = os.pipe()
     pid = os.fork()
     if pid == 0:
@@ -206,7 +217,8 @@ def _changes(event: str, arguments: tuple, root: str) -> bool:
     if event not in CHANGES:
         return False
     paths = [os.fsdecode(path) for path in arguments[:CHANGES[event]] if isinstance(path, str | bytes | os.PathLike)]
-    return any(path.startswith(root) or not os.path.isabs(path) for path in paths)  # shutil.rmtree names what it removes by an open folder
+    # shutil.rmtree names what it removes by an open folder
+    return any(path.startswith(root) or not os.path.isabs(path) for path in paths)
 
 
 def _redirect(stdin: int, told: Path) -> None:

@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light models of other methods behind the solver's own contract, so that a comparison changes the light and nothing else: our own writing, not their code.
+"""Light models of other methods behind the solver's own contract, so that a comparison changes the light and nothing
+else: our own writing, not their code.
 
-A light model is a shader with `main` and `total` (shading [3, H, W] of its lights), the lights' parameters, and their loss. Regions (DeFace, Huang et al.):
-the face is divided softly into K regions, learned with one SH light each. Environment (FLARE, Bharadwaj et al. 2023; split sum after Munkberg et al. 2022):
-one diffuse cubemap of free texels for the whole face. Both know the shadow mask no more than those methods do.
+A light model is a shader with `main` and `total` (shading [3, H, W] of its lights), the lights' parameters, and their
+loss. Regions (DeFace, Huang et al.): the face is divided softly into K regions, learned with one SH light each.
+Environment (FLARE, Bharadwaj et al. 2023; split sum after Munkberg et al. 2022): one diffuse cubemap of free texels for
+the whole face. Both know the shadow mask no more than those methods do.
 """
 
 from __future__ import annotations
@@ -33,7 +35,8 @@ ROUGH = 0.02  # weight of its squared differences, per seen texel, pair and mean
 
 @dataclass
 class RegionLights(Lights):
-    """glob [3, 9]: what all regions share; grid [K, 3, 9]: each one's own light beyond that; chroma [K, CELLS, CELLS]: logits of who lights a texel."""
+    """glob [3, 9]: what all regions share; grid [K, 3, 9]: each one's own light beyond that; chroma [K, CELLS, CELLS]:
+    logits of who lights a texel."""
 
 
 class RegionShader:
@@ -48,8 +51,10 @@ class RegionShader:
 
     def own(self, lights: Lights) -> torch.Tensor:
         """Shading by what the regions add [3, H, W]."""
-        share = functional.interpolate(lights.chroma[None], self.basis.shape[1:], mode="bilinear", align_corners=False)[0].softmax(0)
-        return sum(weight * torch.einsum("ck,khw->chw", gamma, self.basis) for weight, gamma in zip(share, lights.grid, strict=True))
+        share = functional.interpolate(lights.chroma[None], self.basis.shape[1:], mode="bilinear",
+                                       align_corners=False)[0].softmax(0)
+        return sum(weight * torch.einsum("ck,khw->chw", gamma, self.basis)
+                   for weight, gamma in zip(share, lights.grid, strict=True))
 
     def total(self, lights: Lights) -> torch.Tensor:
         """Shading [3, H, W]."""
@@ -57,8 +62,10 @@ class RegionShader:
 
 
 def regions(start: Start, recipe: Recipe, count: int, seed: int = 0):
-    """`start` under K = count region lights, the recipe, and what moves them. The regions begin as clusters of place and lightness on the face."""
-    observations = {factor: replace(o, shader=RegionShader(o.shader.normal)) for factor, o in start.observations.items()}
+    """`start` under K = count region lights, the recipe, and what moves them. The regions begin as clusters of place
+    and lightness on the face."""
+    observations = {factor: replace(o, shader=RegionShader(o.shader.normal))
+                    for factor, o in start.observations.items()}
     lights = RegionLights(start.state.lights.glob.clone(), torch.zeros(count, 3, 9), _clusters(start, count, seed))
     return _under(start, observations, lights), recipe, partial(update_lights, loss=_region_loss)
 
@@ -72,11 +79,13 @@ def _region_loss(lights: RegionLights, denoised: torch.Tensor, o: Observation, r
 
 
 def _clusters(start: Start, count: int, seed: int) -> torch.Tensor:
-    """Logits [count, CELLS, CELLS] of k-means over the map's cells by place and by the logarithm of texture over first rendering."""
+    """Logits [count, CELLS, CELLS] of k-means over the map's cells by place and by the logarithm of texture over first
+    rendering."""
     o = start.observations[1]
     rendered = albedo(start.reference) * o.shader.main(start.state.lights)
     ratio = (o.texture.clamp_min(1e-3) / rendered.clamp_min(1e-3)).log().mean(0).clamp(-2, 2)
-    ratio, weight = (functional.interpolate(a[None, None], (CELLS, CELLS), mode="area")[0, 0].numpy() for a in (ratio * o.weight, o.weight))
+    ratio, weight = (functional.interpolate(a[None, None], (CELLS, CELLS), mode="area")[0, 0].numpy()
+                     for a in (ratio * o.weight, o.weight))
     row, column = (np.mgrid[:CELLS, :CELLS] + 0.5) / CELLS
     features = np.stack([3 * row, 3 * column, ratio / np.maximum(weight, 0.05)], -1)[weight > 0.5]
     centres, _ = kmeans2(features, count, seed=seed, minit="++")
@@ -91,7 +100,8 @@ class EnvironmentLights(Lights):
 
 
 class EnvironmentShader:
-    """Shading by a cubemap: radiance folded with the cosine lobe into an irradiance cubemap, which the normals read linearly."""
+    """Shading by a cubemap: radiance folded with the cosine lobe into an irradiance cubemap, which the normals read
+    linearly."""
 
     def __init__(self, normal: torch.Tensor):
         directions, self.lobe, self.neighbours = cubemap()
@@ -104,37 +114,43 @@ class EnvironmentShader:
     def main(self, lights: Lights) -> torch.Tensor:
         """Shading [3, H, W]."""
         irradiance = self.lobe @ lights.glob.exp()
-        return functional.embedding_bag(self.which, irradiance, per_sample_weights=self.weight, mode="sum").T.reshape(3, *self.shape)
+        return functional.embedding_bag(self.which, irradiance, per_sample_weights=self.weight,
+                                        mode="sum").T.reshape(3, *self.shape)
 
     total = main
 
 
 def environment(start: Start, recipe: Recipe):
     """`start` under one environment cubemap, even at first, the recipe, and what moves it."""
-    observations = {factor: replace(o, shader=EnvironmentShader(o.shader.normal)) for factor, o in start.observations.items()}
+    observations = {factor: replace(o, shader=EnvironmentShader(o.shader.normal))
+                    for factor, o in start.observations.items()}
     o = start.observations[1]
     shade = (o.texture * o.weight).sum((1, 2)) / (albedo(start.reference) * o.weight).sum((1, 2)).clamp_min(1e-6)
     lights = EnvironmentLights(shade.log().repeat(6 * FACE**2, 1), torch.zeros(1), torch.zeros(1))
-    return _under(start, observations, lights), replace(recipe, rate=RATE, phases=tuple(("main", *when) for _, *when in recipe.phases)), \
+    return _under(start, observations, lights), replace(recipe, rate=RATE,
+                                                        phases=tuple(("main", *when) for _, *when in recipe.phases)), \
         partial(update_lights, loss=_environment_loss)
 
 
-def _environment_loss(lights: EnvironmentLights, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> torch.Tensor:
+def _environment_loss(lights: EnvironmentLights, denoised: torch.Tensor, o: Observation,
+                      recipe: Recipe) -> torch.Tensor:
     """L_pho, and smoothness of the cubemap's logarithm."""
     one, other = o.shader.neighbours.T
     rough = ((lights.glob[one] - lights.glob[other]) ** 2).mean()
     brightness = (o.weight * albedo(denoised) ** 2).mean()
-    return photometric(denoised, o.shader.main(lights), o, o.weight * o.trust) + ROUGH * brightness * o.weight.sum() * rough
+    return photometric(denoised, o.shader.main(lights), o,
+                       o.weight * o.trust) + ROUGH * brightness * o.weight.sum() * rough
 
 
 @cache
 def cubemap() -> tuple[np.ndarray, torch.Tensor, torch.Tensor]:
-    """Unit directions [N, 3] of a cubemap's N = 6 FACE^2 texels; the matrix [N, N] from radiance to irradiance over pi in those directions (rows sum to one);
-    pairs [P, 2] of neighbours, across edges too."""
+    """Unit directions [N, 3] of a cubemap's N = 6 FACE^2 texels; the matrix [N, N] from radiance to irradiance over pi
+    in those directions (rows sum to one); pairs [P, 2] of neighbours, across edges too."""
     across = (np.arange(FACE) + 0.5) / FACE * 2 - 1
     u, v = (a.ravel() for a in np.meshgrid(across, across))
     one = np.ones_like(u)
-    corners = [np.stack(face, -1) for face in ((one, v, -u), (-one, v, u), (u, one, -v), (u, -one, v), (u, v, one), (-u, v, -one))]
+    corners = [np.stack(face, -1)
+               for face in ((one, v, -u), (-one, v, u), (u, one, -v), (u, -one, v), (u, v, one), (-u, v, -one))]
     points = np.concatenate(corners)
     solid = np.linalg.norm(points, axis=1) ** -3  # solid angle of a texel, but for a constant
     directions = points / np.linalg.norm(points, axis=1, keepdims=True)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A contact sheet of the people of benchmarks/likenesses.py: front, three-quarter, an eye and its brow close to, and the bare skin below hair and clothes."""
+"""A contact sheet of the people of benchmarks/likenesses.py: front, three-quarter, an eye and its brow close to, and
+the bare skin below hair and clothes."""
 
 from __future__ import annotations
 
@@ -22,8 +23,10 @@ SHOTS = (  # azimuth, height in degrees, distance and the point looked at in met
     (14.0, 0.0, 0.55, (0.030, -0.015, 0.006), 4.5, False), (22.0, 3.0, 0.75, (0.0, 0.02, -0.03), 1.55, True))
 
 
-def write_sheet(out: Path, seeds: list[int], work: Path, facekit: Path | None = None, beside: Path | None = None) -> None:
-    """One row a person; `beside`: a folder of photographs that make the last row. Pictures that are in `work` are not rendered again."""
+def write_sheet(out: Path, seeds: list[int], work: Path, facekit: Path | None = None,
+                beside: Path | None = None) -> None:
+    """One row a person; `beside`: a folder of photographs that make the last row. Pictures that are in `work` are not
+    rendered again."""
     rows = []
     for seed in seeds:
         began = time.monotonic()

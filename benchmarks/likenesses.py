@@ -1,18 +1,21 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Four people with eyes, hair and clothes, filmed whole, and two further lights for them and for the six bald people of benchmarks/people.py.
+"""Four people with eyes, hair and clothes, filmed whole, and two further lights for them and for the six bald people of
+benchmarks/people.py.
 
     python -m benchmarks.likenesses FOLDER [--only NAME ...] [--lights own overcast below] [--facekit FOLDER]
     python -m benchmarks.likenesses FOLDER --sheet OUT.jpg [--beside FOLDER_OF_PICTURES]
 
-FOLDER/NAME has the video, capture.mp4, and the truth in the layout that benchmarks/albedo_score.py says, with bare/ (albedo without hair), parts/, normal/,
-strands_*.npz, opened.obj, maps/ and light.json besides. In its own light a person sits in a room, and the chain begins with the video:
+FOLDER/NAME has the video, capture.mp4, and the truth in the layout that benchmarks/albedo_score.py says, with bare/
+(albedo without hair), parts/, normal/, strands_*.npz, opened.obj, maps/ and light.json besides. In its own light a
+person sits in a room, and the chain begins with the video:
 
     python -m core run FOLDER/NAME/capture.mp4 FOLDER/NAME.wildcap
 
-NAME_overcast and NAME_below have nothing behind the person and true cameras: FOLDER/NAME_overcast.wildcap begins at delight. So do those of the bald people;
-who was in overcast light before is photographed in hazy sun. What is there is not made again. With --facekit (ICT-FaceKit's folder) the heads' shape is
-derived from it too; without, they are other heads of the same people.
+NAME_overcast and NAME_below have nothing behind the person and true cameras: FOLDER/NAME_overcast.wildcap begins at
+delight. So do those of the bald people; who was in overcast light before is photographed in hazy sun. What is there is
+not made again. With --facekit (ICT-FaceKit's folder) the heads' shape is derived from it too; without, they are other
+heads of the same people.
 """
 
 from __future__ import annotations
@@ -33,7 +36,8 @@ from .people_lights import FURTHER, KINDS
 
 @dataclass(frozen=True)
 class Likeness:
-    """name: what the rule of its choice says; light: one of people_lights.KINDS, in which the person is filmed whole."""
+    """name: what the rule of its choice says; light: one of people_lights.KINDS, in which the person is filmed
+    whole."""
 
     name: str
     seed: int
@@ -46,14 +50,16 @@ LIKENESSES = (
     Likeness("stubbled", 910004, "noon sun behind leaves"),
     Likeness("closed", 910001, "mixed lamps"),
 )
-"""The first seed from 910001 on with: cropped hair and a full beard; long hair with a fringe; short hair and stubble; closed lids. None was chosen by eye."""
+"""The first seed from 910001 on with: cropped hair and a full beard; long hair with a fringe; short hair and stubble;
+closed lids. None was chosen by eye."""
 HELD_BACK = (
     Likeness("bearded_2", 920033, "noon sun behind leaves"),
     Likeness("fringed_2", 920002, "mixed lamps"),
     Likeness("stubbled_2", 920031, "hazy sun"),
     Likeness("closed_2", 920003, "window bars"),
 )
-"""By the same rule from 920001 on: rendered by nobody before the release of 0.2.0, and by this command only where they are named."""
+"""By the same rule from 920001 on: rendered by nobody before the release of 0.2.0, and by this command only where they
+are named."""
 OWN_FRAMES, FURTHER_FRAMES = 48, 24
 LIGHTS = {"overcast": "overcast", "below": "lamp from below"}
 OTHERWISE = "hazy sun"
@@ -63,7 +69,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     everybody = [person.name for person in (*LIKENESSES, *people.PEOPLE)]
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--only", nargs="+", choices=everybody + [person.name for person in HELD_BACK], default=everybody)
+    parser.add_argument("--only", nargs="+", choices=everybody + [person.name for person in HELD_BACK],
+                        default=everybody)
     parser.add_argument("--lights", nargs="+", choices=("own", *LIGHTS), default=("own", *LIGHTS))
     parser.add_argument("--facekit", type=Path)
     parser.add_argument("--sheet", type=Path, help="render a contact sheet of the four people instead")
@@ -86,7 +93,8 @@ def film_all(person: Likeness, folder: Path, lights: list[str], facekit: Path | 
     if "own" in lights:
         film(folder, person.name, figure, KINDS[person.light](person.seed), person.light, OWN_FRAMES, room=True)
     for light in (light for light in LIGHTS if light in lights):
-        film(folder, f"{person.name}_{light}", figure, FURTHER[LIGHTS[light]](person.seed), LIGHTS[light], FURTHER_FRAMES, room=False)
+        film(folder, f"{person.name}_{light}", figure, FURTHER[LIGHTS[light]](person.seed), LIGHTS[light],
+             FURTHER_FRAMES, room=False)
 
 
 def photograph_again(person: people.FilmedPerson, folder: Path, light: str) -> None:

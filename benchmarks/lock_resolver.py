@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which wheels a platform and a Python need: the direct requirements and all that they need in turn, as the package index has them.
+"""Which wheels a platform and a Python need: the direct requirements and all that they need in turn, as the package
+index has them.
 
-pip chooses among versions and wheels. It judges the conditions of a requirement ("only on Windows") for the Python that it runs in, so it is asked without
-dependencies, and the conditions are judged here.
+pip chooses among versions and wheels. It judges the conditions of a requirement ("only on Windows") for the Python that
+it runs in, so it is asked without dependencies, and the conditions are judged here.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ class Wheel:
 
 
 def resolve(name: str, direct: list[str], cuda: bool = False) -> dict[str, Wheel]:
-    """Package -> wheel for the lock `name`, with PyTorch's CUDA libraries or without. Raises Problem where a package is not to be had."""
+    """Package -> wheel for the lock `name`, with PyTorch's CUDA libraries or without. Raises Problem where a package is
+    not to be had."""
     environment, extras = environment_of(name), {}
     wanted = {locks.normal(Requirement(text).name): {text} for text in direct}
     while True:
@@ -42,7 +44,12 @@ def resolve(name: str, direct: list[str], cuda: bool = False) -> dict[str, Wheel
         for wheel in found.values():
             for need in map(Requirement, wheel.needs):
                 with_extras = [{**environment, "extra": extra} for extra in ("", *extras.get(wheel.name, ()))]
-                if need.marker is not None and not any(map(need.marker.evaluate, with_extras)) or is_cuda(wheel, need) and not cuda:
+                if (
+                    need.marker is not None
+                    and not any(map(need.marker.evaluate, with_extras))
+                    or is_cuda(wheel, need)
+                    and not cuda
+                ):
                     continue
                 wanted.setdefault(locks.normal(need.name), set()).add(f"{need.name}{need.specifier}")
                 extras.setdefault(locks.normal(need.name), set()).update(need.extras)
@@ -56,19 +63,23 @@ def is_cuda(wheel: Wheel, need: Requirement) -> bool:
 
 
 def ask(name: str, wanted: list[str], *more: str) -> dict[str, Wheel]:
-    """The wheels that pip chooses for a lock's platform and Python, without what they need in turn. Raises Problem where one is not to be had."""
+    """The wheels that pip chooses for a lock's platform and Python, without what they need in turn. Raises Problem
+    where one is not to be had."""
     with tempfile.TemporaryDirectory(prefix="wildcap_lock_") as folder:
         report = Path(folder) / "report.json"
-        command = [sys.executable, "-m", "pip", "install", "--disable-pip-version-check", "--quiet", "--dry-run", "--ignore-installed", "--no-deps",
+        command = [sys.executable, "-m", "pip", "install", "--disable-pip-version-check", "--quiet", "--dry-run",
+                   "--ignore-installed", "--no-deps",
                    "--target", folder, "--report", report, *wheels.tags(name), *more, *wanted]
         ended = subprocess.run([str(word) for word in command], capture_output=True, text=True)
         if ended.returncode:
             errors = [line for line in ended.stderr.splitlines() if line.startswith("ERROR")]
-            raise Problem(f"{name}: {' '.join(errors) or ended.stderr[-300:]}", "Choose versions that have wheels for it in requirements/worker.txt.")
+            raise Problem(f"{name}: {' '.join(errors) or ended.stderr[-300:]}",
+                          "Choose versions that have wheels for it in requirements/worker.txt.")
         chosen = {}
         for entry in json.loads(report.read_text(encoding="utf-8"))["install"]:
             about, source = entry["metadata"], entry["download_info"]
-            wheel = Wheel(locks.normal(about["name"]), about["version"], source["url"], source.get("archive_info", {}).get("hashes", {}).get("sha256", ""),
+            wheel = Wheel(locks.normal(about["name"]), about["version"], source["url"],
+                          source.get("archive_info", {}).get("hashes", {}).get("sha256", ""),
                           tuple(about.get("requires_dist", ())))
             chosen[wheel.name] = wheel
     return chosen
@@ -77,8 +88,11 @@ def ask(name: str, wanted: list[str], *more: str) -> dict[str, Wheel]:
 def environment_of(name: str) -> dict[str, str]:
     """What a requirement's conditions are judged by (PEP 508)."""
     platform, _, python = name.rpartition("-")
-    system, short, machine, kind = {"win_amd64": ("Windows", "win32", "AMD64", "nt"), "macosx_arm64": ("Darwin", "darwin", "arm64", "posix"),
+    system, short, machine, kind = {"win_amd64": ("Windows", "win32", "AMD64", "nt"),
+                                    "macosx_arm64": ("Darwin", "darwin", "arm64", "posix"),
                                     "manylinux_x86_64": ("Linux", "linux", "x86_64", "posix")}[platform]
-    return {"platform_system": system, "sys_platform": short, "platform_machine": machine, "os_name": kind, "python_version": python,
-            "python_full_version": f"{python}.0", "implementation_name": "cpython", "platform_python_implementation": "CPython",
+    return {"platform_system": system, "sys_platform": short, "platform_machine": machine, "os_name": kind,
+            "python_version": python,
+            "python_full_version": f"{python}.0", "implementation_name": "cpython",
+            "platform_python_implementation": "CPython",
             "implementation_version": f"{python}.0", "platform_release": "", "platform_version": "", "extra": ""}

@@ -1,14 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes requirements/locks: every package of the solver for each platform and Python, pinned, with the hash of its wheel.
+"""Writes requirements/locks: every package of the solver for each platform and Python, pinned, with the hash of its
+wheel.
 
     python -m benchmarks.locks [NAME ...]      NAME as win_amd64-3.13; all of them without one
     python -m benchmarks.locks --table         packages, bytes to download and longest path of each, as the locks say
 
-It asks the package index that pip is set up for and downloads no package. Where PyTorch's own index can be reached, the files of its builds for the CPU
-(Linux) and for CUDA (Windows) get hashes too; where it cannot, they keep the version alone and say "not verified". PyTorch's build for Linux on the index
-needs CUDA's libraries, which are in a file beside the lock; where pip finds a build for the CPU as well (in a folder of wheels), the lock has the hashes
-of both.
+It asks the package index that pip is set up for and downloads no package. Where PyTorch's own index can be reached, the
+files of its builds for the CPU (Linux) and for CUDA (Windows) get hashes too; where it cannot, they keep the version
+alone and say "not verified". PyTorch's build for Linux on the index needs CUDA's libraries, which are in a file beside
+the lock; where pip finds a build for the CPU as well (in a folder of wheels), the lock has the hashes of both.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ from .lock_resolver import Wheel
 
 REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
 HEAD = "# {name}: written by `python -m benchmarks.locks`, out of worker.txt.\n"
-NOT_VERIFIED = "# not verified: the index that has this build was not reached when this was written, so its hash is not known.\n"
+NOT_VERIFIED = ("# not verified: the index that has this build was not reached when this was written, so its hash is "
+                "not known.\n")
 PIP = "26.3"
 TEMPORARY = ".0123456789012345"
 """What Python appends to a compiled file's name while it writes it: a dot and a number of 15 digits or so."""
@@ -34,12 +36,14 @@ TEMPORARY = ".0123456789012345"
 
 def write(name: str) -> None:
     """Writes one lock and what lies beside it. Raises Problem where a package is not to be had."""
-    direct = [line.partition("#")[0].strip() for line in (REQUIREMENTS / "worker.txt").read_text(encoding="utf-8").splitlines()]
+    direct = [line.partition("#")[0].strip()
+              for line in (REQUIREMENTS / "worker.txt").read_text(encoding="utf-8").splitlines()]
     wheels = lock_resolver.resolve(name, [line for line in direct if line])
     torch = wheels["torch"]
     public = torch.version.partition("+")[0]
     builds = {torch.sha256: torch}
-    if "+" in torch.version:  # a folder of wheels has another build than the index, which has the one without a local version
+    # a folder of wheels has another build than the index, which has the one without a local version
+    if "+" in torch.version:
         wheels["torch"] = lock_resolver.ask(name, [f"torch==={public}"])["torch"]
         builds[wheels["torch"].sha256] = wheels["torch"]
     lines = [HEAD.format(name=name), *_figures(name, wheels)]
@@ -57,7 +61,8 @@ def _figures(name: str, wheels: dict[str, Wheel]) -> list[str]:
     """What a lock says of its wheels' files, in two comments."""
     files = [index.wheel_files(wheel.url) for wheel in wheels.values()]
     longest = max((path for _, listed in files for file, _ in listed for path in installed_paths(file, name)), key=len)
-    return [f"# longest path: {len(longest)} characters below the environment's folder: {longest}\n", f"# download: {sum(size for size, _ in files)} bytes\n"]
+    return [f"# longest path: {len(longest)} characters below the environment's folder: {longest}\n",
+            f"# download: {sum(size for size, _ in files)} bytes\n"]
 
 
 def _line(name: str, version: str, *hashes: str) -> str:
@@ -66,16 +71,21 @@ def _line(name: str, version: str, *hashes: str) -> str:
 
 def _write_pip(name: str) -> None:
     wheel = lock_resolver.ask(name, [f"pip=={PIP}"])["pip"]
-    _write("pip.txt", ["# pip, for a Python that brings none: a wheel of pure Python, for every platform.\n", _line("pip", wheel.version, wheel.sha256)])
+    _write("pip.txt",
+           ["# pip, for a Python that brings none: a wheel of pure Python, for every platform.\n",
+            _line("pip", wheel.version, wheel.sha256)])
 
 
 def installed_paths(file: str, name: str) -> list[str]:
-    """Where a file of a wheel comes to lie below the environment's folder, the compiled one of a module and its temporary name among them."""
+    """Where a file of a wheel comes to lie below the environment's folder, the compiled one of a module and its
+    temporary name among them."""
     platform, _, python = name.rpartition("-")
-    inside, scripts = ("Lib/site-packages", "Scripts") if platform == "win_amd64" else (f"lib/python{python}/site-packages", "bin")
+    inside, scripts = (("Lib/site-packages", "Scripts") if platform == "win_amd64"
+                       else (f"lib/python{python}/site-packages", "bin"))
     path = PurePosixPath(file)
     if path.parts[0].endswith(".data"):  # PEP 427: PACKAGE.data/purelib/... and the like
-        inside, path = {"purelib": inside, "platlib": inside}.get(path.parts[1], scripts), PurePosixPath(*path.parts[2:])
+        inside, path = {"purelib": inside,
+                        "platlib": inside}.get(path.parts[1], scripts), PurePosixPath(*path.parts[2:])
     path = PurePosixPath(inside) / path
     compiled = path.parent / "__pycache__" / f"{path.stem}.cpython-{python.replace('.', '')}.pyc{TEMPORARY}"
     return [str(path), *([str(compiled)] if path.suffix == ".py" else [])]
@@ -88,8 +98,11 @@ def _write_build(name: str, compute: str, version: str, local: Wheel, wheels: di
     if build:
         lines = _own_build(name, f"{version}+{build}", build, local)
     elif compute == "cuda" and system == "linux":
-        libraries = {other: wheel for other, wheel in lock_resolver.resolve(name, [f"torch==={version}"], cuda=True).items() if other not in wheels}
-        lines = [*_figures(name, libraries), *(_line(other, wheel.version, wheel.sha256) for other, wheel in sorted(libraries.items()))]
+        libraries = {other: wheel
+                     for other, wheel in lock_resolver.resolve(name, [f"torch==={version}"], cuda=True).items()
+                     if other not in wheels}
+        lines = [*_figures(name, libraries),
+                 *(_line(other, wheel.version, wheel.sha256) for other, wheel in sorted(libraries.items()))]
     else:
         return
     _write(f"{name}-{compute}.txt", [HEAD.format(name=f"{name}, {compute}"), *lines])
@@ -113,7 +126,8 @@ def table() -> str:
     """One line per lock, as the locks themselves say."""
     rows = ["| lock | packages | to download | longest path below the folder |", "| --- | --- | --- | --- |"]
     for lock in (locks.read(REQUIREMENTS, name) for name in locks.names()):
-        rows.append(f"| `{lock.name}` | {len(lock.lines)} | {index.gigabytes(lock.download)} | {lock.longest} characters |")
+        rows.append(f"| `{lock.name}` | {len(lock.lines)} | {index.gigabytes(lock.download)} | {lock.longest} "
+                    "characters |")
     return "\n".join(rows)
 
 

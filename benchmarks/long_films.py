@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cameras of long films, beside plain pycolmap on the same frames:
 
-    python -m benchmarks.long_films FOLDER [--frames 60 120 300 1000] [--again] [--plain-times 4] [--json docs/figures/long_films.json]
+    python -m benchmarks.long_films FOLDER [--frames 60 120 300 1000] [--again] [--plain-times 4] [--json
+    docs/figures/long_films.json]
 
-The film: a person with hair and clothes before a cluttered room, filmed by a hand from ear to ear, up and down on the way, 1,000 frames of 720 x 960
-pixels (benchmarks/long_films_render.py), with a phone's noise, smear and compression. Shorter films are every so manyth frame of it, along the whole arc.
-Of each: seconds and processor seconds of the stage cameras, frames registered, the camera centres' error against the true ones (cameras_against_truth.py).
-Plain: pycolmap with its defaults, sequential matching and incremental mapping, ended after --plain-times as long. FOLDER/N gets a film, FOLDER/N.wildcap
-and FOLDER/N_plain.wildcap its cameras. Rows that are in the record are kept without --again.
+The film: a person with hair and clothes before a cluttered room, filmed by a hand from ear to ear, up and down on the
+way, 1,000 frames of 720 x 960 pixels (benchmarks/long_films_render.py), with a phone's noise, smear and compression.
+Shorter films are every so manyth frame of it, along the whole arc. Of each: seconds and processor seconds of the stage
+cameras, frames registered, the camera centres' error against the true ones (cameras_against_truth.py). Plain: pycolmap
+with its defaults, sequential matching and incremental mapping, ended after --plain-times as long. FOLDER/N gets a film,
+FOLDER/N.wildcap and FOLDER/N_plain.wildcap its cameras. Rows that are in the record are kept without --again.
 """
 
 from __future__ import annotations
@@ -41,7 +43,8 @@ from .people_lights import KINDS
 ROOT = Path(__file__).resolve().parent.parent
 COUNTS = (60, 120, 300, 1000)
 FRAMES, SHARED = 1000, 300
-"""Of the longest film; and of the one that shorter ones are taken from, so that few frames are rendered where it is not asked for."""
+"""Of the longest film; and of the one that shorter ones are taken from, so that few frames are rendered where it is not
+asked for."""
 SEED, LIGHT = 910004, "hazy sun"
 """Of the person, "stubbled" in benchmarks/likenesses.py, whose hair and beard are short; and what they sit in."""
 DEGREES, SAMPLES = 72, 2
@@ -55,7 +58,8 @@ def main() -> None:
     options.add_argument("folder", type=Path)
     options.add_argument("--frames", type=int, nargs="+", default=COUNTS, metavar="N")
     options.add_argument("--again", action="store_true", help="measure rows anew that the record has")
-    options.add_argument("--plain-times", type=float, default=4, help="how many times as long plain pycolmap may take; 0: it is left out")
+    options.add_argument("--plain-times", type=float, default=4,
+                         help="how many times as long plain pycolmap may take; 0: it is left out")
     options.add_argument("--json", type=Path)
     asked = options.parse_args()
     folder = asked.folder.resolve()
@@ -65,24 +69,35 @@ def main() -> None:
         if asked.again or str(count) not in known.get("frames", {}):
             found = {"frames": {**known.get("frames", {}), str(count): row(folder, count, asked.plain_times)}}
             found["frames"] = dict(sorted(found["frames"].items(), key=lambda item: int(item[0])))
-            figures.write(path, "long_films", "python -m benchmarks.long_films FOLDER", {**found, "growth": growth(found["frames"])})
+            figures.write(path, "long_films", "python -m benchmarks.long_films FOLDER",
+                          {**found, "growth": growth(found["frames"])})
     print(table(figures.read(path.stem, path.parent)["figures"]))
 
 
 def film(folder: Path, count: int) -> Path:
-    """The folder of the film of so many frames, film.mp4 and cameras.json, made if it is not there; rendered frames stay in FOLDER/rendered."""
+    """The folder of the film of so many frames, film.mp4 and cameras.json, made if it is not there; rendered frames
+    stay in FOLDER/rendered."""
     out = folder / str(count)
     if (out / "film.mp4").is_file():
         return out
-    cameras, numbers, work, taken = scene.camera_path(SEED, FRAMES, DEGREES), chosen_frames(count), folder / "rendered", phone.sample_phone(SEED)
+    cameras, numbers, work, taken = (
+        scene.camera_path(SEED, FRAMES, DEGREES),
+        chosen_frames(count),
+        folder / "rendered",
+        phone.sample_phone(SEED),
+    )
     if not all((work / f"{number:05d}.exr").is_file() for number in numbers):
         from core.synthetic.people.figure import make_figure
 
-        filmed.render(work, make_figure(SEED), KINDS[LIGHT](SEED), scene.Shot(cameras, numbers, SAMPLES), module="benchmarks.long_films_render")
+        filmed.render(work, make_figure(SEED), KINDS[LIGHT](SEED), scene.Shot(cameras, numbers, SAMPLES),
+                      module="benchmarks.long_films_render")
     out.mkdir(exist_ok=True)
-    write_json(out / "cameras.json", {"name": "film", "light": LIGHT, "focal_px": scene.FOCAL, "width": scene.WIDTH, "height": scene.HEIGHT,
-                                      "cameras": [{"frame": k, "matrix_world": cameras[number].tolist()} for k, number in enumerate(numbers)]})
-    sample.write_video(out / "film.mp4", _developed(work, numbers, raster.RayCaster(person_mesh(SEED)), cameras, taken), taken.crf)
+    write_json(out / "cameras.json",
+               {"name": "film", "light": LIGHT, "focal_px": scene.FOCAL, "width": scene.WIDTH, "height": scene.HEIGHT,
+                "cameras": [{"frame": k, "matrix_world": cameras[number].tolist()}
+                            for k, number in enumerate(numbers)]})
+    sample.write_video(out / "film.mp4", _developed(work, numbers, raster.RayCaster(person_mesh(SEED)), cameras, taken),
+                       taken.crf)
     return out
 
 
@@ -92,11 +107,14 @@ def chosen_frames(count: int) -> list[int]:
     return whole[np.linspace(0, len(whole) - 1, count).round().astype(int)].tolist()
 
 
-def _developed(work: Path, numbers: list[int], head: raster.RayCaster, cameras: np.ndarray, taken: phone.Phone) -> Iterator[np.ndarray]:
-    """The frames as the phone shows them, sRGB [H, W, 3]. Its rows are read at once: a rolling shutter has no one true camera."""
+def _developed(work: Path, numbers: list[int], head: raster.RayCaster, cameras: np.ndarray,
+               taken: phone.Phone) -> Iterator[np.ndarray]:
+    """The frames as the phone shows them, sRGB [H, W, 3]. Its rows are read at once: a rolling shutter has no one true
+    camera."""
     views, still = [sample.view_of(matrix) for matrix in cameras], np.tile(np.eye(4), (3, 1, 1))
     first = images.read_linear(work / f"{numbers[0]:05d}.exr")
-    gain = TO / np.percentile(first[first.shape[0] // 4:-first.shape[0] // 4, first.shape[1] // 4:-first.shape[1] // 4].max(-1), METERED)
+    gain = TO / np.percentile(first[first.shape[0] // 4:-first.shape[0] // 4,
+                                    first.shape[1] // 4:-first.shape[1] // 4].max(-1), METERED)
     for k in numbers:
         around = max(k - 1, 0), k, min(k + 1, len(views) - 1)
         flow = motion.image_motion(head, tuple(views[i] for i in around), still) * 2 / (around[2] - around[0])
@@ -105,7 +123,8 @@ def _developed(work: Path, numbers: list[int], head: raster.RayCaster, cameras: 
 
 
 def row(folder: Path, count: int, plain_times: float) -> dict:
-    """{"ours": {...}, "plain": {...}, "times", "processor_times": how many times as long plain pycolmap took, None where it was left out or ended}."""
+    """{"ours": {...}, "plain": {...}, "times", "processor_times": how many times as long plain pycolmap took, None
+    where it was left out or ended}."""
     capture, truth = Capture(folder / f"{count}.wildcap"), film(folder, count)
     settings = {"frames": {"max_frames": count}}
     if not capture.has("frames"):
@@ -114,31 +133,38 @@ def row(folder: Path, count: int, plain_times: float) -> dict:
             raise SystemExit(f"{cost['problem']} {cost['remedy']}")
     ours = stage_cost.measure(capture.root, "cameras", settings=settings)
     if "problem" not in ours:
-        ours |= _against_truth(capture, truth, count) | {"found_by": capture.read()["stages"]["cameras"]["figures"]["features"]}
+        ours |= _against_truth(capture, truth,
+                               count) | {"found_by": capture.read()["stages"]["cameras"]["figures"]["features"]}
     print(count, ours, flush=True)
     found = {"ours": ours, "plain": None, "times": None, "processor_times": None}
     if plain_times and "problem" not in ours:
-        plain = found["plain"] = plain_cost(capture, Capture(folder / f"{count}_plain.wildcap"), truth, count, plain_times * ours["seconds"])
+        plain = found["plain"] = plain_cost(capture, Capture(folder / f"{count}_plain.wildcap"), truth, count,
+                                            plain_times * ours["seconds"])
         if "over_s" not in plain:
-            found |= {"times": plain["seconds"] / ours["seconds"], "processor_times": plain["processor_s"] / ours["processor_s"]}
+            found |= {"times": plain["seconds"] / ours["seconds"],
+                      "processor_times": plain["processor_s"] / ours["processor_s"]}
         print(count, plain, flush=True)
     return found
 
 
 def _against_truth(capture: Capture, truth: Path, frames: int) -> dict:
     found = compare(capture, truth)
-    return {"frames": frames, "registered": found["registered"], "centre_median_percent": found["centre_error_median_percent"],
-            "centre_max_percent": found["centre_error_max_percent"], "rotation_deg": found["rotation_error_median_deg"], "focal_px": found["focal_px"]}
+    return {"frames": frames, "registered": found["registered"],
+            "centre_median_percent": found["centre_error_median_percent"],
+            "centre_max_percent": found["centre_error_max_percent"], "rotation_deg": found["rotation_error_median_deg"],
+            "focal_px": found["focal_px"]}
 
 
 def plain_cost(capture: Capture, beside: Capture, truth: Path, count: int, limit_s: float) -> dict:
-    """Plain pycolmap on a capture's frames, in a process of its own; its cameras are left in `beside`. {"over_s"} where it was ended."""
+    """Plain pycolmap on a capture's frames, in a process of its own; its cameras are left in `beside`. {"over_s"} where
+    it was ended."""
     with replacing_folder(beside.root) as copy:
         (copy / "cameras").mkdir()
         (copy / "frames").symlink_to(capture.frames)
     names = [record.name for record in read_frames(capture).records]
     own, began = stage_cost.own_s(), time.monotonic()
-    child = subprocess.Popen([sys.executable, "-c", f"from {__spec__.name} import plain; plain()", str(capture.frames), str(beside.root), *names], cwd=ROOT,
+    child = subprocess.Popen([sys.executable, "-c", f"from {__spec__.name} import plain; plain()", str(capture.frames),
+                              str(beside.root), *names], cwd=ROOT,
                              start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         child.wait(limit_s)
@@ -150,11 +176,13 @@ def plain_cost(capture: Capture, beside: Capture, truth: Path, count: int, limit
             child.wait()
     seconds = time.monotonic() - began
     cost = {"seconds": round(seconds, 1), "processor_s": round(stage_cost.own_s()[1] - own[1], 1)}
-    return {**cost, **_against_truth(beside, truth, count)} if child.returncode == 0 else {**cost, "frames": count, "registered": 0}
+    return ({**cost, **_against_truth(beside, truth, count)} if child.returncode == 0
+            else {**cost, "frames": count, "registered": 0})
 
 
 def plain() -> None:
-    """What a few lines of pycolmap do with a film, one camera for all frames: the largest model goes to FOLDER/cameras."""
+    """What a few lines of pycolmap do with a film, one camera for all frames: the largest model goes to
+    FOLDER/cameras."""
     import pycolmap
 
     pictures, folder, *names = sys.argv[1:]
@@ -173,7 +201,8 @@ def growth(rows: dict) -> float | None:
 
 def table(found: dict) -> str:
     """The record's table."""
-    head = ["frames", "cameras: seconds (of processor)", "registered", "centre error, median and most, % of the distance", "rotation, degrees", "found by",
+    head = ["frames", "cameras: seconds (of processor)", "registered",
+            "centre error, median and most, % of the distance", "rotation, degrees", "found by",
             "plain pycolmap: seconds (of processor)", "its registered, centre error", "times as long (of processor)"]
     return figures.markdown(head, [[count, *_cells(of)] for count, of in found["frames"].items()])
 
@@ -182,14 +211,16 @@ def _cells(of: dict) -> list:
     ours, plain = of["ours"], of["plain"]
     if "problem" in ours:
         return [ours["problem"], *[None] * 7]
-    own = [f"{ours['seconds']:.0f} ({ours['processor_s']:.0f})", ours["registered"], f"{ours['centre_median_percent']:.3f}, {ours['centre_max_percent']:.2f}",
+    own = [f"{ours['seconds']:.0f} ({ours['processor_s']:.0f})", ours["registered"],
+           f"{ours['centre_median_percent']:.3f}, {ours['centre_max_percent']:.2f}",
            f"{ours['rotation_deg']:.3f}", ours["found_by"]]
     if plain is None:
         return [*own, None, None, None]
     if "over_s" in plain:
         return [*own, f"over {plain['over_s']:.0f}", None, None]
     error = f", {plain['centre_median_percent']:.3f} %" if "centre_median_percent" in plain else ""
-    return [*own, f"{plain['seconds']:.0f} ({plain['processor_s']:.0f})", f"{plain['registered']}{error}", f"{of['times']:.1f} ({of['processor_times']:.1f})"]
+    return [*own, f"{plain['seconds']:.0f} ({plain['processor_s']:.0f})", f"{plain['registered']}{error}",
+            f"{of['times']:.1f} ({of['processor_times']:.1f})"]
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Many frames of a person at a low price, in a process of its own: `python -m benchmarks.long_films_render JOB.json`, a job of core/synthetic/people/filmed.py.
+"""Many frames of a person at a low price, in a process of its own: `python -m benchmarks.long_films_render JOB.json`, a
+job of core/synthetic/people/filmed.py.
 
-The light is traced once, for each vertex of the person; then everything shines by itself, and a frame needs a few rays to the first thing they meet and no
-denoising. Geometry and parallax are true; what changes with the viewer, gloss, is missing, and the room throws no shadows.
+The light is traced once, for each vertex of the person; then everything shines by itself, and a frame needs a few rays
+to the first thing they meet and no denoising. Geometry and parallax are true; what changes with the viewer, gloss, is
+missing, and the room throws no shadows.
 """
 
 from __future__ import annotations
@@ -35,14 +37,19 @@ def main() -> None:
     parts = {name: scene.objects[name] for name in PERSON if name in scene.objects}
     lights = traced(parts, job["sun"], images.read_linear(Path(job["sky"])))
     for name, thing in parts.items():
-        thing.data.color_attributes.new("light", 'FLOAT_COLOR', 'POINT').data.foreach_set("color", np.insert(lights[name], 3, 1, 1).astype(np.float32).ravel())
+        thing.data.color_attributes.new("light", 'FLOAT_COLOR',
+                                        'POINT').data.foreach_set("color",
+                                                                  np.insert(lights[name], 3, 1,
+                                                                            1).astype(np.float32).ravel())
         tree = thing.data.materials[0].node_tree
         light = tree.nodes.new("ShaderNodeAttribute")
         light.attribute_name = "light"
         _emit(tree, _product(tree, _colour(tree), light.outputs["Color"]))
-    for material in {thing.data.materials[0] for thing in scene.objects if thing.type in ('MESH', 'CURVES') and thing.name not in parts}:
+    for material in {thing.data.materials[0] for thing in scene.objects if thing.type in ('MESH', 'CURVES')
+                     and thing.name not in parts}:
         shine(material, job["sun"]["direction"], np.median(lights["skin"], axis=0).tolist())
-    for thing in [thing for thing in scene.objects if thing.type == 'LIGHT' or thing.type == 'MESH' and not thing.visible_camera]:
+    for thing in [thing for thing in scene.objects if thing.type == 'LIGHT' or thing.type == 'MESH'
+                  and not thing.visible_camera]:
         bpy.data.objects.remove(thing)
     scene.cycles.use_denoising, scene.cycles.max_bounces = False, 0
     scene.render.image_settings.color_depth, scene.render.image_settings.exr_codec = '16', 'ZIPS'
@@ -50,7 +57,8 @@ def main() -> None:
 
 
 def traced(parts: dict[str, bpy.types.Object], sun: dict, sky: np.ndarray) -> dict[str, np.ndarray]:
-    """What the albedo of each vertex is to be multiplied with, linear [V, 3] by part: the sky [H, W, 3] and the sun past the person."""
+    """What the albedo of each vertex is to be multiplied with, linear [V, 3] by part: the sky [H, W, 3] and the sun
+    past the person."""
     whole = meshes.joined([_mesh(thing) for thing in parts.values()])
     caster, points, normals = raster.RayCaster(whole), whole.vertices, meshes.vertex_normals(whole)
     rng, light, start = np.random.default_rng(0), np.zeros((len(points), 3)), points + LIFT_M * normals
@@ -58,13 +66,21 @@ def traced(parts: dict[str, bpy.types.Object], sun: dict, sky: np.ndarray) -> di
         towards = _unit(normals + 0.999 * _unit(rng.normal(size=points.shape)))
         free = ~caster.blocked(start, towards)
         row = (np.arccos(np.clip(towards[:, 2], -1, 1)) / np.pi * len(sky)).astype(int).clip(0, len(sky) - 1)
-        column = ((0.5 - np.arctan2(towards[:, 1], towards[:, 0]) / (2 * np.pi)) * sky.shape[1]).astype(int) % sky.shape[1]
+        column = ((0.5 - np.arctan2(towards[:, 1], towards[:, 0]) / (2 * np.pi))
+                  * sky.shape[1]).astype(int) % sky.shape[1]
         light += free[:, None] * sky[row, column] / RAYS
     middle = np.array(sun["direction"])
     for _ in range(SUN_RAYS):
-        towards = _unit(middle + np.tan(sun["angle"] / 2) * np.sqrt(rng.random()) * _unit(np.cross(middle, rng.normal(size=3))))
+        towards = _unit(middle + np.tan(sun["angle"] / 2) * np.sqrt(rng.random())
+                        * _unit(np.cross(middle, rng.normal(size=3))))
         free = ~caster.blocked(start, np.repeat(towards[None], len(points), 0))
-        light += (free * np.clip(normals @ towards, 0, 1))[:, None] * np.array(sun["colour"]) * sun["strength"] / np.pi / SUN_RAYS
+        light += (
+            (free * np.clip(normals @ towards, 0, 1))[:, None]
+            * np.array(sun["colour"])
+            * sun["strength"]
+            / np.pi
+            / SUN_RAYS
+        )
     ends = np.cumsum([len(thing.data.vertices) for thing in parts.values()])
     return dict(zip(parts, np.split(light, ends[:-1]), strict=True))
 
@@ -81,7 +97,8 @@ def _unit(directions: np.ndarray) -> np.ndarray:
 
 
 def shine(material: bpy.types.Material, sun: Sequence[float], light: Sequence[float]) -> None:
-    """Lit without shadows, about as brightly as the skin is in its median, and more towards the sun. Hairs are lit as the head that they stand on."""
+    """Lit without shadows, about as brightly as the skin is in its median, and more towards the sun. Hairs are lit as
+    the head that they stand on."""
     tree = material.node_tree
     place = tree.nodes.new("ShaderNodeNewGeometry")
     normal = place.outputs["Normal"]
@@ -103,7 +120,8 @@ def _colour(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
     return node.outputs[0]
 
 
-def _vector(tree: bpy.types.NodeTree, operation: str, one: bpy.types.NodeSocket, other: Sequence[float] = (0, 0, 0), output: int = 0) -> bpy.types.NodeSocket:
+def _vector(tree: bpy.types.NodeTree, operation: str, one: bpy.types.NodeSocket, other: Sequence[float] = (0, 0, 0),
+            output: int = 0) -> bpy.types.NodeSocket:
     node = tree.nodes.new("ShaderNodeVectorMath")
     node.operation = operation
     tree.links.new(one, node.inputs[0])

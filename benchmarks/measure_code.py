@@ -1,11 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What can be counted of the code: long functions, many parameters, long lines, class names of two meanings, lines of the product.
+"""What can be counted of the code: long functions, many parameters, long lines, class names of two meanings, lines of
+the product.
 
     python -m benchmarks.measure_code [--list] [--json docs/figures/measure_code.json]
 
-The product is core without synthetic/ and training/, wildcap_addon and farm; its lines are those that are neither blank nor comment nor docstring. A
-function's lines are all of it, its parameters are counted without self and cls. A class name has two meanings where two modules define it. Tests are left out.
+The product is core without synthetic/ and training/, wildcap_addon and farm; its lines are those that are neither blank
+nor comment nor docstring. A function's lines are all of it, its parameters are counted without self and cls. A class
+name has two meanings where two modules define it. Tests are left out.
 """
 
 from __future__ import annotations
@@ -32,7 +34,8 @@ def main() -> None:
     asked = parser.parse_args()
     found = look([path for top in (*PRODUCT, "benchmarks") for path in sorted((ROOT / top).rglob("*.py"))])
     if asked.list:
-        print("\n".join(f"{kind}: {name}" for kind, names in found.items() if kind != "product lines" for name in names))
+        print("\n".join(f"{kind}: {name}" for kind, names in found.items() if kind != "product lines"
+                        for name in names))
     counts = {kind: names if isinstance(names, int) else len(names) for kind, names in found.items()}
     print(figures.markdown(["what", "how many"], [[kind, count] for kind, count in counts.items()]))
     if asked.json:
@@ -54,13 +57,16 @@ def look(paths: list[Path], root: Path = ROOT) -> dict[str, list[str] | int]:
         wide += [f"{place}:{number}" for number, line in enumerate(text.splitlines(), 1) if len(line) > COLUMNS]
         if place.startswith(PRODUCT) and not place.startswith(BESIDE):
             lines += count_lines(text, tree)
-    return {f"functions over {LINES} lines": long, f"functions over {PARAMETERS} parameters": many, f"lines over {COLUMNS} columns": wide,
-            "class names of two meanings": [name for name, count in classes.items() if count > 1], "product lines": lines}
+    return {f"functions over {LINES} lines": long, f"functions over {PARAMETERS} parameters": many,
+            f"lines over {COLUMNS} columns": wide,
+            "class names of two meanings": [name for name, count in classes.items() if count > 1],
+            "product lines": lines}
 
 
 def count_parameters(node: ast.FunctionDef) -> int:
     named = [each.arg for each in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
-    return len([name for name in named if name not in ("self", "cls")]) + (node.args.vararg is not None) + (node.args.kwarg is not None)
+    return len([name for name in named
+                if name not in ("self", "cls")]) + (node.args.vararg is not None) + (node.args.kwarg is not None)
 
 
 def count_lines(text: str, tree: ast.Module) -> int:
@@ -68,7 +74,8 @@ def count_lines(text: str, tree: ast.Module) -> int:
     docs = set()
     for node in ast.walk(tree):
         for each in getattr(node, "body", ()) if isinstance(getattr(node, "body", None), list) else ():
-            if isinstance(each, ast.Expr) and isinstance(each.value, ast.Constant) and isinstance(each.value.value, str):
+            if isinstance(each, ast.Expr) and isinstance(each.value,
+                                                         ast.Constant) and isinstance(each.value.value, str):
                 docs |= set(range(each.lineno, each.end_lineno + 1))
     skipped = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
     code = {line for token in tokenize.generate_tokens(io.StringIO(text).readline) if token.type not in skipped

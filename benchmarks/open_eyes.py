@@ -4,9 +4,10 @@
 
     python -m benchmarks.open_eyes FOLDER [--only NAME ...] [--json OUT.json]
 
-FOLDER/NAME is a person of benchmarks/likenesses.py, filmed with open eyes, and FOLDER/NAME.wildcap what `core run` made of the film, up to the solve where the
-colour is asked for. The truth is laid where the capture's cameras see the face as it was filmed (benchmarks/cameras_against_truth.py). Distances in mm: from
-the fitted edges of the lids to the true ones, mean and largest of an eye's two; between the centres of the eyeballs. The iris' true colour is the median of the
+FOLDER/NAME is a person of benchmarks/likenesses.py, filmed with open eyes, and FOLDER/NAME.wildcap what `core run` made
+of the film, up to the solve where the colour is asked for. The truth is laid where the capture's cameras see the face
+as it was filmed (benchmarks/cameras_against_truth.py). Distances in mm: from the fitted edges of the lids to the true
+ones, mean and largest of an eye's two; between the centres of the eyeballs. The iris' true colour is the median of the
 eye's picture between pupil and rim; delta E is CIE 2000.
 """
 
@@ -32,13 +33,15 @@ from .cameras_against_truth import place_truth
 from .figures import markdown, write
 from .likenesses import HELD_BACK, LIKENESSES
 
-COLUMNS = ("rim, mm", "rim's worst, mm", "centre, mm", "radius, mm", "gaze, degrees", "iris radius, mm", "iris, delta E", "openness", "true openness")
+COLUMNS = ("rim, mm", "rim's worst, mm", "centre, mm", "radius, mm", "gaze, degrees", "iris radius, mm",
+           "iris, delta E", "openness", "true openness")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--only", nargs="+", choices=[person.name for person in (*LIKENESSES, *HELD_BACK)], default=[person.name for person in LIKENESSES])
+    parser.add_argument("--only", nargs="+", choices=[person.name for person in (*LIKENESSES, *HELD_BACK)],
+                        default=[person.name for person in LIKENESSES])
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
     rows = {}
@@ -49,7 +52,9 @@ def main() -> None:
             continue
         for side, row in zip(SIDES, compare(capture, asked.folder.resolve() / name), strict=True):
             rows[f"{name}, {side}"] = row
-    print(markdown(["eye", *COLUMNS], [[name, *(None if row[column] is None else f"{row[column]:.2f}" for column in COLUMNS)] for name, row in rows.items()]))
+    print(markdown(["eye", *COLUMNS],
+                   [[name, *(None if row[column] is None else f"{row[column]:.2f}" for column in COLUMNS)]
+                    for name, row in rows.items()]))
     if asked.json:
         write(asked.json, "open_eyes", "python -m benchmarks.open_eyes FOLDER", {"rows": rows}, keep=True)
 
@@ -63,13 +68,16 @@ def compare(capture: Capture, truth: Path) -> list[dict]:
     found, opened, colours = read_eyes(capture), meshes.read_obj(capture.head_open).vertices, read_irises(capture)
     rows = []
     for side, (ball, eye) in enumerate(zip(true.balls, found, strict=True)):
-        rims = [_off(opened[rim], _curve(true, side, lid) @ (scale * turn).T + shift) for lid, rim in enumerate(true.rims[side])]
+        rims = [_off(opened[rim], _curve(true, side, lid) @ (scale * turn).T + shift)
+                for lid, rim in enumerate(true.rims[side])]
         centre = scale * turn @ ball.centre + shift
         gaze = np.degrees(np.arccos(np.clip(turn @ ball.gaze @ np.array(eye.gaze), -1, 1)))
         rows.append(dict(zip(COLUMNS, map(_plain, (
-            1e3 * np.mean([off.mean() for off in rims]), 1e3 * max(off.max() for off in rims), 1e3 * np.linalg.norm(centre - eye.centre),
+            1e3 * np.mean([off.mean() for off in rims]), 1e3 * max(off.max() for off in rims),
+            1e3 * np.linalg.norm(centre - eye.centre),
             1e3 * (eye.radius - scale * ball.radius), gaze, 1e3 * eye.iris_radius / scale - eyes.IRIS_MM,
-            None if colours is None else apart(np.array(colours[side]), true_iris(person, ball.radius)), eye.openness, person["openness"])), strict=True)))
+            None if colours is None else apart(np.array(colours[side]), true_iris(person, ball.radius)), eye.openness,
+            person["openness"])), strict=True)))
     return rows
 
 
@@ -93,7 +101,8 @@ def _curve(opened: lids.OpenHead, side: int, lid: int) -> np.ndarray:
     """The true edge of a lid from corner to corner [N, 3], finely."""
     outer, inner = lids.corners()[side]
     points = opened.skin.vertices[[inner, *opened.rims[side][lid], outer]]
-    return np.concatenate([a + (b - a) * np.linspace(0, 1, 20)[:, None] for a, b in zip(points, points[1:], strict=False)])
+    return np.concatenate([a + (b - a) * np.linspace(0, 1, 20)[:, None]
+                           for a, b in zip(points, points[1:], strict=False)])
 
 
 def _off(points: np.ndarray, curve: np.ndarray) -> np.ndarray:

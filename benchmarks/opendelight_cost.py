@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a frame costs by OpenDelight's networks: python -m benchmarks.opendelight_cost [--frames N] [--device cpu|cuda]
 
-The checkpoint is random, of the published shapes, so the time and the memory are those of the real one and the pictures mean nothing. Printed are the
-multiplications of a frame, seconds per frame, beside them how long 10^12 multiplications of one large matrix product take on the same machine at the same time,
-and the peak memory.
+The checkpoint is random, of the published shapes, so the time and the memory are those of the real one and the pictures
+mean nothing. Printed are the multiplications of a frame, seconds per frame, beside them how long 10^12 multiplications
+of one large matrix product take on the same machine at the same time, and the peak memory.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ SIZE = 512
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.opendelight_cost", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.opendelight_cost", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--frames", type=int, default=1)
     parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu")
     options = parser.parse_args()
@@ -38,9 +39,11 @@ def main() -> None:
     picture = torch.rand(1, 3, SIZE, SIZE, generator=torch.Generator().manual_seed(0)).to(options.device)
     yardsticks, frames, steps = [_yardstick(options.device)], [], []
     for _ in range(options.frames):
-        frames.append(_seconds(lambda: delit(checkpoint.base, checkpoint.enhancer, picture, lambda: steps.append(time.monotonic())), options.device))
+        frames.append(_seconds(lambda: delit(checkpoint.base, checkpoint.enhancer, picture,
+                                             lambda: steps.append(time.monotonic())), options.device))
         yardsticks.append(_yardstick(options.device))
-    print(f"{np.mean(frames):.1f} s per frame on {options.device}, {torch.get_num_threads()} threads; 10^12 multiplications: {np.mean(yardsticks):.1f} s; "
+    print(f"{np.mean(frames):.1f} s per frame on {options.device}, {torch.get_num_threads()} threads; 10^12 "
+          f"multiplications: {np.mean(yardsticks):.1f} s; "
           f"longest time between two looks at a cancel: {np.diff(steps).max():.2f} s; "
           f"memory: {_peak(options.device):.0f} MB at most, {before:.0f} MB before the first frame")
 
@@ -48,12 +51,15 @@ def main() -> None:
 def multiplications() -> float:
     """Of one frame, in 10^12, counted without computing anything."""
     with torch.device("meta"), FlopCounterMode(display=False) as counter:
-        delit(*({name: torch.zeros(shape) for name, shape in shapes.items()} for shapes in (base(), enhancer())), torch.zeros(1, 3, SIZE, SIZE))
+        delit(*({name: torch.zeros(shape) for name, shape in shapes.items()} for shapes in (base(), enhancer())),
+              torch.zeros(1, 3, SIZE, SIZE))
     return counter.get_total_flops() / 2e12
 
 
-def write_random(folder: Path, width: int = 768, depth: int = 12, channels: int = 512, unet: int = 64, seed: int = 0) -> None:
-    """The two files of a checkpoint in a folder, with random values; the sizes that are not given are the published ones."""
+def write_random(folder: Path, width: int = 768, depth: int = 12, channels: int = 512, unet: int = 64,
+                 seed: int = 0) -> None:
+    """The two files of a checkpoint in a folder, with random values; the sizes that are not given are the published
+    ones."""
     rng = torch.Generator().manual_seed(seed)
     for name, shapes in ((BASE, base(width, depth, channels)), (ENHANCER, enhancer(unet))):
         torch.save({key: _random(key, shape, rng) for key, shape in shapes.items()}, folder / name)
@@ -61,16 +67,19 @@ def write_random(folder: Path, width: int = 768, depth: int = 12, channels: int 
 
 def base(width: int = 768, depth: int = 12, channels: int = 512) -> dict[str, tuple[int, ...]]:
     """Name -> shape of the first network's tensors, written down from the authors' published configuration."""
-    shapes = {"encoder.cls_token": (1, 1, width), "encoder.reg_token": (2, 4, width), "encoder.patch_embed.proj.weight": (width, 3, 16, 16),
+    shapes = {"encoder.cls_token": (1, 1, width), "encoder.reg_token": (2, 4, width),
+              "encoder.patch_embed.proj.weight": (width, 3, 16, 16),
               "encoder.patch_embed.proj.bias": (width,), "encoder.norm.weight": (width,), "encoder.norm.bias": (width,)}
     for i in range(depth):
-        for layer, out, into in (("attn.qkv", 3 * width, width), ("attn.proj", width, width), ("mlp.fc1", 4 * width, width), ("mlp.fc2", width, 4 * width)):
+        for layer, out, into in (("attn.qkv", 3 * width, width), ("attn.proj", width, width),
+                                 ("mlp.fc1", 4 * width, width), ("mlp.fc2", width, 4 * width)):
             shapes |= {f"encoder.blocks.{i}.{layer}.weight": (out, into), f"encoder.blocks.{i}.{layer}.bias": (out,)}
         for layer in ("norm1", "norm2"):
             shapes |= {f"encoder.blocks.{i}.{layer}.weight": (width,), f"encoder.blocks.{i}.{layer}.bias": (width,)}
     for i in (0, 3, 6, 9):
         shapes |= {f"decoder.deconv_layers.{i}.weight": (channels if i else width, channels, 4, 4),
-                   f"decoder.conv_layers.{i}.weight": (channels, channels, 1, 1), f"decoder.conv_layers.{i}.bias": (channels,)}
+                   f"decoder.conv_layers.{i}.weight": (channels, channels, 1, 1),
+                   f"decoder.conv_layers.{i}.bias": (channels,)}
     return shapes | {"decoder.cls_conv.weight": (3, channels, 1, 1), "decoder.cls_conv.bias": (3,)}
 
 
@@ -82,12 +91,18 @@ def enhancer(width: int = 64) -> dict[str, tuple[int, ...]]:
         shapes.update({f"{name}.weight": (out, into, kernel, kernel), f"{name}.bias": (out,)})
 
     def put_norm(name: str, size: int) -> None:
-        shapes.update({f"{name}.{kind}": (size,) for kind in ("weight", "bias", "running_mean", "running_var")} | {f"{name}.num_batches_tracked": ()})
+        shapes.update({f"{name}.{kind}": (size,) for kind in ("weight", "bias", "running_mean", "running_var")}
+                      | {f"{name}.num_batches_tracked": ()})
 
     at = "inc_1.res_conv."
-    put(at + "0", 3, width, 6), put_norm(at + "1", width), put(at + "3", 3, width, width), put_norm(at + "4", width), put("inc_1.addtion_layer", 1, width, 6)
-    for name, into, out in (("down1_1.resdown_conv.1", 1, 2), ("down2_1.resdown_conv.1", 2, 4), ("down3_1.resdown_conv.1", 4, 8),
-                            ("down4_1.resdown_conv.1", 8, 8), ("up1_1.conv", 16, 4), ("up2_1.conv", 8, 2), ("up3_1.conv", 4, 1), ("up4_1.conv", 2, 1)):
+    put(at + "0", 3, width, 6), put_norm(at + "1", width), put(at + "3", 3, width,
+                                                               width), put_norm(at + "4",
+                                                                                width), put("inc_1.addtion_layer", 1,
+                                                                                            width, 6)
+    for name, into, out in (("down1_1.resdown_conv.1", 1, 2), ("down2_1.resdown_conv.1", 2, 4),
+                            ("down3_1.resdown_conv.1", 4, 8),
+                            ("down4_1.resdown_conv.1", 8, 8), ("up1_1.conv", 16, 4), ("up2_1.conv", 8, 2),
+                            ("up3_1.conv", 4, 1), ("up4_1.conv", 2, 1)):
         put_norm(f"{name}.res_conv.0", into * width), put(f"{name}.res_conv.2", 3, out * width, into * width)
         put_norm(f"{name}.res_conv.3", out * width), put(f"{name}.res_conv.5", 3, out * width, out * width)
         if into != out:

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of a shadow that is masked exactly stays in the albedo: python -m benchmarks.painted_shadow [--size N] [--json OUT.json]
+"""How much of a shadow that is masked exactly stays in the albedo: python -m benchmarks.painted_shadow [--size N]
+[--json OUT.json]
 
-A disc on the sample head's cheek is darkened in its texture and solved, once with the disc as the proposal, once as what the artist added to an empty
-one. Printed is the share of the darkening (logarithm of inside over around, less that of the untouched texture's solve) that is left in the albedo.
+A disc on the sample head's cheek is darkened in its texture and solved, once with the disc as the proposal, once as
+what the artist added to an empty one. Printed is the share of the darkening (logarithm of inside over around, less that
+of the untouched texture's solve) that is left in the albedo.
 """
 
 from __future__ import annotations
@@ -41,7 +43,8 @@ def main() -> None:
     y, x = np.mgrid[:1024, :1024].astype(np.float32)
     distance = np.hypot(x - CENTRE[0], y - CENTRE[1])
     disc = (distance < RADIUS).astype(np.float32)
-    inside, around = (images.resize(part.astype(np.float32), size, size) > 0.99 for part in (distance < RADIUS - 10, np.abs(distance - RADIUS - 20) < 10))
+    inside, around = (images.resize(part.astype(np.float32), size, size) > 0.99
+                      for part in (distance < RADIUS - 10, np.abs(distance - RADIUS - 20) < 10))
     print("| light in the shadow | mask | left of the shadow in the albedo |\n| --- | --- | --- |")
     for added in (False, True):
         steps = {}
@@ -63,7 +66,8 @@ def solved(darkening: np.ndarray, mask: np.ndarray, added: bool, size: int) -> n
         capture.root.mkdir()
         shutil.copyfile(ASSETS / "sample_head" / "texture_confidence.exr", capture.texture_confidence)
         meshes.write_obj(capture.head, sample_head())
-        images.write_linear(capture.texture, images.read_linear(ASSETS / "sample_head" / "texture.exr") * darkening[..., None])
+        images.write_linear(capture.texture,
+                            images.read_linear(ASSETS / "sample_head" / "texture.exr") * darkening[..., None])
         images.write_data(capture.shadow_mask_auto, 0 * mask if added else mask)
         if added:
             images.write_data(capture.shadow_mask, mask)

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pairs of synthetic portraits that differ in the pigment alone, or in the light alone: what the slopes of benchmarks/measures/slopes.py are taken on.
+"""Pairs of synthetic portraits that differ in the pigment alone, or in the light alone: what the slopes of
+benchmarks/measures/slopes.py are taken on.
 
-The second pigment is the first times blotches of several sizes, from a mole's to a cheek's, unlike any skin: what tells pigment from light may not be that it
-knows faces. Subjects are those of benchmarks/delight_portraits.py, which no training sees.
+The second pigment is the first times blotches of several sizes, from a mole's to a cheek's, unlike any skin: what tells
+pigment from light may not be that it knows faces. Subjects are those of benchmarks/delight_portraits.py, which no
+training sees.
 """
 
 from __future__ import annotations
@@ -30,8 +32,8 @@ LIT = 0.01, 0.95
 
 @dataclass(frozen=True)
 class Pair:
-    """Two portraits, sRGB [S, S, 3], and their true albedos, linear [S, S, 3]; where bool [S, S]: facial skin that both show neither black nor clipped.
-    kind: what differs, "pigment" or "light"."""
+    """Two portraits, sRGB [S, S, 3], and their true albedos, linear [S, S, 3]; where bool [S, S]: facial skin that both
+    show neither black nor clipped. kind: what differs, "pigment" or "light"."""
 
     name: str
     kind: str
@@ -48,7 +50,8 @@ def pairs(subjects: dict[str, list[int]], size: int = 384) -> Iterator[Pair]:
             stage, sight = portrait_parts(seed, size)
             first = relit(sight, stage, np.random.default_rng([seed, 41, 0]))
             other = relit(sight, stage, np.random.default_rng([seed, 41, 1]))
-            blotched = np.clip(sight.albedo * blotches(sight, np.random.default_rng([seed, 45])), 0.003, 0.9).astype(np.float32)
+            blotched = np.clip(sight.albedo * blotches(sight, np.random.default_rng([seed, 45])), 0.003,
+                               0.9).astype(np.float32)
             painted = relit(sight, stage, np.random.default_rng([seed, 41, 0]), albedo=blotched)
             yield _pair(seed, "pigment", group, first, painted)
             yield _pair(seed, "light", group, first, other)
@@ -59,7 +62,8 @@ def blotches(sight: Sight, rng: np.random.Generator) -> np.ndarray:
     total = np.zeros((sight.size, sight.size, 3), np.float32)
     for scale in SCALES:
         for channels, deviation in ((1, DEVIATION), (3, 0.1 * DEVIATION)):
-            noise = cv2.GaussianBlur(rng.standard_normal((sight.size, sight.size, channels)).astype(np.float32), (0, 0), scale * sight.size)
+            noise = cv2.GaussianBlur(rng.standard_normal((sight.size, sight.size, channels)).astype(np.float32), (0, 0),
+                                     scale * sight.size)
             total += deviation * (noise / noise.std()).reshape(sight.size, sight.size, channels)
     return np.exp(total.reshape(-1, 3)[sight.pixel])
 

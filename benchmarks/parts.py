@@ -5,13 +5,15 @@
     python -m benchmarks.parts [--json OUT.json] [--frames FOLDER] [--weights FILE]
     python -m benchmarks.parts --sheet OUT.jpg --pictures FOLDER_OR_FILE ... [--brighter 8] [--weights FILE]
 
-The four people of benchmarks/likenesses.py, each photographed VIEWS times from random sides in lights made without panoramas (core/synthetic/people/unlit.py
-and snapshot.py: rays on the CPU, no Blender); with --frames also the frames that benchmarks/likenesses.py filmed, FOLDER/NAME/parts and capture.mp4, which
-Cycles rendered. The face is found as in a capture, by the face nets; what is judged lies in the crop.
+The four people of benchmarks/likenesses.py, each photographed VIEWS times from random sides in lights made without
+panoramas (core/synthetic/people/unlit.py and snapshot.py: rays on the CPU, no Blender); with --frames also the frames
+that benchmarks/likenesses.py filmed, FOLDER/NAME/parts and capture.mp4, which Cycles rendered. The face is found as in
+a capture, by the face nets; what is judged lies in the crop.
 
-A pixel is of the part that most of it shows; in the photographs the skin between the roots of hair is hair, in the filmed frames, whose truth knows single
-hairs only, a hair counts SPARSE times: figures have so much fewer hairs than people. Per part the intersection over union (null where the person has none),
-over all pixels together; beside the network what always says where parts usually are: the mean of the other people's. hair_as_skin: share of the hair of the
+A pixel is of the part that most of it shows; in the photographs the skin between the roots of hair is hair, in the
+filmed frames, whose truth knows single hairs only, a hair counts SPARSE times: figures have so much fewer hairs than
+people. Per part the intersection over union (null where the person has none), over all pixels together; beside the
+network what always says where parts usually are: the mean of the other people's. hair_as_skin: share of the hair of the
 head that is taken for skin; skin_as_hair: the reverse. The sheet of photographs is for looking only.
 """
 
@@ -40,7 +42,8 @@ VIEWS, SIZE, TEXELS = 8, 400, 1024
 SPARSE = 4.0
 HAIRS = ("brows", "beard", "hair")
 ENDINGS = (".png", ".jpg", ".jpeg")
-COLOURS = np.array([[255, 190, 150], [230, 0, 80], [120, 60, 0], [255, 150, 0], [70, 70, 230], [255, 255, 255], [0, 160, 80], [0, 0, 0]], np.float32) / 255
+COLOURS = np.array([[255, 190, 150], [230, 0, 80], [120, 60, 0], [255, 150, 0], [70, 70, 230], [255, 255, 255],
+                    [0, 160, 80], [0, 0, 0]], np.float32) / 255
 """Of the parts in a sheet."""
 
 
@@ -67,10 +70,12 @@ def main() -> None:
             frames = list(filmed(asked.frames / person.name))
             rows[f"{person.name}, filmed"] = row(list(_crops(frames, network)), len(frames))
     print(markdown(["person", "found", *PARTS, "hair as skin", "skin as hair"],
-                   [[name, f"{r['found']} of {r['pictures']}", *(None if v is None else f"{v:.2f}" for v in (*r["iou"].values(), r["hair_as_skin"],
-                                                                                                             r["skin_as_hair"]))] for name, r in rows.items()]))
+                   [[name, f"{r['found']} of {r['pictures']}",
+                     *(None if v is None else f"{v:.2f}" for v in (*r["iou"].values(), r["hair_as_skin"],
+                                                                   r["skin_as_hair"]))] for name, r in rows.items()]))
     if asked.json:
-        write(asked.json, "parts", "python -m benchmarks.parts" + (" --frames FOLDER" if asked.frames else ""), {"rows": rows}, keep=True)
+        write(asked.json, "parts", "python -m benchmarks.parts" + (" --frames FOLDER" if asked.frames else ""),
+              {"rows": rows}, keep=True)
 
 
 def photographs(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -88,14 +93,17 @@ def filmed(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     with av.open(str(folder / "capture.mp4")) as video:
         for number, frame in enumerate(video.decode(video=0)):
             if f"{number:04d}" in names:
-                parts = np.stack([images.read_mask(folder / "parts" / part / f"{number:04d}.png") for part in GROWN], -1)
+                parts = np.stack([images.read_mask(folder / "parts" / part / f"{number:04d}.png") for part in GROWN],
+                                 -1)
                 shares = unlit.true_shares(parts)
                 shares[..., [PARTS.index(name) for name in HAIRS]] *= SPARSE
                 yield frame.to_ndarray(format="rgb24").astype(np.float32) / 255, shares / shares.sum(-1, keepdims=True)
 
 
-def _crops(pictures: Iterator[tuple[np.ndarray, np.ndarray]], network: parser.ParseNet) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Of each picture in which a face is found: the true parts, the network's, and where the crop shows the picture; [SIDE, SIDE] each."""
+def _crops(pictures: Iterator[tuple[np.ndarray, np.ndarray]],
+           network: parser.ParseNet) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Of each picture in which a face is found: the true parts, the network's, and where the crop shows the picture;
+    [SIDE, SIDE] each."""
     for srgb, shares in pictures:
         face = faces.detect(srgb)
         if face is not None:
@@ -118,8 +126,10 @@ def row(crops: list[tuple[np.ndarray, np.ndarray, np.ndarray]], pictures: int) -
     either = counted.sum(0) + counted.sum(1) - both
     skin, hair = PARTS.index("skin"), PARTS.index("hair")
     return {"pictures": pictures, "found": len(crops),
-            "iou": {name: float(both[k] / either[k]) if counted[k].sum() > 20 * len(crops) else None for k, name in enumerate(PARTS)},
-            "hair_as_skin": _share(counted[hair, skin], counted[hair].sum()), "skin_as_hair": _share(counted[skin, hair], counted[skin].sum())}
+            "iou": {name: float(both[k] / either[k]) if counted[k].sum() > 20 * len(crops) else None
+                    for k, name in enumerate(PARTS)},
+            "hair_as_skin": _share(counted[hair, skin], counted[hair].sum()),
+            "skin_as_hair": _share(counted[skin, hair], counted[skin].sum())}
 
 
 def _share(some: int, whole: int) -> float | None:
@@ -129,7 +139,8 @@ def _share(some: int, whole: int) -> float | None:
 def write_sheet(out: Path, pictures: list[Path], network: parser.ParseNet, brighter: float) -> None:
     """The crops of photographs, and beside each its parts: in colours, and laid over it."""
     rows = []
-    for path in [path for each in pictures for path in (sorted(each.iterdir()) if each.is_dir() else [each]) if path.suffix.lower() in ENDINGS]:
+    for path in [path for each in pictures for path in (sorted(each.iterdir()) if each.is_dir() else [each])
+                 if path.suffix.lower() in ENDINGS]:
         srgb = np.clip(images.read_srgb(path)[..., :3] * brighter, 0, 1)
         face = faces.detect(srgb)
         if face is None:

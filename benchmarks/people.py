@@ -1,14 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Six synthetic people of six skin tones, none known to any training, each filmed in another light, with their truth; and their solve.
+"""Six synthetic people of six skin tones, none known to any training, each filmed in another light, with their truth;
+and their solve.
 
-    python -m benchmarks.people FOLDER [--only NAME ...] [--places wild flash studio] [--until STAGE] [--quality NAME] [--no-solve]
+    python -m benchmarks.people FOLDER [--only NAME ...] [--places wild flash studio] [--until STAGE] [--quality NAME]
+    [--no-solve]
 
-FOLDER/NAME.wildcap is the capture, FOLDER/NAME its truth in the layout that benchmarks/albedo_score.py says, with maps/ (the true maps, 2048) and head.obj
-besides. Path-traced by Cycles (shadows, two bounces, highlights; no scattering under the skin, so that albedo is what the truth says), then exposed,
-balanced, blurred, made noisy and compressed. The cameras are the true ones and the head is half a millimetre off, so the chain begins at delight, with the
-true skin tone. Two more captures of each, NAME_flash and NAME_studio: in a dark room with a lamp at the camera, and by sixteen fixed cameras in even light.
-Those are made only, not solved (benchmarks/controlled.py does). What is there is not made again.
+FOLDER/NAME.wildcap is the capture, FOLDER/NAME its truth in the layout that benchmarks/albedo_score.py says, with maps/
+(the true maps, 2048) and head.obj besides. Path-traced by Cycles (shadows, two bounces, highlights; no scattering under
+the skin, so that albedo is what the truth says), then exposed, balanced, blurred, made noisy and compressed. The
+cameras are the true ones and the head is half a millimetre off, so the chain begins at delight, with the true skin
+tone. Two more captures of each, NAME_flash and NAME_studio: in a dark room with a lamp at the camera, and by sixteen
+fixed cameras in even light. Those are made only, not solved (benchmarks/controlled.py does). What is there is not made
+again.
 """
 
 from __future__ import annotations
@@ -42,7 +46,8 @@ from .shadow_captures import registered, write_views
 
 @dataclass(frozen=True)
 class FilmedPerson:
-    """name: the group of skin tone (benchmarks/delight_measures.py) and the capture's name; light: one of people_lights.KINDS or FURTHER."""
+    """name: the group of skin tone (benchmarks/delight_measures.py) and the capture's name; light: one of
+    people_lights.KINDS or FURTHER."""
 
     name: str
     seed: int
@@ -60,10 +65,12 @@ PEOPLE = (
 """The first seed from 900101 on in each group: nothing was chosen by eye. reserved.json keeps them from training."""
 PLACES = ("wild", "flash", "studio")
 FRAMES, SCALE, SAMPLES = 40, 5 / 6, 7  # of the video, their size (600 x 800), rays per pixel before denoising
-FLASH_EVERY, FLASH_W = 3, 10.0  # of the video's cameras so many are taken again with the lamp; only its place matters, as frames are exposed
+# of the video's cameras so many are taken again with the lamp; only its place matters, as frames are exposed
+FLASH_EVERY, FLASH_W = 3, 10.0
 TRUTHS = 14  # frames whose truth is written
 BALANCED = 0.75  # share of the light's colour that the white balance takes out
-WHITE_AT, TO = 99.0, 0.8  # percentile of the brightest channel on the face that the exposure brings to this linear level
+# percentile of the brightest channel on the face that the exposure brings to this linear level
+WHITE_AT, TO = 99.0, 0.8
 BLUR_PX, NOISE = 0.6, 0.006  # deviations; of the noise in sRGB at mid grey
 
 
@@ -92,27 +99,33 @@ def make(person: FilmedPerson, folder: Path, place: str = "wild") -> Capture:
     skin = make_skin(sample_parameters(person.seed), sample.MAPS)
     light, cameras = _set(person, place)
     work = folder / "rendered" / name
-    sample.render_frames(work, person.seed, skin, scene.Shot(cameras, list(range(len(cameras))), SAMPLES, SCALE, room=False), light=light, suffix=".exr")
+    sample.render_frames(work, person.seed, skin,
+                         scene.Shot(cameras, list(range(len(cameras))), SAMPLES, SCALE, room=False), light=light,
+                         suffix=".exr")
     head = subject_mesh(person.seed)
     meshes.write_obj(truth / "head.obj", head)
     if place == "wild":
         write_maps(truth / "maps", skin)
-    write_json(truth / "cameras.json", {"name": name, "light": person.light if place == "wild" else place, "focal_px": scene.FOCAL * SCALE,
-                                        "width": round(scene.WIDTH * SCALE), "height": round(scene.HEIGHT * SCALE),
-                                        "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
+    write_json(truth / "cameras.json",
+               {"name": name, "light": person.light if place == "wild" else place, "focal_px": scene.FOCAL * SCALE,
+                "width": round(scene.WIDTH * SCALE), "height": round(scene.HEIGHT * SCALE),
+                "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
     faces, total, count = {}, np.zeros(3), 0
     opaque = meshes.joined([head, light.blockers]) if light.blockers else head
     for frame in np.unique(np.linspace(1, len(cameras) - 2, TRUTHS).round().astype(int)).tolist():
-        albedo, alpha, face, shadow = sample.frame_truth(head, opaque, skin, sample.view_of(cameras[frame], SCALE), light.sun.direction if light.sun else None)
+        albedo, alpha, face, shadow = sample.frame_truth(head, opaque, skin, sample.view_of(cameras[frame], SCALE),
+                                                         light.sun.direction if light.sun else None)
         faces[frame] = albedo, face
         _write_truth(truth, frame, albedo, alpha, face, shadow if light.sun else None)
         total, count = total + albedo[face].sum(0, dtype=np.float64), count + int(face.sum())
     views = [sample.view_of(matrix, SCALE) for matrix in cameras]
-    write_views(capture, views, _developed(work, len(cameras), faces, person.seed), min(Settings().frames.views, len(views)))
+    write_views(capture, views, _developed(work, len(cameras), faces, person.seed),
+                min(Settings().frames.views, len(views)))
     sample.write_video(truth / "capture.mp4", _developed(work, len(cameras), faces, person.seed))
     meshes.write_obj(capture.head, registered(head, person.seed))
     with replacing(truth / "skin_tone.txt") as temporary:
-        temporary.write_text(",".join(f"{c:.4f}" for c in images.linear_to_srgb(total / count)) + "\n", encoding="ascii")
+        temporary.write_text(",".join(f"{c:.4f}" for c in images.linear_to_srgb(total / count)) + "\n",
+                             encoding="ascii")
     return capture
 
 
@@ -135,7 +148,8 @@ def write_maps(folder: Path, skin: Skin) -> None:
 
 
 def solve(capture: Capture, truth: Path, until: str, quality: str) -> None:
-    """Runs the chain from delight on, as the worker would, as far as it is not fresh. Raises SystemExit with what was wrong where a stage fails."""
+    """Runs the chain from delight on, as the worker would, as far as it is not fresh. Raises SystemExit with what was
+    wrong where a stage fails."""
     values = {"solve": {"skin_tone": skin_tone(truth)}}
     names, settings = [stage.name for stage in STAGES], from_json(values, preset(quality))
     asked = STAGES[names.index("delight"):names.index(until) + 1]
@@ -153,7 +167,8 @@ def skin_tone(truth: Path) -> str:
     return (truth / "skin_tone.txt").read_text(encoding="ascii").split("#")[0].replace(" ", "").strip()
 
 
-def _write_truth(truth: Path, frame: int, albedo: np.ndarray, alpha: np.ndarray, face: np.ndarray, shadow: np.ndarray | None) -> None:
+def _write_truth(truth: Path, frame: int, albedo: np.ndarray, alpha: np.ndarray, face: np.ndarray,
+                 shadow: np.ndarray | None) -> None:
     name = f"{frame:04d}.png"
     for folder in ("albedo", "face", *(["shadow"] if shadow is not None else [])):
         (truth / folder).mkdir(parents=True, exist_ok=True)
@@ -163,18 +178,22 @@ def _write_truth(truth: Path, frame: int, albedo: np.ndarray, alpha: np.ndarray,
         images.write_data(truth / "shadow" / name, shadow.astype(np.float32))
 
 
-def _developed(work: Path, count: int, faces: dict[int, tuple[np.ndarray, np.ndarray]], seed: int) -> Iterator[np.ndarray]:
-    """The rendered frames as a phone would show them, sRGB [H, W, 3]; `faces`: per frame with truth its albedo [H, W, 3] and facial skin [H, W]."""
+def _developed(work: Path, count: int, faces: dict[int, tuple[np.ndarray, np.ndarray]],
+               seed: int) -> Iterator[np.ndarray]:
+    """The rendered frames as a phone would show them, sRGB [H, W, 3]; `faces`: per frame with truth its albedo [H, W,
+    3] and facial skin [H, W]."""
     gain = exposure({frame: images.read_linear(work / f"{frame:05d}.exr") for frame in faces}, faces)
     for frame in range(count):
         rng = np.random.default_rng([seed, 51, frame])
         linear = cv2.GaussianBlur(images.read_linear(work / f"{frame:05d}.exr") * gain, (0, 0), BLUR_PX)
         srgb = images.linear_to_srgb(linear)
-        yield np.clip(srgb + rng.normal(0, NOISE, srgb.shape) * np.sqrt(np.clip(srgb, 0.05, 1) / 0.5), 0, 1).astype(np.float32)
+        yield np.clip(srgb + rng.normal(0, NOISE, srgb.shape) * np.sqrt(np.clip(srgb, 0.05, 1) / 0.5), 0,
+                      1).astype(np.float32)
 
 
 def exposure(frames: dict[int, np.ndarray], faces: dict[int, tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """One gain [3] for all frames: BALANCED of the light's colour goes, and the WHITE_AT percentile of the face comes to TO, as a phone meters faces."""
+    """One gain [3] for all frames: BALANCED of the light's colour goes, and the WHITE_AT percentile of the face comes
+    to TO, as a phone meters faces."""
     lit = np.concatenate([frames[k][face] for k, (_, face) in faces.items()])
     albedo = np.concatenate([true[face] for true, face in faces.values()])
     cast = lit.mean(0) / albedo.mean(0)

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The light in which the people of benchmarks/people.py are photographed: from overcast to noon sun behind leaves, window bars, mixed lamps.
+"""The light in which the people of benchmarks/people.py are photographed: from overcast to noon sun behind leaves,
+window bars, mixed lamps.
 
-World: metres, +Z up, the head's middle at the origin, its face towards -Y. Radiance is linear; the camera chooses the exposure.
+World: metres, +Z up, the head's middle at the origin, its face towards -Y. Radiance is linear; the camera chooses the
+exposure.
 """
 
 from __future__ import annotations
@@ -47,7 +49,8 @@ def mixed_lamps(seed: int) -> SceneLight:
 def haze(seed: int) -> SceneLight:
     """A sun behind thin cloud, soft and from the side: the head's own shadow and no other."""
     side = float(np.random.default_rng([seed, 50]).choice([-1, 1]))
-    return SceneLight(panorama((0.55, 0.62, 0.75), (0.75, 0.72, 0.68), (0.16, 0.14, 0.11)), Sun(_towards(58 * side, 36), 4.0, 0.09, (1.0, 0.95, 0.87)))
+    return SceneLight(panorama((0.55, 0.62, 0.75), (0.75, 0.72, 0.68), (0.16, 0.14, 0.11)),
+                      Sun(_towards(58 * side, 36), 4.0, 0.09, (1.0, 0.95, 0.87)))
 
 
 def lamp_below(seed: int) -> SceneLight:
@@ -57,7 +60,8 @@ def lamp_below(seed: int) -> SceneLight:
         AreaLamp((0.16 * side, -0.50, -0.48), 0.10, 8.0, (1.0, 0.74, 0.46)),))
 
 
-KINDS = {"noon sun behind leaves": noon, "overcast": overcast, "window bars": window_bars, "mixed lamps": mixed_lamps, "hazy sun": haze}
+KINDS = {"noon sun behind leaves": noon, "overcast": overcast, "window bars": window_bars, "mixed lamps": mixed_lamps,
+         "hazy sun": haze}
 FURTHER = {"overcast": overcast, "lamp from below": lamp_below}
 """The lights in which every person is photographed again (benchmarks/likenesses.py)."""
 
@@ -69,8 +73,10 @@ def panorama(zenith, horizon, ground) -> np.ndarray:
     return np.where(height > 0, sky, np.asarray(ground)).astype(np.float32)
 
 
-def bars(direction: np.ndarray, distance: float = 0.6, period: float = 0.085, width: float = 0.024, reach: float = 0.25) -> Mesh:
-    """A window's upright and level bars between the head and the light that comes from a unit direction [3]; metres, in a plane across it."""
+def bars(direction: np.ndarray, distance: float = 0.6, period: float = 0.085, width: float = 0.024,
+         reach: float = 0.25) -> Mesh:
+    """A window's upright and level bars between the head and the light that comes from a unit direction [3]; metres, in
+    a plane across it."""
     side = np.cross(direction, [0, 0, 1.0])
     side /= np.linalg.norm(side)
     up, places = np.cross(side, direction), np.arange(-reach, reach, period)
@@ -78,7 +84,8 @@ def bars(direction: np.ndarray, distance: float = 0.6, period: float = 0.085, wi
     for along, across, step in ((up, side, 1.0), (side, up, 1.6)):  # panes are higher than they are wide
         for place in places * step:
             first = len(vertices)
-            vertices += [direction * distance + along * a * 2 * reach + across * (place + b * width / 2) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+            vertices += [direction * distance + along * a * 2 * reach + across * (place + b * width / 2)
+                         for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
             faces += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
     return Mesh(np.array(vertices), np.array(faces))
 
@@ -91,10 +98,12 @@ def _patch(picture: np.ndarray, towards: np.ndarray, width_deg: float, radiance:
 
 
 def _directions() -> np.ndarray:
-    """Unit directions [HEIGHT, 2 HEIGHT, 3] of a panorama's texels as Blender reads it: the middle column is +X, a quarter to the right -Y."""
+    """Unit directions [HEIGHT, 2 HEIGHT, 3] of a panorama's texels as Blender reads it: the middle column is +X, a
+    quarter to the right -Y."""
     polar = (np.arange(HEIGHT) + 0.5)[:, None] / HEIGHT * np.pi
     azimuth = -((np.arange(2 * HEIGHT) + 0.5)[None] / (2 * HEIGHT) - 0.5) * 2 * np.pi
-    return np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar) * np.ones_like(azimuth)], -1)
+    return np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth),
+                     np.cos(polar) * np.ones_like(azimuth)], -1)
 
 
 def _towards(azimuth_deg: float, height_deg: float) -> np.ndarray:

@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a PNG costs by zlib's level and libpng's filter, on a finished capture's own pictures: seconds of the processor and megabytes.
+"""What a PNG costs by zlib's level and libpng's filter, on a finished capture's own pictures: seconds of the processor
+and megabytes.
 
     python -m benchmarks.png_levels CAPTURE [--json FILE]
 
-Each of PICTURES is encoded in memory's file system as often as there are LEVELS and FILTERS; "chosen" is libpng's own choice, row by row. What core/imaging
-writes with is images.QUICK.
+Each of PICTURES is encoded in memory's file system as often as there are LEVELS and FILTERS; "chosen" is libpng's own
+choice, row by row. What core/imaging writes with is images.QUICK.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from core.imaging import images
 
 from . import figures
 
-PICTURES = {"albedo": ("maps_4k/diffuse_albedo.png", 16), "normals": ("maps_4k/normal.png", 16), "specular": ("maps_4k/specular_albedo.png", 16),
+PICTURES = {"albedo": ("maps_4k/diffuse_albedo.png", 16), "normals": ("maps_4k/normal.png", 16),
+            "specular": ("maps_4k/specular_albedo.png", 16),
             "confidence": ("maps_4k/confidence.png", 8), "delit frame": ("delit", 16)}
 LEVELS = (1, 3)
 FILTERS = {"none": 0x08, "up": 0x20, "paeth": 0x80, "chosen": None}
@@ -36,7 +38,8 @@ def main() -> None:
     options = parser.parse_args()
     shm = Path("/dev/shm")
     with tempfile.TemporaryDirectory(dir=shm if shm.is_dir() else None) as folder:
-        found = {name: measured(options.capture / path, bits, Path(folder) / "a.png") for name, (path, bits) in PICTURES.items()}
+        found = {name: measured(options.capture / path, bits, Path(folder) / "a.png")
+                 for name, (path, bits) in PICTURES.items()}
     print(table(found))
     if options.json:
         figures.write(options.json, "png_levels", "python -m benchmarks.png_levels CAPTURE", found)
@@ -47,7 +50,8 @@ def measured(path: Path, bits: int, into: Path) -> dict:
     if path.is_dir():
         path = min(path.glob("*.png"))
     pixels = np.ascontiguousarray(images.read_data(path))
-    costs = {f"{name} {level}": encoded(pixels, bits, into, level, flag) for name, flag in FILTERS.items() for level in LEVELS}
+    costs = {f"{name} {level}": encoded(pixels, bits, into, level, flag) for name, flag in FILTERS.items()
+             for level in LEVELS}
     return {"raw_mb": round(pixels.size * bits / 8e6, 1), **costs}
 
 
@@ -67,7 +71,8 @@ def encoded(pixels: np.ndarray, bits: int, into: Path, level: int, flag: int | N
 def table(found: dict) -> str:
     """A Markdown table: a picture a row, a way to write it a column."""
     ways = [f"{name} {level}" for name in FILTERS for level in LEVELS]
-    rows = [[f"{name} ({row['raw_mb']:.0f} MB)", *(f"{row[way]['seconds']:.2f} s, {row[way]['mb']:.1f} MB" for way in ways)] for name, row in found.items()]
+    rows = [[f"{name} ({row['raw_mb']:.0f} MB)",
+             *(f"{row[way]['seconds']:.2f} s, {row[way]['mb']:.1f} MB" for way in ways)] for name, row in found.items()]
     return figures.markdown(["picture (in memory)", *ways], rows)
 
 

@@ -1,14 +1,16 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a trained prior knows: samples beside what it was trained on, and how well normals and specular follow from the diffuse.
+"""What a trained prior knows: samples beside what it was trained on, and how well normals and specular follow from the
+diffuse.
 
     python -m benchmarks.prior_figures samples OUT.png --work DIR [--skins FOLDER] [--weights FILE]
     python -m benchmarks.prior_figures response [--subjects 9000 9001 ...] [--size 512] [--weights FILE]
 
-`samples` draws 32 patches of a quarter of the face and shows beside each the training patch nearest to it (at its place or mirrored, colours over
-skin tone), with their distance over the distance between two neighbouring training skins: a prior that copies gives 0. DIR is the training's work folder.
-`response` gives held-out subjects' true albedo to the prior, which tells the rest: the angle of the normals to the true ones and the RMSE of specular,
-sampled, as the mean of what is possible, and as a draft solves and restores them, against the mean face's maps and another subject's.
+`samples` draws 32 patches of a quarter of the face and shows beside each the training patch nearest to it (at its place
+or mirrored, colours over skin tone), with their distance over the distance between two neighbouring training skins: a
+prior that copies gives 0. DIR is the training's work folder. `response` gives held-out subjects' true albedo to the
+prior, which tells the rest: the angle of the normals to the true ones and the RMSE of specular, sampled, as the mean of
+what is possible, and as a draft solves and restores them, against the mean face's maps and another subject's.
 """
 
 from __future__ import annotations
@@ -62,7 +64,9 @@ def main() -> None:
     response.set_defaults(command=measure_response)
     for command in (samples, response):
         command.add_argument("--weights", type=Path, default=WEIGHTS)
-        command.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/prior.json; those of the other command stay")
+        command.add_argument("--json", type=Path,
+                             help="where the figures go, such as docs/figures/prior.json; those of the other command "
+                                  "stay")
     options = parser.parse_args()
     options.command(options)
 
@@ -97,10 +101,13 @@ def show_samples(options: argparse.Namespace) -> None:
     columns = 4
     sheet = np.vstack([np.hstack(sheet[i:i + columns]) for i in range(0, len(sheet) - columns + 1, columns)])
     images.write_srgb(options.out, images.linear_to_srgb(images.resize(sheet, 2 * sheet.shape[1], 2 * sheet.shape[0])))
-    print(f"{options.count} samples; distance to the nearest training patch over that patch's own distance to its nearest: "
-          f"median {np.median(ratios):.2f}, least {min(ratios):.2f}. Left of each pair the sample, right the training patch.")
+    print(f"{options.count} samples; distance to the nearest training patch over that patch's own distance to its "
+          "nearest: "
+          f"median {np.median(ratios):.2f}, least {min(ratios):.2f}. Left of each pair the sample, right the training "
+          "patch.")
     if options.json:
-        write(options.json, "prior_figures", COMMAND, {"samples": {"count": options.count, "median": np.median(ratios), "least": min(ratios)}}, keep=True)
+        write(options.json, "prior_figures", COMMAND,
+              {"samples": {"count": options.count, "median": np.median(ratios), "least": min(ratios)}}, keep=True)
 
 
 def card_of(weights: Path) -> dict:
@@ -139,21 +146,26 @@ def measure_response(options: argparse.Namespace) -> None:
         draft = given_diffuse(conditioned, truth, options.steps, "proximal")
         again = restored(conditioned, draft[None], coords, replace(OURS, guidance="proximal"), 0)[0]
         rows.append([errors(maps, truth, face) for maps in (solved, expected, again, draft, mean, other)])
-        print(f"{seed}: " + "; ".join(f"{name} {angle:.2f} deg, {gloss:.4f}" for name, (angle, gloss) in zip(NAMES, rows[-1], strict=True)), flush=True)
+        print(f"{seed}: "
+              + "; ".join(f"{name} {angle:.2f} deg, {gloss:.4f}"
+                          for name, (angle, gloss) in zip(NAMES, rows[-1], strict=True)), flush=True)
     means = np.mean(rows, 0)
     if options.json:
         write(options.json, "prior_figures", COMMAND, keep=True, figures={"response": {name: {
             f"{what}_of_{whose}": means[k][part] / means[of][part] for of, whose in ((-2, "mean_face"), (-1, "another"))
             for part, what in enumerate(("normals", "specular"))} for k, name in enumerate(NAMES[:-2])}})
     for k, name in enumerate(NAMES[:-2]):
-        print(f"{name}: " + ", ".join(f"normals {means[k][0] / means[j][0]:.2f} and specular {means[k][1] / means[j][1]:.2f} of {NAMES[j]}'s error"
-                                      for j in (-2, -1)))
+        print(f"{name}: "
+              + ", ".join(f"normals {means[k][0] / means[j][0]:.2f} and specular {means[k][1] / means[j][1]:.2f} of "
+                          f"{NAMES[j]}'s error"
+                          for j in (-2, -1)))
 
 
 def reflectance(seed: int, size: int) -> torch.Tensor:
     """A synthetic subject's map [7, S, S]."""
     made = make_skin(seed, size)
-    return torch.from_numpy(np.concatenate([2 * made.diffuse - 1, made.normal, 2 * made.specular[..., None] - 1], -1).transpose(2, 0, 1).copy())
+    return torch.from_numpy(np.concatenate([2 * made.diffuse - 1, made.normal, 2 * made.specular[..., None] - 1],
+                                           -1).transpose(2, 0, 1).copy())
 
 
 def of_subject(prior: Prior, truth: torch.Tensor) -> ConditionedPrior:
@@ -174,7 +186,8 @@ def given_diffuse(prior: ConditionedPrior, truth: torch.Tensor, steps: int, guid
         normal[2] = 1
         coords = coordinates(side, slice(0, side), slice(0, side))
         one = torch.ones(side, side)
-        found[factor] = Observation(texture, one, one, coords, Shader(normal, 0 * one, (1, 1)), (0 * one).bool(), 1024 / side)
+        found[factor] = Observation(texture, one, one, coords, Shader(normal, 0 * one, (1, 1)), (0 * one).bool(),
+                                    1024 / side)
     recipe = replace(OURS, steps=steps, phases=(), guidance=guidance)
     coords = coordinates(size, slice(0, size), slice(0, size))
     lights = Lights(constant_light(torch.ones(3)), torch.zeros(1, 9, 1, 1), torch.ones(3))
@@ -186,7 +199,8 @@ def errors(maps: torch.Tensor, truth: torch.Tensor, face: torch.Tensor) -> tuple
     """RMS angle of normals in degrees, and RMSE of specular, over the face."""
     unit = torch.nn.functional.normalize(maps[3:6], dim=0)
     cosine = (unit * torch.nn.functional.normalize(truth[3:6], dim=0)).sum(0)[face].clamp(-1, 1)
-    return float(torch.rad2deg(torch.arccos(cosine)).pow(2).mean().sqrt()), float(((maps[6] - truth[6])[face] / 2).pow(2).mean().sqrt())
+    return float(torch.rad2deg(torch.arccos(cosine)).pow(2).mean().sqrt()), float(((maps[6] - truth[6])[face]
+                                                                                   / 2).pow(2).mean().sqrt())
 
 
 if __name__ == "__main__":

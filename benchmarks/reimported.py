@@ -4,8 +4,9 @@
 
     python -m benchmarks.reimported [--resolution 384] [--samples 64] [--picture OUT.jpg] [--json OUT.json]
 
-A copy of the sample head is delivered to a folder that is gone afterwards. Both heads stand under the same light before the same camera, with the
-same noise. The original is shown with and without scattering under the skin, which no exchange format holds.
+A copy of the sample head is delivered to a folder that is gone afterwards. Both heads stand under the same light before
+the same camera, with the same noise. The original is shown with and without scattering under the skin, which no
+exchange format holds.
 """
 
 from __future__ import annotations
@@ -26,14 +27,15 @@ from .render_capture import extension
 ADDON = "bl_ext.user_default.wildcap.wildcap_addon"
 SHOWN = (("blender", "glb"), ("blender", "usd"), ("unreal", "fbx"), ("character_creator", "obj"))
 COMMAND = "python -m benchmarks.reimported --picture docs/pictures/reimported.jpg --json docs/figures/reimported.json"
-DELIVERED = (("blender", "glb"), ("blender", "gltf"), ("blender", "usd"), ("unreal", "fbx"), ("unity_hdrp", "fbx"), ("character_creator", "obj"))
+DELIVERED = (("blender", "glb"), ("blender", "gltf"), ("blender", "usd"), ("unreal", "fbx"), ("unity_hdrp", "fbx"),
+             ("character_creator", "obj"))
 LIGHT = "three_point"
 
 
 @dataclass(frozen=True)
 class Returned:
-    """What came back of a file: psnr_db against the original, flat_psnr_db against the original without scattering, off_mm the farthest vertex, shape_keys
-    and maps: their numbers; picture [H, W, 3], sRGB."""
+    """What came back of a file: psnr_db against the original, flat_psnr_db against the original without scattering,
+    off_mm the farthest vertex, shape_keys and maps: their numbers; picture [H, W, 3], sRGB."""
 
     psnr_db: float
     flat_psnr_db: float
@@ -73,8 +75,8 @@ def table(found: figures.Figures) -> str:
 
 def compare(work: Path, deliveries: tuple[tuple[str, str], ...], resolution: int, samples: int,
             ) -> tuple[np.ndarray, np.ndarray, dict[tuple[str, str], Returned]]:
-    """The original and the original without scattering, sRGB [H, W, 3] each, and what came back of each (preset, format). The extension is enabled; `work`
-    is empty."""
+    """The original and the original without scattering, sRGB [H, W, 3] each, and what came back of each (preset,
+    format). The extension is enabled; `work` is empty."""
     import bpy
 
     from core.contract import sample_head
@@ -95,7 +97,8 @@ def compare(work: Path, deliveries: tuple[tuple[str, str], ...], resolution: int
         for thing in back:
             scene.collection.objects.link(thing)
         shown, _ = render(scene, work / f"{preset}_{kind}.png")
-        returned[preset, kind] = Returned(psnr(shown, original, covered), psnr(shown, flat, covered), 1000 * off(head, back), *counted(back), shown)
+        returned[preset, kind] = Returned(psnr(shown, original, covered), psnr(shown, flat, covered),
+                                          1000 * off(head, back), *counted(back), shown)
         for thing in back:
             bpy.data.objects.remove(thing)
     return original, flat, returned
@@ -110,10 +113,13 @@ def deliver(item, preset: str, kind: str) -> Path:
     from core.worker.job import write_job
     from core.worker.runner import run_job
 
-    operators, waiting, captures, properties = (import_module(f"{ADDON}.{name}") for name in ("deliver.operators", "deliver.waiting", "captures", "properties"))
+    operators, waiting, captures, properties = (import_module(f"{ADDON}.{name}")
+                                                for name in ("deliver.operators", "deliver.waiting", "captures",
+                                                             "properties"))
     item.deliver.preset, item.deliver.format = preset, kind
     capture = Capture(Path(captures.root(item)))
-    settings = {**properties.job_settings(item)["deliver"], "roughness": operators.roughness(captures.head(bpy.context, item)), "whole": False}
+    settings = {**properties.job_settings(item)["deliver"],
+                "roughness": operators.roughness(captures.head(bpy.context, item)), "whole": False}
     plan = operators.planned(bpy.context)
     ended = run_job(write_job(capture, tool="deliver", settings={"deliver": settings}))
     if not isinstance(ended, Done):
@@ -124,13 +130,16 @@ def deliver(item, preset: str, kind: str) -> Path:
 
 
 def bring_back(folder: Path) -> list:
-    """The mesh objects of a delivered file, as Blender's importer makes them, in metres: OBJ alone does not say its unit."""
+    """The mesh objects of a delivered file, as Blender's importer makes them, in metres: OBJ alone does not say its
+    unit."""
     import bpy
 
     path = next(path for path in folder.iterdir() if path.suffix in (".glb", ".gltf", ".usdc", ".fbx", ".obj"))
     before = set(bpy.data.objects)
-    {".glb": lambda: bpy.ops.import_scene.gltf(filepath=str(path)), ".gltf": lambda: bpy.ops.import_scene.gltf(filepath=str(path)),
-     ".usdc": lambda: bpy.ops.wm.usd_import(filepath=str(path)), ".fbx": lambda: bpy.ops.import_scene.fbx(filepath=str(path)),
+    {".glb": lambda: bpy.ops.import_scene.gltf(filepath=str(path)),
+     ".gltf": lambda: bpy.ops.import_scene.gltf(filepath=str(path)),
+     ".usdc": lambda: bpy.ops.wm.usd_import(filepath=str(path)),
+     ".fbx": lambda: bpy.ops.import_scene.fbx(filepath=str(path)),
      ".obj": lambda: bpy.ops.wm.obj_import(filepath=str(path), global_scale=0.01)}[path.suffix]()
     made = set(bpy.data.objects) - before
     bpy.context.view_layer.update()
@@ -147,7 +156,8 @@ def bring_back(folder: Path) -> list:
 
 def as_the_hint_says(meshes: list) -> None:
     """Switches what MTL cannot say to be no colour: every picture but the albedo."""
-    for node in (node for thing in meshes for slot in thing.material_slots for node in slot.material.node_tree.nodes if node.type == 'TEX_IMAGE'):
+    for node in (node for thing in meshes for slot in thing.material_slots for node in slot.material.node_tree.nodes
+                 if node.type == 'TEX_IMAGE'):
         if "Base Color" not in {link.to_socket.name for link in node.outputs["Color"].links}:
             node.image.colorspace_settings.name = "Non-Color"
 
@@ -166,7 +176,8 @@ def render(scene, path: Path) -> tuple[np.ndarray, np.ndarray]:
 @contextmanager
 def without_scattering(head) -> Iterator[None]:
     """The head's skin without light that spreads under it."""
-    nodes = [node for slot in head.material_slots for node in slot.material.node_tree.nodes if node.type == 'GROUP' and "Subsurface" in node.inputs]
+    nodes = [node for slot in head.material_slots for node in slot.material.node_tree.nodes if node.type == 'GROUP'
+             and "Subsurface" in node.inputs]
     before = [node.inputs["Subsurface"].default_value for node in nodes]
     for node in nodes:
         node.inputs["Subsurface"].default_value = 0.0
@@ -200,7 +211,8 @@ def counted(back: list) -> tuple[int, int]:
     """How many shape keys beside the rest, and how many pictures its materials show."""
     keys = sum(len(thing.data.shape_keys.key_blocks) - 1 for thing in back if thing.data.shape_keys is not None)
     images = {node.image.name for thing in back for slot in thing.material_slots if slot.material is not None
-              for node in slot.material.node_tree.nodes if node.type == 'TEX_IMAGE' and node.image is not None and node.image.size[0] > 0}
+              for node in slot.material.node_tree.nodes if node.type == 'TEX_IMAGE' and node.image is not None
+              and node.image.size[0] > 0}
     return keys, len(images)
 
 

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What benchmarks/relit.py renders of a subject: one head, and per row the maps that it wears, as captures that the add-on opens.
+"""What benchmarks/relit.py renders of a subject: one head, and per row the maps that it wears, as captures that the
+add-on opens.
 
-All rows share the registered head, whose UVs are the true subject's, so that pixels can be compared. All albedos have the same mean over confident facial
-skin, the true tone that the solver was given: what the rows differ in is not brightness.
+All rows share the registered head, whose UVs are the true subject's, so that pixels can be compared. All albedos have
+the same mean over confident facial skin, the true tone that the solver was given: what the rows differ in is not
+brightness.
 """
 
 from __future__ import annotations
@@ -21,12 +23,14 @@ from core.imaging import images
 from core.upscale.gloss import on_cheeks_and_forehead
 
 SIZE = 1024
-"""Texels of every row's maps; what is delivered at 4096 is averaged to it, for a texel is smaller than a pixel of the pictures as it is."""
+"""Texels of every row's maps; what is delivered at 4096 is averaged to it, for a texel is smaller than a pixel of the
+pictures as it is."""
 
 
 @dataclass(frozen=True)
 class Worn:
-    """float32 on S x S texels. albedo [S, S, 3]: linear; normal [S, S, 3]: unit, tangent space, OpenGL Y+; specular [S, S]: Specular IOR Level."""
+    """float32 on S x S texels. albedo [S, S, 3]: linear; normal [S, S, 3]: unit, tangent space, OpenGL Y+; specular [S,
+    S]: Specular IOR Level."""
 
     albedo: np.ndarray
     normal: np.ndarray
@@ -34,7 +38,8 @@ class Worn:
 
 
 def rows_of(raw: np.ndarray, delit: np.ndarray, solved: Worn, true: Worn, skin: np.ndarray) -> dict[str, Worn]:
-    """The table's rows by name. raw, delit: textures, linear [S, S, 3]; skin [S, S]: weight of the texels whose mean every albedo shares."""
+    """The table's rows by name. raw, delit: textures, linear [S, S, 3]; skin [S, S]: weight of the texels whose mean
+    every albedo shares."""
     even = np.full_like(solved.specular, (solved.specular * skin).sum() / skin.sum())
     flat = np.broadcast_to(np.float32([0, 0, 1]), solved.normal.shape)
     tone = (true.albedo * skin[..., None]).sum((0, 1)) / skin.sum()
@@ -52,31 +57,38 @@ def rows_of(raw: np.ndarray, delit: np.ndarray, solved: Worn, true: Worn, skin: 
 
 
 def toned(texture: np.ndarray, tone: np.ndarray, skin: np.ndarray) -> np.ndarray:
-    """A texture [S, S, 3] times the gain per channel that gives it the linear mean `tone` [3] over the texels of `skin` [S, S]."""
+    """A texture [S, S, 3] times the gain per channel that gives it the linear mean `tone` [3] over the texels of `skin`
+    [S, S]."""
     return np.clip(texture * (tone * skin.sum() / (texture * skin[..., None]).sum((0, 1))), 0, 1).astype(np.float32)
 
 
 def read_worn(folder: Path, size: int = SIZE) -> Worn:
     """A folder of maps, averaged to `size`."""
     normal = _sized(images.read_data(folder / "normal.png")[..., :3] * 2 - 1, size)
-    return Worn(_sized(images.read_linear(folder / "diffuse_albedo.png"), size), normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
+    return Worn(_sized(images.read_linear(folder / "diffuse_albedo.png"), size),
+                normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
                 _sized(images.read_mask(folder / "specular_albedo.png"), size))
 
 
 def read_rows(capture: Capture, true: Worn) -> dict[str, Worn]:
-    """`rows_of` a solved capture and its subject's true maps, the delivered maps where they are as new as the solved ones."""
+    """`rows_of` a solved capture and its subject's true maps, the delivered maps where they are as new as the solved
+    ones."""
     delivered = [capture.maps_4k / "diffuse_albedo.png", capture.maps / "diffuse_albedo.png"]
-    newest = capture.maps_4k if delivered[0].is_file() and delivered[0].stat().st_mtime >= delivered[1].stat().st_mtime else capture.maps
+    newest = (capture.maps_4k if delivered[0].is_file() and delivered[0].stat().st_mtime >= delivered[1].stat().st_mtime
+              else capture.maps)
     confidence = _sized(images.read_data(capture.texture_confidence)[..., 0], SIZE)
     raw, delit = (_sized(images.read_linear(path), SIZE) for path in (capture.texture_filmed, capture.texture))
     return rows_of(raw, delit, read_worn(newest), true, confidence * template.mask("skin", SIZE))
 
 
 def write_row(folder: Path, capture: Capture, worn: Worn) -> None:
-    """A capture with the other one's head and record and these maps, which the add-on opens as solved; the record says how glossy these maps are."""
+    """A capture with the other one's head and record and these maps, which the add-on opens as solved; the record says
+    how glossy these maps are."""
     row, record = Capture(folder), capture.read()
     seen = _sized(images.read_data(capture.texture_confidence)[..., 0], len(worn.specular))
-    record["stages"].setdefault("upscale", {"key": "", "seconds": 0.0}).setdefault("figures", {})["specular_mean"] = on_cheeks_and_forehead(worn.specular, seen)
+    record["stages"].setdefault("upscale", {"key": "", "seconds": 0.0}).setdefault("figures", {})["specular_mean"] = (
+        on_cheeks_and_forehead(worn.specular, seen)
+    )
     shutil.rmtree(folder, ignore_errors=True)
     row.maps.mkdir(parents=True)
     shutil.copyfile(capture.head, row.head)

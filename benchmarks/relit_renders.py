@@ -4,9 +4,9 @@
 
     python -m benchmarks.relit_renders JOB.json
 
-The job, written by benchmarks/relit.py, names captures (a head with maps each), lights, size, rays per pixel and the folder for CAPTURE_LIGHT.exr;
-pictures that exist stay. One more, face.exr, holds the first capture's masks: red where the face is, green where there is head. Only the rectangle about the
-face is rendered; the rest stays black.
+The job, written by benchmarks/relit.py, names captures (a head with maps each), lights, size, rays per pixel and the
+folder for CAPTURE_LIGHT.exr; pictures that exist stay. One more, face.exr, holds the first capture's masks: red where
+the face is, green where there is head. Only the rectangle about the face is rendered; the rest stays black.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ def main() -> None:
             thing = head.bring_in(bpy.context, item)
             material.assemble(bpy.context, item)
             if not (out / "face.exr").exists():
-                _render_mask(thing, picture.set_up(thing, left[0], job["resolution"], 16), job["mask"], out / "face.exr")
+                _render_mask(thing, picture.set_up(thing, left[0], job["resolution"], 16), job["mask"],
+                             out / "face.exr")
             for light in left:
                 source = Hdri(worlds / light) if light.endswith(".exr") else light
                 scene = picture.set_up(thing, source, job["resolution"], job["samples"])
@@ -67,11 +68,13 @@ def _about_face(scene, mask: Path) -> None:
     import bpy
 
     image = bpy.data.images.load(str(mask), check_existing=True)
-    red = np.array(image.pixels[:]).reshape(image.size[1], image.size[0], image.channels)[..., 0] > 0.5  # rows from below, as the border's
+    # rows from below, as the border's
+    red = np.array(image.pixels[:]).reshape(image.size[1], image.size[0], image.channels)[..., 0] > 0.5
     rows, columns = np.flatnonzero(red.any(1)), np.flatnonzero(red.any(0))
     render, margin = scene.render, MARGIN * len(red)
     render.use_border, render.use_crop_to_border = True, False
-    render.border_min_x, render.border_max_x = (columns[0] - margin) / red.shape[1], (columns[-1] + margin) / red.shape[1]
+    render.border_min_x, render.border_max_x = (columns[0]
+                                                - margin) / red.shape[1], (columns[-1] + margin) / red.shape[1]
     render.border_min_y, render.border_max_y = (rows[0] - margin) / red.shape[0], (rows[-1] + margin) / red.shape[0]
 
 
@@ -84,7 +87,8 @@ def _render_mask(thing, scene, mask: str, path: Path) -> None:
         material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
-    image, emission, output = (nodes.new(kind) for kind in ("ShaderNodeTexImage", "ShaderNodeEmission", "ShaderNodeOutputMaterial"))
+    image, emission, output = (nodes.new(kind)
+                               for kind in ("ShaderNodeTexImage", "ShaderNodeEmission", "ShaderNodeOutputMaterial"))
     image.image = bpy.data.images.load(mask)
     image.image.colorspace_settings.name = "Non-Color"
     links.new(image.outputs["Color"], emission.inputs["Color"])

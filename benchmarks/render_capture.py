@@ -5,8 +5,9 @@
     python -m benchmarks.render_capture CAPTURE [LIGHT ...] [--resolution PX] [--samples N]
     python -m benchmarks.render_capture CAPTURE --contact-sheet
 
-Each light (default: all presets; the name of one of Blender's worlds means that) gives renders/LIGHT.png, shown without a look, and the linear
-renders/LIGHT.exr; --contact-sheet joins all presets to renders/contact_sheet.png. (With Blender itself: blender --command wildcap ...)
+Each light (default: all presets; the name of one of Blender's worlds means that) gives renders/LIGHT.png, shown without
+a look, and the linear renders/LIGHT.exr; --contact-sheet joins all presets to renders/contact_sheet.png. (With Blender
+itself: blender --command wildcap ...)
 """
 
 from __future__ import annotations
@@ -63,8 +64,8 @@ def extension() -> Iterator[None]:
 
 @contextlib.contextmanager
 def without_numpy_1() -> Iterator[None]:
-    """While Blender's module is imported: keeps back NumPy 2's pages on its audio module, which is made for NumPy 1 in every module for Python 3.11, and
-    not used here. Anything else that is said comes out."""
+    """While Blender's module is imported: keeps back NumPy 2's pages on its audio module, which is made for NumPy 1 in
+    every module for Python 3.11, and not used here. Anything else that is said comes out."""
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):

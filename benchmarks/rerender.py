@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Face reconstruction, the paper's table 1: albedo times shading in the views that were solved from, against the delit frames, on facial skin.
+"""Face reconstruction, the paper's table 1: albedo times shading in the views that were solved from, against the delit
+frames, on facial skin.
 
     python -m benchmarks.rerender FOLDER [--only NAME ...] [--json OUT.json]
 
-FOLDER was made by benchmarks/people.py and compared by benchmarks/comparison.py, whose delit rows are taken. Each view has a gain per channel of its own
-(delighters and cameras expose each frame anew), the same way for every row. The ceiling is the texture itself in the same views: where they disagree
-with each other no albedo and no shading can explain them all.
+FOLDER was made by benchmarks/people.py and compared by benchmarks/comparison.py, whose delit rows are taken. Each view
+has a gain per channel of its own (delighters and cameras expose each frame anew), the same way for every row. The
+ceiling is the texture itself in the same views: where they disagree with each other no albedo and no shading can
+explain them all.
 """
 
 from __future__ import annotations
@@ -33,7 +35,8 @@ from .people import PEOPLE
 
 ROWS = (OURS, *LIGHTS)
 CEILING = "the texture itself"
-GRAZING = 0.3  # least cosine between surface and view: beyond it a registered head and a frame do not agree on what is where
+# least cosine between surface and view: beyond it a registered head and a frame do not agree on what is where
+GRAZING = 0.3
 PAPER = {OURS: (28.79, 0.9520), "regions": (22.20, 0.9279), "environment": (27.81, 0.9411)}
 """PSNR and SSIM of the paper's table 1 (its six real captures): ours, DeFace*, FLARE*."""
 TITLES = {"psnr": "PSNR", "ssim": "SSIM", "flip": "FLIP", "features": "features"}
@@ -42,7 +45,8 @@ FORMATS = {"psnr": "{:.2f} dB", "ssim": "{:.4f}", "flip": "{:.4f}", "features": 
 
 @dataclass(frozen=True)
 class DelitFrame:
-    """A delit frame, sRGB [H, W, 3], and how the head looks from there; `look.true.face` is the facial skin that is judged."""
+    """A delit frame, sRGB [H, W, 3], and how the head looks from there; `look.true.face` is the facial skin that is
+    judged."""
 
     picture: np.ndarray
     look: HeadInView
@@ -57,10 +61,12 @@ def main() -> None:
     people = {}
     for name in asked.only:
         views = delit_views(Capture(asked.folder / f"{name}.wildcap"))
-        people[name] = {row: score(rendering(asked.folder / "comparison" / name, row), views) for row in (*ROWS, CEILING)}
+        people[name] = {row: score(rendering(asked.folder / "comparison" / name, row), views)
+                        for row in (*ROWS, CEILING)}
         print(name, json.dumps(people[name]), flush=True)
-    found = {"people": people, "mean": {row: {figure: float(np.mean([rows[row][figure] for rows in people.values()])) for figure in cells}
-                                        for row, cells in next(iter(people.values())).items()}}
+    found = {"people": people,
+             "mean": {row: {figure: float(np.mean([rows[row][figure] for rows in people.values()])) for figure in cells}
+                      for row, cells in next(iter(people.values())).items()}}
     if asked.json:
         figures.write(asked.json, "rerender", "python -m benchmarks.rerender FOLDER", found)
     print(table(found))
@@ -81,7 +87,8 @@ def delit_views(capture: Capture) -> list[DelitFrame]:
         uv = raster.interpolate(head.uvs, head.face_uvs, face[hit], bary[hit])
         towards = view.centre - raster.interpolate(head.vertices, head.faces, face[hit], bary[hit])
         normal = raster.interpolate(normals, head.faces, face[hit], bary[hit])
-        cosine = (towards * normal).sum(1) / np.maximum(np.linalg.norm(towards, axis=1) * np.linalg.norm(normal, axis=1), 1e-9)
+        cosine = (towards * normal).sum(1) / np.maximum(np.linalg.norm(towards, axis=1)
+                                                        * np.linalg.norm(normal, axis=1), 1e-9)
         judged = np.zeros(hit.shape, bool)
         judged[hit] = (raster.sample(skin, np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * 512) > 0.5) & (cosine > GRAZING)
         picture = images.read_srgb(path)
@@ -90,21 +97,25 @@ def delit_views(capture: Capture) -> list[DelitFrame]:
 
 
 def rendering(work: Path, row: str) -> np.ndarray:
-    """Albedo times shading of a delit row, linear [S, S, 3]; the ceiling's is the texture that all rows were solved from."""
+    """Albedo times shading of a delit row, linear [S, S, 3]; the ceiling's is the texture that all rows were solved
+    from."""
     folder = row_folder(work, "delit", "texture" if row == CEILING else row)
     return images.read_linear(folder / "diffuse_albedo.exr") * images.read_linear(folder / "shading.exr")
 
 
 def score(rendered: np.ndarray, views: list[DelitFrame]) -> dict[str, float]:
-    """PSNR, SSIM, FLIP and, where its network is installed, the feature distance of a map [S, S, 3] (linear) to the delit frames, each the mean over views."""
+    """PSNR, SSIM, FLIP and, where its network is installed, the feature distance of a map [S, S, 3] (linear) to the
+    delit frames, each the mean over views."""
     found = []
     for view in views:
         mask = view.look.true.face
         box = face_box(mask)
-        picture, mask, seen = view.picture[box], mask[box], images.linear_to_srgb(np.clip(view.look.picture(rendered), 0, 1))[box]
+        picture, mask, seen = view.picture[box], mask[box], images.linear_to_srgb(np.clip(view.look.picture(rendered),
+                                                                                          0, 1))[box]
         seen = with_gain(seen, picture, mask)
         distance = feature_distance(seen * mask[..., None], picture * mask[..., None])
-        found.append({**differences(seen, picture, mask), **({} if distance is None else {"features": float(distance[mask].mean())})})
+        found.append({**differences(seen, picture, mask),
+                      **({} if distance is None else {"features": float(distance[mask].mean())})})
     return {figure: round(float(np.mean([one[figure] for one in found])), 4) for figure in found[0]}
 
 
@@ -114,9 +125,11 @@ def table(found: dict) -> str:
     lines = []
     for row, cells in found["mean"].items():
         paper = PAPER.get(row if row in PAPER else row.rsplit(" ", 1)[0])
-        lines.append([f"**{row}**" if row == OURS else row, *(FORMATS[figure].format(cells[figure]) for figure in known),
+        lines.append([f"**{row}**" if row == OURS else row,
+                      *(FORMATS[figure].format(cells[figure]) for figure in known),
                       "{:.2f} dB, {:.4f}".format(*paper) if paper else None])
-    return figures.markdown(["mean of the people", *(TITLES[figure] for figure in known), "the paper's, on its own captures"], lines)
+    return figures.markdown(["mean of the people", *(TITLES[figure] for figure in known),
+                             "the paper's, on its own captures"], lines)
 
 
 if __name__ == "__main__":

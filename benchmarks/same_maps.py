@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether two captures hold the same results, byte for byte, pictures to the last bit of every pixel: what a change that should change nothing is judged by.
+"""Whether two captures hold the same results, byte for byte, pictures to the last bit of every pixel: what a change
+that should change nothing is judged by.
 
     python -m benchmarks.same_maps BEFORE.wildcap AFTER.wildcap
 
-Compares every file that a stage of the chain writes. Exit code 1 where one differs or is missing on one side. The same seed and settings give the same
-bytes on one machine; another processor may round otherwise.
+Compares every file that a stage of the chain writes. Exit code 1 where one differs or is missing on one side. The same
+seed and settings give the same bytes on one machine; another processor may round otherwise.
 """
 
 from __future__ import annotations
@@ -32,9 +33,11 @@ def main() -> int:
     for stage in stages.STAGES:
         before, after = (written(capture, stage) for capture in (one, other))
         names = before.keys() | after.keys()
-        unlike = sorted(name for name in names if before.get(name) != after.get(name) and not same_pixels(one.root / name, other.root / name))
+        unlike = sorted(name for name in names if before.get(name) != after.get(name)
+                        and not same_pixels(one.root / name, other.root / name))
         compared, different = compared + len(names), different + len(unlike)
-        print(f"{stage.label:12} {len(names) - len(unlike):4} files are the same" + (f", {len(unlike)} are not: {', '.join(unlike[:4])}" if unlike else ""))
+        print(f"{stage.label:12} {len(names) - len(unlike):4} files are the same"
+              + (f", {len(unlike)} are not: {', '.join(unlike[:4])}" if unlike else ""))
     print(f"{compared - different} of {compared} files are the same.")
     return 1 if different or not compared else 0
 
@@ -51,7 +54,8 @@ def written(capture: Capture, stage: stages.Stage) -> dict[str, str]:
     found = {}
     for name in stage.writes:
         told = hash_tree(capture.root / name)
-        found |= {f"{name}{inside}": content for inside, content in told.items()} if isinstance(told, dict) else {name: told} if told else {}
+        found |= {f"{name}{inside}": content
+                  for inside, content in told.items()} if isinstance(told, dict) else {name: told} if told else {}
     return found
 
 

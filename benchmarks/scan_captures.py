@@ -4,9 +4,10 @@
 
     python -m benchmarks.scan_captures DATA FOLDER [--lights NAME ...]
 
-DATA holds lee_perry_smith/ and lps_sun/, neither of which is part of this project. FOLDER/scan_NAME is the truth in the layout that
-benchmarks/albedo_score.py says, FOLDER/scan_NAME.wildcap the capture: FRAMES frames and their cameras, so that the chain begins at scan. The scan's own map
-stands for the albedo, though it holds light itself: what differs between the five is the measure, not the distance to it. What is there is not made again.
+DATA holds lee_perry_smith/ and lps_sun/, neither of which is part of this project. FOLDER/scan_NAME is the truth in the
+layout that benchmarks/albedo_score.py says, FOLDER/scan_NAME.wildcap the capture: FRAMES frames and their cameras, so
+that the chain begins at scan. The scan's own map stands for the albedo, though it holds light itself: what differs
+between the five is the measure, not the distance to it. What is there is not made again.
 """
 
 from __future__ import annotations
@@ -37,9 +38,11 @@ from .people_lights import FURTHER, KINDS
 from .shadow_captures import write_views
 
 FRAMES, SCALE, SAMPLES, SEED = 24, 5 / 6, 6, 930001
-LIGHTS = {"leaves": "noon sun behind leaves", "overcast": "overcast", "window": "window bars", "lamps": "mixed lamps", "below": "lamp from below"}
+LIGHTS = {"leaves": "noon sun behind leaves", "overcast": "overcast", "window": "window bars", "lamps": "mixed lamps",
+          "below": "lamp from below"}
 METRES = 0.0553  # one unit of the scan, with the pupils 63 mm apart
-MIDDLE = np.array([-0.007, -0.086, 0.094])  # between the pupils, metres in the axes of lps_sun/cameras.json: where the people's origin is
+# between the pupils, metres in the axes of lps_sun/cameras.json: where the people's origin is
+MIDDLE = np.array([-0.007, -0.086, 0.094])
 NEEDED = ("lee_perry_smith/LeePerrySmith.glb", "lee_perry_smith/Map-COL.jpg", "lee_perry_smith/Map-SPEC.jpg",
           "lee_perry_smith/Infinite-Level_02_Tangent_SmoothUV.jpg", "lps_sun/cameras.json", "lps_sun/face")
 
@@ -52,7 +55,8 @@ def main() -> None:
     asked = parser.parse_args()
     missing = [name for name in NEEDED if not (asked.data / name).exists()]
     if missing:
-        raise SystemExit(f"{asked.data} holds no head scan: {', '.join(missing)} is missing. Name the folder that has lee_perry_smith and lps_sun.")
+        raise SystemExit(f"{asked.data} holds no head scan: {', '.join(missing)} is missing. Name the folder that has "
+                         "lee_perry_smith and lps_sun.")
     for light in asked.lights:
         photograph(asked.data, asked.folder.resolve(), light)
 
@@ -68,20 +72,25 @@ def photograph(data: Path, folder: Path, name: str) -> Capture:
     work, cameras = folder / "rendered" / name, scene.camera_path(SEED, FRAMES)
     relief = 2 * images.read_data(data / NEEDED[3])[..., :3] - 1
     gloss = images.read_data(data / NEEDED[2])
-    skin = filmed.skin_part(work, head, albedo, gloss[..., 0] if gloss.ndim == 3 else gloss, relief / np.linalg.norm(relief, axis=-1, keepdims=True))
-    filmed.render_parts(work, SEED, {"skin": skin}, [], light, scene.Shot(cameras, range(FRAMES), SAMPLES, SCALE, room=False))
+    skin = filmed.skin_part(work, head, albedo, gloss[..., 0] if gloss.ndim == 3 else gloss,
+                            relief / np.linalg.norm(relief, axis=-1, keepdims=True))
+    filmed.render_parts(work, SEED, {"skin": skin}, [], light,
+                        scene.Shot(cameras, range(FRAMES), SAMPLES, SCALE, room=False))
     views = [sample.view_of(matrix, SCALE) for matrix in cameras]
     caster, facial = raster.RayCaster(head), face_of(data, head)
     opaque = raster.RayCaster(joined([head, light.blockers])) if light.blockers else caster
     faces = {}
     for frame in np.unique(np.linspace(1, FRAMES - 2, TRUTHS).round().astype(int)).tolist():
-        faces[frame] = _write_truth(target, frame, views[frame], LitScan(caster, opaque, albedo, facial, light.sun.direction if light.sun else None))
+        faces[frame] = _write_truth(target, frame, views[frame],
+                                    LitScan(caster, opaque, albedo, facial, light.sun.direction if light.sun else None))
     write_obj(target / "head.obj", head)  # by it the five are known to be one person
     write_json(target / "cameras.json", {"name": name, "light": LIGHTS[name], "focal_px": scene.FOCAL * SCALE,
                                          "width": views[0].width, "height": views[0].height,
-                                         "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
+                                         "cameras": [{"frame": k, "matrix_world": matrix.tolist()}
+                                                     for k, matrix in enumerate(cameras)]})
     write_views(capture, views, _developed(work, faces), min(Settings().frames.views, FRAMES))
-    tone = sum(true[face].sum(0, dtype=np.float64) for true, face in faces.values()) / sum(int(face.sum()) for _, face in faces.values())
+    tone = sum(true[face].sum(0, dtype=np.float64)
+               for true, face in faces.values()) / sum(int(face.sum()) for _, face in faces.values())
     with replacing(target / "skin_tone.txt") as temporary:
         temporary.write_text(",".join(f"{c:.4f}" for c in images.linear_to_srgb(tone)) + "\n", encoding="ascii")
     print(f"{name}: {(time.monotonic() - began) / 60:.1f} min", flush=True)
@@ -119,8 +128,8 @@ def face_of(data: Path, head: Mesh) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LitScan:
-    """The scan ready for rays; opaque: it with all that throws shadows; its albedo [S, S, 3], linear; facial [V] in [0, 1], how far a vertex is facial skin;
-    sun [3]: unit direction to it, None where there is none."""
+    """The scan ready for rays; opaque: it with all that throws shadows; its albedo [S, S, 3], linear; facial [V] in [0,
+    1], how far a vertex is facial skin; sun [3]: unit direction to it, None where there is none."""
 
     caster: raster.RayCaster
     opaque: raster.RayCaster
@@ -135,14 +144,17 @@ def _write_truth(target: Path, frame: int, view: View, scan: LitScan, over: int 
     face, bary, _ = raster.render_view(scan.caster, view, over)
     hit = face >= 0
     uv = raster.interpolate(head.uvs, head.face_uvs, face, bary)[hit]
-    colour, skin, dark = np.zeros((*hit.shape, 3), np.float32), np.zeros(hit.shape, np.float32), np.zeros(hit.shape, np.float32)
+    colour, skin, dark = np.zeros((*hit.shape, 3),
+                                  np.float32), np.zeros(hit.shape, np.float32), np.zeros(hit.shape, np.float32)
     colour[hit] = raster.sample(albedo, np.stack([uv[:, 0] * albedo.shape[1], (1 - uv[:, 1]) * albedo.shape[0]], -1))
     skin[hit] = (scan.facial[head.faces[face[hit]]] * bary[hit]).sum(1)
     if sun is not None:
         points = raster.interpolate(head.vertices, head.faces, face, bary)[hit]
         normals = raster.interpolate(vertex_normals(head), head.faces, face, bary)[hit]
-        dark[hit] = (normals @ sun <= 0) | scan.opaque.blocked(points + 5e-4 * normals, np.repeat(sun[None], len(points), 0))
-    cover, colour, skin, dark = (images.resize(values, view.width, view.height) for values in (hit.astype(np.float32), colour, skin, dark))
+        dark[hit] = (normals @ sun <= 0) | scan.opaque.blocked(points + 5e-4 * normals,
+                                                               np.repeat(sun[None], len(points), 0))
+    cover, colour, skin, dark = (images.resize(values, view.width, view.height)
+                                 for values in (hit.astype(np.float32), colour, skin, dark))
     colour, face, name = colour / np.maximum(cover, 1e-6)[..., None], (skin > 0.5) & (cover > 0.99), f"{frame:04d}.png"
     for folder in ("albedo", "face", *(["shadow"] if sun is not None else [])):
         (target / folder).mkdir(parents=True, exist_ok=True)
@@ -155,9 +167,11 @@ def _write_truth(target: Path, frame: int, view: View, scan: LitScan, over: int 
 
 def _developed(work: Path, faces: dict[int, tuple[np.ndarray, np.ndarray]]) -> Iterator[np.ndarray]:
     """The frames as a phone shows them that stands still, sRGB [H, W, 3]."""
-    gain, taken = exposure({frame: images.read_linear(work / f"{frame:05d}.exr") for frame in faces}, faces), phone.sample_phone(SEED)
+    gain, taken = exposure({frame: images.read_linear(work / f"{frame:05d}.exr") for frame in faces},
+                           faces), phone.sample_phone(SEED)
     for frame in range(FRAMES):
-        yield phone.develop(images.read_linear(work / f"{frame:05d}.exr").astype(np.float32), taken, gain, np.random.default_rng([SEED, 72, frame]))
+        yield phone.develop(images.read_linear(work / f"{frame:05d}.exr").astype(np.float32), taken, gain,
+                            np.random.default_rng([SEED, 72, frame]))
 
 
 if __name__ == "__main__":

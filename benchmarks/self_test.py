@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Self-Test expects: python -m benchmarks.self_test [SEEDS], after the sample head, the prior or the solver has changed.
+"""What Self-Test expects: python -m benchmarks.self_test [SEEDS], after the sample head, the prior or the solver has
+changed.
 
-Another device draws other noise and rounds otherwise, so what is expected is measured over seeds, in bfloat16 and in float32.
+Another device draws other noise and rounds otherwise, so what is expected is measured over seeds, in bfloat16 and in
+float32.
 """
 
 from __future__ import annotations
@@ -27,9 +29,12 @@ PRECISIONS = {"bfloat16": torch.bfloat16, "float32": torch.float32}
 
 
 def main() -> None:
-    scores = {name: [score(seed, dtype) for seed in range(1, 1 + int(sys.argv[1] if sys.argv[1:] else SEEDS))] for name, dtype in PRECISIONS.items()}
+    scores = {name: [score(seed, dtype) for seed in range(1, 1 + int(sys.argv[1] if sys.argv[1:] else SEEDS))]
+              for name, dtype in PRECISIONS.items()}
     every = np.concatenate(list(scores.values()))
-    write_json(EXPECTED, {"mean_db": round(float(every.mean()), 3), "deviation_db": round(float(every.std(ddof=1)), 3), "scores_db": scores})
+    write_json(EXPECTED,
+               {"mean_db": round(float(every.mean()), 3), "deviation_db": round(float(every.std(ddof=1)), 3),
+                "scores_db": scores})
 
 
 def score(seed: int, dtype: torch.dtype) -> float:

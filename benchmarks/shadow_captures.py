@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Captures with a known shadow mask, for benchmarks/shadow_mask.py: synthetic people under a sun that the head itself and leaves, blinds or an edge block.
+"""Captures with a known shadow mask, for benchmarks/shadow_mask.py: synthetic people under a sun that the head itself
+and leaves, blinds or an edge block.
 
-The light of core/synthetic/light.py is baked into a subject's UVs and photographed by known cameras, with noise and JPEG; the registered head
-is the true one, off by half a millimetre here and there, as a fit leaves it.
+The light of core/synthetic/light.py is baked into a subject's UVs and photographed by known cameras, with noise and
+JPEG; the registered head is the true one, off by half a millimetre here and there, as a fit leaves it.
 """
 
 from __future__ import annotations
@@ -45,8 +46,8 @@ KINDS = ("self", "leaves", "blinds", "edge")
 
 
 def synthetic_capture(seed: int, kind: str, folder: Path) -> tuple[Capture, np.ndarray]:
-    """A capture with frames, cameras and head in `folder` (made once) and the true shadow in its head's UVs, bool [SIZE, SIZE]:
-    where the sun does not reach, be it that the surface turns away from it."""
+    """A capture with frames, cameras and head in `folder` (made once) and the true shadow in its head's UVs, bool
+    [SIZE, SIZE]: where the sun does not reach, be it that the surface turns away from it."""
     capture = Capture(folder)
     if not (capture.root / "truth.png").is_file():
         mesh, skin = subject_mesh(seed), make_skin(sample_parameters(seed), SIZE)
@@ -60,16 +61,19 @@ def synthetic_capture(seed: int, kind: str, folder: Path) -> tuple[Capture, np.n
 
 
 def lifted_truth(capture: Capture, truth: Path, size: int = SIZE) -> np.ndarray:
-    """The true shadow of TRUTH/shadow/NNNN.png (NNNN: frame of the video) in the UVs of a capture's head, bool [size, size]."""
+    """The true shadow of TRUTH/shadow/NNNN.png (NNNN: frame of the video) in the UVs of a capture's head, bool [size,
+    size]."""
     frames = read_frames(capture).by_name
     pictures = {int(path.stem): path for path in (truth / "shadow").glob("*.png")}
-    views = [(view, pictures[frames[view.name].video_frame]) for view in read_views(capture) if frames[view.name].video_frame in pictures]
+    views = [(view, pictures[frames[view.name].video_frame]) for view in read_views(capture)
+             if frames[view.name].video_frame in pictures]
     masks = ((view, images.read_mask(path)) for view, path in views)
     return lift_shadows(read_head(capture).unfold(size), len(views), masks, Reporter("shadow_mask")) > 0.5
 
 
 def _lit(mesh: Mesh, seed: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
-    """Shading [S, S, 3] and the true shadow bool [S, S] under the first of the seed's random lights whose shadow is one."""
+    """Shading [S, S, 3] and the true shadow bool [S, S] under the first of the seed's random lights whose shadow is
+    one."""
     face = template.mask("face", 64) > 0.5
     for i in range(1000):
         light = random_light(np.random.default_rng([seed, 30, i]))
@@ -82,8 +86,10 @@ def _lit(mesh: Mesh, seed: int, kind: str) -> tuple[np.ndarray, np.ndarray]:
     return shading, shadow
 
 
-def _shadow(mesh: Mesh, size: int, light: SkyAndSun, kind: str, seeds: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Shading [S, S, 3], where the sun does not reach bool [S, S], and the share of the light that whatever stands in the sun's way takes [S, S]."""
+def _shadow(mesh: Mesh, size: int, light: SkyAndSun, kind: str,
+            seeds: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Shading [S, S, 3], where the sun does not reach bool [S, S], and the share of the light that whatever stands in
+    the sun's way takes [S, S]."""
     shading, blocked, normal = bake(mesh, size, light, kind, np.random.default_rng(seeds))
     cosine = normal @ light.sun
     sunlit = shading.mean(-1) + np.maximum(cosine, 0) * blocked * light.colour.mean()
@@ -93,19 +99,22 @@ def _shadow(mesh: Mesh, size: int, light: SkyAndSun, kind: str, seeds: tuple) ->
 def registered(mesh: Mesh, seed: int) -> Mesh:
     """The true head as a fit leaves it: off by OFF_M along its normals, smoothly over OFF_MM."""
     off = noise(1000 * mesh.vertices, OFF_MM, np.random.default_rng([seed, 33]), smooth=True)
-    return mesh.moved(mesh.vertices + meshes.vertex_normals(mesh) * (OFF_M * off / max(float(off.std()), 1e-6))[:, None])
+    return mesh.moved(mesh.vertices + meshes.vertex_normals(mesh)
+                      * (OFF_M * off / max(float(off.std()), 1e-6))[:, None])
 
 
 def _photograph(capture: Capture, mesh: Mesh, texture: np.ndarray, rng: np.random.Generator) -> None:
     """frames/ with frames.json, and cameras/, of a lit texture, linear [S, S, 3]."""
     caster = raster.RayCaster(mesh)
-    views = [camera(azimuth, 0.0 if i < len(AZIMUTHS) - 1 else -0.25, scale=SCALE) for i, azimuth in enumerate(AZIMUTHS)]
+    views = [camera(azimuth, 0.0 if i < len(AZIMUTHS) - 1 else -0.25, scale=SCALE)
+             for i, azimuth in enumerate(AZIMUTHS)]
     write_views(capture, views, (picture(caster, view, texture, rng) for view in views))
 
 
-def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarray], selected: int | None = None) -> None:
-    """frames/ with frames.json, and cameras/: sRGB pictures [H, W, 3] with the known cameras that took them, which share one lens; so many of them, evenly
-    spread, are selected for the texture, or all."""
+def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarray],
+                selected: int | None = None) -> None:
+    """frames/ with frames.json, and cameras/: sRGB pictures [H, W, 3] with the known cameras that took them, which
+    share one lens; so many of them, evenly spread, are selected for the texture, or all."""
     capture.claim()
     taken = np.linspace(0, len(views) - 1, selected or len(views)).round().astype(int)
     model = pycolmap.Reconstruction()
@@ -124,13 +133,15 @@ def write_views(capture: Capture, views: list[View], pictures: Iterable[np.ndarr
     model.write_binary(str(capture.cameras))
 
 
-def picture(caster: raster.RayCaster, view: View, texture: np.ndarray, rng: np.random.Generator, rays: int = 2) -> np.ndarray:
+def picture(caster: raster.RayCaster, view: View, texture: np.ndarray, rng: np.random.Generator,
+            rays: int = 2) -> np.ndarray:
     """sRGB [H, W, 3] before a dim, uneven background; `rays` along each side of a pixel."""
     face, bary, _ = raster.render_view(caster, view, rays)
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
     at = np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(texture)
     colour = raster.sample(texture, at).reshape(*face.shape, 3) * (face >= 0)[..., None]
     head, cover = (images.resize(a.astype(np.float32), view.width, view.height) for a in (colour, face >= 0))
-    wall = cv2.resize(rng.uniform(0.02, 0.3, (9, 7, 3)).astype(np.float32), (view.width, view.height), interpolation=cv2.INTER_CUBIC)
+    wall = cv2.resize(rng.uniform(0.02, 0.3, (9, 7, 3)).astype(np.float32), (view.width, view.height),
+                      interpolation=cv2.INTER_CUBIC)
     seen = images.linear_to_srgb(cv2.GaussianBlur(head + (1 - cover)[..., None] * wall, (0, 0), 0.6))
     return np.clip(seen + rng.normal(0, NOISE, seen.shape), 0, 1).astype(np.float32)

@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How well the automatic shadow mask finds the true shadow inside the face:
 
-    python -m benchmarks.shadow_mask [--seeds N ...] [--capture CAPTURE TRUTH] [--delighters NAME ...] [--work FOLDER] [--pictures]
+    python -m benchmarks.shadow_mask [--seeds N ...] [--capture CAPTURE TRUTH] [--delighters NAME ...] [--work FOLDER]
+    [--pictures]
 
-Of each synthetic subject (seeds that nothing was chosen on) a capture is made, delit by each of the delighters and textured. A CAPTURE that has been run
-up to its texture from TRUTH/capture.mp4 is judged as it is, against TRUTH/shadow. Printed per mask: intersection over union, precision and recall over
-the facial skin that was seen, the F-score of its border at 3 texels of a 1024 map, and the processor's seconds that the stage shadow_mask took.
+Of each synthetic subject (seeds that nothing was chosen on) a capture is made, delit by each of the delighters and
+textured. A CAPTURE that has been run up to its texture from TRUTH/capture.mp4 is judged as it is, against TRUTH/shadow.
+Printed per mask: intersection over union, precision and recall over the facial skin that was seen, the F-score of its
+border at 3 texels of a 1024 map, and the processor's seconds that the stage shadow_mask took.
 """
 
 from __future__ import annotations
@@ -36,19 +38,23 @@ COLUMNS = ("true", "masked", "IoU", "precision", "recall", "border F", "CPU seco
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.shadow_mask", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.shadow_mask", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, nargs="*", default=HELD_OUT)
     parser.add_argument("--capture", type=Path, nargs=2, action="append", default=[], metavar=("CAPTURE", "TRUTH"))
     parser.add_argument("--delighters", nargs="+", default=["shading", "none"])
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_shadow_masks")
-    parser.add_argument("--pictures", action="store_true", help="leave the filmed texture, the true mask and the proposal side by side in the work folder")
-    parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/shadow_mask.json; those of other rows stay")
+    parser.add_argument("--pictures", action="store_true",
+                        help="leave the filmed texture, the true mask and the proposal side by side in the work folder")
+    parser.add_argument("--json", type=Path,
+                        help="where the figures go, such as docs/figures/shadow_mask.json; those of other rows stay")
     asked = parser.parse_args()
     found: dict[str, dict] = {}
     print("| capture | delighter | " + " | ".join(COLUMNS) + " |\n| --- | --- |" + " --- |" * len(COLUMNS))
     for delighter in asked.delighters:
         names = [f"synthetic {seed}, {KINDS[seed % len(KINDS)]}" for seed in asked.seeds]
-        rows = [_row(*_synthetic(seed, delighter, asked.work), name, delighter, asked) for seed, name in zip(asked.seeds, names, strict=True)]
+        rows = [_row(*_synthetic(seed, delighter, asked.work), name, delighter, asked)
+                for seed, name in zip(asked.seeds, names, strict=True)]
         found |= {f"{name}, {delighter}": _figures(name, delighter, row) for name, row in zip(names, rows, strict=True)}
         if len(rows) > 1:
             _print("mean of the synthetic", delighter, np.mean(rows, 0))
@@ -61,14 +67,17 @@ def main() -> None:
 
 
 def scores(found: np.ndarray, true: np.ndarray, judged: np.ndarray) -> tuple[float, ...]:
-    """Shares of the judged texels that are in shadow and masked, intersection over union, precision, recall and the F-score of the border
-    at NEAR texels of a 1024 map, of masks bool [S, S] over texels bool [S, S]."""
+    """Shares of the judged texels that are in shadow and masked, intersection over union, precision, recall and the
+    F-score of the border at NEAR texels of a 1024 map, of masks bool [S, S] over texels bool [S, S]."""
     both = (found & true)[judged].sum()
     reach = NEAR * len(found) / 1024
-    borders = [_border(mask) & cv2.erode(judged.astype(np.uint8), np.ones((5, 5))).astype(bool) for mask in (found, true)]
-    hits = [float((_distance(other) <= reach)[own].mean()) if own.any() else 0.0 for own, other in (borders, borders[::-1])]
+    borders = [_border(mask) & cv2.erode(judged.astype(np.uint8), np.ones((5, 5))).astype(bool)
+               for mask in (found, true)]
+    hits = [float((_distance(other) <= reach)[own].mean()) if own.any() else 0.0
+            for own, other in (borders, borders[::-1])]
     return (float(true[judged].mean()), float(found[judged].mean()), float(both / max((found | true)[judged].sum(), 1)),
-            float(both / max(found[judged].sum(), 1)), float(both / max(true[judged].sum(), 1)), 2 * hits[0] * hits[1] / max(sum(hits), 1e-9))
+            float(both / max(found[judged].sum(), 1)), float(both / max(true[judged].sum(), 1)),
+            2 * hits[0] * hits[1] / max(sum(hits), 1e-9))
 
 
 def _row(capture: Capture, true: np.ndarray, name: str, delighter: str, asked: argparse.Namespace) -> tuple[float, ...]:
@@ -81,18 +90,21 @@ def _row(capture: Capture, true: np.ndarray, name: str, delighter: str, asked: a
     found = (*scores(mask > 0.5, true, skin & (confidence > 0.1)), seconds)
     _print(name, delighter, found)
     if asked.pictures:
-        filmed = images.resize(images.read_srgb(capture.texture_filmed if capture.texture_filmed.is_file() else capture.texture_png), SIZE, SIZE)
+        filmed = images.resize(images.read_srgb(capture.texture_filmed if capture.texture_filmed.is_file()
+                                                else capture.texture_png), SIZE, SIZE)
         grey = [np.repeat(m.astype(np.float32)[..., None], 3, -1) for m in (true, mask)]
         images.write_srgb(asked.work / f"{capture.root.stem}_{delighter}.png", np.hstack([filmed, *grey]))
     return found
 
 
 def _figures(name: str, delighter: str, values: tuple[float, ...]) -> dict:
-    return {"capture": name, "delighter": delighter, **{column.lower().replace(" ", "_"): value for column, value in zip(COLUMNS, values, strict=True)}}
+    return {"capture": name, "delighter": delighter,
+            **{column.lower().replace(" ", "_"): value for column, value in zip(COLUMNS, values, strict=True)}}
 
 
 def _print(name: str, delighter: str, values) -> None:
-    print(f"| {name} | {delighter} | " + " | ".join(f"{v:.2f}" for v in values[:-1]) + f" | {values[-1]:.1f} |", flush=True)
+    print(f"| {name} | {delighter} | " + " | ".join(f"{v:.2f}" for v in values[:-1]) + f" | {values[-1]:.1f} |",
+          flush=True)
 
 
 def _synthetic(seed: int, delighter: str, work: Path) -> tuple[Capture, np.ndarray]:
@@ -104,7 +116,8 @@ def _filmed(source: Path, truth: Path, work: Path) -> tuple[Capture, np.ndarray]
     """A copy of the capture up to its texture."""
     copy = Capture(work / f"{source.stem}_copy.wildcap")
     shutil.rmtree(copy.root, ignore_errors=True)
-    shutil.copytree(source, copy.root, ignore=shutil.ignore_patterns("maps*", "checkpoints", "delivery", "renders", "lock"))
+    shutil.copytree(source, copy.root,
+                    ignore=shutil.ignore_patterns("maps*", "checkpoints", "delivery", "renders", "lock"))
     return copy, lifted_truth(copy, truth)
 
 

@@ -1,13 +1,15 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How true the estimated skin tone is, for each of six groups of skin, under random lights, exposures and white balances:
+"""How true the estimated skin tone is, for each of six groups of skin, under random lights, exposures and white
+balances:
 
     python -m benchmarks.skin_tone [--each 6] [--capture CAPTURE TONE.txt ...]
 
-Held-out subjects (seeds from 9000 up, and the reserved ones), at least `--each` a group, each in three lights by two phones. Rows: `before`, what auto
-took until the estimate was there (the best lit skin, as if a delighter had been perfect); `scene`, the estimate; `measured`, the same with a white card
-before the face. Columns: mean signed and root mean square error of L*, mean delta E 2000, the stated deviation of L*, and how often the truth lies
-within two of those. A capture is a finished one with the sRGB of its true tone in a text file.
+Held-out subjects (seeds from 9000 up, and the reserved ones), at least `--each` a group, each in three lights by two
+phones. Rows: `before`, what auto took until the estimate was there (the best lit skin, as if a delighter had been
+perfect); `scene`, the estimate; `measured`, the same with a white card before the face. Columns: mean signed and root
+mean square error of L*, mean delta E 2000, the stated deviation of L*, and how often the truth lies within two of
+those. A capture is a finished one with the sRGB of its true tone in a text file.
 """
 
 from __future__ import annotations
@@ -47,7 +49,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--each", type=int, default=6, help="subjects of each group, at least")
     parser.add_argument("--capture", nargs=2, action="append", default=[], metavar=("CAPTURE", "TONE"))
-    parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/skin_tone.json; those of other captures stay")
+    parser.add_argument("--json", type=Path,
+                        help="where the figures go, such as docs/figures/skin_tone.json; those of other captures stay")
     asked = parser.parse_args()
     known = json.loads(WEIGHTS.with_suffix(".json").read_text(encoding="utf-8"))["tones"]
     rows: dict[str, list] = {"before": [], "scene": [], "measured": []}
@@ -63,7 +66,8 @@ def main() -> None:
         for light, scene in enumerate(scenes):
             for phone in range(PHONES):
                 look, card = photographed(scene, np.random.default_rng([seed, light, phone, 33]))
-                for row, tone in (("before", before(look, known)), ("scene", estimate_skin_tone(look)), ("measured", estimate_skin_tone(look, card))):
+                for row, tone in (("before", before(look, known)), ("scene", estimate_skin_tone(look)),
+                                  ("measured", estimate_skin_tone(look, card))):
                     rows[row].append((name, *errors(tone, scene.tone)))
     print_table(rows, subjects)
     captures = {}
@@ -90,12 +94,13 @@ def before(look: Look, known: list) -> SkinTone:
 def errors(tone: SkinTone, truth: np.ndarray) -> tuple[float, float, float]:
     """Signed error of L*, delta E 2000, and the stated deviation of L*, nan where none is stated."""
     found, true = lab(np.array(tone.linear)), lab(truth)
-    return float(found[0] - true[0]), float(deltaE_ciede2000(true, found)), np.nan if tone.deviation is None else tone.deviation
+    return (float(found[0] - true[0]), float(deltaE_ciede2000(true, found)),
+            np.nan if tone.deviation is None else tone.deviation)
 
 
 def summary(rows: dict[str, list], subjects: dict[str, int]) -> dict[str, dict]:
-    """Group (and "all") -> subjects, and row -> mean signed and root mean square error of L*, mean delta E 2000, mean stated deviation of L* and the share
-    within two of those (both None where none is stated)."""
+    """Group (and "all") -> subjects, and row -> mean signed and root mean square error of L*, mean delta E 2000, mean
+    stated deviation of L* and the share within two of those (both None where none is stated)."""
     found: dict[str, dict] = {}
     for name in (*subjects, "all"):
         of_group = {"subjects": subjects.get(name, sum(subjects.values()))}
@@ -104,24 +109,30 @@ def summary(rows: dict[str, list], subjects: dict[str, int]) -> dict[str, dict]:
             if len(chosen):
                 signed, colour, stated = chosen.T
                 known = bool(np.isfinite(stated).all())
-                of_group[row] = {"lightness": signed.mean(), "rms": np.sqrt((signed**2).mean()), "delta_e": colour.mean(),
-                                 "stated": stated.mean() if known else None, "within_two": np.mean(np.abs(signed) <= 2 * stated) if known else None}
+                of_group[row] = {"lightness": signed.mean(), "rms": np.sqrt((signed**2).mean()),
+                                 "delta_e": colour.mean(),
+                                 "stated": stated.mean() if known else None,
+                                 "within_two": np.mean(np.abs(signed) <= 2 * stated) if known else None}
         found[name] = of_group
     return found
 
 
 def print_table(rows: dict[str, list], subjects: dict[str, int]) -> None:
-    print(f"{'row':9} {'group':13} {'subjects':>8} {'L* mean':>8} {'L* rms':>7} {'delta E':>8} {'stated':>7} {'in two':>7}")
+    print(f"{'row':9} {'group':13} {'subjects':>8} {'L* mean':>8} {'L* rms':>7} {'delta E':>8} {'stated':>7} "
+          f"{'in two':>7}")
     groups = summary(rows, subjects)
     for row in rows:
         for name, of_group in groups.items():
             if of := of_group.get(row):
-                stated = "".join(f" {'-':>7}" if value is None else f" {value:7.2f}" for value in (of["stated"], of["within_two"]))
-                print(f"{row:9} {name:13} {of_group['subjects']:8} {of['lightness']:+8.2f} {of['rms']:7.2f} {of['delta_e']:8.2f}{stated}")
+                stated = "".join(f" {'-':>7}" if value is None else f" {value:7.2f}"
+                                 for value in (of["stated"], of["within_two"]))
+                print(f"{row:9} {name:13} {of_group['subjects']:8} {of['lightness']:+8.2f} {of['rms']:7.2f} "
+                      f"{of['delta_e']:8.2f}{stated}")
 
 
 def of_capture(capture: Capture, srgb: np.ndarray, known: list) -> dict:
-    """One finished capture: prints its name, then the earlier auto's and the estimate's error of L* and delta E, and returns them with its true L*."""
+    """One finished capture: prints its name, then the earlier auto's and the estimate's error of L* and delta E, and
+    returns them with its true L*."""
     truth = images.srgb_to_linear(srgb)
     head = read_head(capture)
     evidence, settings = read_evidence(capture, head, SIZE), from_json({}, Settings())
@@ -131,7 +142,8 @@ def of_capture(capture: Capture, srgb: np.ndarray, known: list) -> dict:
     found: dict = {"lightness": lab(truth)[0]}
     for row, tone in by_row.items():
         signed, colour, stated = errors(tone, truth)
-        print(f"{row:9} {capture.root.name:20} {group(truth):13} L* {lab(truth)[0]:.1f} error {signed:+.2f} delta E {colour:.2f} stated {stated:.2f}")
+        print(f"{row:9} {capture.root.name:20} {group(truth):13} L* {lab(truth)[0]:.1f} error {signed:+.2f} delta E "
+              f"{colour:.2f} stated {stated:.2f}")
         found[row] = {"lightness": signed, "delta_e": colour, "stated": stated if np.isfinite(stated) else None}
     return found
 

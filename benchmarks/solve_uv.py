@@ -1,10 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solver alone, on UV-space problems with known truth: a held-out synthetic skin under a sky and a sun, with cast shadows.
+"""The solver alone, on UV-space problems with known truth: a held-out synthetic skin under a sky and a sun, with cast
+shadows.
 
-    python -m benchmarks.solve_uv [--seeds 9000 9001 9002] [--size 512] [--steps 20] [--guidance dps] [--recipe wildcap] [--pictures DIR]
+    python -m benchmarks.solve_uv [--seeds 9000 9001 9002] [--size 512] [--steps 20] [--guidance dps] [--recipe wildcap]
+    [--pictures DIR]
 
-Prints PSNR (sRGB, after one gain per channel) inside the shadow, in a band of 12 texels about its border, and outside; the input beside the result.
+Prints PSNR (sRGB, after one gain per channel) inside the shadow, in a band of 12 texels about its border, and outside;
+the input beside the result.
 """
 
 from __future__ import annotations
@@ -63,26 +66,32 @@ def _solve_one(capture: Capture, seed: int, options: argparse.Namespace):
     images.write_data(capture.texture_confidence, np.ones((size, size), np.float32))
     images.write_data(capture.shadow_mask_auto, mask)
     meshes.write_obj(capture.head, template.load())
-    settings = from_json({"delight": {"delighter": "none"}, "solve": {"size": size, "steps": options.steps, "guidance": options.guidance,
-                                    "recipe": options.recipe, "skin_tone": "auto" if options.auto_tone else format_skin_tone(tone)}})
+    settings = from_json({"delight": {"delighter": "none"},
+                          "solve": {"size": size, "steps": options.steps, "guidance": options.guidance,
+                                    "recipe": options.recipe,
+                                    "skin_tone": "auto" if options.auto_tone else format_skin_tone(tone)}})
     began = time.monotonic()
     solve.run(capture, settings, Reporter("solve"))
     seconds = time.monotonic() - began
-    solved, shading = images.read_linear(capture.maps / "diffuse_albedo.exr"), images.read_linear(capture.maps / "shading.exr")
+    solved, shading = images.read_linear(capture.maps
+                                         / "diffuse_albedo.exr"), images.read_linear(capture.maps / "shading.exr")
     face = template.mask("face", size) > 0.5
     edge = cv2.morphologyEx((shadow > 0.5).astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
     band = cv2.dilate(edge, np.ones((25 * size // 1024 | 1,) * 2, np.uint8)) > 0
     regions = face & (shadow > 0.5) & ~band, face & band, face & (shadow < 0.05) & ~band
     row = [(psnr(texture, truth, region, face), psnr(solved, truth, region, face)) for region in regions]
-    shown = [texture * (truth.mean() / texture.mean()), solved, truth, shading / np.percentile(shading, 98), np.repeat(mask[..., None], 3, 2)]
+    shown = [texture * (truth.mean() / texture.mean()), solved, truth, shading / np.percentile(shading, 98),
+             np.repeat(mask[..., None], 3, 2)]
     return row, images.linear_to_srgb(np.hstack(shown)), seconds
 
 
 def problem(seed: int, size: int, shadows: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(true albedo [S, S, 3], I_UV [S, S, 3], blocked share of the sun [S, S], painted mask [S, S]): all linear. Sky, sun and ambient occlusion."""
+    """(true albedo [S, S, 3], I_UV [S, S, 3], blocked share of the sun [S, S], painted mask [S, S]): all linear. Sky,
+    sun and ambient occlusion."""
     p = uv_problem(seed, size, shadows)
     noisy = p.texture + np.random.default_rng(seed).normal(0, 0.004, p.texture.shape)
-    mask = cv2.dilate((p.shadow > 0.08).astype(np.uint8), np.ones((9 * size // 1024 | 1,) * 2, np.uint8)).astype(np.float32)
+    mask = cv2.dilate((p.shadow > 0.08).astype(np.uint8),
+                      np.ones((9 * size // 1024 | 1,) * 2, np.uint8)).astype(np.float32)
     return p.albedo, np.maximum(noisy, 0).astype(np.float32), p.shadow, mask
 
 

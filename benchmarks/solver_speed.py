@@ -1,16 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How fast the solver is and how much memory it takes, each row in a fresh process: seconds per sampling step, peak memory, the ratio to the plain recipe.
+"""How fast the solver is and how much memory it takes, each row in a fresh process: seconds per sampling step, peak
+memory, the ratio to the plain recipe.
 
-    python -m benchmarks.solver_speed [--rows plain ours ...] [--size 1024] [--steps 6] [--network ours|60M] [--device cpu|cuda] [--compile]
-                                      [--capture FOLDER] [--json FILE]
+    python -m benchmarks.solver_speed [--rows plain ours ...] [--size 1024] [--steps 6] [--network ours|60M] [--device
+                                      cpu|cuda] [--compile] [--capture FOLDER] [--json FILE]
 
-The first rows sample `--steps` steps of the walk, with their share of the light's updates: "plain" in float32, channels first, the whole map from the first
-step on; "ours" in the precision that is chosen here, channels last, coarse to fine; then in float32, in the low-memory mode, and by the draft's closed form.
-"draft at 512" and "standard at 1024" are the whole stage, loading included, on a synthetic subject, or on a copy of `--capture`, then with its mask proposal
-before it. `60M` is a network of random weights and of the size that the authors' has; it knows no coarse maps. Memory is the process's own peak, Python and
-its libraries included; on CUDA also what torch held there. On a machine that does other things as well only the processor's own seconds, summed over its
-threads, tell something, and the ratio of them.
+The first rows sample `--steps` steps of the walk, with their share of the light's updates: "plain" in float32, channels
+first, the whole map from the first step on; "ours" in the precision that is chosen here, channels last, coarse to fine;
+then in float32, in the low-memory mode, and by the draft's closed form. "draft at 512" and "standard at 1024" are the
+whole stage, loading included, on a synthetic subject, or on a copy of `--capture`, then with its mask proposal before
+it. `60M` is a network of random weights and of the size that the authors' has; it knows no coarse maps. Memory is the
+process's own peak, Python and its libraries included; on CUDA also what torch held there. On a machine that does other
+things as well only the processor's own seconds, summed over its threads, tell something, and the ratio of them.
 """
 
 from __future__ import annotations
@@ -27,8 +29,10 @@ from pathlib import Path
 from .figures import write
 
 ROOT = Path(__file__).resolve().parent.parent
-AUTHORS = {"model": {"type": "image_v1", "input_channels": 7, "patch_size": 1, "mapping_out": 256, "depths": [2, 2, 4, 4], "channels": [128, 256, 256, 512],
-                     "augment_wrapper": True, "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80}, "cond": {"type": "coord"}}
+AUTHORS = {"model": {"type": "image_v1", "input_channels": 7, "patch_size": 1, "mapping_out": 256,
+                     "depths": [2, 2, 4, 4], "channels": [128, 256, 256, 512],
+                     "augment_wrapper": True, "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80},
+           "cond": {"type": "coord"}}
 """The bounds that the paper's time and memory set leave about this (54 to 73 million parameters)."""
 TONE = "0.69,0.54,0.45"
 
@@ -81,7 +85,8 @@ def main() -> None:
         prepare(Path(folder), options.capture)
         for name in options.rows:
             given = [*sys.argv[1:], "--child", name, folder]
-            child = subprocess.run([sys.executable, "-m", "benchmarks.solver_speed", *given], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
+            child = subprocess.run([sys.executable, "-m", "benchmarks.solver_speed", *given], cwd=ROOT,
+                                   stdout=subprocess.PIPE, text=True, check=True)
             rows[name] = json.loads(child.stdout.splitlines()[-1])
             print(line(name, rows[name], rows.get("plain")), flush=True)
     if options.json:
@@ -89,7 +94,8 @@ def main() -> None:
         write(options.json, "solver_speed", "python -m benchmarks.solver_speed", {
             "network": options.network, "device": options.device, "size": options.size,
             "python_gib": next(row["peak_gib"] - row["added_gib"] for row in rows.values()),
-            "steps": {name: {**row, "to_plain": plain and row["seconds_per_step"] / plain} for name, row in rows.items() if not ROWS[name].stage},
+            "steps": {name: {**row, "to_plain": plain and row["seconds_per_step"] / plain} for name, row in rows.items()
+                      if not ROWS[name].stage},
             "stage": {name: {**row, "allowed": ROWS[name].target} for name, row in rows.items() if ROWS[name].stage}})
 
 
@@ -97,9 +103,11 @@ def line(name: str, row: dict, plain: dict | None) -> str:
     """What a row says, for the screen."""
     parts = [f"{row['seconds']:7.2f} s, of the processor's {row['processor_seconds']:.2f} s"]
     if "seconds_per_step" in row:
-        parts.append(f"{row['seconds_per_step']:.3f} s a step, of the processor's {row['processor_seconds_per_step']:.3f} s")
+        parts.append(f"{row['seconds_per_step']:.3f} s a step, of the processor's "
+                     f"{row['processor_seconds_per_step']:.3f} s")
         if plain is not None:
-            parts.append(" and ".join(f"{row[name] / plain[name]:.2f}" for name in ("seconds_per_step", "processor_seconds_per_step")) + " of plain's")
+            parts.append(" and ".join(f"{row[name] / plain[name]:.2f}"
+                                      for name in ("seconds_per_step", "processor_seconds_per_step")) + " of plain's")
     if ROWS[name].target:
         parts.append(f"{ROWS[name].target} s allowed on two cores alone")
     parts.append(f"{row['peak_gib']:5.2f} GiB, {row['added_gib']:.2f} of it since the libraries were loaded")
@@ -109,7 +117,8 @@ def line(name: str, row: dict, plain: dict | None) -> str:
 
 
 def prepare(folder: Path, source: Path | None) -> None:
-    """A capture that is ready to be solved, in a process of its own as well: a copy of `source`, or a synthetic subject's texture."""
+    """A capture that is ready to be solved, in a process of its own as well: a copy of `source`, or a synthetic
+    subject's texture."""
     code = f"from benchmarks.solver_speed import make; make({str(folder)!r}, {str(source) if source else None!r})"
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 
@@ -127,7 +136,8 @@ def make(folder: str, source: str | None) -> None:
 
     capture = Capture(Path(folder) / "a.wildcap")
     if source:
-        shutil.copytree(source, capture.root, ignore=shutil.ignore_patterns("maps*", "checkpoints", "delivery", "logs", "lock"))
+        shutil.copytree(source, capture.root,
+                        ignore=shutil.ignore_patterns("maps*", "checkpoints", "delivery", "logs", "lock"))
         return
     _, texture, _, mask = problem(9000, 512, "leaves")
     images.write_linear(capture.texture, texture)
@@ -146,14 +156,16 @@ def measured(row: SolverVariant, folder: Path, options: argparse.Namespace) -> d
     before = peak_gib()
     capture = Capture(folder / "a.wildcap")
     found = whole_stage(row, capture, options) if row.stage else single_steps(row, capture, options)
-    found |= {"peak_gib": round(peak_gib(), 3), "added_gib": round(peak_gib() - before, 3), "threads": torch.get_num_threads()}
+    found |= {"peak_gib": round(peak_gib(), 3), "added_gib": round(peak_gib() - before, 3),
+              "threads": torch.get_num_threads()}
     if options.device.startswith("cuda"):
         found["device_peak_gib"] = round(torch.cuda.max_memory_allocated() / 2**30, 3)
     return found
 
 
 def single_steps(row: SolverVariant, capture, options: argparse.Namespace) -> dict:
-    """`options.steps` steps that lie along the walk as all of them do, each with as many light updates as one of theirs."""
+    """`options.steps` steps that lie along the walk as all of them do, each with as many light updates as one of
+    theirs."""
     from dataclasses import replace
 
     import torch
@@ -184,7 +196,8 @@ def single_steps(row: SolverVariant, capture, options: argparse.Namespace) -> di
     sample_within_memory(Sampler(conditioned, short, seeded(0)), begun.observations, begun.state, log=report.log)
     seconds, worked = time.perf_counter() - began, time.process_time() - worked
     dtype = str(prior.network.proj_in.weight.dtype).removeprefix("torch.")
-    return {"seconds": round(seconds, 3), "processor_seconds": round(worked, 2), "seconds_per_step": round(seconds / short.steps, 4),
+    return {"seconds": round(seconds, 3), "processor_seconds": round(worked, 2),
+            "seconds_per_step": round(seconds / short.steps, 4),
             "processor_seconds_per_step": round(worked / short.steps, 4), "steps": short.steps, "dtype": dtype}
 
 
@@ -205,8 +218,8 @@ def whole_stage(row: SolverVariant, capture, options: argparse.Namespace) -> dic
     if capture.delit.is_dir():
         shadow_mask.run(capture, settings, report)
     solve.run(capture, settings, report)
-    return {"seconds": round(time.perf_counter() - began, 2), "processor_seconds": round(time.process_time() - worked, 2),
-            "dtype": str(dtype).removeprefix("torch.")}
+    return {"seconds": round(time.perf_counter() - began, 2),
+            "processor_seconds": round(time.process_time() - worked, 2), "dtype": str(dtype).removeprefix("torch.")}
 
 
 def prior_of(row: SolverVariant, options: argparse.Namespace):

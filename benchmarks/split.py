@@ -1,14 +1,18 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skin or light: what the split of a texture's large shapes (core/solve/split.py) is worth, alone and under the solve, and what it takes for granted.
+"""Skin or light: what the split of a texture's large shapes (core/solve/split.py) is worth, alone and under the solve,
+and what it takes for granted.
 
-    python -m benchmarks.split FOLDER [--truths FOLDER] [--only PREFIX ...] [--beside NAME=FOLDER ...] [--skins FOLDER] [--page PATH] [--json PATH]
-    python -m benchmarks.split FOLDER --only NAME --picture OUT.jpg     the parts of that capture, side by side
+    python -m benchmarks.split FOLDER [--truths FOLDER] [--only PREFIX ...] [--beside NAME=FOLDER ...] [--skins FOLDER]
+    [--page PATH] [--json PATH] python -m benchmarks.split FOLDER --only NAME --picture OUT.jpg     the parts of that
+    capture, side by side
 
-FOLDER holds captures as benchmarks/state.py measures them, several lights of each person, solved. The closed form alone is a second of work: the texture over
-the global light that it finds, of each capture alone and of all captures of a person together; and with the scales' prior halved and doubled. --beside names
-folders with the same captures solved in another way (an earlier solver, `core run --with`). --skins: painted skins that `core train carry` brought into our
-UVs; their large shapes say how far traits reach and how alike the two sides are. Likenesses stay where they are; only figures are written.
+FOLDER holds captures as benchmarks/state.py measures them, several lights of each person, solved. The closed form alone
+is a second of work: the texture over the global light that it finds, of each capture alone and of all captures of a
+person together; and with the scales' prior halved and doubled. --beside names folders with the same captures solved in
+another way (an earlier solver, `core run --with`). --skins: painted skins that `core train carry` brought into our UVs;
+their large shapes say how far traits reach and how alike the two sides are. Likenesses stay where they are; only
+figures are written.
 """
 
 from __future__ import annotations
@@ -44,19 +48,35 @@ from .state_scores import in_uv, mean_of, of_person, small
 
 TITLE = "Skin or light"
 COMMAND = "python -m benchmarks.split FOLDER --page docs/results/split.md --json docs/figures/split.json"
-ALONE, TOGETHER, LESS, MORE = "split alone", "split together", "prior of the scales halved", "prior of the scales doubled"
-COLUMNS = {"psnr_uv": Column("PSNR in UV, dB"), "psnr_shared": Column("up to one shared light, dB"), "light_shared": Column("that light, in log", 3, 0),
+ALONE, TOGETHER, LESS, MORE = (
+    "split alone",
+    "split together",
+    "prior of the scales halved",
+    "prior of the scales doubled",
+)
+COLUMNS = {"psnr_uv": Column("PSNR in UV, dB"), "psnr_shared": Column("up to one shared light, dB"),
+           "light_shared": Column("that light, in log", 3, 0),
            "psnr_alone": Column("up to a light of its own, dB"), "agreement": Column("agreement, dB")}
-WORDS = ("Means over people ± their spread, then differences from the delit texture, person by person, ± the standard error of their mean. *Up to one "
-         "shared light*: one grey second-order light, fitted to all captures of a person together, is no error (a capture cannot tell it from skin, and a "
-         "scan's own map holds some); what differs between captures is. *Agreement*: PSNR of the difference between the captures' albedos. *Split alone* is "
-         "the texture over the global light that the closed form finds, before anything is sampled; *together*, over the light that it finds with all "
-         "captures of that person. Rows beside these are solves of the same textures by other code or options (`--beside`): *solved before* by commit c93b420, "
-         "whose lights were held back by pulls chosen by hand, *solved together* by `core run - CAPTURE --from solve --until solve --with OTHERS`.")
-PARTS = ("![As filmed, delit, mean face; with traits, global light, local light; texture over light, solved, true](../pictures/split.jpg)\n\n"
-         "A lamp from below (`python -m benchmarks.split FOLDER --only stubbled_below --picture docs/pictures/split.jpg`). Above: as filmed, delit, "
-         "the mean face of the tone. Middle: with the traits that were found; the light of the whole face that the delighter left, and what it left "
-         "locally. Below: the delit texture over that light, as solved, and the truth. What stays is mostly the delighter's: noise in the dark, a nose "
+WORDS = ("Means over people ± their spread, then differences from the delit texture, person by person, ± the standard "
+         "error of their mean. *Up to one "
+         "shared light*: one grey second-order light, fitted to all captures of a person together, is no error (a "
+         "capture cannot tell it from skin, and a "
+         "scan's own map holds some); what differs between captures is. *Agreement*: PSNR of the difference between "
+         "the captures' albedos. *Split alone* is "
+         "the texture over the global light that the closed form finds, before anything is sampled; *together*, over "
+         "the light that it finds with all "
+         "captures of that person. Rows beside these are solves of the same textures by other code or options "
+         "(`--beside`): *solved before* by commit c93b420, "
+         "whose lights were held back by pulls chosen by hand, *solved together* by `core run - CAPTURE --from solve "
+         "--until solve --with OTHERS`.")
+PARTS = ("![As filmed, delit, mean face; with traits, global light, local light; texture over light, solved, "
+         "true](../pictures/split.jpg)\n\n"
+         "A lamp from below (`python -m benchmarks.split FOLDER --only stubbled_below --picture "
+         "docs/pictures/split.jpg`). Above: as filmed, delit, "
+         "the mean face of the tone. Middle: with the traits that were found; the light of the whole face that the "
+         "delighter left, and what it left "
+         "locally. Below: the delit texture over that light, as solved, and the truth. What stays is mostly the "
+         "delighter's: noise in the dark, a nose "
          "whose shadow was brightened too much.")
 BINS_MM = (0, 4, 8, 14, 20, 30, 40, 60)
 PLAIN = 0.5
@@ -68,14 +88,18 @@ def main() -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--truths", type=Path, help="where NAME/ with the truth lies, if not in FOLDER")
     parser.add_argument("--only", nargs="+", default=[""], help="captures whose names begin so")
-    parser.add_argument("--beside", nargs="+", default=[], metavar="NAME=FOLDER", help="the same captures, solved in another way")
+    parser.add_argument("--beside", nargs="+", default=[], metavar="NAME=FOLDER",
+                        help="the same captures, solved in another way")
     parser.add_argument("--skins", type=Path, help="carried skins, for the traits' reach")
-    parser.add_argument("--picture", type=Path, help="draw the parts of the first capture instead of measuring; of synthetic people only in the docs")
+    parser.add_argument("--picture", type=Path,
+                        help="draw the parts of the first capture instead of measuring; of synthetic people only in "
+                             "the docs")
     parser.add_argument("--page", type=Path)
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
     folder = asked.folder.resolve()
-    captures = [filmed for filmed in find(folder, (asked.truths or folder).resolve(), folder / "state") if filmed.name.startswith(tuple(asked.only))]
+    captures = [filmed for filmed in find(folder, (asked.truths or folder).resolve(), folder / "state")
+                if filmed.name.startswith(tuple(asked.only))]
     if not captures:
         parser.error(f"{folder} holds no capture with a texture and a truth.")
     if asked.picture:
@@ -107,7 +131,8 @@ def sections(record: dict) -> Sections:
 
 
 def measure(captures: list[Filmed], beside: dict[str, Path]) -> tuple[Scores, dict, dict]:
-    """Method -> person -> figures; capture -> method -> PSNR up to the shared light; capture -> scales, of the capture alone."""
+    """Method -> person -> figures; capture -> method -> PSNR up to the shared light; capture -> scales, of the capture
+    alone."""
     scores: Scores = {}
     by_capture, scales = {}, {}
     for person in dict.fromkeys(filmed.person for filmed in captures):
@@ -132,7 +157,8 @@ def measure(captures: list[Filmed], beside: dict[str, Path]) -> tuple[Scores, di
         together, alone = of_person(own, maps)
         for method, of_all in together.items():
             if method not in (NOTHING, TRUE):
-                scores.setdefault(method, {})[person] = {**mean_of([row[method] for row in each if method in row]), **of_all}
+                scores.setdefault(method, {})[person] = {**mean_of([row[method] for row in each if method in row]),
+                                                         **of_all}
                 for name, psnr in alone[method].items():
                     by_capture.setdefault(name, {})[method] = round(psnr, 3)
     return scores, by_capture, scales
@@ -157,16 +183,19 @@ def divided(shapes: split.Shapes, found: split.Split, local: bool) -> np.ndarray
 
 
 def parts_side_by_side(filmed: Filmed) -> np.ndarray:
-    """As filmed, delit, mean face; mean face with traits, global and local light about a middle grey; the texture over the global light, solved, true: sRGB, at
-    the truth's tone."""
+    """As filmed, delit, mean face; mean face with traits, global and local light about a middle grey; the texture over
+    the global light, solved, true: sRGB, at the truth's tone."""
     shapes = shapes_of(filmed)
     found = split.split([shapes])
-    maps = small({method: answer for method in (NOTHING, DELIT, SOLVED, TRUE) if (answer := filmed.answer(method)) is not None})
+    maps = small({method: answer for method in (NOTHING, DELIT, SOLVED, TRUE)
+                  if (answer := filmed.answer(method)) is not None})
     mean = shapes.reference.permute(1, 2, 0).numpy()
-    traits, local = (split.enlarged(torch.from_numpy(part), SIZE).exp().permute(1, 2, 0).numpy() for part in (found.traits, found.local))
+    traits, local = (split.enlarged(torch.from_numpy(part), SIZE).exp().permute(1, 2, 0).numpy()
+                     for part in (found.traits, found.local))
     light = found.light(shapes.normal).permute(1, 2, 0).numpy()
     where, tone = filmed.where, maps[TRUE][filmed.where].mean(0)
-    skins = [maps[NOTHING], maps[DELIT], mean, mean * traits, maps[DELIT] / light, maps.get(SOLVED, maps[DELIT] / light), maps[TRUE]]
+    skins = [maps[NOTHING], maps[DELIT], mean, mean * traits, maps[DELIT] / light,
+             maps.get(SOLVED, maps[DELIT] / light), maps[TRUE]]
     toned = [skin * tone / np.maximum(skin[where].mean(0), 1e-6) for skin in skins]
     lights = [0.35 * part / np.maximum(part[where].mean(0), 1e-6) for part in (light, local)]
     rows, columns = (np.flatnonzero(where.any(axis)) for axis in (1, 0))
@@ -181,15 +210,17 @@ def solved_map(root: Path) -> np.ndarray | None:
 
 
 def reach_of_traits(folder: Path) -> dict:
-    """Of painted skins, one of each cluster: deviation of the grey log ratio to their mean over the facial skin, and its correlation by distance, with the
-    same side and with the mirror image of the other."""
+    """Of painted skins, one of each cluster: deviation of the grey log ratio to their mean over the facial skin, and
+    its correlation by distance, with the same side and with the mirror image of the other."""
     count, names = 64, carried_names(folder)
     mesh = template.load()
     face, bary = raster.rasterize_uv(mesh, count)
-    bare = np.prod([1 - images.resize(template.mask(name, SIZE), count, count) for name in ("brows", "lips", "eyes", "nostrils", "scalp", "ears")], 0)
+    bare = np.prod([1 - images.resize(template.mask(name, SIZE), count, count)
+                    for name in ("brows", "lips", "eyes", "nostrils", "scalp", "ears")], 0)
     where = (face >= 0) & (images.resize(template.mask("face", SIZE), count, count) * bare > 0.7)
     chosen = [cluster[0] for cluster in clusters(folder, names)]
-    logs = np.stack([np.log(np.maximum(images.resize(images.read_linear(folder / f"{name}.png"), count, count), 1e-3)).mean(-1)[where] for name in chosen])
+    logs = np.stack([np.log(np.maximum(images.resize(images.read_linear(folder / f"{name}.png"), count, count),
+                                       1e-3)).mean(-1)[where] for name in chosen])
     logs -= np.median(logs, 1, keepdims=True)
     logs = np.clip(logs - np.median(logs, 0), -PLAIN, PLAIN)
     logs -= logs.mean(1, keepdims=True)
@@ -201,7 +232,8 @@ def reach_of_traits(folder: Path) -> dict:
     mirrored = 1e3 * np.linalg.norm(places[i] - places[j] * [-1, 1, 1], axis=1)
     across = (places[i, 0] * places[j, 0] < 0) & (np.abs(places[i, 0]) > 0.012)
     return {"skins": len(chosen), "deviation": round(float(np.sqrt(np.square(logs).mean())), 4),
-            "same side": correlation_by_distance(product, apart), "mirror image": correlation_by_distance(product[across], mirrored[across])}
+            "same side": correlation_by_distance(product, apart),
+            "mirror image": correlation_by_distance(product[across], mirrored[across])}
 
 
 def correlation_by_distance(product: np.ndarray, apart_mm: np.ndarray) -> dict[str, float]:
@@ -220,13 +252,16 @@ def capture_table(by_capture: dict[str, dict[str, float]]) -> str:
 def scale_table(scales: dict[str, dict[str, float]]) -> str:
     names = ["traits", "global light", "local light", "noise"]
     return ("Deviations in natural log along the axis of brightness (times 0.58 in each channel).\n\n"
-            + figures.markdown(["capture", *names], [[name, *(f"{value:.3f}" for value in row.values())] for name, row in scales.items()]))
+            + figures.markdown(["capture", *names],
+                               [[name, *(f"{value:.3f}" for value in row.values())] for name, row in scales.items()]))
 
 
 def reach_table(found: dict) -> str:
     sides = ("same side", "mirror image")
-    return (f"Correlation of the grey log ratio of {found['skins']} painted skins to their mean, whose deviation is {found['deviation']:.2f}, by distance; the "
-            f"model takes exp(-distance / {1e3 * split.REACH_M:.0f} mm), and {split.ALIKE} of it with the mirror image.\n\n"
+    return (f"Correlation of the grey log ratio of {found['skins']} painted skins to their mean, whose deviation is "
+            f"{found['deviation']:.2f}, by distance; the "
+            f"model takes exp(-distance / {1e3 * split.REACH_M:.0f} mm), and {split.ALIKE} of it with the mirror "
+            "image.\n\n"
             + figures.markdown(["", *found[sides[0]]], [[side, *found[side].values()] for side in sides]))
 
 

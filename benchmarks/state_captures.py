@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The captures that benchmarks/state.py measures, as maps in the UVs of their heads: the answers, the truth as their own cameras show it, and the normals.
+"""The captures that benchmarks/state.py measures, as maps in the UVs of their heads: the answers, the truth as their
+own cameras show it, and the normals.
 
-A folder holds NAME.wildcap and beside it, or in another folder, NAME/ with the truth (benchmarks/albedo_score.py says its layout; head.obj, the true head,
-tells which captures show the same person; maps/part_NAME.png are masks in the head's UVs, where there are any).
+A folder holds NAME.wildcap and beside it, or in another folder, NAME/ with the truth (benchmarks/albedo_score.py says
+its layout; head.obj, the true head, tells which captures show the same person; maps/part_NAME.png are masks in the
+head's UVs, where there are any).
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ PARTS = ("skin", "brows", "lips", "eyes")
 
 @dataclass(frozen=True)
 class Filmed:
-    """One capture with its truth; person: the name of the first capture, in order of names, of the same true head; work: where what is made of it is kept."""
+    """One capture with its truth; person: the name of the first capture, in order of names, of the same true head;
+    work: where what is made of it is kept."""
 
     name: str
     person: str
@@ -55,17 +58,23 @@ class Filmed:
 
     @cached_property
     def true_capture(self) -> Capture:
-        """A copy whose delit frames are the true albedo, up to its texture; made once, and again where the head or the cameras changed."""
-        copy, same = Capture(self.work / f"{self.name}.wildcap"), ("head.obj", "cameras/cameras.bin", "cameras/images.bin")
-        if copy.texture_confidence.is_file() and any(hash_file(copy.root / name) != hash_file(self.capture.root / name) for name in same):
+        """A copy whose delit frames are the true albedo, up to its texture; made once, and again where the head or the
+        cameras changed."""
+        copy, same = Capture(self.work
+                             / f"{self.name}.wildcap"), ("head.obj", "cameras/cameras.bin", "cameras/images.bin")
+        if copy.texture_confidence.is_file() and any(hash_file(copy.root / name) != hash_file(self.capture.root / name)
+                                                     for name in same):
             copy.texture_confidence.unlink()
         return true_frames(self.capture, self.truth, copy, Settings())
 
     def inputs(self) -> list[Path]:
         """The files that the figures of this capture depend on, but for the truth's pictures."""
         capture = self.capture
-        return [path for path in (capture.head, capture.texture_filmed, capture.texture, capture.texture_confidence, capture.maps / "diffuse_albedo.png",
-                                  capture.maps / "confidence.png", self.truth / "cameras.json", self.truth / "head.obj") if path.is_file()]
+        return [path
+                for path in (capture.head, capture.texture_filmed, capture.texture, capture.texture_confidence,
+                             capture.maps / "diffuse_albedo.png",
+                             capture.maps / "confidence.png", self.truth / "cameras.json", self.truth / "head.obj")
+                if path.is_file()]
 
     @cached_property
     def truth_map(self) -> np.ndarray:
@@ -75,14 +84,16 @@ class Filmed:
     @cached_property
     def where(self) -> np.ndarray:
         """bool [SIZE, SIZE]: texels of the face that the capture and its true frames saw well."""
-        seen = [images.resize(images.read_data(capture.texture_confidence)[..., 0], SIZE, SIZE) > SEEN for capture in (self.capture, self.true_capture)]
+        seen = [images.resize(images.read_data(capture.texture_confidence)[..., 0], SIZE, SIZE) > SEEN
+                for capture in (self.capture, self.true_capture)]
         return (template.mask("face", SIZE) > 0.5) & seen[0] & seen[1]
 
     def answer(self, method: str) -> np.ndarray | None:
         """What a method takes for the albedo, linear [S, S, 3]; None where the capture was not taken so far."""
         if method == TRUE:
             return self.truth_map
-        path = {DELIT: self.capture.texture, SOLVED: self.capture.maps / "diffuse_albedo.png"}.get(method, self.capture.texture_filmed)
+        path = {DELIT: self.capture.texture,
+                SOLVED: self.capture.maps / "diffuse_albedo.png"}.get(method, self.capture.texture_filmed)
         if not path.is_file():
             return None
         answer = images.read_linear(path)
@@ -93,15 +104,18 @@ class Filmed:
 
     @cached_property
     def normals(self) -> np.ndarray:
-        """Unit normals [SIZE, SIZE, 3] in the axes of the built-in head, however the capture's world lies; zero off the head."""
+        """Unit normals [SIZE, SIZE, 3] in the axes of the built-in head, however the capture's world lies; zero off the
+        head."""
         unfolded = self.head.unfold(SIZE)
         return unfolded.spread(unfolded.normals @ rotation_between(self.head.mesh.vertices, template.load().vertices).T)
 
     def parts(self) -> dict[str, np.ndarray]:
-        """Part -> bool [SIZE, SIZE]: the truth's own masks where it has any, else those of the built-in head, where they are at least half as dense as
-        where they are densest. Skin is what no other part has."""
-        own = {path.stem.removeprefix("part_"): images.read_mask(path) for path in sorted((self.truth / "maps").glob("part_*.png"))}
-        soft = {name: images.resize(mask, SIZE, SIZE) for name, mask in ({name: template.mask(name, SIZE) for name in PARTS} | own).items()}
+        """Part -> bool [SIZE, SIZE]: the truth's own masks where it has any, else those of the built-in head, where
+        they are at least half as dense as where they are densest. Skin is what no other part has."""
+        own = {path.stem.removeprefix("part_"): images.read_mask(path)
+               for path in sorted((self.truth / "maps").glob("part_*.png"))}
+        soft = {name: images.resize(mask, SIZE, SIZE)
+                for name, mask in ({name: template.mask(name, SIZE) for name in PARTS} | own).items()}
         found = {name: mask > 0.5 * max(float(mask.max()), 1e-3) for name, mask in soft.items()}
         others = np.logical_or.reduce([mask for name, mask in found.items() if name != "skin"])
         return {**found, "skin": found["skin"] & ~others}
@@ -110,9 +124,11 @@ class Filmed:
 def find(folder: Path, truths: Path, work: Path) -> list[Filmed]:
     """The captures of a folder that have a texture and a truth, in order of their names."""
     pairs = [(path.stem, Capture(path), truths / path.stem) for path in sorted(folder.glob("*.wildcap"))]
-    pairs = [(name, capture, truth) for name, capture, truth in pairs if capture.texture.is_file() and (truth / "albedo").is_dir()]
+    pairs = [(name, capture, truth) for name, capture, truth in pairs if capture.texture.is_file()
+             and (truth / "albedo").is_dir()]
     first: dict[str, str] = {}
-    return [Filmed(name, first.setdefault(_true_head(truth), name), capture, truth, work) for name, capture, truth in pairs]
+    return [Filmed(name, first.setdefault(_true_head(truth), name), capture, truth, work)
+            for name, capture, truth in pairs]
 
 
 def landmarks_in_uv(size: int = SIZE) -> np.ndarray:

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A studio through the chain up to the mask: `python -m benchmarks.studio_rig FOLDER [--seed N] [--scale S]`.
 
-Sixteen fixed, calibrated cameras under even light, in the layout of multi-view studios, photograph a synthetic person; their calibration comes in as
-Blender's cameras. FOLDER gets the photographs, rig.json and the capture; printed are the figures of cameras, head and mask.
+Sixteen fixed, calibrated cameras under even light, in the layout of multi-view studios, photograph a synthetic person;
+their calibration comes in as Blender's cameras. FOLDER gets the photographs, rig.json and the capture; printed are the
+figures of cameras, head and mask.
 """
 
 from __future__ import annotations
@@ -55,12 +56,15 @@ def photograph(views: list, folder: Path, seed: int) -> None:
     """folder/photos/cam_NN.png and folder/rig.json."""
     cameras = []
     for i, view in enumerate(views):
-        images.write_srgb(folder / "photos" / f"cam_{i:02d}.png", painted_head.photograph(view, wall=False, even=True, seed=seed, texels=2048))
+        images.write_srgb(folder / "photos" / f"cam_{i:02d}.png",
+                          painted_head.photograph(view, wall=False, even=True, seed=seed, texels=2048))
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = view.rotation.T @ np.diag([1, -1, -1]), view.centre
         cameras.append({"name": f"cam_{i:02d}", "matrix_world": matrix.tolist()})
     camera = views[0].camera
-    (folder / "rig.json").write_text(json.dumps({"width": camera.width, "height": camera.height, "focal_px": camera.mean_focal_length(), "cameras": cameras}))
+    (folder
+     / "rig.json").write_text(json.dumps({"width": camera.width, "height": camera.height,
+                                          "focal_px": camera.mean_focal_length(), "cameras": cameras}))
 
 
 def judge(capture: Capture, views: list, seed: int) -> dict:
@@ -68,10 +72,12 @@ def judge(capture: Capture, views: list, seed: int) -> dict:
     from scipy.spatial import cKDTree
 
     found = read_views(capture)
-    scale, rotation, shift = similarity(np.array([view.centre for view in found]), np.array([view.centre for view in views]))
+    scale, rotation, shift = similarity(np.array([view.centre for view in found]),
+                                        np.array([view.centre for view in views]))
     true = painted_head.person(seed, 2048)[0].mesh
     head = scale * meshes.read_obj(capture.head).vertices @ rotation.T + shift
-    face = (true.vertices[:, 1] < 0.0) & (np.abs(true.vertices[:, 0]) < 0.06) & (true.vertices[:, 2] > -0.12) & (true.vertices[:, 2] < 0.05)
+    face = (true.vertices[:, 1] < 0.0) & (np.abs(true.vertices[:, 0])
+                                          < 0.06) & (true.vertices[:, 2] > -0.12) & (true.vertices[:, 2] < 0.05)
     off = 1000 * cKDTree(head).query(true.vertices[face])[0]
     return {"metres_per_metre": round(scale, 4), "face_to_nearest_vertex_median_mm": round(float(np.median(off)), 2),
             "face_to_nearest_vertex_p90_mm": round(float(np.percentile(off, 90)), 2),

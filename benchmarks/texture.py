@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Geometry and texture alone: textures of the true albedo frames, taken for the albedo, against those same frames.
 
-    python -m benchmarks.texture CAPTURE TRUTH [--rows NAME ...] [--steps N] [--size N] [--leave-out N] [--pictures FOLDER]
+    python -m benchmarks.texture CAPTURE TRUTH [--rows NAME ...] [--steps N] [--size N] [--leave-out N] [--pictures
+    FOLDER]
 
-CAPTURE is registered (cameras, head.obj); TRUTH is laid out as benchmarks/albedo_score.py says. Its albedo frames go through the `folder` delighter, V = those.
-Prints one JSON with, per row, the score of albedo_score and the marks of benchmarks/detail.py:
-  average      the weighted mean of all views: the minimum of a squared loss
+CAPTURE is registered (cameras, head.obj); TRUTH is laid out as benchmarks/albedo_score.py says. Its albedo frames go
+through the `folder` delighter, V = those. Prints one JSON with, per row, the score of albedo_score and the marks of
+  benchmarks/detail.py: average      the weighted mean of all views: the minimum of a squared loss
   blend        in bands, not aligned                        aligned      what the stage does by default
   perceptual   the aligned blend after --steps of the paper's texture loss
   delit        as aligned, from the capture's own delit frames: what its delighter's errors add
@@ -45,15 +46,16 @@ ROWS = ("average", "blend", "aligned", "perceptual", "delit")
 STEPS = 150
 
 
-def measure(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: int = STEPS, size: int = 1024, leave_out: int = 4,
-            pictures: Path | None = None) -> dict:
+def measure(capture: Capture, truth: Path, rows: tuple[str, ...] = ROWS, steps: int = STEPS, size: int = 1024,
+            leave_out: int = 4, pictures: Path | None = None) -> dict:
     """The figures of all rows. Raises Problem where the capture is not registered or no true frame belongs to it."""
     if not capture.head.is_file():
         raise Problem(f"{capture.root} has no head.obj.", "Run the chain until registration first.")
     head, report, results = read_head(capture), Reporter("texture"), {}
     looks = looks_of(capture, head.caster, truth)
     if "delit" in rows and any(capture.delit.glob("*.png")):
-        results["delit"] = _row("aligned", *texture.observe_all(capture, head, size, report)[:2], looks, steps, pictures and pictures / "delit.jpg")
+        results["delit"] = _row("aligned", *texture.observe_all(capture, head, size, report)[:2], looks, steps,
+                                pictures and pictures / "delit.jpg")
     with tempfile.TemporaryDirectory() as folder:
         copy = Capture(Path(folder) / "copy.wildcap")
         for part in (capture.frames, capture.cameras):
@@ -76,13 +78,16 @@ def looks_of(capture: Capture, caster: raster.RayCaster, truth: Path) -> dict[st
     """Frame name -> what its rays meet, of the registered frames with a true albedo."""
     frames = read_frames(capture).by_name
     known = {true.frame: true for true in read_truth(truth)}
-    found = {view.name: look(caster, view, known[frames[view.name].video_frame]) for view in read_views(capture) if frames[view.name].video_frame in known}
+    found = {view.name: look(caster, view, known[frames[view.name].video_frame]) for view in read_views(capture)
+             if frames[view.name].video_frame in known}
     if not found:
-        raise Problem(f"No registered frame of {capture.root} has a true albedo in {truth}.", "Check that the two belong together.")
+        raise Problem(f"No registered frame of {capture.root} has a true albedo in {truth}.",
+                      "Check that the two belong together.")
     return found
 
 
-def _row(row: str, observations: list, surface, looks: dict[str, FaceRays], steps: int, picture: Path | None = None) -> dict:
+def _row(row: str, observations: list, surface, looks: dict[str, FaceRays], steps: int,
+         picture: Path | None = None) -> dict:
     started = time.monotonic()
     map_ = _texture(row, [replace(o) for o in observations], surface, steps)
     seconds = time.monotonic() - started
@@ -95,7 +100,8 @@ def _texture(row: str, observations: list, surface, steps: int) -> np.ndarray:
     """A row's map, sRGB [S, S, 3]. The observations are used up."""
     if row == "average":
         linear = weighted_mean([np.exp(o.log_colour) for o in observations], [o.weight for o in observations])
-        confidence = np.where(surface.covered, 1 - np.prod([1 - o.quality for o in observations], axis=0), 0).astype(np.float32)
+        confidence = np.where(surface.covered, 1 - np.prod([1 - o.quality for o in observations], axis=0),
+                              0).astype(np.float32)
     else:
         settings = from_json({"texture": {"perceptual": steps if row == "perceptual" else 0}})
         built = texture.build(observations, surface, settings, Reporter("texture"), aligned=row != "blend")
@@ -111,17 +117,19 @@ def score(map_: np.ndarray, frames: Iterable[FaceRays]) -> dict:
         scores.append(compare(predicted, seen.true, seen.true.face & hit))
         found.append(marks(seen, map_))
     mean = mean_scores(scores)
-    return {**mean["raw"], **{f"{name}_after_gain": value for name, value in mean["gain"].items()}, "detail": mean["detail"],
-            "shadow_step": mean["shadow_step"], "frames": len(scores), **mean_of(found)}
+    return {**mean["raw"], **{f"{name}_after_gain": value for name, value in mean["gain"].items()},
+            "detail": mean["detail"], "shadow_step": mean["shadow_step"], "frames": len(scores), **mean_of(found)}
 
 
 def _leave_one_out(observations: list, surface, looks: dict[str, FaceRays], count: int) -> dict:
     """The aligned texture without one view, scored in that view alone; `count` views in turn, evenly spread."""
     names = [o.name for o in observations if o.name in looks]
     chosen = [names[i] for i in np.unique(np.linspace(1, max(len(names) - 2, 1), count).round().astype(int))]
-    frames = {name: score(_texture("aligned", [replace(o) for o in observations if o.name != name], surface, 0), [looks[name]]) for name in chosen}
+    frames = {name: score(_texture("aligned", [replace(o) for o in observations if o.name != name], surface, 0),
+                          [looks[name]]) for name in chosen}
     figures = ("psnr", "ssim", "detail", "mole_contrast", "pore_contrast", "pore_correlation")
-    return {**{f: float(np.mean(values)) for f in figures if (values := [v[f] for v in frames.values() if v.get(f) is not None])}, "frames": frames}
+    return {**{f: float(np.mean(values)) for f in figures
+               if (values := [v[f] for v in frames.values() if v.get(f) is not None])}, "frames": frames}
 
 
 def main() -> None:
@@ -134,8 +142,8 @@ def main() -> None:
     parser.add_argument("--leave-out", type=int, default=4, help="frames that are left out in turn; 0 for none")
     parser.add_argument("--pictures", type=Path, help="folder for the rows' textures")
     options = parser.parse_args()
-    print(json.dumps(measure(Capture(options.capture.resolve()), options.truth, tuple(options.rows), options.steps, options.size, options.leave_out,
-                             options.pictures), indent=1))
+    print(json.dumps(measure(Capture(options.capture.resolve()), options.truth, tuple(options.rows), options.steps,
+                             options.size, options.leave_out, options.pictures), indent=1))
 
 
 if __name__ == "__main__":

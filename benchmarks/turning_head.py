@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head that turns, and talks, before a fixed camera and a bare wall, above a shirt that keeps still: what the chain says of it, and in which time.
+"""A head that turns, and talks, before a fixed camera and a bare wall, above a shirt that keeps still: what the chain
+says of it, and in which time.
 
     python -m benchmarks.turning_head FOLDER [--silent] [--until STAGE] [--json docs/figures/turning_head.json]
 
-The film is that of core/synthetic/painted_head.py: 300 frames of 384 x 512 pixels. With --silent nobody talks in it. FOLDER gets it and the capture; what
-is there is not made again. With --until cameras the chain ends there.
+The film is that of core/synthetic/painted_head.py: 300 frames of 384 x 512 pixels. With --silent nobody talks in it.
+FOLDER gets it and the capture; what is there is not made again. With --until cameras the chain ends there.
 """
 
 from __future__ import annotations
@@ -44,25 +45,33 @@ def main() -> int:
         write_video(film, pictures(0.0 if arguments.silent else JAW))
     stage_cost.measure(capture.root, "frames", film.resolve(), "draft")
     cost = stage_cost.measure(capture.root, "cameras", film.resolve(), "draft")
-    command = [sys.executable, "-m", "core", "run", str(film), str(capture.root), "--quality", "draft", "--until", arguments.until]
+    command = [sys.executable, "-m", "core", "run", str(film), str(capture.root), "--quality", "draft", "--until",
+               arguments.until]
     said = subprocess.run(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     record = capture.read()
     stages = {stage: round(done["seconds"], 1) for stage, done in record["stages"].items()}
     findings = [finding["problem"] for done in record["stages"].values() for finding in done.get("findings", [])]
-    row = {"seconds": round(sum(stages.values()), 1), "stages": stages, "cost": cost, "exit": said.returncode, "findings": {str(k): said for k, said in
-           enumerate(findings)}, "cameras": record["stages"].get("cameras", {}).get("figures", {}), "stopped": record.get("stopped")}
+    row = {"seconds": round(sum(stages.values()), 1), "stages": stages, "cost": cost, "exit": said.returncode,
+           "findings": {str(k): said for k, said in
+           enumerate(findings)}, "cameras": record["stages"].get("cameras", {}).get("figures", {}),
+           "stopped": record.get("stopped")}
     print(said.stdout[-2000:], *findings, row, sep="\n")
     if arguments.json:
-        figures.write(arguments.json, "turning_head", "python -m benchmarks.turning_head FOLDER", {name: row}, keep=True)
-    return 0 if any("stood still" in text for text in [*findings, (record.get("stopped") or {}).get("problem", "")]) else 1
+        figures.write(arguments.json, "turning_head", "python -m benchmarks.turning_head FOLDER", {name: row},
+                      keep=True)
+    return (0 if any("stood still" in text for text in [*findings, (record.get("stopped") or {}).get("problem", "")])
+            else 1)
 
 
 def pictures(jaw: float):
     """The film's frames, sRGB [512, 384, 3]; jaw: how far it opens while the person talks."""
     view = camera(0, 0.03, scale=SCALE)
-    shirt = images.linear_to_srgb(images.resize(np.random.default_rng(2).random((40, 40, 3), np.float32) ** 2, view.width, view.width))
+    shirt = images.linear_to_srgb(images.resize(np.random.default_rng(2).random((40, 40, 3), np.float32) ** 2,
+                                                view.width, view.width))
     y, x = np.mgrid[:view.height, :view.width]
-    worn = y > view.height - 0.16 * view.width - 0.25 * np.sqrt(np.maximum((0.5 * view.width) ** 2 - (x - view.width / 2) ** 2, 0)) + 0.1 * view.width
+    worn = y > view.height - 0.16 * view.width - 0.25 * np.sqrt(np.maximum((0.5 * view.width) ** 2
+                                                                           - (x - view.width / 2) ** 2,
+                                                                           0)) + 0.1 * view.width
     for i in range(FRAMES):
         opened = jaw * np.sin(np.pi * i / SYLLABLE) ** 2 * (i % SENTENCE < 2 * SENTENCE / 3)
         picture = photograph(view, WIDEST_DEG * np.sin(2 * np.pi * i / FRAMES), wall=False, jaw=opened)

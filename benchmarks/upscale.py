@@ -1,14 +1,16 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Four times as many texels of a side: the network against Lanczos on subjects that no training saw, and what the frames add.
+"""Four times as many texels of a side: the network against Lanczos on subjects that no training saw, and what the
+frames add.
 
     python -m benchmarks.upscale [--rows enlarging frames cost] [--work DIR] [--json FILE] [--picture FILE]
 
-enlarging: windows of the benchmark's subjects painted at 4096, reduced to 1024 as they are (plain) and softened as a solver leaves them (soft). PSNR, SSIM
-per map, FLIP and the distance in EfficientNet-Lite0's features (not LPIPS) for the diffuse, the mean angle in degrees for the normals.
-frames: a subject filmed closely by known cameras in even light; what stage texture finds in the frames goes into the enlarged albedo. Besides PSNR and SSIM
-at 2048, pores is the correlation with the truth of what is finer than a texel of the 1024 map, moles the share of their depth that is left in it.
-cost: 1024 to 4096 in a process of its own, seconds and peak memory.
+enlarging: windows of the benchmark's subjects painted at 4096, reduced to 1024 as they are (plain) and softened as a
+solver leaves them (soft). PSNR, SSIM per map, FLIP and the distance in EfficientNet-Lite0's features (not LPIPS) for
+the diffuse, the mean angle in degrees for the normals. frames: a subject filmed closely by known cameras in even light;
+what stage texture finds in the frames goes into the enlarged albedo. Besides PSNR and SSIM at 2048, pores is the
+correlation with the truth of what is finer than a texel of the 1024 map, moles the share of their depth that is left in
+it. cost: 1024 to 4096 in a process of its own, seconds and peak memory.
 """
 
 from __future__ import annotations
@@ -61,9 +63,11 @@ CLOSE = 9.0
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rows", nargs="+", choices=("enlarging", "frames", "cost"), default=("enlarging", "frames", "cost"))
+    parser.add_argument("--rows", nargs="+", choices=("enlarging", "frames", "cost"),
+                        default=("enlarging", "frames", "cost"))
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "wildcap_upscale_benchmark")
-    parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/upscale.json; those of other rows stay")
+    parser.add_argument("--json", type=Path,
+                        help="where the figures go, such as docs/figures/upscale.json; those of other rows stay")
     parser.add_argument("--picture", type=Path, help="close-ups of small map, Lanczos, network and truth side by side")
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
@@ -73,11 +77,14 @@ def main() -> None:
     if "frames" in arguments.rows:
         found["frames"] = from_frames(arguments.work)
     if "cost" in arguments.rows:
-        with ProcessPoolExecutor(1, mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:  # each in a fresh process, whose peak is its own
+        # each in a fresh process, whose peak is its own
+        with ProcessPoolExecutor(1, mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:
             found["cost"] = dict(zip(METHODS, pool.map(cost, METHODS), strict=True))
     print("\n\n".join(_table(name, rows) for name, rows in found.items()))
     if arguments.json:
-        keyed = {part: {row.replace("lanczos", "Lanczos"): {figure.lower().replace(" ", "_"): value for figure, value in values.items()}
+        keyed = {part: {row.replace("lanczos",
+                                    "Lanczos"): {figure.lower().replace(" ", "_"): value
+                                                 for figure, value in values.items()}
                         for row, values in rows.items()} for part, rows in found.items()}
         write(arguments.json, "upscale", "python -m benchmarks.upscale", keyed, keep=True)
 
@@ -98,7 +105,8 @@ def enlarging(work: Path, sheet: Path | None = None) -> dict[str, dict[str, floa
                     scores[method].append(compare(result, true))
                 if view == 0 and kind == "soft":
                     shots.append(_closeup(small, {method: results[method] for method in METHODS}, true))
-        found |= {f"{kind}, {method}": {name: round(float(np.mean([s[name] for s in rows])), 4) for name in rows[0]} for method, rows in scores.items()}
+        found |= {f"{kind}, {method}": {name: round(float(np.mean([s[name] for s in rows])), 4) for name in rows[0]}
+                  for method, rows in scores.items()}
     if sheet:
         images.write_srgb(sheet, np.vstack([np.hstack(shots[:2]), np.hstack(shots[2:4])]), quality=86)
     return found
@@ -109,7 +117,8 @@ def compare(result: np.ndarray, true: np.ndarray) -> dict[str, float]:
     result, true = (maps[BORDER:-BORDER, BORDER:-BORDER] for maps in (result, true))
     figures = {}
     for name, channels in (("diffuse", slice(0, 3)), ("specular", slice(6, 7)), ("normal", slice(3, 6))):
-        one, other = (maps[..., channels] * (0.5 if name == "normal" else 1) + (0.5 if name == "normal" else 0) for maps in (result, true))
+        one, other = (maps[..., channels] * (0.5 if name == "normal" else 1) + (0.5 if name == "normal" else 0)
+                      for maps in (result, true))
         figures[f"{name} PSNR"] = float(-10 * np.log10(np.mean((one - other) ** 2)))
         figures[f"{name} SSIM"] = float(structural_similarity(one, other, channel_axis=2, data_range=1.0))
     diffuse, true_diffuse = (np.ascontiguousarray(maps[..., :3]) for maps in (result, true))
@@ -117,7 +126,9 @@ def compare(result: np.ndarray, true: np.ndarray) -> dict[str, float]:
     figures["diffuse FLIP"] = float(np.mean(flip))
     if (distance := feature_distance(diffuse, true_diffuse)) is not None:
         figures["diffuse features"] = float(distance.mean())
-    cosine = (result[..., 3:6] * true[..., 3:6]).sum(-1) / np.maximum(np.linalg.norm(result[..., 3:6], axis=-1) * np.linalg.norm(true[..., 3:6], axis=-1), 1e-6)
+    cosine = (result[..., 3:6]
+              * true[..., 3:6]).sum(-1) / np.maximum(np.linalg.norm(result[..., 3:6], axis=-1)
+                                                     * np.linalg.norm(true[..., 3:6], axis=-1), 1e-6)
     figures["normal degrees"] = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean())
     return figures
 
@@ -125,10 +136,12 @@ def compare(result: np.ndarray, true: np.ndarray) -> dict[str, float]:
 def cost(method: str, size: int = 1024) -> dict[str, float]:
     """Seconds and peak memory in GiB of enlarging maps of that size, in the process it is called in."""
     rng, blank = np.random.default_rng(0), np.ones((size, size, 3), np.float32)
-    maps = HeadMaps(rng.random((size, size, 3), np.float32), blank / np.sqrt(3), rng.random((size, size), np.float32), blank[..., 0], blank)
+    maps = HeadMaps(rng.random((size, size, 3), np.float32), blank / np.sqrt(3), rng.random((size, size), np.float32),
+                    blank[..., 0], blank)
     began = time.perf_counter()
     enlarged(maps, FACTOR * size, method, "cpu", lambda done: None)
-    return {"seconds": round(time.perf_counter() - began, 1), "peak GiB": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20, 2)}
+    return {"seconds": round(time.perf_counter() - began, 1),
+            "peak GiB": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20, 2)}
 
 
 def _enlarged(small: np.ndarray, method: str) -> np.ndarray:
@@ -145,7 +158,8 @@ def _closeup(small: np.ndarray, results: dict[str, np.ndarray], true: np.ndarray
     row, column = (int(at) + side // 2 for at in np.unravel_index(log.argmax(), log.shape))
     nearest = np.repeat(np.repeat(np.moveaxis(small, 0, -1), FACTOR, 0), FACTOR, 1)
     parts = [maps[row:row + side, column:column + side] for maps in (nearest, *results.values(), true)]
-    both = np.vstack([np.hstack([part[..., :3] for part in parts]), np.hstack([part[..., 3:6] * 0.5 + 0.5 for part in parts])])
+    both = np.vstack([np.hstack([part[..., :3] for part in parts]),
+                      np.hstack([part[..., 3:6] * 0.5 + 0.5 for part in parts])])
     return np.pad(both, ((0, 8), (0, 8), (0, 0)), constant_values=1)
 
 
@@ -164,14 +178,17 @@ def from_frames(work: Path) -> dict[str, dict[str, float]]:
             detail.guide(guided, images.read_data(capture.texture_detail), 1024, lambda done: None)
             for name, albedo in ((method, plain), (f"{method}, with the frames", guided)):
                 rows.setdefault(name, []).append(_fine_figures(albedo, true, seen))
-    return {name: {figure: round(float(np.mean([r[figure] for r in found])), 4) for figure in found[0]} for name, found in rows.items()}
+    return {name: {figure: round(float(np.mean([r[figure] for r in found])), 4) for figure in found[0]}
+            for name, found in rows.items()}
 
 
 def filmed(seed: int, folder: Path) -> tuple[Capture, np.ndarray]:
-    """A capture of a reserved subject in even light, with its texture made, and its true albedo, sRGB [2048, 2048, 3]. Made once."""
+    """A capture of a reserved subject in even light, with its texture made, and its true albedo, sRGB [2048, 2048, 3].
+    Made once."""
     capture = Capture(folder)
     if not (capture.root / "truth.png").is_file():
-        mesh, true, rng = subject_mesh(seed), make_skin(sample_parameters(seed), 2048).diffuse, np.random.default_rng([seed, 50])
+        mesh, true, rng = subject_mesh(seed), make_skin(sample_parameters(seed),
+                                                        2048).diffuse, np.random.default_rng([seed, 50])
         views = [camera(azimuth, 0.0, scale=CLOSE) for azimuth in (-45, -25, -8, 8, 25, 45)]
         caster = raster.RayCaster(mesh)
         write_views(capture, views, (picture(caster, view, 0.8 * true, rng, rays=1) for view in views))
@@ -185,7 +202,8 @@ def filmed(seed: int, folder: Path) -> tuple[Capture, np.ndarray]:
 
 
 def _stacked(srgb: np.ndarray) -> np.ndarray:
-    """The network's channels of an albedo at 2048 on smooth skin, at 4096, of which a solver's map is a quarter: [7, 4096, 4096]."""
+    """The network's channels of an albedo at 2048 on smooth skin, at 4096, of which a solver's map is a quarter: [7,
+    4096, 4096]."""
     maps = np.zeros((CHANNELS, 4096, 4096), np.float32)
     maps[:3] = srgb.repeat(2, 0).repeat(2, 1).transpose(2, 0, 1)
     maps[5], maps[6] = 1, 0.35
@@ -202,13 +220,16 @@ def _fine_figures(albedo: np.ndarray, true: np.ndarray, seen: np.ndarray) -> dic
     for row, column in moles(true_spots, inner & (template.mask("brows", 1024) < 0.1).repeat(2, 0).repeat(2, 1)):
         near[row - 6:row + 7, column - 6:column + 7] = True
     return {"PSNR": float(-10 * np.log10(((albedo - true)[inner] ** 2).mean())), "SSIM": float(ssim[inner].mean()),
-            "pores": float(np.corrcoef(fine[inner], true_fine[inner])[0, 1]), "moles": float((spots * true_spots)[near].sum() / (true_spots[near] ** 2).sum())}
+            "pores": float(np.corrcoef(fine[inner], true_fine[inner])[0, 1]),
+            "moles": float((spots * true_spots)[near].sum() / (true_spots[near] ** 2).sum())}
 
 
 def _table(name: str, rows: dict[str, dict[str, float]]) -> str:
     figures = list(next(iter(rows.values())))
     lines = [f"| {name} | " + " | ".join(figures) + " |", "|" + " --- |" * (len(figures) + 1)]
-    return "\n".join(lines + [f"| {row} | " + " | ".join(f"{values[f]:.4g}" for f in figures) + " |" for row, values in rows.items()])
+    return "\n".join(lines
+                     + [f"| {row} | " + " | ".join(f"{values[f]:.4g}" for f in figures) + " |"
+                        for row, values in rows.items()])
 
 
 if __name__ == "__main__":

@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Problems in UV space with known truth, for measuring the solver: subjects that no training saw, lit and shadowed as the paper assumes, not quite.
+"""Problems in UV space with known truth, for measuring the solver: subjects that no training saw, lit and shadowed as
+the paper assumes, not quite.
 
-texture = albedo * (global SH + the rest) * shadow, blurred by a texel, with noise. The global SH are fitted to a sky with its occlusion and a sun; the rest
-is what they cannot explain, scaled to 10 % of the light; shadow is what cast shadows leave of it, per channel. Of kind "delit" the shading is nearly
-flat already, 30 to 60 % of each shadow is left and the colour is off by a few percent over large regions, as a delighter leaves its frames.
+texture = albedo * (global SH + the rest) * shadow, blurred by a texel, with noise. The global SH are fitted to a sky
+with its occlusion and a sun; the rest is what they cannot explain, scaled to 10 % of the light; shadow is what cast
+shadows leave of it, per channel. Of kind "delit" the shading is nearly flat already, 30 to 60 % of each shadow is left
+and the colour is off by a few percent over large regions, as a delighter leaves its frames.
 """
 
 from __future__ import annotations
@@ -32,9 +34,11 @@ from core.synthetic.skin import make_skin
 from core.training.carry import carry
 
 SHADOWS = {"leaves, hard": ("leaves", 0.005), "edge, half soft": ("edge", 0.012), "blinds, soft": ("blinds", 0.025)}
-"""Name -> (what throws it, angular radius of the sun in radians). The head's own shadow (nose, brow, chin) falls on every problem."""
+"""Name -> (what throws it, angular radius of the sun in radians). The head's own shadow (nose, brow, chin) falls on
+every problem."""
 MASKED = 0.12, 0.5
-"""Share of the face that the mask covers: lights that leave more or less are drawn again, as are those that leave lit skin nearly black."""
+"""Share of the face that the mask covers: lights that leave more or less are drawn again, as are those that leave lit
+skin nearly black."""
 UNEXPLAINED = 0.10  # of the light, root mean square: what second-order SH cannot explain
 NOISE = 0.004  # deviation, linear
 LEE_PERRY_SMITH = Path(__file__).parents[2] / "shared" / "data" / "lee_perry_smith"
@@ -43,7 +47,8 @@ CACHE = Path(tempfile.gettempdir()) / "wildcap_ablation"
 
 @dataclass(frozen=True)
 class MaskedUvProblem:
-    """float32, linear. albedo, texture [S, S, 3]; shadow [S, S]: the blocked share of the sun; mask [S, S]: M as an artist would paint it, a bit too large."""
+    """float32, linear. albedo, texture [S, S, 3]; shadow [S, S]: the blocked share of the sun; mask [S, S]: M as an
+    artist would paint it, a bit too large."""
 
     albedo: np.ndarray
     texture: np.ndarray
@@ -56,14 +61,17 @@ class MaskedUvProblem:
         return template.mask("face", len(self.albedo)) > 0.5
 
     def regions(self) -> dict[str, np.ndarray]:
-        """Name -> bool [S, S]: in the shadow, in a band of 12 texels (of a 1024 map) to either side of its border, and outside."""
+        """Name -> bool [S, S]: in the shadow, in a band of 12 texels (of a 1024 map) to either side of its border, and
+        outside."""
         edge = cv2.morphologyEx((self.shadow > 0.5).astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
         band = cv2.dilate(edge, np.ones((25 * len(self.albedo) // 1024 | 1,) * 2, np.uint8)) > 0
-        return {"shadow": self.face & (self.shadow > 0.5) & ~band, "band": self.face & band, "outside": self.face & (self.shadow < 0.05) & ~band}
+        return {"shadow": self.face & (self.shadow > 0.5) & ~band, "band": self.face & band,
+                "outside": self.face & (self.shadow < 0.05) & ~band}
 
 
 def problem(subject: str, shadows: str, size: int, kind: str = "raw") -> MaskedUvProblem:
-    """`subject`: a seed of core/synthetic, "lee_perry_smith", or the path of a skin in our UVs (sRGB); `shadows` from SHADOWS; `kind`: raw or delit.
+    """`subject`: a seed of core/synthetic, "lee_perry_smith", or the path of a skin in our UVs (sRGB); `shadows` from
+    SHADOWS; `kind`: raw or delit.
 
     The same arguments give the same problem.
     """
@@ -89,14 +97,17 @@ def albedo_of(subject: str, size: int) -> np.ndarray:
 
 
 def lee_perry_smith() -> Path:
-    """The scan's colour map in our UVs, carried there once and kept outside of this repository (the scan is CC BY and no part of it)."""
+    """The scan's colour map in our UVs, carried there once and kept outside of this repository (the scan is CC BY and
+    no part of it)."""
     out = CACHE / "lee_perry_smith"
     if not (out / "carried.json").is_file():
         scan = trimesh.load(LEE_PERRY_SMITH / "LeePerrySmith.glb").geometry["LeePerrySmith"]
-        uvs = np.asarray(scan.visual.uv) * [1, -1] + [0, 1]  # this file's v grows downwards, against the glTF reader's reading
+        # this file's v grows downwards, against the glTF reader's reading
+        uvs = np.asarray(scan.visual.uv) * [1, -1] + [0, 1]
         folder = CACHE / "lee_perry_smith_source"
         folder.mkdir(parents=True, exist_ok=True)
-        meshes.write_obj(folder / "head.obj", meshes.Mesh(np.asarray(scan.vertices), np.asarray(scan.faces), uvs, np.asarray(scan.faces)))
+        meshes.write_obj(folder / "head.obj",
+                         meshes.Mesh(np.asarray(scan.vertices), np.asarray(scan.faces), uvs, np.asarray(scan.faces)))
         with replacing(folder / f"{LEE_PERRY_SMITH.name}.jpg") as temporary:
             temporary.write_bytes((LEE_PERRY_SMITH / "Map-COL.jpg").read_bytes())
         carry(folder, out, folder / "head.obj", 1024, Reporter("carry"))
@@ -104,9 +115,13 @@ def lee_perry_smith() -> Path:
 
 
 def _chosen_light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The first usable one of the random lights; kept in CACHE under a name that changes with the sources it comes from."""
+    """The first usable one of the random lights; kept in CACHE under a name that changes with the sources it comes
+    from."""
     sources = b"".join(Path(module).read_bytes() for module in (__file__, light.__file__))
-    stored = CACHE / f"light_{hashlib.blake2b(repr((shadows, seeds, size)).encode() + sources, digest_size=12).hexdigest()}.npz"
+    stored = (
+        CACHE
+        / f"light_{hashlib.blake2b(repr((shadows, seeds, size)).encode() + sources, digest_size=12).hexdigest()}.npz"
+    )
     if not stored.is_file():
         drawn = next(i for i in range(1000) if _usable(*_light(shadows, (*seeds, i), 48)))
         CACHE.mkdir(parents=True, exist_ok=True)
@@ -117,7 +132,8 @@ def _chosen_light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.n
 
 
 def _light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A random light: shading without cast shadows [S, S, 3], the share of it that these leave [S, S, 3], and the blocked share of the sun [S, S]."""
+    """A random light: shading without cast shadows [S, S, 3], the share of it that these leave [S, S, 3], and the
+    blocked share of the sun [S, S]."""
     thrown_by, radius = SHADOWS[shadows]
     rng = np.random.default_rng(seeds)
     drawn = replace(random_light(rng), radius=radius)
@@ -127,20 +143,23 @@ def _light(shadows: str, seeds: tuple[int, ...], size: int) -> tuple[np.ndarray,
     even = _sh_part(open_light, normal, face)
     rest = open_light - even
     rest *= UNEXPLAINED * even[face].mean() / np.sqrt((rest[face] ** 2).mean())
-    return np.maximum(even + rest, 0.05 * even[face].mean()), np.clip(lit / np.maximum(open_light, 1e-4), 0.05, 1), shadow
+    return np.maximum(even + rest,
+                      0.05 * even[face].mean()), np.clip(lit / np.maximum(open_light, 1e-4), 0.05, 1), shadow
 
 
 def _usable(shading: np.ndarray, kept: np.ndarray, shadow: np.ndarray) -> bool:
     face = template.mask("face", len(shadow)) > 0.5
     lightness = shading[face].mean(-1)
     dark = kept[face & (shadow > 0.5)]
-    return (MASKED[0] < _painted(shadow)[face].mean() < MASKED[1] and (shadow[face] > 0.5).mean() > MASKED[0] / 2 and 0.2 < dark.mean() < 0.75
+    return (MASKED[0] < _painted(shadow)[face].mean() < MASKED[1] and (shadow[face] > 0.5).mean() > MASKED[0] / 2
+            and 0.2 < dark.mean() < 0.75
             and np.percentile(lightness, 3) > 0.3 * lightness.mean())
 
 
 def _painted(shadow: np.ndarray) -> np.ndarray:
     """The mask an artist would paint over a shadow: all of it and a little more."""
-    return cv2.dilate((shadow > 0.08).astype(np.uint8), np.ones((9 * len(shadow) // 1024 | 1,) * 2, np.uint8)).astype(np.float32)
+    return cv2.dilate((shadow > 0.08).astype(np.uint8),
+                      np.ones((9 * len(shadow) // 1024 | 1,) * 2, np.uint8)).astype(np.float32)
 
 
 def _sh_part(shading: np.ndarray, normal: np.ndarray, face: np.ndarray) -> np.ndarray:

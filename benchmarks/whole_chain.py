@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which stage costs what: a solved capture's score beside the scores with one stage replaced by the truth or switched off.
+"""Which stage costs what: a solved capture's score beside the scores with one stage replaced by the truth or switched
+off.
 
     python -m benchmarks.whole_chain CAPTURE TRUTH [--rows NAME ...] [--delighters NAME ...]
 
-CAPTURE has been run from TRUTH/capture.mp4 with the true skin tone; TRUTH is laid out as benchmarks/albedo_score.py says. Prints one JSON:
-  chain         the capture's own maps
+CAPTURE has been run from TRUTH/capture.mp4 with the true skin tone; TRUTH is laid out as benchmarks/albedo_score.py
+  says. Prints one JSON: chain         the capture's own maps
   solve_off     its texture, scaled to the tone, taken for the albedo
   raw_texture   the same without any delighting: what geometry and light leave
   true_frames   the true albedo frames through the folder delighter: what geometry, texture and solver cost
@@ -48,7 +49,9 @@ def main() -> None:
     parser.add_argument("truth", type=Path)
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS)
     parser.add_argument("--delighters", nargs="+", default=DELIGHTERS, help="of the row delighters")
-    parser.add_argument("--json", type=Path, help="where the table's figures go, such as docs/figures/whole_chain.json; those of other captures stay")
+    parser.add_argument("--json", type=Path,
+                        help="where the table's figures go, such as docs/figures/whole_chain.json; those of other "
+                             "captures stay")
     arguments = parser.parse_args()
     capture = Capture(arguments.capture.resolve())
     tone = skin_tone(arguments.truth)
@@ -59,16 +62,18 @@ def main() -> None:
         rows["delighters"] = {name: _row("delighter", capture, arguments.truth, of) for name, of in chosen.items()}
     print(json.dumps(rows, indent=1))
     if arguments.json:
-        write(arguments.json, "whole_chain", "python -m benchmarks.whole_chain CAPTURE TRUTH --rows chain solve_off true_mask mask delighters",
+        write(arguments.json, "whole_chain",
+              "python -m benchmarks.whole_chain CAPTURE TRUTH --rows chain solve_off true_mask mask delighters",
               _figures(capture, rows), keep=True)
 
 
 def _figures(capture: Capture, rows: dict) -> dict:
-    """PSNR and SSIM per "CAPTURE, DELIGHTER" of the texture at the true tone, the solve and the solve with the true mask, and the mask's intersection over
-    union; None is what was not run."""
+    """PSNR and SSIM per "CAPTURE, DELIGHTER" of the texture at the true tone, the solve and the solve with the true
+    mask, and the mask's intersection over union; None is what was not run."""
     name, own = capture.root.stem, capture.read()["stages"]["delight"]["figures"]["delighter"]
     chains = {own: (rows.get("solve_off"), rows.get("chain"), rows.get("true_mask"))}
-    chains |= {delighter: (row["solve_off"], row, chains.get(delighter, (None,))[-1]) for delighter, row in rows.get("delighters", {}).items()}
+    chains |= {delighter: (row["solve_off"], row, chains.get(delighter, (None,))[-1])
+               for delighter, row in rows.get("delighters", {}).items()}
     found = {}
     for delighter, scores in chains.items():
         cells = {column: {figure: score and score["raw"][figure] for figure in ("psnr", "ssim")}
@@ -82,7 +87,8 @@ def _row(row: str, capture: Capture, truth: Path, settings: Settings) -> dict:
         return score_capture(capture, truth)
     with tempfile.TemporaryDirectory() as folder:
         copy = Capture(Path(folder) / "copy.wildcap")
-        shutil.copytree(capture.root, copy.root, ignore=shutil.ignore_patterns("maps*", "preview", "checkpoints", "renders", "lock"))
+        shutil.copytree(capture.root, copy.root,
+                        ignore=shutil.ignore_patterns("maps*", "preview", "checkpoints", "renders", "lock"))
         copy.shadow_mask.unlink(missing_ok=True)
         if row == "solve_off":
             return _score_texture(copy, truth, settings)
@@ -94,7 +100,8 @@ def _row(row: str, capture: Capture, truth: Path, settings: Settings) -> dict:
             _run(copy, settings, "delight", "texture", "shadow_mask", "solve")
             return {**score_capture(copy, truth), "solve_off": _score_texture(copy, truth, settings)}
         if row == "true_frames":
-            _run(copy, from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings), "delight", "texture", "shadow_mask", "solve")
+            _run(copy, from_json({"delight": {"delighter": "folder", "folder": str(truth / "albedo")}}, settings),
+                 "delight", "texture", "shadow_mask", "solve")
             return {**score_capture(copy, truth), "solve_off": _score_texture(copy, truth, settings)}
         shadow, seen = _true_shadow(copy, truth, 512)
         if row == "mask":

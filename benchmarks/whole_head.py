@@ -4,15 +4,17 @@
 
     python -m benchmarks.whole_head [--seeds 9101 9102 ...] [--size 512] [CAPTURE ...]
 
-Synthetic subjects (truth known everywhere, only the face seen), mean over the seeds, as {"fill", "completed"}; `fill` is what the solver gives where
-nobody looked, its mean face in the subject's tone:
+Synthetic subjects (truth known everywhere, only the face seen), mean over the seeds, as {"fill", "completed"}; `fill`
+is what the solver gives where nobody looked, its mean face in the subject's tone:
   neck, ears, scalp   mean error of the hidden albedo's tone (over 2 mm), sRGB of 255
   grain               deviation of log albedo between 0.5 and 1 mm, hidden neck over face; 1 is alike
-  brows, beard        correlation of the mask with what the painted hair takes from the albedo; bare_chin: cm^2 of beard found where there is none
-  below_hair          error of the albedo under brows and beard against the skin painted without hair, sRGB of 255: {"with hair", "clean"}
-Captures: border, the mean step of the log tone from 8 mm inside the seen part to 6 mm outside, {"fill", "completed", "within"}, the last between
-places as far apart inside; with --subject SEED (the captures are of that synthetic person) tone, the errors as above where nobody looked; cut, the
-step over the map's own cut beside that of neighbours; hair, cm^2.
+  brows, beard        correlation of the mask with what the painted hair takes from the albedo; bare_chin: cm^2 of beard
+  found where there is none below_hair          error of the albedo under brows and beard against the skin painted
+  without hair, sRGB of 255: {"with hair", "clean"}
+Captures: border, the mean step of the log tone from 8 mm inside the seen part to 6 mm outside, {"fill", "completed",
+"within"}, the last between places as far apart inside; with --subject SEED (the captures are of that synthetic person)
+tone, the errors as above where nobody looked; cut, the step over the map's own cut beside that of neighbours; hair,
+cm^2.
 """
 
 from __future__ import annotations
@@ -54,7 +56,8 @@ def main() -> None:
     parser.add_argument("--seeds", nargs="*", type=int, default=SEEDS)
     parser.add_argument("--subject", type=int)
     parser.add_argument("--size", type=int, default=512)
-    parser.add_argument("--json", type=Path, help="where the figures go, such as docs/figures/whole_head.json; those of other captures stay")
+    parser.add_argument("--json", type=Path,
+                        help="where the figures go, such as docs/figures/whole_head.json; those of other captures stay")
     asked = parser.parse_args()
     found = {}
     if asked.seeds:
@@ -76,27 +79,34 @@ def whole(seed: int, surface: HeadSurface) -> dict:
     tone = torch.from_numpy((truth.diffuse * skin.numpy()[..., None]).sum((0, 1)) / float(skin.sum())).float()
     mean = face_of_tone(load().mean_face, tone, skin)[0].numpy().transpose(1, 2, 0)
     shown = np.clip(2 * face, 0, 1)[..., None]
-    cut = replace(truth, confidence=(0.7 * face).astype(np.float32), diffuse=(truth.diffuse * shown + (mean[..., :3] + 1) / 2 * (1 - shown)).astype(np.float32),
-                  specular=(truth.specular * shown[..., 0] + (mean[..., 6] + 1) / 2 * (1 - shown[..., 0])).astype(np.float32))
+    cut = replace(truth, confidence=(0.7 * face).astype(np.float32),
+                  diffuse=(truth.diffuse * shown + (mean[..., :3] + 1) / 2 * (1 - shown)).astype(np.float32),
+                  specular=(truth.specular * shown[..., 0] + (mean[..., 6] + 1) / 2
+                            * (1 - shown[..., 0])).astype(np.float32))
     done, hidden = complete(cut, surface, Reporter("upscale"), seed), face < 0.02
     row: dict = {}
     for region in ("neck", "ears", "scalp"):
         where = hidden & (template.mask(region, size) > 0.9)
-        row[region] = {name: _error(*(_tone(m, surface) for m in (maps, truth)), where) for name, maps in (("fill", cut), ("completed", done))}
+        row[region] = {name: _error(*(_tone(m, surface) for m in (maps, truth)), where)
+                       for name, maps in (("fill", cut), ("completed", done))}
     near = hidden & (template.mask("neck", size) > 0.9) & (surface.texel < 1.5 * np.median(surface.texel))
-    row["grain"] = {name: _grain(maps, near, surface) / _grain(truth, skin.numpy() > 0.99, surface) for name, maps in (("fill", cut), ("completed", done))}
+    row["grain"] = {name: _grain(maps, near, surface) / _grain(truth, skin.numpy() > 0.99, surface)
+                    for name, maps in (("fill", cut), ("completed", done))}
     return row
 
 
 def hairs(seed: int, surface: HeadSurface) -> dict:
     """How well hair is found and taken away; the subject three times: bearded, shaven, without brows."""
-    bearded, shaven, bare = (_painted(surface, seed, **changes) for changes in ({"beard": 0.8, "beard_length": 1.0}, {"beard": 0.0},
-                                                                                {"beard": 0.0, "brow_density": 0.0}))
+    bearded, shaven, bare = (_painted(surface, seed, **changes)
+                             for changes in ({"beard": 0.8, "beard_length": 1.0}, {"beard": 0.0},
+                                             {"beard": 0.0, "brow_density": 0.0}))
     found, none = hair.find(bearded, surface), hair.find(shaven, surface)
     cleaned, _ = hair.clean(bearded, found, surface)
     under = (_darker(bearded, bare) > 0.05) & (template.mask("scalp", surface.size) < 0.01)
-    return {"brows": _alike(none.brows, _darker(shaven, bare)), "beard": _alike(found.beard, _darker(bearded, shaven)), "bare_chin": _cm2(none.beard, surface),
-            "below_hair": {"with hair": _error(bearded.diffuse, bare.diffuse, under), "clean": _error(cleaned, bare.diffuse, under)}}
+    return {"brows": _alike(none.brows, _darker(shaven, bare)), "beard": _alike(found.beard, _darker(bearded, shaven)),
+            "bare_chin": _cm2(none.beard, surface),
+            "below_hair": {"with hair": _error(bearded.diffuse, bare.diffuse, under),
+                           "clean": _error(cleaned, bare.diffuse, under)}}
 
 
 def of_capture(capture: Capture, subject: int | None = None) -> dict:
@@ -113,10 +123,13 @@ def of_capture(capture: Capture, subject: int | None = None) -> dict:
     tones = {}
     if subject is not None:
         truth, hidden = _painted(surface, subject), maps.confidence < 0.02
-        tones = {"tone": {region: {name: _error(*(_tone(m, surface) for m in (shown, truth)), hidden & (template.mask(region, surface.size) > 0.9))
-                                   for name, shown in (("fill", maps), ("completed", done))} for region in ("neck", "ears", "scalp")}}
+        tones = {"tone": {region: {name: _error(*(_tone(m, surface) for m in (shown, truth)),
+                                                hidden & (template.mask(region, surface.size) > 0.9))
+                                   for name, shown in (("fill", maps), ("completed", done))}
+                          for region in ("neck", "ears", "scalp")}}
     return {**tones, "completed_share_percent": report.figures["completed_share_percent"],
-            "border": {"fill": _step(maps, rings[0], rings[1], surface), "completed": _step(done, rings[0], rings[1], surface),
+            "border": {"fill": _step(maps, rings[0], rings[1], surface),
+                       "completed": _step(done, rings[0], rings[1], surface),
                        "within": _step(maps, rings[0], rings[2], surface)},
             "cut": {"fill": _cut(maps, surface), "completed": _cut(done, surface)},
             "hair": {name: round(_cm2(getattr(found, name), surface), 2) for name in ("brows", "lashes", "beard")}}
@@ -125,11 +138,13 @@ def of_capture(capture: Capture, subject: int | None = None) -> dict:
 def _painted(surface: HeadSurface, seed: int, **changes) -> HeadMaps:
     skin = make_skin(replace(sample_parameters(seed), **changes), surface.size)
     one = np.ones((surface.size,) * 2, np.float32)
-    return HeadMaps(skin.diffuse.astype(np.float32), skin.normal.astype(np.float32), skin.specular, 0.7 * one, np.repeat(one[..., None], 3, 2))
+    return HeadMaps(skin.diffuse.astype(np.float32), skin.normal.astype(np.float32), skin.specular, 0.7 * one,
+                    np.repeat(one[..., None], 3, 2))
 
 
 def _step(maps: HeadMaps, here: np.ndarray, there: np.ndarray, surface: HeadSurface) -> float:
-    """Mean difference of the log tone (over 2 mm) between the texels of a ring and the nearest of another on the surface."""
+    """Mean difference of the log tone (over 2 mm) between the texels of a ring and the nearest of another on the
+    surface."""
     tone = np.log(_tone(maps, surface))
     _, nearest = cKDTree(surface.position[here][::4]).query(surface.position[there][::4], distance_upper_bound=25.0)
     met = nearest < len(surface.position[here][::4])
@@ -137,11 +152,13 @@ def _step(maps: HeadMaps, here: np.ndarray, there: np.ndarray, surface: HeadSurf
 
 
 def _tone(maps: HeadMaps, surface: HeadSurface) -> np.ndarray:
-    return np.exp(cv2.GaussianBlur(np.log(np.maximum(maps.diffuse, 0.004)), (0, 0), 2.0 / float(np.median(surface.texel))))
+    return np.exp(cv2.GaussianBlur(np.log(np.maximum(maps.diffuse, 0.004)), (0, 0),
+                                   2.0 / float(np.median(surface.texel))))
 
 
 def _cut(maps: HeadMaps, surface: HeadSurface) -> dict:
-    """Mean step of log albedo over the map's cut (less than 1 mm apart in space, far apart in the map), and between neighbours along its edge."""
+    """Mean step of log albedo over the map's cut (less than 1 mm apart in space, far apart in the map), and between
+    neighbours along its edge."""
     edge = np.zeros(surface.covered.shape, bool)
     edge[[0, -1]] = edge[:, [0, -1]] = True
     light, at, place = np.log(np.maximum(maps.diffuse, 0.004)).mean(2), np.argwhere(edge), surface.position[edge]
@@ -152,7 +169,8 @@ def _cut(maps: HeadMaps, surface: HeadSurface) -> dict:
 
 
 def _grain(maps: HeadMaps, where: np.ndarray, surface: HeadSurface) -> float:
-    fine = grain.bands(np.log(np.maximum(maps.diffuse, 0.004)), np.ones(where.shape, np.float32), float(np.median(surface.texel)))[2]
+    fine = grain.bands(np.log(np.maximum(maps.diffuse, 0.004)), np.ones(where.shape, np.float32),
+                       float(np.median(surface.texel)))[2]
     return float(np.subtract(*np.percentile(fine[where], [83, 17])))
 
 

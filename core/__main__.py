@@ -19,7 +19,18 @@ from pathlib import Path
 
 from . import __version__
 from .batch import command_line as batch_commands
-from .contract import artist_landmarks, consent, deletion, delighter_cards, delivery_plan, delivery_presets, report, settings, stages, unforeseen
+from .contract import (
+    artist_landmarks,
+    consent,
+    deletion,
+    delighter_cards,
+    delivery_plan,
+    delivery_presets,
+    report,
+    settings,
+    stages,
+    unforeseen,
+)
 from .contract.capture import Capture
 from .contract.messages import Problem
 from .worker import command_settings, read_only, self_test, setup_commands, terminal
@@ -55,43 +66,61 @@ def _log_of(arguments: list[str]) -> Path | None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser("python -m core", description="From a phone video of a face to a relightable head.")
+    parser = argparse.ArgumentParser("python -m core",
+                                     description="From a phone video of a face to a relightable head.")
     parser.add_argument("--version", action="version", version=f"WildCap {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _add_chain(commands)
     _add_captures(commands)
-    commands.add_parser("doctor", help="say what is installed, what is missing and what to do").set_defaults(command=_doctor)
-    test = commands.add_parser("self-test", help="solve the sample head again on this machine, and compare it with what it should be")
+    commands.add_parser("doctor",
+                        help="say what is installed, what is missing and what to do").set_defaults(command=_doctor)
+    test = commands.add_parser(
+        "self-test", help="solve the sample head again on this machine, and compare it with what it should be"
+    )
     test.add_argument("--device", choices=("auto", "cpu", "cuda", "mps"), default="auto")
     test.set_defaults(command=_self_test)
     batch_commands.add_commands(commands)
     setup_commands.add_commands(commands)
-    commands.add_parser("train", help="train a network, or bring other skins in for it (developers): train prior --help, train carry --help")
+    commands.add_parser("train",
+                        help="train a network, or bring other skins in for it (developers): train prior --help, train "
+                             "carry --help")
     return parser
 
 
 def _add_chain(commands) -> None:
     """The chain, what it delivers, and what there is to choose from."""
     run = commands.add_parser("run", help="run the chain; a second run continues where the first stopped")
-    run.add_argument("source", metavar="SOURCE", help="a video, or a folder of photographs; - for the one the capture was made from")
-    run.add_argument("capture", metavar="CAPTURE", type=Path, help="the face's folder, usually NAME.wildcap; made if it is not there")
-    run.add_argument("--from", dest="first", metavar="STAGE", help="begin with this stage and run it even if nothing has changed")
+    run.add_argument("source", metavar="SOURCE",
+                     help="a video, or a folder of photographs; - for the one the capture was made from")
+    run.add_argument("capture", metavar="CAPTURE", type=Path,
+                     help="the face's folder, usually NAME.wildcap; made if it is not there")
+    run.add_argument("--from", dest="first", metavar="STAGE",
+                     help="begin with this stage and run it even if nothing has changed")
     run.add_argument("--until", dest="last", metavar="STAGE", help="end with this stage")
     run.add_argument("--quality", choices=settings.QUALITIES, default="standard")
     run.add_argument("--send-frames", action="store_true",
-                     help="you agree that SwitchLight gets the selected frames, a person's face, and charges you; without it, the run stops before")
+                     help="you agree that SwitchLight gets the selected frames, a person's face, and charges you; "
+                          "without it, the run stops before")
     command_settings.add_options(run, "run")
     run.set_defaults(command=_run)
 
-    deliver = commands.add_parser("deliver", help="the maps as another program wants them, with the mesh as OBJ; other files and shape keys need the add-on")
+    deliver = commands.add_parser("deliver",
+                                  help="the maps as another program wants them, with the mesh as OBJ; other files and "
+                                       "shape keys need the add-on")
     deliver.add_argument("capture", metavar="CAPTURE", type=Path)
     command_settings.add_options(deliver, "deliver")
     deliver.set_defaults(command=_deliver)
-    commands.add_parser("settings", help="list every setting: its default, what it may be, its flag, what it does").set_defaults(command=_settings)
-    table = commands.add_parser("presets", help="say how each program gets its maps, and what each format drops: the tables of docs/guide/deliver.md")
+    commands.add_parser(
+        "settings", help="list every setting: its default, what it may be, its flag, what it does"
+    ).set_defaults(command=_settings)
+    table = commands.add_parser("presets",
+                                help="say how each program gets its maps, and what each format drops: the tables of "
+                                     "docs/guide/deliver.md")
     table.set_defaults(command=_presets)
     commands.add_parser("stages", help="list the stages of the chain").set_defaults(command=_stages)
-    cards = commands.add_parser("delighters", help="say of each way to take the light out where it runs, what leaves the machine and what it costs")
+    cards = commands.add_parser("delighters",
+                                help="say of each way to take the light out where it runs, what leaves the machine and "
+                                     "what it costs")
     cards.add_argument("--markdown", action="store_true", help="as docs/delighters.md has it")
     cards.set_defaults(command=_delighters)
 
@@ -101,15 +130,19 @@ def _add_captures(commands) -> None:
     status = commands.add_parser("status", help="say which stages of a capture are done")
     status.add_argument("capture", metavar="CAPTURE", type=Path)
     status.set_defaults(command=_status)
-    gone = commands.add_parser("delete", help="delete a face: all that WildCap wrote of it; without --yes, list what would go and what would stay")
+    gone = commands.add_parser("delete",
+                               help="delete a face: all that WildCap wrote of it; without --yes, list what would go "
+                                    "and what would stay")
     gone.add_argument("capture", metavar="CAPTURE", type=Path)
     gone.add_argument("--yes", action="store_true", help="delete it, for good")
     gone.set_defaults(command=_delete)
-    about = commands.add_parser("report-problem", help="write a zip to send: logs, versions, settings; no pictures, names or paths")
+    about = commands.add_parser("report-problem",
+                                help="write a zip to send: logs, versions, settings; no pictures, names or paths")
     about.add_argument("capture", metavar="CAPTURE", type=Path, nargs="?")
     about.add_argument("--to", metavar="ZIP", type=Path, required=True)
     about.set_defaults(command=_report_problem)
-    mask = commands.add_parser("mask", help="bring a painted shadow mask in").add_subparsers(required=True, metavar="import")
+    mask = commands.add_parser("mask",
+                               help="bring a painted shadow mask in").add_subparsers(required=True, metavar="import")
     bring = mask.add_parser("import", help="make a picture the capture's shadow mask: white is shadow")
     bring.add_argument("capture", metavar="CAPTURE", type=Path)
     bring.add_argument("picture", metavar="PNG", type=Path)
@@ -129,10 +162,15 @@ def _add_captures(commands) -> None:
     many.add_argument("capture", metavar="CAPTURE", type=Path)
     many.add_argument("file", metavar="JSON", type=Path)
     many.set_defaults(command=_landmarks)
-    white = commands.add_parser("white", help="measure the white point on a ColorChecker, a grey card or white paper in the frames")
+    white = commands.add_parser("white",
+                                help="measure the white point on a ColorChecker, a grey card or white paper in the "
+                                     "frames")
     white.add_argument("capture", metavar="CAPTURE", type=Path)
-    white.add_argument("--frame", metavar="NAME", help="the frame with the card, as in the capture's frames folder; without it a ColorChecker is looked for")
-    white.add_argument("--at", metavar=("X", "Y"), nargs=2, type=float, help="a pixel of the card, from the frame's upper left")
+    white.add_argument("--frame", metavar="NAME",
+                       help="the frame with the card, as in the capture's frames folder; without it a ColorChecker is "
+                            "looked for")
+    white.add_argument("--at", metavar=("X", "Y"), nargs=2, type=float,
+                       help="a pixel of the card, from the frame's upper left")
     white.add_argument("--card", choices=settings.CARDS, default="grey")
     white.set_defaults(command=_white)
 
@@ -140,11 +178,12 @@ def _add_captures(commands) -> None:
 def _run(options: argparse.Namespace) -> int:
     values = command_settings.read_options(options, "run")
     command_settings.refuse_lone_flags(options, values)
-    # A shell that starts a job in the background has it ignore Ctrl-C's signal; here the signal means cancel, whoever sends it.
+    # A shell that starts a job in the background has it ignore Ctrl-C's signal; here the signal means cancel, whoever
+    # sends it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     capture = Capture(options.capture)
-    job = write_job(capture, source="" if options.source == "-" else options.source, first=options.first, last=options.last, settings=values,
-                    quality=options.quality)
+    job = write_job(capture, source="" if options.source == "-" else options.source, first=options.first,
+                    last=options.last, settings=values, quality=options.quality)
     return terminal.follow(ROOT, capture, job, consent.by_flag(capture) if options.send_frames else {})
 
 
@@ -152,11 +191,14 @@ def _deliver(options: argparse.Namespace) -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     capture = Capture(options.capture)
     if not capture.json.is_file():
-        raise Problem(f"There is no capture at {capture.root}.", "Check the name; `python -m core run SOURCE CAPTURE` makes one.")
+        raise Problem(f"There is no capture at {capture.root}.",
+                      "Check the name; `python -m core run SOURCE CAPTURE` makes one.")
     wanted = {"format": "obj", "whole": True, **command_settings.read_options(options, "deliver").get("deliver", {})}
     if not wanted["whole"]:
-        raise Problem("A delivery without its mesh (deliver.whole off) is ended by Blender.", "Leave deliver.whole on, or deliver from the add-on's panel.")
-    before = read_job(capture.job).settings if capture.job.is_file() else settings.Settings()  # job.json is also what `status` judges the stages by
+        raise Problem("A delivery without its mesh (deliver.whole off) is ended by Blender.",
+                      "Leave deliver.whole on, or deliver from the add-on's panel.")
+    # job.json is also what `status` judges the stages by
+    before = read_job(capture.job).settings if capture.job.is_file() else settings.Settings()
     chosen = {**settings.to_json(before), "deliver": wanted}
     with read_only.stand_in(capture, wanted.get("folder", "")) as writable:
         plan = delivery_plan.plan(writable, settings.from_json(chosen).deliver)
@@ -184,7 +226,8 @@ def _stages(options: argparse.Namespace) -> int:
 
 
 def _delighters(options: argparse.Namespace) -> int:
-    print(delighter_cards.markdown() if options.markdown else delighter_cards.text(), end="" if options.markdown else "\n")
+    print(delighter_cards.markdown() if options.markdown else delighter_cards.text(),
+          end="" if options.markdown else "\n")
     return 0
 
 
@@ -192,14 +235,17 @@ def _status(options: argparse.Namespace) -> int:
     """States under the settings of the last job."""
     capture = Capture(options.capture)
     if not capture.root.is_dir():
-        raise Problem(f"There is no capture at {capture.root}.", "Check the name; `python -m core run SOURCE CAPTURE` makes one.")
+        raise Problem(f"There is no capture at {capture.root}.",
+                      "Check the name; `python -m core run SOURCE CAPTURE` makes one.")
     record = capture.read()
     chosen = read_job(capture.job).settings if capture.job.is_file() else settings.Settings()
     print(f"source        {capture.source or 'none yet'}")
     for stage in stages.STAGES:
         finished, verdict = record["stages"].get(stage.name), capture.verdict(stage, chosen)
-        print(f"{stage.name:13} {verdict.state:6}" + (f" {finished['seconds']:8.1f} s  {finished.get('finished', '')}" if finished else "")
-              + (f"  {verdict.reason()}" if verdict.reason() else "") + ("  slimmed away" if (finished or {}).get("slimmed") else ""))
+        print(f"{stage.name:13} {verdict.state:6}"
+              + (f" {finished['seconds']:8.1f} s  {finished.get('finished', '')}" if finished else "")
+              + (f"  {verdict.reason()}" if verdict.reason() else "")
+              + ("  slimmed away" if (finished or {}).get("slimmed") else ""))
     if capture.shadow_mask.is_file():
         print("shadow mask   painted")
     for finding in report.findings(record):
@@ -221,9 +267,11 @@ def _report_problem(options: argparse.Namespace) -> int:
 
     capture = Capture(options.capture) if options.capture else None
     if capture is not None and not capture.json.is_file():
-        raise Problem(f"There is no capture at {capture.root}.", "Check the name, or leave it out for a report about the installation alone.")
+        raise Problem(f"There is no capture at {capture.root}.",
+                      "Check the name, or leave it out for a report about the installation alone.")
     print(problem_report.write(options.to, ROOT, Path(sys.executable), capture))
-    print(f"It holds {', '.join(problem_report.TOLD)}; no pictures, and no names or paths of yours. Nothing was sent: look into it first.")
+    print(f"It holds {', '.join(problem_report.TOLD)}; no pictures, and no names or paths of yours. Nothing was sent: "
+          "look into it first.")
     return 0
 
 
@@ -250,7 +298,8 @@ def _white(options: argparse.Namespace) -> int:
 
     capture = Capture(options.capture)
     if bool(options.frame) != bool(options.at):
-        raise Problem("--frame and --at go together.", "Name a frame and a pixel of the card in it, or neither to look for a ColorChecker.")
+        raise Problem("--frame and --at go together.",
+                      "Name a frame and a pixel of the card in it, or neither to look for a ColorChecker.")
     if options.frame:
         path = capture.frames / options.frame
         capture.require("frames/")

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces of a batch: captures with nothing but a video, or finished up to their masks by their own records, over the stand-in's head; the batch as a terminal
-plans it, and how the tests wait for what the add-on sees of it."""
+"""Faces of a batch: captures with nothing but a video, or finished up to their masks by their own records, over the
+stand-in's head; the batch as a terminal plans it, and how the tests wait for what the add-on sees of it."""
 
 import json
 import time
@@ -50,7 +50,8 @@ def finish_up_to_mask(capture: Capture, settings: Settings) -> None:
 
 def planned(folder: Path, *captures: Capture, gate: str = "artist", settings: dict | None = None) -> Path:
     """A batch as a terminal plans it: with its captures in its own folder."""
-    faces = [record.BatchFace(capture.root.stem, capture.source, capture.root, "draft", settings or {}) for capture in captures]
+    faces = [record.BatchFace(capture.root.stem, capture.source, capture.root, "draft", settings or {})
+             for capture in captures]
     record.write_batch(record.Batch(folder, tuple(faces), gate))
     return folder
 

@@ -30,7 +30,8 @@ os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="wildcap-test-")
 atexit.register(shutil.rmtree, os.environ["BLENDER_USER_RESOURCES"], ignore_errors=True)
 
 
-# As the worker has it: what else the machine does would otherwise slow a test down tenfold. OpenMP reads it when torch is first imported.
+# As the worker has it: what else the machine does would otherwise slow a test down tenfold. OpenMP reads it when torch
+# is first imported.
 for name, value in SPINS.items():
     os.environ.setdefault(name, value)
 
@@ -39,7 +40,8 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     for name in THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
 
-# Every file of a capture is flushed to the disk before it gets its name, which is most of a test's time; where memory serves as a disk it takes none.
+# Every file of a capture is flushed to the disk before it gets its name, which is most of a test's time; where memory
+# serves as a disk it takes none.
 MEMORY_DISK, ROOM = Path("/dev/shm"), 6e9
 if os.access(MEMORY_DISK, os.W_OK) and shutil.disk_usage(MEMORY_DISK).free > ROOM:
     os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(MEMORY_DISK))
@@ -49,8 +51,10 @@ WHOLE = pytest.StashKey()
 
 
 def pytest_addoption(parser):
-    parser.addoption("--messages", action="store_true", help="judge which messages were reached even where not all tests ran")
-    parser.addoption("--reached", type=Path, metavar="FOLDER", help="where the processes of a run keep which messages they reached; what is there counts")
+    parser.addoption("--messages", action="store_true",
+                     help="judge which messages were reached even where not all tests ran")
+    parser.addoption("--reached", type=Path, metavar="FOLDER",
+                     help="where the processes of a run keep which messages they reached; what is there counts")
 
 
 def pytest_configure(config):
@@ -65,7 +69,8 @@ def pytest_collection_modifyitems(config, items):
     """The judgement of the messages comes last; it counts where no file was left out and no test deselected."""
     items.sort(key=lambda item: item.path.name == LAST)
     files = {path.name for path in Path(__file__).parent.glob("test_*.py")}
-    config.stash[WHOLE] = files <= {item.path.name for item in items} and not config.option.keyword and not config.option.markexpr
+    config.stash[WHOLE] = files <= {item.path.name
+                                    for item in items} and not config.option.keyword and not config.option.markexpr
 
 
 @pytest.fixture
@@ -77,9 +82,10 @@ def whole_run(request) -> bool:
 
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure(config):
-    """The bpy 4.2 module crashes at its exit where any property ever had an update callback (seen with five lines of plain bpy),
-    long after the last test: it leaves without its exit.
-    And where a test had the glTF exporter write in a process that has the worker's packages as well, the module's exit waits for its threads for ever."""
+    """The bpy 4.2 module crashes at its exit where any property ever had an update callback (seen with five lines of
+    plain bpy), long after the last test: it leaves without its exit.
+    And where a test had the glTF exporter write in a process that has the worker's packages as well, the module's exit
+    waits for its threads for ever."""
     bpy = sys.modules.get("bpy")
     exported = "io_scene_gltf2.blender.exp.export" in sys.modules
     if bpy is not None and (bpy.app.version < (4, 3, 0) or exported):
@@ -112,7 +118,8 @@ def enabled_extension():
 
 @pytest.fixture
 def wildcap(enabled_extension):
-    """As `enabled_extension`, with Blender's start-up scene emptied first: import_module(f"{wildcap}.wildcap_addon...") is the add-on."""
+    """As `enabled_extension`, with Blender's start-up scene emptied first: import_module(f"{wildcap}.wildcap_addon...")
+    is the add-on."""
     import bpy
 
     bpy.ops.wm.read_homefile(use_empty=True)
@@ -140,7 +147,8 @@ def capture(tmp_path, wildcap):
 
 @pytest.fixture
 def batches(addon, monkeypatch, tmp_path):
-    """The add-on's view of batches, over a chain of tiny rooms; no batch of a test is left running, or known to the next one."""
+    """The add-on's view of batches, over a chain of tiny rooms; no batch of a test is left running, or known to the
+    next one."""
     from . import batch_faces, tiny_chain
 
     module, running = addon("batches"), addon("batch.running")
@@ -153,12 +161,14 @@ def batches(addon, monkeypatch, tmp_path):
         batch_faces.wait(addon, lambda: not running.running() or running.cancel())
         module.close()
     addon("paint.session").forget()
-    addon("preferences").get().python = ""  # looked up again: where the add-on was disabled meanwhile, those of before are gone
+    # looked up again: where the add-on was disabled meanwhile, those of before are gone
+    addon("preferences").get().python = ""
 
 
 @pytest.fixture(scope="session")
 def ict_fitted(tmp_path_factory):
-    """ICT-FaceKit's head laid over a built-in head of one person: the capture that holds it, and what was reported. Two tests look at it."""
+    """ICT-FaceKit's head laid over a built-in head of one person: the capture that holds it, and what was reported. Two
+    tests look at it."""
     template = ROOT.parent / "shared" / "data" / "ict_facekit"
     if not template.is_dir():
         pytest.skip("needs ict_facekit in ../shared/data")

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A deprecation that our own code causes fails the run; those of Blender's scripts and of other packages are only shown.
+"""A deprecation that our own code causes fails the run; those of Blender's scripts and of other packages are only
+shown.
 
-They are counted, not raised where they happen: Blender goes on with such an exception set, and names another place or none.
+They are counted, not raised where they happen: Blender goes on with such an exception set, and names another place or
+none.
 """
 
 import warnings
@@ -13,7 +15,8 @@ import pytest
 OURS = {"core", "wildcap_addon", "benchmarks", "tests"}
 DEPRECATIONS = DeprecationWarning, PendingDeprecationWarning, FutureWarning
 FORKED = "use of fork() may lead to deadlocks"
-"""Of Python 3.12 and newer beside other threads, as pytest-xdist has them. Nothing is to be removed, and those who fork here do so to be killed."""
+"""Of Python 3.12 and newer beside other threads, as pytest-xdist has them. Nothing is to be removed, and those who fork
+here do so to be killed."""
 
 
 class Watch:

@@ -6,7 +6,8 @@ import bpy
 
 
 class Layout:
-    """Notes the texts that panels draw, where `translate` says whether Blender would look them up itself, and the operators of their buttons."""
+    """Notes the texts that panels draw, where `translate` says whether Blender would look them up itself, and the
+    operators of their buttons."""
 
     def __init__(self, drawn: list, buttons: list | None = None):
         self.drawn, self.buttons = drawn, [] if buttons is None else buttons

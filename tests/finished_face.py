@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face whose whole chain has run, by the real worker over tiny rooms (tiny_chain.py), and what lies in it: what slimming is tested with."""
+"""A face whose whole chain has run, by the real worker over tiny rooms (tiny_chain.py), and what lies in it: what
+slimming is tested with."""
 
 import shutil
 from pathlib import Path
@@ -37,7 +38,8 @@ def make(root: Path, folder: Path) -> Path:
 def copy(finished: Path, to: Path, root: Path, monkeypatch) -> Capture:
     """The face in a copy of such a folder, judged by the code that made it: the tiny rooms'."""
     shutil.copytree(finished, to)
-    monkeypatch.setattr(freshness, "code_key", {stage.module: code_key(stage.module, root / "core") for stage in stages.STAGES}.__getitem__)
+    monkeypatch.setattr(freshness, "code_key",
+                        {stage.module: code_key(stage.module, root / "core") for stage in stages.STAGES}.__getitem__)
     return Capture(to / "zoë.wildcap")
 
 
@@ -47,4 +49,5 @@ def states(capture: Capture) -> set[str]:
 
 def pictures(capture: Capture) -> dict[str, bytes]:
     """What slimming takes away, as far as it is there."""
-    return {name: content for name, content in kept_capture.contents(capture.root).items() if name.startswith(stages.SLIMMED)}
+    return {name: content for name, content in kept_capture.contents(capture.root).items()
+            if name.startswith(stages.SLIMMED)}

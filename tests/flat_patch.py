@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A flat patch of skin for the tests of the material: a capture whose head is a square, lights, and a camera that gives linear pictures."""
+"""A flat patch of skin for the tests of the material: a capture whose head is a square, lights, and a camera that gives
+linear pictures."""
 
 import json
 import math
@@ -13,9 +14,11 @@ from . import standin
 
 
 def make(root):
-    """A capture, open, whose head is a flat square of 2 m that faces -Y, V up, and whose specular map has a mean of 0.4 on cheeks and forehead."""
+    """A capture, open, whose head is a flat square of 2 m that faces -Y, V up, and whose specular map has a mean of 0.4
+    on cheeks and forehead."""
     standin.make(root)
-    root.joinpath("head.obj").write_text("v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n", encoding="ascii")
+    root.joinpath("head.obj").write_text("v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf "
+                                         "1/1 2/2 3/3 4/4\n", encoding="ascii")
     record = {"format": 1, "source": "", "stages": {"upscale": {"figures": {"specular_mean": 0.4}, "seconds": 1}}}
     (root / "capture.json").write_text(json.dumps(record), encoding="utf-8")
     bpy.ops.wildcap.open_capture(directory=str(root))
@@ -23,7 +26,8 @@ def make(root):
 
 
 def paint(root, name, pixels):
-    (root / "maps" / name).write_bytes(standin.png([[tuple(int(round(255 * c)) for c in pixel) for pixel in row] for row in pixels]))
+    (root / "maps"
+     / name).write_bytes(standin.png([[tuple(int(round(255 * c)) for c in pixel) for pixel in row] for row in pixels]))
 
 
 def assembled():
@@ -37,7 +41,8 @@ def sockets(material):
 
 
 def seen(path, elevation: float = 0.0, side: int = 8, samples: int = 16, width: float = 0.5) -> np.ndarray:
-    """The scene's linear picture [side, side, 3] by an orthographic camera that looks at the origin from `elevation` degrees above -Y."""
+    """The scene's linear picture [side, side, 3] by an orthographic camera that looks at the origin from `elevation`
+    degrees above -Y."""
     scene = bpy.context.scene
     if scene.camera is None:
         scene.camera = bpy.data.objects.new("eye", bpy.data.cameras.new("eye"))

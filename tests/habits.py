@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An artist's quarter of an hour in a Blender of its own, for test_habits.py: python habits.py [worker], with the circumstances in the environment.
+"""An artist's quarter of an hour in a Blender of its own, for test_habits.py: python habits.py [worker], with the
+circumstances in the environment.
 
-The extension is enabled from the folder it lies in, the sample head opened, relit, its mask painted on and left, a stage's tool run by the real worker,
-settings written and read. Prints one JSON line of what was seen; a traceback anywhere is its failure.
+The extension is enabled from the folder it lies in, the sample head opened, relit, its mask painted on and left, a
+stage's tool run by the real worker, settings written and read. Prints one JSON line of what was seen; a traceback
+anywhere is its failure.
 """
 
 import json
@@ -23,7 +25,8 @@ NAME = "bl_ext.user_default.wildcap"
 def main() -> None:
     import addon_utils  # bpy has made it importable
 
-    for stream in (sys.stdout, sys.stderr):  # what Blender's module prints when it is loaded beside another NumPy than its own is not the add-on's
+    # what Blender's module prints when it is loaded beside another NumPy than its own is not the add-on's
+    for stream in (sys.stdout, sys.stderr):
         print("Started.", file=stream, flush=True)
     locale.setlocale(locale.LC_ALL, "")  # as a toolkit does when it starts
     assert addon_utils.enable(NAME, default_set=True) is not None
@@ -32,8 +35,10 @@ def main() -> None:
     bpy.ops.wildcap.open_sample_head()
     item = bpy.context.scene.wildcap.captures[0]
     capture, head = addon["captures"].folder(item), addon["captures"].head(bpy.context, item)
-    seen = {"decimal_point": locale.localeconv()["decimal_point"], "capture": str(capture.root), "height_m": round(head.dimensions.z, 3)}
-    seen["spaces"] = {node.name: node.image.colorspace_settings.name for node in head.active_material.node_tree.nodes if node.type == 'TEX_IMAGE'}
+    seen = {"decimal_point": locale.localeconv()["decimal_point"], "capture": str(capture.root),
+            "height_m": round(head.dimensions.z, 3)}
+    seen["spaces"] = {node.name: node.image.colorspace_settings.name for node in head.active_material.node_tree.nodes
+                      if node.type == 'TEX_IMAGE'}
     props = bpy.context.scene.wildcap
     props.resolution, props.samples = 16, 1
     bpy.ops.wildcap.render()

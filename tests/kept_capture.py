@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture whose folder holds nothing yet, what lies in one, and frames written as a stage writes them: what ownership is tested with."""
+"""A capture whose folder holds nothing yet, what lies in one, and frames written as a stage writes them: what ownership
+is tested with."""
 
 from pathlib import Path
 
@@ -17,7 +18,8 @@ def make(root: Path) -> Capture:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file() and path.name != ownership.RECORD}
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in sorted(folder.rglob("*"))
+            if path.is_file() and path.name != ownership.RECORD}
 
 
 def make_frames(capture: Capture, *names: str, text: str = "frame") -> None:

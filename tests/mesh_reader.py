@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What other libraries read in a USD (Pixar's) or an FBX file (ufbx), as JSON. A process of its own: Blender brings another copy of the first, and
-ufbx 0.0.5 crashes where a scene that it has read is freed, so none is.
+"""What other libraries read in a USD (Pixar's) or an FBX file (ufbx), as JSON. A process of its own: Blender brings
+another copy of the first, and ufbx 0.0.5 crashes where a scene that it has read is freed, so none is.
 
     python mesh_reader.py FILE
 """
@@ -26,13 +26,17 @@ def usd(path: Path) -> dict:
     shapes = [UsdSkel.BlendShape(prim) for prim in prims if prim.IsA(UsdSkel.BlendShape)]
     hairs = [UsdGeom.BasisCurves(prim) for prim in prims if prim.IsA(UsdGeom.BasisCurves)]
     return {
-        "hairs": {hair.GetPrim().GetName(): [[list(point) for point in hair.GetPointsAttr().Get()], list(hair.GetWidthsAttr().Get() or [])] for hair in hairs},
+        "hairs": {hair.GetPrim().GetName(): [[list(point) for point in hair.GetPointsAttr().Get()],
+                                             list(hair.GetWidthsAttr().Get() or [])] for hair in hairs},
         "metres_per_unit": UsdGeom.GetStageMetersPerUnit(stage), "up": UsdGeom.GetStageUpAxis(stage),
-        "points": [list(point) for point in mesh.GetPointsAttr().Get()], "subdivision": mesh.GetSubdivisionSchemeAttr().Get(),
+        "points": [list(point) for point in mesh.GetPointsAttr().Get()],
+        "subdivision": mesh.GetSubdivisionSchemeAttr().Get(),
         "primvars": [primvar.GetPrimvarName() for primvar in UsdGeom.PrimvarsAPI(mesh).GetPrimvars()],
         "to_world": [list(row) for row in UsdGeom.Xformable(mesh).ComputeLocalToWorldTransform(0)],
-        "shapes": {shape.GetPrim().GetName(): [list(offset) for offset in shape.GetOffsetsAttr().Get()] for shape in shapes},
-        "textures": {shader.GetInput("file").Get().path: shader.GetInput("sourceColorSpace").Get() for shader in textures},
+        "shapes": {shape.GetPrim().GetName(): [list(offset) for offset in shape.GetOffsetsAttr().Get()]
+                   for shape in shapes},
+        "textures": {shader.GetInput("file").Get().path: shader.GetInput("sourceColorSpace").Get()
+                     for shader in textures},
     }
 
 
@@ -47,7 +51,8 @@ def fbx(path: Path) -> dict:
     return {
         "metres_per_unit": scene.settings.unit_meters, "y_up": scene.settings.axes.up == ufbx.CoordinateAxis.POSITIVE_Y,
         "faces": mesh.num_faces, "has_uvs": mesh.vertex_uv.exists,
-        "points": [[p.x, p.y, p.z] for p in mesh.vertices], "scale": [getattr(node.local_transform.scale, axis) for axis in "xyz"],
+        "points": [[p.x, p.y, p.z] for p in mesh.vertices],
+        "scale": [getattr(node.local_transform.scale, axis) for axis in "xyz"],
         "turn": [getattr(node.local_transform.rotation, axis) for axis in "wxyz"],
         "shapes": {shape.name: [[o.x, o.y, o.z] for o in shape.position_offsets] for shape in shapes},
         "textures": [texture.relative_filename.replace("\\", "/") for texture in scene.textures],

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which of the sentences an artist can be told the tests have had said: every Problem made, every reason given for a greyed-out button.
+"""Which of the sentences an artist can be told the tests have had said: every Problem made, every reason given for a
+greyed-out button.
 
-conftest.py has the classes watched from the first test on; test_messages_reached.py, the last of all, compares with the sources.
+conftest.py has the classes watched from the first test on; test_messages_reached.py, the last of all, compares with the
+sources.
 """
 
 import ast
@@ -13,7 +15,8 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PLACES = ("wildcap_addon", "core/worker", "core/contract/capture.py", "core/contract/settings.py", "core/contract/setting_values.py")
+PLACES = ("wildcap_addon", "core/worker", "core/contract/capture.py", "core/contract/settings.py",
+          "core/contract/setting_values.py")
 REASONS = "wildcap_addon/base_operator.py"  # the one file that hands a reason to Blender
 _reached: set[tuple[str, int]] = set()  # (file relative to the root, line that is being carried out)
 
@@ -65,14 +68,17 @@ def unreached() -> list[str]:
 
 def sources() -> list[str]:
     """The files whose sentences count, relative to the root."""
-    found = [path for place in PLACES for path in ([ROOT / place] if place.endswith(".py") else sorted((ROOT / place).rglob("*.py")))]
+    found = [path for place in PLACES
+             for path in ([ROOT / place] if place.endswith(".py") else sorted((ROOT / place).rglob("*.py")))]
     return [path.relative_to(ROOT).as_posix() for path in found]
 
 
 @functools.cache
 def sentences(file: str) -> list[ast.Call]:
-    """The calls in a file that make a Problem of words, or give a reason; one that hands on another's words says nothing of its own."""
-    calls = [node for node in ast.walk(ast.parse((ROOT / file).read_text(encoding="utf-8"))) if isinstance(node, ast.Call)]
+    """The calls in a file that make a Problem of words, or give a reason; one that hands on another's words says
+    nothing of its own."""
+    calls = [node for node in ast.walk(ast.parse((ROOT / file).read_text(encoding="utf-8")))
+             if isinstance(node, ast.Call)]
     return [call for call in calls if _name(call) in ("Problem", "allowed")]
 
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head of another topology laid over the registered built-in head of one person, in fewer steps than the stage takes."""
+"""A head of another topology laid over the registered built-in head of one person, in fewer steps than the stage
+takes."""
 
 from functools import cache
 from pathlib import Path
@@ -25,12 +26,14 @@ def person() -> tuple[Mesh, own_template.BuiltIn]:
 
 
 def lay_over(template: Path, folder: Path, steps: tuple[int, int] = (6, 3), **options) -> tuple[Capture, Reporter]:
-    """The capture in `folder` with the fitted head, and what the stage reported. `steps`: of the fit, and of laying the built-in head over the template;
-    `options` of the registration."""
+    """The capture in `folder` with the fitted head, and what the stage reported. `steps`: of the fit, and of laying the
+    built-in head over the template; `options` of the registration."""
     capture, report = Capture(folder), Reporter("registration")
     with pytest.MonkeyPatch.context() as patched:
         for name, value in zip(("ITERATIONS", "COVER_ITERATIONS"), steps, strict=True):
             patched.setattr(own_template, name, value)
         patched.setattr(render_landmarks, "VIEWS_DEG", render_landmarks.VIEWS_DEG[:5])
-        own_template.run(capture, from_json({"registration": {"template": str(template), **options}, "transfer": {"size": 1024}}), *person(), report)
+        own_template.run(capture,
+                         from_json({"registration": {"template": str(template), **options},
+                                    "transfer": {"size": 1024}}), *person(), report)
     return capture, report

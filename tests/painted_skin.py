@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture small enough to solve in a second or two: the mean face of a known tone in a little light from the left, with a soft shadow on one cheek."""
+"""A capture small enough to solve in a second or two: the mean face of a known tone in a little light from the left,
+with a soft shadow on one cheek."""
 
 from pathlib import Path
 
@@ -23,7 +24,8 @@ TONE = np.array([0.42, 0.26, 0.18], np.float32)  # linear
 
 @pytest.fixture(scope="module", autouse=True)
 def brief_confidence():
-    """In a module that imports this the short runs behind the confidence map are shorter still: at this size they would take longer than the solve."""
+    """In a module that imports this the short runs behind the confidence map are shorter still: at this size they would
+    take longer than the solve."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(confidence, "RUNS", 2)
         patched.setattr(confidence, "STEPS", 2)

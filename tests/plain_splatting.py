@@ -1,25 +1,34 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""2D Gaussian splatting in plain torch, for tiny pictures: every ray meets every surfel. It takes and gives what gsplat's rasterization_2dgs does.
+"""2D Gaussian splatting in plain torch, for tiny pictures: every ray meets every surfel. It takes and gives what
+gsplat's rasterization_2dgs does.
 
-Huang et al. (2024), equations 4 to 13: a surfel's depth is where the ray meets it (gsplat takes its centre's, the same for small surfels).
+Huang et al. (2024), equations 4 to 13: a surfel's depth is where the ray meets it (gsplat takes its centre's, the same
+for small surfels).
 """
 
 import torch
 
 
-def rasterization_2dgs(means, quats, scales, opacities, colors, viewmats, Ks, width, height, render_mode, distloss, near_plane=0.01):  # noqa: N803
-    assert render_mode == "RGB+ED" and colors.shape == (1, len(means), 3), "gsplat 1.5.3 wants [C, N, D] colours where depth is rendered"
+def rasterization_2dgs(means, quats, scales, opacities, colors, viewmats, Ks, width, height,  # noqa: N803
+                       render_mode, distloss, near_plane=0.01):
+    assert render_mode == "RGB+ED" and colors.shape == (1, len(means), 3), (
+        "gsplat 1.5.3 wants [C, N, D] colours where depth is rendered"
+    )
     rotation, shift = viewmats[0, :3, :3], viewmats[0, :3, 3]
     y, x = torch.meshgrid(torch.arange(height) + 0.5, torch.arange(width) + 0.5, indexing="ij")
-    rays = torch.stack([(x - Ks[0, 0, 2]) / Ks[0, 0, 0], (y - Ks[0, 1, 2]) / Ks[0, 1, 1], torch.ones_like(x)], -1).reshape(-1, 3)  # [P, 3]
+    # [P, 3]
+    rays = torch.stack([(x - Ks[0, 0, 2]) / Ks[0, 0, 0], (y - Ks[0, 1, 2]) / Ks[0, 1, 1], torch.ones_like(x)],
+                       -1).reshape(-1, 3)
     centres = means @ rotation.T + shift  # [N, 3], in the camera
     order = torch.argsort(centres[:, 2])
     centres = centres[order]
     axes = rotation @ _matrices(quats[order])  # [N, 3, 3], columns: the disc's two tangents and its normal
     facing = -torch.sign((axes[:, :, 2] * centres).sum(-1, keepdim=True))
     normals = axes[:, :, 2] * facing
-    along = (centres * normals).sum(-1) / torch.where((across := rays @ normals.T).abs() > 1e-6, across, torch.full_like(across, 1e-6))  # [P, N]
+    # [P, N]
+    along = (centres * normals).sum(-1) / torch.where((across := rays @ normals.T).abs() > 1e-6, across,
+                                                      torch.full_like(across, 1e-6))
     offset = along[..., None] * rays[:, None] - centres  # [P, N, 3]
     u, v = ((offset * axes[:, :, k]).sum(-1) / scales[order, k] for k in range(2))
     weight = torch.exp(-0.5 * (u**2 + v**2)) * opacities[order] * ((along > near_plane) & (centres[:, 2] > near_plane))
@@ -35,11 +44,14 @@ def rasterization_2dgs(means, quats, scales, opacities, colors, viewmats, Ks, wi
     shaped = [part.reshape(1, height, width, -1) for part in parts]
     points = (rays * expected).reshape(height, width, 3)
     slopes = torch.zeros_like(points)
-    slopes[1:-1, 1:-1] = torch.nn.functional.normalize(torch.cross(points[2:, 1:-1] - points[:-2, 1:-1], points[1:-1, 2:] - points[1:-1, :-2], dim=-1), dim=-1)
+    slopes[1:-1,
+           1:-1] = torch.nn.functional.normalize(torch.cross(points[2:, 1:-1] - points[:-2, 1:-1],
+                                                             points[1:-1, 2:] - points[1:-1, :-2], dim=-1), dim=-1)
     return (*shaped[:3], slopes @ rotation, shaped[3], shaped[0][..., 3:], {})
 
 
 def _matrices(quats):
     w, x, y, z = torch.nn.functional.normalize(quats, dim=-1).unbind(-1)
-    return torch.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+    return torch.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z),
+                        1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
                         2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1).reshape(-1, 3, 3)

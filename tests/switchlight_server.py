@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A server on this machine that speaks SwitchLight's protocol as its documents tell it, with the failures that a test asks for."""
+"""A server on this machine that speaks SwitchLight's protocol as its documents tell it, with the failures that a test
+asks for."""
 
 import json
 import threading
@@ -16,11 +17,13 @@ KEY = "sk-Zoe-4711-do-not-tell"
 
 
 class Service:
-    """What it was asked, and what it charged. `plan` holds what happens to the next calls, in the order they come: 'fine', 'truncated', 'garbage', 'cut',
-    'slow', 'hang', or (status, {header: value}, JSON); then all are fine. `charged` counts by picture the calls that were answered with status 200."""
+    """What it was asked, and what it charged. `plan` holds what happens to the next calls, in the order they come:
+    'fine', 'truncated', 'garbage', 'cut', 'slow', 'hang', or (status, {header: value}, JSON); then all are fine.
+    `charged` counts by picture the calls that were answered with status 200."""
 
     def __init__(self, plan=(), answer: bytes = b"", credits: float | None = 100.0, seconds: float = 0.0):
-        self.plan, self.answer, self.credits, self.seconds = list(plan), answer or standin.png([[(200, 150, 120)] * 30] * 40), credits, seconds
+        self.plan, self.answer, self.credits, self.seconds = list(plan), answer or standin.png([[(200, 150, 120)] * 30]
+                                                                                               * 40), credits, seconds
         self.charged: Counter[str] = Counter()
         self.calls: list[dict] = []
         self.times: list[float] = []
@@ -49,7 +52,9 @@ class Service:
                     return self._json(404, {"message": "Not Found"})
                 if self.headers["x-api-key"] != KEY:
                     return self._json(401, {"message": "Unauthorized. Check your API Key"})
-                self._json(200, {"Credits": {"Free": service.credits, "Subscription": 0, "OneTime": 0, "Total": service.credits}})
+                self._json(200,
+                           {"Credits": {"Free": service.credits, "Subscription": 0, "OneTime": 0,
+                                        "Total": service.credits}})
 
             def do_POST(self):
                 with service._lock:
@@ -65,22 +70,27 @@ class Service:
                     self._end_call()
 
             def _end_call(self):
-                """Before an answer's last bytes leave: once the client has them it begins its next call, and this thread may not have come further."""
+                """Before an answer's last bytes leave: once the client has them it begins its next call, and this
+                thread may not have come further."""
                 with service._lock:
                     service.at_once -= self.counted
                     self.counted = False
 
             def _albedo(self):
                 body = self.rfile.read(int(self.headers["Content-Length"]))
-                parts = message_from_bytes(f"Content-Type: {self.headers['Content-Type']}\r\n\r\n".encode() + body, policy=policy.HTTP)
+                parts = message_from_bytes(f"Content-Type: {self.headers['Content-Type']}\r\n\r\n".encode() + body,
+                                           policy=policy.HTTP)
                 fields = {part.get_param("name", header="content-disposition"): part for part in parts.iter_parts()}
                 if self.path != "/v1/acquire/albedo" or "source_image" not in fields:
                     return self._json(422, {"detail": [{"msg": "field required"}]})
                 picture = fields["source_image"].get_payload(decode=True)
                 with service._lock:
-                    service.calls.append({"path": self.path, "key": self.headers["x-api-key"], "picture": picture, "agent": self.headers["User-Agent"],
-                                          "file": fields["source_image"].get_filename(), "type": fields["source_image"].get_content_type(),
-                                          **{name: part.get_payload() for name, part in fields.items() if name != "source_image"}})
+                    service.calls.append({"path": self.path, "key": self.headers["x-api-key"], "picture": picture,
+                                          "agent": self.headers["User-Agent"],
+                                          "file": fields["source_image"].get_filename(),
+                                          "type": fields["source_image"].get_content_type(),
+                                          **{name: part.get_payload() for name, part in fields.items()
+                                             if name != "source_image"}})
                     what = service.plan.pop(0) if service.plan else "fine"
                 time.sleep(service.seconds)
                 if isinstance(what, tuple):
@@ -93,7 +103,8 @@ class Service:
                 self._picture(what)
 
             def _picture(self, what: str):
-                data = {"garbage": b"<html>so sorry</html>", "truncated": service.answer[:len(service.answer) // 2]}.get(what, service.answer)
+                data = {"garbage": b"<html>so sorry</html>",
+                        "truncated": service.answer[:len(service.answer) // 2]}.get(what, service.answer)
                 self.send_response(200)
                 self.send_header("Content-Type", "image/png")
                 self.send_header("Content-Length", str(len(data)))

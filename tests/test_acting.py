@@ -41,7 +41,8 @@ def head(capture):
 
 @pytest.fixture
 def open_eyed(capture, addon):
-    """A capture that was filmed with open eyes, half as wide as MakeHuman opens them and looking to the left, and the carried head it was made from."""
+    """A capture that was filmed with open eyes, half as wide as MakeHuman opens them and looking to the left, and the
+    carried head it was made from."""
     solved = write_head(capture, 0.95)
     asset, carrying = addon("acting.asset").load(), addon("acting.carrying")
     rest, units = carrying.carried(asset, solved)
@@ -51,7 +52,8 @@ def open_eyed(capture, addon):
     sockets = np.flatnonzero((asset.kind == 0) & (asset.parts[:, 2] > -0.02))
     rows = np.concatenate([np.arange(HEAD), HEAD + np.flatnonzero(asset.seam > 0), HEAD + COPIES + sockets])
     (capture / "head_open.obj").write_text("".join("v {:.7f} {:.7f} {:.7f}\n".format(*place) for place in rest[rows]))
-    eye = {"centre": [0.029, 0.003, -0.002], "radius": 0.0145, "gaze": [0.28, -0.96, 0.0], "openness": 0.5, "iris_radius": 0.0058, "views": 6}
+    eye = {"centre": [0.029, 0.003, -0.002], "radius": 0.0145, "gaze": [0.28, -0.96, 0.0], "openness": 0.5,
+           "iris_radius": 0.0058, "views": 6}
     (capture / "eyes.json").write_text(json.dumps({"left": eye, "right": {**eye, "centre": [-0.029, 0.003, -0.002]}}))
     (capture / "maps" / "irises.json").write_text(json.dumps({"left": [0.1, 0.2, 0.4], "right": [0.12, 0.2, 0.38]}))
     return rest, rows
@@ -77,7 +79,9 @@ def test_at_rest_it_is_the_head_that_was_solved_and_each_unit_of_the_eye_opens_t
     skin = corners[:3 * 24356]
     assert skin.max() == HEAD + COPIES - 1  # the seams' lower side, and nothing from inside, became part of the skin
     assert np.abs(rest[skin].reshape(-1, 3, 3) - solved[_triangles()]).max() < 1e-6  # the cut moved no triangle
-    assert head.data.materials[0].get("wildcap_skin") and [m.name.split()[-1] for m in head.data.materials[1:]] == ["Eyes", "Mouth", "Teeth"]
+    assert head.data.materials[0].get("wildcap_skin") and [m.name.split()[-1]
+                                                           for m in head.data.materials[1:]] == ["Eyes", "Mouth",
+                                                                                                 "Teeth"]
     _uvs_apart(head)
     rough = np.empty(len(head.data.vertices), np.float32)
     head.data.attributes["wildcap_roughness"].data.foreach_get("value", rough)
@@ -93,7 +97,8 @@ def test_at_rest_it_is_the_head_that_was_solved_and_each_unit_of_the_eye_opens_t
     assert np.abs(wide - rest)[:HEAD, 2].max() > 0.005
     blocks["eyeBlinkLeft"].value = 1
     shut = shown(head)
-    assert np.abs(shut - rest)[rest[:, 0] > 0.005].max() < 1e-6 and np.abs(shut - wide)[rest[:, 0] < -0.005].max() < 1e-6
+    assert np.abs(shut - rest)[rest[:, 0]
+                               > 0.005].max() < 1e-6 and np.abs(shut - wide)[rest[:, 0] < -0.005].max() < 1e-6
     bpy.ops.wildcap.rest_face()
     assert np.abs(shown(head) - rest).max() < 1e-6
     blocks["eyeLookUpRight"].value = 1
@@ -135,13 +140,15 @@ def test_a_head_that_was_filmed_with_open_eyes_looks_back(capture, addon, open_e
     seen = shown(head)
     assert np.abs(seen[rows] - filmed[rows]).max() < 2e-6
     eye = seen[_kind(addon) == 1]
-    assert np.abs(np.linalg.norm(eye - [0.029, 0.003, -0.002], axis=1) - 0.0145).max() < 0.07 * 0.0145  # the cornea stands out by 6 %
+    # the cornea stands out by 6 %
+    assert np.abs(np.linalg.norm(eye - [0.029, 0.003, -0.002], axis=1) - 0.0145).max() < 0.07 * 0.0145
     cornea = np.linalg.norm(eye - [0.029, 0.003, -0.002], axis=1) > 1.01 * 0.0145
     front = eye[cornea].mean(0) - [0.029, 0.003, -0.002]
     assert front / np.linalg.norm(front) == pytest.approx([0.28, -0.96, 0.0], abs=0.01)
     image = np.array(head.data.materials[1].node_tree.nodes["WildCap Eye"].image.pixels[:]).reshape(512, 512, 4)
     radius = np.hypot(*(np.mgrid[:512, :512] + 0.5 - 256)) / 512
-    assert (image[(radius > 0.1) & (radius < 0.13)][:, 2] > image[(radius > 0.1) & (radius < 0.13)][:, 0]).mean() > 0.9, "the blue that was measured"
+    assert (image[(radius > 0.1) & (radius < 0.13)][:, 2]
+            > image[(radius > 0.1) & (radius < 0.13)][:, 0]).mean() > 0.9, "the blue that was measured"
 
     keys.key_blocks["eyeBlinkLeft"].value = keys.key_blocks["eyeBlinkRight"].value = 1
     assert np.abs(shown(head)[:HEAD] - solved).max() < 2e-6  # closed lids are one unit away
@@ -168,7 +175,8 @@ def test_a_damaged_record_of_the_eyes_is_named_and_the_skin_is_there(capture, ad
     assert bpy.ops.wildcap.assemble_material() == {'FINISHED'}
 
 
-def test_values_animation_and_materials_stay_when_another_shape_comes_in_and_over_a_reload(head, capture, addon, tmp_path):
+def test_values_animation_and_materials_stay_when_another_shape_comes_in_and_over_a_reload(head, capture, addon,
+                                                                                           tmp_path):
     keys, slots = head.data.shape_keys, list(head.data.materials)
     keys.key_blocks["jawOpen"].value = 0.4
     keys.key_blocks["browInnerUp"].keyframe_insert("value", frame=3)
@@ -212,12 +220,14 @@ def test_lids_that_were_filmed_open_are_warned_of(addon, tmp_path):
 
     for seen, word in ((0.31, "open while filming"), (0.12, ""), (None, "")):
         record = {"stages": {"registration": {"figures": {"eye_opening": seen}}}}
-        told = addon("acting.operators").filmed_open(SimpleNamespace(read=lambda record=record: record, eyes=tmp_path / "eyes.json"))
+        told = addon("acting.operators").filmed_open(SimpleNamespace(read=lambda record=record: record,
+                                                                     eyes=tmp_path / "eyes.json"))
         assert word in told and bool(told) == bool(word)
 
 
 def _triangles() -> np.ndarray:
-    return np.array([[int(corner.split("/")[0]) - 1 for corner in line.split()[1:]] for line in TEMPLATE.read_text().splitlines() if line.startswith("f ")])
+    return np.array([[int(corner.split("/")[0]) - 1 for corner in line.split()[1:]]
+                     for line in TEMPLATE.read_text().splitlines() if line.startswith("f ")])
 
 
 def _kind(addon) -> np.ndarray:

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The add-on in the bpy wheel: registering, settings, captures, head, problems, panels. The real window is tests/gui/."""
+"""The add-on in the bpy wheel: registering, settings, captures, head, problems, panels. The real window is
+tests/gui/."""
 
 import json
 import math
@@ -17,9 +18,13 @@ bpy = pytest.importorskip("bpy")
 
 
 def registered() -> set[str]:
-    names = {name for kind in (bpy.types.Operator, bpy.types.Panel, bpy.types.UIList, bpy.types.PropertyGroup, bpy.types.AddonPreferences)
+    names = {name
+             for kind in (bpy.types.Operator, bpy.types.Panel, bpy.types.UIList, bpy.types.PropertyGroup,
+                          bpy.types.AddonPreferences)
              for name in (c.__name__ for c in kind.__subclasses__()) if name.startswith("WILDCAP")}
-    return {name for name in names if hasattr(bpy.types, name)} | {"Scene.wildcap"} & {"Scene.wildcap" if hasattr(bpy.types.Scene, "wildcap") else ""}
+    return {name for name in names
+            if hasattr(bpy.types, name)} | {"Scene.wildcap"} & {"Scene.wildcap" if hasattr(bpy.types.Scene, "wildcap")
+                                                                else ""}
 
 
 def handlers() -> int:
@@ -72,18 +77,21 @@ def test_a_quality_sets_the_settings_and_keeps_the_skin_tone(addon):
     assert values["solve"]["skin_tone"] == "0.5000,0.2500,0.1250"
 
 
-@pytest.mark.filterwarnings("ignore:.*does not support blend relative")  # from Blender 4.5 on it warns; what was typed in an older one stays in the file
+# from Blender 4.5 on it warns; what was typed in an older one stays in the file
+@pytest.mark.filterwarnings("ignore:.*does not support blend relative")
 def test_every_place_on_the_disk_is_chosen_as_one_and_made_absolute(addon, tmp_path):
     properties = addon("properties")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "faces.blend"))
     item = bpy.context.scene.wildcap.captures.add()
-    places = {name: field.metadata["path"] for name, field in properties.core_settings.known_settings().items() if "path" in field.metadata}
+    places = {name: field.metadata["path"] for name, field in properties.core_settings.known_settings().items()
+              if "path" in field.metadata}
     assert len(places) >= 8
     for name, kind in places.items():
         stage, own = name.split(".")
         group = getattr(item, stage)
         assert group.bl_rna.properties[own].subtype == ('DIR_PATH' if kind == "folder" else 'FILE_PATH'), name
-        for given, expected in (("//mine é/", tmp_path / "mine é"), ("mine", Path("mine").absolute()), ("~/mine", Path("~/mine").expanduser()), ("", "")):
+        for given, expected in (("//mine é/", tmp_path / "mine é"), ("mine", Path("mine").absolute()),
+                                ("~/mine", Path("~/mine").expanduser()), ("", "")):
             setattr(group, own, given)
             assert properties.job_settings(item)[stage][own] == str(expected), name
 
@@ -211,12 +219,14 @@ def test_a_finished_stage_can_be_done_again_from_its_row(addon, capture, monkeyp
     addon("status").refresh(bpy.context)
     rows = drawn(addon("panel").WILDCAP_PT_stages)
     buttons = [(args[0], options["icon"]) for name, args, options in rows if name == "operator"]
-    assert buttons == [("wildcap.reconstruct", 'PLAY'), ("wildcap.reconstruct", 'FILE_REFRESH')], "the first that is to do, and the one that is done"
+    assert buttons == [("wildcap.reconstruct", 'PLAY'),
+                       ("wildcap.reconstruct", 'FILE_REFRESH')], "the first that is to do, and the one that is done"
     started = []
     monkeypatch.setattr(addon("jobs"), "start", lambda item, goal, **span: started.append((goal, span)))
     bpy.ops.wildcap.reconstruct(first="scan")
     bpy.ops.wildcap.reconstruct()
-    assert started == [("reconstruct", {"first": "scan", "last": "shadow_mask"}), ("reconstruct", {"first": None, "last": "shadow_mask"})]
+    assert started == [("reconstruct", {"first": "scan", "last": "shadow_mask"}),
+                       ("reconstruct", {"first": None, "last": "shadow_mask"})]
 
 
 def test_moved_landmarks_are_kept_and_the_head_is_fitted_to_them_again(addon, capture, monkeypatch):
@@ -225,13 +235,16 @@ def test_moved_landmarks_are_kept_and_the_head_is_fitted_to_them_again(addon, ca
     head = bpy.context.view_layer.objects.active
     with pytest.raises(RuntimeError, match="no landmarks"):
         bpy.ops.wildcap.show_landmarks()
-    (capture / "landmarks.json").write_text(json.dumps({"points": {"1": [0.0, -0.1, 0.0], "152": [0.0, -0.08, -0.1], "7": [0, 0, 0]}}), encoding="utf-8")
+    (capture
+     / "landmarks.json").write_text(json.dumps({"points": {"1": [0.0, -0.1, 0.0], "152": [0.0, -0.08, -0.1],
+                                                           "7": [0, 0, 0]}}), encoding="utf-8")
     bpy.ops.wildcap.show_landmarks()
     empties = {o["wildcap_landmark"]: o for o in bpy.data.collections["WildCap Landmarks"].objects}
     assert set(empties) == {1, 152} and "Chin" in empties[152].name
     head.location = (3, 2, 1)
     bpy.context.view_layer.update()
-    assert tuple(empties[152].matrix_world.translation) == pytest.approx((3, 1.92, 0.9), abs=1e-6), "they stay on the head"
+    assert tuple(empties[152].matrix_world.translation) == pytest.approx((3, 1.92, 0.9),
+                                                                         abs=1e-6), "they stay on the head"
     with pytest.raises(RuntimeError, match="No landmark was moved"):
         bpy.ops.wildcap.fit_landmarks()
     started = []
@@ -243,7 +256,8 @@ def test_moved_landmarks_are_kept_and_the_head_is_fitted_to_them_again(addon, ca
     assert list(kept) == ["152"] and kept["152"] == pytest.approx([0, -0.08, -0.104], abs=1e-6)
     assert "WildCap Landmarks" not in bpy.data.collections
     bpy.ops.wildcap.show_landmarks()
-    assert bpy.data.collections["WildCap Landmarks"].objects["Chin Landmark"].location.z == pytest.approx(-0.104, abs=1e-6)
+    assert bpy.data.collections["WildCap Landmarks"].objects["Chin Landmark"].location.z == pytest.approx(-0.104,
+                                                                                                          abs=1e-6)
     bpy.ops.wildcap.hide_landmarks()
 
 
@@ -258,7 +272,8 @@ def test_every_panel_draws_in_every_state(addon, capture):
         for cls in classes:
             if not hasattr(cls, "poll") or cls.poll(bpy.context):
                 seen += drawn(cls)
-        return [kwargs.get("text", args[1] if len(args) > 1 else "") for name, args, kwargs in seen if name == "operator"]
+        return [kwargs.get("text", args[1] if len(args) > 1 else "") for name, args, kwargs in seen
+                if name == "operator"]
 
     draw_all()
     status.refresh(bpy.context)

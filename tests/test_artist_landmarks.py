@@ -48,8 +48,11 @@ def test_points_of_a_file_are_taken(capture, tmp_path):
     assert set(json.loads(capture.landmarks_artist.read_text())["points"]) == {"4", "152"}
 
 
-@pytest.mark.parametrize("text", ["not json", "[]", '{"points": [1]}', '{"points": {"468": [0, 0, 0]}}', '{"points": {"nose": [0, 0, 0]}}',
-                                  '{"points": {"1": [0, 0]}}', '{"points": {"1": [0, 0, 150]}}', '{"points": {"1": [0, 0, NaN]}}', '{"points": {"1": "abc"}}'])
+@pytest.mark.parametrize("text",
+                         ["not json", "[]", '{"points": [1]}', '{"points": {"468": [0, 0, 0]}}',
+                          '{"points": {"nose": [0, 0, 0]}}',
+                          '{"points": {"1": [0, 0]}}', '{"points": {"1": [0, 0, 150]}}',
+                          '{"points": {"1": [0, 0, NaN]}}', '{"points": {"1": "abc"}}'])
 def test_a_bad_file_is_a_problem_and_changes_nothing(capture, tmp_path, text):
     bad = tmp_path / "bad.json"
     bad.write_text(text)
@@ -80,9 +83,11 @@ def test_a_moved_landmark_takes_the_surface_along(tmp_path, monkeypatch, known):
     artist_landmarks.put(capture, {MOUTH_CORNER: wish})
     registration.run(capture, from_json({"registration": {"iterations": 8}}), report)
     at = model.at_landmarks(meshes.read_obj(capture.head).vertices)
-    assert np.linalg.norm(at[MOUTH_CORNER] - wish) < 0.0007, "it is where the artist put it, not where the frames and the scan have it"
+    assert np.linalg.norm(at[MOUTH_CORNER]
+                          - wish) < 0.0007, "it is where the artist put it, not where the frames and the scan have it"
     assert report.figures["landmarks_put_by_hand"] == 1 and report.figures["put_landmark_residual_mm"] < 0.7
     far = np.linalg.norm(points - points[MOUTH_CORNER], axis=1) > 0.05
     assert np.median(np.linalg.norm(at - points, axis=1)[far]) < 0.001, "the rest of the face stays"
     assert report.figures["flipped_triangles"] == 0
-    assert np.linalg.norm(np.array(json.loads(capture.landmarks.read_text())["points"][str(MOUTH_CORNER)]) - wish) < 1e-5
+    assert np.linalg.norm(np.array(json.loads(capture.landmarks.read_text())["points"][str(MOUTH_CORNER)])
+                          - wish) < 1e-5

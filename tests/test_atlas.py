@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""New UVs for a mesh: no overlap, little stretch, a filled square, the same every time; and what is wrong with UVs is found."""
+"""New UVs for a mesh: no overlap, little stretch, a filled square, the same every time; and what is wrong with UVs is
+found."""
 
 from dataclasses import replace
 
@@ -45,12 +46,14 @@ def test_faults_are_told_apart():
     mesh = egg(24, 16)
     assert atlas.faults(mesh) == []
     assert "no UVs" in atlas.faults(Mesh(mesh.vertices, mesh.faces))[0]
-    mirrored = replace(mesh, uvs=np.stack([np.abs(mesh.uvs[:, 0] - 0.5), mesh.uvs[:, 1]], 1))  # left on right, as games do
+    # left on right, as games do
+    mirrored = replace(mesh, uvs=np.stack([np.abs(mesh.uvs[:, 0] - 0.5), mesh.uvs[:, 1]], 1))
     assert "overlap" in atlas.faults(mirrored)[0]
     assert "no area" in atlas.faults(replace(mesh, uvs=np.full_like(mesh.uvs, 0.5)))[0]
     assert "left of" in atlas.faults(replace(mesh, uvs=mesh.uvs - [1, 0]))[0]
     beside = replace(mesh, uvs=np.concatenate([mesh.uvs, mesh.uvs + [1, 0]]),
-                     face_uvs=np.where((np.arange(len(mesh.faces)) % 2 == 0)[:, None], mesh.face_uvs, mesh.face_uvs + len(mesh.uvs)))
+                     face_uvs=np.where((np.arange(len(mesh.faces)) % 2 == 0)[:, None], mesh.face_uvs,
+                                       mesh.face_uvs + len(mesh.uvs)))
     assert atlas.faults(beside) == [] and {atlas.udim(t) for t in atlas.tiles(beside)} == {1001, 1002}
 
 
@@ -66,14 +69,16 @@ def test_split_seams_are_sewn_and_what_only_touches_is_not():
     sewn, index = surfaces.welded(mesh)
     assert len(sewn.vertices) == len(mesh.vertices) - 17 and np.allclose(sewn.vertices[index], mesh.vertices, atol=1e-6)
     a, b, c = mesh.vertices[mesh.faces[100]]
-    fin = Mesh(np.concatenate([mesh.vertices, [a, b, (a + b) / 2 + [0, 0, 1]]]), np.concatenate([mesh.faces, len(mesh.vertices) + np.array([[0, 1, 2]])]))
+    fin = Mesh(np.concatenate([mesh.vertices, [a, b, (a + b) / 2 + [0, 0, 1]]]),
+               np.concatenate([mesh.faces, len(mesh.vertices) + np.array([[0, 1, 2]])]))
     assert len(surfaces.welded(fin)[0].vertices) == len(sewn.vertices) + 3
 
 
 def test_hollow_polygons_are_cut_inside(tmp_path):
     corners = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 0.4 0\n"  # an arrow head, hollow at its last corner
     for order in ("1 2 3 4", "2 3 4 1", "3 4 1 2", "4 1 2 3"):
-        (tmp_path / "arrow.obj").write_text(corners + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0.5 0.2\nf " + " ".join(f"{i}/{i}" for i in order.split()) + "\n")
+        (tmp_path / "arrow.obj").write_text(corners + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0.5 0.2\nf "
+                                            + " ".join(f"{i}/{i}" for i in order.split()) + "\n")
         mesh = meshes.read_obj(tmp_path / "arrow.obj")
         a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
         assert (np.cross(b - a, c - a)[:, 2] > 0).all() and np.array_equal(mesh.faces, mesh.face_uvs)

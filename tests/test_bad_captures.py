@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bad captures end in the right diagnosis: a head that turns, a side that is missing, mirrored pictures, three photographs, a talking subject."""
+"""Bad captures end in the right diagnosis: a head that turns, a side that is missing, mirrored pictures, three
+photographs, a talking subject."""
 
 from dataclasses import replace
 
@@ -44,12 +45,20 @@ def problems(report: Reporter) -> str:
 def test_missing_sides_are_named():
     whole = np.linspace(-75, 75, 16)
     assert coverage.missing(place(whole, 10 * np.sin(whole))) == []
-    left = " ".join(problem for problem, _ in coverage.missing(place(np.linspace(-75, 15, 10), 10 * np.sin(whole[:10]))))
+    left = " ".join(problem
+                    for problem, _ in coverage.missing(place(np.linspace(-75, 15, 10), 10 * np.sin(whole[:10]))))
     assert "Nothing was seen from the person's left side: the pictures end 15 degrees" in left and "right" not in left
-    right = " ".join(problem for problem, _ in coverage.missing(place(np.linspace(10, 80, 10), 10 * np.sin(whole[:10]))))
+    right = " ".join(problem
+                     for problem, _ in coverage.missing(place(np.linspace(10, 80, 10), 10 * np.sin(whole[:10]))))
     assert "Nothing was seen from the person's right side" in right and "before the nose" in right
-    gap = " ".join(problem for problem, _ in coverage.missing(place(np.array([-70, -60, -50, 40, 55, 70.0]), 10 * np.sin(whole[:6]))))
-    assert "Between 50 degrees to the person's right and 40 degrees to the person's left there is no picture: a gap of 90 degrees" in gap
+    gap = " ".join(problem
+                   for problem, _ in coverage.missing(place(np.array([-70, -60, -50, 40, 55, 70.0]),
+                                                            10 * np.sin(whole[:6]))))
+    assert (
+        "Between 50 degrees to the person's right and 40 degrees to the person's left there is no picture: a gap of 90 "
+        "degrees"
+        in gap
+    )
     assert "one height" in coverage.missing(place(whole))[0][0]
 
 
@@ -78,8 +87,10 @@ def test_a_mirrored_photograph_is_named(tmp_path):
 
 def test_the_two_sides_of_a_symmetric_face_are_not_taken_for_each_others_mirror_image(tmp_path):
     names, found = [f"{i}.png" for i in range(3)], {}
-    for name, azimuth, flip in zip(names, (-30, -28, -33), (1, -1, -1), strict=True):  # from the right, and as if from the left
-        images.write_srgb(tmp_path / name, painted_head.photograph(camera(azimuth, 0.02, scale=2), wall=False)[:, ::flip])
+    # from the right, and as if from the left
+    for name, azimuth, flip in zip(names, (-30, -28, -33), (1, -1, -1), strict=True):
+        images.write_srgb(tmp_path / name,
+                          painted_head.photograph(camera(azimuth, 0.02, scale=2), wall=False)[:, ::flip])
         found[name] = faces.detect(images.read_srgb(tmp_path / name))
     assert find_mirrored(names, [], tmp_path, Reporter("cameras")) == ["0.png"], "by the pictures alone it is one"
     assert find_mirrored(names, [], tmp_path, Reporter("cameras"), found) == []
@@ -101,7 +112,9 @@ def test_a_head_that_turns_before_a_still_camera_is_told(tmp_path):
 def test_an_open_mouth_in_some_frames_is_told():
     face = faces.detect(painted_head.photograph(camera(0)))
     rng = np.random.default_rng(0)
-    found = {str(i): replace(face, landmarks=face.landmarks + rng.normal(0, 0.3, face.landmarks.shape).astype(np.float32)) for i in range(10)}
+    found = {str(i): replace(face,
+                             landmarks=face.landmarks + rng.normal(0, 0.3, face.landmarks.shape).astype(np.float32))
+             for i in range(10)}
     assert expression_changes(found) == []
     wide = face.landmarks.copy()
     wide[list(range(14, 15)), 1] += 0.3 * np.linalg.norm(wide[33] - wide[263])  # the lower lip goes down
@@ -111,7 +124,8 @@ def test_an_open_mouth_in_some_frames_is_told():
 
 @pytest.mark.parametrize("azimuths", [(8,), (2, 10)])
 def test_one_photograph_or_two_make_a_draft(tmp_path, azimuths):
-    """Nothing matches, and where a single side is seen the depths are those of other heads: the face lies on the picture, and the report says what it is."""
+    """Nothing matches, and where a single side is seen the depths are those of other heads: the face lies on the
+    picture, and the report says what it is."""
     for i, azimuth in enumerate(azimuths):
         images.write_srgb(tmp_path / "photos" / f"{i}.png", painted_head.photograph(camera(azimuth, 0.02), wall=False))
     capture = Capture(tmp_path / "face.wildcap")
@@ -122,8 +136,10 @@ def test_one_photograph_or_two_make_a_draft(tmp_path, azimuths):
     registration.run(capture, Settings(), report)
     assert "This head is a draft: the photographs show the face from one side only" in problems(report)
     head, truth = read_head(capture).mesh, painted_head.person()[0].mesh
-    assert np.ptp(head.vertices[:, 0]) == pytest.approx(np.ptp(truth.vertices[:, 0]), rel=0.08), "metres, by the distance of the pupils"
+    assert np.ptp(head.vertices[:, 0]) == pytest.approx(np.ptp(truth.vertices[:, 0]),
+                                                        rel=0.08), "metres, by the distance of the pupils"
     for view, azimuth in zip(read_views(capture), azimuths, strict=True):
-        there, here = (seen.project(template.landmark_points(mesh))[0] for seen, mesh in ((camera(azimuth, 0.02), truth), (view, head)))
+        there, here = (seen.project(template.landmark_points(mesh))[0]
+                       for seen, mesh in ((camera(azimuth, 0.02), truth), (view, head)))
         miss = np.linalg.norm(there - here, axis=1)[template.landmark_weights() > 0.2]
         assert np.median(miss) < 0.04 * np.ptp(there[:, 0]), "of the face's width"

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Input and disks that would lose work, through the command line and the real stages: one sentence, one remedy, exit code 2.
+"""Input and disks that would lose work, through the command line and the real stages: one sentence, one remedy, exit
+code 2.
 
-Where kill -9 strikes: here in the real frames and cameras stages; test_worker.py kills every stage of the chain, over tiny rooms.
+Where kill -9 strikes: here in the real frames and cameras stages; test_worker.py kills every stage of the chain, over
+tiny rooms.
 """
 
 import json
@@ -54,7 +56,8 @@ def video(path: Path, pictures) -> Path:
 
 
 def run(source, capture: Capture, *options, within=()) -> subprocess.CompletedProcess:
-    command = [*within, sys.executable, "-B", "-m", "core", "run", str(source), str(capture.root), "--until", "frames", *options]
+    command = [*within, sys.executable, "-B", "-m", "core", "run", str(source), str(capture.root), "--until", "frames",
+               *options]
     return subprocess.run(command, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
 
 
@@ -62,7 +65,8 @@ def refused(source, capture: Capture, *words: str) -> None:
     """Two lines, code 2, no traceback, no frames, and the capture can be used again."""
     result = run(source, capture)
     lines = result.stderr.strip().splitlines()
-    assert result.returncode == 2 and len(lines) == 2 and all(line.endswith(".") for line in lines), (result.returncode, result.stderr)
+    assert result.returncode == 2 and len(lines) == 2 and all(line.endswith(".")
+                                                              for line in lines), (result.returncode, result.stderr)
     assert "Traceback" not in result.stdout + result.stderr
     assert any(word in lines[0] for word in words), lines[0]
     assert not capture.frames.exists() and not capture.lock.exists() and not list(capture.root.glob(".*"))
@@ -90,7 +94,8 @@ def test_a_truncated_video(capture, face, tmp_path):
 
 def test_a_video_without_a_face(capture, tmp_path):
     noise = np.random.default_rng(0).integers(0, 255, (30, 40, 3), np.uint8)
-    refused(video(tmp_path / "wall.mp4", [np.kron(np.roll(noise, k, 1), np.ones((8, 8, 1), np.uint8)) for k in range(8)]), capture, "face")
+    refused(video(tmp_path / "wall.mp4",
+                  [np.kron(np.roll(noise, k, 1), np.ones((8, 8, 1), np.uint8)) for k in range(8)]), capture, "face")
 
 
 def test_a_video_that_stands_still(capture, tmp_path):
@@ -108,7 +113,8 @@ def test_the_same_capture_takes_a_good_video_after_a_bad_one(capture, face, tmp_
 def test_accents_and_spaces_in_every_path(face, tmp_path):
     """Also in the path of the code itself, as in C:/Users/Chloé Müller."""
     root = tmp_path / "Chloé Müller" / "wild cap"
-    shutil.copytree(ROOT / "core", root / "core", ignore=shutil.ignore_patterns("__pycache__", "sample_head", "training", "synthetic"))
+    shutil.copytree(ROOT / "core", root / "core",
+                    ignore=shutil.ignore_patterns("__pycache__", "sample_head", "training", "synthetic"))
     capture = Capture(tmp_path / "mes visages" / "été 🙂.wildcap")
     command = [sys.executable, "-B", "-m", "core", "run", str(face), str(capture.root), "--until", "frames"]
     result = subprocess.run(command, cwd=root, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
@@ -119,7 +125,8 @@ def test_accents_and_spaces_in_every_path(face, tmp_path):
 # -- disks
 
 def private_mounts() -> bool:
-    return shutil.which("unshare") is not None and subprocess.run(["unshare", "-rm", "true"], capture_output=True).returncode == 0
+    return shutil.which("unshare") is not None and subprocess.run(["unshare", "-rm", "true"],
+                                                                  capture_output=True).returncode == 0
 
 
 needs_mounts = pytest.mark.skipif(not private_mounts(), reason="needs a mount namespace of its own (Linux, unshare)")
@@ -127,7 +134,8 @@ needs_mounts = pytest.mark.skipif(not private_mounts(), reason="needs a mount na
 
 @needs_mounts
 def test_a_full_disk_is_told_and_nothing_is_lost(face, tmp_path):
-    """A disk of 200 kB: it stops in the middle of the frames. With more space the same command goes through, and the mask is still there."""
+    """A disk of 200 kB: it stops in the middle of the frames. With more space the same command goes through, and the
+    mask is still there."""
     disk = tmp_path / "Disque plein"
     disk.mkdir()
     command = f'"{sys.executable}" -B -m core run "{face}" "{disk}/a.wildcap" --until frames'
@@ -140,7 +148,8 @@ def test_a_full_disk_is_told_and_nothing_is_lost(face, tmp_path):
         {command} >/dev/null; echo "code $?"
         cat "{disk}/a.wildcap/shadow_mask.png"; ls "{disk}/a.wildcap/frames" | grep -c jpg
     """
-    result = subprocess.run(["unshare", "-rm", "sh", "-c", script], cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+    result = subprocess.run(["unshare", "-rm", "sh", "-c", script], cwd=ROOT, env=ENVIRONMENT, capture_output=True,
+                            text=True, timeout=120)
     assert result.stdout.split("\n")[:5] == ["code 2", "0", "code 0", "painted", "12"], result
     problem, remedy = result.stderr.strip().splitlines()
     assert problem.startswith("The disk is full") and remedy.endswith(".")
@@ -155,7 +164,8 @@ def test_a_read_only_folder_is_told(face, tmp_path):
         mount --bind "{folder}" "{folder}" && mount -o remount,bind,ro "{folder}"
         "{sys.executable}" -B -m core run "{face}" "{folder}/a.wildcap" --until frames; echo "code $?"
     """
-    result = subprocess.run(["unshare", "-rm", "sh", "-c", script], cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+    result = subprocess.run(["unshare", "-rm", "sh", "-c", script], cwd=ROOT, env=ENVIRONMENT, capture_output=True,
+                            text=True, timeout=120)
     assert result.stdout.strip() == "code 2", result
     problem, remedy = result.stderr.strip().splitlines()
     assert "read-only" in problem and remedy.endswith(".")

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An environment from a Python without venv, ensurepip or pip; pip from a folder or an index, as pip's own settings say. No network."""
+"""An environment from a Python without venv, ensurepip or pip; pip from a folder or an index, as pip's own settings
+say. No network."""
 
 import hashlib
 import http.server
@@ -28,7 +29,9 @@ def run(command) -> tuple[int, str]:
 
 def without(*modules: str):
     """`run` where commands that need one of these modules fail, as on a Python that was stripped of them."""
-    return lambda command: (1, f"No module named {modules[0]}") if any(module in map(str, command) for module in modules) else run(command)
+    return lambda command: (1,
+                            f"No module named {modules[0]}") if any(module in map(str, command)
+                                                                    for module in modules) else run(command)
 
 
 @pytest.fixture
@@ -42,18 +45,27 @@ def wheels(tmp_path) -> Path:
         wheel.writestr("pip-0.1.dist-info/METADATA", "Metadata-Version: 2.1\nName: pip\nVersion: 0.1\n")
     (folder / PIP).write_bytes(content.getvalue())
     (tmp_path / "requirements" / "locks").mkdir(parents=True)
-    (tmp_path / "requirements" / "locks" / "pip.txt").write_text(f"pip==0.1 \\\n    --hash=sha256:{hashlib.sha256(content.getvalue()).hexdigest()}\n")
+    (tmp_path / "requirements" / "locks"
+     / "pip.txt").write_text(f"pip==0.1 \\\n    --hash=sha256:{hashlib.sha256(content.getvalue()).hexdigest()}\n")
     return folder
 
 
 @pytest.mark.parametrize("stripped", [(), ("venv",), ("venv", "ensurepip")])
 def test_an_environment_is_made_whatever_its_python_lacks(tmp_path, wheels, stripped):
     folder = tmp_path / "Löser für Zoë"
-    python = bare_environment.make(folder, Path(sys.executable), tmp_path / "requirements", without(*stripped) if stripped else run, wheels,
-                                   wheel_only="ensurepip" in stripped)
-    said = environment.answer(python, "import sys, pip; print(sys.prefix); print(*sys.version_info[:2]); print(getattr(pip, 'small', False))").splitlines()
-    assert Path(said[0]).samefile(folder) and said[1] == "{} {}".format(*sys.version_info) and said[2] == str("ensurepip" in stripped)
-    assert environment.answer(python, "import numpy") == "" and run([python, "-c", "import numpy"])[0], "none of the packages of the Python it was made from"
+    python = bare_environment.make(folder, Path(sys.executable), tmp_path / "requirements",
+                                   without(*stripped) if stripped else run, wheels, wheel_only="ensurepip" in stripped)
+    said = environment.answer(python,
+                              "import sys, pip; print(sys.prefix); print(*sys.version_info[:2]); print(getattr(pip, "
+                              "'small', False))").splitlines()
+    assert (
+        Path(said[0]).samefile(folder)
+        and said[1] == "{} {}".format(*sys.version_info)
+        and said[2] == str("ensurepip" in stripped)
+    )
+    assert environment.answer(python, "import numpy") == "" and run([python, "-c", "import numpy"])[0], (
+        "none of the packages of the Python it was made from"
+    )
     shutil.rmtree(folder)
 
 
@@ -69,17 +81,21 @@ def test_a_python_that_nothing_can_be_made_from_is_named(tmp_path, wheels):
     with pytest.raises(Problem, match="is not a working Python"):
         bare_environment.make(tmp_path / "env", tmp_path / "none", tmp_path / "requirements", without("venv"), wheels)
     with pytest.raises(Problem, match="No environment can be made from .* does not start"):
-        bare_environment.make(tmp_path / "env", tmp_path / "none", tmp_path / "requirements", lambda command: (0, ""), wheels)
+        bare_environment.make(tmp_path / "env", tmp_path / "none", tmp_path / "requirements", lambda command: (0, ""),
+                              wheels)
     with pytest.raises(Problem, match="does not answer"):
         bare_environment.unpack_pip(tmp_path / "env", b"")
     (wheels / PIP).write_bytes(b"")
-    (tmp_path / "requirements" / "locks" / "pip.txt").write_text(f"pip==0.1 --hash=sha256:{hashlib.sha256(b'').hexdigest()}\n")
+    (tmp_path / "requirements" / "locks"
+     / "pip.txt").write_text(f"pip==0.1 --hash=sha256:{hashlib.sha256(b'').hexdigest()}\n")
     broken = io.BytesIO()
     zipfile.ZipFile(broken, "w").close()
     (wheels / PIP).write_bytes(broken.getvalue())
-    (tmp_path / "requirements" / "locks" / "pip.txt").write_text(f"pip==0.1 --hash=sha256:{hashlib.sha256(broken.getvalue()).hexdigest()}\n")
+    (tmp_path / "requirements" / "locks"
+     / "pip.txt").write_text(f"pip==0.1 --hash=sha256:{hashlib.sha256(broken.getvalue()).hexdigest()}\n")
     with pytest.raises(Problem, match="pip does not work in"):
-        bare_environment.make(tmp_path / "env", Path(sys.executable), tmp_path / "requirements", run, wheels, wheel_only=True)
+        bare_environment.make(tmp_path / "env", Path(sys.executable), tmp_path / "requirements", run, wheels,
+                              wheel_only=True)
 
 
 def test_pip_is_checked_and_missed_by_name(tmp_path, wheels):
@@ -126,7 +142,8 @@ def test_pips_settings_are_read_as_pip_reads_them(tmp_path, monkeypatch):
         monkeypatch.delenv(name)
     file = tmp_path / "pip.conf"
     monkeypatch.setenv("PIP_CONFIG_FILE", str(file))
-    for text, value in (("[global]\nindex-url = https://a/simple\n", "https://a/simple"), ("[global]\nindex-url=b\n[install]\nindex-url = c\n", "c")):
+    for text, value in (("[global]\nindex-url = https://a/simple\n", "https://a/simple"),
+                        ("[global]\nindex-url=b\n[install]\nindex-url = c\n", "c")):
         file.write_text(text)
         assert pip_source.setting("index-url") == value
     monkeypatch.setenv("PIP_INDEX_URL", "https://mirror/simple")

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Batches over rooms of a few lines: what is done is done once, what fails is told in one line, and the rest goes on."""
+"""Batches over rooms of a few lines: what is done is done once, what fails is told in one line, and the rest goes
+on."""
 
 import hashlib
 import json
@@ -52,14 +53,17 @@ def test_one_that_stops_keeps_nobody(code, tmp_path):
     assert ran.returncode == 2 and ran.stderr == "" and ran.stdout.splitlines()[-1] == "4 faces: 1 done, 3 stopped"
     assert "head stopped: The face is not there. Film it." in said["b"] and "The disk is full" in said["c"]
     assert "There is no video or folder at" in said["d"]
-    assert states(batch) == {"a": DONE, "b": STOPPED, "c": TO_DO, "d": TO_DO}, "a disk with room again, a film that is back: nobody has to say so"
+    assert states(batch) == {"a": DONE, "b": STOPPED, "c": TO_DO,
+                             "d": TO_DO}, "a disk with room again, a film that is back: nobody has to say so"
     for face in batch.faces:
         tiny_batch.set_mood(face.capture, {})
     (tmp_path / "films" / "d.mp4").write_bytes(b"d")
     once = finished(batch)
     assert core(code, "batch", "run", batch.root).returncode == 2
-    assert states(batch) == {"a": DONE, "b": STOPPED, "c": DONE, "d": DONE}, "what has stopped at a face's own fault is not tried again by itself"
-    assert core(code, "batch", "retry", batch.root, "b").returncode == 0 and states(batch) == dict.fromkeys("abcd", DONE)
+    assert states(batch) == {"a": DONE, "b": STOPPED, "c": DONE,
+                             "d": DONE}, "what has stopped at a face's own fault is not tried again by itself"
+    assert core(code, "batch", "retry", batch.root,
+                "b").returncode == 0 and states(batch) == dict.fromkeys("abcd", DONE)
     assert finished(batch)["a"] == once["a"] and finished(batch)["b"]["frames"] == once["b"]["frames"]
 
 
@@ -68,8 +72,14 @@ def test_a_worker_that_dies_is_started_once_more(code, tmp_path):
     batch = make(code, tmp_path, "ab", {"a": {"scan": "die once"}, "b": {"scan": "die"}})
     ran = core(code, "batch", "run", batch.root)
     said = {line.partition(":")[0]: line for line in ran.stdout.splitlines()}
-    assert states(batch) == {"a": DONE, "b": TO_DO} and "head stopped: The worker ended unexpectedly during the stage scan" in said["b"]
-    assert "scan" in batch.faces[0].capture.read()["stages"] and ran.stdout.splitlines()[-1] == "2 faces: 1 done, 1 stopped"
+    assert (
+        states(batch) == {"a": DONE, "b": TO_DO}
+        and "head stopped: The worker ended unexpectedly during the stage scan" in said["b"]
+    )
+    assert (
+        "scan" in batch.faces[0].capture.read()["stages"]
+        and ran.stdout.splitlines()[-1] == "2 faces: 1 done, 1 stopped"
+    )
 
 
 def test_a_capture_that_is_worked_on_elsewhere_is_told_and_the_rest_goes_on(code, tmp_path):
@@ -77,7 +87,10 @@ def test_a_capture_that_is_worked_on_elsewhere_is_told_and_the_rest_goes_on(code
     with batch.faces[0].capture.locked():
         assert derive_state(batch, batch.faces[0]).state == WORKING
         ran = core(code, "batch", "run", batch.root)
-        assert f"a: head stopped: Another worker (process {os.getpid()}" in ran.stdout and ran.stdout.splitlines()[-1] == "2 faces: 1 done, 1 stopped"
+        assert (
+            f"a: head stopped: Another worker (process {os.getpid()}" in ran.stdout
+            and ran.stdout.splitlines()[-1] == "2 faces: 1 done, 1 stopped"
+        )
     assert states(batch) == {"a": TO_DO, "b": DONE}
 
 
@@ -85,7 +98,8 @@ def test_a_machine_that_has_gone_holds_nothing(code, tmp_path, monkeypatch):
     """Its lease is waited for and taken over, its face gone on with."""
     batch = make(code, tmp_path, "a")
     capture = batch.faces[0].capture
-    capture.lock.write_text(json.dumps({"host": "gone/1/2", "pid": 1, "began": "", "since": "2026-11-24T00:00:00", "token": "x"}))
+    capture.lock.write_text(json.dumps({"host": "gone/1/2", "pid": 1, "began": "", "since": "2026-11-24T00:00:00",
+                                        "token": "x"}))
     assert derive_state(batch, batch.faces[0]).who == "gone"
     monkeypatch.setattr(lease, "TERM_S", 0.5)
     heard = []
@@ -98,7 +112,11 @@ def test_a_batch_is_run_by_one_at_a_time(code, tmp_path):
     batch = make(code, tmp_path, "a")
     with lease.hold(batch.root, what="batch"):
         ran = core(code, "batch", "run", batch.root)
-        assert ran.returncode == 2 and "is working on this batch" in ran.stderr and "stages" in batch.faces[0].capture.read()
+        assert (
+            ran.returncode == 2
+            and "is working on this batch" in ran.stderr
+            and "stages" in batch.faces[0].capture.read()
+        )
         assert f"process {os.getpid()}" in core(code, "batch", "status", batch.root).stdout
 
 
@@ -107,14 +125,19 @@ def test_the_gate_waits_for_each_mask(code, tmp_path):
     assert core(code, "batch", "run", batch.root).stdout.splitlines()[-1] == "2 faces: 2 waiting for the artist"
     assert states(batch) == {"a": WAITING, "b": WAITING} and core(code, "batch", "commands", batch.root).stdout == ""
     refused = core(code, "batch", "task", batch.root, "a", "solve")
-    assert refused.returncode == 2 and "waits to be looked at" in refused.stderr and len(refused.stderr.strip().splitlines()) == 2
+    assert (
+        refused.returncode == 2
+        and "waits to be looked at" in refused.stderr
+        and len(refused.stderr.strip().splitlines()) == 2
+    )
     assert core(code, "batch", "accept", batch.root, "a").returncode == 0
     assert core(code, "batch", "run", batch.root).stdout.splitlines()[-1] == "2 faces: 1 done, 1 waiting for the artist"
     capture = batch.faces[0].capture
     capture.shadow_mask_auto.write_text("another proposal")
     assert not gate.is_accepted(capture) and states(batch)["a"] != DONE, "another proposal has to be looked at"
     with pytest.raises(Problem, match="no proposed shadow mask"):
-        gate.accept_mask(make(code, tmp_path / "other", "c").faces[0].capture) if (tmp_path / "other").mkdir() is None else None
+        gate.accept_mask(make(code, tmp_path / "other", "c").faces[0].capture) if (tmp_path
+                                                                                   / "other").mkdir() is None else None
 
 
 def test_commands_do_the_batch_in_the_order_they_name(code, tmp_path):
@@ -125,7 +148,9 @@ def test_commands_do_the_batch_in_the_order_they_name(code, tmp_path):
         assert after in done, "each waits for one before it"
         assert subprocess.run(shlex.split(line), cwd=code, capture_output=True).returncode == 0
         done.add(name)
-    assert done == {"", *(f"{face}.{group}" for face in "ab" for group in ("head", "mask", "solve", "deliver"))} and states(batch) == {"a": DONE, "b": DONE}
+    assert done == {"",
+                    *(f"{face}.{group}" for face in "ab"
+                      for group in ("head", "mask", "solve", "deliver"))} and states(batch) == {"a": DONE, "b": DONE}
     assert [task.name for task in lines.list_tasks(batch)] == []
 
 
@@ -134,7 +159,8 @@ def test_a_task_by_an_unknown_name_is_refused(code, tmp_path):
     for words, said in ((("z", "head"), "no face named 'z'"), (("a", "lunch"), "no task named 'lunch'")):
         assert said in core(code, "batch", "task", batch.root, *words).stderr
     for words, said in ((("--at-once", 0), "less than one"), (("--address", "here"), "--on ray only"),
-                        (("--cores", 2), "--on ray only"), (("--on", "ray", "--at-once", 2), "--on local only"), (("z",), "no face named")):
+                        (("--cores", 2), "--on ray only"), (("--on", "ray", "--at-once", 2), "--on local only"),
+                        (("z",), "no face named")):
         assert said in core(code, "batch", "run", batch.root, *words).stderr
 
 
@@ -167,13 +193,16 @@ def test_whatever_ends_it_nothing_is_lost_and_it_goes_on(code, tmp_path, way):
     assert list(capture.read()["stages"]) == ["frames", "cameras"]
     once = finished(batch)["a"]["cameras"]
     tiny_batch.set_mood(capture, {})
-    assert core(code, "batch", "run", batch.root).returncode == 0 and states(batch) == {"a": DONE, "b": DONE} and finished(batch)["a"]["cameras"] == once
+    assert core(code, "batch", "run",
+                batch.root).returncode == 0 and states(batch) == {"a": DONE,
+                                                                  "b": DONE} and finished(batch)["a"]["cameras"] == once
 
 
 def test_what_somebody_else_named_like_the_request_to_stop_is_no_request_and_stays(code, tmp_path):
     batch = make(code, tmp_path, "a")
     (batch.root / local.STOP).write_text("a list of bus stops")
-    assert core(code, "batch", "run", batch.root).returncode == 0 and (batch.root / local.STOP).read_text() == "a list of bus stops"
+    assert core(code, "batch", "run",
+                batch.root).returncode == 0 and (batch.root / local.STOP).read_text() == "a list of bus stops"
     (batch.root / local.STOP).unlink()
     (batch.root / local.STOP).mkdir()
     assert core(code, "batch", "run", batch.root).returncode == 0 and (batch.root / local.STOP).is_dir()
@@ -202,7 +231,8 @@ def test_what_is_delivered_is_what_the_maps_are_now(code, tmp_path):
     batch = make(code, tmp_path, "ab", None, "--deliver", "unreal", "--to", tmp_path / "out")
     assert core(code, "batch", "run", batch.root).returncode == 0 and states(batch) == {"a": DONE, "b": DONE}
     made = sorted((tmp_path / "out").rglob("*.obj"))
-    assert [path.relative_to(tmp_path / "out").as_posix() for path in made] == ["a/a_head_unreal_obj/a.obj", "b/b_head_unreal_obj/b.obj"]
+    assert [path.relative_to(tmp_path / "out").as_posix()
+            for path in made] == ["a/a_head_unreal_obj/a.obj", "b/b_head_unreal_obj/b.obj"]
     made[0].unlink()
     assert states(batch) == {"a": TO_DO, "b": DONE}
     assert core(code, "batch", "run", batch.root).returncode == 0 and made[0].is_file()
@@ -213,8 +243,10 @@ def test_what_is_delivered_is_what_the_maps_are_now(code, tmp_path):
 def test_contact_sheets_by_the_blender_that_is_named(code, tmp_path):
     """A program in Blender's place that writes the sheet, and two that do not."""
     blender = tmp_path / "blender"
-    blender.write_text(f"#!{sys.executable}\nimport sys, pathlib\nassert sys.argv[1:4] == ['--command', 'wildcap', 'contact_sheet']\n"
-                       "folder = pathlib.Path(sys.argv[4], 'renders'); folder.mkdir(exist_ok=True); (folder / 'contact_sheet.png').write_text('sheet')\n")
+    blender.write_text(f"#!{sys.executable}\nimport sys, pathlib\nassert sys.argv[1:4] == ['--command', 'wildcap', "
+                       "'contact_sheet']\n"
+                       "folder = pathlib.Path(sys.argv[4], 'renders'); folder.mkdir(exist_ok=True); (folder / "
+                       "'contact_sheet.png').write_text('sheet')\n")
     blender.chmod(0o755)
     batch = make(code, tmp_path, "a", None, "--blender", blender)
     core(code, "batch", "run", batch.root)
@@ -238,7 +270,8 @@ def test_a_second_look_reads_only_what_has_changed(code, tmp_path, monkeypatch):
     core(code, "batch", "run", batch.root)
     core(code, "batch", "status", batch.root)
     read = []
-    monkeypatch.setattr(hashes, "_hash_whole", lambda file, size: read.append(Path(file.name)) or hashlib.file_digest(file, hashes._hasher).hexdigest())
+    monkeypatch.setattr(hashes, "_hash_whole", lambda file,
+                        size: read.append(Path(file.name)) or hashlib.file_digest(file, hashes._hasher).hexdigest())
     monkeypatch.setattr(hashes, "_hashes", {})
     monkeypatch.setattr(hashes._hash_whole, "__name__", "_hash_whole")
     (batch.faces[0].capture.texture).write_text("edited")

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All faces reconstructed or solved from Blender, by a batch that outlives it and is found again. The batch and its workers are real processes, their rooms are
-tiny; timers do not fire in the wheel, so the tests poll."""
+"""All faces reconstructed or solved from Blender, by a batch that outlives it and is found again. The batch and its
+workers are real processes, their rooms are tiny; timers do not fire in the wheel, so the tests poll."""
 
 import json
 import os
@@ -29,7 +29,8 @@ def open_captures(*captures: Capture) -> None:
 def test_a_batch_goes_on_without_blender_is_found_again_and_stops_within_two_seconds(addon, batches, wildcap, tmp_path):
     import addon_utils
 
-    first, second = (batch_faces.filmed(tmp_path / "films", name, {"cameras": "slow"} if name == "anna" else None) for name in ("anna", "bert"))
+    first, second = (batch_faces.filmed(tmp_path / "films", name, {"cameras": "slow"} if name == "anna" else None)
+                     for name in ("anna", "bert"))
     open_captures(first, second)
     settings = bpy.context.scene.wildcap.captures[1]
     settings.seed = 7
@@ -37,7 +38,8 @@ def test_a_batch_goes_on_without_blender_is_found_again_and_stops_within_two_sec
     folder = batches.current()
     assert folder.parent == tmp_path / "captures" / "batches"
     asked = record.read_batch(folder)
-    assert asked.gate == "artist" and [(face.name, face.root) for face in asked.faces] == [("anna", first.root), ("bert", second.root)]
+    assert asked.gate == "artist" and [(face.name, face.root)
+                                       for face in asked.faces] == [("anna", first.root), ("bert", second.root)]
     assert asked.faces[1].chosen().seed == 7 and asked.faces[0].source == first.source
     bpy.context.scene.wildcap.active_index = 0
     batch_faces.wait(addon, lambda: batches.line(batches.view()).startswith("anna: Cameras"))
@@ -106,7 +108,9 @@ def test_reconstruct_all_stops_at_the_masks_and_solve_all_takes_them_as_they_are
     carl = batch_faces.filmed(tmp_path / "films", "carl")
     open_captures(carl)
     bpy.ops.wildcap.reconstruct_all()
-    assert batches.current() != folder and len(record.read_batch(batches.current()).faces) == 3, "other captures are another batch"
+    assert batches.current() != folder and len(record.read_batch(batches.current()).faces) == 3, (
+        "other captures are another batch"
+    )
 
 
 def test_two_faces_of_one_name_and_a_face_without_a_video(addon, batches, tmp_path):
@@ -122,7 +126,9 @@ def test_two_faces_of_one_name_and_a_face_without_a_video(addon, batches, tmp_pa
     batches.close()
     refuses("No capture of the list has a video", addon("batch.planning").prepare, bpy.context)
     open_captures(first)
-    assert addon("batch.planning")._make_folder(batch.root.parent) != addon("batch.planning")._make_folder(batch.root.parent), "never one that is there"
+    assert addon("batch.planning")._make_folder(batch.root.parent) != addon("batch.planning")._make_folder(
+        batch.root.parent
+    ), "never one that is there"
     (tmp_path / "captures" / "file").write_text("")
     refuses("could not be written", addon("batch.planning")._make_folder, tmp_path / "captures" / "file")
 
@@ -135,7 +141,8 @@ def test_a_result_comes_in_when_the_batch_lets_go_of_the_face(addon, batches, mo
     bpy.ops.wildcap.reconstruct_all()
     batch_faces.wait(addon, lambda: batches.works_on(str(capture.root)))
     assert not came
-    (capture.root / "mood.json").write_text("{}")  # read once, by each stage that begins: the one that is slow is cancelled
+    # read once, by each stage that begins: the one that is slow is cancelled
+    (capture.root / "mood.json").write_text("{}")
     bpy.ops.wildcap.cancel_batch()
     batch_faces.wait(addon, lambda: not batches.works_on(str(capture.root)))
     assert came == [True]

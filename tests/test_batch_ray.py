@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Batches on Ray, over rooms of a few lines: what dies is done again, what was done is not, and whatever is lacking is told in one line.
+"""Batches on Ray, over rooms of a few lines: what dies is done again, what was done is not, and whatever is lacking is
+told in one line.
 
 Two nodes in namespaces of their own, real stages, and a node that dies, are `python -m benchmarks.farm`."""
 
@@ -56,7 +57,8 @@ def own_environment(monkeypatch):
 
 def account(batch) -> list[dict]:
     """What the nodes say that they began and finished."""
-    lines = [line for path in (batch.root / ray_task.LOGS).glob("*.jsonl") for line in path.read_text(encoding="utf-8").splitlines()]
+    lines = [line for path in (batch.root / ray_task.LOGS).glob("*.jsonl")
+             for line in path.read_text(encoding="utf-8").splitlines()]
     return sorted(map(json.loads, lines), key=lambda line: line["at"])
 
 
@@ -73,13 +75,15 @@ def wait_for(condition, process) -> None:
 
 @pytest.mark.skipif(os.name == "nt", reason="no signal ends a process there")
 def test_a_killed_task_is_done_again_and_nothing_that_was_done(code, tmp_path):
-    """Eight faces: one stops at its own fault, one has no video, one is worked on elsewhere, one loses its process, one had been done before."""
+    """Eight faces: one stops at its own fault, one has no video, one is worked on elsewhere, one loses its process, one
+    had been done before."""
     batch = make(code, tmp_path, "abcdefgh", {"a": {"scan": "slow"}, "b": {"scan": "finding"}})
     capture = batch.face("a").capture
     assert core(code, "batch", "run", batch.root, "h").returncode == 0
     once = finished(batch)["h"]
     (tmp_path / "films" / "c.mp4").unlink()
-    with batch.face("d").capture.locked(), tiny_batch.start(code, "batch", "run", batch.root, "--on", "ray", "--cores", 1) as process:
+    with batch.face("d").capture.locked(), tiny_batch.start(code, "batch", "run", batch.root, "--on", "ray", "--cores",
+                                                            1) as process:
         wait_for(lambda: at_stage(batch, "a", "scan"), process)
         tiny_batch.set_mood(capture, {})
         os.kill(at_stage(batch, "a", "scan")[0]["pid"], signal.SIGKILL)
@@ -89,10 +93,13 @@ def test_a_killed_task_is_done_again_and_nothing_that_was_done(code, tmp_path):
     assert set(said) == {*"abcdefgh", "8 faces"}, "nothing of Ray's own"
     assert "head stopped: The face is not there. Film it." in said["b"] and "There is no video" in said["c"]
     assert f"Another worker (process {os.getpid()}" in said["d"]
-    assert states(batch) == dict.fromkeys("aefgh", DONE) | {"b": STOPPED, "c": TO_DO, "d": TO_DO} and finished(batch)["h"] == once
-    begun, done = (collections.Counter((line["face"], line["stage"]) for line in account(batch) if line["finished"] is whether) for whether in (False, True))
+    assert states(batch) == dict.fromkeys("aefgh", DONE) | {"b": STOPPED, "c": TO_DO,
+                                                            "d": TO_DO} and finished(batch)["h"] == once
+    begun, done = (collections.Counter((line["face"], line["stage"]) for line in account(batch)
+                                       if line["finished"] is whether) for whether in (False, True))
     assert set(done.values()) == {1} and len(done) == 4 * 10 + 2, "each stage once"
-    assert {stage: count for stage, count in begun.items() if count > done[stage]} == {("a", "scan"): 2, ("b", "scan"): 1}, "but for what was killed"
+    assert {stage: count for stage, count in begun.items()
+            if count > done[stage]} == {("a", "scan"): 2, ("b", "scan"): 1}, "but for what was killed"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no other process can press Ctrl-C there")
@@ -116,7 +123,8 @@ def test_it_is_cancelled_within_two_seconds_and_goes_on(code, tmp_path, way):
     once = finished(batch)["a"]["cameras"]
     for capture in captures:
         tiny_batch.set_mood(capture, {})
-    assert core(code, "batch", "run", batch.root, "--until", "head").returncode == 0 and finished(batch)["a"]["cameras"] == once
+    assert core(code, "batch", "run", batch.root, "--until",
+                "head").returncode == 0 and finished(batch)["a"]["cameras"] == once
 
 
 def working(batch) -> dict:
@@ -136,12 +144,15 @@ def test_the_gate_waits(code, tmp_path, monkeypatch, own_environment):
     batch = make(code, tmp_path, "ab", None, "--gate", "artist")
     monkeypatch.setattr(ray_cluster, "ROOT", code)
     heard = []
-    with monkeypatch.context() as elsewhere, pytest.raises(Problem, match=f"has no WildCap at {tmp_path / 'none'}. Set WILDCAP_CODE there"):
+    with monkeypatch.context() as elsewhere, pytest.raises(Problem,
+                                                           match=f"has no WildCap at {tmp_path / 'none'}. Set "
+                                                                 "WILDCAP_CODE there"):
         elsewhere.setattr(ray_cluster, "ROOT", tmp_path / "none")
         ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1)
     with pytest.raises(Problem, match="No node of the cluster has 1000 cores and 5 GB"):
         ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1000)
-    with monkeypatch.context() as busy, pytest.raises(Problem, match="could not be started on this machine: It took too long."):
+    with monkeypatch.context() as busy, pytest.raises(Problem,
+                                                      match="could not be started on this machine: It took too long."):
         busy.setattr("ray.init", busy_machine)
         ray_cluster.run_on_ray(batch, batch.faces, False, heard.append, None, None, 1)
     assert states(batch) == dict.fromkeys("ab", TO_DO) and not heard
@@ -157,7 +168,8 @@ def test_what_a_node_lacks(code, tmp_path, monkeypatch):
     assert "another batch" in ray_task.examine(str(batch.root), __version__, "0" * 64)
     assert "There is no batch at" in ray_task.examine(str(tmp_path / "none"), __version__, record)
     monkeypatch.setenv(ray_task.BATCHES, str(tmp_path))
-    assert ray_task.examine(f"/seen/elsewhere/{batch.root.name}", __version__, record) == "", "the node's own name of the folder"
+    assert ray_task.examine(f"/seen/elsewhere/{batch.root.name}", __version__,
+                            record) == "", "the node's own name of the folder"
     monkeypatch.setattr(ray_task.importlib.util, "find_spec", lambda name: None)
     assert "has no torch" in ray_task.examine(str(batch.root), __version__, record)
     assert ray_task.do_task(str(tmp_path / "none"), "a", "head", 1, "", print)["state"] == STOPPED
@@ -171,12 +183,14 @@ def test_a_task_whose_result_is_not_what_was_asked_for(code, tmp_path, monkeypat
 
 
 def test_a_task_of_ours_that_died_is_waited_for(code, tmp_path, monkeypatch):
-    """The worker of a process that was killed is at work for a moment longer; who was there when the batch came is not waited for."""
+    """The worker of a process that was killed is at work for a moment longer; who was there when the batch came is not
+    waited for."""
     batch = make(code, tmp_path, "a")
     capture = batch.faces[0].capture
     monkeypatch.setattr("core.batch.task.ROOT", code)
     words = str(batch.root), "a", "head", 1
-    hold = "import sys; from core.contract.capture import Capture\nwith Capture(sys.argv[1]).locked(): print(flush=True); input()"
+    hold = ("import sys; from core.contract.capture import Capture\nwith Capture(sys.argv[1]).locked(): "
+            "print(flush=True); input()")
     holding = [sys.executable, "-c", hold, capture.root]
     with subprocess.Popen(holding, cwd=code, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         process.stdout.readline()
@@ -185,7 +199,8 @@ def test_a_task_of_ours_that_died_is_waited_for(code, tmp_path, monkeypatch):
         assert "is working on this capture" in refused["words"] and time.monotonic() - began < lease.TERM_S
         with monkeypatch.context() as short:
             short.setattr(lease, "TERM_S", 0.3)
-            assert "is working on this capture" in ray_task.do_task(*words, "", print)["words"], "it is alive, after all"
+            assert "is working on this capture" in ray_task.do_task(*words, "",
+                                                                    print)["words"], "it is alive, after all"
         threading.Timer(1, process.kill).start()
         assert ray_task.do_task(*words, "", lambda line: None)["state"] == DONE
 
@@ -203,18 +218,23 @@ def test_an_address_that_cannot_be_reached_is_told_in_seconds(code, tmp_path, ca
         gone = address
         began = time.monotonic()
         told = core(code, "batch", "run", batch.root, "--on", "ray", "--address", address)
-        assert time.monotonic() - began < 30 and told.returncode == 2, "15 s, and what it takes to import Ray on a busy machine"
+        assert time.monotonic() - began < 30 and told.returncode == 2, (
+            "15 s, and what it takes to import Ray on a busy machine"
+        )
         assert "There is no cluster of Ray's" in told.stderr and len(told.stderr.splitlines()) == 2, told.stderr
-    for words, said in ((("--address", gone), "Connection refused"), (("--address", "here"), "no address of Ray's"), (("--cores", "0"), "less than one")):
+    for words, said in ((("--address", gone), "Connection refused"), (("--address", "here"), "no address of Ray's"),
+                        (("--cores", "0"), "less than one")):
         assert main(["batch", "run", str(batch.root), "--on", "ray", *words]) == 2
         assert said in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "ray", None)
-    assert main(["batch", "run", str(batch.root), "--on", "ray"]) == 2 and "requirements/farm.txt" in capsys.readouterr().err
+    assert main(["batch", "run", str(batch.root), "--on",
+                 "ray"]) == 2 and "requirements/farm.txt" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links to folders take rights there")
 def test_real_stages_on_ray_give_the_bytes_of_a_local_run(tmp_path, monkeypatch):
-    """One head, from twelve frames of the sample; the whole chain is `python -m benchmarks.farm`, for it takes 40 s of a core a capture."""
+    """One head, from twelve frames of the sample; the whole chain is `python -m benchmarks.farm`, for it takes 40 s of
+    a core a capture."""
     for name in THREAD_VARIABLES:
         monkeypatch.setenv(name, "1")
     code = tmp_path / "code"
@@ -222,18 +242,20 @@ def test_real_stages_on_ray_give_the_bytes_of_a_local_run(tmp_path, monkeypatch)
     for room in {path.name for path in (ROOT / "core").iterdir()} - {*tiny_chain.GROUND, "__pycache__"}:
         (code / "core" / room).symlink_to(ROOT / "core" / room)
     tiny_chain.keep_pace(code)
-    settings = {"device": "cpu", "frames": {"max_frames": 12, "long_side": 320, "views": 3}, "scan": {"pairs": 3, "voxel_mm": 5.0},
-                "registration": {"iterations": 2}}
+    settings = {"device": "cpu", "frames": {"max_frames": 12, "long_side": 320, "views": 3},
+                "scan": {"pairs": 3, "voxel_mm": 5.0}, "registration": {"iterations": 2}}
     (tmp_path / "small.json").write_text(json.dumps(settings))
     shots = tmp_path / "shots.csv"
     shots.write_text(f"video,name\n{ROOT / 'core/synthetic/sample/capture.mp4'},one\n")
     running = []
     for name, words in (("local", ("--on", "local")), ("ray", ("--on", "ray", "--cores", 1))):
-        assert core(code, "batch", "plan", shots, tmp_path / name, "--settings", tmp_path / "small.json").returncode == 0
+        assert core(code, "batch", "plan", shots, tmp_path / name, "--settings",
+                    tmp_path / "small.json").returncode == 0
         running.append(tiny_batch.start(code, "batch", "run", tmp_path / name, "--until", "head", *words))
     for process in running:
         out, err = process.communicate(timeout=400)
         assert process.returncode == 0 and err == "", out + err
     captures = [read_batch(tmp_path / name).faces[0].capture for name in ("local", "ray")]
-    written = [{file: content for stage in stages.STAGES[:4] for file, content in same_maps.written(capture, stage).items()} for capture in captures]
+    written = [{file: content for stage in stages.STAGES[:4]
+                for file, content in same_maps.written(capture, stage).items()} for capture in captures]
     assert written[0] == written[1] and len(written[0]) > 15

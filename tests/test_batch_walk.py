@@ -27,22 +27,38 @@ def test_the_walk_goes_through_the_masks_that_wait(addon, batches, tmp_path):
     bpy.ops.wildcap.open_batch(directory=str(folder))
     items = bpy.context.scene.wildcap.captures
     assert [item.name for item in items] == ["anna", "bert", "carl"]
-    assert addon("properties").settings(items[0]).seed == 3 and items[0].quality == "draft" and tuple(items[0].skin_tone) == (0.5, 0.25, 0.125)
-    assert addon("properties").job_settings(items[0])["solve"]["skin_tone"] == "0.5,0.25,0.125", "or what the batch has solved would be out of date here"
+    assert (
+        addon("properties").settings(items[0]).seed == 3
+        and items[0].quality == "draft"
+        and tuple(items[0].skin_tone) == (0.5, 0.25, 0.125)
+    )
+    assert addon("properties").job_settings(items[0])["solve"]["skin_tone"] == "0.5,0.25,0.125", (
+        "or what the batch has solved would be out of date here"
+    )
     items[2].skin_tone[0] = 0.6
     assert addon("properties").job_settings(items[2])["solve"]["skin_tone"] == "0.6000,0.2500,0.1250"
     batch_faces.wait(addon, lambda: batch_faces.seen(batches))
     assert [face.name for face in batches.waiting()] == ["anna", "carl"] and batches.view().count(state.TO_DO) == 1
     assert ("Masks waiting: 2, to do: 1", False) in drawn(addon("batch.panel").WILDCAP_PT_batch)
     bpy.ops.wildcap.next_mask()
-    assert session.root() == str(faces[0].root) and bpy.context.mode == 'PAINT_TEXTURE' and bpy.context.object.name == "anna"
+    assert (
+        session.root() == str(faces[0].root)
+        and bpy.context.mode == 'PAINT_TEXTURE'
+        and bpy.context.object.name == "anna"
+    )
     image = session.mask()
     painted = addon("paint.mask_image").mask_values(image).copy()
     painted[10:20, 30:40] = 1
     addon("paint.mask_image").set_values(image, painted)
     bpy.ops.wildcap.accept_mask()
-    assert faces[0].shadow_mask.read_bytes() == addon("paint.mask_image").grey_png(painted) and gate.is_accepted(faces[0])
-    assert session.root() == str(faces[2].root) and bpy.data.objects["anna"].hide_get() and not bpy.data.objects["carl"].hide_get()
+    assert faces[0].shadow_mask.read_bytes() == addon("paint.mask_image").grey_png(painted) and gate.is_accepted(
+        faces[0]
+    )
+    assert (
+        session.root() == str(faces[2].root)
+        and bpy.data.objects["anna"].hide_get()
+        and not bpy.data.objects["carl"].hide_get()
+    )
     refuses("No other mask waits", bpy.ops.wildcap.next_mask)
     bpy.ops.wildcap.finish_mask()
     bpy.context.scene.wildcap.active_index = 0
@@ -57,7 +73,8 @@ def test_the_walk_goes_through_the_masks_that_wait(addon, batches, tmp_path):
     bpy.ops.wildcap.solve_all()
     assert batches.current() == folder and len(list(folder.glob("batches"))) == 0
     batch_faces.ended(addon, done=3)
-    assert {face.root.name: face.read()["stages"]["solve"]["seed"] for face in faces} == dict.fromkeys(("anna.wildcap", "bert.wildcap", "carl.wildcap"), 3)
+    assert {face.root.name: face.read()["stages"]["solve"]["seed"]
+            for face in faces} == dict.fromkeys(("anna.wildcap", "bert.wildcap", "carl.wildcap"), 3)
     icons = [batches.ICONS[batches.state_of(str(face.root)).state] for face in faces]
     assert icons == ['CHECKMARK'] * 3
 
@@ -74,7 +91,8 @@ def test_the_walk_from_another_mode_and_over_a_face_that_is_damaged(addon, batch
     bpy.ops.object.mode_set(mode='OBJECT')
     anna.head.write_text("v 0 0 0\n")
     refuses("not one mesh with UVs", bpy.ops.wildcap.next_mask)
-    batch_faces.wait(addon, lambda: [face.name for face in batches.waiting()] == ["bert"] or len(batches.waiting()) == 2)
+    batch_faces.wait(addon,
+                     lambda: [face.name for face in batches.waiting()] == ["bert"] or len(batches.waiting()) == 2)
     bpy.ops.wildcap.next_mask()
     assert addon("paint.session").root() == str(bert.root)
     bert.shadow_mask_auto.unlink()
@@ -98,13 +116,15 @@ def test_what_is_no_batch_is_refused_and_one_that_is_damaged_meanwhile_says_so(a
     (folder / "batch.json").write_text("{")
     batch_faces.wait(addon, lambda: batches.view().problem is not None)
     texts = " ".join(text for text, _ in drawn(addon("batch.panel").WILDCAP_PT_batch))
-    assert "batch.json cannot be read".replace(" ", "") in texts.replace(" ", "") and "Masks" not in texts  # a long path is broken anywhere
+    # a long path is broken anywhere
+    assert "batch.json cannot be read".replace(" ", "") in texts.replace(" ", "") and "Masks" not in texts
     refuses("batch.json cannot be read", bpy.ops.wildcap.solve_all)
 
 
 def test_a_folder_that_goes_away_while_it_is_looked_at(addon, batches, monkeypatch, tmp_path):
     folder = batch_faces.planned(tmp_path / "batch", batch_faces.filmed(tmp_path / "batch", "anna"))
-    monkeypatch.setattr(addon("batch_watch").state, "derive_state", lambda *_: (_ for _ in ()).throw(OSError(5, "Input/output error")))
+    monkeypatch.setattr(addon("batch_watch").state, "derive_state",
+                        lambda *_: (_ for _ in ()).throw(OSError(5, "Input/output error")))
     bpy.ops.wildcap.open_batch(directory=str(folder))
     batch_faces.wait(addon, lambda: batches.view().count(state.STOPPED) == 1)
     assert "anna.wildcap cannot be read (Input/output error)" in batches.view().states["anna"].problem
@@ -117,9 +137,13 @@ def test_a_folder_that_goes_away_while_it_is_looked_at(addon, batches, monkeypat
     (folder / "progress.json").write_text('{"ended": 1, "of": 2, "left_s": "soon", "working": {}}')
     batch_faces.wait(addon, lambda: batches.view().runner == socket.gethostname())
     assert batches.view().progress == {}, "a figure that makes no sense is none"
-    (folder / "progress.json").write_text('{"ended": 1, "of": 4, "left_s": 1230.0, "working": {"anna": {"stage": "Cameras", "share": 0.4, "eta_s": 1}}}')
+    (folder
+     / "progress.json").write_text('{"ended": 1, "of": 4, "left_s": 1230.0, "working": {"anna": {"stage": "Cameras", '
+                                   '"share": 0.4, "eta_s": 1}}}')
     batch_faces.wait(addon, lambda: bool(batches.view().progress))
-    assert batches.line(batches.view()) == "anna: Cameras 40%, about 20 min left" and batches.share(batches.view()) == 0.25
+    assert (
+        batches.line(batches.view()) == "anna: Cameras 40%, about 20 min left" and batches.share(batches.view()) == 0.25
+    )
     monkeypatch.setattr(addon("batch_watch").lease, "TERM_S", 0.1)
     batch_faces.wait(addon, lambda: not batches.view().runner)  # it was not refreshed for a term
     (folder / "lock").unlink()

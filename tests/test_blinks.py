@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames in which somebody blinks, among others: around that eye the texture does without them, and elsewhere it does not."""
+"""Frames in which somebody blinks, among others: around that eye the texture does without them, and elsewhere it does
+not."""
 
 from dataclasses import replace
 
@@ -27,7 +28,8 @@ SEED, AZIMUTHS, SIZE = 4, (-20, -8, 8, 20, 70), 128
 
 @pytest.fixture
 def filmed(tmp_path, monkeypatch):
-    """A capture with open eyes, five views of it, and what would be found in each: the second shuts the left eye, and the last is a profile."""
+    """A capture with open eyes, five views of it, and what would be found in each: the second shuts the left eye, and
+    the last is a profile."""
     capture = Capture(tmp_path / "face.wildcap")
     capture.claim()
     closed = shape.person_mesh(SEED)
@@ -40,7 +42,8 @@ def filmed(tmp_path, monkeypatch):
     for i, azimuth in enumerate(AZIMUTHS):
         view = replace(camera(azimuth), name=f"{i}.png", path=tmp_path / f"{i}.png")
         images.write_srgb(view.path, np.full((view.height, view.width, 3), 0.5, np.float32))
-        seen = [faces.Eye(*(view.project(edge[np.linspace(0, len(edge) - 1, 9).round().astype(int)])[0] for edge in lids.edges(head.mesh.vertices, side)),
+        seen = [faces.Eye(*(view.project(edge[np.linspace(0, len(edge) - 1, 9).round().astype(int)])[0]
+                            for edge in lids.edges(head.mesh.vertices, side)),
                           np.zeros(2), 0.0) for side in (0, 1)]
         if i == 1:
             seen[0] = replace(seen[0], upper=seen[0].lower + 0.3 * (seen[0].upper - seen[0].lower))
@@ -56,7 +59,8 @@ def around(surface, capture, side):
     from core.contract.eyes_record import read_eyes
 
     ball = read_eyes(capture)[side]
-    return surface.spread((np.linalg.norm(surface.points - ball.centre, axis=1) < 1.4 * ball.radius).astype(np.float32)) > 0
+    return surface.spread((np.linalg.norm(surface.points - ball.centre, axis=1) < 1.4
+                           * ball.radius).astype(np.float32)) > 0
 
 
 def test_a_blink_is_left_out_around_its_eye_alone(filmed):
@@ -64,8 +68,13 @@ def test_a_blink_is_left_out_around_its_eye_alone(filmed):
     before = [o.weight.copy() for o in observations]
     assert blinks.leave_out_blinks(capture, observations, surface, Reporter("texture")) == ["1.png"]
     left, right = (around(surface, capture, side) for side in (0, 1))
-    assert before[1][left].max() > 0 and observations[1].weight[left].max() == 0 and observations[1].quality[left].max() == 0
-    assert (observations[1].weight[right] == before[1][right]).all() and (observations[1].weight > 0).sum() > 0.8 * (before[1] > 0).sum()
+    assert (
+        before[1][left].max() > 0
+        and observations[1].weight[left].max() == 0
+        and observations[1].quality[left].max() == 0
+    )
+    assert (observations[1].weight[right]
+            == before[1][right]).all() and (observations[1].weight > 0).sum() > 0.8 * (before[1] > 0).sum()
     for i in (0, 2, 3, 4):
         assert (observations[i].weight == before[i]).all()
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a mask's border tells of the light inside: a known step comes back, blotches and the outline of what was seen are none."""
+"""What a mask's border tells of the light inside: a known step comes back, blotches and the outline of what was seen
+are none."""
 
 import numpy as np
 import pytest
@@ -20,11 +21,13 @@ Y, X = np.mgrid[:SIZE, :SIZE] * TEXEL
 
 
 def light_and_mask(taken: float) -> tuple[torch.Tensor, torch.Tensor]:
-    """Skin with blotches of 8 % under a shadow, a bar of 180 texels of a 1024 map with a penumbra of 6; the mask lies on it."""
+    """Skin with blotches of 8 % under a shadow, a bar of 180 texels of a 1024 map with a penumbra of 6; the mask lies
+    on it."""
     blotches = 1 + 0.08 * np.sin(X / 37 + 1) * np.sin(Y / 29) + 0.01 * np.random.default_rng(0).standard_normal(X.shape)
     inside = np.abs(X - 500) < 90
     shadow = 1 / (1 + np.exp((np.abs(X - 500) - 90) / 1.5))
-    return torch.from_numpy(np.repeat((blotches * (1 - taken * shadow))[None], 3, 0).astype(np.float32)), torch.from_numpy(inside.astype(np.float32))
+    return torch.from_numpy(np.repeat((blotches * (1 - taken * shadow))[None], 3,
+                                      0).astype(np.float32)), torch.from_numpy(inside.astype(np.float32))
 
 
 @pytest.mark.parametrize("taken", [0.05, 0.2, 0.5])
@@ -55,9 +58,12 @@ def test_the_outline_of_what_was_seen_is_no_border_and_far_from_one_nothing_is_k
 
 
 def test_a_beard_says_little_of_the_light(tmp_path):
-    """Dark strokes on jaw and chin of a texture that is large enough to show them; without them, or on a small one, there is no beard."""
+    """Dark strokes on jaw and chin of a texture that is large enough to show them; without them, or on a small one,
+    there is no beard."""
     size = beard.SIZE
-    tone = np.array([0.42, 0.26, 0.18], np.float32) * (1 + 0.01 * np.random.default_rng(1).standard_normal((size, size, 1)).astype(np.float32))
+    tone = np.array([0.42, 0.26, 0.18],
+                    np.float32) * (1 + 0.01
+                                   * np.random.default_rng(1).standard_normal((size, size, 1)).astype(np.float32))
     grows = beard._on_template()[0] > 0.9
     strokes = (np.random.default_rng(2).random((size, size)) < 0.04) & grows
     stubbly = np.where(strokes[..., None], 0.5 * tone, tone)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Imported cameras: known ones written as each program lays them out project known points where that program's own formula puts them."""
+"""Imported cameras: known ones written as each program lays them out project known points where that program's own
+formula puts them."""
 
 import json
 from dataclasses import replace
@@ -19,7 +20,8 @@ from core.synthetic import painted_head
 WIDTH, HEIGHT = 1200, 1600  # of the pictures the cameras were solved from; the frames are smaller
 FRAME_WIDTH, FRAME_HEIGHT = 360, 480
 POINTS = np.random.default_rng(0).uniform(-0.07, 0.07, (50, 3))
-FOCAL, CENTRE, RADIAL, TANGENTIAL = 1900.0, (612.0, 790.0), (-0.06, 0.03, -0.01), (0.002, -0.0015)  # tangential as OpenCV's p1, p2
+# tangential as OpenCV's p1, p2
+FOCAL, CENTRE, RADIAL, TANGENTIAL = 1900.0, (612.0, 790.0), (-0.06, 0.03, -0.01), (0.002, -0.0015)
 VIEWS = [painted_head.camera(azimuth, 0.04 * i) for i, azimuth in enumerate((-60, -25, 5, 40))]
 NAMES = [f"IMG_{i:04d}" for i in range(7, 11)]
 
@@ -50,7 +52,8 @@ def metashape_xml() -> str:
         world = camera_to_world(view)
         chunk = np.eye(4)
         chunk[:3, :3], chunk[:3, 3] = rotation.T @ world[:3, :3], rotation.T @ (world[:3, 3] - shift) / scale
-        cameras += (f'<camera id="{i}" sensor_id="0" component_id="0" label="{name}"><transform>{" ".join(f"{x:.17g}" for x in chunk.ravel())}</transform>'
+        cameras += (f'<camera id="{i}" sensor_id="0" component_id="0" '
+                    f'label="{name}"><transform>{" ".join(f"{x:.17g}" for x in chunk.ravel())}</transform>'
                     "<orientation>1</orientation></camera>\n")
     k1, k2, k3 = RADIAL
     return f"""<?xml version="1.0" encoding="UTF-8"?>
@@ -71,11 +74,12 @@ def realityscan_csv(header="#name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4
     lines = [header]
     longer = max(WIDTH, HEIGHT)
     for name, view in zip(NAMES, VIEWS, strict=True):
-        seen = view.rotation.T @ np.diag([1, -1, -1])  # camera to world, looking along -z; = Rz(-heading) Rx(pitch) Ry(roll)
+        # camera to world, looking along -z; = Rz(-heading) Rx(pitch) Ry(roll)
+        seen = view.rotation.T @ np.diag([1, -1, -1])
         pitch = np.degrees(np.arcsin(seen[2, 1]))
         heading, roll = np.degrees(np.arctan2(seen[0, 1], seen[1, 1])), np.degrees(np.arctan2(-seen[2, 0], seen[2, 2]))
-        values = (*view.centre, heading, pitch, roll, FOCAL / longer * 36, (CENTRE[0] - WIDTH / 2) / longer, (CENTRE[1] - HEIGHT / 2) / longer, *RADIAL, 0,
-                  TANGENTIAL[1], TANGENTIAL[0])
+        values = (*view.centre, heading, pitch, roll, FOCAL / longer * 36, (CENTRE[0] - WIDTH / 2) / longer,
+                  (CENTRE[1] - HEIGHT / 2) / longer, *RADIAL, 0, TANGENTIAL[1], TANGENTIAL[0])
         lines.append(f"{name}.JPG," + ",".join(f"{x:.17g}" for x in values))
     return "\n".join(lines) + "\n"
 
@@ -90,7 +94,8 @@ def blender_json() -> str:
 def colmap_model() -> pycolmap.Reconstruction:
     model = pycolmap.Reconstruction()
     params = [FOCAL, FOCAL, *CENTRE, *RADIAL[:2], *TANGENTIAL, RADIAL[2], 0, 0, 0]
-    model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="FULL_OPENCV", width=WIDTH, height=HEIGHT, params=params))
+    model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="FULL_OPENCV", width=WIDTH, height=HEIGHT,
+                                                      params=params))
     for i, (name, view) in enumerate(zip(NAMES, VIEWS, strict=True), 1):
         pose = pycolmap.Rigid3d(np.concatenate([view.rotation, view.translation[:, None]], 1))
         model.add_image_with_trivial_frame(pycolmap.Image(name=f"{name}.jpg", camera_id=1, image_id=i), pose)
@@ -104,7 +109,8 @@ def shot(tmp_path_factory):
     records = []
     for i, name in enumerate(NAMES):
         images.write_srgb(folder / f"{i:05d}.jpg", np.zeros((FRAME_HEIGHT, FRAME_WIDTH, 3), np.float32))
-        records.append(FrameRecord(name=f"{i:05d}.jpg", source=f"{name}.jpeg", video_frame=i, sharpness=1.0, selected=True))
+        records.append(FrameRecord(name=f"{i:05d}.jpg", source=f"{name}.jpeg", video_frame=i, sharpness=1.0,
+                                   selected=True))
     return Frames(tuple(records), PHOTOGRAPHS), folder
 
 
@@ -114,8 +120,15 @@ def written(tmp_path, kind: str):
         path.mkdir(parents=True)
         (colmap_model().write_binary if kind == "colmap_bin" else colmap_model().write_text)(str(path))
         return tmp_path / "model"
-    name, text = {"metashape": ("cameras.xml", metashape_xml), "realityscan": ("cameras.csv", realityscan_csv), "blender": ("cameras.json", blender_json),
-                  "realityscan_2": ("new.csv", lambda: realityscan_csv("#name,x,y,alt,yaw,pitch,roll,f_35mm,px_norm,py_norm,k1,k2,k3,k4,t1,t2"))}[kind]
+    name, text = {
+        "metashape": ("cameras.xml", metashape_xml),
+        "realityscan": ("cameras.csv", realityscan_csv),
+        "blender": ("cameras.json", blender_json),
+        "realityscan_2": (
+            "new.csv",
+            lambda: realityscan_csv("#name,x,y,alt,yaw,pitch,roll,f_35mm,px_norm,py_norm,k1,k2,k3,k4,t1,t2"),
+        ),
+    }[kind]
     (tmp_path / name).write_text(text(), encoding="utf-8")
     return tmp_path / name
 
@@ -155,11 +168,15 @@ def test_a_videos_frames_are_matched_by_number(tmp_path, shot):
 
 
 @pytest.mark.parametrize("name, text, says", [
-    ("a.xml", "<document><chunk>", "damaged"), ("a.xml", "<html></html>", "not Metashape"), ("a.csv", "a,b,c\n1,2,3\n", "column name is missing"),
-    ("a.csv", "#name,x,y,alt,heading,pitch,roll,f\nA.jpg,1,2,three,0,0,0,30\n", "Line 2"), ("a.json", "{", "damaged"), ("a.json", "{}", "no list"),
+    ("a.xml", "<document><chunk>", "damaged"), ("a.xml", "<html></html>", "not Metashape"),
+    ("a.csv", "a,b,c\n1,2,3\n", "column name is missing"),
+    ("a.csv", "#name,x,y,alt,heading,pitch,roll,f\nA.jpg,1,2,three,0,0,0,30\n", "Line 2"), ("a.json", "{", "damaged"),
+    ("a.json", "{}", "no list"),
     ("a.json", '{"width": 10, "height": 10, "cameras": [{"frame": 1, "matrix_world": [[1]]}]}', "incomplete"),
-    ("a.json", '{"cameras": []}', "no solved camera"), ("a.fbx", "", "no kind of camera file"), ("a.csv", "", "column name"),
-    ("a.xml", metashape_xml().replace("<k1>", "<k4>0.1</k4><k1>"), "k4"), ("a.xml", metashape_xml().replace('class="adjusted"', 'class="x"').replace(
+    ("a.json", '{"cameras": []}', "no solved camera"), ("a.fbx", "", "no kind of camera file"),
+    ("a.csv", "", "column name"),
+    ("a.xml", metashape_xml().replace("<k1>", "<k4>0.1</k4><k1>"), "k4"),
+    ("a.xml", metashape_xml().replace('class="adjusted"', 'class="x"').replace(
         'type="frame"', 'type="fisheye"'), "fisheye"), ("a.csv", realityscan_csv().replace(",0,", ",0.2,"), "k4")])
 def test_wrong_files_are_refused_with_the_reason(name, text, says, tmp_path):
     (tmp_path / name).write_text(text)

@@ -45,14 +45,18 @@ def look(centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return rotation, -rotation @ centre
 
 
-def on_plane(picture: np.ndarray, centre: np.ndarray, side: float, depth: float, rotation: np.ndarray, translation: np.ndarray) -> tuple:
-    """A square picture in the plane y = depth about `centre` (x, z), seen by a camera: uint8 [HEIGHT, WIDTH, 3] and where it is."""
+def on_plane(picture: np.ndarray, centre: np.ndarray, side: float, depth: float, rotation: np.ndarray,
+             translation: np.ndarray) -> tuple:
+    """A square picture in the plane y = depth about `centre` (x, z), seen by a camera: uint8 [HEIGHT, WIDTH, 3] and
+    where it is."""
     n = picture.shape[0]
-    texel_to_plane = np.array([[side / n, 0, centre[0] - side / 2], [0, 0, depth], [0, -side / n, centre[1] + side / 2], [0, 0, 1]])
+    texel_to_plane = np.array([[side / n, 0, centre[0] - side / 2], [0, 0, depth], [0, -side / n, centre[1] + side / 2],
+                               [0, 0, 1]])
     homography = intrinsics() @ np.c_[rotation, translation] @ texel_to_plane
     half = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])  # cv2 counts from pixel centres
     homography = np.linalg.inv(half) @ homography @ half
-    warp = [cv2.warpPerspective(p, homography, (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR) for p in (picture, np.full(picture.shape[:2], 255, np.uint8))]
+    warp = [cv2.warpPerspective(p, homography, (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR)
+            for p in (picture, np.full(picture.shape[:2], 255, np.uint8))]
     return warp[0], warp[1] > 127
 
 
@@ -143,7 +147,9 @@ def test_frames_without_common_structure_are_refused(tmp_path):
     folder.mkdir()
     for i in range(4):
         noise = cv2.resize(rng.random((40, 30, 3), dtype=np.float32), (240, 320))
-        noise[60:260, 20:220] = np.ascontiguousarray(astronaut()[30:230, 120:320]).astype(np.float32) / 255 if i == 0 else noise[60:260, 20:220]
+        noise[60:260,
+              20:220] = (np.ascontiguousarray(astronaut()[30:230, 120:320]).astype(np.float32) / 255 if i == 0
+                         else noise[60:260, 20:220])
         images.write_srgb(folder / f"{i}.png", np.clip(noise, 0, 1))
     capture = Capture(tmp_path / "face.wildcap")
     with pytest.raises(Problem, match="do not fit together") as caught:
@@ -159,7 +165,8 @@ def test_a_camera_that_hardly_moved_is_refused(tmp_path):
 
 
 def test_a_head_that_moves_before_a_still_background_is_refused(solved, tmp_path):
-    """Cameras that hold for the background, but in every second picture the face has gone aside by a third of its width."""
+    """Cameras that hold for the background, but in every second picture the face has gone aside by a third of its
+    width."""
     capture, _, _ = solved
     records = read_frames(capture).records
     model = pycolmap.Reconstruction(str(capture.cameras))
@@ -167,7 +174,8 @@ def test_a_head_that_moves_before_a_still_background_is_refused(solved, tmp_path
         picture = images.read_srgb(capture.frames / record.name)
         aside = round((record.face_box[2] - record.face_box[0]) / 3) if i % 2 else 0
         images.write_srgb(tmp_path / record.name, np.roll(picture, aside, 1))
-    still, moved = (find_head(model, find_landmarks(records, folder, Reporter("cameras")), 0.063) for folder in (capture.frames, tmp_path))
+    still, moved = (find_head(model, find_landmarks(records, folder, Reporter("cameras")), 0.063)
+                    for folder in (capture.frames, tmp_path))
     assert still.still and still.error_px < 5
     assert not moved.still
 
@@ -206,6 +214,7 @@ def test_sixteen_frames_of_a_real_video_against_its_truth(tmp_path):
     figures = compare(capture, truth)
     assert figures["registered"] >= 14
     assert figures["centre_error_median_percent"] < 0.6
-    assert figures["up_tilt_deg"] < 13 and abs(figures["facing_off_deg"]) < 5  # the scan holds its chin up: registration finds 7.5 degrees
+    # the scan holds its chin up: registration finds 7.5 degrees
+    assert figures["up_tilt_deg"] < 13 and abs(figures["facing_off_deg"]) < 5
     assert figures["true_units_per_metre"] == pytest.approx(1 / 0.0553, rel=0.04)
     assert json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"][-1]["video_frame"] == 95

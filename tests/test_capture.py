@@ -25,7 +25,12 @@ def test_a_missing_output_is_to_do_and_a_forgotten_stage_too(capture):
 
 def test_records_keep_what_was_used(capture):
     record = capture.read()["stages"]["cameras"]
-    assert record["settings"]["interpupillary_mm"] == 63.0 and record["figures"] == {"count": 3} and record["seconds"] == 1.5 and record["version"] == "0.2.0"
+    assert (
+        record["settings"]["interpupillary_mm"] == 63.0
+        and record["figures"] == {"count": 3}
+        and record["seconds"] == 1.5
+        and record["version"] == "0.2.0"
+    )
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"stages": 3}', "\0\0"])

@@ -45,7 +45,9 @@ def test_the_row_that_is_clicked_is_the_face_of_the_tab_whichever_head_was_activ
         assert bpy.context.selected_objects == [heads[index]]
     bpy.ops.object.mode_set(mode='SCULPT')
     props.active_index = 1
-    assert bpy.context.mode == 'SCULPT' and bpy.context.view_layer.objects.active == heads[0], "nobody is thrown out of a stroke"
+    assert bpy.context.mode == 'SCULPT' and bpy.context.view_layer.objects.active == heads[0], (
+        "nobody is thrown out of a stroke"
+    )
     bpy.ops.object.mode_set(mode='OBJECT')
     bpy.data.objects.remove(heads[1])
     props.active_index = 0
@@ -61,7 +63,8 @@ def test_what_is_dropped_becomes_captures(addon, tmp_path):
     shots.mkdir()
     for name in ("a.jpg", "b.JPG"):
         (shots / name).write_bytes(b"0")
-    bpy.ops.wildcap.choose_video('INVOKE_DEFAULT', directory=str(tmp_path), files=[{"name": "one.mp4"}, {"name": "TWO.MOV"}])
+    bpy.ops.wildcap.choose_video('INVOKE_DEFAULT', directory=str(tmp_path),
+                                 files=[{"name": "one.mp4"}, {"name": "TWO.MOV"}])
     assert [chosen_source(item) for item in items()] == [str(tmp_path / "one.mp4"), str(tmp_path / "TWO.MOV")]
     bpy.ops.wildcap.choose_video('INVOKE_DEFAULT', directory=str(shots), files=[{"name": "a.jpg"}, {"name": "b.JPG"}])
     assert len(items()) == 3 and chosen_source(items()[2]) == str(shots) and bpy.context.scene.wildcap.active_index == 2
@@ -73,13 +76,18 @@ def test_what_is_dropped_becomes_captures(addon, tmp_path):
 
 def test_drops_are_taken_where_the_tab_is_shown(addon):
     source = addon("capture.source")
-    stage = ast.parse((Path(__file__).parents[1] / "core" / "frames" / "photographs.py").read_text(encoding="utf-8"))  # not imported: it needs OpenCV
-    known = {node.targets[0].id: ast.literal_eval(node.value) for node in stage.body if isinstance(node, ast.Assign) and node.targets[0].id.isupper()}
+    # not imported: it needs OpenCV
+    stage = ast.parse((Path(__file__).parents[1] / "core" / "frames" / "photographs.py").read_text(encoding="utf-8"))
+    known = {node.targets[0].id: ast.literal_eval(node.value) for node in stage.body if isinstance(node, ast.Assign)
+             and node.targets[0].id.isupper()}
     assert set(source.PHOTOGRAPHS) == {*known["SUFFIXES"], *known["RAW"]}
 
     def taken(tab: str) -> bool:
-        space, sidebar = SimpleNamespace(show_region_ui=bool(tab)), SimpleNamespace(type='UI', active_panel_category=tab)
-        return handler.poll_drop(SimpleNamespace(area=SimpleNamespace(type='VIEW_3D', spaces=SimpleNamespace(active=space), regions=[sidebar])))
+        space, sidebar = SimpleNamespace(show_region_ui=bool(tab)), SimpleNamespace(type='UI',
+                                                                                    active_panel_category=tab)
+        return handler.poll_drop(SimpleNamespace(area=SimpleNamespace(type='VIEW_3D',
+                                                                      spaces=SimpleNamespace(active=space),
+                                                                      regions=[sidebar])))
 
     handler = source.WILDCAP_FH_source
     assert taken("WildCap") and not taken("Item") and not taken("")
@@ -104,7 +112,8 @@ def test_save_as_elsewhere_keeps_the_link(addon, project, tmp_path):
     assert [Path(item.path) for item in items()] == [project / "anna.wildcap", project / "berta.wildcap"]
     shutil.move(tmp_path / "elsewhere" / "other.blend", tmp_path / "alone.blend")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "alone.blend"))
-    assert [Path(item.path) for item in items()] == [project / "anna.wildcap", project / "berta.wildcap"], "moved alone, it knows where they were"
+    assert [Path(item.path) for item in items()] == [project / "anna.wildcap",
+                                                     project / "berta.wildcap"], "moved alone, it knows where they were"
 
 
 @pytest.mark.parametrize("kept", [False, True], ids=["moved", "copied"])
@@ -116,8 +125,10 @@ def test_a_project_that_was_moved_or_copied_works_on_its_own_captures(addon, pro
     (shutil.copytree if kept else shutil.move)(project, there)
     bpy.ops.wm.open_mainfile(filepath=str(there / "face.blend"))
     assert [Path(item.path) for item in items()] == [there / "anna.wildcap", there / "berta.wildcap"]
-    assert {o.name: Path(o["wildcap_capture"]).parent for o in bpy.context.scene.objects} == {"anna": there, "berta": there}
-    pictures = [Path(bpy.path.abspath(image.filepath)) for image in bpy.data.images if image.source == 'FILE' and image.filepath]
+    assert {o.name: Path(o["wildcap_capture"]).parent
+            for o in bpy.context.scene.objects} == {"anna": there, "berta": there}
+    pictures = [Path(bpy.path.abspath(image.filepath)) for image in bpy.data.images if image.source == 'FILE'
+                and image.filepath]
     assert pictures and all(path.is_relative_to(there) and path.is_file() for path in pictures)
 
 
@@ -167,7 +178,8 @@ def test_the_strip_shows_frames_of_the_texture_with_their_sharpness(addon, tmp_p
     item = items()[0]
     assert strip.of(item) is None and strip.look(str(root)) and strip.of(item) is None and panel.poll(bpy.context)
     (root / "frames").mkdir()
-    frames = [{"name": f"{i:05}.png", "selected": i % 4 == 1, "sharpness": 0.05 if i in (5, 6) else 0.2 + i / 1000} for i in range(100)]
+    frames = [{"name": f"{i:05}.png", "selected": i % 4 == 1, "sharpness": 0.05 if i in (5, 6) else 0.2 + i / 1000}
+              for i in range(100)]
     for frame in frames[:50]:
         (root / "frames" / frame["name"]).write_bytes(standin.plain((90, 80, 70)))
     (root / "frames" / "frames.json").write_text(json.dumps({"kind": "video", "frames": frames}), encoding="utf-8")
@@ -177,7 +189,8 @@ def test_the_strip_shows_frames_of_the_texture_with_their_sharpness(addon, tmp_p
     assert (found.count, found.used, found.blurred, len(found.frames)) == (100, 25, 2, strip.MOST)
     assert [frame.name for frame in found.frames][:4] == ["00001", "00009", "00017", "00025"]
     assert found.frames[0].sharpness == pytest.approx(0.201 / 0.299) and not found.frames[0].blurred
-    shown = {str(root / "frames" / f"{frame.name}.png") for frame in found.frames}  # icons have no numbers without a window
+    # icons have no numbers without a window
+    shown = {str(root / "frames" / f"{frame.name}.png") for frame in found.frames}
     known = {path for path in addon("frame_icons")._icons if path.startswith(str(root))}
     assert known == {path for path in shown if Path(path).is_file()} and 3 < len(known) < len(shown)
     assert len(bpy.data.images) == images

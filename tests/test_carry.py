@@ -17,10 +17,12 @@ from core.training import carry
 
 @pytest.fixture
 def painted(tmp_path, monkeypatch):
-    """A folder with our own head in other UVs, turned and half as large, and a map that tells its X and Z; and that head as already laid over ours."""
+    """A folder with our own head in other UVs, turned and half as large, and a map that tells its X and Z; and that
+    head as already laid over ours."""
     folder, head = tmp_path / "in", template.load()
     folder.mkdir()
-    other = meshes.Mesh(head.vertices, head.faces, 0.25 + 0.5 * np.stack([1 - head.uvs[:, 1], head.uvs[:, 0]], 1), head.face_uvs)
+    other = meshes.Mesh(head.vertices, head.faces, 0.25 + 0.5 * np.stack([1 - head.uvs[:, 1], head.uvs[:, 0]], 1),
+                        head.face_uvs)
     meshes.write_obj(folder / "head.obj", other)
     face, bary = raster.rasterize_uv(other, 512)
     points = raster.interpolate(head.vertices, head.faces, face, bary)
@@ -40,7 +42,10 @@ def test_places_stay_places(painted, tmp_path):
     inner = np.s_[8:-8, 8:-8]
     assert np.percentile(np.abs(got[..., 0] - 0.5 - 4 * points[..., 0])[inner], 98) < 0.02, "0.02 is 5 mm"
     assert np.percentile(np.abs(got[..., 1] - (0.5 + 4 * points[..., 2]).clip(0, 1))[inner], 98) < 0.02
-    assert told["known_percent"] > 99 and told["skins"] == ["a skin"] == json.loads((tmp_path / "out" / "carried.json").read_text())["skins"]
+    assert (
+        told["known_percent"] > 99
+        and told["skins"] == ["a skin"] == json.loads((tmp_path / "out" / "carried.json").read_text())["skins"]
+    )
     assert images.read_srgb(tmp_path / "out" / "sheet.jpg").shape == (carry.TILE, carry.TILE, 3)
 
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every picture and mesh that is read or written passes one check: what is damaged is refused by name, what is merely unusual is not."""
+"""Every picture and mesh that is read or written passes one check: what is damaged is refused by name, what is merely
+unusual is not."""
 
 import os
 import struct
@@ -77,7 +78,8 @@ def test_pictures_with_values_that_are_no_numbers(tmp_path, value):
     assert refused(lambda: images.read_linear(tmp_path / "texture.exr")).remedy == "Run the stage texture again."
     pixels = np.ones((4, 4, 3), np.float32)
     pixels[1, 2, 0] = value
-    for write, name in ((images.write_srgb, "a.png"), (images.write_linear, "a.exr"), (images.write_data, "a.png"), (images.write_packed, "a.png")):
+    for write, name in ((images.write_srgb, "a.png"), (images.write_linear, "a.exr"), (images.write_data, "a.png"),
+                        (images.write_packed, "a.png")):
         wide = pixels if write is not images.write_packed else np.concatenate([pixels, pixels[..., :1]], 2)
         refused(lambda write=write, name=name, wide=wide: write(tmp_path / name, wide), name, "was not written")
         assert not (tmp_path / name).exists()
@@ -89,18 +91,23 @@ def test_pictures_with_values_that_are_no_numbers(tmp_path, value):
 
 def test_what_a_stage_writes_is_named_by_its_stage(tmp_path):
     (tmp_path / "capture.json").write_text("{}")
-    for name, stage in (("texture.exr", "texture"), ("maps/normal.png", "solve"), ("frames/00001.jpg", "frames"), ("delit/shadow/00001.png", "delight")):
+    for name, stage in (("texture.exr", "texture"), ("maps/normal.png", "solve"), ("frames/00001.jpg", "frames"),
+                        ("delit/shadow/00001.png", "delight")):
         assert checks.advise_remaking(tmp_path / name, "") == f"Run the stage {stage} again."
-    assert checks.advise_remaking(tmp_path / "shadow_mask.png", "Mine.") == checks.advise_remaking(tmp_path / "a" / "frames" / "1.jpg", "Mine.") == "Mine."
+    assert checks.advise_remaking(tmp_path / "shadow_mask.png",
+                                  "Mine.") == checks.advise_remaking(tmp_path / "a" / "frames" / "1.jpg",
+                                                                     "Mine.") == "Mine."
 
 
 @pytest.mark.parametrize("mode", ["RGB", "L", "P", "CMYK", "LA", "RGBA", "I;16", "1"])
 def test_unusual_pictures_are_read(tmp_path, mode):
     pil = pytest.importorskip("PIL.Image")
     path = tmp_path / ("Zoë – im Garten 1" + (".tif" if mode == "CMYK" else ".png"))
-    picture = pil.fromarray(PICTURE[..., 0].astype(np.uint16) * 257) if mode == "I;16" else pil.fromarray(PICTURE).convert(mode)
+    picture = (pil.fromarray(PICTURE[..., 0].astype(np.uint16) * 257) if mode == "I;16"
+               else pil.fromarray(PICTURE).convert(mode))
     picture.save(path)
-    truth = PICTURE[..., :1].repeat(3, 2) / 255 if mode == "I;16" else np.asarray(picture.convert("RGB"), np.float32) / 255
+    truth = (PICTURE[..., :1].repeat(3, 2) / 255 if mode == "I;16"
+             else np.asarray(picture.convert("RGB"), np.float32) / 255)
     found = images.read_srgb(path)
     assert found.shape == (24, 18, 3) and np.allclose(found, truth, atol=0.005)
 
@@ -158,11 +165,14 @@ def test_pictures_of_frames_have_their_shape(tmp_path):
 # -- meshes
 
 @pytest.mark.parametrize(("text", "words"), [
-    (SQUARE + "v nan 0 0\nf 1 2 3\n", "no numbers"), (SQUARE + "v 0 inf 0\nf 1 2 3\n", "no numbers"), (SQUARE + "v 0 1e300 0\nf 1 2 3\n", "no numbers"),
-    (SQUARE + "vt 0 nan\nf 1/1 2/2 3/5\n", "no numbers"), (SQUARE + "v 0 zero 0\nf 1 2 3\n", "zero"), (SQUARE + "v 0 1\nf 1 2 3\n", "line 9"),
-    (SQUARE + "f 1 2 5\n", "not in it"), (SQUARE + "f 1/1 2/2 3/5\n", "not in it"), (SQUARE + "f 0 1 2\n", "line 9"), (SQUARE + "f -5 1 2\n", "line 9"),
-    (SQUARE + "f 1 2\n", "line 9"), (SQUARE + "f 1 2 x\n", "line 9"), (SQUARE + f"f 1 2 {10 ** 30}\n", "damaged"), (SQUARE, "no faces"),
-    ("\0\xff" * 99, "no faces")], ids=count())
+    (SQUARE + "v nan 0 0\nf 1 2 3\n", "no numbers"), (SQUARE + "v 0 inf 0\nf 1 2 3\n", "no numbers"),
+    (SQUARE + "v 0 1e300 0\nf 1 2 3\n", "no numbers"),
+    (SQUARE + "vt 0 nan\nf 1/1 2/2 3/5\n", "no numbers"), (SQUARE + "v 0 zero 0\nf 1 2 3\n", "zero"),
+    (SQUARE + "v 0 1\nf 1 2 3\n", "line 9"),
+    (SQUARE + "f 1 2 5\n", "not in it"), (SQUARE + "f 1/1 2/2 3/5\n", "not in it"), (SQUARE + "f 0 1 2\n", "line 9"),
+    (SQUARE + "f -5 1 2\n", "line 9"),
+    (SQUARE + "f 1 2\n", "line 9"), (SQUARE + "f 1 2 x\n", "line 9"), (SQUARE + f"f 1 2 {10 ** 30}\n", "damaged"),
+    (SQUARE, "no faces"), ("\0\xff" * 99, "no faces")], ids=count())
 def test_damaged_objs(tmp_path, text, words):
     (tmp_path / "head.obj").write_text(text)
     refused(lambda: meshes.read_obj(tmp_path / "head.obj"), "head.obj", words)
@@ -177,23 +187,29 @@ def test_unusual_objs_are_read(tmp_path):
     for text in written:
         path.write_bytes(text.encode())
         mesh = meshes.read_obj(path)
-        assert mesh.faces.tolist() == mesh.face_uvs.tolist() == [[0, 1, 2], [0, 2, 3]] and np.array_equal(mesh.vertices[:4, :2], mesh.uvs[:4])
+        assert mesh.faces.tolist() == mesh.face_uvs.tolist() == [[0, 1, 2],
+                                                                 [0, 2, 3]] and np.array_equal(mesh.vertices[:4, :2],
+                                                                                               mesh.uvs[:4])
     two = SQUARE + "f -4 -3 -2\n" + SQUARE + "f -4 -3 -2\n"  # negative numbers count from where they stand
     path.write_text(two)
     assert meshes.read_obj(path).faces.tolist() == [[0, 1, 2], [4, 5, 6]]
 
 
-HEADER = ("ply\nformat {form} 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\nelement face {faces}\n"
+HEADER = ("ply\nformat {form} 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float "
+          "z\nelement face {faces}\n"
           "property list uchar int vertex_indices\nend_header\n")
 BODY = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n"
 
 
 def binary(order: str, last: float = 0.0, index: int = 3) -> bytes:
-    return struct.pack(f"{order}12f", 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, last) + struct.pack(f"{order}BiiiBiii", 3, 0, 1, 2, 3, 0, 2, index)
+    return struct.pack(f"{order}12f", 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1,
+                       last) + struct.pack(f"{order}BiiiBiii", 3, 0, 1, 2, 3, 0, 2, index)
 
 
-@pytest.mark.parametrize(("form", "body"), [("ascii", BODY.encode()), ("ascii", BODY.rstrip().encode()), ("binary_little_endian", binary("<")),
-                                            ("binary_big_endian", binary(">"))])
+@pytest.mark.parametrize(("form", "body"),
+                         [("ascii", BODY.encode()), ("ascii", BODY.rstrip().encode()),
+                          ("binary_little_endian", binary("<")),
+                          ("binary_big_endian", binary(">"))])
 def test_plys_of_every_kind_are_read(tmp_path, form, body):
     (tmp_path / "a.ply").write_bytes(HEADER.format(form=form, vertices=4, faces=2).encode() + body)
     mesh = meshes.read_ply(tmp_path / "a.ply")
@@ -201,10 +217,14 @@ def test_plys_of_every_kind_are_read(tmp_path, form, body):
 
 
 @pytest.mark.parametrize(("vertices", "faces", "body"), [
-    (4, 2, binary("<")[:-1]), (4, 2, binary("<")[:40]), (10 ** 12, 2, binary("<")), (4, 10 ** 15, binary("<")), (-4, 2, binary("<")), ("many", 2, binary("<")),
-    (4, 2, binary("<", np.nan)), (4, 2, binary("<", np.inf)), (4, 2, binary("<", index=9)), (4, 2, binary("<", index=-1)), (4, 0, binary("<")[:48])])
+    (4, 2, binary("<")[:-1]), (4, 2, binary("<")[:40]), (10 ** 12, 2, binary("<")), (4, 10 ** 15, binary("<")),
+    (-4, 2, binary("<")), ("many", 2, binary("<")),
+    (4, 2, binary("<", np.nan)), (4, 2, binary("<", np.inf)), (4, 2, binary("<", index=9)),
+    (4, 2, binary("<", index=-1)), (4, 0, binary("<")[:48])])
 def test_damaged_plys(tmp_path, vertices, faces, body):
-    (tmp_path / "scan.ply").write_bytes(HEADER.format(form="binary_little_endian", vertices=vertices, faces=faces).encode() + body)
+    (tmp_path
+     / "scan.ply").write_bytes(HEADER.format(form="binary_little_endian", vertices=vertices, faces=faces).encode()
+                               + body)
     refused(lambda: meshes.read_ply(tmp_path / "scan.ply"), "scan.ply is damaged")
     (tmp_path / "scan.ply").write_bytes(b"no mesh at all")
     refused(lambda: meshes.read_ply(tmp_path / "scan.ply"), "header")
@@ -212,7 +232,8 @@ def test_damaged_plys(tmp_path, vertices, faces, body):
 
 def test_meshes_that_are_none_are_not_written(tmp_path):
     points, faces = np.eye(3), np.array([[0, 1, 2]])
-    wrong = [Mesh(points * np.nan, faces), Mesh(points, faces + 1), Mesh(points, faces[:0]), Mesh(points, faces, np.full((3, 2), np.inf), faces)]
+    wrong = [Mesh(points * np.nan, faces), Mesh(points, faces + 1), Mesh(points, faces[:0]),
+             Mesh(points, faces, np.full((3, 2), np.inf), faces)]
     for mesh in wrong:
         for write, name in ((meshes.write_obj, "head.obj"), (meshes.write_ply, "scan.ply")):
             refused(lambda write=write, name=name, mesh=mesh: write(tmp_path / name, mesh), name, "was not written")

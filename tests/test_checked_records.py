@@ -47,14 +47,17 @@ def capture(tmp_path) -> Capture:
 
 def write_model(capture: Capture, name: str, text: bool = False) -> None:
     model = pycolmap.Reconstruction()
-    model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="PINHOLE", width=720, height=960, params=[900, 900, 360, 480]))
-    model.add_image_with_trivial_frame(pycolmap.Image(name=name, camera_id=1, image_id=1), pycolmap.Rigid3d(np.eye(4)[:3]))
+    model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="PINHOLE", width=720, height=960,
+                                                      params=[900, 900, 360, 480]))
+    model.add_image_with_trivial_frame(pycolmap.Image(name=name, camera_id=1, image_id=1),
+                                       pycolmap.Rigid3d(np.eye(4)[:3]))
     model.add_point3D(np.zeros(3), pycolmap.Track(), np.zeros(3, np.uint8))
     (model.write_text if text else model.write)(str(capture.cameras))
 
 
 def test_sound_models_are_read(capture):
-    assert [view.name for view in read_views(capture)] == ["00000.jpg"] and len(read_model(capture.cameras).points3D) == 1
+    assert [view.name
+            for view in read_views(capture)] == ["00000.jpg"] and len(read_model(capture.cameras).points3D) == 1
     shutil.rmtree(capture.cameras)
     capture.cameras.mkdir()
     write_model(capture, "00000.jpg", text=True)
@@ -86,7 +89,9 @@ def test_lenses_that_are_none(capture, at, value):
     refused(lambda: read_views(capture), "cameras of this capture")
 
 
-@pytest.mark.parametrize("name", ["../../private/x.jpg", "/etc/x.jpg", "a/b.jpg", "a\\b.jpg", "C:x.jpg", "..", ".", "", "a\0b", 3, None, ["a"]])
+@pytest.mark.parametrize("name",
+                         ["../../private/x.jpg", "/etc/x.jpg", "a/b.jpg", "a\\b.jpg", "C:x.jpg", "..", ".", "", "a\0b",
+                          3, None, ["a"]])
 def test_frames_have_names_without_a_path(capture, name):
     capture.frames_json.write_text(json.dumps({"frames": [{**FRAME, "name": name}]}))
     refused(lambda: read_frames(capture), "frames.json", "no name of a frame")
@@ -98,7 +103,8 @@ def test_frames_have_names_without_a_path(capture, name):
 
 def test_names_in_every_script_are_names(capture):
     for name in ("Zoë – 1 (2).jpg", "顔 写真.png", "a..b.jpg", "c.jpg"):
-        capture.frames_json.write_text(json.dumps({"frames": [{**FRAME, "name": name}]}, ensure_ascii=False), encoding="utf-8")
+        capture.frames_json.write_text(json.dumps({"frames": [{**FRAME, "name": name}]}, ensure_ascii=False),
+                                       encoding="utf-8")
         assert read_frames(capture).records[0].name == name
 
 
@@ -106,14 +112,18 @@ def test_names_in_every_script_are_names(capture):
 
 DEEP = "[" * 100_000
 HUGE = "1" + "0" * 400
-WRONG = ["null", "[]", "3", DEEP, '{"a":' * 2000 + "1" + "}" * 2000, '{"stages": ' + HUGE + "}", '{"stages": {"x": 1e400}}', '"\\ud800"',
-         '{"stages": ["\\ud800"]}']
+WRONG = ["null", "[]", "3", DEEP, '{"a":' * 2000 + "1" + "}" * 2000, '{"stages": ' + HUGE + "}",
+         '{"stages": {"x": 1e400}}', '"\\ud800"', '{"stages": ["\\ud800"]}']
 
 
-@pytest.mark.parametrize("text", [*WRONG, '{"stages": null}', '{"stages": {"solve": null}}', '{"stages": {"solve": {"seconds": "1"}}}',
-                                  '{"stages": {}, "source": 3}', '{"stages": {}, "format": "2"}', '{"stages": {}, "stopped": {}}',
-                                  '{"stages": {}, "source_stamp": [[1, 2]]}',
-                                  '{"stages": {"solve": {"seconds": 1, "inputs": {}}}}', '{"stages": {"solve": {"seconds": 1, "findings": [3]}}}'], ids=count())
+@pytest.mark.parametrize("text",
+                         [*WRONG, '{"stages": null}', '{"stages": {"solve": null}}',
+                          '{"stages": {"solve": {"seconds": "1"}}}',
+                          '{"stages": {}, "source": 3}', '{"stages": {}, "format": "2"}',
+                          '{"stages": {}, "stopped": {}}',
+                          '{"stages": {}, "source_stamp": [[1, 2]]}',
+                          '{"stages": {"solve": {"seconds": 1, "inputs": {}}}}',
+                          '{"stages": {"solve": {"seconds": 1, "findings": [3]}}}'], ids=count())
 def test_capture_records_of_every_wrong_kind(tmp_path, text, capsys):
     capture = Capture(tmp_path)
     capture.json.write_text(text)
@@ -153,9 +163,11 @@ def test_names_that_are_no_text(tmp_path, capsys):
     photographs = tmp_path / "photos"
     photographs.mkdir()
     (photographs / "a\udcff.jpg").write_bytes(b"")
-    for source, root in ((photographs, "a.wildcap"), (tmp_path / "film\udcff.mp4", "a.wildcap"), ("", "a\udcff.wildcap")):
+    for source, root in ((photographs, "a.wildcap"), (tmp_path / "film\udcff.mp4", "a.wildcap"),
+                         ("", "a\udcff.wildcap")):
         refused(lambda source=source, root=root: write_job(Capture(tmp_path / root), source=source), "udcff", "Rename")
-    assert main(["run", str(photographs), str(tmp_path / "b.wildcap")]) == 2 and "not in UTF-8" in capsys.readouterr().err
+    assert main(["run", str(photographs),
+                 str(tmp_path / "b.wildcap")]) == 2 and "not in UTF-8" in capsys.readouterr().err
 
 
 # -- what is delivered
@@ -164,7 +176,8 @@ def deliver(root, change=lambda capture: None, **settings) -> tuple[Message, str
     """How a delivery ended, and its log, after `change` was done to a solved capture."""
     capture, said = delivered.make(root), []
     change(capture)
-    ended = run_job(write_job(capture, tool="deliver", settings={"deliver": {"format": "obj", "whole": True}, **settings}), said.append)
+    ended = run_job(write_job(capture, tool="deliver",
+                              settings={"deliver": {"format": "obj", "whole": True}, **settings}), said.append)
     assert isinstance(ended, Done) == bool(list(capture.exports.glob("*")))
     return ended, " ".join(message.text for message in said if isinstance(message, Log))
 
@@ -178,8 +191,10 @@ def cut(name: str, left: float):
     return change
 
 
-@pytest.mark.parametrize(("name", "left"), [("maps/normal.png", 0.5), ("maps/diffuse_albedo.png", 0.9), ("maps/specular_albedo.png", 0.5), ("head.obj", 0.5),
-                                            ("head.obj", 0.6), ("maps/normal.png", 0.0)])
+@pytest.mark.parametrize(("name", "left"),
+                         [("maps/normal.png", 0.5), ("maps/diffuse_albedo.png", 0.9), ("maps/specular_albedo.png", 0.5),
+                          ("head.obj", 0.5),
+                          ("head.obj", 0.6), ("maps/normal.png", 0.0)])
 def test_cut_files_are_not_delivered(tmp_path, name, left):
     ended, _ = deliver(tmp_path / "a.wildcap", cut(name, left))
     assert isinstance(ended, Failed) and name.split("/")[-1] in ended.problem and ended.remedy.endswith(".")
@@ -190,10 +205,15 @@ def test_what_is_out_of_date_is_not_delivered_and_what_is_older_is_named(tmp_pat
     ended, log = deliver(tmp_path / "a.wildcap")
     assert isinstance(ended, Done) and "older code" in log and "Solve" in log
     ended, _ = deliver(tmp_path / "b.wildcap", solve={"steps": 30})
-    assert isinstance(ended, Failed) and "Solve is out of date: solve.steps changed" in ended.problem and "stage solve" in ended.remedy
+    assert (
+        isinstance(ended, Failed)
+        and "Solve is out of date: solve.steps changed" in ended.problem
+        and "stage solve" in ended.remedy
+    )
     ended, _ = deliver(tmp_path / "c.wildcap", lambda capture: images.write_data(capture.shadow_mask, np.ones((8, 8))))
     assert isinstance(ended, Failed) and "shadow_mask.png changed" in ended.problem
-    ended, _ = deliver(tmp_path / "d.wildcap", lambda capture: images.write_data(capture.maps / "normal.png", np.ones((8, 16))))
+    ended, _ = deliver(tmp_path / "d.wildcap",
+                       lambda capture: images.write_data(capture.maps / "normal.png", np.ones((8, 16))))
     assert isinstance(ended, Failed) and "normal.png" in ended.problem
 
 

@@ -27,14 +27,16 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def core(*words, cwd=ROOT, **options) -> subprocess.CompletedProcess:
-    return subprocess.run([sys.executable, "-B", "-m", "core", *map(str, words)], cwd=cwd, capture_output=True, text=True, timeout=120, **options)
+    return subprocess.run([sys.executable, "-B", "-m", "core", *map(str, words)], cwd=cwd, capture_output=True,
+                          text=True, timeout=120, **options)
 
 
 def refused(*words, cwd=ROOT) -> list[str]:
     """The two lines of a failure."""
     result = core(*words, cwd=cwd)
     lines = result.stderr.strip().splitlines()
-    assert result.returncode == 2 and len(lines) == 2 and all(line.endswith(".") for line in lines), (result.returncode, result.stderr)
+    assert result.returncode == 2 and len(lines) == 2 and all(line.endswith(".")
+                                                              for line in lines), (result.returncode, result.stderr)
     return lines
 
 
@@ -65,26 +67,33 @@ def test_stages_lists_the_chain():
 
 def test_run_until_then_on_then_status(tiny, capture, film):
     result = core("run", film, capture.root, "--until", "cameras", "--quality", "draft", cwd=tiny)
-    assert result.returncode == 0 and "Cameras      done in" in result.stdout and "Scan" not in result.stdout, result.stderr
+    assert result.returncode == 0 and "Cameras      done in" in result.stdout and "Scan" not in result.stdout, (
+        result.stderr
+    )
     assert "report.html" in result.stdout.splitlines()[-1] and capture.report.is_file()
     result = core("run", "-", capture.root, "--seed", "0", "--quality", "draft", cwd=tiny)
-    assert result.returncode == 0 and "Frames       unchanged" in result.stdout and "4K Maps      done in" in result.stdout, result.stderr
+    assert (
+        result.returncode == 0 and "Frames       unchanged" in result.stdout and "4K Maps      done in" in result.stdout
+    ), result.stderr
     status = core("status", capture.root, cwd=tiny).stdout
     assert str(film) in status and status.count("done") == len(stages.STAGES)
     (capture.root / "texture.exr").write_text("edited")
     status = dict(line.split()[:2] for line in core("status", capture.root, cwd=tiny).stdout.splitlines())
-    assert (status["delight"], status["texture"], status["shadow_mask"], status["upscale"]) == ("done", "done", "stale", "done")
-    assert core("run", film, capture.root, "--from", "delight", "--until", "delight", "--quality", "draft", cwd=tiny).stdout.count("done in") == 1
+    assert (status["delight"], status["texture"], status["shadow_mask"],
+            status["upscale"]) == ("done", "done", "stale", "done")
+    assert core("run", film, capture.root, "--from", "delight", "--until", "delight", "--quality", "draft",
+                cwd=tiny).stdout.count("done in") == 1
 
 
 def test_options_reach_the_stages(tiny, capture, film, tmp_path):
-    core("run", film, capture.root, "--skin-tone", "0.6,0.5,0.4", "--delighter", "folder", "--folder", tmp_path, "--seed", "7", "--quality", "film",
-         "--prior", tmp_path, cwd=tiny)
+    core("run", film, capture.root, "--skin-tone", "0.6,0.5,0.4", "--delighter", "folder", "--folder", tmp_path,
+         "--seed", "7", "--quality", "film", "--prior", tmp_path, cwd=tiny)
     record = capture.read()["stages"]
     assert read_portable(record["solve"]["settings"]["prior"], capture.root) == tmp_path
     assert record["solve"]["settings"]["skin_tone"] == "0.6,0.5,0.4" and record["solve"]["seed"] == 7
     assert record["solve"]["settings"]["steps"] == preset("film").solve.steps
-    assert record["delight"]["settings"].items() >= {"delighter": "folder", "folder": ".."}.items(), "it travels with the capture"
+    assert record["delight"]["settings"].items() >= {"delighter": "folder",
+                                                     "folder": ".."}.items(), "it travels with the capture"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no other process can press Ctrl-C there")
@@ -111,7 +120,8 @@ def test_a_failure_is_two_lines(tiny, capture, film):
 
 
 @pytest.mark.parametrize("words", [
-    ("run", "a", "b", "--from", "solve", "--until", "frames"), ("run", "a", "b", "--until", "lunch"), ("run", "/no/such/video.mp4", "CAPTURE"),
+    ("run", "a", "b", "--from", "solve", "--until", "frames"), ("run", "a", "b", "--until", "lunch"),
+    ("run", "/no/such/video.mp4", "CAPTURE"),
     ("run", "-", "CAPTURE"), ("run", "a", "b", "--folder", "c"), ("run", "a", "b", "--checkpoint", "c"),
     ("status", "/no/such/capture"), ("mask", "import", "CAPTURE", "mask.png"), ("train",), ("train", "patience"),
 ])
@@ -123,7 +133,9 @@ def test_a_folder_of_other_things_is_no_capture(tmp_path, film):
     (tmp_path / "frames").mkdir()
     (tmp_path / "frames" / "holiday.jpg").write_bytes(b"1")
     assert film.name in refused("run", film, tmp_path)[0]
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["frames", film.name]) and (tmp_path / "frames" / "holiday.jpg").is_file()
+    assert sorted(path.name
+                  for path in tmp_path.iterdir()) == sorted(["frames", film.name]) and (tmp_path / "frames"
+                                                                                        / "holiday.jpg").is_file()
 
 
 def test_a_capture_of_a_newer_version_is_refused(capture, film):
@@ -135,7 +147,8 @@ def test_a_capture_of_a_newer_version_is_refused(capture, film):
 
 
 def test_the_command_line_loads_nothing_heavy():
-    code = "import sys; import core.__main__; print(sorted({'numpy', 'torch', 'cv2', 'OpenImageIO', 'pycolmap'} & set(sys.modules)))"
+    code = ("import sys; import core.__main__; print(sorted({'numpy', 'torch', 'cv2', 'OpenImageIO', 'pycolmap'} & "
+            "set(sys.modules)))")
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True).stdout.strip() == "[]"
 
 
@@ -176,7 +189,8 @@ def test_the_last_ten_masks_are_kept(painted, tmp_path):
         import_mask(painted, tmp_path / "mask.png")
         time.sleep(0.002)  # the names of the history count milliseconds
     kept = [images.read_mask(path)[0, 0] for path in sorted(painted.mask_history.iterdir())]
-    assert np.allclose(kept, np.arange(2, 12) / 20, atol=0.01) and np.isclose(images.read_mask(painted.shadow_mask)[0, 0], 0.6, atol=0.01)
+    assert np.allclose(kept, np.arange(2, 12) / 20,
+                       atol=0.01) and np.isclose(images.read_mask(painted.shadow_mask)[0, 0], 0.6, atol=0.01)
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x89PNG\r\n\x1a\n cut off"])

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Eyes and mouth for a close-up: as deep as life's, they look where they are told, lids and tears keep to them, and nothing of them stays when they go."""
+"""Eyes and mouth for a close-up: as deep as life's, they look where they are told, lids and tears keep to them, and
+nothing of them stays when they go."""
 
 import numpy as np
 import pytest
@@ -9,10 +10,12 @@ bpy = pytest.importorskip("bpy")
 mathutils = pytest.importorskip("mathutils")
 BVHTree = pytest.importorskip("mathutils.bvhtree").BVHTree
 
-from tests.test_acting import COPIES, HEAD, coordinates, head, shown, write_head  # noqa: E402, F401  (head is a fixture)
+from tests.test_acting import COPIES, HEAD, coordinates, shown, write_head  # noqa: E402
+from tests.test_acting import head as head  # noqa: E402  (a fixture)
 from tests.test_gaze import degrees  # noqa: E402
 
-KINDS = {f"{side} {what}" for side in ("Left", "Right") for what in ("Eye", "Cornea", "Lid Margin", "Wet Line", "Caruncle")} | {"Teeth", "Tongue"}
+KINDS = {f"{side} {what}" for side in ("Left", "Right")
+         for what in ("Eye", "Cornea", "Lid Margin", "Wet Line", "Caruncle")} | {"Teeth", "Tongue"}
 OPENINGS = (0.0, 0.3, 0.6, 1.0)
 LOOKS = ("Up", "Down", "In", "Out")
 
@@ -40,7 +43,10 @@ def set_face(head, opened: float, **units) -> None:  # noqa: F811
 def seen(thing) -> np.ndarray:
     """Vertices as they are shown, in the head's axes."""
     evaluated = thing.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    return coordinates(evaluated.data.vertices) @ np.array(evaluated.matrix_local)[:3, :3].T + np.array(evaluated.matrix_local)[:3, 3]
+    return (
+        coordinates(evaluated.data.vertices) @ np.array(evaluated.matrix_local)[:3, :3].T
+        + np.array(evaluated.matrix_local)[:3, 3]
+    )
 
 
 def ball_and_gaze(head, side: str) -> tuple[np.ndarray, np.ndarray]:  # noqa: F811
@@ -49,7 +55,9 @@ def ball_and_gaze(head, side: str) -> tuple[np.ndarray, np.ndarray]:  # noqa: F8
 
 
 def tree_of(thing) -> BVHTree:
-    return BVHTree.FromPolygons(seen(thing).tolist(), [list(p.vertices) for p in thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.polygons])
+    return BVHTree.FromPolygons(seen(thing).tolist(),
+                                [list(p.vertices)
+                                 for p in thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.polygons])
 
 
 def test_an_eye_is_as_deep_as_lifes_and_inside_of_the_heads_own_ball(close_up, addon):
@@ -61,14 +69,18 @@ def test_an_eye_is_as_deep_as_lifes_and_inside_of_the_heads_own_ball(close_up, a
         shell, inner = seen(things(close_up)[f"{side} Cornea"]) - centre, things(close_up)[f"{side} Eye"]
         apex = (shell @ gaze).max()
         assert 0.0008 < apex - ball.radius < 0.0013, "the cornea stands out by a millimetre"
-        own = coordinates(close_up.data.shape_keys.reference_key.data)[HEAD + COPIES + np.flatnonzero(asset.kind == 1 + number)] - centre
+        own = coordinates(close_up.data.shape_keys.reference_key.data)[HEAD + COPIES
+                                                                       + np.flatnonzero(asset.kind == 1
+                                                                                        + number)] - centre
         assert apex < (own @ gaze).max() + 1e-4, "no farther than the ball to which the lids were fitted"
         slots, places = np.array([p.material_index for p in inner.data.polygons]), seen(inner) - centre
         iris = np.unique([v for p in inner.data.polygons if p.material_index == 1 for v in p.vertices])
         depth = apex - places[iris] @ gaze
         assert depth.min() > 0.0018 and depth.max() < 0.0032
         rim = np.linalg.norm(places[iris] - (places[iris] @ gaze)[:, None] * gaze, axis=1)
-        assert 0.0015 < rim.min() < 0.0025 and 0.0055 < rim.max() < 0.0065, "a hole for the pupil, and an iris as wide as life's"
+        assert 0.0015 < rim.min() < 0.0025 and 0.0055 < rim.max() < 0.0065, (
+            "a hole for the pupil, and an iris as wide as life's"
+        )
         assert set(slots) == {0, 1, 2}
 
 
@@ -99,7 +111,8 @@ def test_it_looks_where_the_empty_is_and_a_bone_can_hold_that(close_up, addon):
 
 def test_lids_and_tears_keep_to_an_eye_however_it_is_opened_and_turned(close_up, addon):
     asset, rims_of = addon("acting.asset").load(), addon("acting.close_up.ball").rims
-    poses = [(opened, {}) for opened in OPENINGS] + [(1.0, {f"eyeLook{way}{side}": 1.2 for side in ("Left", "Right")}) for way in LOOKS]
+    poses = [(opened, {}) for opened in OPENINGS] + [(1.0, {f"eyeLook{way}{side}": 1.2 for side in ("Left", "Right")})
+                                                     for way in LOOKS]
     for way in LOOKS:
         for side in ("Left", "Right"):
             close_up.data.shape_keys.key_blocks[f"eyeLook{way}{side}"].slider_max = 1.2
@@ -112,7 +125,9 @@ def test_lids_and_tears_keep_to_an_eye_however_it_is_opened_and_turned(close_up,
             for place in skin[rim]:
                 near, normal, _, _ = shell.find_nearest(place.tolist())
                 assert (mathutils.Vector(place) - near).dot(normal) > 0, (opened, units, side)
-            wet = coordinates(things(close_up)[f"{side} Wet Line"].evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices)
+            wet = coordinates(
+                things(close_up)[f"{side} Wet Line"].evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices
+            )
             margin = seen(things(close_up)[f"{side} Lid Margin"])
             from_rim = np.array([np.linalg.norm(margin - place, axis=1).min() for place in skin[rim]])
             assert from_rim.max() < 1e-5, "the margin begins at the rim"
@@ -124,7 +139,8 @@ def test_lids_and_tears_keep_to_an_eye_however_it_is_opened_and_turned(close_up,
 
 
 def test_it_goes_as_it_came_and_an_undo_takes_it_back(head, addon):  # noqa: F811
-    before = {name: {block.name for block in getattr(bpy.data, name)} for name in ("objects", "meshes", "materials", "images", "node_groups", "shape_keys")}
+    before = {name: {block.name for block in getattr(bpy.data, name)}
+              for name in ("objects", "meshes", "materials", "images", "node_groups", "shape_keys")}
     rest = shown(head)
     bpy.ops.ed.undo_push(message="before")
     bpy.ops.wildcap.close_up()
@@ -148,18 +164,23 @@ def test_it_goes_as_it_came_and_an_undo_takes_it_back(head, addon):  # noqa: F81
 
 
 def test_it_follows_another_shape_and_another_colour_and_what_was_set_stays(close_up, addon, capture):
-    iris = next(slot.material for slot in things(close_up)["Left Eye"].material_slots if slot.material["wildcap_inside"] == "iris")
+    iris = next(slot.material for slot in things(close_up)["Left Eye"].material_slots
+                if slot.material["wildcap_inside"] == "iris")
     shader = next(node for node in iris.node_tree.nodes if node.type == 'BSDF_PRINCIPLED')
     shader.inputs["Roughness"].default_value = 0.77
     bpy.ops.wildcap.iris(iris='blue')
-    assert tuple(iris.node_tree.nodes["WildCap Iris"].outputs[0].default_value)[:3] == pytest.approx(addon("acting.materials").IRISES["blue"])
+    assert tuple(iris.node_tree.nodes["WildCap Iris"].outputs[0].default_value)[:3] == pytest.approx(
+        addon("acting.materials").IRISES["blue"]
+    )
     objects = set(things(close_up).values())
     write_head(capture, 1.15)
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.assemble_material()
     assert set(things(close_up).values()) == objects and shader.inputs["Roughness"].default_value == pytest.approx(0.77)
     for number, side in enumerate(("Left", "Right")):
-        assert ball_and_gaze(close_up, side)[0] == pytest.approx(addon("acting.close_up.ball").of(close_up, number).centre, abs=1e-5)
+        assert ball_and_gaze(close_up,
+                             side)[0] == pytest.approx(addon("acting.close_up.ball").of(close_up, number).centre,
+                                                       abs=1e-5)
     scene = addon("relight.picture").set_up(close_up, "three_point", 64, 1)
     assert objects <= set(scene.collection.objects)
 
@@ -177,7 +198,8 @@ def test_both_engines_have_an_output_that_shows_something(close_up):
 def test_solid_shading_shows_no_relief_for_a_colour(close_up):
     for slot in things(close_up)["Left Eye"].material_slots:
         pictures = [node for node in slot.material.node_tree.nodes if node.type == 'TEX_IMAGE']
-        assert [node.image for node in pictures if node.show_texture] == [None] * bool(pictures), "the picture holds no colour"
+        assert [node.image for node in pictures
+                if node.show_texture] == [None] * bool(pictures), "the picture holds no colour"
 
 
 def test_nothing_of_the_mouth_comes_through_the_skin_at_rest_and_in_any_unit(close_up, addon):
@@ -214,4 +236,6 @@ def about_the_mouth(head, addon) -> BVHTree:  # noqa: F811
     """The skin on the outside as far as teeth and tongue reach, within 8 cm of the lips."""
     asset, places = addon("acting.asset").load(), shown(head)
     near = np.linalg.norm(places - places[asset.copies[asset.seam == 0]].mean(0), axis=1) < 0.08
-    return BVHTree.FromPolygons(places.tolist(), [list(p.vertices) for p in head.data.polygons[:len(asset.triangles)] if near[p.vertices[0]]])
+    return BVHTree.FromPolygons(places.tolist(),
+                                [list(p.vertices) for p in head.data.polygons[:len(asset.triangles)]
+                                 if near[p.vertices[0]]])

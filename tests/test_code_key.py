@@ -30,7 +30,8 @@ print(sys.version_info[:2], {{s.name: code_key.code_key(s.module) for s in stage
 def copy(tmp_path) -> Path:
     """core/ with its sources to be edited; its data are links."""
     copied = tmp_path / "core"
-    shutil.copytree(CORE, copied, ignore=lambda folder, names: [name for name in names if not (name.endswith(".py") or (Path(folder) / name).is_dir())])
+    shutil.copytree(CORE, copied, ignore=lambda folder,
+                    names: [name for name in names if not (name.endswith(".py") or (Path(folder) / name).is_dir())])
     for name in ("weights", "assets"):
         shutil.rmtree(copied / name)
         (copied / name).symlink_to(CORE / name)
@@ -59,11 +60,13 @@ def changed(before: dict[str, str], core: Path) -> set[str]:
 
 
 def dependent_stages() -> dict[str, set[str]]:
-    """File of core -> the stages that import it, however far away: by the reading of imports that keeps the house's rules, which is another one."""
+    """File of core -> the stages that import it, however far away: by the reading of imports that keeps the house's
+    rules, which is another one."""
     edges: dict[str, set[str]] = {}
     for found in house.CORE:
         if found.level and found.target != "core":
-            edges.setdefault(found.file.removesuffix(".py").removesuffix("/__init__").replace("/", "."), set()).add(found.target)
+            edges.setdefault(found.file.removesuffix(".py").removesuffix("/__init__").replace("/", "."),
+                             set()).add(found.target)
     reached: dict[str, set[str]] = {}
     for stage in stages.STAGES:
         known, waiting = set(), [stage.module]
@@ -94,8 +97,10 @@ def test_a_line_in_a_shared_module_changes_exactly_the_stages_that_depend_on_it(
 
 
 @pytest.mark.parametrize(("file", "expected"), [
-    ("light/sunlight.py", {"delight", "shadow_mask"}), ("face/beard.py", {"solve", "upscale"}), ("geometry/noise.py", {"upscale"}),
-    ("imaging/images.py", set(stages.NAMES)), ("cameras/colmap.py", {"cameras"}), ("cameras/importers/metashape.py", {"cameras"}),
+    ("light/sunlight.py", {"delight", "shadow_mask"}), ("face/beard.py", {"solve", "upscale"}),
+    ("geometry/noise.py", {"upscale"}),
+    ("imaging/images.py", set(stages.NAMES)), ("cameras/colmap.py", {"cameras"}),
+    ("cameras/importers/metashape.py", {"cameras"}),
     ("solve/sampler.py", {"solve"}), ("__init__.py", set()), ("synthetic/skin.py", set()), ("worker/runner.py", set())])
 def test_known_dependents(copy, file, expected):
     """By hand: colmap.py is run as a process of its own; the version alone changes nothing."""
@@ -110,29 +115,34 @@ def test_a_shipped_file_changes_the_stages_that_read_it(copy):
     (copy / "weights").unlink()
     shutil.copytree(CORE / "weights", copy / "weights")
     assert changed(before, copy) == set()
-    for name, expected in (("tones.json", {"solve"}), ("upscaler.safetensors", {"upscale"}), ("delighter.safetensors", {"delight"}),
-                           ("prior.safetensors", {"solve", "upscale"})):
+    for name, expected in (("tones.json", {"solve"}), ("upscaler.safetensors", {"upscale"}),
+                           ("delighter.safetensors", {"delight"}), ("prior.safetensors", {"solve", "upscale"})):
         (copy / "weights" / name).write_bytes(b"other weights")
         assert changed(before, copy) == expected
         shutil.copyfile(CORE / "weights" / name, copy / "weights" / name)
 
 
 def test_modules_that_read_shipped_files_name_them():
-    """Whatever module of a stage speaks of weights/ or assets/ has the constant, and what it names is there. The face parser waits for its first stage."""
+    """Whatever module of a stage speaks of weights/ or assets/ has the constant, and what it names is there. The face
+    parser waits for its first stage."""
     seen = set(code_key.data_files("core.face.parser"))
     for stage in stages.STAGES:
         for file in code_key.modules(stage.module):
             text = (CORE / file).read_text(encoding="utf-8")
             named = code_key._closure(stage.module, CORE)[file].data
-            paths = [node.value for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant) and isinstance(node.value, str)
+            paths = [node.value for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant)
+                     and isinstance(node.value, str)
                      and re.fullmatch(r"(weights|assets)(/\S*)?", node.value)]
             assert bool(paths) == bool(named), f"{file} speaks of {paths} and names {named}"
             assert all((CORE / name).exists() for name in named), file
             seen |= set(named)
-    assert {name for name in seen if name.endswith(".safetensors")} == {f"weights/{path.name}" for path in (CORE / "weights").glob("*.safetensors")}
+    assert {name for name in seen
+            if name.endswith(".safetensors")} == {f"weights/{path.name}"
+                                                  for path in (CORE / "weights").glob("*.safetensors")}
 
 
-WORDS = ('"""Another docstring."""', "# a comment", "def shade(normal,\n          light):\n    'Words.'\n    return normal*light   # more words",
+WORDS = ('"""Another docstring."""', "# a comment",
+         "def shade(normal,\n          light):\n    'Words.'\n    return normal*light   # more words",
          "SIZE = 3\n'What it is.'")
 BARE = ("def shade(normal, light): return normal * light", "SIZE = 3")
 
@@ -146,24 +156,31 @@ def written(source: str) -> str:
 def test_docstrings_comments_and_layout_do_not_count_and_code_does():
     assert written("\n".join(WORDS)) == written("\n".join(BARE))
     assert written("f'a' f'b{x}' 'c'") == written("f'ab{x}c'")
-    for one, other in (("a = 1", "a = 2"), ("a = 1", "a = True"), ("a = 1", "a = 1.0"), ("a = 'x'", "a = b'x'"), ("f(a, *b)", "f(*a, b)"),
-                       ("a < b", "a <= b"), ("def f(a, /): ...", "def f(a): ..."), ("x = None", "x = ..."), ("f'{a!r}'", "f'{a}'"),
+    for one, other in (("a = 1", "a = 2"), ("a = 1", "a = True"), ("a = 1", "a = 1.0"), ("a = 'x'", "a = b'x'"),
+                       ("f(a, *b)", "f(*a, b)"),
+                       ("a < b", "a <= b"), ("def f(a, /): ...", "def f(a): ..."), ("x = None", "x = ..."),
+                       ("f'{a!r}'", "f'{a}'"),
                        ("{**a, b: c}", "{b: c, **a}"), ("f('x')", "f()"), ("return_ = [1, [2]]", "return_ = [[1], 2]")):
         assert written(one) != written(other), one
 
 
 def test_only_a_plain_name_after_the_package_means_a_module_that_is_run(copy):
     with open(copy / "scan" / "pairs.py", "a", encoding="utf-8") as source:
-        source.write('\nname = "x"\nNAMES = (f"{__package__}{name}", f"{__package__}", f"{name}.colmap", f"{__package__}.pairs")\n')
+        source.write('\nname = "x"\nNAMES = (f"{__package__}{name}", f"{__package__}", f"{name}.colmap", '
+                     'f"{__package__}.pairs")\n')
     forget()
-    assert "cameras/colmap.py" not in code_key.modules("core.scan", copy) and "scan/pairs.py" in code_key.modules("core.scan", copy)
+    assert "cameras/colmap.py" not in code_key.modules("core.scan",
+                                                       copy) and "scan/pairs.py" in code_key.modules("core.scan", copy)
 
 
 def test_every_python_gives_the_same_keys():
-    installed = [path for version in VERSIONS for path in (shutil.which(f"python{version}"), *Path.home().glob(f".pyenv/versions/{version}.*/bin/python"))]
+    installed = [path for version in VERSIONS
+                 for path in (shutil.which(f"python{version}"),
+                              *Path.home().glob(f".pyenv/versions/{version}.*/bin/python"))]
     answers = {}
     for python in (sys.executable, *filter(None, installed)):
-        asked = subprocess.run([python, "-E", "-s", "-B", "-c", KEYS.format(str(ROOT))], capture_output=True, text=True, cwd="/")
+        asked = subprocess.run([python, "-E", "-s", "-B", "-c", KEYS.format(str(ROOT))], capture_output=True, text=True,
+                               cwd="/")
         if asked.returncode == 0:  # a version manager's stub may stand for a Python that is not installed
             version, _, answer = asked.stdout.partition(") ")
             answers[version] = answer

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings on the command line: --set and --settings reach every one, flags are theirs, the order among them holds, and what cannot be is refused."""
+"""Settings on the command line: --set and --settings reach every one, flags are theirs, the order among them holds, and
+what cannot be is refused."""
 
 import json
 from pathlib import Path
@@ -59,7 +60,8 @@ def test_every_setting_can_be_set(capture, name, tmp_path, capsys):
     command = "deliver" if name in DELIVER else "run"
     if name == "deliver.whole":  # the command's own choice, and its only one
         assert job(capture, "--set", "deliver.whole=yes", command=command).deliver.whole
-        assert main(["deliver", str(capture.root), "--set", "deliver.whole=no"]) == 2 and "ended by Blender" in capsys.readouterr().err
+        assert main(["deliver", str(capture.root), "--set",
+                     "deliver.whole=no"]) == 2 and "ended by Blender" in capsys.readouterr().err
         return
     settings = job(capture, "--set", f"{name}={text}", command=command)
     assert value(settings, name) == (str(tmp_path / "mine" / "é") if "path" in find_setting(name).metadata else kept)
@@ -74,57 +76,77 @@ def test_a_flag_says_the_same_as_set(capture, name):
     text, _ = other(name)
     field = find_setting(name)
     needed = {"delight.folder": ["--delighter", "folder"], "delight.checkpoint": ["--delighter", "opendelight"],
-              "delight.switchlight_preview": ["--delighter", "switchlight"], "registration.new_atlas": ["--template", "mine.obj"]}.get(name, [])
+              "delight.switchlight_preview": ["--delighter", "switchlight"],
+              "registration.new_atlas": ["--template", "mine.obj"]}.get(name, [])
     words = [field.metadata["flag"]] if isinstance(field.default, bool) else [field.metadata["flag"], text]
     command = "deliver" if name in DELIVER else "run"
-    assert job(capture, *needed, *words, command=command) == job(capture, *needed, "--set", f"{name}={text}", command=command)
+    assert job(capture, *needed, *words,
+               command=command) == job(capture, *needed, "--set", f"{name}={text}", command=command)
 
 
-@pytest.mark.parametrize("name", [name for name in known_settings() if isinstance(find_setting(name).default, bool) and name in RUN])
+@pytest.mark.parametrize("name",
+                         [name for name in known_settings() if isinstance(find_setting(name).default, bool)
+                          and name in RUN])
 def test_a_switch_has_many_words(capture, name):
     for words, state in (("on true YES 1", True), ("off False no 0", False)):
         assert {value(job(capture, "--set", f"{name}={word}"), name) for word in words.split()} == {state}
 
 
 def test_a_file_lies_over_the_quality_and_set_and_flags_over_the_file(capture, tmp_path):
-    (tmp_path / "mine.json").write_text('\ufeff{"seed": 3, "solve": {"steps": 7, "size": 256, "skin_tone": "0.5,0.4,0.3"}, "deliver": {"preset": "unreal"}}',
-                                        encoding="utf-8")
-    settings = job(capture, "--quality", "draft", "--settings", "mine.json", "--set", "solve.size=128", "--set", "solve.grid_cells=8", "--skin-tone", "auto")
-    assert (settings.seed, settings.solve.steps, settings.solve.size, settings.solve.grid_cells, settings.solve.skin_tone) == (3, 7, 128, 8, "auto")
+    (tmp_path
+     / "mine.json").write_text('\ufeff{"seed": 3, "solve": {"steps": 7, "size": 256, "skin_tone": "0.5,0.4,0.3"}, '
+                               '"deliver": {"preset": "unreal"}}',
+                               encoding="utf-8")
+    settings = job(capture, "--quality", "draft", "--settings", "mine.json", "--set", "solve.size=128", "--set",
+                   "solve.grid_cells=8", "--skin-tone", "auto")
+    assert (settings.seed, settings.solve.steps, settings.solve.size, settings.solve.grid_cells,
+            settings.solve.skin_tone) == (3, 7, 128, 8, "auto")
     assert settings.solve.guidance == preset("draft").solve.guidance
     assert json.loads(capture.job.read_text(encoding="utf-8"))["quality"] == "draft"
     assert job(capture, "--settings", "mine.json", command="deliver").deliver.preset == "unreal"
     kept = job(capture, "--settings", "mine.json", "--pictures", "png8", command="deliver")
-    assert (kept.deliver.pictures, kept.deliver.whole, kept.deliver.format) == ("png8", True, "obj") and kept.seed == settings.seed, "the last run's stay"
+    assert (kept.deliver.pictures, kept.deliver.whole,
+            kept.deliver.format) == ("png8", True, "obj") and kept.seed == settings.seed, "the last run's stay"
 
 
 def test_paths_begin_where_they_are_written(capture, tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     (tmp_path / "studio").mkdir()
-    places = {"delight": {"delighter": "folder", "folder": "delit"}, "solve": {"prior": "~/authors"}, "registration": {"template": ""},
-              "cameras": {"import_from": str(tmp_path / "rig.json")}}
+    places = {"delight": {"delighter": "folder", "folder": "delit"}, "solve": {"prior": "~/authors"},
+              "registration": {"template": ""}, "cameras": {"import_from": str(tmp_path / "rig.json")}}
     (tmp_path / "studio" / "mine.json").write_text(json.dumps(places), encoding="utf-8")
-    settings = job(capture, "--settings", "studio/mine.json", "--set", "texture.perceptual_network=vgg", "--softened", "~/soft")
-    assert settings.delight.folder == str(tmp_path / "studio" / "delit") and settings.solve.prior == str(tmp_path / "home" / "authors")
+    settings = job(capture, "--settings", "studio/mine.json", "--set", "texture.perceptual_network=vgg", "--softened",
+                   "~/soft")
+    assert settings.delight.folder == str(tmp_path / "studio"
+                                          / "delit") and settings.solve.prior == str(tmp_path / "home" / "authors")
     assert settings.registration.template == "" and settings.cameras.import_from == str(tmp_path / "rig.json")
-    assert settings.texture.perceptual_network == str(tmp_path / "vgg") and settings.shadow_mask.softened == str(tmp_path / "home" / "soft")
-    assert job(capture, "--settings", "studio/mine.json", "--folder", "mine").delight.folder == str(tmp_path / "mine"), "the file says that it is for folder"
+    assert settings.texture.perceptual_network == str(tmp_path
+                                                      / "vgg") and settings.shadow_mask.softened == str(tmp_path
+                                                                                                        / "home"
+                                                                                                        / "soft")
+    assert job(capture, "--settings", "studio/mine.json", "--folder",
+               "mine").delight.folder == str(tmp_path / "mine"), "the file says that it is for folder"
     assert job(capture, "--settings", "studio/mine.json", "--set", "delight.folder=").delight.folder == ""
 
 
 @pytest.mark.parametrize(("words", "said"), [
     (["--set", "solve.steps"], "--set solve.steps gives no value. Write --set solve.steps=VALUE, as solve.steps=20."),
-    (["--set", "solve.stps=5"], "no setting named 'solve.stps'. Did you mean solve.steps?"), (["--set", "slove.steps=5"], "Did you mean solve.steps?"),
+    (["--set", "solve.stps=5"], "no setting named 'solve.stps'. Did you mean solve.steps?"),
+    (["--set", "slove.steps=5"], "Did you mean solve.steps?"),
     (["--set", "solve.steps=many"], "solve.steps is 'many', which is no whole number. It goes from 4 to 600."),
     (["--set", "solve.steps=5.5"], "no whole number"), (["--set", "solve.steps="], "'', which is no whole number"),
     (["--set", "solve.steps=3"], "solve.steps is 3. It goes from 4 to 600."),
     (["--set", "scan.voxel_mm=wide"], "which is no number. It goes from 0.3 to 5 mm."),
-    (["--set", "scan.voxel_mm=nan"], "It goes from 0.3 to 5 mm."), (["--set", "upscale.hair=perhaps"], "upscale.hair is 'perhaps'. It is on or off."),
-    (["--set", "scan.method=magic"], "Choose one of auto, stereo, splats."), (["--seed", "-1"], "seed is -1. It goes from 0 to 2147483647."),
+    (["--set", "scan.voxel_mm=nan"], "It goes from 0.3 to 5 mm."),
+    (["--set", "upscale.hair=perhaps"], "upscale.hair is 'perhaps'. It is on or off."),
+    (["--set", "scan.method=magic"], "Choose one of auto, stereo, splats."),
+    (["--seed", "-1"], "seed is -1. It goes from 0 to 2147483647."),
     (["--set", "seed=1", "--seed", "2"], "--seed and --set seed=1 ask for two values of seed. Leave one of them out."),
     (["--set", "scan.pairs=5", "--set", "scan.pairs=6"], "ask for two values of scan.pairs."),
-    (["--set", "deliver.preset=unreal"], "`core run` has no use for deliver.preset. It is a setting of `core deliver`."),
-    (["--new-atlas"], "--new-atlas goes with --template only."), (["--folder", "x", "--delighter", "none"], "--folder goes with --delighter folder only."),
+    (["--set", "deliver.preset=unreal"],
+     "`core run` has no use for deliver.preset. It is a setting of `core deliver`."),
+    (["--new-atlas"], "--new-atlas goes with --template only."),
+    (["--folder", "x", "--delighter", "none"], "--folder goes with --delighter folder only."),
     (["--checkpoint", "x"], "--checkpoint goes with --delighter opendelight only."),
     (["--preview"], "--preview and --send-frames go with --delighter switchlight"),
 ])
@@ -145,9 +167,12 @@ def test_two_words_for_one_value_are_no_contradiction(capture):
 
 
 @pytest.mark.parametrize(("content", "said"), [
-    (None, "mine.json cannot be read"), (b"", "cannot be read"), (b"{", "cannot be read"), (b"\xff\xfe\x00", "cannot be read"), (b"[1]", "no object but [1]"),
-    (b'"solve"', "no object but 'solve'"), (b'{"solve": [5]}', "settings of the stage solve are no object"), (b'{"solve": {"prior": 5}}', "not a str"),
-    (b'{"slove": {}}', "Did you mean solve?"), (b'{"scan": {"voxel_mm": NaN}}', "0.3 to 5 mm"), (b"[" * 100_000, "cannot be read")])
+    (None, "mine.json cannot be read"), (b"", "cannot be read"), (b"{", "cannot be read"),
+    (b"\xff\xfe\x00", "cannot be read"), (b"[1]", "no object but [1]"),
+    (b'"solve"', "no object but 'solve'"), (b'{"solve": [5]}', "settings of the stage solve are no object"),
+    (b'{"solve": {"prior": 5}}', "not a str"),
+    (b'{"slove": {}}', "Did you mean solve?"), (b'{"scan": {"voxel_mm": NaN}}', "0.3 to 5 mm"),
+    (b"[" * 100_000, "cannot be read")])
 def test_a_settings_file_that_is_none_is_refused(capture, tmp_path, content, said, capsys):
     if content is not None:
         (tmp_path / "mine.json").write_bytes(content)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A lamp at the camera, divided out of frames of an egg whose paint is known; and the table of the gap to a controlled capture."""
+"""A lamp at the camera, divided out of frames of an egg whose paint is known; and the table of the gap to a controlled
+capture."""
 
 import json
 
@@ -22,7 +23,8 @@ ROUGHNESS, F0 = 0.5, 0.04
 
 
 def microfacets(normal, light, view) -> np.ndarray:
-    """GGX with height-correlated masking over Lambert's 1 / pi, for a reflectance of 1 at every angle (Heitz 2014, equations 71 and 99)."""
+    """GGX with height-correlated masking over Lambert's 1 / pi, for a reflectance of 1 at every angle (Heitz 2014,
+    equations 71 and 99)."""
     half = light + view
     half /= np.linalg.norm(half, axis=-1, keepdims=True)
     nl, nv, nh = (np.maximum((normal * v).sum(-1), 1e-3) for v in (light, view, half))
@@ -38,7 +40,8 @@ def dark_room(tmp_path_factory):
     azimuths = (-36, -12, 12, 36)
     names = [f"{i:05d}.jpg" for i in range(len(azimuths))]
     capture.frames.mkdir(parents=True)
-    capture.frames_json.write_text(json.dumps({"frames": [{"name": n, "video_frame": i, "time_s": i, "sharpness": 1.0, "selected": True}
+    capture.frames_json.write_text(json.dumps({"frames": [{"name": n, "video_frame": i, "time_s": i, "sharpness": 1.0,
+                                                           "selected": True}
                                                           for i, n in enumerate(names)]}))
     painted_egg.write_cameras(capture.cameras, names, azimuths, 0.42, 0.05)
     meshes.write_obj(capture.head, mesh)
@@ -51,7 +54,11 @@ def dark_room(tmp_path_factory):
         towards = view.centre - raster.interpolate(mesh.vertices, mesh.faces, face, bary)
         towards /= np.linalg.norm(towards, axis=-1, keepdims=True)
         cosine = np.clip((normal * towards).sum(-1), 0, 1)
-        seen = (albedo + F0 * microfacets(normal, towards, towards)[..., None]) * cosine[..., None] * (0.12 / np.where(hit, distance, 1)[..., None] ** 2)
+        seen = (albedo + F0
+                * microfacets(normal, towards, towards)[..., None]) * cosine[...,
+                                                                             None] * (0.12
+                                                                                      / np.where(hit, distance,
+                                                                                                 1)[..., None] ** 2)
         images.write_srgb(view.path, images.linear_to_srgb(np.where(hit[..., None], seen, 0)), quality=98)
         true.append((albedo, hit & (cosine > 0.35)))
     return capture, true
@@ -91,31 +98,42 @@ def test_without_a_highlight_none_is_found(dark_room):
 
 def test_the_table_says_the_gap_and_leaves_out_what_was_not_measured():
     def row(psnr, **more):
-        return {"psnr": psnr - 1, "psnr_after_gain": psnr, "ssim_after_gain": 0.9, "flip_after_gain": 0.1, "detail": 0.8, "mole_contrast": None, **more}
+        return {"psnr": psnr - 1, "psnr_after_gain": psnr, "ssim_after_gain": 0.9, "flip_after_gain": 0.1,
+                "detail": 0.8, "mole_contrast": None, **more}
 
     textures = {"wild_texture": row(29.0), "flash_texture": row(33.0)}
     people = {"tan": {"wild": row(30.0), "flash": row(33.5), "limit": row(40.0), **textures},
-              "dark": {"wild": row(32.0), "flash": row(34.5), "limit": row(42.0), **textures, "studio_texture": row(31.0),
-                       "studio": row(31.5, seconds=80.0, proposed_mask_percent=0.4)},
+              "dark": {"wild": row(32.0), "flash": row(34.5), "limit": row(42.0), **textures,
+                       "studio_texture": row(31.0), "studio": row(31.5, seconds=80.0, proposed_mask_percent=0.4)},
               "light": {"wild": row(10.0)}}
     mean = controlled.means(people)
-    assert mean["flash"]["psnr_after_gain"] == 34 and mean["studio"]["psnr_after_gain"] == 31.5 and "mole_contrast" not in mean["wild"]
+    assert (
+        mean["flash"]["psnr_after_gain"] == 34
+        and mean["studio"]["psnr_after_gain"] == 31.5
+        and "mole_contrast" not in mean["wild"]
+    )
     text = controlled.table({"people": people, "mean": mean})
-    assert "| tan | 30.00 | 33.50 | 40.00 | +3.50 | - | - | - |" in text and "| mean | 31.00 | 34.00 | 41.00 | +3.00 |" in text
+    assert (
+        "| tan | 30.00 | 33.50 | 40.00 | +3.50 | - | - | - |" in text
+        and "| mean | 31.00 | 34.00 | 41.00 | +3.00 |" in text
+    )
     assert "mean of 2 people" in text and "mean of 1 people" in text and "light" not in text
     assert "| dark | 31.00 | 31.50 | +0.50 | 0.80 | 0.80 | 0.40 | 80 |" in text and "| tan | 31" not in text
 
 
 def test_people_of_a_record_stay_where_others_are_measured(tmp_path, monkeypatch, capsys):
     def row(psnr):
-        return {"psnr": psnr, "psnr_after_gain": psnr, "ssim_after_gain": 0.9, "flip_after_gain": 0.1, "detail": 0.8, "mole_contrast": None}
+        return {"psnr": psnr, "psnr_after_gain": psnr, "ssim_after_gain": 0.9, "flip_after_gain": 0.1, "detail": 0.8,
+                "mole_contrast": None}
 
     def rows(psnr):
-        return {name: row(psnr + i) for i, name in enumerate(("wild_texture", "wild", "flash_texture", "flash", "limit"))}
+        return {name: row(psnr + i)
+                for i, name in enumerate(("wild_texture", "wild", "flash_texture", "flash", "limit"))}
 
     def run(name, psnr):
         monkeypatch.setattr(controlled, "measure", lambda folder, person: rows(psnr))
-        monkeypatch.setattr("sys.argv", ["controlled", str(tmp_path), "--only", name, "--json", str(tmp_path / "out.json")])
+        monkeypatch.setattr("sys.argv",
+                            ["controlled", str(tmp_path), "--only", name, "--json", str(tmp_path / "out.json")])
         assert controlled.main() == 0
         return json.loads((tmp_path / "out.json").read_text())["figures"]
 
@@ -127,4 +145,6 @@ def test_people_of_a_record_stay_where_others_are_measured(tmp_path, monkeypatch
     monkeypatch.setattr(controlled, "measure", lambda folder, person: {"wild": row(50.0)})
     controlled.main()
     people = json.loads((tmp_path / "out.json").read_text())["figures"]["people"]
-    assert people["tan"]["wild"]["psnr"] == 50.0 and people["tan"]["flash"]["psnr"] == 43.0, "a set that was not made again keeps its figures"
+    assert people["tan"]["wild"]["psnr"] == 50.0 and people["tan"]["flash"]["psnr"] == 43.0, (
+        "a set that was not made again keeps its figures"
+    )

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the chain costs: a table says what was measured, what was not and what was disturbed; the processor's time is counted as it was spent."""
+"""What the chain costs: a table says what was measured, what was not and what was disturbed; the processor's time is
+counted as it was spent."""
 
 import json
 import os
@@ -20,13 +21,15 @@ TICKS = os.sysconf("SC_CLK_TCK")
 
 def lines(text):
     """First cell of each row -> its other cells, of the last table that has it."""
-    return {cells[0].strip(" *"): [cell.strip() for cell in cells[1:]] for line in text.splitlines() if (cells := line.strip("|").split("|"))}
+    return {cells[0].strip(" *"): [cell.strip() for cell in cells[1:]] for line in text.splitlines()
+            if (cells := line.strip("|").split("|"))}
 
 
 def test_table_says_what_was_measured_what_not_and_what_was_disturbed():
-    found = {"machine": {}, "standard": {**dict.fromkeys(stages.NAMES, DONE), "solve": {**DONE, "others": 0.74}}, "draft": {"solve": {**DONE, "seconds": 3.6}},
-             "solve-2048": {"solve": {"over_s": 600.0, "load": 0.0}}, "solve-512": {"solve": {**DONE, "processor_s": 5.0}},
-             "frames-60": {"frames": {**DONE, "others": None}}}
+    found = {"machine": {}, "standard": {**dict.fromkeys(stages.NAMES, DONE), "solve": {**DONE, "others": 0.74}},
+             "draft": {"solve": {**DONE, "seconds": 3.6}},
+             "solve-2048": {"solve": {"over_s": 600.0, "load": 0.0}},
+             "solve-512": {"solve": {**DONE, "processor_s": 5.0}}, "frames-60": {"frames": {**DONE, "others": None}}}
     found["together"] = {whole: costs.together(found, whole) for whole in ("standard", "float32")}
     assert costs.together(found, "draft") is None, "a stage of it was not measured"
     assert found["together"]["standard"] == {"minutes": 2.1, "processor_minutes": 3.3, "peak_mb": 1640, "others": 0.74}
@@ -34,9 +37,11 @@ def test_table_says_what_was_measured_what_not_and_what_was_disturbed():
     text = costs.table(found)
     chain, sides = map(lines, text.split("\n\n"))
     assert chain["frames"] == ["12 s, 1.6 GB"] * 3, "those of float32 and of the draft are the standard's"
-    assert chain["scan"] == ["12 s, 1.6 GB", "12 s, 1.6 GB", "-"] and chain["together"] == ["**2.1 min, 1.6 GB**", "-", "-"]
+    assert chain["scan"] == ["12 s, 1.6 GB", "12 s, 1.6 GB",
+                             "-"] and chain["together"] == ["**2.1 min, 1.6 GB**", "-", "-"]
     assert chain["solve"] == ["12 s, 1.6 GB (20 s of processor; others took 0.7 cores)", "-", "4 s, 1.6 GB"]
-    assert sides["solve"] == ["12 s, 1.6 GB", chain["solve"][0], "over 600 s", "2.00 (2)"] and "upscale" not in sides, "one value alone tells of no growth"
+    assert sides["solve"] == ["12 s, 1.6 GB", chain["solve"][0], "over 600 s",
+                              "2.00 (2)"] and "upscale" not in sides, "one value alone tells of no growth"
     assert "cells" not in text and "views" not in text, "where only one size was measured nothing is seen to grow"
 
 
@@ -49,8 +54,10 @@ def test_the_exponent_is_that_of_the_growth(power):
 
 def test_every_row_is_in_a_table():
     shown = {(row, stage) for _, _, grown in costs.GROWTH for stage, rows in grown.items() for row in rows}
-    assert {(name, stage) for name, row in costs.ROWS.items() if name not in costs.WHOLES[:3] for stage in row.stages} <= shown
-    assert all(len(rows) == len(values) and set(rows) <= {*costs.ROWS, ""} for _, values, grown in costs.GROWTH for rows in grown.values())
+    assert {(name, stage) for name, row in costs.ROWS.items() if name not in costs.WHOLES[:3]
+            for stage in row.stages} <= shown
+    assert all(len(rows) == len(values) and set(rows) <= {*costs.ROWS, ""} for _, values, grown in costs.GROWTH
+               for rows in grown.values())
 
 
 def test_idle_and_waiting_processors_are_not_busy():
@@ -83,13 +90,15 @@ def test_stage_that_fails_and_stage_that_takes_too_long_are_told(tmp_path):
 
 
 def test_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
-    asked, options = [], costs.argparse.Namespace(work=tmp_path, json=tmp_path / "costs.json", capture=None, film=costs.VIDEO, limit_s=600, again=False)
+    asked, options = [], costs.argparse.Namespace(work=tmp_path, json=tmp_path / "costs.json", capture=None,
+                                                  film=costs.VIDEO, limit_s=600, again=False)
     found_on = costs.machine()
 
     def measure(capture, stage, *given):
         asked.append(stage)
         capture.mkdir(exist_ok=True)
-        return {"problem": "The disk is full.", "remedy": "Free some space."} if stage == "scan" and asked.count("scan") == 1 else DONE
+        return ({"problem": "The disk is full.", "remedy": "Free some space."} if stage == "scan"
+                and asked.count("scan") == 1 else DONE)
 
     monkeypatch.setattr(stage_cost, "measure", measure)
     chain = list(stages.NAMES)
@@ -108,11 +117,13 @@ def test_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
 
 
 def test_what_was_disturbed_is_measured_once_more_and_the_better_one_kept(tmp_path, monkeypatch):
-    options = costs.argparse.Namespace(work=tmp_path, json=tmp_path / "costs.json", capture=None, film=None, limit_s=600, again=True)
+    options = costs.argparse.Namespace(work=tmp_path, json=tmp_path / "costs.json", capture=None, film=None,
+                                       limit_s=600, again=True)
     busy = {"frames": [0.1], "cameras": [0.9, 1.5, 0.3, 0.0], "scan": [0.0]}
     capture = tmp_path / "standard.wildcap"
     monkeypatch.setitem(costs.ROWS, "standard", costs.StageRun(("frames", "cameras", "scan")))
-    monkeypatch.setattr(stage_cost, "measure", lambda capture, stage, *given: capture.mkdir(exist_ok=True) or {**DONE, "others": busy[stage].pop(0)})
+    monkeypatch.setattr(stage_cost, "measure", lambda capture, stage,
+                        *given: capture.mkdir(exist_ok=True) or {**DONE, "others": busy[stage].pop(0)})
     kept = []
     for _ in range(5):
         assert costs.measured("standard", options)
@@ -124,15 +135,18 @@ def test_video_is_played_to_and_fro_with_new_noise():
     steps = [np.full((24, 32, 3), 40 * i + 20, np.uint8) for i in range(5)]
     frames = list(costs.to_and_fro(steps, 11))
     assert [round((255 * float(frame.mean()) - 20) / 40) for frame in frames] == [0, 1, 2, 3, 4, 3, 2, 1, 0, 1, 2]
-    assert 255 * np.std(frames[3] - frames[5]) == pytest.approx(costs.NOISE * 2**0.5, rel=0.05), "the same picture, but for the noise"
+    assert 255 * np.std(frames[3] - frames[5]) == pytest.approx(costs.NOISE * 2**0.5,
+                                                                rel=0.05), "the same picture, but for the noise"
     assert frames[0].dtype == np.float32 and max(frame.max() for frame in frames) <= 1
     assert costs.length(costs.VIDEO) == 60
 
 
 def test_views_are_chosen_anew(tmp_path):
     capture = Capture(tmp_path)
-    frames = [{"name": f"{i:05d}.jpg", "sharpness": 0.5 + 0.01 * (i % 3), "yaw_deg": float(3 * i - 45), "selected": True} for i in range(30)]
+    frames = [{"name": f"{i:05d}.jpg", "sharpness": 0.5 + 0.01 * (i % 3), "yaw_deg": float(3 * i - 45),
+               "selected": True} for i in range(30)]
     write_json(capture.frames_json, {"kind": "video", "frames": frames})
     costs.select(capture, 8)
-    chosen = [i for i, frame in enumerate(json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"]) if frame["selected"]]
+    chosen = [i for i, frame in enumerate(json.loads(capture.frames_json.read_text(encoding="utf-8"))["frames"])
+              if frame["selected"]]
     assert len(chosen) == 8 and max(np.diff(chosen)) <= 6, "spread over the turn"

@@ -32,10 +32,14 @@ def test_the_list_comes_first_and_then_all_of_it_goes(addon, face):
     operator = addon("capture.deleting").WILDCAP_OT_delete_face
     bpy.ops.wildcap.bring_in_head()
     head = addon("captures").head(bpy.context, addon("captures").active(bpy.context))
-    assert operator.tell() is None and not bpy.ops.wildcap.delete_face.poll(), "the files are looked at in the background"
+    assert operator.tell() is None and not bpy.ops.wildcap.delete_face.poll(), (
+        "the files are looked at in the background"
+    )
     follow(addon)
     told = " ".join(operator.tell())
-    assert all(words in told for words in ("Maps", "1 files stay", "notes.txt", "The video and what was delivered elsewhere stay", "loses its maps"))
+    assert all(words in told
+               for words in ("Maps", "1 files stay", "notes.txt", "The video and what was delivered elsewhere stay",
+                             "loses its maps"))
     assert (face / "head.obj").is_file(), "it only told"
     follow(addon) if operator.tell() is None else pytest.fail("what was told once is looked at anew")
     bpy.ops.wildcap.delete_face()

@@ -18,7 +18,8 @@ from .kept_capture import make_frames
 
 @pytest.fixture
 def capture(tmp_path) -> Capture:
-    """Frames, a render, a log and a delivery of ours; a file that was changed, and three of somebody else's, one by a link to a folder elsewhere."""
+    """Frames, a render, a log and a delivery of ours; a file that was changed, and three of somebody else's, one by a
+    link to a folder elsewhere."""
     capture = delivered.make(tmp_path / "Zoë et moi.wildcap")
     ownership.claim_all(capture.root)
     delivered.deliver(capture, **delivered.OBJ)

@@ -25,7 +25,8 @@ from core.light.sunlight import fit_light
 
 SKIN = np.array([0.45, 0.28, 0.20])
 SKY = np.zeros((9, 3))
-SKY[0], SKY[1], SKY[2], SKY[6] = [2.0, 2.3, 2.6], [0.5, 0.4, 0.3], [0.3, 0.4, 0.6], [0.15, 0.15, 0.1]  # radiance, bluish from above
+# radiance, bluish from above
+SKY[0], SKY[1], SKY[2], SKY[6] = [2.0, 2.3, 2.6], [0.5, 0.4, 0.3], [0.3, 0.4, 0.6], [0.15, 0.15, 0.1]
 SUN = np.array([-0.45, -0.60, 0.66]) / np.linalg.norm([-0.45, -0.60, 0.66])
 SUN_COLOUR = np.array([1.5, 1.25, 0.95])
 
@@ -34,7 +35,8 @@ def write_cameras(capture: Capture, angles=(-30, -10, 10, 30), size=(240, 320)) 
     """Cameras on an arc in front of the head, which looks along -Y, 0.5 m away."""
     model = pycolmap.Reconstruction()
     width, height = size
-    camera = pycolmap.Camera(model="SIMPLE_PINHOLE", width=width, height=height, params=[1.3 * height, width / 2, height / 2], camera_id=1)
+    camera = pycolmap.Camera(model="SIMPLE_PINHOLE", width=width, height=height,
+                             params=[1.3 * height, width / 2, height / 2], camera_id=1)
     model.add_camera_with_trivial_rig(camera)
     target = np.array([0.0, -0.05, 0.0])
     for i, angle in enumerate(np.radians(angles)):
@@ -47,12 +49,14 @@ def write_cameras(capture: Capture, angles=(-30, -10, 10, 30), size=(240, 320)) 
         model.add_image_with_trivial_frame(pycolmap.Image(name=f"{i:05d}.png", camera_id=1, image_id=i + 1), pose)
     capture.cameras.mkdir(parents=True)
     model.write_binary(str(capture.cameras))
-    frames = [{"name": f"{i:05d}.png", "video_frame": 6 * i + 9, "time_s": 0.25 * i, "sharpness": 1.0, "selected": i < 3} for i in range(len(angles))]
+    frames = [{"name": f"{i:05d}.png", "video_frame": 6 * i + 9, "time_s": 0.25 * i, "sharpness": 1.0,
+               "selected": i < 3} for i in range(len(angles))]
     write_json(capture.frames_json, {"frames": frames})
 
 
 def render_frames(capture: Capture, sun: np.ndarray, stripes: bool = False) -> list[np.ndarray]:
-    """Constant skin under SKY and a sun, with its self shadows and, if wanted, leaves' stripes; the head's pixels of each frame."""
+    """Constant skin under SKY and a sun, with its self shadows and, if wanted, leaves' stripes; the head's pixels of
+    each frame."""
     mesh = meshes.read_obj(capture.head)
     caster = raster.RayCaster(mesh)
     normals = meshes.vertex_normals(mesh)
@@ -83,14 +87,16 @@ def capture(tmp_path) -> Capture:
 
 
 def deviation(capture: Capture, share: float) -> float:
-    """The bound in log units that holds a share of the delit skin's deviations from its median, seen at less than 60 degrees."""
+    """The bound in log units that holds a share of the delit skin's deviations from its median, seen at less than 60
+    degrees."""
     mesh = meshes.read_obj(capture.head)
     caster = raster.RayCaster(mesh)
     values = []
     for view in read_views(capture, selected_only=True):
         face, bary, _ = raster.render_view(caster, view)
         normal = raster.interpolate(meshes.vertex_normals(mesh), mesh.faces, face, bary)
-        values.append(images.read_linear(capture.delit / f"{view.name[:5]}.png")[(face >= 0) & (normal @ -view.axis > 0.5)])
+        values.append(images.read_linear(capture.delit
+                                         / f"{view.name[:5]}.png")[(face >= 0) & (normal @ -view.axis > 0.5)])
     log = np.log(np.concatenate(values))
     return float(np.quantile(np.abs(log - np.median(log, 0)).max(1), share))
 
@@ -121,7 +127,8 @@ def test_quarter_of_the_skin_in_shadow_does_not_move_the_light():
     shadow = np.cos(9 * normals[:, 0] + 4 * normals[:, 2]) > np.cos(0.25 * np.pi)  # leaves
     sky, sun = transfer @ SKY, np.maximum(normals @ SUN, 0)[:, None] * SUN_COLOUR
     colours = SKIN * (sky + ~shadow[:, None] * sun) * np.exp(rng.normal(0, 0.03, (len(normals), 1)))
-    light, reached, _ = fit_light(colours, normals, transfer, lambda d: (normals @ d > 0).astype(float), np.ones(len(normals)))
+    light, reached, _ = fit_light(colours, normals, transfer, lambda d: (normals @ d > 0).astype(float),
+                                  np.ones(len(normals)))
     delit = SKIN * (sky + sun) / (light.ambient(transfer) + light.direct(normals))
     assert np.quantile(np.abs(np.log(delit / np.median(delit, 0))), 0.95) < 0.06
     clear = sun[:, 1] > 0.5 * sky[:, 1]
@@ -129,7 +136,8 @@ def test_quarter_of_the_skin_in_shadow_does_not_move_the_light():
 
 
 def test_folder_pictures_are_matched_by_name_or_by_video_frame(capture, tmp_path):
-    frames = {view.name: np.full((320, 240, 3), 0.1 * (i + 1), np.float32) for i, view in enumerate(read_views(capture))}
+    frames = {view.name: np.full((320, 240, 3), 0.1 * (i + 1), np.float32)
+              for i, view in enumerate(read_views(capture))}
     for name, pixels in frames.items():
         images.write_srgb(capture.frames / name, pixels)
     folder = tmp_path / "delit elsewhere"
@@ -137,13 +145,15 @@ def test_folder_pictures_are_matched_by_name_or_by_video_frame(capture, tmp_path
     settings = from_json({"delight": {"delighter": "folder", "folder": str(folder)}})
     with pytest.raises(Problem, match="None of the 0 pictures"):
         run(capture, settings, Reporter("delight"))
-    for number, grey in ((15, 0.4), (27, 0.8), (99, 0.9)):  # frames 1 and 3 of the capture, and one that is not there; frame 3 is not selected
+    # frames 1 and 3 of the capture, and one that is not there; frame 3 is not selected
+    for number, grey in ((15, 0.4), (27, 0.8), (99, 0.9)):
         images.write_srgb(folder / f"{number:04d}.png", np.full((320, 240, 4), grey, np.float32))
     run(capture, settings, Reporter("delight"))
     assert sorted(p.name for p in capture.delit.glob("*.png")) == ["00001.png", "00003.png"]
     assert abs(images.read_srgb(capture.delit / "00003.png").mean() - 0.8) < 0.01
     for name in frames:
-        images.write_srgb(folder / f"{name[:5]}.jpg", np.full((160, 120, 3), 0.3, np.float32))  # any size of the same shape
+        # any size of the same shape
+        images.write_srgb(folder / f"{name[:5]}.jpg", np.full((160, 120, 3), 0.3, np.float32))
     run(capture, settings, Reporter("delight"))
     assert len(list(capture.delit.glob("*.png"))) == 4
     assert images.read_srgb(capture.delit / "00000.png").shape == (320, 240, 3)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The measure of delighters: pictures whose figures are known beforehand, and the floors that are known of the light stage's photographs."""
+"""The measure of delighters: pictures whose figures are known beforehand, and the floors that are known of the light
+stage's photographs."""
 
 import math
 from pathlib import Path
@@ -43,7 +44,8 @@ def test_the_step_is_measured_only_where_the_light_steps(truth):
     photograph = lit(truth, light[..., None])
     assert score(photograph, photograph, truth, features=False)["shadow_step"] == pytest.approx(math.log(2), abs=0.03)
     half_gone = lit(truth, np.sqrt(light)[..., None])
-    assert score(half_gone, photograph, truth, features=False)["shadow_step"] == pytest.approx(math.log(2) / 2, abs=0.03)
+    assert score(half_gone, photograph, truth,
+                 features=False)["shadow_step"] == pytest.approx(math.log(2) / 2, abs=0.03)
 
 
 def test_without_a_step_there_is_none_to_measure(truth):
@@ -62,8 +64,9 @@ def test_the_feature_distance_is_nought_for_the_truth_alone(truth):
     assert score(lit(truth, np.where(truth.shadow, 0.5, 1)[..., None]), truth.albedo, truth)["features"] > 0.05
 
 
-@pytest.mark.parametrize(("lightness", "b", "group"), [(75, 12, "very light"), (70, 20, "light"), (62, 18, "intermediate"), (56, 20, "tan"),
-                                                       (45, 18, "brown"), (30, 12, "dark")])
+@pytest.mark.parametrize(("lightness", "b", "group"),
+                         [(75, 12, "very light"), (70, 20, "light"), (62, 18, "intermediate"), (56, 20, "tan"),
+                          (45, 18, "brown"), (30, 12, "dark")])
 def test_tones_fall_into_their_groups(lightness, b, group):
     from skimage.color import lab2rgb
 
@@ -72,7 +75,8 @@ def test_tones_fall_into_their_groups(lightness, b, group):
 
 def test_rows_of_a_set_without_a_capture(truth):
     shade = np.where(truth.shadow, 0.5, 1)[..., None]
-    photographs = [Photograph(name, lit(truth, light), truth, group=name) for name, light in (("one", 0.9), ("two", shade))]
+    photographs = [Photograph(name, lit(truth, light), truth, group=name)
+                   for name, light in (("one", 0.9), ("two", shade))]
     results = delight.measure(Photographs(photographs), Settings(), features=False, only=["none", "flat"])
     assert results["none"]["pictures"] == 2 and results["none"]["groups"]["one"]["figures"]["psnr"] > 50
     assert results["none"]["groups"]["two"]["figures"]["psnr"] < 30
@@ -88,10 +92,13 @@ def test_where_the_network_is_no_better_is_told():
         return {"pictures": 1, "figures": known, "groups": {"dark": {"pictures": 1, "figures": {**known, "ssim": 0.7}}}}
 
     network = row(psnr=20, ssim=0.8, flip=0.3, detail=0.4, shadow_step=-0.1)
-    results = {"set": {"none": row(psnr=18, ssim=0.7, flip=0.4, detail=0.6, shadow_step=0.9), "shading": {"not_run": "why"}, "network": network}}
+    results = {"set": {"none": row(psnr=18, ssim=0.7, flip=0.4, detail=0.6, shadow_step=0.9),
+                       "shading": {"not_run": "why"}, "network": network}}
     assert shortfalls(results) == ["set: dark: ssim 0.700 of network, 0.700 of none"]
     results["set"]["shading"] = row(psnr=21, ssim=0.7, flip=0.4, shadow_step=-0.05)
-    assert {line.split(" of ")[0] for line in shortfalls(results)} >= {"set: psnr 20.000", "set: shadow_step -0.100", "set: dark: psnr 20.000"}
+    assert {line.split(" of ")[0]
+            for line in shortfalls(results)} >= {"set: psnr 20.000", "set: shadow_step -0.100",
+                                                 "set: dark: psnr 20.000"}
 
 
 def test_a_photograph_that_is_refused_stays_as_it_is(truth, monkeypatch):
@@ -100,7 +107,8 @@ def test_a_photograph_that_is_refused_stays_as_it_is(truth, monkeypatch):
             raise Problem("It is too dark.", "Take another.")
         return srgb, None
 
-    monkeypatch.setattr(delight.delight, "PHOTOGRAPHERS", {"halves": halves, "never": lambda srgb, settings: halves(0 * srgb, settings)})
+    monkeypatch.setattr(delight.delight, "PHOTOGRAPHERS",
+                        {"halves": halves, "never": lambda srgb, settings: halves(0 * srgb, settings)})
     photographs = Photographs([Photograph(f"{light}", lit(truth, light), truth) for light in (0.9, 0.1)])
     results = delight.measure(photographs, Settings(), features=False, only=["halves", "never"])
     assert results["halves, one photograph"]["pictures"] == 2 and results["halves, one photograph"]["refused"] == 1
@@ -124,7 +132,8 @@ def test_portraits_are_of_people_that_no_training_sees(monkeypatch):
 
     assert delight_portraits.FIRST_SEED > HELD_OUT_SEED
     seeds = delight_portraits.subjects_by_tone(1)
-    assert list(seeds) == ["very light", "light", "intermediate", "tan", "brown", "dark"] and min(map(min, seeds.values())) >= delight_portraits.FIRST_SEED
+    assert list(seeds) == ["very light", "light", "intermediate", "tan", "brown",
+                           "dark"] and min(map(min, seeds.values())) >= delight_portraits.FIRST_SEED
 
 
 def test_a_portrait_is_made_once_and_is_its_albedo_in_some_light(tmp_path, monkeypatch):
@@ -140,9 +149,11 @@ def test_a_portrait_is_made_once_and_is_its_albedo_in_some_light(tmp_path, monke
 
 
 @pytest.mark.skipif(not FACEOLAT.is_dir(), reason="the light stage's photographs are not at hand")
-@pytest.mark.parametrize(("person", "raw", "flat"), [("049", (20.16, 0.722), (24.87, 0.864)), ("071", (21.27, 0.798), (25.46, 0.878))])
+@pytest.mark.parametrize(("person", "raw", "flat"),
+                         [("049", (20.16, 0.722), (24.87, 0.864)), ("071", (21.27, 0.798), (25.46, 0.878))])
 def test_the_floors_of_the_light_stage(monkeypatch, person, raw, flat):
-    monkeypatch.setattr(pictures, "flip_evaluate", lambda true, *_, **__: (np.zeros(true.shape[:2]), 0, {}))  # slow, and not what is asked
+    # slow, and not what is asked
+    monkeypatch.setattr(pictures, "flip_evaluate", lambda true, *_, **__: (np.zeros(true.shape[:2]), 0, {}))
     photographs = [p for p in light_stage(FACEOLAT).photographs if p.group == person]
     none = mean_of([score(p.srgb, p.srgb, p.truth, features=False) for p in photographs])
     true = photographs[0].truth

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighting network and what surrounds it: input, lifting along edges, evening out over views, training that goes on."""
+"""The delighting network and what surrounds it: input, lifting along edges, evening out over views, training that goes
+on."""
 
 import importlib
 import json
@@ -33,7 +34,8 @@ QUIET = Reporter("train", emit=lambda message: None)
 
 
 def test_a_lifted_shadow_edge_lies_where_the_picture_has_it():
-    """Skin with pores, and a shadow whose edge falls inside a coarse cell: the coarse answer blurs it, the lifted one does not, and no pore passes into it."""
+    """Skin with pores, and a shadow whose edge falls inside a coarse cell: the coarse answer blurs it, the lifted one
+    does not, and no pore passes into it."""
     rng = np.random.default_rng(0)
     pores = 0.05 * cv2.GaussianBlur(rng.standard_normal((256, 256)).astype(np.float32), (0, 0), 0.8) / 0.35
     shading = np.zeros((256, 256), np.float32)
@@ -55,7 +57,12 @@ def test_a_lifted_share_stays_a_share():
     log = np.repeat(-2 * cv2.resize(share, (128, 128), interpolation=cv2.INTER_NEAREST)[..., None], 3, -1)
     lifted = lift_share(share, log)
     assert lifted.min() >= 0 and lifted.max() <= 1
-    assert lifted[:, :52].max() < 0.05 and lifted[:, 76:].min() > 0.95 and lifted[:, 63].mean() < 0.35 and lifted[:, 64].mean() > 0.65
+    assert (
+        lifted[:, :52].max() < 0.05
+        and lifted[:, 76:].min() > 0.95
+        and lifted[:, 63].mean() < 0.35
+        and lifted[:, 64].mean() > 0.65
+    )
 
 
 def test_a_crop_finds_a_place_again():
@@ -74,7 +81,10 @@ def test_a_crop_finds_a_place_again():
 def test_the_input_does_not_know_the_exposure():
     rng = np.random.default_rng(0)
     linear = rng.uniform(0.05, 0.4, (64, 64, 3)).astype(np.float32)
-    (one, middle), (other, brighter) = network_input(images.linear_to_srgb(linear)), network_input(images.linear_to_srgb(2 * linear))
+    (one, middle), (other, brighter) = (
+        network_input(images.linear_to_srgb(linear)),
+        network_input(images.linear_to_srgb(2 * linear)),
+    )
     assert brighter - middle == pytest.approx(np.log(2), abs=1e-3)
     assert np.abs(one[3:6] - other[3:6]).max() < 1e-3 and not one[6:].any()
 
@@ -85,7 +95,8 @@ def test_geometry_is_told_as_what_it_leaves_unexplained():
     head = np.zeros((64, 64), np.float32)
     head[:, :32] = 1
     layers, _ = network_input(srgb, light, light, np.zeros((64, 64, 3), np.float32), head)
-    assert layers[6:12, :, :32] == pytest.approx(1, abs=1e-3) and not layers[6:12, :, 32:].any() and layers[15, 0, 0] == 1
+    assert layers[6:12, :, :32] == pytest.approx(1,
+                                                 abs=1e-3) and not layers[6:12, :, 32:].any() and layers[15, 0, 0] == 1
 
 
 def test_an_untrained_network_says_nothing_and_sees_any_size():
@@ -96,10 +107,12 @@ def test_an_untrained_network_says_nothing_and_sees_any_size():
 
 
 def test_views_are_brought_to_one_albedo():
-    """Three looks at one head whose shadings are off by a constant and by a slope: afterwards what they leave as albedo agrees."""
+    """Three looks at one head whose shadings are off by a constant and by a slope: afterwards what they leave as albedo
+    agrees."""
     mesh = template.load()
     nowhere = np.zeros(len(mesh.vertices))
-    head = LitHead(Head(mesh), vertex_normals(mesh), np.zeros((len(nowhere), 9)), 1 - nowhere, nowhere, nowhere, None, np.ones(3))
+    head = LitHead(Head(mesh), vertex_normals(mesh), np.zeros((len(nowhere), 9)), 1 - nowhere, nowhere, nowhere, None,
+                   np.ones(3))
     face, bary = template.landmarks()
     landmarks = (mesh.vertices[mesh.faces[face]] * bary[..., None]).sum(1)
     views, looks = [], []
@@ -109,7 +122,8 @@ def test_views_are_brought_to_one_albedo():
         slope = np.linspace(-0.2, 0.2, 96, dtype=np.float32)[None, :, None] * (seed == 2)
         log = np.full((96, 96, 3), np.log(0.3), np.float32)
         views.append(view)
-        looks.append(ShadingEstimate((0.0, 0.0, 96.0), log - np.log(0.4) + np.float32(off) + slope, np.zeros((96, 96), np.float32), log, where, at))
+        looks.append(ShadingEstimate((0.0, 0.0, 96.0), log - np.log(0.4) + np.float32(off) + slope,
+                                     np.zeros((96, 96), np.float32), log, where, at))
     even = even_out(head, views, looks)
 
     def spread(answers):
@@ -121,11 +135,13 @@ def test_views_are_brought_to_one_albedo():
 
 
 def test_the_hue_of_the_shade_leaves_the_albedo_and_that_of_lips_stays():
-    """One skin under a sun and a bluer shade, whose difference the shading missed by a third; lips are redder by themselves."""
+    """One skin under a sun and a bluer shade, whose difference the shading missed by a third; lips are redder by
+    themselves."""
     rng = np.random.default_rng(0)
     shadow = np.zeros((64, 64), np.float32)
     shadow[:, 30:] = 1
-    light = shadow[..., None] * np.float32([-1.5, -1.3, -1.1]) + 0.02 * rng.standard_normal((64, 64, 3)).astype(np.float32)
+    light = shadow[...,
+                   None] * np.float32([-1.5, -1.3, -1.1]) + 0.02 * rng.standard_normal((64, 64, 3)).astype(np.float32)
     albedo = np.log(np.float32([0.5, 0.35, 0.27])) + np.zeros((64, 64, 3), np.float32)
     albedo[40:44, 10:50] += np.float32([0.1, -0.4, -0.3])
     said = light - shadow[..., None] * np.float32([-0.07, 0, 0.07])
@@ -144,7 +160,8 @@ def test_the_hue_of_the_shade_leaves_the_albedo_and_that_of_lips_stays():
 
 
 def test_beyond_the_square_the_fitted_light_takes_over_at_the_same_level():
-    """A scalp that the network's square does not reach: there its border's shading gives way to the fit's, whose level is another."""
+    """A scalp that the network's square does not reach: there its border's shading gives way to the fit's, whose level
+    is another."""
     shading, shadow = np.full((40, 30, 3), -0.5, np.float32), np.zeros((40, 30), np.float32)
     known = np.zeros((40, 30), np.float32)
     known[15:] = 1
@@ -171,7 +188,8 @@ def test_the_shipped_network_is_the_one_its_card_tells_of():
     card = json.loads(WEIGHTS.with_suffix(".json").read_text(encoding="utf-8"))
     net = load("cpu")
     assert sum(v.numel() for v in net.parameters()) == card["parameters"] and WEIGHTS.stat().st_size < 15e6
-    assert not set(card["seeds"]) & (set(card["held_out_seeds"]) | set(reserved_seeds())) and not set(card["skins"]) & set(card["held_out_skins"])
+    assert not set(card["seeds"]) & (set(card["held_out_seeds"])
+                                     | set(reserved_seeds())) and not set(card["skins"]) & set(card["held_out_skins"])
     assert card["held_out"]["geometry"] < card["held_out"]["picture"] < 0.5 * card["held_out"]["none"]
 
 
@@ -187,7 +205,8 @@ def test_two_answers_are_weighed_where_they_agree_and_the_network_wins_where_the
 
 
 def test_below_hair_the_fitted_light_goes_on_at_the_level_of_the_skin_around():
-    """A true shading that slopes; a beard that the network took for shadow; the fitted light is right but for its level."""
+    """A true shading that slopes; a beard that the network took for shadow; the fitted light is right but for its
+    level."""
     y, x = np.mgrid[0:48, 0:48].astype(np.float32)
     true = np.repeat((-0.02 * x - 0.01 * y)[..., None], 3, -1)
     hair = (np.hypot(x - 24, y - 30) < 12).astype(np.float32)
@@ -202,17 +221,21 @@ def test_below_hair_the_fitted_light_goes_on_at_the_level_of_the_skin_around():
 
 def test_a_training_goes_on_where_it_stopped(monkeypatch, tmp_path):
     small = {"model": {"widths": [16, 16, 16, 16], "depths": [1, 1, 1, 1]},
-             "training": {"pairs": 1, "echo": 2, "rate": 1e-3, "minutes": 1, "skins": 1, "people": 1, "views": 1, "held_out": 1, "seed": 0, "workers": 0}}
+             "training": {"pairs": 1, "echo": 2, "rate": 1e-3, "minutes": 1, "skins": 1, "people": 1, "views": 1,
+                          "held_out": 1, "seed": 0, "workers": 0}}
     monkeypatch.setitem(delighter.CONFIGS, "cpu", small)
     monkeypatch.setattr(delighter, "prepare", lambda seeds, views, work, *rest: _prepared(seeds, work))
-    monkeypatch.setattr(delighter, "prepare_people", lambda seeds, views, work, *rest: people.prepare_people(seeds, views, work, QUIET, processes=2))
+    monkeypatch.setattr(delighter, "prepare_people", lambda seeds, views, work,
+                        *rest: people.prepare_people(seeds, views, work, QUIET, processes=2))
     with pytest.raises(Problem, match="There are no people in"):
-        delighter.train_delighter("cpu", tmp_path / "out.safetensors", QUIET, TrainingRun(growing=True, work=tmp_path / "work"))
+        delighter.train_delighter("cpu", tmp_path / "out.safetensors", QUIET,
+                                  TrainingRun(growing=True, work=tmp_path / "work"))
     out = tmp_path / "out.safetensors"
     first = delighter.train_delighter("cpu", out, QUIET, TrainingRun(0.01, tmp_path / "work"))
     second = delighter.train_delighter("cpu", out, QUIET, TrainingRun(0.02, tmp_path / "work"))
     assert second["steps"] > first["steps"] > 0 and second["started"] == "random weights" and len(second["people"]) == 1
-    begun = delighter.train_delighter("cpu", tmp_path / "third.safetensors", QUIET, TrainingRun(0.01, _emptied(tmp_path / "work"), start=out))
+    begun = delighter.train_delighter("cpu", tmp_path / "third.safetensors", QUIET,
+                                      TrainingRun(0.01, _emptied(tmp_path / "work"), start=out))
     assert begun["started"] == "the weights before"
     assert json.loads(out.with_suffix(".json").read_text(encoding="utf-8"))["held_out"]["none"] > 0
     assert not set(second["seeds"]) & set(second["held_out_seeds"])
@@ -236,7 +259,8 @@ def _prepared(seeds, work):
             continue
         place.mkdir(parents=True)
         mesh = subject_mesh(seed)
-        stage = olat.LightStage(mesh, vertex_normals(mesh).astype(np.float32), np.ones((len(mesh.vertices), olat.LIGHTS), bool))
+        stage = olat.LightStage(mesh, vertex_normals(mesh).astype(np.float32),
+                                np.ones((len(mesh.vertices), olat.LIGHTS), bool))
         np.save(place / "visible.npy", np.packbits(stage.visible, axis=1))
         plain = np.broadcast_to(np.float32([0, 0, 1]), (64, 64, 3))
         view = random_camera(sight.landmarks_of(stage), SIDE, np.random.default_rng(seed))

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The add-on's part of a delivery: each file that Blender writes is read back by another reader, which finds mesh, unit, UVs, maps and shape keys."""
+"""The add-on's part of a delivery: each file that Blender writes is read back by another reader, which finds mesh,
+unit, UVs, maps and shape keys."""
 
 import json
 import os
@@ -30,7 +31,8 @@ MOVED = slice(100, 140)
 
 @pytest.fixture
 def capture(addon, tmp_path, monkeypatch):
-    """A solved capture whose head is in the scene, turned and with two shape keys that are in use; jobs run here at once."""
+    """A solved capture whose head is in the scene, turned and with two shape keys that are in use; jobs run here at
+    once."""
     capture = delivered.make(tmp_path / "face.wildcap")
     bpy.ops.wildcap.open_capture(directory=str(capture.root))
     bpy.ops.wildcap.bring_in_head()
@@ -58,15 +60,20 @@ def deliver(capture, **settings) -> Path:
     group = bpy.context.scene.wildcap.captures[0].deliver
     for name, value in settings.items():
         setattr(group, name, value)
-    before = {kind: len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "materials", "images", "scenes", "shape_keys")}
+    before = {kind: len(getattr(bpy.data, kind))
+              for kind in ("objects", "meshes", "materials", "images", "scenes", "shape_keys")}
     assert bpy.ops.wildcap.deliver() == {'FINISHED'}
     after = {kind: len(getattr(bpy.data, kind)) for kind in before}
     assert after == before and bpy.context.window.scene.name != "WildCap Delivery", "nothing of it stays in the .blend"
     made = [path for path in capture.exports.iterdir() if not path.name.startswith(".")]
     assert len(made) == 1 and not list(capture.exports.glob(".*"))
     told = json.loads((made[0] / "provenance.json").read_text())
-    assert told["versions"]["Blender"] == bpy.app.version_string and f"textures/{sorted((made[0] / 'textures').iterdir())[0].name}" in told["files"]
-    assert str(capture.root) not in (made[0] / "provenance.json").read_text() and not (made[0] / "packing.json").exists()
+    assert (
+        told["versions"]["Blender"] == bpy.app.version_string
+        and f"textures/{sorted((made[0] / 'textures').iterdir())[0].name}" in told["files"]
+    )
+    assert str(capture.root) not in (made[0]
+                                     / "provenance.json").read_text() and not (made[0] / "packing.json").exists()
     return made[0]
 
 
@@ -96,7 +103,8 @@ def glb(path: Path) -> tuple[dict, bytes]:
 
 
 def by_another_reader(path: Path) -> dict:
-    result = subprocess.run([sys.executable, Path(__file__).with_name("mesh_reader.py"), path], capture_output=True, text=True)
+    result = subprocess.run([sys.executable, Path(__file__).with_name("mesh_reader.py"), path], capture_output=True,
+                            text=True)
     assert result.returncode == 0, result.stderr
     return json.loads(result.stdout)
 
@@ -112,28 +120,34 @@ def test_gltf_in_one_file(capture):
     for image in document["images"]:
         view = document["bufferViews"][image["bufferView"]]
         stored.append(binary[view["byteOffset"]:view["byteOffset"] + view["byteLength"]])
-    assert {(folder / "textures" / f"face_{name}.png").read_bytes() for name in ("albedo", "normal")} == set(stored), "the worker's bytes, not saved again"
+    assert {(folder / "textures" / f"face_{name}.png").read_bytes()
+            for name in ("albedo", "normal")} == set(stored), "the worker's bytes, not saved again"
     mesh = document["meshes"][0]
     assert mesh["extras"]["targetNames"] == list(KEYS) and mesh.get("weights", [0, 0]) == [0, 0]
     for i, move in enumerate(KEYS.values()):
         accessor = document["accessors"][mesh["primitives"][0]["targets"][i]["POSITION"]]
         low, high = np.array(accessor["min"]), np.array(accessor["max"])
-        assert np.allclose(np.where(np.abs(low) > high, low, high), y_up(np.array([move]))[0], atol=1e-6), "metres, Y up"
+        assert np.allclose(np.where(np.abs(low) > high, low, high), y_up(np.array([move]))[0],
+                           atol=1e-6), "metres, Y up"
 
 
 def test_gltf_with_files_refers_to_the_delivered_maps(capture):
     folder = deliver(capture, format="gltf", preset="unreal")
     document = json.loads((folder / "face.gltf").read_text())
     uris = {image["uri"] for image in document["images"]}
-    assert uris == {"textures/T_face_BaseColor.png", "textures/T_face_N.png"} and all((folder / uri).is_file() for uri in uris)
+    assert uris == {"textures/T_face_BaseColor.png",
+                    "textures/T_face_N.png"} and all((folder / uri).is_file() for uri in uris)
     normal = (folder / "textures" / "T_face_N.png").stat().st_size
-    assert normal and json.loads((folder / "provenance.json").read_text())["delivery"]["normals"] == "opengl", "glTF has no other"
+    assert normal and json.loads((folder / "provenance.json").read_text())["delivery"]["normals"] == "opengl", (
+        "glTF has no other"
+    )
 
 
 def test_a_metahuman_gets_open_eyes_and_no_shape_keys(capture):
     pytest.importorskip("ufbx")
     bpy.context.scene.wildcap.captures[0].deliver.preset = 'metahuman'
-    with pytest.raises(RuntimeError, match="MetaHuman from Mesh wants a head with open eyes, and this one's lids are closed"):
+    with pytest.raises(RuntimeError,
+                       match="MetaHuman from Mesh wants a head with open eyes, and this one's lids are closed"):
         bpy.ops.wildcap.deliver()
     head, moved = bpy.data.objects["face"], truth()
     for name, rows in (("eyesOpenLeft", slice(200, 210)), ("eyesOpenRight", slice(300, 310))):
@@ -142,7 +156,8 @@ def test_a_metahuman_gets_open_eyes_and_no_shape_keys(capture):
         moved[rows] += (0, 0.001, 0.004)
     read = by_another_reader(deliver(capture, preset="metahuman") / "face.fbx")
     assert not read["shapes"] and np.allclose(read["points"], 100 * y_up(moved), atol=1e-4)
-    assert len(head.data.shape_keys.key_blocks) == 5 and np.abs(truth() - moved).max() > 0.003, "the artist's head is as it was"
+    assert len(head.data.shape_keys.key_blocks) == 5 and np.abs(truth()
+                                                                - moved).max() > 0.003, "the artist's head is as it was"
 
 
 def test_fbx_in_centimetres_with_shape_keys(capture):
@@ -159,7 +174,8 @@ def test_fbx_in_centimetres_with_shape_keys(capture):
         assert moving.sum() == 40 and np.allclose(offsets[moving], 100 * y_up(np.array([move])), atol=1e-4)
     assert {"textures/T_face_BaseColor.png", "textures/T_face_N.png"} <= set(read["textures"])
     assert all((folder / name).is_file() for name in read["textures"])
-    assert str(capture.root).encode() not in (folder / "face.fbx").read_bytes(), "where it was made is nobody's business"
+    assert str(capture.root).encode() not in (folder
+                                              / "face.fbx").read_bytes(), "where it was made is nobody's business"
 
 
 def test_usd_with_blend_shapes_and_colour_spaces(capture):
@@ -167,7 +183,8 @@ def test_usd_with_blend_shapes_and_colour_spaces(capture):
         pytest.skip("no usd-core here, or a Blender without USD")
     folder = deliver(capture, format="usd")
     read = by_another_reader(folder / "face.usdc")
-    assert (read["metres_per_unit"], read["up"], read["subdivision"]) == (1, "Z", "none") and np.allclose(read["to_world"], np.eye(4))
+    assert (read["metres_per_unit"], read["up"],
+            read["subdivision"]) == (1, "Z", "none") and np.allclose(read["to_world"], np.eye(4))
     assert np.allclose(read["points"], truth(), atol=1e-6) and {"st", "UVMap"} & set(read["primvars"])
     assert set(read["shapes"]) == set(KEYS)
     for name, move in KEYS.items():
@@ -183,7 +200,8 @@ def test_fbx_for_arnold_refers_to_linear_exr_numbered_by_tile(capture):
     folder = deliver(capture, preset="arnold")
     read = by_another_reader(folder / "face.fbx")
     linked = {"base_color", "normal_camera", "specular", "specular_roughness"}
-    assert set(read["textures"]) == {f"textures/face_{name}.1001.exr" for name in linked} and all((folder / name).is_file() for name in read["textures"])
+    assert set(read["textures"]) == {f"textures/face_{name}.1001.exr"
+                                     for name in linked} and all((folder / name).is_file() for name in read["textures"])
 
 
 def test_obj_for_character_creator(capture):
@@ -192,15 +210,20 @@ def test_obj_for_character_creator(capture):
     read = next(iter(trimesh.load_scene(folder / "face.obj", process=False).geometry.values()))
     same_points(np.asarray(read.vertices), 100 * y_up(truth()), 20)
     named = [line.split()[-1] for line in (folder / "face.mtl").read_text().splitlines() if line.startswith("map_")]
-    assert {"textures/face_Diffuse.png", "textures/face_Normal.png"} <= set(named) and all((folder / name).is_file() for name in named)
+    assert {"textures/face_Diffuse.png",
+            "textures/face_Normal.png"} <= set(named) and all((folder / name).is_file() for name in named)
 
 
 def test_the_artists_own_mesh_has_a_material_per_tile(capture):
     delivered.in_tiles(capture)
     folder = deliver(capture, what="own_mesh", format="glb")
     document, _ = glb(folder / "face.glb")
-    assert sorted(material["name"] for material in document["materials"]) == ["face_1001", "face_1002"] and len(document["meshes"][0]["primitives"]) == 2
-    assert {path.name for path in (folder / "textures").glob("*albedo*")} == {"face_albedo.1001.png", "face_albedo.1002.png"}
+    assert (
+        sorted(material["name"] for material in document["materials"]) == ["face_1001", "face_1002"]
+        and len(document["meshes"][0]["primitives"]) == 2
+    )
+    assert {path.name
+            for path in (folder / "textures").glob("*albedo*")} == {"face_albedo.1001.png", "face_albedo.1002.png"}
 
 
 def test_what_comes_before_the_files_is_told_in_panel_and_dialog(addon, capture):
@@ -240,16 +263,22 @@ def test_a_delivery_waits_for_the_artist_to_leave_a_mode_and_a_failure_keeps_the
         bpy.ops.wildcap.open_delivery()
 
 
-def test_a_read_only_capture_is_delivered_to_another_folder_and_nothing_in_it_changes(addon, capture, tmp_path, monkeypatch):
+def test_a_read_only_capture_is_delivered_to_another_folder_and_nothing_in_it_changes(addon, capture, tmp_path,
+                                                                                      monkeypatch):
     access = os.access
-    monkeypatch.setattr(os, "access", lambda path, mode: access(path, mode) and not (mode == os.W_OK and Path(path) == capture.root))
+    monkeypatch.setattr(os, "access", lambda path,
+                        mode: access(path, mode) and not (mode == os.W_OK and Path(path) == capture.root))
     before = {path: path.read_bytes() for path in capture.root.rglob("*") if path.is_file()}
     with pytest.raises(RuntimeError, match="is read-only"):
         bpy.ops.wildcap.deliver()
     bpy.context.scene.wildcap.captures[0].deliver.folder = str(tmp_path / "out")
     assert bpy.ops.wildcap.deliver() == {'FINISHED'}
     folder, = (tmp_path / "out").iterdir()
-    assert list(folder.glob("*.glb")) and list((folder / "textures").iterdir()) and not any(path.is_symlink() for path in folder.rglob("*"))
+    assert (
+        list(folder.glob("*.glb"))
+        and list((folder / "textures").iterdir())
+        and not any(path.is_symlink() for path in folder.rglob("*"))
+    )
     assert {path: path.read_bytes() for path in capture.root.rglob("*") if path.is_file()} == before
 
 
@@ -274,16 +303,20 @@ def test_a_head_with_face_units_keeps_their_names_their_moves_and_its_eyes(captu
     mesh = document["meshes"][0]
     names = mesh["extras"]["targetNames"]
     assert names == [key.name for key in keys.key_blocks[1:]] and len(names) == 54 and not any(mesh.get("weights", []))
-    assert [document["materials"][part["material"]]["name"].split()[-2:][0] for part in mesh["primitives"]][1:] == ["Eyes", "Mouth", "Teeth"]
+    assert [document["materials"][part["material"]]["name"].split()[-2:][0]
+            for part in mesh["primitives"]][1:] == ["Eyes", "Mouth", "Teeth"]
     eyes = document["materials"][mesh["primitives"][1]["material"]]["pbrMetallicRoughness"]
     assert "baseColorTexture" in eyes, "iris and white"
-    basis, moved = (np.array([point.co for point in key.data]) for key in (keys.reference_key, keys.key_blocks["jawOpen"]))
+    basis, moved = (np.array([point.co for point in key.data])
+                    for key in (keys.reference_key, keys.key_blocks["jawOpen"]))
     span = np.abs(moved - basis).max(0)
     found = [document["accessors"][part["targets"][names.index("jawOpen")]["POSITION"]] for part in mesh["primitives"]]
     stored = np.abs([(accessor["min"], accessor["max"]) for accessor in found]).max((0, 1))
     assert np.allclose(stored, span[[0, 2, 1]], atol=1e-6), "metres, Y up"
     eyes = np.array([i for polygon in head.data.polygons if polygon.material_index == 1 for i in polygon.vertices])
-    assert np.abs(moved - basis)[eyes].max() == 0 and not np.any([found[1]["min"], found[1]["max"]]), "eyes stay when the jaw opens"
+    assert np.abs(moved
+                  - basis)[eyes].max() == 0 and not np.any([found[1]["min"],
+                                                            found[1]["max"]]), "eyes stay when the jaw opens"
 
 
 def test_the_terminal_delivers_too(addon, capture, capsys):

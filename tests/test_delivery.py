@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The worker's part of a delivery: known tiny maps come out packed, flipped and named as the table says; what was delivered before is safe."""
+"""The worker's part of a delivery: known tiny maps come out packed, flipped and named as the table says; what was
+delivered before is safe."""
 
 import errno
 import hashlib
@@ -54,7 +55,8 @@ def four_channels(path: Path) -> np.ndarray:
 
 def test_directx_flips_the_green_of_every_texel_and_nothing_else(capture):
     assert isinstance(delivered.deliver(capture, preset="unreal", pictures="png16", **OBJ), Done)
-    before, after = stored(capture.maps / "normal.png"), stored(folder(capture, preset="unreal") / "textures" / "T_Zoe_et_moi_N.png")
+    before, after = stored(capture.maps / "normal.png"), stored(folder(capture, preset="unreal") / "textures"
+                                                                / "T_Zoe_et_moi_N.png")
     assert (before[..., 1] == np.round(NORMALS[..., 1] * 65535)).all() and len(np.unique(before[..., 1])) == SIDE
     assert (after[..., 1] == 65535 - before[..., 1]).all() and (after[..., [0, 2]] == before[..., [0, 2]]).all()
 
@@ -67,16 +69,19 @@ def test_what_needs_no_change_is_the_solvers_file_byte_for_byte(capture):
 
 
 def test_channels_are_packed_as_unity_and_unreal_read_them(capture):
-    """The specular map is 0.2 on one half and 0.4 on the other, its mean where it is sure 0.3: skin of an IOR of 1.4 reflects 2.8 % there."""
+    """The specular map is 0.2 on one half and 0.4 on the other, its mean where it is sure 0.3: skin of an IOR of 1.4
+    reflects 2.8 % there."""
     for preset in ("unity_hdrp", "unity_urp", "unreal", "arnold"):
         assert isinstance(delivered.deliver(capture, preset=preset, roughness=40, **OBJ), Done)
     mask = four_channels(folder(capture, preset="unity_hdrp") / "textures" / "Zoe_et_moi_MaskMap.png")
     assert np.allclose(mask, [0, 1, 1, 0.6], atol=0.003)
     urp = four_channels(folder(capture, preset="unity_urp") / "textures" / "Zoe_et_moi_SpecGlossMap.png")
-    assert np.allclose(images.srgb_to_linear(urp[:, [0, -1], 0]), [0.0278 * 2 / 3, 0.0278 * 4 / 3], atol=5e-4) and np.allclose(urp[..., 3], 0.6, atol=0.003)
+    assert np.allclose(images.srgb_to_linear(urp[:, [0, -1], 0]), [0.0278 * 2 / 3, 0.0278 * 4 / 3],
+                       atol=5e-4) and np.allclose(urp[..., 3], 0.6, atol=0.003)
     unreal = folder(capture, preset="unreal") / "textures"
     assert np.allclose(images.read_data(unreal / "T_Zoe_et_moi_ORM.png"), [1, 0.4, 0], atol=0.003)
-    assert np.allclose(images.read_data(unreal / "T_Zoe_et_moi_Specular.png")[:, [0, -1], 0] * 0.08, [0.0278 * 2 / 3, 0.0278 * 4 / 3], atol=3e-4)
+    assert np.allclose(images.read_data(unreal / "T_Zoe_et_moi_Specular.png")[:, [0, -1], 0] * 0.08,
+                       [0.0278 * 2 / 3, 0.0278 * 4 / 3], atol=3e-4)
     weight = images.read_data(folder(capture, preset="arnold") / "textures" / "Zoe_et_moi_specular.1001.exr")
     assert np.allclose(weight[:, [0, -1], 0], [2 / 3, 4 / 3], atol=1e-3), "EXR keeps what is above 1"
 
@@ -88,10 +93,14 @@ def test_pngs_have_the_depth_and_say_their_colour_space(capture, pictures, colou
     made = folder(capture) / "textures"
     bits, kind, chunks = delivered.png(made / "Zoe_et_moi_albedo.png")
     assert (bits, kind) == (depth, 2) and tag in chunks and (b"sRGB" in chunks) == (colour == "srgb")
-    assert b"sRGB" not in delivered.png(made / "Zoe_et_moi_specular_level.png")[2] and delivered.png(made / "Zoe_et_moi_normal.png")[0] == depth
+    assert (
+        b"sRGB" not in delivered.png(made / "Zoe_et_moi_specular_level.png")[2]
+        and delivered.png(made / "Zoe_et_moi_normal.png")[0] == depth
+    )
     stored = images.read_data(made / "Zoe_et_moi_albedo.png")
     linear = stored if colour == "linear" else images.srgb_to_linear(stored)
-    assert np.allclose(linear, images.read_linear(capture.maps / "diffuse_albedo.exr"), atol=4e-3 if depth == 8 else 3e-4)
+    assert np.allclose(linear, images.read_linear(capture.maps / "diffuse_albedo.exr"),
+                       atol=4e-3 if depth == 8 else 3e-4)
 
 
 def test_exr_is_linear_half_float_and_numbered_by_tile(capture):
@@ -102,9 +111,12 @@ def test_exr_is_linear_half_float_and_numbered_by_tile(capture):
     names = {"base_color", "bump_input", "refl_weight", "refl_roughness", "displacement"}
     assert {path.name for path in made.iterdir()} == {f"Zoe_et_moi_{name}.1001.exr" for name in names}
     spec = oiio.ImageInput.open(str(made / "Zoe_et_moi_base_color.1001.exr")).spec()
-    assert str(spec.format) == "half" and spec.getattribute("oiio:ColorSpace") in ("lin_srgb", "Linear", "lin_rec709", "lin_rec709_scene")
-    assert np.allclose(images.read_data(made / "Zoe_et_moi_base_color.1001.exr"), images.read_data(capture.maps / "diffuse_albedo.exr"), atol=3e-4)
-    assert np.allclose(images.read_data(made / "Zoe_et_moi_displacement.1001.exr"), -0.2, atol=1e-4), "centimetres, as the mesh"
+    assert str(spec.format) == "half" and spec.getattribute("oiio:ColorSpace") in ("lin_srgb", "Linear", "lin_rec709",
+                                                                                   "lin_rec709_scene")
+    assert np.allclose(images.read_data(made / "Zoe_et_moi_base_color.1001.exr"),
+                       images.read_data(capture.maps / "diffuse_albedo.exr"), atol=3e-4)
+    assert np.allclose(images.read_data(made / "Zoe_et_moi_displacement.1001.exr"), -0.2,
+                       atol=1e-4), "centimetres, as the mesh"
 
 
 def test_roughness_follows_the_regions_of_the_built_in_head_alone(capture):
@@ -165,13 +177,17 @@ def test_the_obj_is_read_by_another_reader_in_the_targets_unit(capture, preset, 
     target = folder(capture, preset=preset)
     read = part_of(target / "Zoe_et_moi.obj")
     truth = meshes.read_obj(capture.head)
-    corners = np.concatenate([truth.vertices[truth.faces][..., [0, 2, 1]] * [factor, factor, -factor], truth.uvs[truth.face_uvs]], -1)
+    corners = np.concatenate([truth.vertices[truth.faces][..., [0, 2, 1]] * [factor, factor, -factor],
+                              truth.uvs[truth.face_uvs]], -1)
     found = np.concatenate([read.vertices[read.faces], read.visual.uv[read.faces]], -1)
     assert len(read.faces) == len(truth.faces)
     for a, b in ((found, corners), (corners, found)):
-        assert cKDTree(a.reshape(-1, 5)).query(b.reshape(-1, 5))[0].max() < 1e-5 * factor, "Y up, face towards Z, each corner with its UV"
+        assert cKDTree(a.reshape(-1, 5)).query(b.reshape(-1, 5))[0].max() < 1e-5 * factor, (
+            "Y up, face towards Z, each corner with its UV"
+        )
     assert read.visual.material.image.size == (SIDE, SIDE)
-    named = [line.split(maxsplit=1)[1] for line in (target / "Zoe_et_moi.mtl").read_text().splitlines() if line.startswith(("map_", "norm"))]
+    named = [line.split(maxsplit=1)[1] for line in (target / "Zoe_et_moi.mtl").read_text().splitlines()
+             if line.startswith(("map_", "norm"))]
     assert len(named) >= 3 and all((target / name).is_file() for name in named)
 
 
@@ -179,12 +195,17 @@ def test_a_mesh_of_several_tiles_gets_a_material_for_each(capture):
     delivered.in_tiles(capture)
     assert isinstance(delivered.deliver(capture, what="own_mesh", preset="unreal", **OBJ), Done)
     target = folder(capture, "own_mesh", "unreal")
-    assert {path.name for path in (target / "textures").glob("*_BaseColor*")} == {f"T_Zoe_et_moi_BaseColor.{tile}.png" for tile in (1001, 1002)}
+    assert {path.name
+            for path in (target / "textures").glob("*_BaseColor*")} == {f"T_Zoe_et_moi_BaseColor.{tile}.png"
+                                                                        for tile in (1001, 1002)}
     parts = trimesh.load_scene(target / "Zoe_et_moi.obj", process=False).geometry.values()
-    shades = sorted((round(np.array(part.visual.material.image)[0, 0, 0] / 255, 2), part.visual.uv[:, 0].min() >= 1) for part in parts)
+    shades = sorted((round(np.array(part.visual.material.image)[0, 0, 0] / 255, 2), part.visual.uv[:, 0].min() >= 1)
+                    for part in parts)
     assert shades == [(0.25, False), (0.5, True)]
     assert isinstance(delivered.deliver(capture, what="scan", **OBJ), Done)
-    assert {path.name for path in (folder(capture, "scan") / "textures").iterdir()} == {"Zoe_et_moi_albedo.png", "Zoe_et_moi_lit.png"}
+    assert {path.name
+            for path in (folder(capture, "scan") / "textures").iterdir()} == {"Zoe_et_moi_albedo.png",
+                                                                              "Zoe_et_moi_lit.png"}
 
 
 def test_provenance_tells_all_and_no_folder(capture):
@@ -193,11 +214,13 @@ def test_provenance_tells_all_and_no_folder(capture):
     told = json.loads(text)
     assert "anna" not in text and str(capture.root.parent) not in text and "/home" not in text and str(ROOT) not in text
     assert told["capture"]["sources"] == [{"name": "film.mp4", "bytes": 7, "sha256": "not there any more"}]
-    assert told["stages"]["solve"]["seed"] == 0 and told["stages"]["solve"]["settings"] == {"steps": 20, "prior": "prior"}
+    assert told["stages"]["solve"]["seed"] == 0 and told["stages"]["solve"]["settings"] == {"steps": 20,
+                                                                                            "prior": "prior"}
     assert told["versions"]["packages"]["numpy"] == np.__version__ and told["versions"]["Python"]
     prior = next(entry for entry in told["weights"] if entry["name"] == "prior.safetensors")
     assert len(prior["sha256"]) == 64 and prior["licence"] == "GPL-3.0-or-later" and prior["notices"]
-    assert set(told["files"]) == {path.relative_to(folder(capture)).as_posix() for path in folder(capture).rglob("*.*")} - {"provenance.json"}
+    assert set(told["files"]) == {path.relative_to(folder(capture)).as_posix()
+                                  for path in folder(capture).rglob("*.*")} - {"provenance.json"}
 
 
 def test_a_video_that_is_there_is_named_with_its_hash(capture, tmp_path):
@@ -205,7 +228,8 @@ def test_a_video_that_is_there_is_named_with_its_hash(capture, tmp_path):
     capture.set_source(tmp_path / "film.mp4")
     delivered.deliver(capture, **OBJ)
     told = json.loads((folder(capture) / "provenance.json").read_text())
-    assert told["capture"]["sources"] == [{"name": "film.mp4", "bytes": 7, "sha256": hashlib.sha256(b"a film\n").hexdigest()}]
+    assert told["capture"]["sources"] == [{"name": "film.mp4", "bytes": 7,
+                                           "sha256": hashlib.sha256(b"a film\n").hexdigest()}]
 
 
 def test_what_was_delivered_before_survives_a_full_disk_and_a_cancel(capture, monkeypatch):
@@ -236,8 +260,10 @@ def test_a_folder_that_cannot_be_written_and_one_that_is_not_ours_are_refused(ca
 
 @pytest.mark.parametrize(("settings", "words"), [
     ({"format": "glb", "pictures": "exr"}, "cannot hold EXR"), ({"format": "glb", "colour": "linear"}, "sRGB only"),
-    ({"pictures": "exr", "colour": "srgb", "format": "obj"}, "hold linear light"), ({"pictures": "png8", "colour": "linear", "format": "obj"}, "too few"),
-    ({"format": "fbx", "whole": True}, "written by Blender"), ({"what": "scan"}, "no scan"), ({"what": "own_mesh"}, "no fitted mesh of yours")])
+    ({"pictures": "exr", "colour": "srgb", "format": "obj"}, "hold linear light"),
+    ({"pictures": "png8", "colour": "linear", "format": "obj"}, "too few"),
+    ({"format": "fbx", "whole": True}, "written by Blender"), ({"what": "scan"}, "no scan"),
+    ({"what": "own_mesh"}, "no fitted mesh of yours")])
 def test_choices_that_do_not_go_together_are_refused_with_a_remedy(capture, settings, words):
     ended = delivered.deliver(capture, **settings)
     assert isinstance(ended, Failed) and words in ended.problem and ended.remedy.endswith(".")
@@ -245,8 +271,14 @@ def test_choices_that_do_not_go_together_are_refused_with_a_remedy(capture, sett
 
 def test_every_preset_has_an_albedo_that_is_linked_and_names_of_its_own():
     for preset in delivery_presets.PRESETS.values():
-        assert preset.format in delivery_presets.FORMATS and preset.maps[0].slot == "base_color" and preset.maps[0].kind == delivery_presets.COLOUR
-        assert len({picture.name for picture in (*preset.maps, *delivery_presets.HAIR)}) == len(preset.maps) + len(delivery_presets.HAIR)
+        assert (
+            preset.format in delivery_presets.FORMATS
+            and preset.maps[0].slot == "base_color"
+            and preset.maps[0].kind == delivery_presets.COLOUR
+        )
+        assert len({picture.name
+                    for picture in (*preset.maps,
+                                    *delivery_presets.HAIR)}) == len(preset.maps) + len(delivery_presets.HAIR)
     with pytest.raises(Problem):
         delivery_plan.needs(Capture("/none"), "head")
     assert delivery_plan.safe_name("山田") == "head" and delivery_plan.safe_name("Zoë & moi") == "Zoe_moi"
@@ -258,7 +290,8 @@ def test_the_terminal_delivers_without_blender(capture, capsys):
     assert main(["deliver", str(capture.root), "--preset", "unreal", "--pictures", "png16"]) == 0
     target = folder(capture, preset="unreal")
     assert capsys.readouterr().out.splitlines()[-1] == str(target)
-    assert {"Zoe_et_moi.obj", "Zoe_et_moi.mtl", "provenance.json", "textures"} == {path.name for path in target.iterdir()}
+    assert {"Zoe_et_moi.obj", "Zoe_et_moi.mtl", "provenance.json",
+            "textures"} == {path.name for path in target.iterdir()}
 
 
 def test_the_guide_has_the_tables_as_they_are(capsys):

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A delivery over an older one: files that others put there stay, files of ours that were changed are refused by name, a kill loses nothing."""
+"""A delivery over an older one: files that others put there stay, files of ours that were changed are refused by name,
+a kill loses nothing."""
 
 import os
 import shutil
@@ -30,8 +31,10 @@ def test_files_that_others_added_stay_and_the_delivery_goes_on(capture):
     (place / "look" / "shader.ma").write_text("and mine")
     first = (place / delivery_plan.PROVENANCE).stat().st_ino
     assert isinstance(delivered.deliver(capture, **{**OBJ, "hair": False}), Done)
-    assert (place / "my notes.txt").read_text() == "mine" and (place / "textures" / "painted.psd").read_text() == "mine too"
-    assert (place / "look" / "shader.ma").read_text() == "and mine" and (place / delivery_plan.PROVENANCE).stat().st_ino != first
+    assert (place / "my notes.txt").read_text() == "mine" and (place / "textures"
+                                                               / "painted.psd").read_text() == "mine too"
+    assert (place / "look"
+            / "shader.ma").read_text() == "and mine" and (place / delivery_plan.PROVENANCE).stat().st_ino != first
     assert [path.name for path in capture.exports.iterdir()] == [place.name], "nothing is left beside it"
 
 
@@ -68,7 +71,8 @@ def test_what_others_put_into_both_an_older_delivery_and_the_new_one_is_kept_twi
     (old / "notes.txt").write_text("older")
     (place / "notes.txt").write_text("newer")
     assert isinstance(delivered.deliver(capture, **OBJ), Done)
-    assert {path.name: path.read_text() for path in place.glob("notes*")} == {"notes.txt": "newer", "notes_2.txt": "older"} and not old.exists()
+    assert {path.name: path.read_text()
+            for path in place.glob("notes*")} == {"notes.txt": "newer", "notes_2.txt": "older"} and not old.exists()
 
 
 @pytest.mark.parametrize("at", range(6))
@@ -95,5 +99,6 @@ def test_killed_at_any_rename_a_delivery_loses_nothing_of_others(capture, at, mo
     monkeypatch.setattr(delivery_plan.os, "replace", rename)
     delivery_plan.discard(plan)
     assert isinstance(delivered.deliver(capture, **OBJ), Done), "the next delivery ends what was begun"
-    assert {path.name: path.read_text() for path in place.glob("* notes.txt")} == {name: name for name in ("a notes.txt", "b notes.txt")}
+    assert {path.name: path.read_text()
+            for path in place.glob("* notes.txt")} == {name: name for name in ("a notes.txt", "b notes.txt")}
     assert [path.name for path in capture.exports.iterdir()] == [place.name]

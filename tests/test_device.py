@@ -24,7 +24,8 @@ def fresh():
 
 
 def machine(monkeypatch, **devices) -> list[str]:
-    """A machine with these devices: name -> (result, seconds) of a pass, or what it raises. The passes that were made."""
+    """A machine with these devices: name -> (result, seconds) of a pass, or what it raises. The passes that were
+    made."""
     tried = []
 
     def run_pass(name):
@@ -43,8 +44,10 @@ def machine(monkeypatch, **devices) -> list[str]:
     ((MAP, 1.5), "cpu", "cuda is slower than the CPU: 1.50 s against 1.00 s"),
     ((MAP + 0.5, 0.1), "cpu", "cuda computes something else than the CPU."),
     ((MAP * float("nan"), 0.1), "cpu", "cuda computes something else than the CPU."),
-    (RuntimeError("no kernel image is available\nfor execution"), "cpu", "does not run the network (RuntimeError: no kernel image is available)."),
-    (torch.cuda.OutOfMemoryError("CUDA out of memory."), "cpu", "does not run the network (OutOfMemoryError: CUDA out of memory).")])
+    (RuntimeError("no kernel image is available\nfor execution"), "cpu",
+     "does not run the network (RuntimeError: no kernel image is available)."),
+    (torch.cuda.OutOfMemoryError("CUDA out of memory."), "cpu",
+     "does not run the network (OutOfMemoryError: CUDA out of memory).")])
 def test_a_card_is_taken_where_it_computes_the_same_and_faster(monkeypatch, card, taken, reason):
     machine(monkeypatch, cpu=(MAP, 1.0), cuda=card)
     proof = device.prove()
@@ -57,7 +60,9 @@ def test_the_second_card_is_tried_after_the_first_and_all_of_it_once(monkeypatch
 
 
 def test_without_a_card_nothing_is_computed(monkeypatch):
-    assert machine(monkeypatch) == [] and device.prove() == device.Proof("cpu", "PyTorch finds no graphics card that it can use.")
+    assert machine(monkeypatch) == [] and device.prove() == device.Proof("cpu",
+                                                                         "PyTorch finds no graphics card that it can "
+                                                                         "use.")
 
 
 def test_the_pass_is_one_of_the_shipped_network_there_and_back():

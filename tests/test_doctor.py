@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The video doctor: bad captures end in the right diagnosis, blurred frames and blinks are left out, good ones hear nothing of it."""
+"""The video doctor: bad captures end in the right diagnosis, blurred frames and blinks are left out, good ones hear
+nothing of it."""
 
 import json
 from dataclasses import replace
@@ -80,7 +81,8 @@ def test_blurred_frames_and_blinks_are_left_out_and_the_exposure_is_evened(tmp_p
     assert report.figures["frames_dropped_as_blurred"] == 3 and report.figures["frames_with_a_blink"] == 2
     assert report.figures["exposure_drift_percent"] == pytest.approx(33, abs=4)
     assert "3 of 18 photographs are blurred" in problems(report) and "exposure changed" in problems(report)
-    assert [f["frames"] for f in report.findings if "blurred" in f["problem"]] == [["00003.jpg", "00009.jpg", "00014.jpg"]]
+    assert [f["frames"] for f in report.findings
+            if "blurred" in f["problem"]] == [["00003.jpg", "00009.jpg", "00014.jpg"]]
 
 
 def test_a_capture_that_is_blurred_all_over_is_told(tmp_path):
@@ -104,25 +106,29 @@ def test_two_equal_faces_are_a_problem_and_a_smaller_one_is_passed_over(tmp_path
 
 def record(**other) -> FrameRecord:
     """A frame with nothing wrong."""
-    return FrameRecord(**{"name": "00000.jpg", "time_s": 0.0, "size": (720, 960), "sharpness": 0.2, "selected": False, "face_box": (200, 300, 520, 720),
+    return FrameRecord(**{"name": "00000.jpg", "time_s": 0.0, "size": (720, 960), "sharpness": 0.2, "selected": False,
+                          "face_box": (200, 300, 520, 720),
                           "yaw_deg": 0.0, "blur": 0.5, "brightness": 0.6, "noise": 0.002, **other})
 
 
 def around(low=-60, high=60, step=3, **other) -> list[FrameRecord]:
-    return [record(name=f"{i:05d}.jpg", yaw_deg=float(yaw), **other) for i, yaw in enumerate(range(low, high + 1, step))]
+    return [record(name=f"{i:05d}.jpg", yaw_deg=float(yaw), **other)
+            for i, yaw in enumerate(range(low, high + 1, step))]
 
 
 @pytest.mark.parametrize(("records", "words"), [
     (around(), ""),
     (around(low=0), "left side of the face is not seen at all"),
     (around(high=12), "right side of the face is hardly seen: the camera came only 12 degrees"),
-    (around(low=-12, high=9, step=1), "from in front only: the camera came 12 degrees around to its left and 9 to its right"),
+    (around(low=-12, high=9, step=1),
+     "from in front only: the camera came 12 degrees around to its left and 9 to its right"),
     ([r for r in around() if not 0 < r.yaw_deg < 40], "Between 0 and 42 degrees"),
     (around(brightness=0.12), "too dark"),
     (around(clipped=0.2), "overexposed: 20% of it"),
     (around(noise=0.04), "noisy"),
     ([replace(r, gain=(1 + 0.4 * i / 40,) * 3) for i, r in enumerate(around())], "exposure changed by 40%"),
-    ([replace(r, gain=(1 + 0.1 * i / 20 - 0.1, 1.0, 1.1 - 0.1 * i / 20)) for i, r in enumerate(around())], "white balance changed"),
+    ([replace(r, gain=(1 + 0.1 * i / 20 - 0.1, 1.0, 1.1 - 0.1 * i / 20)) for i, r in enumerate(around())],
+     "white balance changed"),
     (around(face_box=[300, 400, 400, 540]), "small in the picture: 14%"),
     (around(face_box=[60, 60, 160, 190], size=[240, 320]), "only 100 pixels wide"),
     (around(blur=0.75), "blurred in most"),
@@ -144,10 +150,12 @@ def test_the_measures_say_what_was_done_to_the_picture():
     box = faces.detect(FACE).box
     good = examine(FACE, box)
     assert good["blur"] < 0.55 and 0.4 < good["brightness"] < 0.9 and good["clipped"] < 0.05 and good["noise"] < 0.012
-    assert examine(cv2.GaussianBlur(FACE, (0, 0), 3), box)["blur"] > 0.68 and examine(shaken(FACE, 15), box)["blur"] > 0.68
+    assert examine(cv2.GaussianBlur(FACE, (0, 0), 3),
+                   box)["blur"] > 0.68 and examine(shaken(FACE, 15), box)["blur"] > 0.68
     assert examine(images.linear_to_srgb(0.04 * images.srgb_to_linear(FACE)), box)["brightness"] < 0.22
     assert examine(np.clip(2 * FACE, 0, 1), box)["clipped"] > 0.2
-    assert examine((FACE + 0.05 * rng.normal(size=FACE.shape)).astype(np.float32), box)["noise"] == pytest.approx(0.05 * 0.67, abs=0.01), "of luma"
+    assert examine((FACE + 0.05 * rng.normal(size=FACE.shape)).astype(np.float32),
+                   box)["noise"] == pytest.approx(0.05 * 0.67, abs=0.01), "of luma"
 
 
 def test_at_most_a_third_is_dropped_and_enough_stay():
@@ -165,6 +173,8 @@ def test_blinks_are_told_by_what_the_eyes_do_else():
     assert np.flatnonzero(blinks(blinking, time)).tolist() == list(range(20, 25))
     assert not blinks([(0.1, 0.12)] * 60, time).any(), "closed throughout"
     assert not blinks([(0.36 - 0.004 * i, 0.12 + 0.004 * i) for i in range(60)], time).any(), "a turn of the head"
-    assert not blinks([(0.1, 0.34) if i == 30 else eye for i, eye in enumerate(eyes)], time).any(), "one eye alone is a mistake or a wink"
-    assert blinks([(0.1, 0.1) if i == 2 else None if i == 5 else (0.3, 0.3) for i in range(9)], [None] * 9).nonzero()[0].tolist() == [2]
+    assert not blinks([(0.1, 0.34) if i == 30 else eye for i, eye in enumerate(eyes)],
+                      time).any(), "one eye alone is a mistake or a wink"
+    assert blinks([(0.1, 0.1) if i == 2 else None if i == 5 else (0.3, 0.3) for i in range(9)],
+                  [None] * 9).nonzero()[0].tolist() == [2]
     assert not blinks([None] * 3, [None] * 3).any()

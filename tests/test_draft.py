@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The draft's normals and specular: those that are expected of its albedo, as a Gaussian prior tells in closed form and as the shipped one does."""
+"""The draft's normals and specular: those that are expected of its albedo, as a Gaussian prior tells in closed form and
+as the shipped one does."""
 
 from dataclasses import replace
 
@@ -22,7 +23,8 @@ SLOPE, OWN = 0.6, 0.1
 
 
 class Related:
-    """The exact denoiser of independent texels: albedo N(0, 0.3^2); all other channels SLOPE times its mean, and N(0, OWN^2) of their own."""
+    """The exact denoiser of independent texels: albedo N(0, 0.3^2); all other channels SLOPE times its mean, and N(0,
+    OWN^2) of their own."""
 
     def __init__(self):
         loading = torch.cat([torch.eye(3), torch.full((4, 3), SLOPE / 3)])
@@ -37,11 +39,13 @@ class Related:
         return torch.cat([maps[:, :3], SLOPE * maps[:, :3].mean(1, keepdim=True).expand(-1, 4, -1, -1)], 1)
 
     def draw(self, generator):
-        return torch.einsum("ij,njhw->nihw", torch.linalg.cholesky(self.covariance), torch.randn(1, 7, SIZE, SIZE, generator=generator))
+        return torch.einsum("ij,njhw->nihw", torch.linalg.cholesky(self.covariance),
+                            torch.randn(1, 7, SIZE, SIZE, generator=generator))
 
 
 def test_what_the_albedo_tells_is_restored_and_the_albedo_stays():
-    """The error that is left is that which no one can know, OWN; a sample has that twice, and the closed form's own on top."""
+    """The error that is left is that which no one can know, OWN; a sample has that twice, and the closed form's own on
+    top."""
     prior = Related()
     truth = prior.draw(torch.Generator().manual_seed(2))
     drawn = Sampler(prior, DRAFT, seeded(0)).sample({1: observation((truth[0, :3] + 1) / 2)}, start()).denoised
@@ -53,7 +57,8 @@ def test_what_the_albedo_tells_is_restored_and_the_albedo_stays():
 
 def test_a_sampled_map_and_another_guidance_stay_as_they_are():
     maps = torch.randn(1, 7, SIZE, SIZE)
-    assert restored(Related(), maps, coordinates(SIZE, slice(0, SIZE), slice(0, SIZE)), replace(DRAFT, guidance="dps"), 0) is maps
+    assert restored(Related(), maps, coordinates(SIZE, slice(0, SIZE), slice(0, SIZE)), replace(DRAFT, guidance="dps"),
+                    0) is maps
 
 
 @pytest.mark.parametrize("seed", [9000, 9003])

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exposure and white balance: what a camera changed is found and evened out; what the light does to a turning head is not taken for it."""
+"""Exposure and white balance: what a camera changed is found and evened out; what the light does to a turning head is
+not taken for it."""
 
 import cv2
 import numpy as np
@@ -48,20 +49,28 @@ def test_a_steady_exposure_is_left_alone():
 
 
 def noise(rng, cells: int, width: int, height: int) -> np.ndarray:
-    return np.exp(0.5 * cv2.resize(rng.normal(size=(height // cells, width // cells, 1)).astype(np.float32), (width, height), interpolation=cv2.INTER_CUBIC))
+    return np.exp(0.5
+                  * cv2.resize(rng.normal(size=(height // cells, width // cells, 1)).astype(np.float32),
+                               (width, height), interpolation=cv2.INTER_CUBIC))
 
 
 def turning_head(angle: float, skin: np.ndarray, wall: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A painted ball before a wall, lit from the left and above and turned by `angle` (radians) with its light held still: linear picture, its mask."""
+    """A painted ball before a wall, lit from the left and above and turned by `angle` (radians) with its light held
+    still: linear picture, its mask."""
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH].astype(np.float32)
     right, up = (x - WIDTH / 2) / 130, (HEIGHT / 2 - y) / 130
     inside = right**2 + up**2 < 1
     near = np.sqrt(np.maximum(1 - right**2 - up**2, 0))
     light = np.array([-0.75, 0.3, 0.6]) / np.linalg.norm([-0.75, 0.3, 0.6])
     shade = 0.12 + 0.88 * np.maximum(right * light[0] + up * light[1] + near * light[2], 0)
-    u, v = (np.arctan2(right, near) + angle + np.pi) / (2 * np.pi) * skin.shape[1], np.arccos(np.clip(up, -1, 1)) / np.pi * skin.shape[0]
-    albedo = cv2.remap(skin, u.astype(np.float32), v.astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)[..., None]
-    return np.where(inside[..., None], albedo * shade[..., None] * np.array([0.5, 0.36, 0.28]), wall[..., None] * 0.3).astype(np.float32), inside
+    u, v = (
+        (np.arctan2(right, near) + angle + np.pi) / (2 * np.pi) * skin.shape[1],
+        np.arccos(np.clip(up, -1, 1)) / np.pi * skin.shape[0],
+    )
+    albedo = cv2.remap(skin, u.astype(np.float32), v.astype(np.float32), cv2.INTER_LINEAR,
+                       borderMode=cv2.BORDER_WRAP)[..., None]
+    return np.where(inside[..., None], albedo * shade[..., None] * np.array([0.5, 0.36, 0.28]),
+                    wall[..., None] * 0.3).astype(np.float32), inside
 
 
 @pytest.mark.parametrize("behind", ["a textured wall", "an empty wall"])
@@ -70,11 +79,13 @@ def test_a_head_that_turns_into_the_shade_is_not_drift(monkeypatch, behind, expo
     rng = np.random.default_rng(3)
     skin = noise(rng, 8, 1200, 480)[..., None]
     wall = noise(rng, 9, WIDTH, HEIGHT) if behind == "a textured wall" else np.ones((HEIGHT, WIDTH), np.float32)
-    true = np.exp(0.25 * np.sin(np.arange(24) / 8))[:, None] * np.ones(3) if exposure == "drifting" else np.ones((24, 3))
+    true = (np.exp(0.25 * np.sin(np.arange(24) / 8))[:, None] * np.ones(3) if exposure == "drifting"
+            else np.ones((24, 3)))
     contents = []
     for i in range(24):
         picture, inside = turning_head(0.035 * i, skin, wall)
-        monkeypatch.setattr(faces, "segment_person", lambda small, inside=inside: cv2.resize(inside.astype(np.float32), small.shape[1::-1]))
+        monkeypatch.setattr(faces, "segment_person", lambda small,
+                            inside=inside: cv2.resize(inside.astype(np.float32), small.shape[1::-1]))
         contents.append(content_of(exposed(picture, true[i])))
     assert np.mean([c.person.mean() for c in contents]) > (0.2 if behind == "a textured wall" else 0.8)
     gains = gains_of(contents)
@@ -82,7 +93,8 @@ def test_a_head_that_turns_into_the_shade_is_not_drift(monkeypatch, behind, expo
         assert np.abs(np.log(gains)).max() <= 0.02
     elif behind == "a textured wall":
         assert errors(gains, true).max() < 0.03
-    else:  # turn and exposure cannot be told apart in one shaded ball: it may leave the drift in, but must not add to it
+    else:
+        # turn and exposure cannot be told apart in one shaded ball: it may leave the drift in, but must not add to it
         assert errors(gains, true).max() < errors(np.ones((24, 3)), true).max() + 0.05
 
 

@@ -42,7 +42,11 @@ def test_a_soft_step_is_no_line_either():
 @pytest.mark.parametrize(("height", "bright", "dark"), [(0.15, 0.15, 0), (-0.1, 0, 0.1)])
 def test_a_line_is_what_it_rises_above_the_higher_side_or_falls_below_the_lower(height, bright, dark):
     found = score(np.where(AT, height, 0))
-    assert found.bright == pytest.approx(bright, abs=0.002) and found.dark == pytest.approx(dark, abs=0.002) and found.step == pytest.approx(0, abs=1e-3)
+    assert (
+        found.bright == pytest.approx(bright, abs=0.002)
+        and found.dark == pytest.approx(dark, abs=0.002)
+        and found.step == pytest.approx(0, abs=1e-3)
+    )
     over_a_step = score(np.where(AT, 0.25, np.where(SHADOW, 0, 0.2)))
     assert over_a_step.bright == pytest.approx(0.05, abs=0.005) and over_a_step.step == pytest.approx(0.2, abs=0.005)
 

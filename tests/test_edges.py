@@ -15,7 +15,8 @@ MELANIN = np.array([0.5, 0.8, 1.0])  # what a mole takes of the skin's reflectan
 
 
 def shadowed(width, size=SIZE, centre=(0.655, 0.56), radius=90.0, grown=8, moved=(3, -3)):
-    """(distance to the edge in texels of a 1024 map, positive outside; share of the shadow; a hard mask grown and moved by so many texels)."""
+    """(distance to the edge in texels of a 1024 map, positive outside; share of the shadow; a hard mask grown and moved
+    by so many texels)."""
     texel = 1024 / size
     y, x = (np.mgrid[:size, :size] + 0.5) * texel
     distance = np.hypot(x - 1024 * centre[0], y - 1024 * centre[1]) - radius
@@ -48,7 +49,9 @@ def test_a_mask_without_a_shadow_stays_as_it_was_painted():
     assert np.array_equal(edge.alpha, painted) and edge.found.max() == 0
 
 
-@pytest.mark.parametrize("painted", [np.zeros((64, 64), np.float32), np.ones((64, 64), np.float32), np.eye(64, dtype=np.float32) * (np.arange(64) == 30)])
+@pytest.mark.parametrize("painted",
+                         [np.zeros((64, 64), np.float32), np.ones((64, 64), np.float32),
+                          np.eye(64, dtype=np.float32) * (np.arange(64) == 30)])
 def test_any_mask_gives_a_finite_alpha(painted):
     light = np.random.default_rng(0).uniform(0.2, 1, (64, 64, 3))
     for weight in (0, 1):
@@ -57,7 +60,8 @@ def test_any_mask_gives_a_finite_alpha(painted):
 
 
 def test_a_step_of_another_colour_is_not_the_shadows():
-    """The mask covers a shadow and, elsewhere, something brown such as a patch of hair: alpha goes to the shadow's edge and leaves the other alone."""
+    """The mask covers a shadow and, elsewhere, something brown such as a patch of hair: alpha goes to the shadow's edge
+    and leaves the other alone."""
     _, shadow, painted = shadowed(2, centre=(0.7, 0.5))
     _, patch, around = shadowed(2, centre=(0.25, 0.5), radius=60.0)
     light = (1 - shadow[..., None] * TAKEN) * np.exp(-patch[..., None] * MELANIN)

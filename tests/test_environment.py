@@ -32,7 +32,8 @@ def write_wheel(folder: Path, name: str, version: str = "1.0") -> Path:
         info = f"{name}-{version}.dist-info"
         wheel.writestr(f"{name}.py", "")
         wheel.writestr(f"{info}/METADATA", f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
-        wheel.writestr(f"{info}/WHEEL", "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+        wheel.writestr(f"{info}/WHEEL",
+                       "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
         wheel.writestr(f"{info}/RECORD", f"{name}.py,,\n{info}/METADATA,,\n{info}/WHEEL,,\n{info}/RECORD,,\n")
     return path
 
@@ -40,7 +41,8 @@ def write_wheel(folder: Path, name: str, version: str = "1.0") -> Path:
 def write_lock(requirements: Path, *wheels: Path) -> None:
     """The lock for this machine and Python, of these wheels alone."""
     (requirements / "locks").mkdir(exist_ok=True)
-    lines = ["{}=={}".format(*wheel.name.split("-")[:2]) + f" --hash=sha256:{hashlib.sha256(wheel.read_bytes()).hexdigest()}\n" for wheel in wheels]
+    lines = ["{}=={}".format(*wheel.name.split("-")[:2])
+             + f" --hash=sha256:{hashlib.sha256(wheel.read_bytes()).hexdigest()}\n" for wheel in wheels]
     (requirements / "locks" / f"{HERE}.txt").write_text("".join(lines))
 
 
@@ -68,7 +70,8 @@ def follow(task: BackgroundTask, timeout_s: float = 120) -> list:
 
 
 def install(folder: Path, local: Path, **options) -> list:
-    task = installation.installation(folder, local, folder.with_name("install.log"), None, installation.PackageSource(**options))
+    task = installation.installation(folder, local, folder.with_name("install.log"), None,
+                                     installation.PackageSource(**options))
     task.start()
     return follow(task)
 
@@ -77,7 +80,11 @@ def test_an_installation_from_nothing_through_a_failure_and_another_device_to_re
     folder, wheels = tmp_path / "Umgebung é", tmp_path / "wheels"
     (wheels / "tinynets-1.0-py3-none-any.whl").rename(tmp_path / "away.whl")
     final = install(folder, local)[-1]
-    assert isinstance(final, Failed) and final.problem.startswith("A package could not be downloaded") and "install.log" in final.remedy
+    assert (
+        isinstance(final, Failed)
+        and final.problem.startswith("A package could not be downloaded")
+        and "install.log" in final.remedy
+    )
     (tmp_path / "away.whl").rename(wheels / "tinynets-1.0-py3-none-any.whl")
     made = (folder / "pyvenv.cfg").stat().st_mtime_ns
     messages = install(folder, local)
@@ -110,7 +117,8 @@ def test_an_environment_whose_files_are_gone_is_repaired(local, tmp_path):
     assert isinstance(install(folder, local)[-1], Done)
     module, = folder.rglob("tinytorch.py")
     module.unlink()
-    assert verify(python_of(folder), local, importing=True) == ["tinytorch does not load: ModuleNotFoundError: No module named 'tinytorch'."]
+    assert verify(python_of(folder), local,
+                  importing=True) == ["tinytorch does not load: ModuleNotFoundError: No module named 'tinytorch'."]
     assert isinstance(install(folder, local)[-1], Done)
     assert verify(python_of(folder), local, importing=True) == []
 
@@ -127,17 +135,23 @@ def test_what_cannot_be_loaded_after_two_tries_is_told(local, tmp_path):
     with zipfile.ZipFile(tmp_path / "wheels" / "broken-1.0-py3-none-any.whl", "w") as wheel:
         wheel.writestr("broken.py", "raise OSError('no such library')")
         wheel.writestr("broken-1.0.dist-info/METADATA", "Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
-        wheel.writestr("broken-1.0.dist-info/WHEEL", "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+        wheel.writestr("broken-1.0.dist-info/WHEEL",
+                       "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
         wheel.writestr("broken-1.0.dist-info/RECORD", "")
     (local / "worker.txt").write_text("broken==1.0\n")
     write_lock(local, tmp_path / "wheels" / "broken-1.0-py3-none-any.whl")
     for _ in range(2):
         final = install(tmp_path / "env", local)[-1]
-        assert isinstance(final, Failed) and final.problem == "broken does not load: OSError: no such library." and "install.log" in final.remedy
+        assert (
+            isinstance(final, Failed)
+            and final.problem == "broken does not load: OSError: no such library."
+            and "install.log" in final.remedy
+        )
 
 
 def test_a_cancelled_installation_says_so(local, tmp_path):
-    task = installation.installation(tmp_path / "env", local, tmp_path / "install.log", None, installation.PackageSource())
+    task = installation.installation(tmp_path / "env", local, tmp_path / "install.log", None,
+                                     installation.PackageSource())
     task.start()
     task.cancel()
     assert isinstance(follow(task)[-1], Cancelled)
@@ -161,7 +175,9 @@ def test_what_an_installation_brings_is_known_before_it_begins(local, tmp_path):
     with pytest.raises(Problem, match="are needed while"):
         index.check_space(huge, tmp_path)
     with pytest.raises(Problem, match=r"did not answer as expected \(No matching distribution\)"):
-        work(task, lambda command: (1, "ERROR: No matching distribution.") if "--report" in command else BackgroundTask.run(task, command))
+        work(task,
+             lambda command: (1, "ERROR: No matching distribution.") if "--report" in command
+             else BackgroundTask.run(task, command))
     wheels[0].unlink()
     task = BackgroundTask("index", work)
     task.start()
@@ -196,7 +212,9 @@ def test_sizes_come_from_a_wheels_own_directory_wherever_it_lies(tmp_path):
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), WithRanges)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     address = f"http://127.0.0.1:{server.server_port}/a-1-py3-none-any.whl"
-    assert index.wheel_size(address) == index.wheel_size((tmp_path / "a-1-py3-none-any.whl").as_uri()) == (size, len(content) + 20 + 2250)
+    assert index.wheel_size(address) == index.wheel_size((tmp_path / "a-1-py3-none-any.whl").as_uri()) == (size,
+                                                                                                           len(content)
+                                                                                                           + 20 + 2250)
     WithRanges.whole = True
     assert index.wheel_size(address) == (size, round(index.UNPACKED * size))
     server.shutdown()
@@ -222,10 +240,15 @@ def test_a_task_ends_with_its_problem_or_at_once_when_cancelled():
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows ends the command alone")
 def test_a_cancel_ends_what_the_command_has_started(tmp_path):
-    """venv runs pip's installer as a process of its own, which must not go on in a folder that the next installation begins with."""
+    """venv runs pip's installer as a process of its own, which must not go on in a folder that the next installation
+    begins with."""
     late = tmp_path / "late"
-    child = f"import time, pathlib; pathlib.Path({str(tmp_path / 'begun')!r}).touch(); time.sleep(1); pathlib.Path({str(late)!r}).touch()"
-    task = BackgroundTask("venv", lambda task: task.run([sys.executable, "-c", f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"]))
+    child = (f"import time, pathlib; pathlib.Path({str(tmp_path / 'begun')!r}).touch(); time.sleep(1); "
+             f"pathlib.Path({str(late)!r}).touch()")
+    task = BackgroundTask("venv",
+                          lambda task: task.run([sys.executable, "-c",
+                                                 f"import subprocess, sys; subprocess.run([sys.executable, '-c', "
+                                                 f"{child!r}])"]))
     task.start()
     while not (tmp_path / "begun").exists():
         time.sleep(0.02)
@@ -259,12 +282,15 @@ def test_an_environment_that_was_half_made_is_made_anew(local, tmp_path):
 
 def test_a_base_python_is_found_and_fits():
     found = find_python()
-    assert tuple(map(int, environment.answer(found, "import sys; print(*sys.version_info[:2])").split())) in locks.PYTHONS
+    assert tuple(map(int,
+                     environment.answer(found, "import sys; print(*sys.version_info[:2])").split())) in locks.PYTHONS
 
 
 def test_this_environment_is_judged_fit():
     found = survey(Path(sys.executable), REQUIREMENTS)
-    assert set(found["versions"]) == set(required(REQUIREMENTS)) and found["device"] == "", "not tried without loading anything"
+    assert set(found["versions"]) == set(required(REQUIREMENTS)) and found["device"] == "", (
+        "not tried without loading anything"
+    )
     assert judge(found, REQUIREMENTS) == []
 
 
@@ -273,7 +299,8 @@ def test_what_is_wrong_is_said():
             "opencv": ["opencv-contrib-python-headless"], "errors": {}, "device": "cpu"}
     assert judge(good, REQUIREMENTS) == []
     bad = {**good, "python": [3, 9], "versions": {**good["versions"], "torch": None, "av": "1.0"},
-           "opencv": ["opencv-contrib-python-headless", "opencv-python"], "errors": {"torch": "OSError: cannot open libc10.so"}}
+           "opencv": ["opencv-contrib-python-headless", "opencv-python"],
+           "errors": {"torch": "OSError: cannot open libc10.so"}}
     problems = judge(bad, REQUIREMENTS)
     assert len(problems) == 5
     for words in ("3.9", "torch", "av is 1.0", "opencv-python", "libc10"):

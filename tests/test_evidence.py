@@ -61,10 +61,13 @@ def test_cameras_and_scan_come_in_again_in_place_and_go_with_the_head(addon, rec
     for _ in range(2):
         bpy.ops.wildcap.bring_in_cameras()
         bpy.ops.wildcap.bring_in_scan()
-    assert sorted(name.split()[-1] for name in cameras()) == ["00000.jpg", "00002.jpg"], "those the texture is made from"
+    assert sorted(name.split()[-1] for name in cameras()) == ["00000.jpg",
+                                                              "00002.jpg"], "those the texture is made from"
     assert len(bpy.data.cameras) == 2 and [c.name for c in bpy.data.collections] == ["head Cameras"]
     scans = [o for o in bpy.context.scene.objects if o.name.endswith("Scan")]
-    assert len(scans) == 1 and len(scans[0].data.vertices) == 4 and scans[0].data.vertices[0].co.y == pytest.approx(-0.1)
+    assert (
+        len(scans) == 1 and len(scans[0].data.vertices) == 4 and scans[0].data.vertices[0].co.y == pytest.approx(-0.1)
+    )
     assert bpy.context.view_layer.objects.active == head and head.select_get() and not scans[0].select_get()
     before = {o.name: o.matrix_world.copy() for o in (*cameras().values(), scans[0])}
     head.matrix_world = Matrix.Translation((1, 2, 3))
@@ -93,7 +96,8 @@ def test_what_is_missing_or_damaged_is_told_and_nothing_comes_in_while_painting(
 
 
 @pytest.mark.parametrize("ask", [lambda: bpy.ops.wildcap.bring_in_cameras(), lambda: bpy.ops.wildcap.compare_delit(),
-                                 lambda: bpy.ops.wildcap.pick_white_point(frame="00000.jpg", uv=(0.5, 0.5))], ids=["cameras", "delit", "card"])
+                                 lambda: bpy.ops.wildcap.pick_white_point(frame="00000.jpg", uv=(0.5, 0.5))],
+                         ids=["cameras", "delit", "card"])
 def test_what_was_slimmed_away_is_made_again_for_whoever_looks_at_it(addon, reconstructed, monkeypatch, ask):
     folder, frames = Capture(reconstructed), stages.by_name("frames")
     folder.finish(frames, folder.conditions(frames, Settings()), 1.0, Settings(), {}, "0.2.0")

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension as Blender's own tool sees it: the manifest is valid, and the zip holds what an artist needs and nothing else."""
+"""The extension as Blender's own tool sees it: the manifest is valid, and the zip holds what an artist needs and
+nothing else."""
 
 import re
 import subprocess
@@ -20,21 +21,29 @@ TAGS = SCRIPTS / "modules" / "_bpy_internal" / "extensions" / "tags.py"
 
 # Every file of the zip matches one of these.
 WANTED = (
-    r"__(init|main)__\.py", r"farm/flamenco/wildcap\.js", r"blender_manifest\.toml", r"LICENSE", r"README\.md",
-    r"requirements/(worker|perceptual|cuda|farm)\.txt",
+    r"__(init|main)__\.py",
+    r"farm/flamenco/wildcap\.js",
+    r"blender_manifest\.toml",
+    r"LICENSE",
+    r"README\.md", r"requirements/(worker|perceptual|cuda|farm)\.txt",
     r"requirements/locks/([a-z0-9_]+-3\.[0-9]+(-cpu|-cuda)?|pip)\.txt",
     r"wildcap_addon/([a-z_]+/){0,2}[a-z_]+\.py",
-    r"core/README\.md", r"core/[a-z_]+\.py", r"core/(batch|contract|worker|imaging|geometry|face|light)/[a-z0-9_]+\.py",
+    r"core/README\.md",
+    r"core/[a-z_]+\.py",
+    r"core/(batch|contract|worker|imaging|geometry|face|light)/[a-z0-9_]+\.py",
     r"core/(frames|cameras|scan|registration|delight|texture|shadow_mask|solve|transfer|upscale|deliver)/(importers/)?[a-z0-9_]+\.py",
-    r"core/weights/[a-z0-9_]+\.(safetensors|json)", r"core/weights/face_nets/([a-z_]+\.tflite|NOTICE\.md|LICENSE\.txt)",
+    r"core/weights/[a-z0-9_]+\.(safetensors|json)",
+    r"core/weights/face_nets/([a-z_]+\.tflite|NOTICE\.md|LICENSE\.txt)",
     r"core/assets/([A-Z]+\.md|head\.obj|head\.json|identity\.npz|masks/[a-z_]+\.png)",
-    r"core/assets/[a-z_]+\.(png|json|npz|md)", r"core/assets/sample_head/.+\.(obj|png|exr|json|npz)",
-    r"core/[a-z_]+/(README\.md|[a-z0-9_]+\.(npz|json))",
+    r"core/assets/[a-z_]+\.(png|json|npz|md)",
+    r"core/assets/sample_head/.+\.(obj|png|exr|json|npz)", r"core/[a-z_]+/(README\.md|[a-z0-9_]+\.(npz|json))",
 )
-NEEDED = ("__init__.py", "__main__.py", "farm/flamenco/wildcap.js", "blender_manifest.toml", "LICENSE", "requirements/worker.txt", "requirements/locks/pip.txt",
-          "core/weights/face_nets/face_landmark.tflite", "core/weights/face_nets/NOTICE.md", "wildcap_addon/__init__.py",
-          "wildcap_addon/relight/headless.py", "core/contract/settings.py", "core/worker/__main__.py", "core/worker/client.py", "core/solve/__init__.py",
-          "core/assets/head.obj")
+NEEDED = ("__init__.py", "__main__.py", "farm/flamenco/wildcap.js", "blender_manifest.toml", "LICENSE",
+          "requirements/worker.txt", "requirements/locks/pip.txt",
+          "core/weights/face_nets/face_landmark.tflite", "core/weights/face_nets/NOTICE.md",
+          "wildcap_addon/__init__.py",
+          "wildcap_addon/relight/headless.py", "core/contract/settings.py", "core/worker/__main__.py",
+          "core/worker/client.py", "core/solve/__init__.py", "core/assets/head.obj")
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The skin tone picked from the head: a ray finds the UV it meets, and the colour there is the texture's, in whatever kind of image it is."""
+"""The skin tone picked from the head: a ray finds the UV it meets, and the colour there is the texture's, in whatever
+kind of image it is."""
 
 import numpy as np
 import pytest
@@ -29,7 +30,8 @@ def marked(name: str, is_float: bool, side: int = 256):
 
 @pytest.mark.parametrize("turned", [0.0, 0.7])
 def test_a_ray_finds_the_uv_of_what_it_meets_wherever_the_head_stands(addon, head, turned):
-    """The egg is convex: a ray against a triangle's normal meets its middle, where the UV is the mean of its corners'."""
+    """The egg is convex: a ray against a triangle's normal meets its middle, where the UV is the mean of its
+    corners'."""
     from mathutils import Matrix, Vector
 
     mesh, uv_on = head.data, addon("solve.eyedropper").uv_on

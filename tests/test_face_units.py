@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Face units carried onto another head: against MakeHuman's own on that head, and clean along lips and lids at full strength."""
+"""Face units carried onto another head: against MakeHuman's own on that head, and clean along lips and lids at full
+strength."""
 
 import importlib.util
 from importlib import import_module
@@ -10,12 +11,14 @@ import pytest
 
 pytest.importorskip("bpy")  # the add-on carries them
 
-ARKIT = """browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff cheekSquintLeft cheekSquintRight eyeBlinkLeft eyeBlinkRight
-eyeLookDownLeft eyeLookDownRight eyeLookInLeft eyeLookInRight eyeLookOutLeft eyeLookOutRight eyeLookUpLeft eyeLookUpRight eyeSquintLeft eyeSquintRight
-eyeWideLeft eyeWideRight jawForward jawLeft jawOpen jawRight mouthClose mouthDimpleLeft mouthDimpleRight mouthFrownLeft mouthFrownRight mouthFunnel
-mouthLeft mouthLowerDownLeft mouthLowerDownRight mouthPressLeft mouthPressRight mouthPucker mouthRight mouthRollLower mouthRollUpper mouthShrugLower
-mouthShrugUpper mouthSmileLeft mouthSmileRight mouthStretchLeft mouthStretchRight mouthUpperUpLeft mouthUpperUpRight noseSneerLeft noseSneerRight
-tongueOut""".split()
+ARKIT = """browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff cheekSquintLeft
+cheekSquintRight eyeBlinkLeft eyeBlinkRight eyeLookDownLeft eyeLookDownRight eyeLookInLeft eyeLookInRight
+eyeLookOutLeft eyeLookOutRight eyeLookUpLeft eyeLookUpRight eyeSquintLeft eyeSquintRight eyeWideLeft
+eyeWideRight jawForward jawLeft jawOpen jawRight mouthClose mouthDimpleLeft mouthDimpleRight
+mouthFrownLeft mouthFrownRight mouthFunnel mouthLeft mouthLowerDownLeft mouthLowerDownRight mouthPressLeft
+mouthPressRight mouthPucker mouthRight mouthRollLower mouthRollUpper mouthShrugLower mouthShrugUpper
+mouthSmileLeft mouthSmileRight mouthStretchLeft mouthStretchRight mouthUpperUpLeft mouthUpperUpRight
+noseSneerLeft noseSneerRight tongueOut""".split()
 EYES = ("eyesOpen", "eyeBlink", "eyeLook", "eyeSquint", "eyeWide")
 
 
@@ -33,7 +36,8 @@ def direct():
 
     base = read_base()
     builder = HeadBuilder(base)
-    wanted = ("head/head-oval", "head/head-fat-incr", "chin/chin-width-incr", "mouth/mouth-scale-horiz-incr", "nose/nose-scale-vert-incr")
+    wanted = ("head/head-oval", "head/head-fat-incr", "chin/chin-width-incr", "mouth/mouth-scale-horiz-incr",
+              "nose/nose-scale-vert-incr")
     body = base.vertices + 0.7 * sum(base.target(name) for name in wanted)
     return base, builder, body, builder.head(body)
 
@@ -59,7 +63,8 @@ def test_every_name_of_arkit_is_there_and_two_that_open_the_lids(asset):
 def test_a_carried_unit_is_makehumans_own_on_that_head(asset, direct, acting):
     base, builder, body, head = direct
     assert np.percentile(np.linalg.norm(head - asset.template, axis=1), 99) > 0.02  # far from the template
-    away = np.min(np.linalg.norm(asset.template[:, None] - asset.template[asset.copies][None], axis=2), 1) > 0.012  # the welded head has no rims to compare
+    # the welded head has no rims to compare
+    away = np.min(np.linalg.norm(asset.template[:, None] - asset.template[asset.copies][None], axis=2), 1) > 0.012
     worst = []
     for name in ARKIT:
         if name.startswith(EYES) or name == "tongueOut":
@@ -77,13 +82,17 @@ def test_on_the_template_itself_units_are_makehumans_to_the_files_precision(asse
     pupils = [body[base.groups[f"joint-{side}-eye"]].mean(0) for side in "lr"]
     away = np.min(np.linalg.norm(asset.template[:, None] - asset.template[asset.copies][None], axis=2), 1) > 0.012
     for name in ("jawOpen", "mouthSmileRight", "browInnerUp"):
-        offset = builder.subdivision @ base.target(f"faceunits/{name}")[builder.used] * (0.063 / np.linalg.norm(pupils[0] - pupils[1]))
+        offset = builder.subdivision @ base.target(f"faceunits/{name}")[builder.used] * (0.063
+                                                                                         / np.linalg.norm(pupils[0]
+                                                                                                          - pupils[1]))
         truth = np.stack([offset[:, 0], -offset[:, 2], offset[:, 1]], 1)[away]
         rows, moves = asset.units[name]
         found = np.zeros_like(asset.template)
         found[rows[rows < len(found)]] = moves[rows < len(found)]
-        size = (found[away] * truth).sum() / (truth**2).sum()  # the eyes of MakeHuman's own head are wider apart than the mean's
-        assert 1 < size < 1.1 and np.linalg.norm(found[away] / size - truth) / np.linalg.norm(truth) < 0.06, name  # and it is turned by two degrees
+        # the eyes of MakeHuman's own head are wider apart than the mean's
+        size = (found[away] * truth).sum() / (truth**2).sum()
+        # and it is turned by two degrees
+        assert 1 < size < 1.1 and np.linalg.norm(found[away] / size - truth) / np.linalg.norm(truth) < 0.06, name
 
 
 def test_left_and_right_mirror_each_other(asset):
@@ -112,7 +121,8 @@ def test_lips_and_lids_do_not_pass_through_each_other_and_hardly_a_triangle_turn
             shape += dense(rest, units["jawOpen"])  # that it closes
         assert (shape[asset.copies, 2] - shape[below, 2]).min() > -0.001, name
         over = (_normals(shape, cut) * before).sum(1) < 0
-        assert over[~near].sum() <= 20 and over.sum() < 60, name  # of 24,356; MakeHuman's own smile turns over 11 on this head
+        # of 24,356; MakeHuman's own smile turns over 11 on this head
+        assert over[~near].sum() <= 20 and over.sum() < 60, name
     shut = rest + dense(rest, units["eyesOpenLeft"]) + dense(rest, units["eyeBlinkLeft"])
     assert np.abs(shut - rest).max() < 1e-9
 

@@ -18,7 +18,8 @@ PORTRAITS = Path(__file__).resolve().parents[2] / "shared" / "data" / "portraits
 
 @pytest.fixture(scope="module")
 def picture() -> np.ndarray:
-    """A woman before a flag: sRGB [512, 512, 3], the face about 110 px high, its eyes near (208, 118) and (244, 118)."""
+    """A woman before a flag: sRGB [512, 512, 3], the face about 110 px high, its eyes near (208, 118) and (244,
+    118)."""
     return astronaut().astype(np.float32) / 255
 
 

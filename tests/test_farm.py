@@ -19,7 +19,8 @@ def test_a_farm_is_laid_out_with_twins_and_again(tmp_path):
     farm, serial = read_batch(tmp_path / "farm"), read_batch(tmp_path / "serial")
     assert [face.name for face in serial.faces] == ["kind0", "kind1", "kind2", "kind3"] and len(farm.faces) == 6
     assert farm.faces[5].source == serial.faces[1].source and farm.faces[5].settings == serial.faces[1].settings
-    assert {(face.source, face.settings["seed"]) for face in serial.faces} == {(farm_batch.film(tmp_path, kind), kind) for kind in range(4)}
+    assert {(face.source, face.settings["seed"])
+            for face in serial.faces} == {(farm_batch.film(tmp_path, kind), kind) for kind in range(4)}
     assert derive_state(farm, farm.faces[0]).state == TO_DO
     with av.open(str(serial.faces[2].source)) as film:
         assert sum(1 for _ in film.decode(video=0)) == farm_batch.FRAMES
@@ -37,16 +38,21 @@ def test_what_nodes_say_is_paired(tmp_path):
     def line(at, pid, stage, finished):
         return json.dumps({"at": at, "face": "f", "stage": stage, "finished": finished, "pid": pid}) + "\n"
 
-    (logs / "a.jsonl").write_text(line(1, 7, "frames", False) + line(2, 7, "frames", True) + line(3, 7, "scan", False) + '{"at": 4, "fa')
+    (logs / "a.jsonl").write_text(line(1, 7, "frames", False) + line(2, 7, "frames", True) + line(3, 7, "scan", False)
+                                  + '{"at": 4, "fa')
     (logs / "b.jsonl").write_text(line(5, 8, "scan", False) + line(6, 8, "scan", True))
-    assert farm_batch.read_account(tmp_path) == [Begun("a", 7, "f", "frames", 1, 2), Begun("a", 7, "f", "scan", 3, None), Begun("b", 8, "f", "scan", 5, 6)]
+    assert farm_batch.read_account(tmp_path) == [Begun("a", 7, "f", "frames", 1, 2),
+                                                 Begun("a", 7, "f", "scan", 3, None), Begun("b", 8, "f", "scan", 5, 6)]
 
 
 def test_what_was_done_twice_or_lost_for_no_reason_is_found():
     fine = [Begun("a", 7, "f", "scan", 3, None), Begun("b", 8, "f", "scan", 5, 6)]
     kill = {"at": 4, "host": "a", "pid": 7}
     assert judge_account(fine, [kill]) == {"stages": 1, "twice": 0, "interrupted": 1, "unexplained": 0}
-    assert judge_account(fine, [{**kill, "pid": None}])["unexplained"] == judge_account(fine, [{**kill, "host": None, "pid": None}])["unexplained"] == 0
+    assert judge_account(fine,
+                         [{**kill, "pid": None}])["unexplained"] == judge_account(fine,
+                                                                                  [{**kill, "host": None,
+                                                                                    "pid": None}])["unexplained"] == 0
     for other in ({**kill, "pid": 8}, {**kill, "host": "b"}, {**kill, "at": 2}):
         assert judge_account(fine, [other])["unexplained"] == 1
     assert judge_account([*fine, Begun("a", 9, "f", "scan", 7, 8)], [kill])["twice"] == 1

@@ -41,13 +41,19 @@ def test_the_tables_are_those_of_the_code():
     tasks = rows("task")
     assert [row[0] for row in tasks if row[0] != "the gate"] == [group.name for group in GROUPS]
     assert [row[0] for row in tasks if "GPU" in row[2]] == [group.name for group in GROUPS if group.on_device]
-    labels = re.findall(r"description|key: \"(\w+)\"", (ROOT / "farm" / "flamenco" / "wildcap.js").read_text(encoding="utf-8"))
+    labels = re.findall(r"description|key: \"(\w+)\"",
+                        (ROOT / "farm" / "flamenco" / "wildcap.js").read_text(encoding="utf-8"))
     named = {name.strip().lower().replace(" ", "_") for row in rows("setting") for name in row[0].split(",")}
     assert named == set(filter(None, labels))
 
 
 def test_the_loop_for_slurm_submits_and_chains_every_task(tmp_path):
-    program, films, batch, log = tiny_chain.build(tmp_path / "pro gram"), tmp_path / "films", tmp_path / "bat ch", tmp_path / "log"
+    program, films, batch, log = (
+        tiny_chain.build(tmp_path / "pro gram"),
+        tmp_path / "films",
+        tmp_path / "bat ch",
+        tmp_path / "log",
+    )
     films.mkdir()
     for name in ("Zoë d'Arc", "Bert"):
         (films / f"{name}.mp4").write_text(name, encoding="utf-8")
@@ -59,7 +65,8 @@ def test_the_loop_for_slurm_submits_and_chains_every_task(tmp_path):
     sbatch.parent.mkdir()
     sbatch.write_text(SBATCH.format(python=sys.executable), encoding="utf-8")
     sbatch.chmod(0o755)
-    loop = re.search(r"```bash\n(.*?)```", PAGE, re.DOTALL)[1].replace("python /opt/wildcap/code", f"'{sys.executable}' '{program}'")
+    loop = re.search(r"```bash\n(.*?)```", PAGE,
+                     re.DOTALL)[1].replace("python /opt/wildcap/code", f"'{sys.executable}' '{program}'")
     ended = subprocess.run(["bash", "-euo", "pipefail", "-c", loop], capture_output=True, text=True, cwd="/", env={
         **os.environ, "PATH": f"{sbatch.parent}:{os.environ['PATH']}", "BATCH": str(batch), "SBATCH_LOG": str(log)})
     assert ended.returncode == 0, ended.stderr

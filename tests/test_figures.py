@@ -10,7 +10,8 @@ from core.contract.messages import Problem
 
 
 def test_a_record_is_read_as_it_was_written(tmp_path):
-    figures.write(tmp_path / "one.json", "demo", "make demo", {"rows": {"b": {"psnr": np.float32(0.5)}, "a": {"views": np.int64(14), "none": None}}})
+    figures.write(tmp_path / "one.json", "demo", "make demo",
+                  {"rows": {"b": {"psnr": np.float32(0.5)}, "a": {"views": np.int64(14), "none": None}}})
     record = figures.read("one", tmp_path)
     assert record["benchmark"] == "demo" and record["command"] == "make demo" and "commit" in record
     assert record["figures"] == {"rows": {"b": {"psnr": 0.5}, "a": {"views": 14, "none": None}}}
@@ -42,4 +43,6 @@ def test_a_file_that_is_no_record_is_a_problem(tmp_path, text):
 
 
 def test_a_table_has_a_dash_where_nothing_was_measured():
-    assert figures.markdown(["row", "PSNR"], [["ours", "30.1 dB"], ["theirs", None]]) == "| row | PSNR |\n| --- | --- |\n| ours | 30.1 dB |\n| theirs | - |"
+    assert figures.markdown(["row", "PSNR"],
+                            [["ours", "30.1 dB"],
+                             ["theirs", None]]) == "| row | PSNR |\n| --- | --- |\n| ours | 30.1 dB |\n| theirs | - |"

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Detail finer than the texture: taken from frames that hold it, shrunk by what the views disagree on, put in the place of what was made up."""
+"""Detail finer than the texture: taken from frames that hold it, shrunk by what the views disagree on, put in the place
+of what was made up."""
 
 from types import SimpleNamespace
 
@@ -20,7 +21,8 @@ HEAD = SimpleNamespace(covered=np.ones((SIZE, SIZE), bool))
 
 
 def seen_flat(log_luminance: np.ndarray, density: float, weight: float = 1.0) -> UnwrappedView:
-    """A view that looks straight at the map: `density` pixels per texel, its picture the exponential of log_luminance [density S, density S]."""
+    """A view that looks straight at the map: `density` pixels per texel, its picture the exponential of log_luminance
+    [density S, density S]."""
     picture = np.repeat(np.exp(log_luminance - 1.5)[..., None], 3, 2).astype(np.float32)
     at = ((np.arange(SIZE) + 0.5) * density).astype(np.float32)
     pixels = np.stack(np.meshgrid(at, at), -1)
@@ -41,7 +43,8 @@ def test_the_frames_tell_how_fine_a_map_they_fill(density, factor):
 def test_frames_without_more_detail_leave_none():
     flat = np.zeros((SIZE, SIZE), np.float32)
     assert fine_detail([seen_flat(flat, 1.0)] * 3, HEAD, SIZE, QUIET) is None
-    assert fine_detail([seen_flat(np.zeros((2 * SIZE, 2 * SIZE), np.float32), 2.0)], HEAD, SIZE, QUIET) is None  # one view: nobody to agree with
+    # one view: nobody to agree with
+    assert fine_detail([seen_flat(np.zeros((2 * SIZE, 2 * SIZE), np.float32), 2.0)], HEAD, SIZE, QUIET) is None
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.1, 0.3])
@@ -55,7 +58,8 @@ def test_what_views_agree_on_is_kept_and_what_they_do_not_is_shrunk(noise):
     assert abs(agreed[inner].mean() - expected) < 0.08
     true = (skin - cv2.GaussianBlur(skin, (0, 0), 2.0))[inner]
     slope = (band[inner] * true).sum() / (true**2).sum()
-    assert abs(slope - expected) < 0.1 and np.abs(band[inner] - true).std() < 1.05 * np.sqrt(1 - expected) * true.std() + 0.005
+    assert abs(slope - expected) < 0.1 and np.abs(band[inner]
+                                                  - true).std() < 1.05 * np.sqrt(1 - expected) * true.std() + 0.005
 
 
 def test_the_band_takes_the_place_of_what_was_made_up():
@@ -74,4 +78,6 @@ def test_the_band_takes_the_place_of_what_was_made_up():
     log = np.log(images.srgb_to_linear(albedo)).mean(-1)[16:-16, size // 2 + 16:-16]
     there = np.s_[16:-16, size // 2 + 16:-16]
     got = (log - coarse[there]).ravel()
-    assert np.corrcoef(got, bands[0][there].ravel())[0, 1] > 0.97 and abs(np.corrcoef(got, bands[1][there].ravel())[0, 1]) < 0.2
+    assert np.corrcoef(got, bands[0][there].ravel())[0,
+                                                     1] > 0.97 and abs(np.corrcoef(got,
+                                                                                   bands[1][there].ravel())[0, 1]) < 0.2

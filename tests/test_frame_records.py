@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""frames.json: read and written in one place, byte for byte as it was; older and newer ones are read, damaged ones end in a sentence."""
+"""frames.json: read and written in one place, byte for byte as it was; older and newer ones are read, damaged ones end
+in a sentence."""
 
 import dataclasses
 import json
@@ -100,7 +101,8 @@ def test_what_is_read_is_written_byte_for_byte(tmp_path):
     assert (tmp_path / "again" / "frames.json").read_bytes() == WRITTEN.encode()
     changed = dataclasses.replace(frames.records[1], selected=True)
     write_frames(tmp_path / "again", dataclasses.replace(frames, records=(frames.records[0], changed)))
-    assert (tmp_path / "again" / "frames.json").read_text(encoding="utf-8") == WRITTEN.replace('"selected": false', '"selected": true')
+    assert (tmp_path / "again"
+            / "frames.json").read_text(encoding="utf-8") == WRITTEN.replace('"selected": false', '"selected": true')
 
 
 def test_records_are_values():
@@ -111,18 +113,23 @@ def test_records_are_values():
 
 
 def test_older_and_newer_files_are_read(tmp_path):
-    frames = read_frames(capture_with(tmp_path, json.dumps({"frames": [OLDEST, {**OLDEST, "name": "00002.jpg", "mood": "bright"}], "camera": "of tomorrow"})))
+    frames = read_frames(capture_with(tmp_path,
+                                      json.dumps({"frames": [OLDEST, {**OLDEST, "name": "00002.jpg", "mood": "bright"}],
+                                                  "camera": "of tomorrow"})))
     assert frames.kind is None
     assert frames.records == (FrameRecord(**OLDEST), FrameRecord(**{**OLDEST, "name": "00002.jpg"}))
     first = frames.records[0]
-    assert (first.video_frame, first.yaw_deg, first.focal_px, first.source, first.gain) == (None, None, None, "", (1.0, 1.0, 1.0))
+    assert (first.video_frame, first.yaw_deg, first.focal_px, first.source,
+            first.gain) == (None, None, None, "", (1.0, 1.0, 1.0))
     write_frames(tmp_path / "again", frames)
     assert "kind" not in json.loads((tmp_path / "again" / "frames.json").read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "3", "{}", '{"frames": 3}', '{"frames": [3]}', '{"frames": ["00000.jpg"]}',
-                                  '{"frames": [{"name": "00000.jpg"}]}',
-                                  json.dumps({"frames": [{**OLDEST, "name": 3}]}), json.dumps({"frames": [{**OLDEST, "sharpness": "much"}]}), WRITTEN[:-40]])
+@pytest.mark.parametrize("text",
+                         ["", "{", "[]", "3", "{}", '{"frames": 3}', '{"frames": [3]}', '{"frames": ["00000.jpg"]}',
+                          '{"frames": [{"name": "00000.jpg"}]}',
+                          json.dumps({"frames": [{**OLDEST, "name": 3}]}),
+                          json.dumps({"frames": [{**OLDEST, "sharpness": "much"}]}), WRITTEN[:-40]])
 def test_a_damaged_file_is_a_problem(tmp_path, text):
     with pytest.raises(Problem, match="frames of this capture cannot be read") as problem:
         read_frames(capture_with(tmp_path, text))

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames: the right ones, upright, in true colour, the sharp ones chosen; and every kind of bad source told in a sentence."""
+"""Frames: the right ones, upright, in true colour, the sharp ones chosen; and every kind of bad source told in a
+sentence."""
 
 import json
 import struct
@@ -31,7 +32,8 @@ def capture(tmp_path) -> Capture:
 
 
 def moving_face(index: int) -> np.ndarray:
-    """uint8 [SIZE, SIZE, 3]: a face that wanders, with the frame's number in eight black or white blocks along the lower edge."""
+    """uint8 [SIZE, SIZE, 3]: a face that wanders, with the frame's number in eight black or white blocks along the
+    lower edge."""
     left, top = 100 + 2 * (index % 20), 10 + index % 20
     picture = np.ascontiguousarray(astronaut()[top:top + SIZE, left:left + SIZE])
     for bit in range(8):
@@ -71,7 +73,8 @@ def refused(capture: Capture, source, **settings) -> Problem:
     return caught.value
 
 
-@pytest.mark.parametrize(("name", "codec"), [("vidéo.mp4", "libx264"), ("IMG 0001.MOV", "libx265"), ("clip.mkv", "libx264")])
+@pytest.mark.parametrize(("name", "codec"),
+                         [("vidéo.mp4", "libx264"), ("IMG 0001.MOV", "libx265"), ("clip.mkv", "libx264")])
 def test_frames_are_those_the_record_says(capture, tmp_path, name, codec):
     source = write_video(tmp_path / "une entrée" / name, [moving_face(i) for i in range(50)], codec)
     record, report = take(capture, source, max_frames=12, views=5)
@@ -122,7 +125,8 @@ def test_rec709_video_keeps_its_colour(capture, tmp_path):
         stream.codec_context.colorspace = 1
         for picture in shown:
             frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
-            container.mux(stream.encode(frame.reformat(format="yuv420p", src_colorspace="DEFAULT", dst_colorspace="ITU709")))
+            container.mux(stream.encode(frame.reformat(format="yuv420p", src_colorspace="DEFAULT",
+                                                       dst_colorspace="ITU709")))
         container.mux(stream.encode())
     record, _ = take(capture, path)
     picture = images.read_srgb(capture.frames / record["frames"][0]["name"])
@@ -141,7 +145,8 @@ def test_photographs_upright_with_focal_length(capture, tmp_path):
     folder.mkdir()
     for i, suffix in enumerate(("jpg", "png", "tif")):
         images.write_srgb(folder / f"b{i}.{suffix}", moving_face(5 * i).astype(np.float32) / 255)
-    turned = np.ascontiguousarray(np.rot90(moving_face(0)[:, :200], 1)).astype(np.float32) / 255  # shown after a turn clockwise: orientation 6
+    # shown after a turn clockwise: orientation 6
+    turned = np.ascontiguousarray(np.rot90(moving_face(0)[:, :200], 1)).astype(np.float32) / 255
     spec = oiio.ImageSpec(turned.shape[1], turned.shape[0], 3, "uint8")
     spec.attribute("Orientation", 6)
     spec.attribute("Exif:FocalLengthIn35mmFilm", 27)
@@ -165,7 +170,8 @@ def test_display_p3_photographs_are_brought_to_srgb(capture, tmp_path):
     """As iPhones write them: the profile is in the JPEG's second application segment."""
     text = b"Display P3\0"
     tag = b"desc" + bytes(4) + struct.pack(">I", len(text)) + text + bytes(78 + -(90 + len(text)) % 4)
-    head = struct.pack(">I4xI4s4s4s12x4s28x3I48x", 144 + len(tag), 0x02100000, b"mntr", b"RGB ", b"XYZ ", b"acsp", 0xF6D6, 0x10000, 0xD32D)
+    head = struct.pack(">I4xI4s4s4s12x4s28x3I48x", 144 + len(tag), 0x02100000, b"mntr", b"RGB ", b"XYZ ", b"acsp",
+                       0xF6D6, 0x10000, 0xD32D)
     profile = b"ICC_PROFILE\0\1\1" + head + struct.pack(">I4s2I", 1, b"desc", 144, len(tag)) + tag
     (tmp_path / "photos").mkdir()
     for i in range(3):
@@ -254,7 +260,9 @@ def test_bad_sources_end_in_a_sentence(capture, tmp_path):
 def test_no_face_and_no_motion_are_told(capture, tmp_path):
     rng = np.random.default_rng(0)
     scene = cv2.resize(rng.integers(0, 255, (40, 60, 3), np.uint8), (360, 240), interpolation=cv2.INTER_CUBIC)
-    assert "No face" in refused(capture, write_video(tmp_path / "wall.mp4", [np.ascontiguousarray(scene[:, i:i + 240]) for i in range(6)])).problem
+    assert "No face" in refused(capture,
+                                write_video(tmp_path / "wall.mp4",
+                                            [np.ascontiguousarray(scene[:, i:i + 240]) for i in range(6)])).problem
     assert "did not move" in refused(capture, write_video(tmp_path / "still.mp4", [moving_face(0)] * 8)).problem
 
 

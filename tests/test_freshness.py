@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What makes a stage out of date and what does not: inputs, settings, the source, older code, another place on another disk; captures of 0.1.0."""
+"""What makes a stage out of date and what does not: inputs, settings, the source, older code, another place on another
+disk; captures of 0.1.0."""
 
 import json
 import os
@@ -161,7 +162,8 @@ def test_a_long_video_is_known_by_its_size_and_blocks_from_its_first_byte_to_its
     assert not same_source(before, stamp(length=4999))
     assert same_source(before, stamp(40)), "between two blocks: the price of not reading a long film"
     whole = stamp(length=1000)
-    assert all(not same_source(whole, stamp(place, 1000)) for place in (0, 15, 40, 999)), "up to WHOLE_BYTES every byte counts"
+    assert all(not same_source(whole, stamp(place, 1000))
+               for place in (0, 15, 40, 999)), "up to WHOLE_BYTES every byte counts"
 
 
 # -- paths
@@ -175,13 +177,15 @@ def test_paths_in_a_capture_are_relative_where_both_may_be_moved_together(tmp_pa
         assert read_portable(text, root) == inside
         assert read_portable(text, Path("/elsewhere/project/anna.wildcap")) != inside
     assert write_portable("/film.mp4", root) == str(Path("/film.mp4").absolute())
-    assert write_portable(Path.home() / "Videos" / "film.mp4", Path.home() / "Documents" / "anna.wildcap") == str(Path.home() / "Videos" / "film.mp4")
+    assert write_portable(Path.home() / "Videos" / "film.mp4",
+                          Path.home() / "Documents" / "anna.wildcap") == str(Path.home() / "Videos" / "film.mp4")
     assert read_portable("/film.mp4", root) == Path("/film.mp4").absolute()
 
 
 def test_a_job_names_no_folder_that_a_copy_would_not_have(capture, tmp_path):
     (tmp_path / "model.json").write_text("{}", encoding="utf-8")
-    path = write_job(capture, source=tmp_path / "project" / "film.mp4", settings={"cameras": {"import_from": str(tmp_path / "model.json")}})
+    path = write_job(capture, source=tmp_path / "project" / "film.mp4",
+                     settings={"cameras": {"import_from": str(tmp_path / "model.json")}})
     assert str(tmp_path) not in path.read_text(encoding="utf-8")
     job = read_job(path)
     assert job.capture.root == capture.root and job.source == str(tmp_path / "project" / "film.mp4")
@@ -193,7 +197,8 @@ def test_a_job_names_no_folder_that_a_copy_would_not_have(capture, tmp_path):
 
 @pytest.fixture
 def first_format(tmp_path) -> Capture:
-    """A capture whose record WildCap 0.1.0 wrote (capture_0_1_0.json), for files that hold their own names; seed 3, pupils 61 mm apart."""
+    """A capture whose record WildCap 0.1.0 wrote (capture_0_1_0.json), for files that hold their own names; seed 3,
+    pupils 61 mm apart."""
     capture = Capture(tmp_path / "face.wildcap")
     capture.root.mkdir()
     film = tmp_path / "film.mp4"
@@ -247,12 +252,14 @@ def test_a_run_keeps_what_older_code_made_says_so_and_forced_makes_it_again(capt
     from core.worker import runner
 
     ran, said = [], []
-    monkeypatch.setattr(runner, "_room", lambda step: type("Room", (), {"run": staticmethod(lambda *_: ran.append(step.name))}))
+    monkeypatch.setattr(runner, "_room",
+                        lambda step: type("Room", (), {"run": staticmethod(lambda *_: ran.append(step.name))}))
     monkeypatch.setattr(freshness, "code_key", lambda module: "another version's")
     monkeypatch.setattr(runner.report, "write", lambda *_: None)
     runner.run_job(write_job(capture, last="cameras"), said.append)
     assert ran == [] and states(capture) == ["older", "older"]
-    assert [line.text for line in said if isinstance(line, Log)][-1].startswith("Made by older code and kept: Frames, Cameras. Run a stage again")
+    assert [line.text for line in said
+            if isinstance(line, Log)][-1].startswith("Made by older code and kept: Frames, Cameras. Run a stage again")
     runner.run_job(write_job(capture, first="cameras", last="cameras"), said.append)
     assert ran == ["cameras"] and states(capture) == ["older", "done"]
 

@@ -47,7 +47,8 @@ def test_both_eyes_look_at_the_empty_wherever_it_is(head, addon):  # noqa: F811
             assert degrees(way, np.array(empty.location) - centre) < 3.5, (yaw, pitch)
     head.location, head.rotation_euler = (1, 2, 3), (0, 0, 1)
     bpy.context.view_layer.update()
-    assert degrees(looks(head, asset)[0][1], np.array(empty.location) - looks(head, asset)[0][0]) < 3.5, "it goes along with the head"
+    assert degrees(looks(head, asset)[0][1],
+                   np.array(empty.location) - looks(head, asset)[0][0]) < 3.5, "it goes along with the head"
 
 
 def test_no_driver_needs_a_script(head, addon):  # noqa: F811
@@ -96,7 +97,10 @@ def test_a_driver_of_the_artists_is_not_taken_away(head, addon):  # noqa: F811
     key.driver_add("value").driver.expression = "0.3"
     with pytest.raises(RuntimeError, match="eyeLookInRight has a driver of yours already"):
         bpy.ops.wildcap.gaze()
-    assert addon("acting.gaze").of(head) is None and head.data.shape_keys.animation_data.drivers.find('key_blocks["eyeLookInRight"].value') is not None
+    assert (
+        addon("acting.gaze").of(head) is None
+        and head.data.shape_keys.animation_data.drivers.find('key_blocks["eyeLookInRight"].value') is not None
+    )
 
 
 def test_an_empty_that_was_deleted_comes_back_by_a_click(head, addon):  # noqa: F811

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Glasses: a capture with them is refused where nearly all frames agree, the artist can overrule that, doubt is a warning; drawn pairs lie where pairs lie."""
+"""Glasses: a capture with them is refused where nearly all frames agree, the artist can overrule that, doubt is a
+warning; drawn pairs lie where pairs lie."""
 
 from pathlib import Path
 
@@ -32,11 +33,14 @@ def with_rims(srgb: np.ndarray, thick: int = 4) -> np.ndarray:
     middles = [marks[list(corners)].mean(0) for corners in (faces.RIGHT_EYE, faces.LEFT_EYE)]
     reach = 0.36 * np.linalg.norm(middles[1] - middles[0])
     for middle in middles:
-        cv2.circle(over, np.round(middle + [0, 0.15 * reach]).astype(int).tolist(), round(reach), (0.03, 0.03, 0.03), thick, cv2.LINE_AA)
+        cv2.circle(over, np.round(middle + [0, 0.15 * reach]).astype(int).tolist(), round(reach), (0.03, 0.03, 0.03),
+                   thick, cv2.LINE_AA)
     across = (middles[1] - middles[0]) / np.linalg.norm(middles[1] - middles[0])
-    ends = [(middles[0] + reach * across, middles[1] - reach * across), (middles[0] - reach * across, marks[234]), (middles[1] + reach * across, marks[454])]
+    ends = [(middles[0] + reach * across, middles[1] - reach * across), (middles[0] - reach * across, marks[234]),
+            (middles[1] + reach * across, marks[454])]
     for a, b in ends:
-        cv2.line(over, np.round(a).astype(int).tolist(), np.round(b).astype(int).tolist(), (0.03, 0.03, 0.03), thick, cv2.LINE_AA)
+        cv2.line(over, np.round(a).astype(int).tolist(), np.round(b).astype(int).tolist(), (0.03, 0.03, 0.03), thick,
+                 cv2.LINE_AA)
     return over
 
 
@@ -66,7 +70,8 @@ def test_a_capture_with_glasses_is_refused_and_the_artist_can_overrule_it(tmp_pa
     overruled = tmp_path / "overruled"
     overruled.mkdir()
     report = take(overruled, pictures, no_glasses=True)
-    assert report.figures["frames_with_glasses_percent"] == 100 and not any("glasses" in finding["problem"] for finding in report.findings)
+    assert report.figures["frames_with_glasses_percent"] == 100 and not any("glasses" in finding["problem"]
+                                                                            for finding in report.findings)
 
 
 def test_doubt_is_a_warning_and_few_photographs_refuse_nothing():
@@ -88,20 +93,23 @@ def test_a_drawn_pair_stands_before_the_eyes_and_rests_on_the_ears(kind):
         eyes = [landmarks[list(corners)].mean(0) for corners in glasses.EYES]
         for rim, eye in zip(pair.rims, eyes, strict=True):
             low, high = rim.min(0), rim.max(0)
-            assert (low[[0, 2]] < eye[[0, 2]]).all() and (eye[[0, 2]] < high[[0, 2]]).all(), "the pupil lies within its rim"
+            assert (low[[0, 2]] < eye[[0, 2]]).all() and (eye[[0, 2]]
+                                                          < high[[0, 2]]).all(), "the pupil lies within its rim"
             assert 0.008 < eye[1] - rim[:, 1].mean() < 0.03, "and behind it"
         for temple, ear in zip(pair.bars[-2:], glasses.SIDES, strict=True):
             assert np.linalg.norm(temple[-1] - landmarks[ear]) < 0.05
 
 
 def test_what_lies_behind_the_head_is_not_drawn():
-    """From behind a wall only the nearer things show: a depth of nothing before the glasses leaves them whole, one of a wall before them takes them away."""
+    """From behind a wall only the nearer things show: a depth of nothing before the glasses leaves them whole, one of a
+    wall before them takes them away."""
     landmarks = template.landmark_points(template.load())
     pair = glasses.sample_glasses(landmarks, np.random.default_rng(0), "thick")
     camera = pycolmap.Camera(model="PINHOLE", width=200, height=200, params=[300, 300, 100, 100])
     view = View("", Path(), camera, np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.array([0, 0, 0.4]), True)
     bare = np.full((200, 200, 3), 0.5, np.float32)
-    shown = [glasses.put_on(bare, view, np.full((200, 200), depth), pair, 1.0, np.random.default_rng(1)) for depth in (9.0, 0.1)]
+    shown = [glasses.put_on(bare, view, np.full((200, 200), depth), pair, 1.0, np.random.default_rng(1))
+             for depth in (9.0, 0.1)]
     pixels, _ = view.project(np.concatenate(pair.rims))
     rows, columns = pixels.astype(int).T[::-1]
     assert shown[0][rows, columns].mean() < 0.35, "black rims where the rims project"

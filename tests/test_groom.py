@@ -27,7 +27,8 @@ def upper_lids(vertices: np.ndarray, asset) -> np.ndarray:
 def write_strands(folder, vertices: np.ndarray, asset, count: int = 40) -> dict[str, np.ndarray]:
     """Straight hairs of 6 mm off the skin above the eyes, and lashes before them; their points by part."""
     rng = np.random.default_rng(1)
-    above = vertices[(np.abs(vertices[:, 0]) < 0.05) & (vertices[:, 2] > 0.012) & (vertices[:, 2] < 0.022) & (vertices[:, 1] < -0.02)]
+    above = vertices[(np.abs(vertices[:, 0]) < 0.05) & (vertices[:, 2] > 0.012) & (vertices[:, 2] < 0.022)
+                     & (vertices[:, 1] < -0.02)]
     points, arrays = {}, {}
     for part, places in (("brows", above), ("lashes", upper_lids(vertices, asset))):
         roots = places[rng.choice(len(places), count)]
@@ -68,7 +69,8 @@ def test_hair_lies_where_the_worker_grew_it_and_in_its_thickness(strands, addon)
         assert hair.parent == head() and hair.data.surface == head()
         assert np.abs(places(hair) - strands[part].reshape(-1, 3)).max() < 1e-5, "at rest nothing bends it"
         assert hair.data.attributes["radius"].data[0].value == pytest.approx(4e-5)
-    assert tuple(hairs["brows"].data.attributes["wildcap_colour"].data[0].color)[:3] == pytest.approx((0.03, 0.03, 0.03))
+    assert tuple(hairs["brows"].data.attributes["wildcap_colour"].data[0].color)[:3] == pytest.approx((0.03, 0.03,
+                                                                                                       0.03))
 
 
 def test_hair_goes_along_when_the_face_moves(strands, addon):
@@ -99,7 +101,8 @@ def test_what_was_combed_stays_and_the_rest_grows_anew(strands, addon):
     assert np.abs(places(brows) - combed).max() < 1e-5
     assert len(lashes.data.curves) == 20
     shorter = places(lashes).reshape(20, 5, 3)
-    assert np.linalg.norm(shorter[:, -1] - shorter[:, 0], axis=1) == pytest.approx(0.5 * 0.006 * np.hypot(1, 0.2), rel=1e-3)
+    assert np.linalg.norm(shorter[:, -1] - shorter[:, 0],
+                          axis=1) == pytest.approx(0.5 * 0.006 * np.hypot(1, 0.2), rel=1e-3)
 
 
 def test_what_was_thickened_stays_and_data_in_another_use_is_kept(strands, addon):
@@ -143,7 +146,10 @@ def test_hairs_that_a_brush_added_stay_where_they_are_and_are_rooted_there(captu
     assert np.abs(places_now[-5:] - added).max() < 1e-6
     assert np.abs(places_now[:5, 0] - 0.9 * strands["brows"][0, :, 0]).max() < 1e-3
     root = np.array(brows.data.attributes["wildcap_root"].data[40].vector)
-    assert np.linalg.norm(root - added[0]) < 0.01 and np.array(brows.data.attributes["surface_uv_coordinate"].data[40].vector).any()
+    assert (
+        np.linalg.norm(root - added[0]) < 0.01
+        and np.array(brows.data.attributes["surface_uv_coordinate"].data[40].vector).any()
+    )
 
 
 def test_the_skin_below_is_shown(capture, strands, addon):
@@ -183,9 +189,11 @@ def test_hair_goes_out_and_comes_back_by_blenders_own_exporters(strands, addon, 
     bpy.ops.wildcap.grow_hair()
     brows, lashes = addon("groom.curves").of(head())
     path = str(tmp_path / f"hair{suffix}")
-    bpy.ops.wm.usd_export(filepath=path) if suffix == ".usdc" else bpy.ops.wm.alembic_export(filepath=path, as_background_job=False)
+    bpy.ops.wm.usd_export(filepath=path) if suffix == ".usdc" else bpy.ops.wm.alembic_export(filepath=path,
+                                                                                             as_background_job=False)
     bpy.ops.wm.read_homefile(use_empty=True)
-    bpy.ops.wm.usd_import(filepath=path) if suffix == ".usdc" else bpy.ops.wm.alembic_import(filepath=path, as_background_job=False)
+    bpy.ops.wm.usd_import(filepath=path) if suffix == ".usdc" else bpy.ops.wm.alembic_import(filepath=path,
+                                                                                             as_background_job=False)
     back = [obj for obj in bpy.data.objects if obj.type in ('CURVES', 'CURVE')]
     counts = sorted(len(obj.data.curves if obj.type == 'CURVES' else obj.data.splines) for obj in back)
     assert counts == [40, 40]
@@ -193,9 +201,11 @@ def test_hair_goes_out_and_comes_back_by_blenders_own_exporters(strands, addon, 
 
 @pytest.mark.parametrize("harm, told", [
     (lambda path: path.unlink(), "no hair to grow yet"), (lambda path: path.write_bytes(b"PK no zip"), "is damaged"),
-    (lambda path: np.savez(path, brows_points=np.zeros((2, 3)), brows_radius=np.zeros(2), brows_colour=np.zeros((2, 3))), "is damaged"),
+    (lambda path: np.savez(path, brows_points=np.zeros((2, 3)), brows_radius=np.zeros(2),
+                           brows_colour=np.zeros((2, 3))), "is damaged"),
     (lambda path: path.write_bytes(path.read_bytes()[:900] + b"\0" * 40 + path.read_bytes()[940:]), "is damaged"),
-    (lambda path: np.savez(path, brows_points=np.zeros((2, 5, 3)), brows_radius=np.full((2, 5), np.nan), brows_colour=np.zeros((2, 3))), "is damaged"),
+    (lambda path: np.savez(path, brows_points=np.zeros((2, 5, 3)), brows_radius=np.full((2, 5), np.nan),
+                           brows_colour=np.zeros((2, 3))), "is damaged"),
     (lambda path: np.savez_compressed(path, brows_points=np.zeros(40 << 20)), "more than 256 MB"),
     (lambda path: np.savez(path, nothing=np.zeros(1)), "No brows and no beard")])
 def test_hair_that_is_not_there_or_damaged_is_said(capture, strands, addon, harm, told):

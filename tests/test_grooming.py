@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hairs grown from masks: along strokes that were painted, covering as much as the mask says, in the colour that was mixed in, on the skin and not in it."""
+"""Hairs grown from masks: along strokes that were painted, covering as much as the mask says, in the colour that was
+mixed in, on the skin and not in it."""
 
 from functools import cache
 
@@ -35,7 +36,8 @@ def usual() -> np.ndarray:
 
 
 def striped(degrees: float) -> tuple[np.ndarray, np.ndarray]:
-    """Albedo [S, S, 3] with straight strokes 1 mm apart that rise by so much on the map, and the direction [2] across them."""
+    """Albedo [S, S, 3] with straight strokes 1 mm apart that rise by so much on the map, and the direction [2] across
+    them."""
     texels, turn = brows(), np.radians(degrees)
     across = np.array([-np.sin(turn), np.cos(turn)])
     v, u = np.nonzero(texels.where)
@@ -73,7 +75,8 @@ def groomed(cover: float, seed: int = 0) -> tuple[dict, np.ndarray]:
     skin = np.broadcast_to(SKIN, (SIZE, SIZE, 3)).astype(np.float32)
     albedo = (1 - mask[..., None]) * skin + mask[..., None] * HAIR
     none = np.zeros((SIZE, SIZE), np.float32)
-    maps = HeadMaps(albedo.astype(np.float32), none[..., None] + [0, 0, 1], none, none + 1, none[..., None] + np.ones(3))
+    maps = HeadMaps(albedo.astype(np.float32), none[..., None] + [0, 0, 1], none, none + 1,
+                    none[..., None] + np.ones(3))
     return grooming.groom(maps, Hair(mask, none, none, none), skin, surface(), seed), mask
 
 
@@ -133,7 +136,10 @@ def test_the_same_seed_gives_the_same_file_without_pickles(tmp_path):
     assert a == b != c
     with np.load(tmp_path / "a.npz", allow_pickle=False) as stored:
         assert {name.partition("_")[0] for name in stored.files} == {"brows", "lashes"}
-        assert stored["brows_points"].shape[1:] == (grooming.STEPS, 3) and stored["brows_radius"].shape == stored["brows_points"].shape[:2]
+        assert (
+            stored["brows_points"].shape[1:] == (grooming.STEPS, 3)
+            and stored["brows_radius"].shape == stored["brows_points"].shape[:2]
+        )
 
 
 def test_a_face_without_hair_grows_none():

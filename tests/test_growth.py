@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair where the face parser says there is some: beards dark, white and of stubble, and brows behind a fringe, against the shares that were painted."""
+"""Hair where the face parser says there is some: beards dark, white and of stubble, and brows behind a fringe, against
+the shares that were painted."""
 
 from functools import cache
 
@@ -40,7 +41,8 @@ def found(skin: np.ndarray, layers: list[tuple[np.ndarray, np.ndarray]], parts: 
     for share, colour in layers:
         albedo = albedo * (1 - share[..., None]) + share[..., None] * colour
     one = np.ones((SIZE, SIZE), np.float32)
-    maps = HeadMaps(albedo.astype(np.float32), one[..., None] * [0, 0, 1], 0.35 * one, 0.7 * one, np.repeat(one[..., None], 3, 2))
+    maps = HeadMaps(albedo.astype(np.float32), one[..., None] * [0, 0, 1], 0.35 * one, 0.7 * one,
+                    np.repeat(one[..., None], 3, 2))
     return hair.find(maps, surface(), parts)
 
 
@@ -51,7 +53,8 @@ def answer(brows: float = 0.0, beard: float = 0.0) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("skin", "colour", "sure", "mean", "spread"), [
-    (LIGHT, BLACK, 0.8, 0.4, 0.25), (DARK, WHITE, 0.8, 0.4, 0.25), (LIGHT, WHITE, 0.8, 0.4, 0.25), (LIGHT, BLACK, 0.3, 0.12, 0.05)],
+    (LIGHT, BLACK, 0.8, 0.4, 0.25), (DARK, WHITE, 0.8, 0.4, 0.25), (LIGHT, WHITE, 0.8, 0.4, 0.25),
+    (LIGHT, BLACK, 0.3, 0.12, 0.05)],
     ids=["dark beard", "white beard on dark skin", "white beard on light skin", "stubble"])
 def test_a_beard_covers_as_much_as_was_painted(skin, colour, sure, mean, spread):
     """Within 0.06 in the mean, with black brows above it; nothing is found beside it."""
@@ -90,7 +93,8 @@ def test_brows_behind_a_fringe_are_like_the_other_one_or_as_usual(both):
     parts[forehead] = [0, 0, 0.95]
     seen = found(LIGHT, [(brows, BLACK), (fringe, BLACK)], parts)
     hidden = where & forehead
-    assert seen.brows[hidden].mean() == pytest.approx(hair.USUAL["brows"] if both else brows[where & ~forehead].mean(), abs=0.1)
+    assert seen.brows[hidden].mean() == pytest.approx(hair.USUAL["brows"] if both else brows[where & ~forehead].mean(),
+                                                      abs=0.1)
     assert seen.brows[forehead & ~where].mean() < 0.02 and seen.hidden[hidden].min() > 0.99
 
 

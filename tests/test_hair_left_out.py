@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that a parser sees is no skin: it leaves the texture, in all views what most of them show and in one what that one shows, and it leaves the scan."""
+"""Hair that a parser sees is no skin: it leaves the texture, in all views what most of them show and in one what that
+one shows, and it leaves the scan."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -39,18 +40,22 @@ def head():
 
 
 def sees(monkeypatch, module, views, head, mask, otherwise=None):
-    """The parser sees a UV mask of the head as hair in every view; in some, by number, it sees another picture [H, W]."""
+    """The parser sees a UV mask of the head as hair in every view; in some, by number, it sees another picture [H,
+    W]."""
     shown = {}
     for i, view in enumerate(views):
         face, bary, _ = raster.render_view(head.caster, view)
         uv = raster.interpolate(head.mesh.uvs, head.mesh.face_uvs, face, bary)
-        share = raster.sample(mask, np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(mask)).reshape(face.shape) * (face >= 0)
+        share = raster.sample(mask,
+                              np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2)
+                              * len(mask)).reshape(face.shape) * (face >= 0)
         shown[i] = share.astype(np.float32) if otherwise is None or i not in otherwise else otherwise[i](share)
 
     def parse(srgb, landmarks):
         assert landmarks.shape == (468, 2)
         share = shown[round(float(srgb.mean()) * 10) - 1]
-        return SimpleNamespace(of=lambda *names: share if "hair" in names else 0 * share, known=lambda: np.ones_like(share))
+        return SimpleNamespace(of=lambda *names: share if "hair" in names else 0 * share,
+                               known=lambda: np.ones_like(share))
 
     monkeypatch.setattr(module.parser, "parse", parse)
 
@@ -58,7 +63,8 @@ def sees(monkeypatch, module, views, head, mask, otherwise=None):
 @pytest.fixture
 def observations(views, head):
     surface = head.unfold(SIZE)
-    return [observe(view, np.full((view.height, view.width, 3), 0.5, np.float32), surface, 1.0) for view in views], surface
+    return [observe(view, np.full((view.height, view.width, 3), 0.5, np.float32), surface, 1.0)
+            for view in views], surface
 
 
 def left_out(seen, surface) -> np.ndarray:
@@ -80,7 +86,11 @@ def test_what_most_views_show_as_hair_is_left_out_of_all(monkeypatch, views, hea
         assert np.allclose(o.weight[skin], was[skin]) and skin.any()
     assert found[inner & (np.max(before, axis=0) > 0)].mean() > 0.8
     hair = shown.shares[..., parts_shown.ASKED.index("hair")]
-    assert np.median(hair[inner & shown.told]) > 0.7 and hair[~shown.told].max() == 0 and np.array_equal(shown.told, np.max(before, axis=0) > 0)
+    assert (
+        np.median(hair[inner & shown.told]) > 0.7
+        and hair[~shown.told].max() == 0
+        and np.array_equal(shown.told, np.max(before, axis=0) > 0)
+    )
     assert shown.shares[..., parts_shown.ASKED.index("brows")].max() == 0
 
 
@@ -105,7 +115,8 @@ def test_a_strand_that_one_view_shows_counts_in_that_one(monkeypatch, views, hea
     sees(monkeypatch, parts_shown, views, head, scalp, {1: with_strand})
     left_out(seen, surface)
     face = (template.mask("face", SIZE) > 0.5) & (foreign_edge(scalp) + scalp < 0.5)
-    lost = [(face & (was > 0) & (o.weight < 0.5 * was)).sum() / (face & (was > 0)).sum() for o, was in zip(seen, before, strict=True)]
+    lost = [(face & (was > 0) & (o.weight < 0.5 * was)).sum() / (face & (was > 0)).sum()
+            for o, was in zip(seen, before, strict=True)]
     assert lost[1] > 0.05 and max(lost[:1] + lost[2:]) < 0.02
 
 

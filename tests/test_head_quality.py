@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clean heads: cuts and folds are counted by Blender's own triangle test, mended, and open eyes do not pull the lids in."""
+"""Clean heads: cuts and folds are counted by Blender's own triangle test, mended, and open eyes do not pull the lids
+in."""
 
 import numpy as np
 import pytest
@@ -27,7 +28,8 @@ def blenders(vertices, faces) -> set:
 
 
 def test_two_triangles_through_each_other_are_found():
-    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, -1], [0.3, 0.2, 1], [0.2, 0.3, 1], [2, 0, 0], [2, 1, 0.0]])
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, -1], [0.3, 0.2, 1], [0.2, 0.3, 1], [2, 0, 0],
+                         [2, 1, 0.0]])
     faces = np.array([[0, 1, 2], [3, 4, 5], [1, 6, 7]])
     assert intersections.intersecting(vertices, faces).tolist() == [[0, 1]]
     assert len(intersections.intersecting(vertices + [0, 0, 5 * 1], faces[[0, 2]])) == 0
@@ -96,10 +98,13 @@ def _eyes_opened(truth, points, lids):
     changed, marks = truth.copy(), points.copy()
     for inner, outer in ((133, 33), (362, 263)):
         middle = (points[inner] + points[outer]) / 2
-        across = (truth - middle) @ ((points[outer] - points[inner]) / np.linalg.norm(points[outer] - points[inner])) / 0.013
-        inside = (across**2 + ((truth - middle)[:, 2] / 0.007) ** 2 < 1) & (lids > 0.3) & (np.linalg.norm(truth - middle, axis=1) < 0.02)
+        across = (truth - middle) @ ((points[outer] - points[inner])
+                                     / np.linalg.norm(points[outer] - points[inner])) / 0.013
+        inside = (across**2 + ((truth - middle)[:, 2] / 0.007) ** 2
+                  < 1) & (lids > 0.3) & (np.linalg.norm(truth - middle, axis=1) < 0.02)
         changed[inside, 1] += 0.004
     rims = np.array(eyes.LID_MARKS)
-    middles = np.where((marks[rims, 0] < points[[33, 263], 0].mean())[:, None], points[[33, 133]].mean(0), points[[263, 362]].mean(0))
+    middles = np.where((marks[rims, 0] < points[[33, 263], 0].mean())[:, None], points[[33, 133]].mean(0),
+                       points[[263, 362]].mean(0))
     marks[rims, 2] += np.where(marks[rims, 2] > middles[:, 2], 0.005, -0.003)
     return changed, marks

@@ -23,7 +23,8 @@ BPY = {"core/synthetic/render.py", "core/synthetic/people/render.py"}
 
 @dataclass(frozen=True)
 class Import:
-    """One imported module: `target` is its full name in the repository for a relative import, `level` the dots it was written with."""
+    """One imported module: `target` is its full name in the repository for a relative import, `level` the dots it was
+    written with."""
 
     file: str
     line: int
@@ -40,13 +41,15 @@ def imports(*paths: str) -> list[Import]:
     found = []
     for path in [file for name in paths for file in (sorted((ROOT / name).rglob("*.py")) or [ROOT / name])]:
         tree = ast.parse(path.read_text(encoding="utf-8"))
-        late = {id(node) for function in ast.walk(tree) if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef) for node in ast.walk(function)}
+        late = {id(node) for function in ast.walk(tree) if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef)
+                for node in ast.walk(function)}
         file = path.relative_to(ROOT).as_posix()
         for node in ast.walk(tree):
             if isinstance(node, ast.Import):
                 found += [Import(file, node.lineno, 0, alias.name, id(node) in late) for alias in node.names]
             elif isinstance(node, ast.ImportFrom):
-                found += [Import(file, node.lineno, node.level, target, id(node) in late) for target in _targets(file, node)]
+                found += [Import(file, node.lineno, node.level, target, id(node) in late)
+                          for target in _targets(file, node)]
     return found
 
 
@@ -57,8 +60,10 @@ def _targets(file: str, node: ast.ImportFrom) -> list[str]:
         return list(dict.fromkeys(name if _is_module(name.split(".")) else node.module for name in names))
     package = file.split("/")[:-1]
     assert node.level <= len(package) + 1, f"{file}:{node.lineno} climbs out of the repository"
-    base = package[:len(package) - node.level + 1] + (node.module.split(".") if node.module else [])  # [] is the extension itself
-    return list(dict.fromkeys(".".join([*base, alias.name] if _is_module([*base, alias.name]) else base) for alias in node.names))
+    # [] is the extension itself
+    base = package[:len(package) - node.level + 1] + (node.module.split(".") if node.module else [])
+    return list(dict.fromkeys(".".join([*base, alias.name] if _is_module([*base, alias.name]) else base)
+                              for alias in node.names))
 
 
 def _is_module(parts: list[str]) -> bool:
@@ -88,7 +93,8 @@ def _none(offending):
 
 
 def test_core_imports_itself_relatively_and_never_climbs_above_itself():
-    _none(i for i in CORE if (i.level and i.target.split(".")[0] != "core") or (not i.level and i.target.split(".")[0] in ("core", "wildcap_addon")))
+    _none(i for i in CORE if (i.level and i.target.split(".")[0] != "core")
+          or (not i.level and i.target.split(".")[0] in ("core", "wildcap_addon")))
 
 
 def test_core_knows_nothing_of_blender():
@@ -96,7 +102,8 @@ def test_core_knows_nothing_of_blender():
 
 
 def test_the_ground_floor_stands_on_the_standard_library():
-    """Inside a function of the worker or the command line a heavy module may be imported, once there is something for it to do."""
+    """Inside a function of the worker or the command line a heavy module may be imported, once there is something for
+    it to do."""
     ground = [i for i in CORE if own_room(i.file) in (*GROUND, "") and not (i.late and own_room(i.file) != "contract")]
     assert len(ground) > 50
     _none(i for i in ground if not i.level and i.target.split(".")[0] not in sys.stdlib_module_names)
@@ -129,7 +136,8 @@ def test_no_module_imports_itself_in_a_circle():
     found = imports("__init__.py", "core", "wildcap_addon", "benchmarks")
     edges: dict[str, set[str]] = {}
     for i in found:
-        edges.setdefault(i.file.removesuffix(".py").replace("/", ".").removesuffix("__init__").removesuffix("."), set()).add(i.target)
+        edges.setdefault(i.file.removesuffix(".py").replace("/", ".").removesuffix("__init__").removesuffix("."),
+                         set()).add(i.target)
     assert len(edges) > 300 and "" in edges, "the extension's root is one of them"
     while leaves := {name for name, targets in edges.items() if not targets & edges.keys()}:
         edges = {name: targets for name, targets in edges.items() if name not in leaves}
@@ -138,7 +146,8 @@ def test_no_module_imports_itself_in_a_circle():
 
 def test_the_add_on_imports_of_core_the_ground_floor_only():
     assert any(i.target.startswith("core.") for i in ADDON)
-    _none(i for i in ADDON if i.target.split(".")[0] == "core" and (not i.level or (i.target != "core" and room(i.target) not in GROUND)))
+    _none(i for i in ADDON if i.target.split(".")[0] == "core"
+          and (not i.level or (i.target != "core" and room(i.target) not in GROUND)))
 
 
 def test_the_add_on_imports_itself_relatively():
@@ -146,7 +155,8 @@ def test_the_add_on_imports_itself_relatively():
 
 
 def test_rooms_of_the_add_on_do_not_import_each_other():
-    rooms = {path.name for path in (ROOT / "wildcap_addon").iterdir() if path.is_dir() and (path / "__init__.py").is_file()}
+    rooms = {path.name for path in (ROOT / "wildcap_addon").iterdir() if path.is_dir()
+             and (path / "__init__.py").is_file()}
     inside = [i for i in ADDON if own_room(i.file) in rooms and i.level and i.target.startswith("wildcap_addon.")]
     _none(i for i in inside if room(i.target) in rooms - {own_room(i.file)})
 
@@ -162,7 +172,8 @@ def test_pictures_and_weights_go_through_one_door(folder):
     for path in sorted((ROOT / folder).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-                assert (node.value.id, node.attr) not in {("cv2", "imread"), ("cv2", "imwrite")}, f"{path}:{node.lineno}"
+                assert (node.value.id, node.attr) not in {("cv2", "imread"),
+                                                          ("cv2", "imwrite")}, f"{path}:{node.lineno}"
             if isinstance(node, ast.Call) and ast.unparse(node.func) == "torch.load":
                 assert "weights_only=True" in ast.unparse(node), f"{path}:{node.lineno}"
 
@@ -173,7 +184,8 @@ def test_import_targets_are_read_right():
         return _targets(file, ast.parse(source).body[0])
 
     assert targets("core/frames/video.py", "from ..imaging import images") == ["core.imaging.images"]
-    assert targets("core/frames/video.py", "from ..contract.messages import Problem, Reporter") == ["core.contract.messages"]
+    assert targets("core/frames/video.py",
+                   "from ..contract.messages import Problem, Reporter") == ["core.contract.messages"]
     assert targets("core/contract/report.py", "from .. import __version__") == ["core"]
     assert targets("wildcap_addon/paint/panel.py", "from ...core.contract import stages") == ["core.contract.stages"]
     assert targets("benchmarks/demo.py", "from core.contract import report") == ["core.contract.report"]

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The colour of irises, measured in pictures of a head whose irises are known, under coloured light, with a catchlight and a blink."""
+"""The colour of irises, measured in pictures of a head whose irises are known, under coloured light, with a catchlight
+and a blink."""
 
 from dataclasses import replace
 
@@ -84,7 +85,8 @@ class Painted:
 
 
 def apart(found, true) -> float:
-    return float(deltaE_ciede2000(*(rgb2lab(images.linear_to_srgb(np.float32(v)).reshape(1, 1, 3)) for v in (found, true)))[0, 0])
+    return float(deltaE_ciede2000(*(rgb2lab(images.linear_to_srgb(np.float32(v)).reshape(1, 1, 3))
+                                    for v in (found, true)))[0, 0])
 
 
 @pytest.mark.parametrize("colour", [(0.05, 0.024, 0.010), (0.048, 0.078, 0.115)])

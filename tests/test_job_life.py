@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A job while its artist does other things: other files, undo, other faces' jobs, a disabled add-on, a kill. The worker is real, its rooms are tiny."""
+"""A job while its artist does other things: other files, undo, other faces' jobs, a disabled add-on, a kill. The worker
+is real, its rooms are tiny."""
 
 import json
 import os
@@ -124,7 +125,9 @@ def test_a_job_goes_on_when_another_file_is_opened_and_when_everything_is_undone
     assert [folder for folder, _ in jobs.elsewhere("")] == [root], "the tab tells of it there, too"
     bpy.ops.wildcap.open_capture(directory=root)
     assert jobs.elsewhere(root) == []
-    assert jobs.of(addon("captures").root(addon("captures").active(bpy.context))).goal == "solve", "the tab of the capture shows it again"
+    assert jobs.of(addon("captures").root(addon("captures").active(bpy.context))).goal == "solve", (
+        "the tab of the capture shows it again"
+    )
     bpy.ops.scene.new(type='NEW')
     assert jobs.of(root) is not None
     bpy.ops.wildcap.cancel(capture=root)
@@ -196,7 +199,8 @@ def test_a_killed_worker_is_a_problem_with_a_remedy_and_the_lock_is_taken_over(a
 
 def test_a_capture_that_another_blender_works_on_is_refused_by_name(addon, jobs, tmp_path):
     capture = a_capture(tmp_path, "a")
-    capture.lock.write_text(json.dumps({"pid": os.getpid(), "host": socket.gethostname(), "start": "2026-01-01T00:00:00"}))
+    capture.lock.write_text(json.dumps({"pid": os.getpid(), "host": socket.gethostname(),
+                                        "start": "2026-01-01T00:00:00"}))
     with pytest.raises(RuntimeError, match=f"process {os.getpid()}"):
         bpy.ops.wildcap.solve()
     capture.lock.unlink()
@@ -214,9 +218,11 @@ def test_an_interrupted_solve_is_offered_to_go_on_when_the_file_is_opened_again(
     assert step.label == "Continue Solving" and step.operator == "wildcap.solve"
     capture.job.write_text("{}")
     os.utime(capture.job, (1, 1))
-    capture.shadow_mask.write_bytes((capture.root / "shadow_mask_auto.png").read_bytes())  # painted since: a checkpoint of another mask is of no use
+    # painted since: a checkpoint of another mask is of no use
+    capture.shadow_mask.write_bytes((capture.root / "shadow_mask_auto.png").read_bytes())
     addon("status").refresh(bpy.context)
-    assert addon("next_step").next_step(addon("panel").gather(bpy.context, addon("captures").active(bpy.context))).label == "Solve"
+    assert addon("next_step").next_step(addon("panel").gather(bpy.context,
+                                                              addon("captures").active(bpy.context))).label == "Solve"
 
 
 def test_how_long_a_quality_takes_is_learned_from_the_last_solve(addon, jobs, tmp_path):
@@ -264,7 +270,8 @@ def test_the_running_solve_is_shown_on_the_head_and_leaves_no_trace(addon, jobs,
     bpy.ops.wildcap.paint_mask()
     (capture.preview / "albedo.png").write_bytes(standin.plain((0, 255, 0)))
     live.update(root)
-    assert tuple(round(v) for v in nodes[head_name].image.pixels[:3]) == (0, 0, 1), "nothing is touched while somebody paints"
+    assert tuple(round(v)
+                 for v in nodes[head_name].image.pixels[:3]) == (0, 0, 1), "nothing is touched while somebody paints"
     bpy.ops.wildcap.finish_mask()
     jobs.cancel(root)
     finish(jobs)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Kills over the real stages: a handful of trials, other ones each time, and that the judge of them finds what is wrong."""
+"""Kills over the real stages: a handful of trials, other ones each time, and that the judge of them finds what is
+wrong."""
 
 import json
 import os
@@ -40,7 +41,8 @@ TRIALS = 5
 
 def test_a_handful_of_kills_loses_nothing_and_ends_in_the_same_bytes():
     seed = time.time_ns() % 10**6
-    command = [sys.executable, "-m", "benchmarks.kills", "--count", str(TRIALS), "--seed", str(seed), "--until", "scan", "--delighter", "none"]
+    command = [sys.executable, "-m", "benchmarks.kills", "--count", str(TRIALS), "--seed", str(seed), "--until", "scan",
+               "--delighter", "none"]
     ended = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300)
     assert ended.returncode == 0, ended.stdout[-4000:] + ended.stderr[-2000:]
 
@@ -66,25 +68,33 @@ def test_the_judge_is_content_with_what_is_whole_and_finds_every_fault(place):
     undisturbed.copy(place.parent / "end", place)
     assert kills_judge.after_kill(place, known) == [] and kills_judge.after_resume(place, undisturbed, "frames") == []
     for name, content, fault in (
-        ("frames/00000.jpg", b"a fra", "no complete content"), ("frames/00001.jpg", b"", "no complete content"), ("frames/retouched.psd", b"", "is changed"),
-        ("capture.json", b"{", "is no JSON"), ("report.html", b"<html>", "is cut off"), ("../anna.txt", b"", "beside the capture is changed"),
-        ("preview/albedo.png", b"\x89PNG", "cannot be read"), ("checkpoints/solve.safetensors", b"\1", "cannot be read"),
+        ("frames/00000.jpg", b"a fra", "no complete content"), ("frames/00001.jpg", b"", "no complete content"),
+        ("frames/retouched.psd", b"", "is changed"),
+        ("capture.json", b"{", "is no JSON"), ("report.html", b"<html>", "is cut off"),
+        ("../anna.txt", b"", "beside the capture is changed"),
+        ("preview/albedo.png", b"\x89PNG", "cannot be read"),
+        ("checkpoints/solve.safetensors", b"\1", "cannot be read"),
     ):
         before = (root / name).read_bytes() if (root / name).exists() else None
         (root / name).parent.mkdir(exist_ok=True)
         (root / name).write_bytes(content)
         assert [told for told in kills_judge.after_kill(place, known) if fault in told], name
         (root / name).unlink() if before is None else (root / name).write_bytes(before)
-    assert kills_judge.after_kill(place, known, {"shadow_mask.png": (b"old", b"new")}) == ["shadow_mask.png is neither the old mask nor a new one"]
+    assert kills_judge.after_kill(place, known,
+                                  {"shadow_mask.png": (b"old",
+                                                       b"new")}) == ["shadow_mask.png is neither the old mask nor a "
+                                                                     "new one"]
     (root / "notes" / "list.txt").rename(root / "list.txt")
     assert "the user's notes/list.txt is gone" in kills_judge.after_kill(place, known)
     (root / "list.txt").rename(root / "notes" / "list.txt")
 
 
 def test_the_judge_finds_what_is_left_after_the_run_that_goes_on(place):
-    undisturbed = Undisturbed(place.parent, {}, ("frames",), known={"frames/00000.jpg": {read_hash(capture_at(place).frames / "00000.jpg")}})
+    undisturbed = Undisturbed(place.parent, {}, ("frames",),
+                              known={"frames/00000.jpg": {read_hash(capture_at(place).frames / "00000.jpg")}})
     place.rename(place.parent / "end")
-    for name, fault in ((".scan.1.tmp.ply", "is left"), ("lock.succeeding", "is left"), ("kept/frames/00000.jpg", "nobody had changed it"),
+    for name, fault in ((".scan.1.tmp.ply", "is left"), ("lock.succeeding", "is left"),
+                        ("kept/frames/00000.jpg", "nobody had changed it"),
                         ("../stray.txt", "lies beside"), ("lock", "the lock is not free")):
         undisturbed.copy(place.parent / "end", place)
         path = capture_at(place).root / name
@@ -98,7 +108,9 @@ def test_the_judge_finds_what_is_left_after_the_run_that_goes_on(place):
     assert "the stage cameras is not on record" in kills_judge.after_resume(place, undisturbed, "cameras")
 
 
-@pytest.mark.parametrize("moment", [kills_worker.Moment(after_s=0.3), kills_worker.Moment(write=3), kills_worker.Moment(write=3, late_s=0.05)], ids=str)
+@pytest.mark.parametrize("moment",
+                         [kills_worker.Moment(after_s=0.3), kills_worker.Moment(write=3),
+                          kills_worker.Moment(write=3, late_s=0.05)], ids=str)
 def test_a_process_is_struck_at_its_moment(tmp_path, moment):
     def work() -> None:
         for number in range(1000):
@@ -109,15 +121,18 @@ def test_a_process_is_struck_at_its_moment(tmp_path, moment):
     assert forked.strike() and forked.code == -signal.SIGKILL
     written = len(list(tmp_path.glob("*.txt")))
     assert written == 2 if moment.write and not moment.late_s else 2 < written < 100
-    assert kills_worker.Forked(lambda: None, tmp_path, tmp_path / "told", kills_worker.Moment(write=1)).strike() is False
+    assert kills_worker.Forked(lambda: None, tmp_path, tmp_path / "told",
+                               kills_worker.Moment(write=1)).strike() is False
 
 
 def test_a_camera_model_that_did_not_fit_on_the_disk_gets_no_name(tmp_path):
     """pycolmap writes what fits, and says nothing of the rest."""
     model = pycolmap.Reconstruction()
     for number in range(1, 20):
-        model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=number, model="PINHOLE", width=720, height=960, params=[900, 900, 360, 480]))
-        model.add_image_with_trivial_frame(pycolmap.Image(name=f"{number:05d}.jpg", camera_id=number, image_id=number), pycolmap.Rigid3d(np.eye(4)[:3]))
+        model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=number, model="PINHOLE", width=720, height=960,
+                                                          params=[900, 900, 360, 480]))
+        model.add_image_with_trivial_frame(pycolmap.Image(name=f"{number:05d}.jpg", camera_id=number, image_id=number),
+                                           pycolmap.Rigid3d(np.eye(4)[:3]))
     cameras = tmp_path / "cameras"
 
     def attempt() -> None:
@@ -133,9 +148,14 @@ def test_a_camera_model_that_did_not_fit_on_the_disk_gets_no_name(tmp_path):
 
 def test_a_checkpoint_that_did_not_fit_on_the_disk_is_told_by_name(tmp_path, monkeypatch):
     """safetensors has an error of its own, with the system's in words."""
-    state, path = State(1, None, torch.ones(1, 7, 32, 32), Lights(*torch.ones(3, 4)), []), tmp_path / "solve.safetensors"
-    assert "solve.safetensors could not be written" in with_limit(4096, lambda: checkpoint.write(path, state, "key")) and os.listdir(tmp_path) == []
-    assert with_limit(1 << 20, lambda: checkpoint.write(path, state, "key")) == "" and checkpoint.read(path, "key").step == 1
+    state, path = State(1, None, torch.ones(1, 7, 32, 32), Lights(*torch.ones(3, 4)),
+                        []), tmp_path / "solve.safetensors"
+    assert (
+        "solve.safetensors could not be written" in with_limit(4096, lambda: checkpoint.write(path, state, "key"))
+        and os.listdir(tmp_path) == []
+    )
+    assert with_limit(1 << 20,
+                      lambda: checkpoint.write(path, state, "key")) == "" and checkpoint.read(path, "key").step == 1
 
     def full(*_, **__):
         raise SafetensorError("Error while serializing: I/O error: No space left on device (os error 28)")

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lock of a capture: never two inside, the dead replaced at once, the sleeping after a term, and who was replaced writes nothing more."""
+"""The lock of a capture: never two inside, the dead replaced at once, the sleeping after a term, and who was replaced
+writes nothing more."""
 
 import json
 import os
@@ -50,11 +51,16 @@ def test_a_worker_that_is_at_work_is_refused_at_once_by_name(capture):
     capture.check_free()
 
 
-def test_one_that_has_ended_is_replaced_at_once_also_where_its_number_went_to_another_or_the_machine_began_anew(capture):
+def test_one_that_has_ended_is_replaced_at_once_also_where_its_number_went_to_another_or_the_machine_began_anew(
+    capture,
+):
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()
-    texts = [written_by(pid=dead.pid), written_by(began="long ago"), written_by(host=processes.name_host().partition("/")[0] + "/00000000/1"),
-             json.dumps({"pid": dead.pid, "host": processes.name_host().partition("/")[0], "start": "2026-11-22T00:00:00"})]  # the last by 0.1.0
+    texts = [written_by(pid=dead.pid), written_by(began="long ago"),
+             written_by(host=processes.name_host().partition("/")[0] + "/00000000/1"),
+             # the last by 0.1.0
+             json.dumps({"pid": dead.pid, "host": processes.name_host().partition("/")[0],
+                         "start": "2026-11-22T00:00:00"})]
     for text in texts:
         capture.lock.write_text(text)
         began = time.monotonic()
@@ -94,7 +100,8 @@ def test_one_that_was_killed_while_it_took_a_lease_over_leaves_nothing_beside_it
 def test_a_refresh_that_is_seen_keeps_the_lease_whatever_time_it_tells(capture, monkeypatch):
     monkeypatch.setattr(lease, "TERM_S", 3.0)
     capture.lock.write_text(written_by(host="another machine"))
-    beat = subprocess.Popen([sys.executable, "-c", f"import os, time; time.sleep(1); os.utime({str(capture.lock)!r}, (5, 5)); time.sleep(1)"])
+    beat = subprocess.Popen([sys.executable, "-c",
+                             f"import os, time; time.sleep(1); os.utime({str(capture.lock)!r}, (5, 5)); time.sleep(1)"])
     with pytest.raises(Problem, match="another machine"), capture.locked():
         pass
     beat.wait()
@@ -117,12 +124,15 @@ def test_who_was_replaced_writes_nothing_more(capture):
         write_json(capture.root / "texture.json", 1)
         capture.lock.write_text(written_by())
         before = {path: path.read_bytes() for path in capture.root.iterdir()}
-        for attempt in (lambda: write_json(capture.root / "texture.json", 2), lambda: capture.forget(["frames"]) or capture.stop("x", Problem("a", "b"))):
+        for attempt in (lambda: write_json(capture.root / "texture.json", 2),
+                        lambda: capture.forget(["frames"]) or capture.stop("x", Problem("a", "b"))):
             with pytest.raises(Problem, match="taken this capture over"):
                 attempt()
-        with pytest.raises(Problem, match="taken this capture over"), replacing(capture.root / "deep" / "new.txt") as temporary:
+        with pytest.raises(Problem,
+                           match="taken this capture over"), replacing(capture.root / "deep" / "new.txt") as temporary:
             temporary.write_text("x")
-        after = {path: path.read_bytes() for path in capture.root.iterdir() if path.is_file() and path.name != "written.jsonl"}
+        after = {path: path.read_bytes() for path in capture.root.iterdir() if path.is_file()
+                 and path.name != "written.jsonl"}
     assert all(before[path] == content for path, content in after.items())
 
 
@@ -209,7 +219,9 @@ def test_never_two_inside(capture, beginning):
 
 
 @pytest.mark.parametrize("kind", ["dangling link", "link to itself", "folder",
-                                  pytest.param("pipe", marks=pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes here"))])
+                                  pytest.param("pipe",
+                                               marks=pytest.mark.skipif(not hasattr(os, "mkfifo"),
+                                                                        reason="there are no named pipes here"))])
 def test_what_is_no_lock_is_refused_by_name_and_not_waited_for(tmp_path, kind):
     capture = kept_capture.make(tmp_path / "a.wildcap")
     if kind == "folder":

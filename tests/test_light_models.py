@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The other methods' light models explain light of their own kind, and hold the solver's contract; the comparison's table names what is best."""
+"""The other methods' light models explain light of their own kind, and hold the solver's contract; the comparison's
+table names what is best."""
 
 from dataclasses import replace
 
@@ -18,7 +19,8 @@ SIZE = 32
 
 
 def begun(shading) -> Start:
-    """A half ball of even albedo 0.4 under `shading`(normal) [3, S, S], as the solver begins it: with the even light of the texture's mean."""
+    """A half ball of even albedo 0.4 under `shading`(normal) [3, S, S], as the solver begins it: with the even light of
+    the texture's mean."""
     y, x = (torch.meshgrid(*[torch.linspace(-0.95, 0.95, SIZE)] * 2, indexing="ij"))
     inside = (x**2 + y**2 < 0.9).float()
     normal = torch.stack([x, -(1 - x**2 - y**2).clamp_min(0.05).sqrt(), -y])
@@ -26,7 +28,8 @@ def begun(shading) -> Start:
     reference = torch.cat([torch.full((1, 3, SIZE, SIZE), 2 * 0.4 - 1), torch.zeros(1, 4, SIZE, SIZE)], 1)
     texture = 0.4 * shading(normal, x)
     shader = Shader(normal, torch.zeros(SIZE, SIZE), (4, 4))
-    o = Observation(texture, inside, torch.ones(SIZE, SIZE), torch.zeros(1, 2, SIZE, SIZE), shader, torch.zeros(SIZE, SIZE))
+    o = Observation(texture, inside, torch.ones(SIZE, SIZE), torch.zeros(1, 2, SIZE, SIZE), shader,
+                    torch.zeros(SIZE, SIZE))
     mean = (texture * inside).sum((1, 2)) / inside.sum() / 0.4
     state = State(0, None, reference, Lights(constant_light(mean), torch.zeros(1, 9, 4, 4), torch.ones(3)))
     return Start(torch.full((3,), 0.4), OURS, reference, 1.0, torch.zeros(SIZE, SIZE), {1: o}, state)
@@ -81,14 +84,20 @@ def test_an_even_sky_is_an_even_irradiance_and_a_point_is_a_cosine():
 
 def test_the_table_marks_the_best_and_its_ties():
     def score(psnr, step):
-        return {"raw": {"psnr": psnr}, "gain": {"psnr": psnr, "ssim": 0.9, "flip": 0.1}, "detail": 0.5, "shadow_step": step}
+        return {"raw": {"psnr": psnr}, "gain": {"psnr": psnr, "ssim": 0.9, "flip": 0.1}, "detail": 0.5,
+                "shadow_step": step}
 
-    rows = {"delit": {"wildcap": {"0": score(30.0, -0.1), "1": score(30.4, -0.1)}, "regions 5": {"0": score(29.9, 0.2)}, "texture": {"0": score(29.0, None)}}}
+    rows = {"delit": {"wildcap": {"0": score(30.0, -0.1), "1": score(30.4, -0.1)}, "regions 5": {"0": score(29.9, 0.2)},
+                      "texture": {"0": score(29.0, None)}}}
     text = comparison.table({"people": comparison.means([rows, rows])})
     lines = {line.split("|")[1].strip(): line for line in text.splitlines()}
     assert "**30.00**" in lines["delit: wildcap"] and "**-0.10**" in lines["delit: wildcap"]
     assert "**29.90**" in lines["delit: regions 5"]  # within half of what two seeds differ by
-    assert "**0.20**" not in lines["delit: regions 5"] and "| 29.00 |" in lines["delit: texture"] and "| - |" in lines["delit: texture"]
+    assert (
+        "**0.20**" not in lines["delit: regions 5"]
+        and "| 29.00 |" in lines["delit: texture"]
+        and "| - |" in lines["delit: texture"]
+    )
 
 
 def test_a_rendering_that_is_the_frame_scores_and_a_wrong_one_does_not():

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Spherical harmonic shading against quadrature, the grid's interpolation, the closed-form global light, and what holds it to an even one."""
+"""Spherical harmonic shading against quadrature, the grid's interpolation, the closed-form global light, and what holds
+it to an even one."""
 
 
 import numpy as np
@@ -11,7 +12,8 @@ from core.light.spherical_harmonics import GAMMA_BANDS, per_function
 from core.solve.lighting import Lights, Shader, constant_light, fit_global, interpolation, shading_basis
 
 BAND_OF = torch.tensor(per_function(GAMMA_BANDS))
-SIDEWAYS = torch.tensor([0, 0, 0, 1, 1, 0, 0, 1, 0])  # of 1, y, z, x, xy, yz, 3 z^2 - 1, xz, x^2 - y^2 those that change their sign with x
+# of 1, y, z, x, xy, yz, 3 z^2 - 1, xz, x^2 - y^2 those that change their sign with x
+SIDEWAYS = torch.tensor([0, 0, 0, 1, 1, 0, 0, 1, 0])
 
 
 def sphere(rows: int = 200, columns: int = 400):
@@ -20,7 +22,8 @@ def sphere(rows: int = 200, columns: int = 400):
     phi = (np.arange(columns) + 0.5) * 2 * np.pi / columns
     r = np.sqrt(1 - z**2)[:, None]
     direction = np.stack([r * np.cos(phi), r * np.sin(phi), np.broadcast_to(z[:, None], (rows, columns))])
-    return torch.from_numpy(direction), torch.from_numpy(np.broadcast_to(weight[:, None] * 2 * np.pi / columns, (rows, columns)).copy())
+    return torch.from_numpy(direction), torch.from_numpy(np.broadcast_to(weight[:, None] * 2 * np.pi / columns,
+                                                                         (rows, columns)).copy())
 
 
 def test_basis_is_orthogonal_with_the_stated_band_scales():
@@ -52,7 +55,8 @@ def test_constant_light_shades_a_sphere_evenly():
     directions, _ = sphere(20, 40)
     shader = Shader(directions.float(), torch.zeros(20, 40), (2, 2))
     lights = Lights(constant_light(torch.tensor([0.5, 1.0, 2.0])), torch.zeros(3, 9, 2, 2), torch.ones(3))
-    assert torch.allclose(shader.total(lights), torch.tensor([0.5, 1.0, 2.0])[:, None, None].expand(3, 20, 40), atol=1e-6)
+    assert torch.allclose(shader.total(lights), torch.tensor([0.5, 1.0, 2.0])[:, None, None].expand(3, 20, 40),
+                          atol=1e-6)
 
 
 @pytest.mark.parametrize("coloured", [True, False])
@@ -62,7 +66,8 @@ def test_local_light_lives_inside_the_mask_only(coloured):
     alpha[10:20, 12:30] = 0.7
     shader = Shader(directions.float(), alpha, (5, 5))
     generator = torch.Generator().manual_seed(0)
-    lights = Lights(torch.randn(3, 9, generator=generator), torch.randn(1 if coloured else 3, 9, 5, 5, generator=generator), torch.rand(3, generator=generator))
+    lights = Lights(torch.randn(3, 9, generator=generator),
+                    torch.randn(1 if coloured else 3, 9, 5, 5, generator=generator), torch.rand(3, generator=generator))
     difference = shader.total(lights) - shader.main(lights)
     assert difference[:, alpha == 0].abs().max() == 0
     assert difference[:, alpha > 0].abs().mean() > 0.1

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The locks: one for each platform and Python, complete, with hashes; who has none is told before a download; and what pip is told by them."""
+"""The locks: one for each platform and Python, complete, with hashes; who has none is told before a download; and what
+pip is told by them."""
 
 import json
 import os
@@ -24,8 +25,8 @@ REQUIREMENTS = Path(__file__).resolve().parent.parent / "requirements"
 
 
 def describe(**other) -> str:
-    return json.dumps({"python": [3, 11], "system": "linux", "machine": "x86_64", "bits": 64, "macos": "", "libc": ["glibc", "2.39"], "free_threaded": False,
-                       **other})
+    return json.dumps({"python": [3, 11], "system": "linux", "machine": "x86_64", "bits": 64, "macos": "",
+                       "libc": ["glibc", "2.39"], "free_threaded": False, **other})
 
 
 @pytest.mark.parametrize("name", locks.names())
@@ -33,7 +34,9 @@ def test_every_lock_has_all_direct_requirements_and_a_hash_for_every_package(nam
     lock = locks.read(REQUIREMENTS, name)
     assert lock.verified and len(lock.lines) > len(required(REQUIREMENTS))
     for package, version in required(REQUIREMENTS).items():
-        assert lock.lines[locks.normal(package)].startswith(f"{locks.normal(package)}=={version} --hash=sha256:"), f"run `python -m benchmarks.locks {name}`"
+        assert lock.lines[locks.normal(package)].startswith(f"{locks.normal(package)}=={version} --hash=sha256:"), (
+            f"run `python -m benchmarks.locks {name}`"
+        )
     assert all(re.fullmatch(r"[a-z0-9-]+==[\w.!]+( --hash=sha256:[0-9a-f]{64})+", line) for line in lock.lines.values())
     assert lock.download > 100_000_000
 
@@ -60,7 +63,9 @@ def test_where_the_files_of_a_wheel_come_to_lie():
     assert maker.installed_paths("a-1.data/purelib/a.txt", "win_amd64-3.11") == ["Lib/site-packages/a.txt"]
     assert maker.installed_paths("a-1.data/scripts/a", "win_amd64-3.11") == ["Scripts/a"]
     plain, compiled = maker.installed_paths("a/b.py", "win_amd64-3.11")
-    assert plain == "Lib/site-packages/a/b.py" and compiled.startswith("Lib/site-packages/a/__pycache__/b.cpython-311.pyc.")
+    assert plain == "Lib/site-packages/a/b.py" and compiled.startswith(
+        "Lib/site-packages/a/__pycache__/b.cpython-311.pyc."
+    )
 
 
 @pytest.mark.parametrize(("about", "name"), [
@@ -74,9 +79,11 @@ def test_every_machine_that_is_served_has_its_lock(about, name):
 @pytest.mark.parametrize(("about", "problem"), [
     (describe(system="darwin", machine="x86_64", macos="15.1"), "Macs with an Intel processor"),
     (describe(system="darwin", machine="arm64", macos="13.6"), "needs macOS 14 or newer; this is 13.6"),
-    (describe(machine="aarch64"), r"no solver for this processor \(aarch64"), (describe(machine="x86_64", bits=32), "32 bits"),
+    (describe(machine="aarch64"), r"no solver for this processor \(aarch64"),
+    (describe(machine="x86_64", bits=32), "32 bits"),
     (describe(system="win32", machine="arm64"), "no solver for this processor"),
-    (describe(libc=["glibc", "2.27"]), "glibc 2.28 or newer; this has glibc 2.27"), (describe(libc=["", ""]), "this has another library"),
+    (describe(libc=["glibc", "2.27"]), "glibc 2.28 or newer; this has glibc 2.27"),
+    (describe(libc=["", ""]), "this has another library"),
     (describe(python=[3, 14]), r"This Python is 3.14; the solver's packages are made for 3.11 and 3.13"),
     (describe(python=[3, 13], free_threaded=True), "without its global lock"), ("", "does not answer")])
 def test_what_cannot_be_had_is_said_before_anything_is_downloaded(about, problem):
@@ -91,7 +98,8 @@ def test_a_lock_that_is_not_there_is_named():
 
 
 @pytest.mark.parametrize("name, compute, source, torch", [
-    ("manylinux_x86_64-3.11", "cpu", "pytorch", "cpu"), ("manylinux_x86_64-3.13", "cpu", "pytorch", "cpu"), ("manylinux_x86_64-3.11", "cuda", "pytorch", ""),
+    ("manylinux_x86_64-3.11", "cpu", "pytorch", "cpu"), ("manylinux_x86_64-3.13", "cpu", "pytorch", "cpu"),
+    ("manylinux_x86_64-3.11", "cuda", "pytorch", ""),
     ("win_amd64-3.13", "cpu", "pytorch", ""), ("win_amd64-3.11", "cuda", "pytorch", "cu130"),
     ("macosx_arm64-3.13", "apple", "pytorch", "")])
 def test_each_system_gets_the_torch_that_was_chosen(tmp_path, name, compute, source, torch):
@@ -104,9 +112,15 @@ def test_each_system_gets_the_torch_that_was_chosen(tmp_path, name, compute, sou
         build = REQUIREMENTS / "locks" / f"{name}-{compute}.txt"
         assert steps[1][-1] == str(build) and f"torch==2.13.0+{torch}" in build.read_text(encoding="utf-8")
         assert steps[1][steps[1].index("--find-links") + 1] == f"https://download.pytorch.org/whl/{torch}/torch/"
-        assert ("--require-hashes" in steps[1]) == ("--hash" in build.read_text(encoding="utf-8")) == ("not verified" not in build.read_text(encoding="utf-8"))
+        assert (
+            ("--require-hashes" in steps[1])
+            == ("--hash" in build.read_text(encoding="utf-8"))
+            == ("not verified" not in build.read_text(encoding="utf-8"))
+        )
     elif name.startswith("manylinux"):
-        assert "--require-hashes" in steps[1] and "nvidia-cudnn-cu13==" in Path(steps[1][-1]).read_text(encoding="utf-8"), "what that PyTorch needs besides"
+        assert "--require-hashes" in steps[1] and "nvidia-cudnn-cu13==" in Path(steps[1][-1]).read_text(
+            encoding="utf-8"
+        ), "what that PyTorch needs besides"
     else:
         assert len(steps) == 1
 
@@ -116,7 +130,8 @@ def test_where_a_studios_index_lacks_pytorchs_build_its_own_is_taken(tmp_path, n
     rest, torch = pip_steps.steps(REQUIREMENTS, locks.read(REQUIREMENTS, name), compute, "pip", tmp_path)
     assert "--find-links" not in torch.words and not rest.otherwise
     assert len(torch.otherwise) == count and "--require-hashes" in torch.otherwise[0]
-    assert re.fullmatch(r"torch==2.13.0( --hash=sha256:\w{64})+\n", Path(torch.otherwise[0][-1]).read_text(encoding="utf-8"))
+    assert re.fullmatch(r"torch==2.13.0( --hash=sha256:\w{64})+\n",
+                        Path(torch.otherwise[0][-1]).read_text(encoding="utf-8"))
     ran = []
 
     def run(words):
@@ -137,7 +152,8 @@ def test_a_folder_of_wheels_is_the_only_place_that_is_looked_in(tmp_path):
 
 
 def test_what_a_device_needs_here_is_found_out(monkeypatch):
-    for system, driver, computes in (("linux", None, "cpu"), ("linux", "/usr/bin/nvidia-smi", "cuda"), ("win32", None, "cpu"), ("darwin", None, "apple")):
+    for system, driver, computes in (("linux", None, "cpu"), ("linux", "/usr/bin/nvidia-smi", "cuda"),
+                                     ("win32", None, "cpu"), ("darwin", None, "apple")):
         monkeypatch.setattr(sys, "platform", system)
         monkeypatch.setattr(pip_steps.shutil, "which", lambda name, driver=driver: driver)
         assert pip_steps.compute_of("auto") == computes
@@ -155,9 +171,12 @@ def index_page() -> str:
     return page
 
 
-@pytest.mark.parametrize("name", locks.names() if "WILDCAP_LOCKS" in os.environ else [locks.names()[time.localtime().tm_yday % len(locks.names())]])
+@pytest.mark.parametrize("name",
+                         locks.names() if "WILDCAP_LOCKS" in os.environ
+                         else [locks.names()[time.localtime().tm_yday % len(locks.names())]])
 def test_every_lock_is_what_the_index_has(name):
-    """pip finds every wheel of the lock for its platform and Python, with the hash that the lock has, and nothing that a package needs is left out.
+    """pip finds every wheel of the lock for its platform and Python, with the hash that the lock has, and nothing that
+    a package needs is left out.
 
     Another lock each day, as each takes pip a third of a minute; WILDCAP_LOCKS=all asks for all of them.
     """
@@ -171,7 +190,8 @@ def test_every_lock_is_what_the_index_has(name):
         for need in map(lock_resolver.Requirement, wheel.needs):
             if need.marker is None or need.marker.evaluate(environment) and not lock_resolver.is_cuda(wheel, need):
                 other = found.get(locks.normal(need.name))
-                assert other is not None and need.specifier.contains(other.version, prereleases=True), f"{wheel.name} needs {need}"
+                assert other is not None and need.specifier.contains(other.version,
+                                                                     prereleases=True), f"{wheel.name} needs {need}"
 
 
 def test_the_longest_path_and_the_download_are_what_the_wheels_say():
@@ -180,10 +200,12 @@ def test_the_longest_path_and_the_download_are_what_the_wheels_say():
     lock = locks.read(REQUIREMENTS, "win_amd64-3.13")
     found = lock_resolver.ask(lock.name, [], "--require-hashes", "-r", str(REQUIREMENTS / "locks" / f"{lock.name}.txt"))
     files = [index.wheel_files(wheel.url) for wheel in found.values()]
-    assert max(len(path) for _, listed in files for file, _ in listed for path in maker.installed_paths(file, lock.name)) == lock.longest
+    assert max(len(path) for _, listed in files for file, _ in listed
+               for path in maker.installed_paths(file, lock.name)) == lock.longest
     assert sum(size for size, _ in files) == lock.download
 
 
 def test_the_table_has_a_line_for_every_lock():
-    printed = subprocess.run([sys.executable, "-m", "benchmarks.locks", "--table"], cwd=REQUIREMENTS.parent, capture_output=True, text=True).stdout
+    printed = subprocess.run([sys.executable, "-m", "benchmarks.locks", "--table"], cwd=REQUIREMENTS.parent,
+                             capture_output=True, text=True).stdout
     assert all(f"| `{name}` | " in printed for name in locks.names())

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make My Head in the bpy wheel, its job played by hand: what comes into the scene when, and what an artist's edits keep out; and words of the terminal."""
+"""Make My Head in the bpy wheel, its job played by hand: what comes into the scene when, and what an artist's edits
+keep out; and words of the terminal."""
 
 import sys
 from types import SimpleNamespace
@@ -137,7 +138,8 @@ def test_the_terminal_runs_the_chain_with_the_solver_that_is_set_up(addon, captu
     assert execute(["solve", str(capture)]) == 1
     assert "solver is not set up" in capfd.readouterr().err
     monkeypatch.setattr(preferences, "python", lambda: sys.executable)
-    assert execute(["run", str(capture / "no_film.mp4"), str(capture), "--quality", "draft"]) == 2  # the chain's own exit code, and its words
+    # the chain's own exit code, and its words
+    assert execute(["run", str(capture / "no_film.mp4"), str(capture), "--quality", "draft"]) == 2
     assert "no_film.mp4" in capfd.readouterr().err
     with pytest.raises(SystemExit):
         execute(["run"])

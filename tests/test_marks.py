@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Moles inside a shadow: found, told from freckles, pores and shadow, confirmed by views, and still there after the real solve, as the shadow's edge is not."""
+"""Moles inside a shadow: found, told from freckles, pores and shadow, confirmed by views, and still there after the
+real solve, as the shadow's edge is not."""
 
 from dataclasses import replace
 
@@ -52,7 +53,8 @@ def skin(strength=0.05):
 def test_a_mole_is_found_where_and_as_large_as_it_is(diameter):
     marks = find(skin() * np.exp(-spot(200, 300, diameter) * MELANIN), SKIN, TEXEL)
     assert len(marks) == 1
-    assert np.hypot(marks[0].row - 200, marks[0].column - 300) < 1.5 and 0.6 < marks[0].radius * TEXEL / (diameter / 2) < 1.6
+    assert np.hypot(marks[0].row - 200,
+                    marks[0].column - 300) < 1.5 and 0.6 < marks[0].radius * TEXEL / (diameter / 2) < 1.6
     assert 0.6 * MELANIN.mean() < marks[0].contrast < 1.2 * MELANIN.mean()
     assert unlike_shadow(marks[0], TAKEN / TAKEN.mean())
 
@@ -62,7 +64,8 @@ def test_freckles_pores_and_shadow_edges_are_no_moles():
     freckles = np.zeros((SIZE, SIZE), np.float32)  # one in 47 square millimetres, 0.8 mm wide, faint to well seen
     freckles[tuple(random.integers(0, SIZE, (2, 1500)))] = random.uniform(0.1, 0.35, 1500)
     freckles = cv2.GaussianBlur(freckles, (0, 0), 1.5 / TEXEL) * (2 * np.pi) * (1.5 / TEXEL) ** 2
-    assert len(find(skin() * np.exp(-freckles[..., None] * MELANIN), SKIN, TEXEL)) <= 5  # where several fall on one place
+    # where several fall on one place
+    assert len(find(skin() * np.exp(-freckles[..., None] * MELANIN), SKIN, TEXEL)) <= 5
     assert find(skin(0.12), SKIN, TEXEL) == []
     wavy = 260 + 20 * np.sin(np.arange(SIZE) / 12)
     shadow = (np.arange(SIZE)[:, None] > wavy).astype(float)[..., None]
@@ -90,7 +93,8 @@ def test_views_confirm_what_they_all_show(tmp_path, monkeypatch):
     rotation = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
     views = []
     for i, x in enumerate((-0.1, 0.0, 0.1)):
-        view = View(f"{i}.jpg", capture.frames / f"{i}.jpg", camera, rotation, -rotation @ np.array([x, there[0, 1] - 0.5, there[0, 2]]), True)
+        view = View(f"{i}.jpg", capture.frames / f"{i}.jpg", camera, rotation,
+                    -rotation @ np.array([x, there[0, 1] - 0.5, there[0, 2]]), True)
         picture = np.full((400, 400, 3), 0.5, np.float32)
         pixels, _ = view.project(there)
         for pixel in pixels[: 2 if i == 0 else 1]:
@@ -100,14 +104,17 @@ def test_views_confirm_what_they_all_show(tmp_path, monkeypatch):
     monkeypatch.setattr(witnesses, "read_views", lambda capture: views)
     assert witnesses.confirmed(capture, read_head(capture), marks, 256) == marks[:1]
     monkeypatch.setattr(witnesses, "read_views", lambda capture: views[:1])
-    assert witnesses.confirmed(capture, read_head(capture), marks, 256) == marks  # one view is too few to deny what the texture shows
+    # one view is too few to deny what the texture shows
+    assert witnesses.confirmed(capture, read_head(capture), marks, 256) == marks
 
 
 def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
-    """A mole of 8 texels, as large as a cell of the light's grid, in a shadow with a hard edge under a mask that is 8 texels too large and beside it."""
+    """A mole of 8 texels, as large as a cell of the light's grid, in a shadow with a hard edge under a mask that is 8
+    texels too large and beside it."""
     prior, capture = load(), Capture(tmp_path)
     covered = torch.from_numpy(template.mask("skin", SIZE).copy())
-    albedo = (initial.face_of_tone(prior.mean_face, torch.from_numpy(TONE), covered)[0, :3].permute(1, 2, 0).numpy() + 1) / 2
+    albedo = (initial.face_of_tone(prior.mean_face, torch.from_numpy(TONE), covered)[0, :3].permute(1, 2, 0).numpy()
+              + 1) / 2
     row, column = round(0.56 * SIZE), round(0.655 * SIZE)
     albedo = albedo * skin(0.04) / TONE * np.exp(-spot(row, column, 8) * MELANIN)
     distance = distance_to(row, column) - 90
@@ -119,7 +126,8 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
     evidence, recipe = read_evidence(capture, read_head(capture), SIZE), replace(OURS, guidance="proximal", steps=16)
     start = initial.start(prior, evidence, SkinTone.from_linear(TONE, GIVEN), 8.0, recipe)
     assert [(round(m.row / 4), round(m.column / 4)) for m in start.marks] == [(round(row / 4), round(column / 4))]
-    result = maps.finished(Sampler(prior.of_tone(start.tone), start.recipe, seeded(0)).sample(start.observations, start.state), evidence, start)
+    result = maps.finished(Sampler(prior.of_tone(start.tone), start.recipe,
+                                   seeded(0)).sample(start.observations, start.state), evidence, start)
     solved = result.diffuse
 
     def contrast(image):
@@ -128,9 +136,12 @@ def test_the_solve_keeps_a_mole_in_a_shadow_and_leaves_no_edge(tmp_path):
 
     assert 0.8 < contrast(solved) / contrast(albedo) < 1.2
     error = np.log(np.maximum(solved, 1e-3) / albedo).mean(-1)
-    rings = [error[(distance >= d) & (distance < d + 3)].mean() for d in range(-18, 18, 3)]  # six inside the shadow, six outside
+    # six inside the shadow, six outside
+    rings = [error[(distance >= d) & (distance < d + 3)].mean() for d in range(-18, 18, 3)]
     inside, outside = np.mean(rings[:4]), np.mean(rings[-4:])
     assert abs(outside - inside) < 0.15 * -np.log(1 - TAKEN).mean()
     usual = (prior.mean_face[6].numpy() + 1) / 2
-    assert np.abs(result.specular - cv2.resize(usual, (SIZE, SIZE), interpolation=cv2.INTER_AREA)).max() < 0.05  # no photograph tells it: no grain of chance
-    assert max(rings) - max(inside, outside) < 0.06 and min(rings) - min(inside, outside) > -0.06  # no light or dark outline
+    # no photograph tells it: no grain of chance
+    assert np.abs(result.specular - cv2.resize(usual, (SIZE, SIZE), interpolation=cv2.INTER_AREA)).max() < 0.05
+    # no light or dark outline
+    assert max(rings) - max(inside, outside) < 0.06 and min(rings) - min(inside, outside) > -0.06

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""After a mask edit only the touched part is solved again: the rest stays bit by bit, and whatever makes that impossible is said."""
+"""After a mask edit only the touched part is solved again: the rest stays bit by bit, and whatever makes that
+impossible is said."""
 
 import shutil
 from pathlib import Path
@@ -57,7 +58,8 @@ def paint(capture: Capture, *where: tuple[slice, slice]) -> None:
 def solve_part(capture: Capture, **options) -> list[str]:
     """Solves the edited part, or the whole where it must; what was logged."""
     said = []
-    solve.run(capture, settings(edited_part=True, **options), Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))))
+    solve.run(capture, settings(edited_part=True, **options),
+              Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))))
     return said
 
 
@@ -119,7 +121,8 @@ def test_what_cannot_be_solved_in_part_is_solved_whole_and_says_why(capture, spo
     paint(capture, EDIT)
     spoil(capture)
     said = []
-    whole = Reporter("solve", lambda message: said.append(getattr(message, "text", "")), lambda: any("whole map" in line for line in said))
+    whole = Reporter("solve", lambda message: said.append(getattr(message, "text", "")),
+                     lambda: any("whole map" in line for line in said))
     with pytest.raises(CancelledError):  # the test has heard enough once that solve begins
         solve.run(capture, settings(edited_part=True, **options), whole)
     assert any(line.startswith("The whole map is solved.") and reason in line for line in said), said

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The worker's tools behind Detect, Snap to Edges and Estimate: what they find on painted skin, and how their results wait for a click."""
+"""The worker's tools behind Detect, Snap to Edges and Estimate: what they find on painted skin, and how their results
+wait for a click."""
 
 import numpy as np
 import pytest
@@ -102,7 +103,8 @@ def test_what_a_worker_prepared_waits_for_a_click(addon, capture, monkeypatch):
     mine[5:9] = 1
     mask_image.set_values(session.mask(), mine)
     bpy.ops.wildcap.snap_mask()
-    assert started[0]["tool"] == "mask_edges" and (capture / "shadow_mask.png").read_bytes() == mask_image.grey_png(mine)
+    assert started[0]["tool"] == "mask_edges" and (capture
+                                                   / "shadow_mask.png").read_bytes() == mask_image.grey_png(mine)
     theirs = np.zeros((64, 64), np.float32)
     theirs[6:8] = 1
     (capture / "shadow_mask_edges.png").write_bytes(mask_image.grey_png(theirs))

@@ -19,7 +19,9 @@ class Twice:
 def many(a, b, c, d, e, f, g, *, h):
     pass
 '''
-SECOND = "class Twice: pass\nclass Once: pass\n\n\ndef long(*a, **b):\n" + "    a = 1\n" * 60 + "x = '" + "y" * 120 + "'\n"
+SECOND = (
+    "class Twice: pass\nclass Once: pass\n\n\ndef long(*a, **b):\n" + "    a = 1\n" * 60 + "x = '" + "y" * 120 + "'\n"
+)
 
 
 def test_what_is_counted_is_what_is_there(tmp_path):

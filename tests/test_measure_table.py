@@ -9,9 +9,12 @@ import pytest
 from benchmarks import figures
 from benchmarks.measures.table import Column, standard_error, summarise, to_markdown, to_record
 
-COLUMNS = {"psnr": Column("PSNR, dB"), "flip": Column("FLIP", 3, -1), "step": Column("step", 2, 0), "unknown": Column("never measured")}
-SCORES = {"old": {"a": {"psnr": 20.0, "flip": 0.2, "step": 0.1}, "b": {"psnr": 30.0, "flip": 0.1}, "c": {"psnr": 40.0}, "d": {"psnr": 50.0}},
-          "new": {"a": {"psnr": 21.0, "flip": 0.1, "step": None}, "b": {"psnr": 31.1}, "c": {"psnr": 41.0}, "d": {"psnr": 50.9, "flip": math.nan}}}
+COLUMNS = {"psnr": Column("PSNR, dB"), "flip": Column("FLIP", 3, -1), "step": Column("step", 2, 0),
+           "unknown": Column("never measured")}
+SCORES = {"old": {"a": {"psnr": 20.0, "flip": 0.2, "step": 0.1}, "b": {"psnr": 30.0, "flip": 0.1}, "c": {"psnr": 40.0},
+                  "d": {"psnr": 50.0}},
+          "new": {"a": {"psnr": 21.0, "flip": 0.1, "step": None}, "b": {"psnr": 31.1}, "c": {"psnr": 41.0},
+                  "d": {"psnr": 50.9, "flip": math.nan}}}
 
 
 def test_means_spreads_and_paired_differences():
@@ -19,12 +22,17 @@ def test_means_spreads_and_paired_differences():
     old, new = found["old"]["psnr"], found["new"]["psnr"]
     assert (old.mean, old.people, old.difference) == (35.0, 4, None) and old.spread == pytest.approx(math.sqrt(500 / 3))
     assert new.difference == pytest.approx(1.0) and new.error == pytest.approx(math.sqrt(0.02 / 3) / 2)
-    assert found["new"]["flip"].people == 1 and found["new"]["flip"].spread is None and found["new"]["flip"].difference == pytest.approx(-0.1)
+    assert (
+        found["new"]["flip"].people == 1
+        and found["new"]["flip"].spread is None
+        and found["new"]["flip"].difference == pytest.approx(-0.1)
+    )
     assert "step" not in found["new"] and "unknown" not in found["old"]
 
 
 def test_a_standard_error_needs_two():
-    assert standard_error([]) is None and standard_error([1.0]) is None and standard_error([1.0, 3.0]) == pytest.approx(1.0)
+    assert standard_error([]) is None and standard_error([1.0]) is None and standard_error([1.0,
+                                                                                            3.0]) == pytest.approx(1.0)
 
 
 def test_sure_differences_are_marked_though_people_differ_by_more():

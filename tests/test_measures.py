@@ -28,7 +28,8 @@ def unit(n: int = N) -> np.ndarray:
 
 
 def skin(n: int = N) -> np.ndarray:
-    return (np.float64([0.45, 0.28, 0.2]) * np.exp(0.15 * RNG.normal(size=(n, 1)) + 0.03 * RNG.normal(size=(n, 3)))).clip(0.01, 0.9)
+    return (np.float64([0.45, 0.28, 0.2])
+            * np.exp(0.15 * RNG.normal(size=(n, 1)) + 0.03 * RNG.normal(size=(n, 3)))).clip(0.01, 0.9)
 
 
 NORMALS, TRUE, LIGHT = unit(), skin(), 0.1 * RNG.normal(size=9)
@@ -50,8 +51,10 @@ def test_what_differs_between_captures_stays_an_error():
     ratios = [log_ratio(a, TRUE) for a in answers]
     together, alone = fit_light(ratios, [NORMALS] * 2), [fit_light([r], [NORMALS]) for r in ratios]
     assert together.deviation < 1e-3
-    assert psnr_after_gain(without_light(answers[0], NORMALS, together), TRUE) == pytest.approx(psnr_after_gain(answers[0], TRUE), abs=0.05)
-    assert all(psnr_after_gain(without_light(a, NORMALS, light), TRUE) == BEST_PSNR for a, light in zip(answers, alone, strict=True))
+    assert psnr_after_gain(without_light(answers[0], NORMALS, together),
+                           TRUE) == pytest.approx(psnr_after_gain(answers[0], TRUE), abs=0.05)
+    assert all(psnr_after_gain(without_light(a, NORMALS, light), TRUE) == BEST_PSNR
+               for a, light in zip(answers, alone, strict=True))
 
 
 def test_a_capture_of_few_texels_has_the_same_say_as_one_of_many():
@@ -67,7 +70,8 @@ def test_a_shadow_that_was_left_in_does_not_bend_the_light():
 
 
 def test_a_colour_is_not_taken_for_light():
-    tinted = TRUE * np.exp(sh_basis(NORMALS) @ LIGHT)[:, None] ** np.array([1, 0, -1])  # grey in the mean of the logarithms
+    # grey in the mean of the logarithms
+    tinted = TRUE * np.exp(sh_basis(NORMALS) @ LIGHT)[:, None] ** np.array([1, 0, -1])
     assert fit_light([log_ratio(tinted, TRUE)], [NORMALS]).deviation < 1e-6
 
 
@@ -90,9 +94,13 @@ def test_what_the_true_map_disagrees_by_is_not_counted():
 def test_parts_share_the_gain_of_the_face():
     brows = np.arange(N) < 500
     answer = np.where(brows[:, None], TRUE * 1.5, TRUE)
-    found = score_parts(to_tone(answer, TRUE.mean(0) * 3), TRUE, {"brows": brows, "skin": ~brows, "lips": np.arange(N) < 5})
+    found = score_parts(to_tone(answer, TRUE.mean(0) * 3), TRUE,
+                        {"brows": brows, "skin": ~brows, "lips": np.arange(N) < 5})
     assert set(found) == {"brows", "skin"} and found["brows"].texels == 500
-    assert found["brows"].bias - found["skin"].bias == pytest.approx(np.log(1.5), abs=1e-3) and found["brows"].psnr < found["skin"].psnr
+    assert (
+        found["brows"].bias - found["skin"].bias == pytest.approx(np.log(1.5), abs=1e-3)
+        and found["brows"].psnr < found["skin"].psnr
+    )
     assert found["brows"].deviation < 0.05
 
 
@@ -102,7 +110,8 @@ def test_a_true_sigma_covers_two_thirds_and_beats_a_constant():
     found = calibrate(error, sigma)
     assert found.coverage == pytest.approx(WITHIN_ONE, abs=0.005)
     assert found.likelihood == pytest.approx(-2 + 0.5 + math.log(2 * math.pi) / 2, abs=0.01)
-    assert found.gained == pytest.approx(np.log(np.sqrt((sigma**2).mean())) + 2, abs=0.02)  # log rms less mean log sigma
+    # log rms less mean log sigma
+    assert found.gained == pytest.approx(np.log(np.sqrt((sigma**2).mean())) + 2, abs=0.02)
     assert calibrate(error, sigma / 3).coverage < 0.3 and calibrate(error, sigma / 3).gained < 0
 
 
@@ -127,7 +136,9 @@ def test_reference_answers():
     where[10:110, 10:90] = True
     ramp = np.linspace(0.1, 0.4, 120)[:, None, None] * np.ones((120, 100, 3))
     assert face_height(where) == 100
-    assert flat_colour(ramp, where).std((0, 1)) == pytest.approx(0, abs=1e-6) and flat_colour(ramp, where)[0, 0] == pytest.approx(ramp[where].mean(0))
+    assert flat_colour(ramp, where).std((0, 1)) == pytest.approx(0, abs=1e-6) and flat_colour(ramp, where)[
+        0, 0
+    ] == pytest.approx(ramp[where].mean(0))
     out = blur_divided_out(ramp, where)
     assert np.ptp(out[20:100, 20:80]) < 0.02 < 0.1 < np.ptp(ramp[20:100, 20:80]), "a slow ramp goes"
     moles = ramp.copy()

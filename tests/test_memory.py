@@ -22,7 +22,8 @@ from .recorded import changed, record
 from .test_sampler import SmoothPrior, observation, shadow_problem, start
 
 REFUSALS = [MemoryError(), torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB"),
-            RuntimeError("[enforce fail at alloc_cpu.cpp:117] DefaultCPUAllocator: can't allocate memory: you tried to allocate 99 bytes"),
+            RuntimeError("[enforce fail at alloc_cpu.cpp:117] DefaultCPUAllocator: can't allocate memory: you tried to "
+                         "allocate 99 bytes"),
             RuntimeError("DefaultCPUAllocator: not enough memory: you tried to allocate 99 bytes.")]
 
 
@@ -50,7 +51,8 @@ def problem():
     """Observations of a shadow at two sizes, and their denoisers: the map becomes finer within the run."""
     prior, _, texture, mask, _ = shadow_problem(32)
     half = observation(torch.nn.functional.avg_pool2d(texture, 2), torch.nn.functional.avg_pool2d(mask[None], 2)[0])
-    return {32: prior, 16: SmoothPrior(16)}, {1: observation(texture, mask), 2: half}, Recipe(steps=6, coarse=((2, 0.5),))
+    return {32: prior, 16: SmoothPrior(16)}, {1: observation(texture, mask),
+                                              2: half}, Recipe(steps=6, coarse=((2, 0.5),))
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +70,8 @@ def unbroken():
 def test_a_step_that_did_not_fit_is_done_again_to_the_same_bytes(unbroken, at, backward):
     priors, seen, recipe = problem()
     prior, said, steps = Refusing(priors, at, REFUSALS[at % len(REFUSALS)], backward), [], []
-    out = sample_within_memory(Sampler(prior, recipe, seeded(1)), seen, start(-0.2), lambda state, of: steps.append(state.step), said.append)
+    out = sample_within_memory(Sampler(prior, recipe, seeded(1)), seen, start(-0.2), lambda state,
+                               of: steps.append(state.step), said.append)
     assert torch.equal(out.denoised, unbroken.denoised) and torch.equal(out.x, unbroken.x)
     assert all(torch.equal(a, b) for a, b in zip(out.lights.parameters(), unbroken.lights.parameters(), strict=True))
     assert prior.network.low_memory and len(said) == 1 and f"step {at} of 6" in said[0]
@@ -118,13 +121,17 @@ def test_a_network_that_does_not_learn_keeps_less_for_the_same_gradient(norm, mo
     found = []
     for sparing in (True, False):
         if not sparing:
-            monkeypatch.setattr("core.solve.network._Shaped.of", lambda norm, convolution, x, mapped: convolution(torch.nn.functional.gelu(norm(x, mapped))))
+            monkeypatch.setattr("core.solve.network._Shaped.of", lambda norm, convolution, x,
+                                mapped: convolution(torch.nn.functional.gelu(norm(x, mapped))))
         x, kept = torch.linspace(-1, 1, 5 * 32 * 32).reshape(1, 5, 32, 32).requires_grad_(), {}
-        with torch.autograd.graph.saved_tensors_hooks(lambda saved, kept=kept: (kept.update({saved.data_ptr(): saved.nbytes}), saved)[1], lambda saved: saved):
+        with torch.autograd.graph.saved_tensors_hooks(lambda saved,
+                                                      kept=kept: (kept.update({saved.data_ptr(): saved.nbytes}),
+                                                                  saved)[1], lambda saved: saved):
             out = network(x, torch.tensor([0.5]))
         maps = sum(size for size in kept.values() if size >= 32 * 16 * 16 * 4)
         found.append((out.detach(), torch.autograd.grad(out.square().sum(), x)[0], maps))
-    assert torch.equal(found[0][0], found[1][0]) and torch.equal(found[0][1], found[1][1]) and found[0][1].abs().max() > 0
+    assert torch.equal(found[0][0],
+                       found[1][0]) and torch.equal(found[0][1], found[1][1]) and found[0][1].abs().max() > 0
     assert found[0][2] < 0.6 * found[1][2]
 
 
@@ -149,13 +156,15 @@ def test_the_stage_falls_back_and_its_maps_are_the_same(tmp_path, monkeypatch):
         said = solved(capture, **options, low_memory=low)
         assert any("step 3 of 4" in line and "low-memory" in line for line in said) == fails
         assert modes[0] == low and modes[-1]
-        assert {name: (capture.maps / name).read_bytes() == (plain.maps / name).read_bytes() for name in MAPS} == dict.fromkeys(MAPS, True)
+        assert {name: (capture.maps / name).read_bytes() == (plain.maps / name).read_bytes()
+                for name in MAPS} == dict.fromkeys(MAPS, True)
 
 
 def solved(capture, **options):
     """Runs the stage; what it said."""
     said = []
-    solve.run(capture, settings(**options), Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))))
+    solve.run(capture, settings(**options),
+              Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))))
     return said
 
 

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every error message of the add-on, the worker, the capture and the settings, and every reason for a greyed-out button, was said in some test.
+"""Every error message of the add-on, the worker, the capture and the settings, and every reason for a greyed-out
+button, was said in some test.
 
-Judged after all other tests, and only where all of them ran; `pytest --messages FILES` judges after any. `make test` runs them in several processes,
-which keep what they reached in a folder (`--reached`).
+Judged after all other tests, and only where all of them ran; `pytest --messages FILES` judges after any. `make test`
+runs them in several processes, which keep what they reached in a folder (`--reached`).
 """
 
 import ast
@@ -41,11 +42,13 @@ def test_what_other_processes_reached_counts(tmp_path, monkeypatch):
     monkeypatch.setattr(message_sites, "_reached", set())
     assert len(message_sites.unreached()) > 80
     message_sites.take_in(tmp_path / "reached")
-    assert message_sites._reached == everything and not any(sentence.startswith("core/contract/settings.py") for sentence in message_sites.unreached())
+    assert message_sites._reached == everything and not any(sentence.startswith("core/contract/settings.py")
+                                                            for sentence in message_sites.unreached())
 
 
 def test_a_sentence_is_noted_at_its_own_line():
-    call = next(call for call in message_sites.sentences("core/contract/settings.py") if "no quality" in ast.unparse(call))
+    call = next(call for call in message_sites.sentences("core/contract/settings.py")
+                if "no quality" in ast.unparse(call))
     message_sites._reached -= {("core/contract/settings.py", line) for line in range(call.lineno, call.end_lineno + 1)}
     assert any("no quality" in sentence for sentence in message_sites.unreached())
     with pytest.raises(Problem):

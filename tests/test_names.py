@@ -1,17 +1,20 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a file takes of another is there, read from the sources: benchmarks run for hours and are rarely run, so a name that moved would be missed for long."""
+"""What a file takes of another is there, read from the sources: benchmarks run for hours and are rarely run, so a name
+that moved would be missed for long."""
 
 import ast
 from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-FILES = sorted(path for folder in ("core", "benchmarks", "wildcap_addon", "tests") for path in (ROOT / folder).rglob("*.py"))
+FILES = sorted(path for folder in ("core", "benchmarks", "wildcap_addon", "tests")
+               for path in (ROOT / folder).rglob("*.py"))
 
 
 def missing_names(path: Path, text: str) -> list[str]:
-    """`from .room import name` and `room.name` in a file's text, where the repository's file `room` has no such name."""
+    """`from .room import name` and `room.name` in a file's text, where the repository's file `room` has no such
+    name."""
     tree = ast.parse(text)
     missing, modules = [], {}
     for node in (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)):
@@ -22,11 +25,16 @@ def missing_names(path: Path, text: str) -> list[str]:
             inner = module_at(base / alias.name)
             if inner is not None:
                 modules[alias.asname or alias.name] = inner
-            elif (outer := module_at(base)) is not None and "__getattr__" not in names_of(outer) and alias.name not in names_of(outer):
+            elif (
+                (outer := module_at(base)) is not None
+                and "__getattr__" not in names_of(outer)
+                and alias.name not in names_of(outer)
+            ):
                 missing.append(f"{node.lineno}: {alias.name} of {outer.relative_to(ROOT)}")
     rebound = {name.id for name in ast.walk(tree) if isinstance(name, ast.Name) and not isinstance(name.ctx, ast.Load)}
     rebound |= {argument.arg for argument in ast.walk(tree) if isinstance(argument, ast.arg)}
-    for node in (node for node in ast.walk(tree) if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)):
+    for node in (node for node in ast.walk(tree) if isinstance(node, ast.Attribute)
+                 and isinstance(node.value, ast.Name)):
         module = modules.get(node.value.id)
         if module is None or node.value.id in rebound or node.attr.startswith("__"):
             continue
@@ -38,7 +46,8 @@ def missing_names(path: Path, text: str) -> list[str]:
 def base_of(path: Path, node: ast.ImportFrom) -> Path | None:
     """The folder or file, without its ending, that `from ... import` names, where that is in the repository."""
     if node.level:
-        return path.parents[node.level - 1].joinpath(*(node.module or "").split(".")) if node.module else path.parents[node.level - 1]
+        return (path.parents[node.level - 1].joinpath(*(node.module or "").split(".")) if node.module
+                else path.parents[node.level - 1])
     base = ROOT.joinpath(*node.module.split("."))
     return base if module_at(base) is not None or base.is_dir() and base.parent == ROOT else None
 
@@ -59,16 +68,21 @@ def names_of(path: Path) -> frozenset[str]:
         elif isinstance(node, ast.Import | ast.ImportFrom):
             found |= {(alias.asname or alias.name).split(".")[0] for alias in node.names}
         else:
-            found |= {name.id for name in ast.walk(node) if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store)}
-            pending += [child for child in ast.iter_child_nodes(node) if isinstance(child, ast.stmt | ast.ExceptHandler)]
+            found |= {name.id for name in ast.walk(node) if isinstance(name, ast.Name)
+                      and isinstance(name.ctx, ast.Store)}
+            pending += [child for child in ast.iter_child_nodes(node)
+                        if isinstance(child, ast.stmt | ast.ExceptHandler)]
     return frozenset(found)
 
 
 def test_what_a_file_takes_of_another_is_there():
-    missing = [f"{path.relative_to(ROOT)}:{name}" for path in FILES for name in missing_names(path, path.read_text(encoding="utf-8"))]
+    missing = [f"{path.relative_to(ROOT)}:{name}" for path in FILES
+               for name in missing_names(path, path.read_text(encoding="utf-8"))]
     assert not missing, "\n".join(missing)
 
 
 def test_a_name_that_moved_is_seen():
-    text = "from ..geometry import meshes\nfrom ..geometry.meshes import Mesh, together\nmeshes.joined\nmeshes.together\n"
-    assert missing_names(ROOT / "core" / "synthetic" / "beside.py", text) == ["2: together of core/geometry/meshes.py", "4: meshes.together"]
+    text = ("from ..geometry import meshes\nfrom ..geometry.meshes import Mesh, "
+            "together\nmeshes.joined\nmeshes.together\n")
+    assert missing_names(ROOT / "core" / "synthetic" / "beside.py",
+                         text) == ["2: together of core/geometry/meshes.py", "4: meshes.together"]

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Eyes that were open while filming: marks lifted to the lids' edges, eyeballs placed by them, the head opened to meet them, and what that hides."""
+"""Eyes that were open while filming: marks lifted to the lids' edges, eyeballs placed by them, the head opened to meet
+them, and what that hides."""
 
 import json
 from dataclasses import replace
@@ -65,7 +66,8 @@ def seen_eye(rims: lid_marks.LidMarks, view: View) -> Eye:
 
 
 def off_curve(points: np.ndarray, curve: np.ndarray) -> np.ndarray:
-    fine = np.concatenate([a + (b - a) * np.linspace(0, 1, 20)[:, None] for a, b in zip(curve, curve[1:], strict=False)])
+    fine = np.concatenate([a + (b - a) * np.linspace(0, 1, 20)[:, None]
+                           for a, b in zip(curve, curve[1:], strict=False)])
     return np.linalg.norm(points[:, None] - fine[None], axis=2).min(1)
 
 
@@ -99,7 +101,8 @@ def test_an_eye_is_not_read_beyond_the_nose_nor_in_a_blink(person):
     eye = seen_eye(rims, view_from(0))
     shut = replace(eye, upper=eye.lower + 0.3 * (eye.upper - eye.lower))
     seen = [(0, eye), (-40, eye), (40, eye), (5, shut), (-60, eye)]
-    assert lid_marks.usable(seen, 0) == [0, 1]  # yaw is positive where the head turns to the picture's right, and hides its left eye
+    # yaw is positive where the head turns to the picture's right, and hides its left eye
+    assert lid_marks.usable(seen, 0) == [0, 1]
     assert lid_marks.usable(seen, 1) == [0, 2]
 
 
@@ -114,8 +117,10 @@ def test_lids_meet_the_edges_that_were_seen_and_balls_lie_behind_them(person, fi
         assert np.degrees(np.arccos(np.clip(ball.gaze @ true.gaze, -1, 1))) < 5
         for rim in (0, 1):
             points = found.opened.skin.vertices[found.opened.rims[side][rim]]
-            off = off_curve(points, np.concatenate([opened.skin.vertices[lids.corners()[side][1]][None], opened.skin.vertices[opened.rims[side][rim]],
-                                                    opened.skin.vertices[lids.corners()[side][0]][None]]))
+            off = off_curve(points,
+                            np.concatenate([opened.skin.vertices[lids.corners()[side][1]][None],
+                                            opened.skin.vertices[opened.rims[side][rim]],
+                                            opened.skin.vertices[lids.corners()[side][0]][None]]))
             assert off.mean() < 0.0003 and off.max() < 0.001
             clear = np.linalg.norm(points - ball.centre, axis=1) - ball.radius
             assert clear.min() > 0.9 * lids.CLEAR_M
@@ -156,7 +161,8 @@ def capture(tmp_path, fitted):
 
 
 def test_no_iris_is_seen_on_a_lid(capture, fitted):
-    """From the front, rays to the irises meet the closed head's lids, and the filmed head's eyeballs, which are none of its triangles."""
+    """From the front, rays to the irises meet the closed head's lids, and the filmed head's eyeballs, which are none of
+    its triangles."""
     _, found = fitted
     closed, filmed = read_head(capture), read_filmed_head(capture)
     assert filmed.built_in and len(filmed.mesh.faces) == len(closed.mesh.faces)
@@ -179,7 +185,8 @@ def test_the_record_of_the_eyes_comes_back_and_a_damaged_one_is_refused(capture)
     write_eyes(capture, left, replace(left, centre=(-0.03, 0.01, 0.0), views=0))
     assert read_eyes(capture) == (left, replace(left, centre=(-0.03, 0.01, 0.0), views=0))
     told = json.loads(capture.eyes.read_text())
-    damage = (("left", "radius", 0), ("right", "gaze", [0, 0, 0]), ("left", "centre", [0, 0]), ("left", "centre", [0, "a", 0]), ("right", "views", None))
+    damage = (("left", "radius", 0), ("right", "gaze", [0, 0, 0]), ("left", "centre", [0, 0]),
+              ("left", "centre", [0, "a", 0]), ("right", "views", None))
     for side, name, value in damage:
         broken = {**told, side: {**told[side], name: value}}
         capture.eyes.write_text(json.dumps(broken))

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""OpenDelight: our functions against plain modules of the published names, the alignment, and files that are no checkpoint.
+"""OpenDelight: our functions against plain modules of the published names, the alignment, and files that are no
+checkpoint.
 
 The checkpoints are random; nothing here was seen by the authors' weights.
 """
@@ -36,7 +37,8 @@ class Block(nn.Module):
         super().__init__()
         self.norm1, self.norm2 = nn.LayerNorm(width, 1e-6), nn.LayerNorm(width, 1e-6)
         self.attn = nn.ModuleDict({"qkv": nn.Linear(width, 3 * width), "proj": nn.Linear(width, width)})
-        self.mlp = nn.Sequential(OrderedDict(fc1=nn.Linear(width, 4 * width), act=nn.GELU(), fc2=nn.Linear(4 * width, width)))
+        self.mlp = nn.Sequential(OrderedDict(fc1=nn.Linear(width, 4 * width), act=nn.GELU(),
+                                             fc2=nn.Linear(4 * width, width)))
 
     def forward(self, x):
         heads = self.attn["qkv"](self.norm1(x)).split(x.shape[-1], -1)
@@ -56,7 +58,8 @@ class Encoder(nn.Module):
         self.norm = nn.LayerNorm(width, 1e-6)
 
     def forward(self, picture):
-        x = self.patch_embed["proj"]((picture - torch.tensor([0.485, 0.456, 0.406])[:, None, None]) / torch.tensor([0.229, 0.224, 0.225])[:, None, None])
+        x = self.patch_embed["proj"]((picture - torch.tensor([0.485, 0.456, 0.406])[:, None, None])
+                                     / torch.tensor([0.229, 0.224, 0.225])[:, None, None])
         width, side = x.shape[1], x.shape[2]
         for at in range(side):
             for k in range(width // 4):
@@ -74,10 +77,13 @@ class Base(nn.Module):
     def __init__(self, width, depth, channels):
         super().__init__()
         self.encoder = Encoder(width, depth)
-        layers = [layer for i in range(4) for layer in (nn.ConvTranspose2d(channels if i else width, channels, 4, 2, 1, bias=False),
-                                                        nn.InstanceNorm2d(channels), nn.SiLU())]
-        more = [layer for _ in range(4) for layer in (nn.Conv2d(channels, channels, 1), nn.InstanceNorm2d(channels), nn.SiLU())]
-        self.decoder = nn.Sequential(OrderedDict(deconv_layers=nn.Sequential(*layers), conv_layers=nn.Sequential(*more), cls_conv=nn.Conv2d(channels, 3, 1)))
+        layers = [layer for i in range(4)
+                  for layer in (nn.ConvTranspose2d(channels if i else width, channels, 4, 2, 1, bias=False),
+                                nn.InstanceNorm2d(channels), nn.SiLU())]
+        more = [layer for _ in range(4)
+                for layer in (nn.Conv2d(channels, channels, 1), nn.InstanceNorm2d(channels), nn.SiLU())]
+        self.decoder = nn.Sequential(OrderedDict(deconv_layers=nn.Sequential(*layers), conv_layers=nn.Sequential(*more),
+                                                 cls_conv=nn.Conv2d(channels, 3, 1)))
 
     def forward(self, picture):
         return torch.sigmoid(self.decoder(self.encoder(picture)))
@@ -88,7 +94,8 @@ class Residual(nn.Module):
         super().__init__()
         convolutions = [nn.Conv2d(into, out, 3, padding=1), nn.Conv2d(out, out, 3, padding=1)]
         norms = [nn.BatchNorm2d(out if first else into), nn.BatchNorm2d(out)]
-        layers = [part for c, n in zip(convolutions, norms, strict=True) for part in ([c, n, nn.LeakyReLU(0.02)] if first else [n, nn.LeakyReLU(0.02), c])]
+        layers = [part for c, n in zip(convolutions, norms, strict=True)
+                  for part in ([c, n, nn.LeakyReLU(0.02)] if first else [n, nn.LeakyReLU(0.02), c])]
         self.res_conv = nn.Sequential(*layers)
         if into != out:
             self.addtion_layer = nn.Conv2d(into, out, 1)
@@ -102,7 +109,8 @@ class Enhancer(nn.Module):
         super().__init__()
         self.inc_1 = Residual(6, w, first=True)
         for i, (into, out) in enumerate(((1, 2), (2, 4), (4, 8), (8, 8)), 1):
-            setattr(self, f"down{i}_1", nn.ModuleDict({"resdown_conv": nn.Sequential(nn.MaxPool2d(2), Residual(into * w, out * w))}))
+            setattr(self, f"down{i}_1",
+                    nn.ModuleDict({"resdown_conv": nn.Sequential(nn.MaxPool2d(2), Residual(into * w, out * w))}))
         for i, (into, out) in enumerate(((16, 4), (8, 2), (4, 1), (2, 1)), 1):
             setattr(self, f"up{i}_1", nn.ModuleDict({"conv": Residual(into * w, out * w)}))
         self.outc_1 = nn.ModuleDict({"conv": nn.Conv2d(w, 3, 1)})
@@ -113,7 +121,10 @@ class Enhancer(nn.Module):
             levels.append(getattr(self, f"down{i}_1")["resdown_conv"](levels[-1]))
         x = levels.pop()
         for i in range(1, 5):
-            x = getattr(self, f"up{i}_1")["conv"](torch.cat([levels.pop(), nn.Upsample(scale_factor=2, mode="bilinear", align_corners=True)(x)], 1))
+            x = getattr(self,
+                        f"up{i}_1")["conv"](torch.cat([levels.pop(),
+                                                       nn.Upsample(scale_factor=2, mode="bilinear",
+                                                                   align_corners=True)(x)], 1))
         return torch.sigmoid(self.outc_1["conv"](x))
 
 
@@ -147,7 +158,8 @@ def test_the_shapes_asked_for_are_the_published_ones():
     for module, shapes, ours in zip(plain, (base(), enhancer()), (base_shapes, enhancer_shapes), strict=True):
         state = module.state_dict()
         assert {name: tuple(tensor.shape) for name, tensor in state.items()} == shapes == ours(state)
-    assert sum(np.prod(shape) for shape in base().values()) == 105_580_035  # 85,653,504 of ViT-B and its tokens, 19,926,531 of the decoder
+    # 85,653,504 of ViT-B and its tokens, 19,926,531 of the decoder
+    assert sum(np.prod(shape) for shape in base().values()) == 105_580_035
 
 
 def test_the_first_network_is_the_plain_one(checkpoint):
@@ -175,7 +187,10 @@ def test_a_face_stands_upright_in_its_crop():
     to_crop = alignment(face, 512, 0.85)
     points = face.landmarks[:, :2] @ to_crop[:, :2].T + to_crop[:, 2]
     right, left, mouth = points[33], points[263], points[[61, 291]].mean(0)
-    assert right[1] == pytest.approx(left[1], abs=0.01) and left[0] > right[0] and (right + left)[0] / 2 == pytest.approx(256, abs=0.01)
+    assert right[1] == pytest.approx(left[1],
+                                     abs=0.01) and left[0] > right[0] and (right
+                                                                           + left)[0] / 2 == pytest.approx(256,
+                                                                                                           abs=0.01)
     assert mouth[0] == pytest.approx(256, abs=0.01)
     half = max(2.0 * 60, 1.8 * 72) * 0.85  # the published rule, for eyes 60 apart and 72 above the mouth
     assert mouth[1] - left[1] == pytest.approx(72 * 512 / (2 * half), rel=1e-4)
@@ -217,7 +232,9 @@ def frames(monkeypatch, folder, pictures):
 
 
 def run(folder, checkpoint, report):
-    return list(room.opendelight(Capture(folder), from_json({"delight": {"delighter": "opendelight", "checkpoint": str(checkpoint)}}), report))
+    return list(room.opendelight(Capture(folder),
+                                 from_json({"delight": {"delighter": "opendelight", "checkpoint": str(checkpoint)}}),
+                                 report))
 
 
 def test_frames_with_a_face_are_delit_and_others_left_out(tmp_path, monkeypatch, checkpoint, portrait):
@@ -259,12 +276,16 @@ def test_without_the_second_file_the_detail_is_not_enhanced(tmp_path, checkpoint
 
 
 @pytest.mark.parametrize(("make", "what"), [
-    (lambda folder, state: torch.save({n: t for n, t in state.items() if n != "decoder.cls_conv.bias"}, folder / BASE), "decoder.cls_conv.bias is missing"),
-    (lambda folder, state: torch.save({**state, "encoder.mask_token": torch.zeros(1)}, folder / BASE), "encoder.mask_token is not part of it"),
-    (lambda folder, state: torch.save({**state, "encoder.norm.bias": torch.zeros(7)}, folder / BASE), "encoder.norm.bias is 7, not 64"),
+    (lambda folder, state: torch.save({n: t for n, t in state.items() if n != "decoder.cls_conv.bias"}, folder / BASE),
+     "decoder.cls_conv.bias is missing"),
+    (lambda folder, state: torch.save({**state, "encoder.mask_token": torch.zeros(1)}, folder / BASE),
+     "encoder.mask_token is not part of it"),
+    (lambda folder, state: torch.save({**state, "encoder.norm.bias": torch.zeros(7)}, folder / BASE),
+     "encoder.norm.bias is 7, not 64"),
     (lambda folder, state: torch.save({"epoch": 3}, folder / BASE), "encoder.patch_embed.proj.weight is missing"),
     (lambda folder, state: torch.save([1, 2], folder / BASE), "its first tensors"),
-    (lambda folder, state: torch.save({n: t for n, t in state.items() if "deconv_layers.9" not in n}, folder / BASE), "do not undo patches"),
+    (lambda folder, state: torch.save({n: t for n, t in state.items() if "deconv_layers.9" not in n}, folder / BASE),
+     "do not undo patches"),
     (lambda folder, state: (folder / BASE).write_bytes(b"no checkpoint"), "cannot be read as weights"),
     (lambda folder, state: torch.save({"run": print}, folder / BASE), "cannot be read as weights"),
     (lambda folder, state: None, "There is no OpenDelight checkpoint"),
@@ -290,6 +311,7 @@ def test_a_width_that_has_no_heads_is_refused(tmp_path):
 def test_the_terminal_names_the_checkpoint(tmp_path, monkeypatch):
     monkeypatch.setattr(terminal.terminal, "follow", lambda *_: 0)
     (tmp_path / "film.mp4").write_bytes(b"film")
-    command = ["run", str(tmp_path / "film.mp4"), str(tmp_path / "c.wildcap"), "--delighter", "opendelight", "--checkpoint", str(tmp_path)]
+    command = ["run", str(tmp_path / "film.mp4"), str(tmp_path / "c.wildcap"), "--delighter", "opendelight",
+               "--checkpoint", str(tmp_path)]
     assert terminal.main(command) == 0
     assert read_job(Capture(tmp_path / "c.wildcap").job).settings.delight.checkpoint == str(tmp_path)

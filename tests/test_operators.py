@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What F3 finds: every operator in every mode, with and without a capture, works or says in plain words why not; never a traceback."""
+"""What F3 finds: every operator in every mode, with and without a capture, works or says in plain words why not; never
+a traceback."""
 
 import shutil
 
@@ -8,8 +9,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-ASKS = {"choose_video": {"filepath": "/none.mp4"}, "open_capture": {"directory": "/none"}, "open_batch": {"directory": "/none"},
-        "use_python": {"filepath": "/none"}}
+ASKS = {"choose_video": {"filepath": "/none.mp4"}, "open_capture": {"directory": "/none"},
+        "open_batch": {"directory": "/none"}, "use_python": {"filepath": "/none"}}
 
 
 @pytest.fixture
@@ -83,6 +84,6 @@ def test_with_a_capture_each_operator_works_or_says_why_not(operators, capture, 
 def test_every_operator_has_a_tooltip_and_a_label(operators):
     for name in operators:
         kind = getattr(bpy.types, f"WILDCAP_OT_{name}")
-        tooltip = kind.bl_rna.description
+        tooltip = getattr(bpy.ops.wildcap, name).get_rna_type().description
         assert kind.bl_rna.name and len(tooltip) > 15 and not tooltip.endswith("."), name
         assert "\n" not in tooltip and "  " not in tooltip, name

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The artist's own head mesh: any units, axes and polygons; where each of its vertices belongs is known for a made one."""
+"""The artist's own head mesh: any units, axes and polygons; where each of its vertices belongs is known for a made
+one."""
 
 from pathlib import Path
 
@@ -25,14 +26,16 @@ EYES = np.array([[-0.0315, -0.004, 0.0], [0.0315, -0.004, 0.0]])
 
 
 def coarse(folder: Path) -> tuple[Path, np.ndarray]:
-    """The neutral head with a third of its vertices, of quads and triangles, with eyeballs, in centimetres and Y up; and which vertices of ours they are."""
+    """The neutral head with a third of its vertices, of quads and triangles, with eyeballs, in centimetres and Y up;
+    and which vertices of ours they are."""
     mesh = template.load()
     place = np.floor(mesh.vertices / 0.0055).astype(np.int64)
     _, of = np.unique(place, axis=0, return_inverse=True)
     of = of.ravel()
     mean = np.stack([np.bincount(of, mesh.vertices[:, i]) for i in range(3)], 1) / np.bincount(of)[:, None]
     distance = np.linalg.norm(mesh.vertices - mean[of], axis=1)
-    chosen = np.array([members[distance[members].argmin()] for members in np.split(np.argsort(of, kind="stable"), np.cumsum(np.bincount(of))[:-1])])
+    chosen = np.array([members[distance[members].argmin()]
+                       for members in np.split(np.argsort(of, kind="stable"), np.cumsum(np.bincount(of))[:-1])])
     faces = of[mesh.faces]
     faces = faces[(faces != np.roll(faces, 1, 1)).all(1)]
     faces = faces[np.sort(np.unique(np.sort(faces, 1), axis=0, return_index=True)[1])]
@@ -58,9 +61,11 @@ def coarse(folder: Path) -> tuple[Path, np.ndarray]:
         else:
             polygons.append(list(faces[f]))
     count = len(chosen)
-    lines = ["o Head", *(f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in points), *(f"vt {u:.6f} {v:.6f}" for u, v in uv[chosen])]
+    lines = ["o Head", *(f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in points),
+             *(f"vt {u:.6f} {v:.6f}" for u, v in uv[chosen])]
     lines += ["f " + " ".join(f"{v + 1}/{v + 1}" for v in polygon) for polygon in polygons] + ["g Eyes"]
-    lines += [f"f {a}/1 {b}/1 {c}/1" for offset in (count, count + len(ball.vertices)) for a, b, c in ball.faces + offset + 1]
+    lines += [f"f {a}/1 {b}/1 {c}/1" for offset in (count, count + len(ball.vertices))
+              for a, b, c in ball.faces + offset + 1]
     (folder / "coarse head.obj").write_text("\n".join(lines) + "\n")
     return folder / "coarse head.obj", chosen
 
@@ -73,7 +78,8 @@ def test_a_made_mesh_goes_where_its_vertices_belong(tmp_path):
     error = np.linalg.norm(mesh.vertices[:len(chosen)] - truth.vertices[chosen], axis=1)
     face = registration.weights_of(registration.load_model())[0][chosen] > 0.5
     by_scale = alignment.similarity(neutral, truth.vertices, np.ones(len(neutral))).apply(neutral)
-    assert np.median(np.linalg.norm(by_scale - truth.vertices, axis=1)[chosen][face]) > 0.002, "the person differs from the neutral head"
+    assert np.median(np.linalg.norm(by_scale - truth.vertices,
+                                    axis=1)[chosen][face]) > 0.002, "the person differs from the neutral head"
     assert np.median(error[face]) < 0.001 and np.percentile(error[face], 95) < 0.002
     assert report.figures["own_to_head_median_mm"] < 0.15 and report.figures["own_flipped_triangles"] <= 5
     for eye, middle in zip(np.split(mesh.vertices[len(chosen):], 2), EYES, strict=True):
@@ -97,7 +103,8 @@ def test_the_head_of_the_valid_avatars_is_laid_over_ours(tmp_path):
     check_head_of_others(path, *lay_over(path, tmp_path), shapes=0, median=0.2, p95=1.8)
 
 
-def check_head_of_others(path: Path, capture: Capture, report: Reporter, shapes: int, median: float, p95: float) -> None:
+def check_head_of_others(path: Path, capture: Capture, report: Reporter, shapes: int, median: float,
+                         p95: float) -> None:
     own = own_mesh.read(str(path), report)
     assert report.figures["own_shapes"] == shapes == len(own.shapes) and report.figures["own_uvs"] == "the artist's"
     assert report.figures["own_to_head_median_mm"] < median and report.figures["own_to_head_p95_mm"] < p95
@@ -134,7 +141,9 @@ def test_uvs_that_cannot_be_baked_into_are_refused_until_an_atlas_is_allowed(tmp
     assert uvs == "a new atlas" and atlas.overlap_share(unwrapped.mesh) < 0.01
     own_mesh.write(tmp_path / "out.obj", unwrapped, mesh.vertices)
     back = meshes.read_obj(tmp_path / "out.obj")
-    assert np.array_equal(back.faces, mesh.faces) and np.allclose(back.uvs[back.face_uvs], unwrapped.mesh.uvs[unwrapped.mesh.face_uvs], atol=1e-6)
+    assert np.array_equal(back.faces,
+                          mesh.faces) and np.allclose(back.uvs[back.face_uvs],
+                                                      unwrapped.mesh.uvs[unwrapped.mesh.face_uvs], atol=1e-6)
 
 
 def test_parts_without_a_counterpart_follow_the_skin_around_them():
@@ -151,8 +160,8 @@ def test_parts_without_a_counterpart_follow_the_skin_around_them():
 
 
 @pytest.mark.parametrize(("content", "match"), [
-    ("v 0 0 0\n", "no faces"), ("v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\n", "3 vertices"), ("v 0 0 nan\nv 1 0 0\nv 0 1 1\nf 1 2 3\n", "no numbers"),
-    ("v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 9\n", "not in it"),
+    ("v 0 0 0\n", "no faces"), ("v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\n", "3 vertices"),
+    ("v 0 0 nan\nv 1 0 0\nv 0 1 1\nf 1 2 3\n", "no numbers"), ("v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 9\n", "not in it"),
 ])
 def test_what_is_no_head_mesh_is_refused(tmp_path, content, match):
     (tmp_path / "a.obj").write_text(content)
@@ -170,7 +179,8 @@ def test_a_folder_needs_one_neutral_and_shapes_of_it(tmp_path):
     meshes.write_obj(tmp_path / "identity000.obj", mesh.moved(mesh.vertices + [0, 0, 0.01]))
     meshes.write_obj(tmp_path / "smile.obj", mesh.moved(mesh.vertices + [0, 0, 0.01]))
     own = own_mesh.read(str(tmp_path), Reporter("x"))
-    assert np.allclose(own.shapes[0, :, 2], 0.01, atol=1e-5) and np.allclose(own.shapes[1, :, 2], 0.01 * own_mesh.EXPRESSION_SIGMA, atol=1e-5)
+    assert np.allclose(own.shapes[0, :, 2], 0.01,
+                       atol=1e-5) and np.allclose(own.shapes[1, :, 2], 0.01 * own_mesh.EXPRESSION_SIGMA, atol=1e-5)
     (tmp_path / "smile.obj").write_text("v 0 0 0\n")
     with pytest.raises(Problem, match="1 vertices"):
         own_mesh.read(str(tmp_path), Reporter("x"))

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What WildCap did not write it never deletes or overwrites; what it wrote and somebody changed is kept aside; what a killed writer left goes."""
+"""What WildCap did not write it never deletes or overwrites; what it wrote and somebody changed is kept aside; what a
+killed writer left goes."""
 
 import json
 import os
@@ -46,7 +47,9 @@ def test_a_file_of_ours_is_replaced_and_one_that_was_changed_is_kept_aside(captu
     with replacing(path) as temporary:
         temporary.write_text("five")
     assert path.read_text() == "five"
-    assert (capture.root / "kept" / "texture.txt").read_text() == "by hand" and (capture.root / "kept" / "texture_2.txt").read_text() == "by hand again"
+    assert (capture.root / "kept"
+            / "texture.txt").read_text() == "by hand" and (capture.root / "kept"
+                                                           / "texture_2.txt").read_text() == "by hand again"
 
 
 def test_a_stranger_under_a_name_of_ours_is_kept_aside(capture):
@@ -75,7 +78,8 @@ def test_every_file_of_a_capture_has_the_users_mode(capture):
         os.close(os.open(folder / "b.bin", os.O_CREAT | os.O_WRONLY, 0o600))
     (capture.root.parent / "theirs").write_text("")
     usual = (capture.root.parent / "theirs").stat().st_mode
-    assert {(capture.root / "a.bin").stat().st_mode, (capture.frames / "b.bin").stat().st_mode, capture.json.stat().st_mode} == {usual}
+    assert {(capture.root / "a.bin").stat().st_mode, (capture.frames / "b.bin").stat().st_mode,
+            capture.json.stat().st_mode} == {usual}
 
 
 # -- folders
@@ -96,7 +100,8 @@ def test_a_changed_file_in_a_folder_of_ours_is_kept_aside_whether_there_is_a_new
         (capture.frames / name).write_text(f"retouched {name}")
     make_frames(capture, "00000.jpg", text="new")
     assert contents(capture.frames) == {"00000.jpg": b"new"}
-    assert contents(capture.root / "kept") == {f"frames/{name}": f"retouched {name}".encode() for name in ("00000.jpg", "00001.jpg")}
+    assert contents(capture.root / "kept") == {f"frames/{name}": f"retouched {name}".encode()
+                                               for name in ("00000.jpg", "00001.jpg")}
 
 
 KILLED = """
@@ -132,7 +137,8 @@ def test_killed_at_any_rename_nothing_is_lost_and_the_next_run_clears_up(capture
     with capture.locked():
         assert not [path for path in capture.root.rglob(".*")], "what the killed one left is gone"
     found = contents(capture.root)
-    assert {found[name] for name in found if name.startswith("frames/holiday") or name.startswith("frames/z")} == {b"holiday.jpg", b"z.jpg"}
+    assert {found[name] for name in found if name.startswith("frames/holiday")
+            or name.startswith("frames/z")} == {b"holiday.jpg", b"z.jpg"}
     assert found["frames/00000.jpg"] in (b"frame", b"new")
     assert b"retouched" in found.values()
 
@@ -141,7 +147,8 @@ def test_killed_at_any_rename_nothing_is_lost_and_the_next_run_clears_up(capture
 def test_killed_while_it_writes_the_captures_own_books_leaves_nothing_either(tmp_path, at):
     """capture.json when the folder becomes a capture (at 0: its first rename), and job.json."""
     root = tmp_path / "anna.wildcap"
-    code = KILLED.replace("with replacing_folder", "Capture({capture!r}).claim()\nwith replacing").replace(".frames)", ".job)").replace(
+    code = KILLED.replace("with replacing_folder",
+                          "Capture({capture!r}).claim()\nwith replacing").replace(".frames)", ".job)").replace(
         '(folder / "00000.jpg")', "folder").replace("import replacing_folder", "import replacing")
     subprocess.run([sys.executable, "-c", code.format(root=str(ROOT), at=at, capture=str(root))], check=False)
     assert len(list(root.glob(".*.tmp.json"))) == 1
@@ -187,8 +194,10 @@ with Capture({str(capture.root)!r}).workspace() as work:
 def test_a_capture_of_0_1_0_gets_a_record_of_what_it_wrote_and_of_nothing_else(tmp_path):
     root = tmp_path / "old.wildcap"
     (root / "frames").mkdir(parents=True)
-    for name, text in (("frames/00000.jpg", "frame"), ("frames/frames.json", "{}"), ("frames/2026 holiday.jpg", "a picture"), ("head.obj", "head"),
-                       ("notes.txt", "mine"), (".scan.99999999.tmp.ply", "half"), ("frames/.00001.99999999.tmp.jpg", "half"),
+    for name, text in (("frames/00000.jpg", "frame"), ("frames/frames.json", "{}"),
+                       ("frames/2026 holiday.jpg", "a picture"), ("head.obj", "head"),
+                       ("notes.txt", "mine"), (".scan.99999999.tmp.ply", "half"),
+                       ("frames/.00001.99999999.tmp.jpg", "half"),
                        ("frames/.mine.1.tmp.jpg", "mine"), (".notes.old", "mine")):
         (root / name).write_text(text)
     (root / ".maps.99999999.tmp").mkdir()
@@ -196,13 +205,16 @@ def test_a_capture_of_0_1_0_gets_a_record_of_what_it_wrote_and_of_nothing_else(t
     capture = Capture(root)
     with capture.locked():
         pass
-    assert not any((root / name).exists() for name in (".scan.99999999.tmp.ply", "frames/.00001.99999999.tmp.jpg", ".maps.99999999.tmp"))
-    assert (root / "frames" / ".mine.1.tmp.jpg").read_text() == (root / ".notes.old").read_text() == "mine", "such names are not 0.1.0's alone"
+    assert not any((root / name).exists()
+                   for name in (".scan.99999999.tmp.ply", "frames/.00001.99999999.tmp.jpg", ".maps.99999999.tmp"))
+    assert (root / "frames" / ".mine.1.tmp.jpg").read_text() == (root / ".notes.old").read_text() == "mine", (
+        "such names are not 0.1.0's alone"
+    )
     make_frames(capture, "00000.jpg", text="new")
     with replacing(capture.head) as temporary:
         temporary.write_text("new")
-    assert contents(root).keys() == {"capture.json", "frames/00000.jpg", "frames/2026 holiday.jpg", "head.obj", "notes.txt", ".notes.old",
-                                     "frames/.mine.1.tmp.jpg"}
+    assert contents(root).keys() == {"capture.json", "frames/00000.jpg", "frames/2026 holiday.jpg", "head.obj",
+                                     "notes.txt", ".notes.old", "frames/.mine.1.tmp.jpg"}
 
 
 def test_the_first_thing_written_into_a_capture_of_0_1_0_does_not_hide_what_it_wrote(tmp_path):
@@ -238,7 +250,8 @@ def test_a_record_with_a_line_cut_off_is_read_and_a_lost_one_loses_no_file(captu
         file.write(b'{"path": "frames/000')
     make_frames(capture, "00000.jpg", text="new")
     make_frames(capture, "00000.jpg", text="newer")
-    assert contents(capture.root).keys() == {"capture.json", "frames/00000.jpg"}, "the line after it is a line of its own"
+    assert contents(capture.root).keys() == {"capture.json",
+                                             "frames/00000.jpg"}, "the line after it is a line of its own"
     with open(record, "ab") as file:
         file.write(b'{"path": "frames/000')
     (capture.root / "a.txt").write_text("ours")
@@ -262,7 +275,9 @@ def test_a_long_record_is_shortened_to_what_is_there(capture, monkeypatch):
     lines = [json.loads(line) for line in (capture.root / ownership.RECORD).read_text().splitlines()]
     assert [line["path"] for line in lines] == ["frames/00000.jpg", "shadow_mask.png"], "what was changed is not ours"
     make_frames(capture, "00000.jpg", text="new")
-    assert contents(capture.root / "kept") == {"frames/00001.jpg": b"retouched"} or (capture.frames / "00001.jpg").read_text() == "retouched"
+    assert contents(capture.root
+                    / "kept") == {"frames/00001.jpg": b"retouched"} or (capture.frames
+                                                                        / "00001.jpg").read_text() == "retouched"
 
 
 def test_a_copy_of_a_capture_knows_what_is_ours_by_content(capture, tmp_path):

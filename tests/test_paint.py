@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Painting the shadow mask, as far as it goes without a window: files, orientation, set-up and leaving. Strokes are tests/gui/."""
+"""Painting the shadow mask, as far as it goes without a window: files, orientation, set-up and leaving. Strokes are
+tests/gui/."""
 
 import numpy as np
 import pytest
@@ -53,7 +54,8 @@ def test_painting_sets_everything_up_and_leaving_puts_it_back(addon, capture, on
     for mode in ('TEXTURE_PAINT', 'OBJECT'):  # Blender gives the mode its first brush
         bpy.ops.object.mode_set(mode=mode)
     paint = bpy.context.scene.tool_settings.image_paint
-    before = {name: getattr(paint, name) for name in ("mode", "canvas", "use_stencil_layer", "stencil_image", "invert_stencil", "brush")}
+    before = {name: getattr(paint, name)
+              for name in ("mode", "canvas", "use_stencil_layer", "stencil_image", "invert_stencil", "brush")}
     objects = {o.name for o in bpy.data.objects}
     bpy.ops.wildcap.paint_mask(on=on)
     assert bpy.context.mode == 'PAINT_TEXTURE'
@@ -93,7 +95,9 @@ def test_strokes_reach_the_capture_while_the_artist_paints_on(addon, capture, mo
         session.wait()
         assert file() == mask_image.grey_png(mask_image.mask_values(image)) != before
         before = file()
-    assert [p.read_bytes() for p in (capture / "mask_history").iterdir()] == [standin.plain((77,))], "one session is one step of the history"
+    assert [p.read_bytes()
+            for p in (capture
+                      / "mask_history").iterdir()] == [standin.plain((77,))], "one session is one step of the history"
     bpy.ops.wildcap.finish_mask()
     assert file() == before
 
@@ -141,8 +145,11 @@ def test_what_is_protected_is_a_mask_of_its_own(addon, capture):
     spot[10:14, 20:24] = 1
     mask_image.set_values(paint.stencil_image, spot)
     bpy.ops.wildcap.paint_mask(mask='SHADOW', on='SHEET')
-    assert (capture / "protect_mask.png").read_bytes() == mask_image.grey_png(spot), "turning to the other mask saves this one"
-    assert session.painted_kind() == 'SHADOW' and session.on_sheet() and paint.stencil_image.name.endswith("Shadow Mask")
+    assert (capture
+            / "protect_mask.png").read_bytes() == mask_image.grey_png(spot), "turning to the other mask saves this one"
+    assert (
+        session.painted_kind() == 'SHADOW' and session.on_sheet() and paint.stencil_image.name.endswith("Shadow Mask")
+    )
     bpy.ops.wildcap.finish_mask()
     bpy.ops.wildcap.paint_mask(mask='PROTECT')
     assert np.array_equal(mask_image.mask_values(paint.stencil_image), spot)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A painting session from its outside: what an artist had comes back exactly, and no mask is lost to files, other programs or a closed Blender."""
+"""A painting session from its outside: what an artist had comes back exactly, and no mask is lost to files, other
+programs or a closed Blender."""
 
 import os
 
@@ -22,7 +23,8 @@ def state(thing, without=()) -> dict:
         if prop.type == 'POINTER':
             found[prop.identifier] = getattr(value, "name", None)
         else:
-            found[prop.identifier] = tuple(value) if getattr(prop, "is_array", False) and not isinstance(value, str) else value
+            found[prop.identifier] = (tuple(value) if getattr(prop, "is_array", False) and not isinstance(value, str)
+                                      else value)
     return found
 
 
@@ -34,9 +36,12 @@ def everything() -> dict:
     unified = getattr(context.scene.tool_settings, "unified_paint_settings", None) or paint.unified_paint_settings
     active = context.view_layer.objects.active
     return {
-        "mode": context.mode, "active": active.name if active else None, "selected": [o.name for o in context.view_layer.objects if o.select_get()],
-        "hidden": [o.name for o in context.view_layer.objects if o.hide_get()], "objects": sorted(o.name for o in bpy.data.objects),
-        "brushes": sorted(b.name for b in bpy.data.brushes if b.library is None), "paint": state(paint, ("tool_slots",)), "unified": state(unified),
+        "mode": context.mode, "active": active.name if active else None,
+        "selected": [o.name for o in context.view_layer.objects if o.select_get()],
+        "hidden": [o.name for o in context.view_layer.objects if o.hide_get()],
+        "objects": sorted(o.name for o in bpy.data.objects),
+        "brushes": sorted(b.name for b in bpy.data.brushes if b.library is None),
+        "paint": state(paint, ("tool_slots",)), "unified": state(unified),
         "brush": state(paint.brush) if paint.brush else None,
         "shading": [state(s.shading) for s in spaces], "overlay": [state(s.overlay) for s in spaces],
         "canvas": state(paint.canvas, ("is_dirty", "bindcode")) if paint.canvas else None,
@@ -54,7 +59,8 @@ def test_leaving_gives_back_what_the_artist_had(addon, capture, mode, shading):
     bpy.context.object.name = "Mine"
     paint = bpy.context.scene.tool_settings.image_paint
     paint.mode, paint.canvas = 'IMAGE', bpy.data.images.new("My Canvas", 8, 8)
-    paint.stencil_image, paint.use_stencil_layer, paint.stencil_color = bpy.data.images.new("My Stencil", 8, 8), False, (0.25, 0.5, 0.75)
+    paint.stencil_image, paint.use_stencil_layer, paint.stencil_color = bpy.data.images.new("My Stencil", 8,
+                                                                                            8), False, (0.25, 0.5, 0.75)
     paint.invert_stencil = True
     if paint.brush is not None:
         paint.brush.color, paint.brush.size, paint.brush.strength = (0.125, 0.25, 0.5), 77, 0.5
@@ -62,7 +68,11 @@ def test_leaving_gives_back_what_the_artist_had(addon, capture, mode, shading):
         if area.type == 'VIEW_3D':
             space = area.spaces.active
             space.shading.light, space.shading.color_type = 'MATCAP', 'RANDOM'
-            space.shading.type, space.overlay.show_overlays, space.overlay.texture_paint_mode_opacity = shading, False, 0.125
+            space.shading.type, space.overlay.show_overlays, space.overlay.texture_paint_mode_opacity = (
+                shading,
+                False,
+                0.125,
+            )
     bpy.ops.object.mode_set(mode=mode)
     before = everything()
     for on, mask in (('HEAD', 'SHADOW'), ('SHEET', 'SHADOW'), ('SHEET', 'PROTECT'), ('HEAD', 'PROTECT')):
@@ -90,7 +100,8 @@ def test_what_an_undo_brings_back_is_followed_and_nothing_of_the_painting_is_lef
     files.settle()
     assert session.on_sheet() and bpy.context.mode == 'PAINT_TEXTURE'
     bpy.ops.wildcap.finish_mask()
-    assert "WildCap Mask Sheet" not in bpy.data.objects and {o.name for o in bpy.context.view_layer.objects if o.visible_get()} == visible
+    assert "WildCap Mask Sheet" not in bpy.data.objects and {o.name for o in bpy.context.view_layer.objects
+                                                             if o.visible_get()} == visible
     bpy.ops.ed.undo_push(message="left")
     bpy.ops.ed.undo()  # into the painting that has ended
     files.settle()
@@ -127,7 +138,8 @@ def test_a_brush_that_blenders_mask_tool_links_goes_and_others_of_a_library_stay
     with bpy.data.libraries.load(str(library), link=True) as (there, wanted):
         wanted.brushes = there.brushes
     bpy.ops.wildcap.finish_mask()
-    assert [b.name for b in bpy.data.brushes if b.library is not None and bpy.path.abspath(b.library.filepath) == str(library)] == ["Fill"]
+    assert [b.name for b in bpy.data.brushes if b.library is not None
+            and bpy.path.abspath(b.library.filepath) == str(library)] == ["Fill"]
 
 
 def test_mirrored_strokes_go_with_the_artist_to_the_sheet_and_back_and_stay_with_the_painting(addon, capture):
@@ -187,7 +199,11 @@ def test_a_file_saved_while_painting_goes_on_painting_and_leaves_as_it_began(add
     mask_image.set_values(session.mask(), painted)
     bpy.ops.wildcap.finish_mask()
     assert (capture / "shadow_mask.png").read_bytes() == mask_image.grey_png(painted)
-    assert bpy.context.mode == 'SCULPT' and "WildCap Mask Sheet" not in bpy.data.objects and "WildCap Mask" not in bpy.data.brushes
+    assert (
+        bpy.context.mode == 'SCULPT'
+        and "WildCap Mask Sheet" not in bpy.data.objects
+        and "WildCap Mask" not in bpy.data.brushes
+    )
     bpy.ops.object.mode_set(mode='OBJECT')
 
 
@@ -209,7 +225,8 @@ def test_the_newer_mask_of_file_and_capture_wins_and_the_other_goes_to_the_histo
     os.utime(blend, (2e9, 2e9) if newer == "file" else (1e9, 1e9))
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     winner, loser = (mask_image.grey_png(mine), other) if newer == "file" else (other, mask_image.grey_png(mine))
-    assert (capture / "shadow_mask.png").read_bytes() == winner == mask_image.grey_png(mask_image.mask_values(session.mask()))
+    assert (capture
+            / "shadow_mask.png").read_bytes() == winner == mask_image.grey_png(mask_image.mask_values(session.mask()))
     assert loser in [p.read_bytes() for p in (capture / "mask_history").iterdir()]
     bpy.ops.wildcap.finish_mask()
     assert (capture / "shadow_mask.png").read_bytes() == winner

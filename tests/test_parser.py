@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The face parser: its crop maps back, its shares add up, it learns from synthetic people that nothing is measured on, and goes on where it was killed."""
+"""The face parser: its crop maps back, its shares add up, it learns from synthetic people that nothing is measured on,
+and goes on where it was killed."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -35,7 +36,8 @@ def work(tmp_path_factory):
         for view in range(VIEWS):
             rng = np.random.default_rng([seed, view])
             (folder / f"figure_{seed}").mkdir(exist_ok=True)
-            unlit.save(folder / f"figure_{seed}" / f"{view}.npz", unlit.see(scene, unlit.random_view(scene.figure, rng), rng))
+            unlit.save(folder / f"figure_{seed}" / f"{view}.npz",
+                       unlit.see(scene, unlit.random_view(scene.figure, rng), rng))
     return folder
 
 
@@ -102,7 +104,8 @@ def test_shares_add_up_to_one_and_beyond_the_crop_is_background():
     assert whole.shape == (240, 300, len(PARTS)) and whole.dtype == np.float32 and whole.min() >= 0
     assert np.abs(whole.sum(-1) - 1).max() < 1e-4 and found.crop[..., 0].std() > 0.01
     assert (whole[0, 0] == np.eye(len(PARTS))[PARTS.index("background")]).all()
-    assert np.allclose(found.of("hair", "beard"), whole[..., PARTS.index("hair")] + whole[..., PARTS.index("beard")], atol=1e-5)
+    assert np.allclose(found.of("hair", "beard"), whole[..., PARTS.index("hair")] + whole[..., PARTS.index("beard")],
+                       atol=1e-5)
 
 
 def test_a_mirrored_picture_has_mirrored_parts():
@@ -145,7 +148,12 @@ def test_a_photograph_keeps_its_parts_whatever_its_colours(sight):
     again = snapshot.photograph(sight, np.random.default_rng(5))
     assert np.array_equal(pictures[5][0], again[0]) and np.array_equal(pictures[5][1], again[1])
     for srgb, shares in pictures:
-        assert srgb.shape == shares.shape[:2] + (3,) and 0 <= srgb.min() and srgb.max() <= 1 and np.abs(shares.sum(-1) - 1).max() < 0.02
+        assert (
+            srgb.shape == shares.shape[:2] + (3,)
+            and 0 <= srgb.min()
+            and srgb.max() <= 1
+            and np.abs(shares.sum(-1) - 1).max() < 0.02
+        )
         lost = plain[..., :-1].sum(-1) - shares[..., :-1].sum(-1)
         assert lost.min() > -0.02, "what covers a person is background: no part grows beyond its owner"
     tones = np.array([srgb[plain[..., PARTS.index("skin")] > 0.95].mean(0) for srgb, _ in pictures])
@@ -170,7 +178,9 @@ def test_the_shipped_network_knows_the_parts_of_somebody_it_never_saw(work):
 def test_nothing_is_learnt_from_people_that_are_measured():
     for config in training.CONFIGS.values():
         named = training.named_figures(config["training"])
-        assert len(set(named["seeds"])) == config["training"]["figures"] and not set(named["seeds"]) & set(named["held_out_seeds"])
+        assert len(set(named["seeds"])) == config["training"]["figures"] and not set(named["seeds"]) & set(
+            named["held_out_seeds"]
+        )
         assert not (set(named["seeds"]) | set(named["held_out_seeds"])) & reserved_seeds()
     assert {person.seed for person in benchmark.LIKENESSES} <= reserved_seeds()
 
@@ -181,7 +191,8 @@ def test_a_little_training_beats_the_constant_answer(work):
     torch.manual_seed(0)
     network = ParseNet(**TINY)
     weight = batch.known * (1 + training.NEAR * torch.nn.functional.max_pool2d(
-        batch.shares[:, [PARTS.index(n) for n in training.SMALL]].sum(1, keepdim=True), 2 * training.REACH + 1, 1, training.REACH))
+        batch.shares[:, [PARTS.index(n) for n in training.SMALL]].sum(1, keepdim=True), 2 * training.REACH + 1, 1,
+        training.REACH))
     usual = (batch.shares * weight).sum((0, 2, 3)) / weight.sum()
     constant = -float((usual * usual.clamp_min(1e-9).log()).sum())
     optimiser = torch.optim.AdamW(network.parameters(), lr=1e-2)
@@ -197,7 +208,8 @@ def test_a_killed_training_goes_on_to_the_same_weights(work, tmp_path, monkeypat
     options = training.CONFIGS["cpu"]["training"] | {"batch": 1, "echo": 2, "figures": 1, "held_out": 1, "views": VIEWS}
     monkeypatch.setitem(training.CONFIGS, "cpu", {"model": TINY, "training": options})
     ticks = iter(range(10**6))
-    monkeypatch.setattr(descent, "time", SimpleNamespace(monotonic=lambda: 40.0 * next(ticks)))  # a step takes 40 s by the training's clock
+    # a step takes 40 s by the training's clock
+    monkeypatch.setattr(descent, "time", SimpleNamespace(monotonic=lambda: 40.0 * next(ticks)))
     weights = []
     for kill in (None, 12):
         folder = tmp_path / str(kill)
@@ -218,7 +230,8 @@ def test_a_killed_training_goes_on_to_the_same_weights(work, tmp_path, monkeypat
                 with pytest.raises(KeyboardInterrupt):
                     training.train_parser("cpu", folder / "parser.safetensors", QUIET, TrainingRun(12, folder))
             card = training.train_parser("cpu", folder / "parser.safetensors", QUIET, TrainingRun(12, folder))
-        weights.append({name: value.clone() for name, value in parser.load(folder / "parser.safetensors").state_dict().items()})
+        weights.append({name: value.clone()
+                        for name, value in parser.load(folder / "parser.safetensors").state_dict().items()})
     assert card["steps"] == 18 and card["prepared"] == 1 and set(PARTS) < set(card["held_out"]), card
     assert all(torch.equal(weights[0][name], weights[1][name]) for name in weights[0])
     with pytest.raises(Problem, match="other data"):
@@ -228,7 +241,8 @@ def test_a_killed_training_goes_on_to_the_same_weights(work, tmp_path, monkeypat
 
 def test_growing_needs_figures(tmp_path):
     with pytest.raises(Problem, match="There are no figures"):
-        training.train_parser("cpu", tmp_path / "parser.safetensors", QUIET, TrainingRun(1, tmp_path / "work", growing=True))
+        training.train_parser("cpu", tmp_path / "parser.safetensors", QUIET,
+                              TrainingRun(1, tmp_path / "work", growing=True))
 
 
 def test_the_figures_of_a_row_are_those_counted_by_hand():
@@ -239,4 +253,9 @@ def test_the_figures_of_a_row_are_those_counted_by_hand():
     found[:2] = skin  # two rows of hair taken for skin
     row = benchmark.row([(truth, found, np.ones((20, 20), bool))], 2)
     assert row["pictures"] == 2 and row["found"] == 1 and row["hair_as_skin"] == 0.4 and row["skin_as_hair"] == 0.0
-    assert row["iou"]["hair"] == 0.6 and row["iou"]["skin"] == pytest.approx(100 / 140) and row["iou"]["background"] == 1.0 and row["iou"]["beard"] is None
+    assert (
+        row["iou"]["hair"] == 0.6
+        and row["iou"]["skin"] == pytest.approx(100 / 140)
+        and row["iou"]["background"] == 1.0
+        and row["iou"]["beard"] is None
+    )

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Subjects like people: what is promised of their shape, eyes, hair, pigment and truth, and that nothing is trained on those that are filmed."""
+"""Subjects like people: what is promised of their shape, eyes, hair, pigment and truth, and that nothing is trained on
+those that are filmed."""
 
 from dataclasses import replace
 
@@ -32,7 +33,8 @@ def ready(someone):
 
 
 def view(scale):
-    return sample.view_of(scene.looking(np.array([[0.05, -0.5, 0.0]]), np.array([[0.0, 0.0, -0.03]]), np.zeros(1))[0], scale)
+    return sample.view_of(scene.looking(np.array([[0.05, -0.5, 0.0]]), np.array([[0.0, 0.0, -0.03]]), np.zeros(1))[0],
+                          scale)
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +43,8 @@ def seen(ready):
 
 
 def test_the_identity_basis_leaves_two_millimetres_of_a_person():
-    """The best rigid motion, scale and identity together; a bald subject is left without a residual. A good part differs between left and right."""
+    """The best rigid motion, scale and identity together; a bald subject is left without a residual. A good part
+    differs between left and right."""
     rest = template.load().vertices
     mirror = strands.cKDTree(rest).query(rest * [-1, 1, 1])[1]
     for seed in (1, 2, 910001, 910003, 910004, 910006):
@@ -53,7 +56,8 @@ def test_the_identity_basis_leaves_two_millimetres_of_a_person():
 
 def test_a_person_is_not_symmetric_and_not_a_caricature():
     rest, moved = template.load(), shape.person_mesh(4)
-    mirror = np.linalg.norm(rest.vertices[:, None, [0, 2]][::400] * [-1, 1] - rest.vertices[None][..., [0, 2]], axis=-1).argmin(1)
+    mirror = np.linalg.norm(rest.vertices[:, None, [0, 2]][::400] * [-1, 1] - rest.vertices[None][..., [0, 2]],
+                            axis=-1).argmin(1)
     left, right = moved.vertices[::400] - rest.vertices[::400], moved.vertices[mirror] - rest.vertices[mirror]
     assert 0.0002 < np.abs(left[:, 1] - right[:, 1]).mean() < 0.006
     assert shape.root_mean_square(moved.vertices - rest.vertices) < 0.012
@@ -132,7 +136,8 @@ def test_each_growth_is_where_its_part_of_the_map_is(someone):
 
 
 def test_prisms_have_the_hairs_radius_and_their_order():
-    straight = strands.Strands(np.linspace([0, 0, 0], [0, 0, 0.01], 5, dtype=np.float32)[None] + np.float32([[[0, 0, 0]], [[0.1, 0, 0]]]),
+    straight = strands.Strands(np.linspace([0, 0, 0], [0, 0, 0.01], 5, dtype=np.float32)[None]
+                               + np.float32([[[0, 0, 0]], [[0.1, 0, 0]]]),
                                np.full(2, 1e-4, np.float32), np.zeros((2, 3), np.float32), "hair")
     mesh = strands.prisms(straight)
     assert len(mesh.faces) == 2 * 6 * 4
@@ -144,11 +149,14 @@ def test_prisms_have_the_hairs_radius_and_their_order():
 def test_parts_cover_what_is_seen_once(seen):
     assert np.allclose(seen.parts.sum(-1), seen.alpha, atol=1e-5)
     shares = dict(zip(figure.PARTS, seen.parts.sum((0, 1)) / seen.alpha.sum(), strict=True))
-    assert all(shares[part] > least for part, least in (("skin", 0.1), ("brows", 5e-4), ("beard", 5e-3), ("hair", 0.02), ("eyes", 5e-4), ("clothes", 0.1)))
+    assert all(shares[part] > least
+               for part, least in (("skin", 0.1), ("brows", 5e-4), ("beard", 5e-3), ("hair", 0.02), ("eyes", 5e-4),
+                                   ("clothes", 0.1)))
 
 
 def test_no_hair_hangs_before_the_face_or_flies():
-    """Long hair and a fringe, the hairest that there is: below the brows nothing before the cheeks, and nothing far beside the head."""
+    """Long hair and a fringe, the hairest that there is: below the brows nothing before the cheeks, and nothing far
+    beside the head."""
     someone = replace(person.sample_person(910003), hair_length=0.26, curl=0.8)
     head = shape.person_mesh(someone.seed)
     opened = lids.open_lids(head, 0.9, np.zeros(2))
@@ -166,18 +174,21 @@ def test_a_shirt_ends_above_the_cut_of_the_neck_and_around_it():
         cloth = clothes.shirt(replace(person.sample_person(seed), collar=collar), head)
         edge = cloth.vertices.reshape(clothes.ROWS, clothes.AROUND, 3)[:12]
         top = edge[np.argmax(edge[..., 2], 0), np.arange(clothes.AROUND)]
-        pairs, count = np.unique(np.sort(head.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), 1), axis=0, return_counts=True)
+        pairs, count = np.unique(np.sort(head.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), 1), axis=0,
+                                 return_counts=True)
         cut = head.vertices[np.unique(pairs[count == 1])]
         near = strands.cKDTree(top[:, :2]).query(cut[:, :2])[1]
         assert (top[near, 2] > cut[:, 2] + 0.003).all(), "no hole"
-        assert np.quantile(np.linalg.norm(top[:, :2] - cut[strands.cKDTree(cut[:, :2]).query(top[:, :2])[1], :2], axis=1), 0.9) < 0.03
+        assert np.quantile(np.linalg.norm(top[:, :2] - cut[strands.cKDTree(cut[:, :2]).query(top[:, :2])[1], :2],
+                                          axis=1), 0.9) < 0.03
 
 
 def test_hair_is_in_what_is_seen_and_not_in_the_bare_skin(someone, seen):
     beard = seen.parts[..., figure.PARTS.index("beard")] > 0.9
     assert beard.sum() > 20
     hair = np.mean(next(growth.colour for growth in someone.strands if growth.part == "beard"))
-    assert seen.seen[beard].mean() == pytest.approx(hair, rel=0.4) and seen.bare[beard].mean() > 1.5 * seen.seen[beard].mean()
+    assert seen.seen[beard].mean() == pytest.approx(hair,
+                                                    rel=0.4) and seen.bare[beard].mean() > 1.5 * seen.seen[beard].mean()
     clear = seen.parts[..., 0] > 0.99
     assert np.abs(seen.seen - seen.bare)[clear].mean() < 0.01
 
@@ -191,8 +202,10 @@ def test_a_seed_is_one_person(someone):
     assert person.sample_person(SEED) == someone.person != person.sample_person(SEED + 1)
     assert np.array_equal(shape.person_mesh(SEED).vertices, someone.head.vertices)
     assert np.array_equal(figure.paint(someone.person, SIZE)[1], someone.seen)
-    shaven = figure.grown(replace(someone.person, beard="none", hair="none"), someone.head, someone.opened, someone.shirt)
-    assert all(np.array_equal(a.points, b.points) for a, b in zip(shaven, someone.strands, strict=False)), "each growth has a stream of its own"
+    shaven = figure.grown(replace(someone.person, beard="none", hair="none"), someone.head, someone.opened,
+                          someone.shirt)
+    assert all(np.array_equal(a.points, b.points)
+               for a, b in zip(shaven, someone.strands, strict=False)), "each growth has a stream of its own"
 
 
 def test_training_never_draws_a_person_who_is_filmed():
@@ -207,8 +220,8 @@ def test_training_never_draws_a_person_who_is_filmed():
 def test_the_people_are_the_first_who_are_as_their_names_say():
     from benchmarks import likenesses
 
-    rule = {"bearded": lambda p: p.openness > 0 and (p.hair, p.beard) == ("cropped", "full"), "closed": lambda p: p.openness == 0,
-            "fringed": lambda p: p.openness > 0 and p.hair == "long" and p.fringe,
+    rule = {"bearded": lambda p: p.openness > 0 and (p.hair, p.beard) == ("cropped", "full"),
+            "closed": lambda p: p.openness == 0, "fringed": lambda p: p.openness > 0 and p.hair == "long" and p.fringe,
             "stubbled": lambda p: p.openness > 0 and (p.hair, p.beard) == ("short", "stubble")}
     for first, group in ((910001, likenesses.LIKENESSES), (920001, likenesses.HELD_BACK)):
         for each in group:

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The people that a delighter learns from: their light must know nothing of what grows on them or of what colour they are."""
+"""The people that a delighter learns from: their light must know nothing of what grows on them or of what colour they
+are."""
 
 from dataclasses import fields, replace
 
@@ -21,7 +22,8 @@ BEARDED = 1010
 @pytest.fixture(scope="module")
 def stage():
     sitter = portraits.Sitter(make_figure(BEARDED, 256), np.random.default_rng(0))
-    return next(s for s in (sitter.stage(np.random.default_rng(seed)) for seed in range(9)) if share(s, "beard").sum() > 150 and share(s, "brows").sum() > 100)
+    return next(s for s in (sitter.stage(np.random.default_rng(seed)) for seed in range(9))
+                if share(s, "beard").sum() > 150 and share(s, "brows").sum() > 100)
 
 
 def share(stage: portraits.RelightableView, name: str) -> np.ndarray:
@@ -38,18 +40,22 @@ def contrast(picture: np.ndarray, stage: portraits.RelightableView) -> float:
 def test_a_sight_comes_back_as_it_was_kept(stage, tmp_path):
     portraits.save(tmp_path / "0.npz", stage)
     back = portraits.load(tmp_path / "0.npz")
-    assert all(np.array_equal(getattr(stage, f.name), getattr(back, f.name)) for f in fields(portraits.RelightableView) if f.name != "unlit")
-    assert all(np.array_equal(getattr(stage.unlit, f.name), getattr(back.unlit, f.name)) for f in fields(portraits.Unlit))
+    assert all(np.array_equal(getattr(stage, f.name), getattr(back, f.name)) for f in fields(portraits.RelightableView)
+               if f.name != "unlit")
+    assert all(np.array_equal(getattr(stage.unlit, f.name), getattr(back.unlit, f.name))
+               for f in fields(portraits.Unlit))
 
 
 def test_light_does_not_know_the_pigment(stage):
-    """Two people of the same shape under the same light, one with a black beard and brows and a blotch: their light is the same, exposure apart."""
+    """Two people of the same shape under the same light, one with a black beard and brows and a blotch: their light is
+    the same, exposure apart."""
     shares = stage.unlit.shares.astype(np.float32) / 255
     shares /= np.maximum(shares.sum(-1, keepdims=True), 1e-6)
     plain = portraits.Colours(np.full((*stage.here.shape, 3), 0.4, np.float32), shares)
     dark = plain.albedo * np.exp(-2 * (share(stage, "beard") + share(stage, "brows")))[..., None]
     dark[100:130, 100:130] *= np.float32([0.6, 0.4, 0.4])
-    made = [portraits.portray(stage, portraits.Colours(albedo, shares), np.random.default_rng(4)) for albedo in (plain.albedo, dark)]
+    made = [portraits.portray(stage, portraits.Colours(albedo, shares), np.random.default_rng(4))
+            for albedo in (plain.albedo, dark)]
     pictures = [images.srgb_to_linear(portrait.srgb) for portrait in made]
     assert contrast(pictures[1], stage) - contrast(pictures[0], stage) > 0.8
     known = (made[0].skin > 0.99) & (made[1].skin > 0.99) & (made[0].even.min(-1) > 0.02)
@@ -81,7 +87,8 @@ def test_a_lamp_that_is_blocked_everywhere_lights_nothing(stage):
 
 def test_batches_show_each_sight_under_two_lights_and_depend_on_the_seed_alone(tmp_path):
     people.prepare_people([BEARDED], 1, tmp_path, QUIET, processes=1)
-    drawn = [people.People([BEARDED, BEARDED + 1], 1, tmp_path, None).draw(1, np.random.default_rng(3)) for _ in range(2)]
+    drawn = [people.People([BEARDED, BEARDED + 1], 1, tmp_path, None).draw(1, np.random.default_rng(3))
+             for _ in range(2)]
     assert all(np.array_equal(getattr(drawn[0], f.name), getattr(drawn[1], f.name)) for f in fields(drawn[0]))
     batch = drawn[0]
     assert batch.layers.shape[0] == 2 and not np.allclose(batch.shading[0], batch.shading[1], atol=0.1)

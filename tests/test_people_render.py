@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Cycles draws of a person is what the truth says: under an even light the picture is the albedo, each part is where it is told, and a head that
-moves together with its camera leaves the picture as it was."""
+"""What Cycles draws of a person is what the truth says: under an even light the picture is the albedo, each part is
+where it is told, and a head that moves together with its camera leaves the picture as it was."""
 
 from dataclasses import replace
 
@@ -24,9 +24,10 @@ EVEN = scene.SceneLight((1.0, 1.0, 1.0))
 
 @pytest.fixture(scope="module")
 def pictured(tmp_path_factory):
-    """A bald man in a green shirt with stubble, blue eyes and black brows: two linear frames under an even light of radiance 1, and their truth."""
-    asked = replace(person.sample_person(5), male=True, hair="none", beard="stubble", beard_length=0.002, openness=0.95, gaze=(0.0, 0.0), iris=IRIS,
-                    brow=1.0, brow_colour=tuple(person.BROWS[0]), clothes=SHIRT, shade=0.0)
+    """A bald man in a green shirt with stubble, blue eyes and black brows: two linear frames under an even light of
+    radiance 1, and their truth."""
+    asked = replace(person.sample_person(5), male=True, hair="none", beard="stubble", beard_length=0.002, openness=0.95,
+                    gaze=(0.0, 0.0), iris=IRIS, brow=1.0, brow_colour=tuple(person.BROWS[0]), clothes=SHIRT, shade=0.0)
     someone = figure.make_figure(asked, 512)
     camera = scene.looking(np.array([[0.0, -0.42, 0.0]]), np.array([[0.0, 0.0, -0.03]]), np.zeros(1))
     poses = np.tile(np.eye(4), (2, 1, 1))
@@ -71,7 +72,8 @@ def test_parts_have_their_own_colours_where_the_truth_has_the_parts(pictured):
     skin = np.median(frame[found.face & of(found, "skin")], 0).mean()
     assert np.median(frame[of(found, "brows", 0.5)]) < 0.6 * skin, "black brows"
     lips = np.median(frame[of(found, "lips")], 0)
-    assert lips[1] / lips[0] < np.median((frame[..., 1] / frame[..., 0])[found.face & of(found, "skin")]), "redder than skin"
+    assert lips[1] / lips[0] < np.median((frame[..., 1]
+                                          / frame[..., 0])[found.face & of(found, "skin")]), "redder than skin"
 
 
 def test_eyes_are_blue_and_black_in_the_middle_and_white_beside(pictured):
@@ -88,4 +90,5 @@ def test_eyes_are_blue_and_black_in_the_middle_and_white_beside(pictured):
 
 def test_a_camera_that_goes_with_the_head_sees_the_same(pictured):
     (still, moved), _ = pictured
-    assert np.abs(still - moved).mean() < 0.01 and np.abs(still[:, 5:] - moved[:, :-5]).mean() > 0.02, "five pixels are a difference"
+    assert np.abs(still - moved).mean() < 0.01 and np.abs(still[:, 5:]
+                                                          - moved[:, :-5]).mean() > 0.02, "five pixels are a difference"

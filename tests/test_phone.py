@@ -13,14 +13,15 @@ from core.imaging import images  # noqa: E402
 from core.synthetic import sample, scene  # noqa: E402
 from core.synthetic.people import motion, phone  # noqa: E402
 
-PLAIN = phone.Phone(shot=0, read=0, reduction=0, contrast=0, shoulder=0.8, local=0, local_radius=0.05, sharpening=0, sharpening_px=1, crf=18, readout=0,
-                    shutter=0, sway_mm=0, sway_degrees=0)
+PLAIN = phone.Phone(shot=0, read=0, reduction=0, contrast=0, shoulder=0.8, local=0, local_radius=0.05, sharpening=0,
+                    sharpening_px=1, crf=18, readout=0, shutter=0, sway_mm=0, sway_degrees=0)
 STEP = np.where(np.arange(64)[None, :, None] < 32, 0.3, 0.5) * np.ones((48, 64, 3))
 
 
 def test_a_plain_phone_shows_srgb():
     linear = np.random.default_rng(0).uniform(0, 0.5, (8, 8, 3)).astype(np.float32)
-    assert np.allclose(phone.develop(linear, PLAIN, np.array([1.0, 1, 1]), np.random.default_rng(0)), images.linear_to_srgb(linear), atol=1e-4)
+    assert np.allclose(phone.develop(linear, PLAIN, np.array([1.0, 1, 1]), np.random.default_rng(0)),
+                       images.linear_to_srgb(linear), atol=1e-4)
 
 
 def test_exposure_is_a_gain_of_the_light():
@@ -52,7 +53,8 @@ def test_local_contrast_raises_what_is_small_and_leaves_what_is_large(wavelength
 
 def test_sharpening_leaves_a_halo_of_half_the_amount():
     out = phone.sharpened(STEP.astype(np.float32), 0.5, 3.0)[24, :, 0]
-    assert out.max() - 0.5 == pytest.approx(0.5 * 0.2 / 2, rel=0.15) and 0.3 - out.min() == pytest.approx(0.5 * 0.2 / 2, rel=0.15)
+    assert out.max() - 0.5 == pytest.approx(0.5 * 0.2 / 2,
+                                            rel=0.15) and 0.3 - out.min() == pytest.approx(0.5 * 0.2 / 2, rel=0.15)
     assert out[:10] == pytest.approx(0.3, abs=1e-4)
 
 
@@ -102,7 +104,8 @@ def test_a_head_sways_by_the_millimetres_it_is_given():
 
 
 def test_a_wall_moves_as_the_camera_does():
-    """A camera that goes 10 mm a frame to the right before a wall 0.5 m away: everything moves left by focal x 10 / 500 pixels."""
+    """A camera that goes 10 mm a frame to the right before a wall 0.5 m away: everything moves left by focal x 10 / 500
+    pixels."""
     wall = Mesh(np.array([[-9.0, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]]), np.array([[0, 1, 2], [0, 2, 3]]))
     position = np.array([[0.01 * k, -0.5, 0] for k in (-1, 0, 1)])
     cameras = scene.looking(position, position + [0, 1.0, 0], np.zeros(3))

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Single photographs: what the references score on a sitter whose light is known, and pairs in which one thing differs."""
+"""Single photographs: what the references score on a sitter whose light is known, and pairs in which one thing
+differs."""
 
 import cv2
 import numpy as np
@@ -43,8 +44,16 @@ def test_references_score_what_they_must(sitter, monkeypatch):
     assert scores[NOTHING]["kept_brows"] == pytest.approx(1, abs=0.15)
     assert scores[FLAT]["light_slope"] == pytest.approx(0, abs=1e-6) and scores[FLAT]["agreement"] == BEST_PSNR
     assert scores[FLAT]["kept_brows"] == pytest.approx(0, abs=1e-4) and scores[FLAT]["detail"] == 0
-    assert scores[TRUE]["psnr"] == BEST_PSNR and scores[TRUE]["lost"] == pytest.approx(0, abs=1e-6) and scores[TRUE]["light_slope"] == 0
-    assert 0 < scores[BLUR]["light_slope"] < 0.3 and 0 < scores[BLUR]["kept_brows"] < 0.8 and scores[BLUR]["agreement"] > scores[NOTHING]["agreement"] + 6
+    assert (
+        scores[TRUE]["psnr"] == BEST_PSNR
+        and scores[TRUE]["lost"] == pytest.approx(0, abs=1e-6)
+        and scores[TRUE]["light_slope"] == 0
+    )
+    assert (
+        0 < scores[BLUR]["light_slope"] < 0.3
+        and 0 < scores[BLUR]["kept_brows"] < 0.8
+        and scores[BLUR]["agreement"] > scores[NOTHING]["agreement"] + 6
+    )
     assert scores["network"]["light_slope"] == pytest.approx(1, abs=0.1), "an answer that keeps the light"
 
 
@@ -63,7 +72,8 @@ def test_in_a_pair_one_thing_differs():
     assert (light.albedos[0] == light.albedos[1]).all() and not (pigment.albedos[0] == pigment.albedos[1]).all()
     linear = [tuple(images.srgb_to_linear(srgb) for srgb in pair.pictures) for pair in (pigment, light)]
     assert slope(linear[0], pigment.albedos, pigment.where) > 0.6, "the picture follows the pigment"
-    assert slope(pigment.albedos, pigment.albedos, pigment.where) == pytest.approx(1) and slope(light.albedos, linear[1], light.where) == 0
+    assert slope(pigment.albedos, pigment.albedos,
+                 pigment.where) == pytest.approx(1) and slope(light.albedos, linear[1], light.where) == 0
     assert slope(linear[1], linear[1], light.where) == pytest.approx(1)
 
 

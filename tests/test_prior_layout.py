@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A prior of the authors' kind on a capture: maps go to the UVs it works in and come back to where they were, and the stage gives sensible maps.
+"""A prior of the authors' kind on a capture: maps go to the UVs it works in and come back to where they were, and the
+stage gives sensible maps.
 
 The head with other UVs is the built-in one with its chart turned and moved to where such a prior expects a face.
 """
@@ -37,7 +38,8 @@ from .test_released_prior import weights_of, write
 SIZE = 128
 TONE = np.array([0.42, 0.26, 0.18], np.float32)  # linear
 SHARED = Path(__file__).resolve().parents[2] / "shared"
-MODEL = {"depths": [1, 1], "channels": [32, 32], "self_attn_depths": [False, False], "mapping_out": 16, "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80}
+MODEL = {"depths": [1, 1], "channels": [32, 32], "self_attn_depths": [False, False], "mapping_out": 16,
+         "sigma_data": 0.5, "sigma_min": 0.01, "sigma_max": 80}
 
 
 def front() -> meshes.Mesh:
@@ -49,7 +51,8 @@ def front() -> meshes.Mesh:
 
 
 def other_head(turn_deg: float = 12.0) -> meshes.Mesh:
-    """The built-in face in another order, 0.3 mm larger all around, its chart turned, a fifth smaller, the bridge of the nose where the prior's tone box is."""
+    """The built-in face in another order, 0.3 mm larger all around, its chart turned, a fifth smaller, the bridge of
+    the nose where the prior's tone box is."""
     mesh, whole = front(), template.load()
     face, bary = template.landmarks()
     bridge = (whole.uvs[whole.face_uvs[face[[6, 197]]]] * bary[[6, 197], :, None]).sum(1).mean(0)
@@ -64,14 +67,17 @@ def put_own_head(capture: Capture, own: meshes.Mesh, skin: np.ndarray | None = N
     """As the registration leaves it; skin bool [F] marks the triangles to paint, all by default."""
     meshes.write_obj(capture.own_head, own)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], np.ones(len(own.faces), bool) if skin is None else skin, [0]])))
-    capture.own_head_skin.write_text(json.dumps({"template": "other.obj", "skin_triangles": edges.reshape(-1, 2).tolist()}))
+    capture.own_head_skin.write_text(json.dumps({"template": "other.obj",
+                                                 "skin_triangles": edges.reshape(-1, 2).tolist()}))
 
 
 @pytest.fixture
 def capture(tmp_path):
-    """The mean face of TONE in a little light from the left, a soft shadow on one cheek, and another head fitted beside the built-in one."""
+    """The mean face of TONE in a little light from the left, a soft shadow on one cheek, and another head fitted beside
+    the built-in one."""
     made = Capture(tmp_path / "face.wildcap")
-    reference = initial.face_of_tone(load().mean_face, torch.from_numpy(TONE), torch.from_numpy(template.mask("skin", SIZE).copy()))
+    reference = initial.face_of_tone(load().mean_face, torch.from_numpy(TONE),
+                                     torch.from_numpy(template.mask("skin", SIZE).copy()))
     y, x = np.mgrid[:SIZE, :SIZE] / SIZE
     shadow = 1 / (1 + np.exp((np.hypot(x - 0.6, y - 0.5) - 0.06) / 0.006))
     light = (0.7 + 0.3 * x) * (1 - 0.5 * shadow)
@@ -95,7 +101,8 @@ def authors(tmp_path):
 
 def settings(prior, **options):
     tone = format_skin_tone(SkinTone.from_linear(TONE, GIVEN))
-    return from_json({"solve": {"size": SIZE, "steps": 10, "guidance": "proximal", "skin_tone": tone, "prior": str(prior), **options}})
+    return from_json({"solve": {"size": SIZE, "steps": 10, "guidance": "proximal", "skin_tone": tone,
+                                "prior": str(prior), **options}})
 
 
 def seen_layouts(monkeypatch) -> list[layout.Layout]:
@@ -113,7 +120,8 @@ def seen_layouts(monkeypatch) -> list[layout.Layout]:
 
 @pytest.fixture(scope="module")
 def carried():
-    """The layout of the other head at 256, and the built-in head's texels: position [S, S, 3], and which of them are far within the window."""
+    """The layout of the other head at 256, and the built-in head's texels: position [S, S, 3], and which of them are
+    far within the window."""
     own, size = other_head(), 256
     there = layout.between(front(), own, np.ones(len(own.faces), bool), size, load().mean_face, lambda done: None)
     face, bary = raster.rasterize_uv(template.load(), size)
@@ -124,18 +132,22 @@ def carried():
 def round_trip(there: layout.Layout, albedo: np.ndarray, normal: np.ndarray) -> Maps:
     """Maps of the built-in UVs taken to the window's and returned."""
     size, other = len(albedo), there.there.covered.shape
-    gone = {name: there._there(torch.from_numpy(m.transpose(2, 0, 1).copy())).permute(1, 2, 0).numpy() for name, m in (("diffuse", albedo),)}
+    gone = {name: there._there(torch.from_numpy(m.transpose(2, 0, 1).copy())).permute(1, 2, 0).numpy()
+            for name, m in (("diffuse", albedo),)}
     flat = np.ones(other, np.float32)
-    solved = Maps(gone["diffuse"], flat, layout.baking.bake_normals(normal, there.there), np.repeat(flat[..., None], 3, 2), flat, torch.ones(3))
+    solved = Maps(gone["diffuse"], flat, layout.baking.bake_normals(normal, there.there),
+                  np.repeat(flat[..., None], 3, 2), flat, torch.ones(3))
     ones = torch.ones(size, size)
     up = torch.zeros(3, size, size)
     up[2] = 1
     e = layout.Evidence(torch.zeros(3, size, size), 0 * ones, 0 * ones, up, ones > 0, ones, ones, 0 * ones, 0 * ones)
-    return there.returned(solved, e, Lights(torch.ones(3, 9), torch.zeros(1, 9, 1, 1), torch.ones(3)), 1.0, SkinTone.from_linear(TONE, GIVEN))
+    return there.returned(solved, e, Lights(torch.ones(3, 9), torch.zeros(1, 9, 1, 1), torch.ones(3)), 1.0,
+                          SkinTone.from_linear(TONE, GIVEN))
 
 
 def test_a_smooth_map_survives_both_ways(carried):
-    """Stated: within 0.01 of a range of 0.6 at 256 texels, for a wave of about 60 mm; a normal map within half a degree, though the chart is turned."""
+    """Stated: within 0.01 of a range of 0.6 at 256 texels, for a wave of about 60 mm; a normal map within half a
+    degree, though the chart is turned."""
     there, position, inner = carried
     wave = (0.5 + 0.3 * np.sin(position @ np.array([[95.0, 40, 0], [0, 80, 60], [60, 0, 90]]).T)).astype(np.float32)
     tilted = np.stack([0.3 * np.sin(40 * position[..., 2]), np.full(wave.shape[:2], 0.25), np.ones(wave.shape[:2])], -1)
@@ -160,7 +172,10 @@ def test_the_prior_is_asked_in_its_own_window_and_coordinates(carried):
     head = template.load()
     wanted = (head.vertices[head.faces[face[[6, 197]]]] * bary[[6, 197], :, None]).sum(1).mean(0)
     assert np.linalg.norm(at.numpy() - wanted) < 0.006
-    assert layout.whole_size(1024, 8) == 1024 and layout.whole_size(500, 8) == 480 and layout.whole_size(1024, 64) * 3 / 4 % 64 == 0
+    assert layout.whole_size(1024,
+                             8) == 1024 and layout.whole_size(500,
+                                                              8) == 480 and layout.whole_size(1024,
+                                                                                              64) * 3 / 4 % 64 == 0
 
 
 @pytest.mark.parametrize("recipe", ["wildcap", "released"])
@@ -183,7 +198,8 @@ def test_the_stage_solves_with_it_and_answers_in_the_built_in_uvs(capture, autho
         assert box.sum() > 20
         assert np.abs((albedo[box] ** (1 / 2.2)).mean(0) / TONE ** (1 / 2.2) - 1).max() < 0.03
     else:
-        assert np.abs(albedo * shading - texture)[face].mean() < 0.05 * texture[face].mean(), "the texture is explained where it was"
+        assert np.abs(albedo * shading
+                      - texture)[face].mean() < 0.05 * texture[face].mean(), "the texture is explained where it was"
         brows, cheeks = template.mask("brows", SIZE) > 0.7, (template.mask("skin", SIZE) > 0.9) & face
         assert albedo[brows].mean() < 0.9 * albedo[cheeks].mean(), "brows are where brows are"
         skin = template.mask("skin", SIZE) * template.mask("face", SIZE) * (1 - template.mask("eyes", SIZE))
@@ -222,7 +238,8 @@ def test_on_ict_facekit_with_random_weights_of_the_released_shape(capture, ict_f
     if not weights.is_dir():
         pytest.skip(f"{weights} is missing")
     meshes.write_obj(capture.head, person()[0])
-    for theirs, ours in ((ict_fitted[0].own_head, capture.own_head), (ict_fitted[0].own_head_skin, capture.own_head_skin)):
+    for theirs, ours in ((ict_fitted[0].own_head, capture.own_head),
+                         (ict_fitted[0].own_head_skin, capture.own_head_skin)):
         shutil.copyfile(theirs, ours)
     kept = seen_layouts(monkeypatch)
     solve.run(capture, settings(weights, steps=6), Reporter("solve"))

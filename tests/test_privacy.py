@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a stranger's capture may say, what a worker and its children get to know, and that no other pixels are sent than those that were shown."""
+"""What a stranger's capture may say, what a worker and its children get to know, and that no other pixels are sent than
+those that were shown."""
 
 import json
 import os
@@ -32,7 +33,8 @@ def leaves(value, way=()):
 def test_no_text_of_a_record_becomes_part_of_the_report_s_page(tmp_path):
     capture = recorded.make(tmp_path / "a.wildcap")
     whole = capture.read()
-    whole["stopped"] = {"stage": "scan", "problem": "p", "remedy": "r", "findings": [{"problem": "p", "remedy": "r", "frames": ["1"]}]}
+    whole["stopped"] = {"stage": "scan", "problem": "p", "remedy": "r",
+                        "findings": [{"problem": "p", "remedy": "r", "frames": ["1"]}]}
     written = 0
     for way in leaves(whole):
         told = json.loads(json.dumps(whole))
@@ -57,16 +59,21 @@ def key(monkeypatch):
 
 
 def test_the_key_goes_to_workers_that_send_and_to_nobody_else(key, tmp_path, monkeypatch):
-    assert KEY not in client._environment({}).values() and KEY in client._environment({switchlight_api.KEY_VARIABLE: KEY}).values()
+    assert (
+        KEY not in client._environment({}).values()
+        and KEY in client._environment({switchlight_api.KEY_VARIABLE: KEY}).values()
+    )
     given = []
     monkeypatch.setattr(terminal, "Worker", lambda *arguments: given.append(arguments[-1]) or sys.exit())
     for delighter in ("network", "switchlight"):
         capture = Capture(tmp_path / f"{delighter}.wildcap")
         with pytest.raises(SystemExit):
-            terminal.follow(tmp_path, capture, write_job(capture, settings={"delight": {"delighter": delighter}}), {"A": "B"})
+            terminal.follow(tmp_path, capture, write_job(capture, settings={"delight": {"delighter": delighter}}),
+                            {"A": "B"})
     assert given == [{"A": "B"}, {"A": "B", switchlight_api.KEY_VARIABLE: KEY}]
     heard = []
-    task = BackgroundTask("try", lambda task: task.run([sys.executable, "-c", "import os; print(os.environ)"], heard.append))
+    task = BackgroundTask("try",
+                          lambda task: task.run([sys.executable, "-c", "import os; print(os.environ)"], heard.append))
     task.start()
     task._thread.join()
     assert heard and KEY not in "".join(heard)

@@ -31,10 +31,12 @@ def capture(tmp_path, monkeypatch) -> Capture:
 
 SECRETS = ("Zoë", "Zoe\u0308", "Müller", "zoeann", "MacBook", "Erna", "Urlaub", "Sommer", "geheim", KEY, "film.mp4")
 LINES = (
-    'File "/home/zoeann/Sommer Urlaub/geheim.py", line 3, in run', "could not open /Users/zoeann/Sommer Urlaub (1).mov: No such file", "~/Sommer/Urlaub.mp4",
-    r"C:\Users\Zoë Müller\Videos\Urlaub.mp4 is missing", r'{"path": "C:\\Users\\zoeann\\geheim"}', r"\\server\geheim\Urlaub.mp4", "file:///home/zoeann/geheim.jpg",
-    "D:/Urlaub/geheim.png", "the frame of film.mp4 shows Tante Erna", "'/Volumes/Zoe\u0308s Disk/Urlaub.mov' [Errno 2]", f"x-api-key: {KEY}",
-    "ZOEANN@Zoes-MacBook:~$")
+    'File "/home/zoeann/Sommer Urlaub/geheim.py", line 3, in run',
+    "could not open /Users/zoeann/Sommer Urlaub (1).mov: No such file", "~/Sommer/Urlaub.mp4",
+    r"C:\Users\Zoë Müller\Videos\Urlaub.mp4 is missing", r'{"path": "C:\\Users\\zoeann\\geheim"}',
+    r"\\server\geheim\Urlaub.mp4", "file:///home/zoeann/geheim.jpg",
+    "D:/Urlaub/geheim.png", "the frame of film.mp4 shows Tante Erna", "'/Volumes/Zoe\u0308s Disk/Urlaub.mov' [Errno 2]",
+    f"x-api-key: {KEY}", "ZOEANN@Zoes-MacBook:~$")
 
 
 def test_nothing_of_the_user_s_is_left_whatever_a_log_says(capture):
@@ -46,18 +48,28 @@ def test_nothing_of_the_user_s_is_left_whatever_a_log_says(capture):
 
 def test_what_helps_stays(capture):
     scrub = Scrubber(ROOT, Path("/opt/solver/bin/python"), capture)
-    trace = f'  File "{ROOT}/core/scan/stereo.py", line 31, in match\n    depth = 3/4 * focal  # and/or\nZeroDivisionError: division by zero'
+    trace = (f'  File "{ROOT}/core/scan/stereo.py", line 31, in match\n    depth = 3/4 * focal  # '
+             'and/or\nZeroDivisionError: division by zero')
     assert scrub(trace) == trace.replace(str(ROOT), "<WildCap>")
     assert scrub(f"{capture.root}/frames/00001.jpg cannot be read") == "<capture>/frames/00001.jpg cannot be read"
-    assert scrub("/opt/solver/lib/python3.11/site-packages/torch/x.py") == "<solver>/lib/python3.11/site-packages/torch/x.py"
-    assert scrub("https://example.org/simple 12:30:05 2026-11-23 50% of 3/4") == "https://example.org/simple 12:30:05 2026-11-23 50% of 3/4"
+    assert (
+        scrub("/opt/solver/lib/python3.11/site-packages/torch/x.py")
+        == "<solver>/lib/python3.11/site-packages/torch/x.py"
+    )
+    assert (
+        scrub("https://example.org/simple 12:30:05 2026-11-23 50% of 3/4")
+        == "https://example.org/simple 12:30:05 2026-11-23 50% of 3/4"
+    )
 
 
 def test_the_zip_holds_logs_versions_settings_and_states_and_no_picture(capture, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(problem_report.doctor, "examine", lambda *_, **__: problem_report.doctor.Findings(("device cpu",), (), ()))
+    monkeypatch.setattr(problem_report.doctor, "examine", lambda *_,
+                        **__: problem_report.doctor.Findings(("device cpu",), (), ()))
     (capture.logs / "scan.log").write_text("\n".join(LINES), encoding="utf-8")
     (capture.logs / "mine.log").write_text("somebody else's")
-    (capture.root / "job.json").write_text(json.dumps({"capture": ".", "source": "", "from": None, "until": None, "quality": "standard", "settings": {
+    (capture.root
+     / "job.json").write_text(json.dumps({"capture": ".", "source": "", "from": None, "until": None,
+                                          "quality": "standard", "settings": {
         "registration": {"template": "/home/zoeann/geheim.obj"}, "solve": {"steps": 31}}}))
     try:
         raise ValueError("/home/zoeann/geheim")
@@ -73,7 +85,9 @@ def test_the_zip_holds_logs_versions_settings_and_states_and_no_picture(capture,
     assert not any(secret.lower() in whole.lower() for secret in SECRETS), whole
     told = json.loads(texts["report.json"])
     assert told["versions"]["WildCap"] and told["capture"]["settings"]["solve"]["steps"] == 31
-    assert told["capture"]["settings"]["registration"]["template"] == REMOVED and told["capture"]["stages"]["cameras"]["figures"] == {"count": 3}
+    assert told["capture"]["settings"]["registration"]["template"] == REMOVED and told["capture"]["stages"]["cameras"][
+        "figures"
+    ] == {"count": 3}
     assert "WC-" in texts["unforeseen.txt"] and "device cpu" in texts["doctor.txt"]
     assert main(["report-problem", "--to", str(target)]) == 2 and "is there already" in capsys.readouterr().err
     assert main(["report-problem", str(tmp_path / "none"), "--to", str(tmp_path / "b.zip")]) == 2

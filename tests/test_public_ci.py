@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The definition for a public CI, which nobody runs for us: it names what the locks serve, and its commands are the Makefile's."""
+"""The definition for a public CI, which nobody runs for us: it names what the locks serve, and its commands are the
+Makefile's."""
 
 import re
 import shutil
@@ -36,7 +37,9 @@ def test_it_says_at_its_top_that_it_is_not_run_by_us():
 def test_every_platform_and_python_that_has_a_lock_is_tested():
     served = {tuple(name.rsplit("-", 1)) for name in locks.names()}
     assert {platform for platform, _ in served} == set(SYSTEMS)
-    assert sorted(runner.split("-")[0] for runner in named("system")) == sorted(SYSTEMS[platform] for platform in {platform for platform, _ in served})
+    assert sorted(runner.split("-")[0]
+                  for runner in named("system")) == sorted(SYSTEMS[platform]
+                                                           for platform in {platform for platform, _ in served})
     assert sorted(named("python")) == sorted({python for _, python in served})
 
 
@@ -44,7 +47,10 @@ def test_its_commands_are_those_of_the_makefile():
     tests = MAKEFILE[MAKEFILE.index("\ntest:"):MAKEFILE.index("\n# The pages of docs/results")]
     ours = commands(tests + MAKEFILE[MAKEFILE.index("$(VENV)/installed: "):], "$(BIN)")
     assert len(ours) == 5 and sorted(ours) == sorted(commands(WORKFLOW, '"$PYTHON"'))
-    assert "-m core install $(VENV) --compute cpu" in MAKEFILE and "python -m core install .venv --compute cpu\n" in WORKFLOW
+    assert (
+        "-m core install $(VENV) --compute cpu" in MAKEFILE
+        and "python -m core install .venv --compute cpu\n" in WORKFLOW
+    )
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="no make")

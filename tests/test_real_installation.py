@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solver installed for real, by the add-on's own operators, to its end: minutes and gigabytes, so only with WILDCAP_REAL_INSTALLATION=pip
-(from where this machine's pip is set up to look), =pytorch (from PyTorch's own index), or the path of a folder that `python -m core wheels` made, without a
-network. Run it with -s: it prints its figures."""
+"""The solver installed for real, by the add-on's own operators, to its end: minutes and gigabytes, so only with
+WILDCAP_REAL_INSTALLATION=pip (from where this machine's pip is set up to look), =pytorch (from PyTorch's own index), or
+the path of a folder that `python -m core wheels` made, without a network. Run it with -s: it prints its figures."""
 
 import os
 import subprocess
@@ -15,7 +15,9 @@ SOURCE = os.environ.get("WILDCAP_REAL_INSTALLATION", "")
 
 WHEELS = SOURCE if SOURCE and SOURCE not in ("pip", "pytorch") else ""
 
-pytestmark = pytest.mark.skipif(not SOURCE, reason="installs gigabytes: WILDCAP_REAL_INSTALLATION=pip, =pytorch or =FOLDER_OF_WHEELS runs it")
+pytestmark = pytest.mark.skipif(not SOURCE,
+                                reason="installs gigabytes: WILDCAP_REAL_INSTALLATION=pip, =pytorch or "
+                                       "=FOLDER_OF_WHEELS runs it")
 
 
 @pytest.fixture
@@ -42,7 +44,12 @@ def follow(jobs, until=lambda job: False, limit_s: float = 1800) -> float:
 
 
 def test_from_the_question_through_a_cancel_to_a_solve_and_removed_again(addon, solver):
-    jobs, install, problems, checking = addon("jobs"), addon("setup.install"), addon("problems"), addon("setup.checking")
+    jobs, install, problems, checking = (
+        addon("jobs"),
+        addon("setup.install"),
+        addon("problems"),
+        addon("setup.checking"),
+    )
     if not bpy.app.online_access and not WHEELS:
         pytest.skip("this Blender cannot go online")
     assert install.WILDCAP_OT_install_solver.tell() is None
@@ -74,7 +81,13 @@ def test_from_the_question_through_a_cancel_to_a_solve_and_removed_again(addon, 
     bpy.ops.wildcap.open_sample_head()
     item = bpy.context.scene.wildcap.captures[-1]
     item.quality = 'draft'
-    item.solve.size, item.solve.steps, item.upscale.size, item.transfer.size, item.transfer.scan = 128, 6, 1024, 256, False
+    item.solve.size, item.solve.steps, item.upscale.size, item.transfer.size, item.transfer.scan = (
+        128,
+        6,
+        1024,
+        256,
+        False,
+    )
     bpy.ops.wildcap.solve()
     solve_s = follow(jobs)
     capture = addon("captures").folder(item)
@@ -87,6 +100,8 @@ def test_from_the_question_through_a_cancel_to_a_solve_and_removed_again(addon, 
     remove_s = follow(jobs)
     assert not solver.exists() and addon("preferences").python() is None and problems.of("") is None
     print(*told, *freed, sep="\n")
-    print(f"told {plan.disk / 1e9:.2f} GB on disk, found {size / 1e9:.2f} GB; {len(plan.packages)} packages; asked in {asking_s:.0f} s, cancelled in "
-          f"{cancel_s:.1f} s, installed and verified in {install_s:.0f} s, a draft solved in {solve_s:.0f} s, removed in {remove_s:.0f} s")
+    print(f"told {plan.disk / 1e9:.2f} GB on disk, found {size / 1e9:.2f} GB; {len(plan.packages)} packages; asked in "
+          f"{asking_s:.0f} s, cancelled in "
+          f"{cancel_s:.1f} s, installed and verified in {install_s:.0f} s, a draft solved in {solve_s:.0f} s, removed "
+          f"in {remove_s:.0f} s")
     assert size == pytest.approx(plan.disk, rel=0.2)

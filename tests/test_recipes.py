@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The recipes of CONTRIBUTING.md, followed word by word in a copy of the code: what they promise is there afterwards."""
+"""The recipes of CONTRIBUTING.md, followed word by word in a copy of the code: what they promise is there
+afterwards."""
 
 import json
 import re
@@ -58,7 +59,10 @@ def test_a_delighter_is_offered_with_its_card_and_run(code):
     pytest.importorskip("torch")
     follow("Add a delighter", code)
     assert "evened: Brings all frames to one exposure" in run(code, "-m", "core", "delighters")
-    told = run(code, "-c", """
+    told = run(
+        code,
+        "-c",
+        """
 import sys
 from types import SimpleNamespace
 import numpy as np
@@ -73,7 +77,8 @@ settings = from_json({"delight": {"delighter": "evened"}})
 found = list(delight.DELIGHTERS[settings.delight.delighter](None, settings, Reporter("delight")))
 assert set(delight.DELIGHTERS) == set(delighter_cards.choices()) == set(delighter_cards.CARDS)
 print([round(float(images.srgb_to_linear(each.image).mean()), 3) for each in found])
-""")
+""",
+    )
     assert told.strip().endswith("[0.18, 0.18]")
 
 
@@ -89,9 +94,14 @@ def test_an_importer_reads_cameras_where_they_are_and_refuses_a_damaged_file(cod
     place = np.eye(4)
     place[:3, 3] = 0.1, -0.5, 0.2  # in OpenGL's axes, which look along -z: COLMAP's rotation is a half turn about x
     frames = [{"file_path": f"frames/{k:05d}.png", "transform_matrix": place.tolist()} for k in range(3)]
-    (tmp_path / "face.transforms").write_text(json.dumps({"fl_x": 900, "fl_y": 900, "cx": 320, "cy": 240, "w": 640, "h": 480, "frames": frames}))
+    (tmp_path
+     / "face.transforms").write_text(json.dumps({"fl_x": 900, "fl_y": 900, "cx": 320, "cy": 240, "w": 640, "h": 480,
+                                                 "frames": frames}))
     (tmp_path / "damaged.transforms").write_text("{}")
-    told = run(code, "-c", """
+    told = run(
+        code,
+        "-c",
+        """
 from pathlib import Path
 import numpy as np
 from core.cameras.calibration import read_cameras
@@ -103,5 +113,6 @@ try:
     read_cameras(Path("damaged.transforms"))
 except Problem as problem:
     print(problem.problem)
-""")
+""",
+    )
     assert "damaged.transforms is no transforms.json" in told

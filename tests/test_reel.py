@@ -32,21 +32,24 @@ def test_the_contact_sheet_shows_each_preset_as_it_is_alone(addon, capture):
     shown = {name: pixels(capture / "renders" / f"{name}.exr") for name in ("window", "rim")}
     headless.render_relit(capture, shown, resolution=32, samples=2)
     for name, before in shown.items():
-        assert np.abs(pixels(capture / "renders" / f"{name}.exr") - before).mean() < 0.1 * before.mean(), "the same light as in a render of its own"
+        assert np.abs(pixels(capture / "renders" / f"{name}.exr")
+                      - before).mean() < 0.1 * before.mean(), "the same light as in a render of its own"
     assert not [p for p in (capture / "renders").iterdir() if p.name.startswith(".")]
     assert not [d for d in (*bpy.data.curves, *bpy.data.actions) if d.users == 0]
 
 
 @pytest.mark.parametrize("turns", ['LIGHT', 'HEAD'])
 def test_a_turntable_goes_once_around(addon, capture, turns):
-    """The window stands at the head's right: a quarter turn counter-clockwise it is before the face, half a turn at the left. Where the head turns, the
-    light stays with the viewer, and the open back of the egg comes around."""
+    """The window stands at the head's right: a quarter turn counter-clockwise it is before the face, half a turn at the
+    left. Where the head turns, the light stays with the viewer, and the open back of the egg comes around."""
     folder = addon("relight.headless").render_turntable(capture, "window", turns, 4, resolution=32, samples=4)
     assert sorted(p.name for p in folder.iterdir()) == ["0001.png", "0002.png", "0003.png", "0004.png"]
     views = [pixels(folder / f"{i:04d}.png")[8:24].mean((0, 2)) for i in range(1, 5)]
     balance = [view[18:].sum() / view[:14].sum() for view in views]
     if turns == 'LIGHT':
-        assert balance[0] < 0.8 and balance[2] > 1.2 and views[1].sum() > 1.2 * views[3].sum(), (balance, [v.sum() for v in views])
+        assert balance[0] < 0.8 and balance[2] > 1.2 and views[1].sum() > 1.2 * views[3].sum(), (balance,
+                                                                                                 [v.sum()
+                                                                                                  for v in views])
     else:
         head, scene = bpy.data.objects[capture.stem], bpy.data.scenes["WildCap Relight"]
         assert head.animation_data is None and head.matrix_world.is_identity
@@ -56,19 +59,23 @@ def test_a_turntable_goes_once_around(addon, capture, turns):
             places.append(scene.camera.evaluated_get(scene.view_layers[0].depsgraph).matrix_world.translation.copy())
         assert all(a.z == pytest.approx(places[0].z) for a in places)
         assert (places[0] + places[2]).xy.length < 0.05 * places[0].xy.length, "the other side after half a turn"
-        assert places[0].xy.angle_signed(places[1].xy) == pytest.approx(np.pi / 2, abs=0.02), "clockwise, so that the head turns counter-clockwise"
+        assert places[0].xy.angle_signed(places[1].xy) == pytest.approx(np.pi / 2, abs=0.02), (
+            "clockwise, so that the head turns counter-clockwise"
+        )
 
 
 def test_a_film_replaces_the_frames_and_one_that_is_stopped_leaves_the_last(addon, capture, monkeypatch):
     headless, output = addon("relight.headless"), addon("relight.output")
     folder = headless.render_turntable(capture, "sun", frames=2, film=True, resolution=32, samples=1)
-    assert [p.name for p in folder.iterdir()] == ["turntable.mp4"] and b"ftyp" in (folder / "turntable.mp4").read_bytes()[:12]
+    assert [p.name
+            for p in folder.iterdir()] == ["turntable.mp4"] and b"ftyp" in (folder / "turntable.mp4").read_bytes()[:12]
     output._running = output.Running(folder=folder)
     (folder.parent / ".turntable").mkdir()
     output.drop()
     assert not (folder.parent / ".turntable").exists() and (folder / "turntable.mp4").is_file()
     shutil.rmtree(folder)
-    monkeypatch.setattr(output, "_render", lambda scene, wait, **what: None)  # one that Esc stops before its first frame
+    # one that Esc stops before its first frame
+    monkeypatch.setattr(output, "_render", lambda scene, wait, **what: None)
     output.frames(bpy.data.scenes[output.SCENE], folder, "####.png", 2, False)
     output.drop()
     assert not folder.exists()
@@ -79,7 +86,8 @@ def test_a_film_replaces_the_frames_and_one_that_is_stopped_leaves_the_last(addo
 
 def test_the_command_line_renders_and_says_what_is_wrong(addon, capture, capsys):
     execute = addon("terminal").execute
-    assert execute(["turntable", str(capture), "--frames", "2", "--turns", "light", "--resolution", "16", "--samples", "1"]) == 0
+    assert execute(["turntable", str(capture), "--frames", "2", "--turns", "light", "--resolution", "16", "--samples",
+                    "1"]) == 0
     assert str(capture / "renders" / "turntable") in capsys.readouterr().out
     assert execute(["relight", str(capture), "moon"]) == 1
     assert "no light named moon" in capsys.readouterr().err
@@ -89,12 +97,20 @@ def test_the_buttons_render_what_the_panel_says_and_wait_for_each_other(addon, c
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.assemble_material()
     props = bpy.context.scene.wildcap
-    props.resolution, props.samples, props.view, props.light, props.turn_frames, props.turn_file = 16, 1, 'AgX', 'overcast', 2, 'PNG'
+    props.resolution, props.samples, props.view, props.light, props.turn_frames, props.turn_file = (
+        16,
+        1,
+        'AgX',
+        'overcast',
+        2,
+        'PNG',
+    )
     bpy.ops.wildcap.render()
     assert b"View transform: AgX" in (capture / "renders" / "overcast.png").read_bytes()
     bpy.ops.wildcap.turntable()
     bpy.ops.wildcap.contact_sheet()
-    assert len(list((capture / "renders" / "turntable").iterdir())) == 2 and (capture / "renders" / "contact_sheet.png").is_file()
+    assert len(list((capture / "renders" / "turntable").iterdir())) == 2 and (capture / "renders"
+                                                                              / "contact_sheet.png").is_file()
     monkeypatch.setattr(addon("relight.output"), "busy", lambda: True)
     for name in ("render", "turntable", "contact_sheet"):
         with pytest.raises(RuntimeError, match="Blender is rendering"):

@@ -55,13 +55,16 @@ def test_similarity_is_found_exactly():
     source = rng.normal(size=(20, 3))
     rotation = alignment._rotation(np.array([0.3, -1.1, 0.7]))
     found = alignment.similarity(source, 2.5 * source @ rotation.T + [1, 2, 3], rng.uniform(0.1, 1, 20))
-    assert np.allclose(found.rotation, rotation) and np.isclose(found.scale, 2.5) and np.allclose(found.translation, [1, 2, 3])
+    assert np.allclose(found.rotation, rotation) and np.isclose(found.scale,
+                                                                2.5) and np.allclose(found.translation, [1, 2, 3])
 
 
 def test_landmarks_are_lifted_although_one_view_is_wrong(tmp_path, known):
     points = known[2]
     views = _views(tmp_path, points.mean(0))
-    pixels = np.stack([view.project(points)[0] for view in views]) + np.random.default_rng(0).normal(0, 0.3, (len(views), len(points), 2))
+    pixels = np.stack([view.project(points)[0] for view in views]) + np.random.default_rng(0).normal(0, 0.3,
+                                                                                                     (len(views),
+                                                                                                      len(points), 2))
     pixels[1] += [25, -10]
     found = landmarks.triangulate(views, pixels)
     error = np.linalg.norm(found.points - points, axis=1)
@@ -100,7 +103,8 @@ def test_a_known_head_is_recovered(known):
 
 def test_the_stage_writes_a_head_of_the_frozen_topology(tmp_path, monkeypatch, known):
     model, truth, points, _ = known
-    capture, report = _capture(tmp_path / "Café Müller.wildcap", truth, model, points, monkeypatch), Reporter("registration")
+    capture, report = _capture(tmp_path / "Café Müller.wildcap", truth, model, points,
+                               monkeypatch), Reporter("registration")
     registration.run(capture, from_json({"registration": {"iterations": 8}}), report)
     head = meshes.read_obj(capture.head)
     assert template.template_hash(head) == template.template_hash(template.load())
@@ -108,7 +112,8 @@ def test_the_stage_writes_a_head_of_the_frozen_topology(tmp_path, monkeypatch, k
     assert np.median(np.linalg.norm(head.vertices - truth, axis=1)[follow]) < 0.001
     assert report.figures["flipped_triangles"] == 0 and report.figures["head_to_scan_median_mm"] < 0.5
     edge = head.vertices[bust.open_edge(head)]
-    assert np.linalg.svd(edge - edge.mean(0))[1][2] < 1e-5, "the neck ends in a plane, whatever was smoothed after the fit"
+    assert np.linalg.svd(edge
+                         - edge.mean(0))[1][2] < 1e-5, "the neck ends in a plane, whatever was smoothed after the fit"
     stored = json.loads(capture.landmarks.read_text())
     assert np.linalg.norm(np.array(stored["points"]["152"]) - points[152]) < 0.001
     assert set(stored["images"]) == {view.name for view in read_views(capture)}
@@ -117,7 +122,8 @@ def test_the_stage_writes_a_head_of_the_frozen_topology(tmp_path, monkeypatch, k
 
 def test_a_scan_of_something_else_is_a_problem(tmp_path, monkeypatch, known):
     model, truth, points, _ = known
-    capture = _capture(tmp_path / "other", truth, model, points, monkeypatch, lambda mesh: mesh.moved(mesh.vertices + [0, 0.3, 0]))
+    capture = _capture(tmp_path / "other", truth, model, points, monkeypatch,
+                       lambda mesh: mesh.moved(mesh.vertices + [0, 0.3, 0]))
     with pytest.raises(Problem, match="could not be laid over the scan"):
         registration.run(capture, from_json({"registration": {"iterations": 3}}), Reporter("registration"))
     assert not capture.head.exists()
@@ -140,7 +146,8 @@ def _views(root, middle):
     capture = Capture(root)
     capture.frames.mkdir(parents=True)
     names = [f"{i:05d}.jpg" for i in range(len(AZIMUTHS))]
-    frames = [{"name": name, "video_frame": i, "time_s": i / 24, "sharpness": 1.0, "selected": True} for i, name in enumerate(names)]
+    frames = [{"name": name, "video_frame": i, "time_s": i / 24, "sharpness": 1.0, "selected": True}
+              for i, name in enumerate(names)]
     capture.frames_json.write_text(json.dumps({"frames": frames}))
     write_cameras(capture.cameras, names, AZIMUTHS, height=float(middle[2]))
     for name in names:
@@ -149,7 +156,8 @@ def _views(root, middle):
 
 
 def _capture(root, truth, model, points, monkeypatch, change=lambda mesh: mesh):
-    """A capture up to the scan; its landmarks are given instead of detected, unless monkeypatch is None: the frames are grey."""
+    """A capture up to the scan; its landmarks are given instead of detected, unless monkeypatch is None: the frames are
+    grey."""
     views = _views(root, points.mean(0))
     capture = Capture(root)
     meshes.write_ply(capture.scan, change(scan_of(model, truth)))

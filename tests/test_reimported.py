@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is delivered comes back: by Blender's own importers it looks as it looked, and for MetaHuman it is what Epic's documentation asks of a mesh."""
+"""What is delivered comes back: by Blender's own importers it looks as it looked, and for MetaHuman it is what Epic's
+documentation asks of a mesh."""
 
 import numpy as np
 import pytest
@@ -17,8 +18,10 @@ EYE_OPENING_M = 0.005
 
 
 def test_a_file_that_blender_imports_looks_as_the_head_did(addon, tmp_path):
-    """The same light and noise: 29 dB in so small a picture, 30 in a larger one (docs/results/reimported.md); scattering is what is lost."""
-    deliveries = tuple(tuple(name.rsplit("_", 1)) for name in KEPT if name != "blender_usd" or bpy.app.build_options.usd)
+    """The same light and noise: 29 dB in so small a picture, 30 in a larger one (docs/results/reimported.md);
+    scattering is what is lost."""
+    deliveries = tuple(tuple(name.rsplit("_", 1)) for name in KEPT if name != "blender_usd"
+                       or bpy.app.build_options.usd)
     _, _, returned = reimported.compare(tmp_path, deliveries, resolution=128, samples=32)
     for key, back in returned.items():
         assert back.psnr_db > 29 and back.flat_psnr_db > 33, key
@@ -26,8 +29,9 @@ def test_a_file_that_blender_imports_looks_as_the_head_did(addon, tmp_path):
 
 
 def test_a_metahuman_gets_what_its_documentation_asks_for(addon, tmp_path):
-    """One check for each requirement of "From Mesh": FBX or OBJ; the skin's albedo as its texture; eyes that are open and no empty sockets, with white that
-    another material or its texture tells from the skin; besides, as the hint says, a static mesh in a neutral pose."""
+    """One check for each requirement of "From Mesh": FBX or OBJ; the skin's albedo as its texture; eyes that are open
+    and no empty sockets, with white that another material or its texture tells from the skin; besides, as the hint
+    says, a static mesh in a neutral pose."""
     from core.contract import sample_head
 
     headless = addon("relight.headless")
@@ -37,7 +41,11 @@ def test_a_metahuman_gets_what_its_documentation_asks_for(addon, tmp_path):
     folder = reimported.deliver(item, "metahuman", "fbx")
     assert {path.suffix for path in folder.iterdir()} == {".fbx", ".json", ""}
     head, = reimported.bring_back(folder)
-    assert head.data.shape_keys is None and not head.vertex_groups and not any(m.type == 'ARMATURE' for m in head.modifiers), "static, no pose but the neutral"
+    assert (
+        head.data.shape_keys is None
+        and not head.vertex_groups
+        and not any(m.type == 'ARMATURE' for m in head.modifiers)
+    ), "static, no pose but the neutral"
 
     skin = head.material_slots[0].material
     shader = next(node for node in skin.node_tree.nodes if node.type == 'BSDF_PRINCIPLED')
@@ -50,18 +58,22 @@ def test_a_metahuman_gets_what_its_documentation_asks_for(addon, tmp_path):
         rows = seen_eye(head, eyes[0], side)
         gaps.append(max(rows.values(), default=0.0))
         whites.append(len(rows))
-    assert min(gaps) > EYE_OPENING_M and min(whites) > 10, "both eyes are open, and an eyeball is behind every lid's gap"
-    picture = next(node for node in head.material_slots[eyes[0]].material.node_tree.nodes if node.type == 'TEX_IMAGE').image
+    assert min(gaps) > EYE_OPENING_M and min(whites) > 10, (
+        "both eyes are open, and an eyeball is behind every lid's gap"
+    )
+    picture = next(node for node in head.material_slots[eyes[0]].material.node_tree.nodes
+                   if node.type == 'TEX_IMAGE').image
     colours = np.array(picture.pixels[:]).reshape(-1, 4)[:, :3]
     assert (colours.min(1) > 0.6).mean() > 0.2, "the white of the eye is in its texture"
 
 
 def seen_eye(head, material: int, side: int) -> dict[float, float]:
-    """Of columns 0.5 mm apart across the eye on a side, by their place: over what height a look from the front meets the eye and nothing else before it,
-    metres."""
+    """Of columns 0.5 mm apart across the eye on a side, by their place: over what height a look from the front meets
+    the eye and nothing else before it, metres."""
     place = np.array(head.matrix_world)
     points = reimported.points_of(head)
-    eye = np.unique([v for polygon in head.data.polygons if polygon.material_index == material for v in polygon.vertices])
+    eye = np.unique([v for polygon in head.data.polygons if polygon.material_index == material
+                     for v in polygon.vertices])
     middle = points[eye][np.sign(points[eye][:, 0]) == side].mean(0)
     back, seen = np.linalg.inv(place), {}
     along = back[:3, :3] @ np.array([0.0, 1.0, 0.0])

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The authors' config.json and ckpt.pth: configurations of every kind against a network written out plainly here, and files that are none."""
+"""The authors' config.json and ckpt.pth: configurations of every kind against a network written out plainly here, and
+files that are none."""
 
 import io
 import json
@@ -18,20 +19,22 @@ from core.solve.network import Condition, denoise
 
 CONFIGS = {
     "posenc, patches of 2, attention, variance": (
-        {"depths": [1, 2, 3], "channels": [32, 64, 96], "self_attn_depths": [False, True, True], "patch_size": 2, "mapping_out": 24, "sigma_data": 0.5,
-         "has_variance": True}, {"type": "posenc", "pos_enc_freq": 4}),
+        {"depths": [1, 2, 3], "channels": [32, 64, 96], "self_attn_depths": [False, True, True], "patch_size": 2,
+         "mapping_out": 24, "sigma_data": 0.5, "has_variance": True}, {"type": "posenc", "pos_enc_freq": 4}),
     "four levels, the first left out, defaults": (
-        {"depths": [1, 1, 2, 1], "channels": [32, 32, 64, 64], "self_attn_depths": [True, False, True, False], "skip_stages": 1, "mapping_out": 16},
+        {"depths": [1, 1, 2, 1], "channels": [32, 32, 64, 64], "self_attn_depths": [True, False, True, False],
+         "skip_stages": 1, "mapping_out": 16},
         {"type": "coord"}),
     "noise, patches of 4, no wrapper, own mapping": (
-        {"depths": [2], "channels": [32], "self_attn_depths": [False], "patch_size": 4, "mapping_out": 16, "augment_wrapper": False, "mapping_cond_dim": 5,
-         "sigma_data": 1.0}, {"type": "noise"}),
+        {"depths": [2], "channels": [32], "self_attn_depths": [False], "patch_size": 4, "mapping_out": 16,
+         "augment_wrapper": False, "mapping_cond_dim": 5, "sigma_data": 1.0}, {"type": "noise"}),
 }
 COND_CHANNELS = {"coord": 2, "posenc": 18, "noise": 3}
 
 
 def weights_of(model: dict, cond_channels: int, wrapped: bool) -> dict[str, torch.Tensor]:
-    """A state dict of a configuration with random values, its names and shapes written down from what is known of the released models."""
+    """A state dict of a configuration with random values, its names and shapes written down from what is known of the
+    released models."""
     rng = torch.Generator().manual_seed(3)
     state, mapping, levels = {}, model["mapping_out"], len(model["depths"])
     p2, skip, widths = model.get("patch_size", 1) ** 2, model.get("skip_stages", 0), model["channels"]
@@ -65,10 +68,12 @@ def weights_of(model: dict, cond_channels: int, wrapped: bool) -> dict[str, torc
     put("mapping.2", mapping, mapping)
     put("proj_in", widths[max(0, skip - 1)], (7 + cond_channels) * p2, 1, 1)
     put("proj_out", 7 * p2 + model.get("has_variance", False), widths[max(0, skip - 1)], 1, 1)
-    for level, (depth, width, attention) in enumerate(zip(model["depths"], widths, model["self_attn_depths"], strict=True)):
+    for level, (depth, width,
+                attention) in enumerate(zip(model["depths"], widths, model["self_attn_depths"], strict=True)):
         above, up = widths[max(0, level - 1)], f"u_net.u_blocks.{levels - 1 - level}"
         put_blocks(f"u_net.d_blocks.{level}", 1, [above] + [width] * (depth - 1), width, width, attention)
-        put_blocks(up, 0, [width if level == levels - 1 else 2 * width] + [width] * (depth - 1), width, above, attention)
+        put_blocks(up, 0, [width if level == levels - 1 else 2 * width] + [width] * (depth - 1), width, above,
+                   attention)
         if level > skip:
             kernel = torch.tensor([[1.0, 3.0, 3.0, 1.0]]) / 8
             state[f"u_net.d_blocks.{level}.0.kernel"] = kernel.T @ kernel
@@ -90,14 +95,16 @@ def forward(state: dict, model: dict, x: torch.Tensor, sigma: torch.Tensor, extr
     def norm(name, value):
         count = value.shape[1]
         grouped = value.reshape(len(value), max(1, count // 32), -1)
-        grouped = (grouped - grouped.mean(-1, keepdim=True)) / (grouped.var(-1, unbiased=False, keepdim=True) + 1e-5).sqrt()
+        grouped = (grouped - grouped.mean(-1, keepdim=True)) / (grouped.var(-1, unbiased=False, keepdim=True)
+                                                                + 1e-5).sqrt()
         weight, bias = affine(f"{name}.mapper", mapped)[:, :count], affine(f"{name}.mapper", mapped)[:, count:]
         return grouped.reshape(value.shape) * (1 + weight[:, :, None, None]) + bias[:, :, None, None]
 
     def attention(name, value):
         n, c, h, w = value.shape
         heads = max(1, c // 64)
-        q, k, v = conv(f"{name}.qkv_proj", norm(f"{name}.norm_in", value)).reshape(n, 3, heads, c // heads, h * w).unbind(1)
+        q, k, v = conv(f"{name}.qkv_proj",
+                       norm(f"{name}.norm_in", value)).reshape(n, 3, heads, c // heads, h * w).unbind(1)
         seen = torch.softmax(torch.einsum("nhci,nhcj->nhij", q, k) / math.sqrt(c // heads), -1)
         return value + conv(f"{name}.out_proj", torch.einsum("nhij,nhcj->nhci", seen, v).reshape(n, c, h, w))
 
@@ -113,7 +120,8 @@ def forward(state: dict, model: dict, x: torch.Tensor, sigma: torch.Tensor, extr
 
     def halved(value, kernel):
         count = value.shape[1]
-        return functional.conv2d(functional.pad(value, (1, 1, 1, 1), mode="reflect"), kernel.expand(count, 1, 4, 4), stride=2, groups=count)
+        return functional.conv2d(functional.pad(value, (1, 1, 1, 1), mode="reflect"), kernel.expand(count, 1, 4, 4),
+                                 stride=2, groups=count)
 
     def doubled(value, kernel):
         count = value.shape[1]
@@ -125,7 +133,8 @@ def forward(state: dict, model: dict, x: torch.Tensor, sigma: torch.Tensor, extr
     mapped = mapped if extra is None else mapped + affine("mapping_cond", extra)
     mapped = functional.gelu(affine("mapping.2", functional.gelu(affine("mapping.0", mapped))))
     n, c, h, w = x.shape
-    x = x.reshape(n, c, h // patch, patch, w // patch, patch).permute(0, 1, 3, 5, 2, 4).reshape(n, c * patch**2, h // patch, w // patch)
+    x = x.reshape(n, c, h // patch, patch, w // patch,
+                  patch).permute(0, 1, 3, 5, 2, 4).reshape(n, c * patch**2, h // patch, w // patch)
     x, kept, levels = conv("proj_in", x), [], len(model["depths"])
     for level in range(skip, levels):
         if level > skip:
@@ -134,7 +143,11 @@ def forward(state: dict, model: dict, x: torch.Tensor, sigma: torch.Tensor, extr
         kept.append(x)
     for level in reversed(range(skip, levels)):
         x = x if level == levels - 1 else torch.cat([x, kept[level - skip]], 1)
-        name, depth, attends = f"u_net.u_blocks.{levels - 1 - level}", model["depths"][level], model["self_attn_depths"][level]
+        name, depth, attends = (
+            f"u_net.u_blocks.{levels - 1 - level}",
+            model["depths"][level],
+            model["self_attn_depths"][level],
+        )
         x = block(name, depth, 0, attends, x)
         if level > skip:
             x = doubled(x, s[f"{name}.{depth * (2 if attends else 1)}.kernel"])
@@ -144,7 +157,9 @@ def forward(state: dict, model: dict, x: torch.Tensor, sigma: torch.Tensor, extr
 
 def write(folder, model: dict, cond: dict, state, **around) -> None:
     folder.mkdir(exist_ok=True)
-    (folder / "config.json").write_text(json.dumps({"model": {"type": "image_v1", "input_channels": 7, **model}, "cond": cond}))
+    (folder
+     / "config.json").write_text(json.dumps({"model": {"type": "image_v1", "input_channels": 7, **model},
+                                             "cond": cond}))
     torch.save({"model_ema": state, **around}, folder / "ckpt.pth")
 
 
@@ -158,7 +173,8 @@ def test_a_checkpoint_of_another_kind_gives_what_its_formulas_give(tmp_path, nam
     network = prior.load(tmp_path, dtype=torch.float32).network
     rng = torch.Generator().manual_seed(1)
     x, condition = torch.randn(2, 7, 16, 32, generator=rng), torch.randn(2, channels, 16, 32, generator=rng)
-    sigma, extra = torch.tensor([0.05, 4.0]), torch.randn(2, model["mapping_cond_dim"], generator=rng) if "mapping_cond_dim" in model else None
+    sigma, extra = (torch.tensor([0.05, 4.0]),
+                    torch.randn(2, model["mapping_cond_dim"], generator=rng) if "mapping_cond_dim" in model else None)
     s, data = sigma[:, None, None, None], model.get("sigma_data", 1.0)
     inner = forward(state, model, torch.cat([x, condition], 1) / (s**2 + data**2).sqrt(), sigma, extra)
     wanted = s * data / (s**2 + data**2).sqrt() * inner + data**2 / (s**2 + data**2) * x
@@ -177,7 +193,8 @@ def test_noise_is_read_where_the_folder_carries_it_and_asked_for_where_not(tmp_p
     np.save(tmp_path / released.NOISE_FILE, noise)
     loaded = prior.load(tmp_path, dtype=torch.float32)
     window = torch.from_numpy(noise[None, :, 8:24, 32:48])
-    assert (loaded.of_tone()(x, 1.0, coords) - denoise(loaded.network, x, torch.tensor([1.0]), Condition(window))).abs().max() < 1e-6
+    assert (loaded.of_tone()(x, 1.0, coords)
+            - denoise(loaded.network, x, torch.tensor([1.0]), Condition(window))).abs().max() < 1e-6
     for wrong in (noise[:2], noise[:, :8], noise.astype(np.int32), np.where(noise > 2, np.nan, noise)):
         np.save(tmp_path / released.NOISE_FILE, wrong)
         with pytest.raises(Problem, match="of shape"):
@@ -191,7 +208,8 @@ def test_a_noise_map_that_is_damaged_or_promises_more_than_it_holds_is_refused(t
     with pytest.raises(Problem, match="noise.npy cannot be read"):
         released.read_noise(tmp_path)
     header = io.BytesIO()
-    np.lib.format.write_array_header_1_0(header, {"descr": "<f4", "fortran_order": False, "shape": (3, 1 << 20, 1 << 20)})
+    np.lib.format.write_array_header_1_0(header,
+                                         {"descr": "<f4", "fortran_order": False, "shape": (3, 1 << 20, 1 << 20)})
     path.write_bytes(header.getvalue())
     with pytest.raises(Problem, match="noise.npy cannot be read"):
         released.read_noise(tmp_path)
@@ -212,9 +230,10 @@ def good(tmp_path):
 
 
 @pytest.mark.parametrize(("entry", "value", "match"), [
-    ("type", "image_transformer_v2", "image_transformer_v2"), ("input_channels", 3, "models 3 channels"), ("channels", [32, 32, 64, 96], "does not fit"),
-    ("depths", [1, 1], "one length"), ("mapping_out", "many", "no positive numbers"), ("cross_cond_dim", 8, "cross attention"),
-    ("patch_size", 2, "does not fit")])
+    ("type", "image_transformer_v2", "image_transformer_v2"), ("input_channels", 3, "models 3 channels"),
+    ("channels", [32, 32, 64, 96], "does not fit"),
+    ("depths", [1, 1], "one length"), ("mapping_out", "many", "no positive numbers"),
+    ("cross_cond_dim", 8, "cross attention"), ("patch_size", 2, "does not fit")])
 def test_other_models_are_told_apart(good, entry, value, match):
     config = json.loads((good / "config.json").read_text())
     config["model"] |= {entry: value, "cross_attn_depths": [True] * 4}

@@ -14,9 +14,15 @@ def test_assembling_again_keeps_the_artists_values_and_makes_nothing_new(addon, 
     bpy.ops.wildcap.assemble_material()
     material = bpy.context.view_layer.objects.active.data.materials[0]
     material.node_tree.nodes["WildCap Skin"].inputs["Roughness"].default_value = 0.3
-    before = node_text.lines(material.node_tree), len(bpy.data.images), len(bpy.data.materials), len(bpy.data.node_groups)
+    before = (
+        node_text.lines(material.node_tree),
+        len(bpy.data.images),
+        len(bpy.data.materials),
+        len(bpy.data.node_groups),
+    )
     bpy.ops.wildcap.assemble_material()
-    assert (node_text.lines(material.node_tree), len(bpy.data.images), len(bpy.data.materials), len(bpy.data.node_groups)) == before
+    assert (node_text.lines(material.node_tree), len(bpy.data.images), len(bpy.data.materials),
+            len(bpy.data.node_groups)) == before
     assert material.node_tree.nodes["WildCap Skin"].inputs["Roughness"].default_value == pytest.approx(0.3)
 
 
@@ -63,7 +69,8 @@ def test_a_render_is_written_and_the_scene_is_untouched(addon, capture):
         means.append(pixels[24:40, 24:40, :3].mean())
     assert all(0.1 < mean < 0.95 for mean in means), means
     assert [p.name for p in (capture / "renders").iterdir() if p.name.startswith(".")] == []
-    assert (scene.camera, scene.world, scene.render.engine, scene.render.filepath, {o.name for o in scene.objects}) == before
+    assert (scene.camera, scene.world, scene.render.engine, scene.render.filepath,
+            {o.name for o in scene.objects}) == before
 
 
 def test_headless_renders_a_picture_and_its_linear_twin(addon, capture):
@@ -73,7 +80,8 @@ def test_headless_renders_a_picture_and_its_linear_twin(addon, capture):
         assert b"tEXtNote\0View transform: Standard" in path.read_bytes()
         linear, shown = (pixels(file) for file in (path.with_suffix(".exr"), path))
         encoded = np.where(linear > 0.0031308, 1.055 * np.maximum(linear, 0) ** (1 / 2.4) - 0.055, 12.92 * linear)
-        assert np.abs(np.clip(encoded, 0, 1) - shown).max() < 2.5 / 255, "the same render: linear, and as sRGB without a look, dithered"
+        assert np.abs(np.clip(encoded, 0, 1)
+                      - shown).max() < 2.5 / 255, "the same render: linear, and as sRGB without a look, dithered"
     assert addon("relight.headless").light_of("sunset").path.is_file(), "one of Blender's worlds"
     with pytest.raises(addon("hdri").Problem, match="no light named"):
         addon("relight.headless").render_relit(capture, ("moon",))
@@ -120,8 +128,9 @@ def test_the_panel_names_every_preset_and_old_files_keep_theirs(addon):
 
 
 def test_the_surroundings_of_a_picture_light_the_head_and_turn_with_their_rotation(addon, capture, tmp_path):
-    """A panorama that is bright towards +X alone: the head's left, at the right of the picture; a quarter turn clockwise it is before the face, half a
-    turn its other side is lit, a quarter turn counter-clockwise it is behind."""
+    """A panorama that is bright towards +X alone: the head's left, at the right of the picture; a quarter turn
+    clockwise it is before the face, half a turn its other side is lit, a quarter turn counter-clockwise it is
+    behind."""
     bpy.ops.wildcap.bring_in_head()
     bpy.ops.wildcap.assemble_material()
     panorama = bpy.data.images.new("side", 64, 32, float_buffer=True)

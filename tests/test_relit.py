@@ -35,9 +35,11 @@ def test_the_people_are_six_tones_that_no_training_may_take():
     assert {p.seed for p in people.PEOPLE} <= reserved_seeds()
     for person in people.PEOPLE:
         p = sample_parameters(person.seed)
-        colour = pigment.reflectance(np.array([p.melanin]), np.array([p.blood]), p.oxygen, p.scattering, p.slope, p.chroma)[0]
+        colour = pigment.reflectance(np.array([p.melanin]), np.array([p.blood]), p.oxygen, p.scattering, p.slope,
+                                     p.chroma)[0]
         assert tone_group(images.linear_to_srgb(colour)).replace(" ", "_") == person.name
-    assert len({p.name for p in people.PEOPLE}) == len(TONES) and {p.light for p in people.PEOPLE} == set(people_lights.KINDS)
+    assert len({p.name for p in people.PEOPLE}) == len(TONES) and {p.light
+                                                                   for p in people.PEOPLE} == set(people_lights.KINDS)
 
 
 def test_a_panorama_is_bright_where_its_sky_and_window_are():
@@ -45,9 +47,11 @@ def test_a_panorama_is_bright_where_its_sky_and_window_are():
     side = np.sign(light.sun.direction[0])
     rows, columns = np.nonzero(light.sky.mean(-1) > 1)
     middle = people_lights._directions()[rows, columns].mean(0)
-    assert np.sign(middle[0]) == side and middle[1] < 0 < middle[2]  # the window is on the sun's side, before the face and above
+    # the window is on the sun's side, before the face and above
+    assert np.sign(middle[0]) == side and middle[1] < 0 < middle[2]
     sky = people_lights.panorama((3, 3, 3), (1, 1, 1), (0.1, 0.1, 0.1))
-    assert sky[0, 0, 0] == pytest.approx(3, rel=0.01) and sky[people_lights.HEIGHT // 2 - 1, 0, 0] == pytest.approx(1, rel=0.06)
+    assert sky[0, 0, 0] == pytest.approx(3, rel=0.01) and sky[people_lights.HEIGHT // 2 - 1, 0,
+                                                              0] == pytest.approx(1, rel=0.06)
     assert sky[-1, 0, 0] == pytest.approx(0.1)
 
 
@@ -73,10 +77,13 @@ def test_exposure_takes_the_lights_colour_out_and_brings_the_face_to_its_level()
 def test_each_swapped_row_takes_one_true_map_and_no_other(maps):
     solved, true = maps
     skin = np.ones((SIZE, SIZE))
-    rows = rows_of(np.full((SIZE, SIZE, 3), 0.1, np.float32), np.full((SIZE, SIZE, 3), 0.2, np.float32), solved, true, skin)
+    rows = rows_of(np.full((SIZE, SIZE, 3), 0.1, np.float32), np.full((SIZE, SIZE, 3), 0.2, np.float32), solved, true,
+                   skin)
     assert set(rows) == {"truth", *relit.ROWS}
-    taken = {name: [name for name in ("albedo", "normal", "specular") if getattr(row, name) is getattr(true, name)] for name, row in rows.items()}
-    assert taken == {"truth": ["albedo", "normal", "specular"], "floor": ["albedo", "normal", "specular"], "raw": [], "delit": [], "solved": [], "plain": [],
+    taken = {name: [name for name in ("albedo", "normal", "specular") if getattr(row, name) is getattr(true, name)]
+             for name, row in rows.items()}
+    assert taken == {"truth": ["albedo", "normal", "specular"], "floor": ["albedo", "normal", "specular"], "raw": [],
+                     "delit": [], "solved": [], "plain": [],
                      "true_albedo": ["albedo"], "true_normal": ["normal"], "true_specular": ["specular"]}
     for name in ("raw", "delit"):  # other albedos of the true tone, the solver's other maps
         np.testing.assert_allclose(rows[name].albedo, 0.4, rtol=1e-5)
@@ -93,7 +100,8 @@ def test_a_row_is_a_capture_that_holds_its_maps(maps, tmp_path):
     images.write_data(source.texture_confidence, np.ones((SIZE, SIZE, 3), np.float32))
     write_row(tmp_path / "row.wildcap", source, maps[1])
     assert (tmp_path / "row.wildcap" / "head.obj").read_text() == "v 0 0 0\n"
-    assert Capture(tmp_path / "row.wildcap").read()["stages"]["upscale"]["figures"]["specular_mean"] == pytest.approx(0.3)
+    assert Capture(tmp_path
+                   / "row.wildcap").read()["stages"]["upscale"]["figures"]["specular_mean"] == pytest.approx(0.3)
     back = read_worn(tmp_path / "row.wildcap" / "maps", SIZE)
     for name in ("albedo", "normal", "specular"):
         np.testing.assert_allclose(getattr(back, name), getattr(maps[1], name), atol=1e-4)
@@ -115,7 +123,10 @@ def test_the_same_head_scores_infinite_one_and_nought_and_a_known_gain_its_decib
         found = relit.score(tmp_path, ["window"])["window"]
     finally:
         relit.MIDDLE = relit_middle
-    assert found["solved"]["psnr"] == pytest.approx(120) and found["solved"]["ssim"] == 1 and found["solved"]["flip"] == 0  # 120 dB stands for infinite
+    # 120 dB stands for infinite
+    assert (
+        found["solved"]["psnr"] == pytest.approx(120) and found["solved"]["ssim"] == 1 and found["solved"]["flip"] == 0
+    )
     assert found["raw"]["psnr"] == pytest.approx(-20 * np.log10(12.92 * 0.0010), abs=0.01)
     assert (tmp_path / "window.png").is_file()
     missing = relit.shortfall(relit.mean_over_lights({"window": found}))
@@ -150,7 +161,9 @@ def test_only_the_rectangle_about_the_face_is_shown():
     face = np.zeros((200, 300), bool)
     face[50:100, 120:160] = True
     rows, columns = relit.rendered(face)
-    assert 44 <= rows.start < 50 and 100 <= rows.stop <= 106 and 114 <= columns.start < 120 and 160 <= columns.stop <= 166
+    assert (
+        44 <= rows.start < 50 and 100 <= rows.stop <= 106 and 114 <= columns.start < 120 and 160 <= columns.stop <= 166
+    )
 
 
 def test_the_gallerys_close_up_lies_on_the_right_cheek():
@@ -158,7 +171,9 @@ def test_the_gallerys_close_up_lies_on_the_right_cheek():
     skin = template.mask("skin", 256)
     assert skin[int(row * 256), int(column * 256)] > 0.9
     nose, side = gallery.landmark_uv(4), gallery.CLOSE_UP
-    assert side / 4 < abs(column - nose[0]) < 2 * side and column != pytest.approx(gallery.landmark_uv(423)[0], abs=side / 2)  # 423: the other side
+    # 423: the other side
+    assert side / 4 < abs(column
+                          - nose[0]) < 2 * side and column != pytest.approx(gallery.landmark_uv(423)[0], abs=side / 2)
 
 
 def test_a_gallery_row_is_two_lines_and_small_enough(tmp_path):

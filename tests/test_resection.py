@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cameras from the face: known ones found again from landmarks alone and with matches; a profile without a face comes in through matches."""
+"""Cameras from the face: known ones found again from landmarks alone and with matches; a profile without a face comes
+in through matches."""
 
 from types import SimpleNamespace
 
@@ -28,7 +29,8 @@ PERSON = template_landmarks().shape(IDENTITY)
 def seen(view, noise_px: float, rng) -> Face:
     pixels, _ = view.project(PERSON + rng.normal(0, 0.0005, PERSON.shape))
     pixels = pixels + rng.normal(0, noise_px, pixels.shape)
-    return Face((*pixels.min(0), *pixels.max(0)), np.concatenate([pixels, np.zeros((468, 1))], 1).astype(np.float32), 1.0)
+    return Face((*pixels.min(0), *pixels.max(0)), np.concatenate([pixels, np.zeros((468, 1))], 1).astype(np.float32),
+                1.0)
 
 
 def matched(views: dict, rng, count: int = 400) -> Matches:
@@ -46,12 +48,16 @@ def matched(views: dict, rng, count: int = 400) -> Matches:
 
 
 def off(result, views: dict) -> tuple[np.ndarray, np.ndarray]:
-    """Errors of the centres [N] as shares of the distance, and of the rotations [N] in degrees, after the similarity of the centres."""
+    """Errors of the centres [N] as shares of the distance, and of the rotations [N] in degrees, after the similarity of
+    the centres."""
     found = sorted(result.model.images.values(), key=lambda image: image.name)
     true = [views[image.name] for image in found]
-    scale, rotation, shift = similarity(np.array([image.projection_center() for image in found]), np.array([view.centre for view in true]))
-    centres = [np.linalg.norm(scale * rotation @ image.projection_center() + shift - view.centre) / 0.55 for image, view in zip(found, true, strict=True)]
-    cosines = [(np.trace(view.rotation @ rotation @ image.cam_from_world().rotation.matrix().T) - 1) / 2 for image, view in zip(found, true, strict=True)]
+    scale, rotation, shift = similarity(np.array([image.projection_center() for image in found]),
+                                        np.array([view.centre for view in true]))
+    centres = [np.linalg.norm(scale * rotation @ image.projection_center() + shift - view.centre) / 0.55
+               for image, view in zip(found, true, strict=True)]
+    cosines = [(np.trace(view.rotation @ rotation @ image.cam_from_world().rotation.matrix().T) - 1) / 2
+               for image, view in zip(found, true, strict=True)]
     return np.array(centres), np.degrees(np.arccos(np.clip(cosines, -1, 1)))
 
 
@@ -93,7 +99,8 @@ def test_wrong_matches_do_not_count_as_refinement(scene):
     rng, views, found = scene
     keypoints = {name: rng.uniform(0, WIDTH, (300, 2)) for name in views}
     index = np.stack([np.arange(300)] * 2, 1)
-    result = resect(group(views), found, Matches(keypoints, {(a, b): index for a in views for b in views if a < b}), Reporter("cameras"))
+    result = resect(group(views), found, Matches(keypoints, {(a, b): index for a in views for b in views if a < b}),
+                    Reporter("cameras"))
     assert not result.refined
 
 
@@ -105,7 +112,8 @@ def test_fewer_than_two_faces_give_nothing(scene):
 def model_of(views: dict, focal: float, rng, off_m: float) -> pycolmap.Reconstruction:
     """The true cameras, moved by about so much, with a lens of this focal length."""
     model = pycolmap.Reconstruction()
-    model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="SIMPLE_RADIAL", width=WIDTH, height=HEIGHT, params=[focal, WIDTH / 2, HEIGHT / 2, 0]))
+    model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="SIMPLE_RADIAL", width=WIDTH, height=HEIGHT,
+                                                      params=[focal, WIDTH / 2, HEIGHT / 2, 0]))
     for number, (name, view) in enumerate(views.items(), 1):
         shift = (view.translation + rng.normal(0, off_m, 3)) * [1, 1, focal / FOCAL]
         pose = pycolmap.Rigid3d(np.concatenate([view.rotation, shift[:, None]], 1))
@@ -114,7 +122,8 @@ def model_of(views: dict, focal: float, rng, off_m: float) -> pycolmap.Reconstru
 
 
 def test_cameras_that_are_nearly_right_are_made_right_with_the_face(scene):
-    """Off by some pixels and a tenth of the focal length, with a profile that the net mistakes and one without a camera."""
+    """Off by some pixels and a tenth of the focal length, with a profile that the net mistakes and one without a
+    camera."""
     rng, views, found = scene
     views = views | {"8.jpg": camera(-85, 0.05), "9.jpg": camera(88, 0.05)}
     profile = seen(camera(-40, 0.05), 0.5, rng)
@@ -142,13 +151,17 @@ def test_of_two_ways_the_one_that_places_more_frames_wins_unless_nothing_but_the
     def solved(way: str, frames: int, refined: bool = True) -> Solved:
         return Solved(SimpleNamespace(num_reg_images=lambda: frames), way, None, {}, refined=refined)
 
-    assert worth(solved("face", 5)) > worth(solved("skin", 3)) > worth(solved("face", 3)) > worth(solved("face", 5, refined=False))
+    assert worth(solved("face", 5)) > worth(solved("skin",
+                                                   3)) > worth(solved("face", 3)) > worth(solved("face", 5,
+                                                                                                 refined=False))
 
 
 def test_tracks_hang_together_and_ambiguous_ones_go():
     pixels = {name: np.zeros((5, 2)) for name in "abc"}
-    pairs = {("a", "b"): np.array([[0, 0], [1, 1]]), ("b", "c"): np.array([[0, 3], [1, 2]]), ("a", "c"): np.array([[4, 2]])}
-    assert sorted(map(sorted, tracks(Matches(pixels, pairs)))) == [[("a", 0), ("b", 0), ("c", 3)]]  # a1-b1-c2-a4 meets a twice
+    pairs = {("a", "b"): np.array([[0, 0], [1, 1]]), ("b", "c"): np.array([[0, 3], [1, 2]]),
+             ("a", "c"): np.array([[4, 2]])}
+    # a1-b1-c2-a4 meets a twice
+    assert sorted(map(sorted, tracks(Matches(pixels, pairs)))) == [[("a", 0), ("b", 0), ("c", 3)]]
 
 
 def test_head_of_known_size_against_rays():

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""review.html: the faces of a batch in the right order, with their pictures, escaped, and in need of nothing from elsewhere."""
+"""review.html: the faces of a batch in the right order, with their pictures, escaped, and in need of nothing from
+elsewhere."""
 
 import base64
 import json
@@ -31,7 +32,8 @@ def make(root, name: str, findings: int = 0, **figures) -> BatchFace:
     for measure in review.MEASURES:
         if measure.label in figures or measure.label == review.FINDINGS:
             stage = stages.by_name(measure.stage or "frames")
-            face.capture.finish(stage, face.capture.conditions(stage, Settings()), 60.0, Settings(), {measure.figure: figures.get(measure.label)}, "0.2.0",
+            face.capture.finish(stage, face.capture.conditions(stage, Settings()), 60.0, Settings(),
+                                {measure.figure: figures.get(measure.label)}, "0.2.0",
                                 [FINDING] * findings if stage.name == "frames" else [])
     return face
 
@@ -46,16 +48,20 @@ def batch(tmp_path) -> Batch:
     root = tmp_path / "R&D <batch> 100%"
     root.mkdir()
     (root / "film.mp4").write_bytes(b"film")
-    faces = (make(root, "good", Mask=1.0, Landmarks=0.2, Seen=90.0), make(root, "bad chin", Mask=2.0, Landmarks=9.0, Seen=89.0),
-             make(root, "half", Mask=50.0, Landmarks=0.9, Seen=70.0), make(root, "told", findings=2, Mask=1.5, Landmarks=0.3, Seen=88.0))
+    faces = (make(root, "good", Mask=1.0, Landmarks=0.2, Seen=90.0),
+             make(root, "bad chin", Mask=2.0, Landmarks=9.0, Seen=89.0),
+             make(root, "half", Mask=50.0, Landmarks=0.9, Seen=70.0),
+             make(root, "told", findings=2, Mask=1.5, Landmarks=0.3, Seen=88.0))
     write_batch(Batch(root, faces))
     return Batch(root, faces)
 
 
 def test_a_measure_is_ranked_by_the_share_of_the_others_that_are_better(batch):
-    ranks = review.rank([{"Mask": 10.0, "Seen": 90.0}, {"Mask": 10.0, "Seen": 80.0}, {"Mask": 30.0}, {"Mask": 20.0, "Seen": 70.0}])
+    ranks = review.rank([{"Mask": 10.0, "Seen": 90.0}, {"Mask": 10.0, "Seen": 80.0}, {"Mask": 30.0},
+                         {"Mask": 20.0, "Seen": 70.0}])
     assert [own["Mask"] for own in ranks] == [0, 0, 1, pytest.approx(2 / 3)]
-    assert [own.get("Seen") for own in ranks] == [0, 0.5, None, 1], "of what is seen, less is riskier; who has none is not compared"
+    assert [own.get("Seen") for own in ranks] == [0, 0.5, None,
+                                                  1], "of what is seen, less is riskier; who has none is not compared"
     assert review.rank([{"Mask": 10.0}]) == [{"Mask": 0.0}]
 
 
@@ -63,12 +69,14 @@ def test_the_worst_measure_decides_and_where_that_is_equal_their_mean(batch):
     assert order(batch) == ["half", "told", "bad chin", "good"], "means of 2/3, 7/12 and 1/2"
     lines = review.list_riskiest(review.write_review(batch)[1])
     assert [line.split("  ")[0] for line in lines] == ["half", "told", "bad chin", "good"]
-    assert lines[2].endswith("landmarks 9 mm, worse than all others") and lines[1].endswith("findings 2, worse than all others")
+    assert lines[2].endswith("landmarks 9 mm, worse than all others") and lines[1].endswith("findings 2, worse than "
+                                                                                            "all others")
     assert lines[3].endswith("nothing is worse than in the others")
 
 
 def test_stopped_faces_come_first_then_those_that_wait(batch, monkeypatch):
-    states = {"good": FaceState(STOPPED, review.GROUPS[0], "It <broke>.", "Mend it."), "told": FaceState(WAITING, review.GROUPS[2]), "half": FaceState(DONE),
+    states = {"good": FaceState(STOPPED, review.GROUPS[0], "It <broke>.", "Mend it."),
+              "told": FaceState(WAITING, review.GROUPS[2]), "half": FaceState(DONE),
               "bad chin": FaceState(TO_DO, review.GROUPS[1])}
     monkeypatch.setattr(review, "derive_state", lambda batch, face: states[face.name])
     assert order(batch) == ["good", "told", "half", "bad chin"]
@@ -87,9 +95,11 @@ def test_the_page_is_escaped_loads_nothing_and_links_where_the_reports_are(batch
     path, _ = review.write_review(Batch(batch.root, (*batch.faces, strange)))
     text = path.read_text(encoding="utf-8")
     page = Page(text)
-    assert not {"script", "link", "iframe", "b>"} & {tag for tag, _ in page.elements} and "http" not in text and "url(" not in text
+    assert not {"script", "link", "iframe",
+                "b>"} & {tag for tag, _ in page.elements} and "http" not in text and "url(" not in text
     assert {"R&D <batch> 100%", "<b>", "The light <changed>.", "Lock the exposure.", "2 findings"} <= set(page.texts)
-    assert sorted(a["href"] for a in page.attributes("a")) == ["a%20%231%20%3Ci%3E.wildcap/report.html", "half.wildcap/report.html"]
+    assert sorted(a["href"] for a in page.attributes("a")) == ["a%20%231%20%3Ci%3E.wildcap/report.html",
+                                                               "half.wildcap/report.html"]
 
 
 def test_pictures_are_small_and_in_the_page_and_a_damaged_one_is_left_out(batch):
@@ -102,7 +112,8 @@ def test_pictures_are_small_and_in_the_page_and_a_damaged_one_is_left_out(batch)
     images.write_srgb(batch.faces[1].capture.picture("frames", "selected"), wide[:60])
     review.write_review(batch)
     shown = Page((batch.root / review.NAME).read_text(encoding="utf-8")).attributes("img")
-    assert [image["title"] for image in shown] == ["Frames", *(words for _, _, words in review.PICTURES[::2]), "Render"], "the second face has no other yet"
+    assert [image["title"] for image in shown] == ["Frames", *(words for _, _, words in review.PICTURES[::2]),
+                                                   "Render"], "the second face has no other yet"
     small = batch.root / "small.jpg"
     for image, size in zip(shown, [(1200, 60), *[(480, 160)] * 3], strict=True):
         small.write_bytes(base64.b64decode(image["src"].removeprefix("data:image/jpeg;base64,")))
@@ -120,7 +131,8 @@ def test_a_face_that_nothing_is_known_of_and_a_record_that_cannot_be_read_have_t
     torn = BatchFace("torn", batch.root / "film.mp4", batch.root / "torn.wildcap")
     torn.root.mkdir()
     torn.capture.json.write_text("{", encoding="utf-8")
-    assert order(Batch(batch.root, (new, *batch.faces, torn, odd))) == ["torn", "half", "told", "bad chin", "good", "new", "odd"]
+    assert order(Batch(batch.root, (new, *batch.faces, torn, odd))) == ["torn", "half", "told", "bad chin", "good",
+                                                                        "new", "odd"]
     assert order(Batch(batch.root, ())) == []
 
 
@@ -136,7 +148,10 @@ def test_a_page_that_cannot_be_written_is_told(batch):
     (batch.root / review.NAME).mkdir()
     with pytest.raises(Problem, match="review.html"):
         review.write_review(batch)
-    assert json.loads((batch.root / "batch.json").read_text(encoding="utf-8"))["faces"] and Capture(batch.faces[0].root).json.is_file()
+    assert (
+        json.loads((batch.root / "batch.json").read_text(encoding="utf-8"))["faces"]
+        and Capture(batch.faces[0].root).json.is_file()
+    )
 
 
 def test_what_somebody_else_has_put_in_the_pages_place_stays(batch):

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sampler on problems small enough to know the answer: a Gaussian prior with its closed-form posterior, and a shadow to remove."""
+"""The sampler on problems small enough to know the answer: a Gaussian prior with its closed-form posterior, and a
+shadow to remove."""
 
 import numpy as np
 import pytest
@@ -55,7 +56,8 @@ def observation(texture, alpha=None, cells=(4, 4), weight=None):
 
 
 def start(value=0.0, size=SIZE, light=1.0, cells=(4, 4)):
-    return State(0, None, torch.full((1, 7, size, size), value), Lights(constant_light(torch.full((3,), light)), torch.zeros(1, 9, *cells), torch.ones(3)))
+    return State(0, None, torch.full((1, 7, size, size), value),
+                 Lights(constant_light(torch.full((3,), light)), torch.zeros(1, 9, *cells), torch.ones(3)))
 
 
 def test_schedule_walks_the_last_part_of_karras_sequence():
@@ -70,14 +72,16 @@ def test_schedule_walks_the_last_part_of_karras_sequence():
 
 def test_without_observation_the_sampler_draws_from_the_prior():
     o = observation(torch.zeros(3, SIZE, SIZE), weight=torch.zeros(SIZE, SIZE))
-    drawn = torch.cat([Sampler(gaussian_prior, EVEN, seeded(seed)).sample({1: o}, start()).denoised for seed in range(3)])
+    drawn = torch.cat([Sampler(gaussian_prior, EVEN, seeded(seed)).sample({1: o}, start()).denoised
+                       for seed in range(3)])
     assert abs(drawn.mean().item() - MEAN) < 0.02
     assert abs(drawn.std().item() - SPREAD) < 0.03
 
 
 @pytest.mark.parametrize("guidance", ["dps", "proximal"])
 def test_posterior_mean_under_a_gaussian_prior(guidance):
-    """Albedo observed under known light: the samples' mean is the closed-form posterior's (noise-free: the observation), other channels stay the prior's."""
+    """Albedo observed under known light: the samples' mean is the closed-form posterior's (noise-free: the
+    observation), other channels stay the prior's."""
     generator = torch.Generator().manual_seed(3)
     truth = MEAN + SPREAD * torch.randn(1, 7, SIZE, SIZE, generator=generator)
     light = 1.2
@@ -86,7 +90,8 @@ def test_posterior_mean_under_a_gaussian_prior(guidance):
     weight[:, SIZE // 2:] = 0.0  # the right half is unseen: its posterior is the prior
     recipe = Recipe(steps=75, coarse=(), guidance=guidance, rate=0.0)
     o = {1: observation(texture, weight=weight)}
-    drawn = torch.stack([Sampler(gaussian_prior, recipe, seeded(seed)).sample(o, start(light=light)).denoised[0] for seed in range(12)])
+    drawn = torch.stack([Sampler(gaussian_prior, recipe, seeded(seed)).sample(o, start(light=light)).denoised[0]
+                         for seed in range(12)])
     seen, unseen = drawn[:, :3, :, :SIZE // 2], drawn[:, :3, :, SIZE // 2:]
     assert (seen.mean(0) - truth[0, :3, :, :SIZE // 2]).abs().mean() < 0.02
     assert seen.std(0).mean() < 0.04
@@ -110,7 +115,8 @@ def test_a_known_soft_shadow_is_removed_and_only_with_the_grid():
     recipe = Recipe(steps=60, coarse=())
     errors = {}
     for name, alpha in (("grid", mask), ("no grid", torch.zeros_like(mask))):
-        out = Sampler(prior, recipe, seeded(0)).sample({1: observation(texture, alpha, (8, 8))}, start(-0.2, 64, cells=(8, 8)))
+        out = Sampler(prior, recipe, seeded(0)).sample({1: observation(texture, alpha, (8, 8))},
+                                                       start(-0.2, 64, cells=(8, 8)))
         error = ((out.denoised - truth)[0, :3] / 2) ** 2
         errors[name] = error[:, shadow].mean().sqrt().item(), error[:, mask == 0].mean().sqrt().item()
     assert errors["grid"][0] < 0.6 * errors["no grid"][0]
@@ -129,13 +135,15 @@ def test_the_paper_and_its_code_remove_a_known_shadow_too(name):
     out = Sampler(prior, recipe, seeded(0)).sample({1: o}, first)
     error, before = ((out.denoised - truth)[0, :3] / 2).abs(), (texture - (truth[0, :3] + 1) / 2).abs()
     assert error[:, shadow].mean() < 0.7 * before[:, shadow].mean()
-    assert error[:, support == 0].mean() < 0.05  # lights fitted one after the other leave more outside than lights fitted together
+    # lights fitted one after the other leave more outside than lights fitted together
+    assert error[:, support == 0].mean() < 0.05
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not():
     prior, _, texture, mask, _ = shadow_problem(32)
     o = {1: observation(texture, mask)}
-    a, b, c = (Sampler(prior, Recipe(steps=12, coarse=()), seeded(seed)).sample(o, start(-0.2)).denoised for seed in (5, 5, 6))
+    a, b, c = (Sampler(prior, Recipe(steps=12, coarse=()), seeded(seed)).sample(o, start(-0.2)).denoised
+               for seed in (5, 5, 6))
     assert torch.equal(a, b) and not torch.equal(a, c)
 
 
@@ -171,7 +179,8 @@ def test_any_mask_gives_finite_maps(kind, guidance):
     alpha = {"empty": torch.zeros(32, 32), "full": torch.ones(32, 32), "one texel": torch.zeros(32, 32)}[kind]
     if kind == "one texel":
         alpha[7, 9] = 1
-    out = Sampler(prior, Recipe(steps=20, coarse=(), guidance=guidance), seeded(0)).sample({1: observation(texture, alpha)}, start(-0.2))
+    out = Sampler(prior, Recipe(steps=20, coarse=(), guidance=guidance),
+                  seeded(0)).sample({1: observation(texture, alpha)}, start(-0.2))
     assert torch.isfinite(out.denoised).all()
     assert ((out.denoised - truth)[0, :3, 20:] / 2).abs().mean() < (0.1 if kind != "full" else 0.5)
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Self-Test: the shipped sample head solved again as a worker does it, a score that a sound machine has, and words for one that it has not."""
+"""Self-Test: the shipped sample head solved again as a worker does it, a score that a sound machine has, and words for
+one that it has not."""
 
 import json
 from pathlib import Path
@@ -41,9 +42,14 @@ def solved(noise: float):
 
 def test_the_sample_is_solved_with_its_own_tone_and_the_draft(capture):
     settings = read_job(capture.job).settings
-    assert settings.solve.skin_tone == (SAMPLE / "skin_tone.txt").read_text(encoding="ascii").strip() == self_test.SKIN_TONE
+    assert settings.solve.skin_tone == (SAMPLE
+                                        / "skin_tone.txt").read_text(encoding="ascii").strip() == self_test.SKIN_TONE
     assert settings.solve.size == 512 and settings.solve.guidance == "proximal" and settings.device == "auto"
-    assert read_job(capture.job).tool.name == "self_test" and capture.texture.is_file() and not sample_head.SHIPPED.samefile(capture.root)
+    assert (
+        read_job(capture.job).tool.name == "self_test"
+        and capture.texture.is_file()
+        and not sample_head.SHIPPED.samefile(capture.root)
+    )
 
 
 def test_the_command_solves_a_copy_and_takes_it_away(monkeypatch):
@@ -79,7 +85,9 @@ def test_what_is_expected_was_measured_over_seeds_and_precisions():
     expected = json.loads(tool.EXPECTED.read_text(encoding="utf-8"))
     scores = np.concatenate(list(expected["scores_db"].values()))
     assert set(expected["scores_db"]) == {"bfloat16", "float32"} and len(scores) >= 6
-    assert expected["mean_db"] == pytest.approx(scores.mean(), abs=1e-3) and expected["deviation_db"] == pytest.approx(scores.std(ddof=1), abs=1e-3)
+    assert expected["mean_db"] == pytest.approx(scores.mean(), abs=1e-3) and expected["deviation_db"] == pytest.approx(
+        scores.std(ddof=1), abs=1e-3
+    )
     assert scores.min() > expected["mean_db"] - tool.DEVIATIONS * expected["deviation_db"], "what was measured passes"
 
 
@@ -127,13 +135,19 @@ class TestInBlender:
             def poll(self):
                 self.running = False
                 messages = addon("jobs").messages
-                return [messages.StageDone("self_test", 41.0, False, {"score_db": 33.21, "expected_db": 32.5, "seconds": 40.7}), messages.Done(42.0)]
+                return [messages.StageDone("self_test", 41.0, False,
+                                           {"score_db": 33.21, "expected_db": 32.5, "seconds": 40.7}),
+                        messages.Done(42.0)]
 
         monkeypatch.setattr(module, "Worker", Ended)
         bpy.ops.wildcap.self_test()
         assert jobs.of("").goal == "test" and folders[0].is_dir()
         jobs.poll()
         said = "The solver works: 33.2 dB where 32.5 or more were expected, in 41 s."
-        assert addon("preferences").get().tested == addon("problems").of("").problem == said and not folders[0].exists() and jobs.of("") is None
+        assert (
+            addon("preferences").get().tested == addon("problems").of("").problem == said
+            and not folders[0].exists()
+            and jobs.of("") is None
+        )
         addon("preferences").set_python(tmp_path / "another" / "python")
         assert addon("preferences").get().tested == "", "another solver was not tested"

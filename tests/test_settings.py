@@ -49,7 +49,8 @@ def test_metadata_says_what_a_setting_may_be(name):
 
 
 def test_no_two_settings_of_a_command_have_one_flag():
-    flags = [(name.startswith("deliver."), field.metadata["flag"]) for name, field in known_settings().items() if "flag" in field.metadata]
+    flags = [(name.startswith("deliver."), field.metadata["flag"]) for name, field in known_settings().items()
+             if "flag" in field.metadata]
     assert len(flags) > 20 and len(set(flags)) == len(flags) and all(flag.startswith("--") for _, flag in flags)
 
 
@@ -60,7 +61,9 @@ def test_the_content_of_a_place_counts_where_the_result_depends_on_it(name, tmp_
     if own not in result_settings(getattr(settings, stage)):
         assert name == "deliver.folder" and not result_paths(settings.deliver)
         return
-    assert result_paths(getattr(settings, stage)) == {own: str(tmp_path / "mine")} and not result_paths(getattr(Settings(), stage))
+    assert result_paths(getattr(settings,
+                                stage)) == {own: str(tmp_path
+                                                     / "mine")} and not result_paths(getattr(Settings(), stage))
     capture, step = Capture(tmp_path / "a.wildcap"), stages.by_name(stage)
     record(capture, step, Settings())
     assert changed(capture, step, settings) == (name,), "named since"
@@ -79,7 +82,8 @@ def test_a_place_in_the_home_folder_is_found(monkeypatch, tmp_path):
 
 def test_a_quality_leaves_alone_what_is_about_the_face():
     left = {f"{stage}.{field.name}" for stage, field in EVERY if field.name not in quality_settings(STAGE_KINDS[stage])}
-    assert left == {*PATHS, "frames.mirrored", "frames.no_glasses", "cameras.interpupillary_mm", "registration.new_atlas", "delight.delighter",
+    assert left == {*PATHS, "frames.mirrored", "frames.no_glasses", "cameras.interpupillary_mm",
+                    "registration.new_atlas", "delight.delighter",
                     "delight.switchlight_preview", "solve.skin_tone", "solve.white_point"}
 
 
@@ -118,10 +122,12 @@ def test_every_setting_has_a_tooltip_a_valid_default_and_limits_that_hold(stage,
 @pytest.mark.parametrize(("values", "words"), [
     ({"moon": {}}, "no setting named 'moon'"), ({"solve": {"moon": 1}}, "no setting named 'solve.moon'"),
     ({"solve": {"steps": True}}, "True, which is not a int"),
-    ({"solve": {"steps": "5"}}, "'5', which is not a int"), ({"seed": "5"}, "not a int"), ({"seed": -1}, "0 to 2147483647"),
+    ({"solve": {"steps": "5"}}, "'5', which is not a int"), ({"seed": "5"}, "not a int"),
+    ({"seed": -1}, "0 to 2147483647"),
     ({"device": 0}, "not a str"), ({"device": "abacus"}, "auto, cpu, cuda, mps"), ({"__doc__": "x"}, "no setting"),
     ({"solve.steps": 5}, "has no 'solve.steps'"), ([1], "no object but \\[1\\]"),
-    ("seed", "no object but 'seed'"), ({"solve": 5}, "settings of the stage solve are no object but 5"), ({"solve": None}, "no object but None"),
+    ("seed", "no object but 'seed'"), ({"solve": 5}, "settings of the stage solve are no object but 5"),
+    ({"solve": None}, "no object but None"),
     ({"scan": {"voxel_mm": float("nan")}}, "0.3 to 5 mm"), ({"scan": {"voxel_mm": float("inf")}}, "0.3 to 5 mm"),
     ({"scan": {"voxel_mm": 10**400}}, "0.3 to 5 mm")])
 def test_what_is_no_setting_is_refused(values, words):
@@ -131,8 +137,8 @@ def test_what_is_no_setting_is_refused(values, words):
 
 
 @pytest.mark.parametrize(("wrong", "right"), [
-    ("slove", "solve"), ("solve.step", "solve.steps"), ("slove.steps", "solve.steps"), ("skin_tone", "solve.skin_tone"), ("sede", "seed"),
-    ("delight.delight", "delight.delighter")])
+    ("slove", "solve"), ("solve.step", "solve.steps"), ("slove.steps", "solve.steps"), ("skin_tone", "solve.skin_tone"),
+    ("sede", "seed"), ("delight.delight", "delight.delighter")])
 def test_the_nearest_setting_is_named(wrong, right):
     with pytest.raises(Problem, match=f"Did you mean {right}\\?"):
         find_setting(wrong)

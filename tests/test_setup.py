@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The first steps in Blender: what is said before anything is installed or removed, and a Python that does not answer. No network."""
+"""The first steps in Blender: what is said before anything is installed or removed, and a Python that does not answer.
+No network."""
 
 import time
 import venv
@@ -41,7 +42,8 @@ def wait(checking, limit_s: float = 60):
 
 def plan_of(addon, disk: int = 1_600_000_000):
     index = addon("setup.install").index
-    return index.InstallationPlan({"torch": "2.13.0", "numpy": "1.26.4", "av": "15.1.0"}, ("files.pythonhosted.org",), 430_000_000, disk)
+    return index.InstallationPlan({"torch": "2.13.0", "numpy": "1.26.4", "av": "15.1.0"}, ("files.pythonhosted.org",),
+                                  430_000_000, disk)
 
 
 def test_installing_asks_the_index_first_and_says_what_it_means(setup, monkeypatch, tmp_path):
@@ -54,11 +56,13 @@ def test_installing_asks_the_index_first_and_says_what_it_means(setup, monkeypat
     assert install.WILDCAP_OT_install_solver.tell() is None
     assert jobs.of("").goal == "ask" and not bpy.ops.wildcap.install_solver.poll()
     follow(setup)
-    assert asked == [("cpu", "pytorch", None)] and asking.answer(("plan", "cpu", "pytorch", None)) == plan_of(setup), "from now on the dialog opens at once"
+    assert asked == [("cpu", "pytorch",
+                      None)] and asking.answer(("plan", "cpu", "pytorch",
+                                                None)) == plan_of(setup), "from now on the dialog opens at once"
     assert "the CPU" in install.WILDCAP_OT_install_solver.tell()[0] and jobs.of("") is None
     lines = install.describe_plan(plan_of(setup), "cpu", tmp_path / "Löser", 23_400_000_000)
-    for words in ("PyTorch 2.13.0 for the CPU and 2 more packages", "0.4 GB to download from files.pythonhosted.org", "1.6 GB on disk",
-                  "Löser", "23.4 GB are free"):
+    for words in ("PyTorch 2.13.0 for the CPU and 2 more packages", "0.4 GB to download from files.pythonhosted.org",
+                  "1.6 GB on disk", "Löser", "23.4 GB are free"):
         assert any(words in line for line in lines), words
 
 
@@ -137,11 +141,16 @@ def test_the_set_up_offers_a_test_once_a_solver_answers_and_no_longer_when_it_do
     assert "torch" in setup("problems").of("").problem and setup("problems").of("").remedy
     monkeypatch.setattr(checking.environment, "judge", lambda found, requirements: [])
     found = {"device": "cuda", "reason": "cuda takes 0.1 s."}
-    monkeypatch.setattr(checking.environment, "survey", lambda python, requirements, importing: found if importing else {"device": "", "reason": ""})
+    monkeypatch.setattr(checking.environment, "survey", lambda python, requirements,
+                        importing: found if importing else {"device": "", "reason": ""})
     checking.accept(bare / "bin" / "python")
     assert "wildcap.self_test" in buttons(panel) and preferences.get().device == ""
     wait(checking)
-    assert preferences.get().device == "cuda" and preferences.get().device_reason == "cuda takes 0.1 s." and preferences.python() == bare / "bin" / "python"
+    assert (
+        preferences.get().device == "cuda"
+        and preferences.get().device_reason == "cuda takes 0.1 s."
+        and preferences.python() == bare / "bin" / "python"
+    )
     checking._checks.clear()
 
 

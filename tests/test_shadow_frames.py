@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the mask's proposal is made from: shadows that frames show, by a delighter's word or softened pictures; the sun's; and baked occlusion."""
+"""What the mask's proposal is made from: shadows that frames show, by a delighter's word or softened pictures; the
+sun's; and baked occlusion."""
 
 from __future__ import annotations
 
@@ -72,8 +73,9 @@ def capture(tmp_path) -> Capture:
         model.add_image_with_trivial_frame(pycolmap.Image(name=view.name, camera_id=1, image_id=i + 1), pose)
     capture.cameras.mkdir()
     model.write_binary(str(capture.cameras))
-    write_json(capture.frames_json, {"frames": [{"name": view.name, "video_frame": 3 * i, "time_s": i, "sharpness": 1.0, "selected": True}
-                                                for i, view in enumerate(views())]})
+    write_json(capture.frames_json,
+               {"frames": [{"name": view.name, "video_frame": 3 * i, "time_s": i, "sharpness": 1.0, "selected": True}
+                           for i, view in enumerate(views())]})
     images.write_linear(capture.texture, np.broadcast_to(SKIN, (SIZE, SIZE, 3)))
     images.write_data(capture.texture_confidence, np.ones((SIZE, SIZE), np.float32))
     return capture
@@ -109,9 +111,11 @@ def test_the_delighter_s_shadows_become_the_proposal(capture):
 
 
 def test_what_softening_lightens_becomes_the_proposal(capture, tmp_path):
-    """The softened pictures are brighter as a whole, named by the video's frame numbers, and half the size: any tool may have made them."""
+    """The softened pictures are brighter as a whole, named by the video's frame numbers, and half the size: any tool
+    may have made them."""
     for i, view in enumerate(views()):
-        soft = images.resize(images.linear_to_srgb(np.clip(1.15 * seen(view, lit(0.25)), 0, 1)), view.width // 2, view.height // 2)
+        soft = images.resize(images.linear_to_srgb(np.clip(1.15 * seen(view, lit(0.25)), 0, 1)), view.width // 2,
+                             view.height // 2)
         images.write_srgb(tmp_path / "soft" / f"{3 * i:04d}.png", soft)
     mask = proposal(capture, dilate_px=0, softened=str(tmp_path / "soft"))
     assert overlap(mask) > 0.75
@@ -129,14 +133,16 @@ def test_the_command_line_takes_the_folder(capture, tmp_path, monkeypatch):
 def test_a_folder_without_softened_frames_is_told(capture, tmp_path):
     (tmp_path / "soft").mkdir()
     images.write_srgb(tmp_path / "soft" / "holiday.png", np.zeros((8, 8, 3)))
-    for folder, complaint in ((tmp_path / "soft", "belongs to a registered frame"), (tmp_path / "gone", "no folder .* with softened pictures")):
+    for folder, complaint in ((tmp_path / "soft", "belongs to a registered frame"),
+                              (tmp_path / "gone", "no folder .* with softened pictures")):
         with pytest.raises(Problem, match=complaint):
             proposal(capture, softened=str(folder))
 
 
 def test_one_view_does_not_outvote_the_others():
     """The one from the front takes everything for shadow; two others see the left side as well."""
-    masks = [(view, np.ones((view.height, view.width), np.float32) if i == 1 else seen(view, SHADOWED)) for i, view in enumerate(views())]
+    masks = [(view, np.ones((view.height, view.width), np.float32) if i == 1 else seen(view, SHADOWED))
+             for i, view in enumerate(views())]
     share = lift_shadows(head(), len(masks), masks, Reporter("shadow_mask"))
     share = np.where(template.mask("face", SIZE) > 0.5, share, 0)
     share[:, :int(0.55 * SIZE)] = 0
@@ -148,7 +154,12 @@ def test_a_frame_s_mask_loses_specks_and_pinholes():
     alpha[100:200, 100:200] = 0.9
     alpha[150, 150], alpha[300:303, 50:53] = 0, 1
     mask = filtered(alpha, 0.5)
-    assert mask[150, 150] == 1 and mask[301, 51] == 0 and mask[120:180, 120:180].min() == 1 and mask.sum() == pytest.approx(10000, rel=0.02)
+    assert (
+        mask[150, 150] == 1
+        and mask[301, 51] == 0
+        and mask[120:180, 120:180].min() == 1
+        and mask.sum() == pytest.approx(10000, rel=0.02)
+    )
 
 
 def test_softening_alone_is_shadow_not_gain_nor_noise():
@@ -168,28 +179,40 @@ def test_the_sun_s_shadow_is_told_by_the_filmed_texture_alone(monkeypatch):
     at = raster.interpolate(transfer, small.mesh.faces, small.face, small.bary)
     sun = np.array([0.45, -0.70, 0.55]) / np.linalg.norm([0.45, -0.70, 0.55])
     normals = small.spread(small.normals)
-    reached = small.spread(sunless._sees(small, np.arange(len(small.points)), sun)) * (images.resize(SHADOWED.astype(np.float32), SMALL, SMALL) < 0.5)
-    sky = np.maximum(at @ (0.9 * sh_basis(np.array([0.0, -0.5, 0.87]))[:, None] * [0.8, 0.9, 1.0] + 1.2 * np.eye(9)[:, :1]), 0.01)
+    reached = small.spread(sunless._sees(small, np.arange(len(small.points)),
+                                         sun)) * (images.resize(SHADOWED.astype(np.float32), SMALL, SMALL) < 0.5)
+    sky = np.maximum(at
+                     @ (0.9 * sh_basis(np.array([0.0, -0.5, 0.87]))[:, None] * [0.8, 0.9, 1.0] + 1.2
+                        * np.eye(9)[:, :1]), 0.01)
     filmed = (SKIN * (sky + (reached * np.maximum(normals @ sun, 0))[..., None] * [1.6, 1.4, 1.1])).astype(np.float32)
     face = small.covered & (template.mask("face", SMALL) > 0.5)
-    found = sunless.out_of_sun(filmed, transfer, small, face, template.mask("skin", SMALL) > 0.5, 0.5, Reporter("shadow_mask"))
+    found = sunless.out_of_sun(filmed, transfer, small, face, template.mask("skin", SMALL) > 0.5, 0.5,
+                               Reporter("shadow_mask"))
     true = (reached < 0.5) & face
     assert (found & true).sum() / (found | true).sum() > 0.7
-    assert not sunless.out_of_sun((SKIN * sky).astype(np.float32), transfer, small, face, face, 0.5, Reporter("shadow_mask")).any()
+    assert not sunless.out_of_sun((SKIN * sky).astype(np.float32), transfer, small, face, face, 0.5,
+                                  Reporter("shadow_mask")).any()
 
 
 def test_occlusion_is_masked_gently_where_shape_and_texture_agree():
     small = Head(template.load()).unfold(SMALL)
     transfer = radiance_transfer(small.caster, small.mesh.vertices, small.head.normals, 48)
-    visible = raster.bleed(raster.interpolate(ambient_occlusion(transfer)[:, None], small.mesh.faces, small.face, small.bary)[..., 0], small.covered)
-    skin = template.mask("skin", SMALL) * template.mask("face", SMALL) * (1 - template.mask("lips", SMALL)) * (1 - template.mask("eyes", SMALL))
+    visible = raster.bleed(raster.interpolate(ambient_occlusion(transfer)[:, None], small.mesh.faces, small.face,
+                                              small.bary)[..., 0], small.covered)
+    skin = (
+        template.mask("skin", SMALL)
+        * template.mask("face", SMALL)
+        * (1 - template.mask("lips", SMALL))
+        * (1 - template.mask("eyes", SMALL))
+    )
     pores = np.random.default_rng(0).normal(0, 0.03, visible.shape)
     baked = baked_occlusion(np.log(np.clip(visible, 0.05, 1)) + pores, visible, skin)
     deep = (visible < 0.8) & (skin > 0.9)
     assert deep.sum() > 50 and baked[deep].mean() > 0.25 and baked.max() <= GENTLE
     assert baked[(visible > 0.93) & (skin > 0.9)].max() < 0.05
     assert baked_occlusion(pores, visible, skin)[skin > 0.9].mean() < 0.005  # even skin
-    spots = pores - 0.6 * np.clip(painted_blob((0.5, 0.25), 0.05)[::2, ::2], 0, 1)  # a dark patch on the forehead, which no shape explains
+    # a dark patch on the forehead, which no shape explains
+    spots = pores - 0.6 * np.clip(painted_blob((0.5, 0.25), 0.05)[::2, ::2], 0, 1)
     assert baked_occlusion(spots, visible, skin)[20:44, 50:78].max() < 0.05
 
 

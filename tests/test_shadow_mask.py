@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The proposal of the shadow mask against painted shadows: found where they are, and nothing found where there are none."""
+"""The proposal of the shadow mask against painted shadows: found where they are, and nothing found where there are
+none."""
 
 from __future__ import annotations
 
@@ -92,7 +93,8 @@ def test_even_skin_of_every_tone_gives_an_almost_empty_mask(capture):
 
 
 def test_shadow_on_the_left_cheek_is_masked_on_the_left_cheek(capture):
-    masks = {side: proposed(capture, skin_texture() * (1 - painted_blob(cheek(side), 0.11)[..., None] * (1 - SHADOW))) for side in (-1, 1)}
+    masks = {side: proposed(capture, skin_texture() * (1 - painted_blob(cheek(side), 0.11)[..., None] * (1 - SHADOW)))
+             for side in (-1, 1)}
     for side, mask in masks.items():
         columns = mask[:, SIZE // 2:].sum(), mask[:, :SIZE // 2].sum()  # the person's left is at u > 0.5
         assert columns[0 if side > 0 else 1] > 20 * columns[1 if side > 0 else 0]
@@ -131,5 +133,6 @@ def test_the_benchmark_s_scores_of_masks_with_known_overlap():
     everywhere = np.ones_like(disc)
     assert scores(disc, disc, everywhere)[2:] == (1, 1, 1, 1)
     assert scores(half, disc, everywhere)[2:5] == pytest.approx((0.5, 1, 0.5), abs=0.02)
-    assert scores(shifted, disc, everywhere)[5] < 0.4  # by 20 texels of a 1024 map: only where the borders cross do they meet
+    # by 20 texels of a 1024 map: only where the borders cross do they meet
+    assert scores(shifted, disc, everywhere)[5] < 0.4
     assert scores(~disc, disc, everywhere)[2:5] == (0, 0, 0)

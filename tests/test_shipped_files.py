@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What comes with WildCap is as it was shipped, or is named: by the doctor, and by whoever needs it. And errors that nobody foresaw have an id."""
+"""What comes with WildCap is as it was shipped, or is named: by the doctor, and by whoever needs it. And errors that
+nobody foresaw have an id."""
 
 import importlib
 import shutil
@@ -23,7 +24,8 @@ network = importlib.import_module("core.delight.network")  # the room has a func
 def core(tmp_path, monkeypatch) -> Path:
     """A copy of the shipped files, in the place of ours."""
     for folder in manifest.FOLDERS:
-        shutil.copytree(shipped_files.CORE / folder, tmp_path / "core" / folder, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+        shutil.copytree(shipped_files.CORE / folder, tmp_path / "core" / folder,
+                        ignore=shutil.ignore_patterns("*.py", "__pycache__"))
     monkeypatch.setattr(shipped_files, "CORE", tmp_path / "core")
     return tmp_path / "core"
 
@@ -56,8 +58,8 @@ def test_line_ends_of_a_checkout_are_no_damage(core):
 
 
 @pytest.mark.parametrize(("module", "name", "load"), [
-    (network, "delighter", lambda path: network.load("cpu")), (enlarge, "upscaler", enlarge.load_network), (prior, "prior", prior._load_ours),
-    (whole_head, "prior", lambda path: whole_head.usual_skin(8))])
+    (network, "delighter", lambda path: network.load("cpu")), (enlarge, "upscaler", enlarge.load_network),
+    (prior, "prior", prior._load_ours), (whole_head, "prior", lambda path: whole_head.usual_skin(8))])
 def test_damaged_weights_are_named_by_what_needs_them(core, monkeypatch, module, name, load):
     path = core / "weights" / f"{name}.safetensors"
     path.write_bytes(path.read_bytes()[:100_000])
@@ -112,7 +114,12 @@ def test_the_same_fault_has_the_same_id_and_its_traceback_is_in_the_log_alone(tm
             said.append(unforeseen.identify(error))
     assert said[1] == said[3] and said[1] in said[0].problem and "no. 2" in said[2].problem
     log = (tmp_path / "logs" / "trial.log").read_text()
-    assert log.count(said[1]) == 2 and "Traceback" in log and "Traceback" not in str(said[0]) and "What was finished is kept" in said[0].remedy
+    assert (
+        log.count(said[1]) == 2
+        and "Traceback" in log
+        and "Traceback" not in str(said[0])
+        and "What was finished is kept" in said[0].remedy
+    )
     monkeypatch.setattr("core.__main__.stages.STAGES", None)
     assert main(["stages"]) == 2
     told = capsys.readouterr().err

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension's own repository: Blender's tool lists it, and an older installation is updated from it, over a server on this machine."""
+"""The extension's own repository: Blender's tool lists it, and an older installation is updated from it, over a server
+on this machine."""
 
 import functools
 import hashlib
@@ -46,7 +47,8 @@ def sources(tmp_path_factory) -> Path:
 def publish(sources: Path, site: Path, version: str) -> None:
     """As `make site`, for the sources called a version."""
     manifest = sources / "blender_manifest.toml"
-    manifest.write_text(re.sub(r'(?m)^version = ".*"', f'version = "{version}"', manifest.read_text(encoding="utf-8")), encoding="utf-8")
+    manifest.write_text(re.sub(r'(?m)^version = ".*"', f'version = "{version}"', manifest.read_text(encoding="utf-8")),
+                        encoding="utf-8")
     shutil.rmtree(site, ignore_errors=True)
     site.mkdir()
     run("build", "--source-dir", str(sources), "--output-dir", str(site))
@@ -78,10 +80,16 @@ def test_the_listing_and_the_page_name_the_zip(sources, tmp_path):
     publish(sources, site, MANIFEST["version"])
     entry, = json.loads((site / "index.json").read_text(encoding="utf-8"))["data"]
     archive = site / f"wildcap-{MANIFEST['version']}.zip"
-    assert entry["id"] == "wildcap" and entry["version"] == MANIFEST["version"] and entry["license"] == MANIFEST["license"]
-    assert entry["archive_size"] == archive.stat().st_size and entry["archive_hash"] == f"sha256:{hashlib.sha256(archive.read_bytes()).hexdigest()}"
+    assert (
+        entry["id"] == "wildcap" and entry["version"] == MANIFEST["version"] and entry["license"] == MANIFEST["license"]
+    )
+    assert (
+        entry["archive_size"] == archive.stat().st_size
+        and entry["archive_hash"] == f"sha256:{hashlib.sha256(archive.read_bytes()).hexdigest()}"
+    )
     page = (site / "index.html").read_text(encoding="utf-8")
-    assert re.search(rf'href="[^"]*{re.escape(archive.name)}\?repository=[^"]*index\.json', page), "the drag brings the repository along"
+    assert re.search(rf'href="[^"]*{re.escape(archive.name)}\?repository=[^"]*index\.json',
+                     page), "the drag brings the repository along"
     assert "${" not in page
     assert "Why it is here and not on extensions.blender.org" in page
 
@@ -90,13 +98,15 @@ def test_the_manifest_names_every_licence_and_holder_of_what_ships():
     assert set(MANIFEST["license"]) == {"SPDX:GPL-3.0-or-later", "SPDX:MIT", "SPDX:Apache-2.0", "SPDX:CC0-1.0"}
     notices = (ROOT / "core" / "weights" / "prior.json").read_text(encoding="utf-8")
     year, holder = re.search(r"Copyright \(c\) (\d{4}) ([A-Z]\w+ [A-Z]\w+)", notices).groups()
-    assert f"{year} {holder}" in MANIFEST["copyright"] and any("MediaPipe Authors" in name for name in MANIFEST["copyright"])
+    assert f"{year} {holder}" in MANIFEST["copyright"] and any("MediaPipe Authors" in name
+                                                               for name in MANIFEST["copyright"])
     assert MANIFEST.get("website", "") == links.WEBSITE, "one constant says where WildCap is"
 
 
 def test_links_are_shown_once_they_are_set(addon, monkeypatch):
     preferences = addon("preferences")
-    for website, reports, shown in (("", "", []), ("https://wildcap.example", "", ["Website"]), ("", "https://wildcap.example/new", ["Report a Problem"])):
+    for website, reports, shown in (("", "", []), ("https://wildcap.example", "", ["Website"]),
+                                    ("", "https://wildcap.example/new", ["Report a Problem"])):
         monkeypatch.setattr(preferences.links, "WEBSITE", website)
         monkeypatch.setattr(preferences.links, "REPORTS", reports)
         found: list = []

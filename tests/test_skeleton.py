@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which frames carry a film's structure, what is matched, and the poses of the frames that are placed by them, against known ones."""
+"""Which frames carry a film's structure, what is matched, and the poses of the frames that are placed by them, against
+known ones."""
 
 import numpy as np
 import pycolmap
@@ -51,7 +52,8 @@ def test_a_film_that_comes_back_closes_its_loop():
     names = [name for name, _, _ in frames]
     pairs = set(skeleton.pairs_within(frames, names))
     assert (names[5], names[54]) in pairs  # the same side, 49 frames later
-    apart = [abs(frames[names.index(a)][2] - frames[names.index(b)][2]) for a, b in pairs - set(skeleton.pairs_within(film([None] * 60), names))]
+    apart = [abs(frames[names.index(a)][2] - frames[names.index(b)][2])
+             for a, b in pairs - set(skeleton.pairs_within(film([None] * 60), names))]
     assert apart and max(apart) < skeleton.SAME_SIDE_DEG
 
 
@@ -62,7 +64,8 @@ def test_every_other_frame_is_matched_with_the_chosen_ones_around_it():
     for one, other in skeleton.pairs_between(frames, chosen):
         around.setdefault(other, []).append(one)
     assert set(around) == {name for name, _, _ in frames} - set(chosen)
-    assert around["00015.jpg"] == [chosen[0], chosen[1], chosen[2], chosen[3]] and around["00035.jpg"] == [chosen[2], chosen[3]]
+    assert around["00015.jpg"] == [chosen[0], chosen[1], chosen[2],
+                                   chosen[3]] and around["00035.jpg"] == [chosen[2], chosen[3]]
 
 
 @pytest.fixture(scope="module")
@@ -88,10 +91,12 @@ def test_frames_that_are_placed_by_the_others_lie_where_they_were(synthesized):
     for image in images:
         if image.name not in names:
             pixels = np.array([point.xy for point in image.points2D])
-            kept.add_image_with_trivial_frame(pycolmap.Image(name=image.name, camera_id=image.camera_id, image_id=image.image_id, keypoints=pixels),
+            kept.add_image_with_trivial_frame(pycolmap.Image(name=image.name, camera_id=image.camera_id,
+                                                             image_id=image.image_id, keypoints=pixels),
                                               true.images[image.image_id].cam_from_world())
     for point in true.points3D.values():
-        track = pycolmap.Track([pycolmap.TrackElement(e.image_id, e.point2D_idx) for e in point.track.elements if e.image_id in kept.images])
+        track = pycolmap.Track([pycolmap.TrackElement(e.image_id, e.point2D_idx) for e in point.track.elements
+                                if e.image_id in kept.images])
         if track.length() > 1:
             kept.add_point3D(point.xyz, track, point.color)
     before, said = kept.num_reg_images(), []
@@ -120,20 +125,25 @@ def filmed(tmp_path_factory):
     """Eleven pictures of a person before a wall, five degrees from one to the next."""
     folder = tmp_path_factory.mktemp("filmed")
     for i in range(11):
-        images.write_srgb(folder / f"{i:05d}.jpg", photograph(camera(5 * i - 25, 0.05 * np.sin(i), scale=1.6)), quality=95)
+        images.write_srgb(folder / f"{i:05d}.jpg", photograph(camera(5 * i - 25, 0.05 * np.sin(i), scale=1.6)),
+                          quality=95)
     return folder
 
 
 def solved(folder, work, sharpest_first=True):
-    """The bytes of the model that COLMAP's process leaves of a film, by the names of its files, and the names of the frames in it."""
+    """The bytes of the model that COLMAP's process leaves of a film, by the names of its files, and the names of the
+    frames in it."""
     work.mkdir()
     names = sorted(path.name for path in folder.iterdir())
-    job = {"images": str(folder), "groups": [{"names": names, "width": 480, "height": 640, "focal_px": None}], "skin": False, "photographs": False,
-           "film": [(name, float(-i if sharpest_first else i), None) for i, name in enumerate(names)], "finer": True, "masks": None, "seed": 0,
-           "database": str(work / "database.db"), "output": str(work / "model")}
+    job = {"images": str(folder), "groups": [{"names": names, "width": 480, "height": 640, "focal_px": None}],
+           "skin": False, "photographs": False,
+           "film": [(name, float(-i if sharpest_first else i), None) for i, name in enumerate(names)], "finer": True,
+           "masks": None, "seed": 0, "database": str(work / "database.db"), "output": str(work / "model")}
     assert colmap.reconstruct(job)
     model = pycolmap.Reconstruction(job["output"])
-    return {path.name: path.read_bytes() for path in (work / "model").iterdir()}, sorted(image.name for image in model.images.values() if image.has_pose)
+    return {path.name: path.read_bytes()
+            for path in (work / "model").iterdir()}, sorted(image.name for image in model.images.values()
+                                                            if image.has_pose)
 
 
 def test_the_order_in_which_features_are_found_changes_no_byte(filmed, tmp_path, monkeypatch):
@@ -168,10 +178,12 @@ def test_what_lies_beyond_a_chosen_frame_that_is_not_mapped_is_placed_by_those_t
 
 
 def test_a_second_model_may_take_every_frame_that_the_first_has(tmp_path, monkeypatch):
-    """COLMAP lets it take twenty: after a bad first pair the good model had 31 of 40 frames, and the film counted as one that needs more."""
+    """COLMAP lets it take twenty: after a bad first pair the good model had 31 of 40 frames, and the film counted as
+    one that needs more."""
     given = []
     monkeypatch.setattr(pycolmap, "incremental_mapping", lambda *arguments, **more: given.append(arguments[3]) or {})
     names = [f"{i:05d}.jpg" for i in range(40)]
-    job = {"database": "", "images": "", "output": str(tmp_path / "model"), "groups": [{"names": names}], "skin": False, "photographs": False, "seed": 0}
+    job = {"database": "", "images": "", "output": str(tmp_path / "model"), "groups": [{"names": names}], "skin": False,
+           "photographs": False, "seed": 0}
     colmap._map(job, names)
     assert given[0].max_model_overlap >= len(names) and given[0].image_names == names

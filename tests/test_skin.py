@@ -68,7 +68,8 @@ def test_every_subject_is_plausible():
         assert 0.01 < inside.mean() < 0.9 and inside.min() > 0 and inside.max() < 1
         assert 0.05 <= skin.specular.min() and skin.specular.max() <= 1 and np.abs(skin.height).max() < 3
         assert np.allclose(np.linalg.norm(skin.normal, axis=-1), 1, atol=1e-5) and skin.normal[..., 2].min() > 0
-    angles = [pigment.typology_angle(pigment.reflectance(np.array([p.melanin]), np.array([p.blood]), p.oxygen, p.scattering, p.slope))[0]
+    angles = [pigment.typology_angle(pigment.reflectance(np.array([p.melanin]), np.array([p.blood]), p.oxygen,
+                                                         p.scattering, p.slope))[0]
               for p in map(sample_parameters, range(200))]
     counts, _ = np.histogram(angles, [-60, -30, 10, 28, 41, 55, 70])  # the six classes of skin colour
     assert (counts > 5).all(), counts
@@ -98,12 +99,14 @@ def test_pores_brows_and_creases_act_on_all_maps(plain):
 def test_the_paint_does_not_know_where_the_uvs_are_cut(plain):
     mesh, on = template.load(), canvas(SIZE)
     right = mesh.uvs[mesh.face_uvs][..., 0].mean(1) > 0.5
-    cut = replace(mesh, uvs=np.concatenate([mesh.uvs + [0.5, 0], mesh.uvs - [0.5, 0]]), face_uvs=mesh.face_uvs + right[:, None] * len(mesh.uvs))
+    cut = replace(mesh, uvs=np.concatenate([mesh.uvs + [0.5, 0], mesh.uvs - [0.5, 0]]),
+                  face_uvs=mesh.face_uvs + right[:, None] * len(mesh.uvs))
     moved = make_canvas(cut, SIZE, on.landmarks / 1000, lambda name: np.roll(template.mask(name, SIZE), SIZE // 2, 1))
     other = paint_skin(PLAIN, moved, canvas(GROUND))
     known = on.covered & np.roll(moved.covered, SIZE // 2, 1)
     assert known.mean() > 0.95 * on.covered.mean()
-    beside = np.abs(np.arange(SIZE) + 0.5 - SIZE / 2) < 8  # columns at the new cut, which runs through the middle of the face
+    # columns at the new cut, which runs through the middle of the face
+    beside = np.abs(np.arange(SIZE) + 0.5 - SIZE / 2) < 8
     for name in ("diffuse", "specular", "height"):
         there, here = np.roll(getattr(other, name), SIZE // 2, 1), getattr(plain, name)
         apart = np.abs(there - here)[known & beside]

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""WildCap Skin measured: a flat patch through the whole of Assemble Material, rendered linear, against the answers of optics."""
+"""WildCap Skin measured: a flat patch through the whole of Assemble Material, rendered linear, against the answers of
+optics."""
 
 import math
 
@@ -12,7 +13,8 @@ from . import flat_patch  # noqa: E402
 from .flat_patch import assembled, height_map, lamp, paint, seen, sockets, white_world  # noqa: E402
 
 F0 = (0.4 / 2.4) ** 2  # of IOR 1.4: 2.8 percent
-FACE = {"cheek": (0.0401, -0.013, -0.0479), "forehead": (0.0, -0.0228, 0.048), "nose": (-0.0001, -0.0431, -0.0415), "lips": (0.0, -0.034, -0.0825),
+FACE = {"cheek": (0.0401, -0.013, -0.0479), "forehead": (0.0, -0.0228, 0.048), "nose": (-0.0001, -0.0431, -0.0415),
+        "lips": (0.0, -0.034, -0.0825),
         "lid": (0.0324, -0.0192, 0.0003), "crown": (0.0, 0.08, 0.1175), "nostril": (0.0075, -0.031, -0.0515)}
 """Places on the built-in head, metres"""
 
@@ -32,8 +34,10 @@ def fresnel(degrees: float, ior: float) -> float:
 
 
 def test_a_smooth_black_patch_reflects_as_fresnel_says(patch, tmp_path):
-    """The capture's mean of the specular map is 0.4: a texel of 0.4 is skin, one of 0.2 half as bright, and 0.9 is clamped at a level of one."""
-    for name, pixels in (("diffuse_albedo.png", [[(0, 0, 0)] * 4] * 4), ("normal.png", [[(0.5, 0.5, 1)] * 4] * 4), ("specular_albedo.png", [[(0.4,)] * 4] * 4)):
+    """The capture's mean of the specular map is 0.4: a texel of 0.4 is skin, one of 0.2 half as bright, and 0.9 is
+    clamped at a level of one."""
+    for name, pixels in (("diffuse_albedo.png", [[(0, 0, 0)] * 4] * 4), ("normal.png", [[(0.5, 0.5, 1)] * 4] * 4),
+                         ("specular_albedo.png", [[(0.4,)] * 4] * 4)):
         paint(patch, name, pixels)
     skin = sockets(assembled())
     assert skin["Specular Amount"].default_value == pytest.approx(0.5 / 0.4)
@@ -49,8 +53,8 @@ def test_a_smooth_black_patch_reflects_as_fresnel_says(patch, tmp_path):
 @pytest.mark.parametrize("tone", [(0.58, 0.40, 0.33), (0.17, 0.085, 0.052)])
 @pytest.mark.parametrize("subsurface", [1.0, 0.0])
 def test_under_even_light_a_patch_without_gloss_shows_its_albedo(patch, tmp_path, tone, subsurface):
-    """Within 6 %, though light that goes under the skin comes back with losses: a sheet without a back loses more than a head, for which it is 2 %
-    (benchmarks/even_light.py); with the albedo as it is, up to 12 % were missing."""
+    """Within 6 %, though light that goes under the skin comes back with losses: a sheet without a back loses more than
+    a head, for which it is 2 % (benchmarks/even_light.py); with the albedo as it is, up to 12 % were missing."""
     srgb = [12.92 * c if c < 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055 for c in tone]
     for name, pixel in (("diffuse_albedo.png", srgb), ("normal.png", (0.5, 0.5, 1)), ("specular_albedo.png", (0.4,))):
         paint(patch, name, [[tuple(pixel)] * 4] * 4)
@@ -70,12 +74,14 @@ def test_a_bump_lit_from_above_is_bright_on_its_upper_slope(patch, tmp_path):
     sockets(assembled())["Subsurface"].default_value = 0.0
     lamp((0, -1, 1))
     picture = seen(tmp_path / "bump.exr", side=16, width=1.8)  # rows from the bottom
-    lower, upper, flat = picture[4:6, 6:10].mean(), picture[10:12, 6:10].mean(), picture[[0, 0, -1, -1], [0, -1, 0, -1]].mean()
+    lower, upper, flat = picture[4:6, 6:10].mean(), picture[10:12,
+                                                            6:10].mean(), picture[[0, 0, -1, -1], [0, -1, 0, -1]].mean()
     assert upper > 1.1 * flat and lower < 0.9 * flat, (upper, flat, lower)
 
 
 def test_displacement_is_off_by_default_and_then_in_the_heads_own_metres(patch, tmp_path):
-    """Seen from 45 degrees above, a patch that comes 0.2 m nearer sinks by 0.2 sin 45 in the picture; a head of twice the size by twice that."""
+    """Seen from 45 degrees above, a patch that comes 0.2 m nearer sinks by 0.2 sin 45 in the picture; a head of twice
+    the size by twice that."""
     height_map(patch, 0.2)
     material = assembled()
     sockets(material)["Subsurface"].default_value = 0.0
@@ -92,12 +98,14 @@ def test_displacement_is_off_by_default_and_then_in_the_heads_own_metres(patch, 
 def test_the_regions_are_rougher_or_smoother_than_the_cheeks(addon):
     """On the built-in head, at the vertices nearest to a few places."""
     regions = addon("relight.regions")
-    bpy.ops.wm.obj_import(filepath=str(regions.MASKS.parent / "head.obj"), forward_axis='Y', up_axis='Z', validate_meshes=False)
+    bpy.ops.wm.obj_import(filepath=str(regions.MASKS.parent / "head.obj"), forward_axis='Y', up_axis='Z',
+                          validate_meshes=False)
     head = bpy.context.scene.objects[0]
     regions.write(head.data)
     value = {name: near(head, place) for name, place in FACE.items()}
     assert value["cheek"] == pytest.approx(0.0, abs=0.02)
-    for name, share in (("forehead", "forehead"), ("nose", "nose"), ("lips", "lips"), ("lid", "eyes"), ("crown", "scalp")):
+    for name, share in (("forehead", "forehead"), ("nose", "nose"), ("lips", "lips"), ("lid", "eyes"),
+                        ("crown", "scalp")):
         assert value[name] == pytest.approx(regions.SHARES[share], abs=0.04), value
 
 
@@ -105,11 +113,13 @@ def near(head, place) -> float:
     """The attribute at the vertex nearest to a place."""
     points = np.empty(3 * len(head.data.vertices), np.float32)
     head.data.vertices.foreach_get("co", points)
-    return head.data.attributes["wildcap_roughness"].data[int(np.linalg.norm(points.reshape(-1, 3) - place, axis=1).argmin())].value
+    return head.data.attributes["wildcap_roughness"].data[int(np.linalg.norm(points.reshape(-1, 3) - place,
+                                                                             axis=1).argmin())].value
 
 
 def test_light_from_behind_does_not_come_through_lids_and_nostrils(patch, addon, tmp_path):
-    """The built-in head with 3 mm of scattering, from below in front; what a sun in front makes of the cheek is the measure."""
+    """The built-in head with 3 mm of scattering, from below in front; what a sun in front makes of the cheek is the
+    measure."""
     (patch / "head.obj").write_bytes((addon("relight.regions").MASKS.parent / "head.obj").read_bytes())
     assembled()
     radiance = {}

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The skin tone's estimate: known tones through known light, no group drawn to another, and a stated deviation that holds."""
+"""The skin tone's estimate: known tones through known light, no group drawn to another, and a stated deviation that
+holds."""
 
 import numpy as np
 import pytest
@@ -49,9 +50,11 @@ def test_with_a_measured_white_a_tone_is_what_it_is(reflects):
     known = population.population()
     true = known.tones[np.abs(known.tones[:, 0] - reflects).argmin()]
     shown = (true + population.SHEEN) * BRIGHT
-    found = [population.estimate_skin_tone(look.Look(gain * shown, gain * shown), white=gain * BRIGHT) for gain in (0.2, 0.7)]
+    found = [population.estimate_skin_tone(look.Look(gain * shown, gain * shown), white=gain * BRIGHT)
+             for gain in (0.2, 0.7)]
     assert np.allclose(found[0].linear, found[1].linear, rtol=1e-3)
-    assert abs(population.lab(np.array(found[0].linear))[0] - population.lab(true)[0]) < 4 and 0 < found[0].deviation < 10
+    assert abs(population.lab(np.array(found[0].linear))[0]
+               - population.lab(true)[0]) < 4 and 0 < found[0].deviation < 10
 
 
 def test_the_stated_deviation_holds_and_no_group_is_drawn_to_the_middle():
@@ -69,13 +72,16 @@ def test_the_stated_deviation_holds_and_no_group_is_drawn_to_the_middle():
     signed, stated, light = np.array(signed), np.array(stated), np.array(light)
     assert np.mean(np.abs(signed) <= 2 * stated) >= 0.85
     assert np.sqrt(np.mean(np.square(measured))) < np.sqrt(np.mean(signed**2)), "a measured white helps"
-    assert abs(np.polyfit(light, signed, 1)[0]) < 0.3, "light skin does not come out darker nor dark skin lighter by much of the difference"
+    assert abs(np.polyfit(light, signed, 1)[0]) < 0.3, (
+        "light skin does not come out darker nor dark skin lighter by much of the difference"
+    )
 
 
 def test_groups_by_their_angle():
     from core.solve.population import from_lab, group
 
-    for angle, name in ((60, "very light"), (48, "light"), (35, "intermediate"), (20, "tan"), (-10, "brown"), (-50, "dark")):
+    for angle, name in ((60, "very light"), (48, "light"), (35, "intermediate"), (20, "tan"), (-10, "brown"),
+                        (-50, "dark")):
         lightness = 50 + 16 * np.tan(np.radians(angle))
         assert group(from_lab(np.array([lightness, 12.0, 16.0]))) == name
 
@@ -92,7 +98,8 @@ def test_a_setting_is_a_tone_and_a_tone_a_setting():
 
 def test_who_types_the_estimated_tone_gives_the_solve_the_same():
     shown, white = look.Look(np.array([0.41, 0.27, 0.2]), np.array([0.35, 0.22, 0.17])), np.array([0.8, 0.77, 0.7])
-    for found, source in ((population.estimate_skin_tone(shown), SCENE), (population.estimate_skin_tone(shown, white), WHITE_POINT)):
+    for found, source in ((population.estimate_skin_tone(shown), SCENE),
+                          (population.estimate_skin_tone(shown, white), WHITE_POINT)):
         assert found.source == source and found.group and found.deviation > 0 and found.error > 0
         assert parse_skin_tone(format_skin_tone(found)).linear == found.linear
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Slimming a face: what goes counts as there, comes back as it was when a stage needs it, and nothing that could not come back goes."""
+"""Slimming a face: what goes counts as there, comes back as it was when a stage needs it, and nothing that could not
+come back goes."""
 
 import shutil
 from pathlib import Path
@@ -19,8 +20,8 @@ from . import finished_face, kept_capture
 from .finished_face import pictures, states
 from .tiny_chain import follow, start
 
-KEPT = ("cameras/a.txt", "scan.ply", "head.obj", "landmarks.json", "texture.png", "shadow_mask_auto.png", "maps/normal.png", "maps_4k/normal.png",
-        "delivery/a.txt", "report.html")
+KEPT = ("cameras/a.txt", "scan.ply", "head.obj", "landmarks.json", "texture.png", "shadow_mask_auto.png",
+        "maps/normal.png", "maps_4k/normal.png", "delivery/a.txt", "report.html")
 
 
 @pytest.fixture(scope="module")
@@ -45,15 +46,20 @@ def ran(messages) -> list[str]:
 def test_frames_and_delit_frames_go_and_every_stage_stays_done(root, capture):
     before, record = kept_capture.contents(capture.root), capture.read()
     found = slimming.plan(capture, Settings())
-    assert set(found.going) == {"frames/a.txt", "delit/a.txt"} and kept_capture.contents(capture.root) == before, "a plan changes nothing"
+    assert set(found.going) == {"frames/a.txt", "delit/a.txt"} and kept_capture.contents(capture.root) == before, (
+        "a plan changes nothing"
+    )
     assert slimming.slim(capture, Settings()) == found and found.notes == ()
     after = kept_capture.contents(capture.root)
     assert before.keys() - after.keys() == set(found.going) and not capture.frames.exists()
     assert set(KEPT) <= after.keys() and all(after[name] == before[name] for name in after if name != "capture.json")
     assert states(capture) == {"done"}
-    assert {name: entry["finished"] for name, entry in capture.read()["stages"].items()} == {n: e["finished"] for n, e in record["stages"].items()}
+    assert {name: entry["finished"]
+            for name, entry in capture.read()["stages"].items()} == {n: e["finished"]
+                                                                     for n, e in record["stages"].items()}
     messages = follow(start(root, capture))
-    assert ran(messages) == [] and isinstance(messages[-1], Done) and not capture.frames.exists(), "a run finds nothing to do"
+    assert ran(messages) == [] and isinstance(messages[-1],
+                                              Done) and not capture.frames.exists(), "a run finds nothing to do"
 
 
 def test_what_a_stage_needs_comes_back_first_and_as_it_was_so_the_others_stay_done(root, capture):
@@ -84,7 +90,9 @@ def test_a_stage_begun_anew_forgets_what_it_had_lost(root, capture):
 def test_it_comes_back_with_the_settings_that_it_was_made_with(root, capture, monkeypatch):
     chosen = {}
     slimming.slim(capture, Settings())
-    monkeypatch.setattr(runner, "_room", lambda step: type("Room", (), {"run": staticmethod(lambda capture, settings, report: chosen.update(
+    monkeypatch.setattr(runner, "_room",
+                        lambda step: type("Room", (),
+                                          {"run": staticmethod(lambda capture, settings, report: chosen.update(
         {step.name: settings}) or write_pictures(capture, step))}))
     path = write_job(capture, first="solve", last="solve", settings={"frames": {"views": 5}, "seed": 3})
     runner.run_job(path)
@@ -102,9 +110,12 @@ def write_pictures(capture: Capture, step: stages.Stage) -> None:
 def test_where_something_else_comes_back_it_is_said_and_what_was_made_of_it_is_out_of_date(capture, monkeypatch):
     slimming.slim(capture, Settings())
     said = []
-    monkeypatch.setattr(runner, "_room", lambda step: type("Room", (), {"run": staticmethod(lambda capture, *_: write_pictures(capture, step))}))
+    monkeypatch.setattr(runner, "_room",
+                        lambda step: type("Room", (),
+                                          {"run": staticmethod(lambda capture, *_: write_pictures(capture, step))}))
     assert isinstance(runner.run_job(write_job(capture, first="texture", last="texture"), said.append), Done)
-    assert [m.text for m in said if isinstance(m, Log) and "not what they were before" in m.text and m.text.startswith("Frames")]
+    assert [m.text for m in said if isinstance(m, Log) and "not what they were before" in m.text
+            and m.text.startswith("Frames")]
     assert capture.verdict(stages.by_name("cameras"), Settings()).reason() == "frames/ changed"
     assert slimmed.hashes_of(capture.read()) == {} and capture.state(stages.by_name("frames"), Settings()) == "done"
 
@@ -127,7 +138,9 @@ def test_killed_in_the_middle_nothing_is_lost_and_it_can_be_asked_for_again(root
     again = Capture(shutil.copytree(capture.root, capture.root.with_name("again.wildcap")))
     slimming.slim(again, Settings())
     assert pictures(again) == {} and states(again) == {"done"}
-    assert ran(follow(start(root, capture, tool="bring_back"))) == ["frames"] * moment + ["bring_back"], "what is there is not made again"
+    assert ran(follow(start(root, capture, tool="bring_back"))) == ["frames"] * moment + ["bring_back"], (
+        "what is there is not made again"
+    )
     assert pictures(capture) == before and states(capture) == {"done"}
 
 
@@ -159,7 +172,8 @@ def test_without_its_video_a_face_is_not_slimmed_and_of_a_slim_one_nothing_is_ch
     stages_before = capture.read()["stages"]
     assert isinstance(follow(start(root, capture))[-1], Done), "nothing needs it"
     final = follow(start(root, capture, first="solve"))[-1]
-    assert isinstance(final, Failed) and "film.mp4 is not there any more" in final.problem and "core run VIDEO" in final.remedy
+    assert isinstance(final,
+                      Failed) and "film.mp4 is not there any more" in final.problem and "core run VIDEO" in final.remedy
     assert capture.read()["stages"] == stages_before and states(capture) == {"done"}
     assert capture.read()["stopped"]["stage"] == "solve"
     film.write_bytes(b"another film altogether")
@@ -193,18 +207,25 @@ def test_what_could_not_come_back_as_it_is_stays_and_is_named(capture, monkeypat
     write_json(capture.json, record)
     found = slimming.slim(capture, Settings())
     assert found.going == {}
-    assert found.notes == ("frames/ stays: frames/a.txt is not as WildCap wrote it.", "delit/ stays: delit/notes.txt is not as WildCap wrote it.")
+    assert found.notes == ("frames/ stays: frames/a.txt is not as WildCap wrote it.",
+                           "delit/ stays: delit/notes.txt is not as WildCap wrote it.")
     assert (capture.frames / "a.txt").read_text() == "retouched" and "slimmed" not in capture.json.read_text()
 
 
 @pytest.mark.parametrize(("delighter", "why"), [("switchlight", "paid for"), ("folder", "outside of the capture")])
 def test_delit_frames_that_came_from_elsewhere_stay(capture, tmp_path, delighter, why):
     (tmp_path / "pictures").mkdir()
-    settings = from_json({"delight": {"delighter": delighter, "folder": str(tmp_path / "pictures") if delighter == "folder" else ""}})
+    settings = from_json({"delight": {"delighter": delighter,
+                                      "folder": str(tmp_path / "pictures") if delighter == "folder" else ""}})
     delight = stages.by_name("delight")
     capture.finish(delight, capture.conditions(delight, settings), 1.0, settings, {}, "0.2.0")
     found = slimming.slim(capture, settings)
-    assert set(found.going) == {"frames/a.txt"} and why in found.notes[0] and states(capture) <= {"done", "stale"} and capture.delit.is_dir()
+    assert (
+        set(found.going) == {"frames/a.txt"}
+        and why in found.notes[0]
+        and states(capture) <= {"done", "stale"}
+        and capture.delit.is_dir()
+    )
 
 
 def test_a_solve_of_an_edited_part_still_knows_what_it_goes_on_from(capture):
@@ -216,7 +237,11 @@ def test_a_solve_of_an_edited_part_still_knows_what_it_goes_on_from(capture):
 def test_made_by_older_code_it_goes_and_that_is_said(capture, monkeypatch):
     monkeypatch.setattr(freshness, "code_key", lambda module: "another version's")
     found = slimming.slim(capture, Settings())
-    assert len(found.going) == 2 and found.notes[0].startswith("Made by older code: Frames, Delight.") and states(capture) == {"older"}
+    assert (
+        len(found.going) == 2
+        and found.notes[0].startswith("Made by older code: Frames, Delight.")
+        and states(capture) == {"older"}
+    )
 
 
 def test_an_older_version_sees_stages_to_do_and_the_next_one_is_not_misled_by_what_it_did(capture):

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Slimming from the terminal, faces one by one and a batch's; what needs the frames and is no worker; and the real stage, which takes the same frames again."""
+"""Slimming from the terminal, faces one by one and a batch's; what needs the frames and is no worker; and the real
+stage, which takes the same frames again."""
 
 import shutil
 import subprocess
@@ -64,9 +65,17 @@ def test_the_terminal_lists_removes_and_brings_back(root, capture, capsys):
 
 def test_of_a_batch_the_faces_that_are_done_are_slimmed_and_the_others_left_and_said(root, capture, capsys):
     folder = capture.root.parent
-    write_batch(Batch(folder, tuple(BatchFace(name, folder / "film.mp4", folder / f"{name}.wildcap") for name in ("zoë", "new"))))
+    write_batch(Batch(folder,
+                      tuple(BatchFace(name, folder / "film.mp4", folder / f"{name}.wildcap")
+                            for name in ("zoë", "new"))))
     said = command(root, "slim", folder)
-    assert "zoë" in said and "2 files" in said and "new" in said and "left, for it is not done: head is next" in said and "1 of 2 faces" in said
+    assert (
+        "zoë" in said
+        and "2 files" in said
+        and "new" in said
+        and "left, for it is not done: head is next" in said
+        and "1 of 2 faces" in said
+    )
     assert len(pictures(capture)) == 2
     (folder / "film.mp4").rename(folder / "away.mp4")
     said = command(root, "slim", folder, "--yes")
@@ -78,7 +87,8 @@ def test_of_a_batch_the_faces_that_are_done_are_slimmed_and_the_others_left_and_
 
 def command(root: Path, *words) -> str:
     """What a command line of the tiny chain says."""
-    done = subprocess.run([sys.executable, "-m", "core", *map(str, words)], cwd=root, capture_output=True, text=True, timeout=60)
+    done = subprocess.run([sys.executable, "-m", "core", *map(str, words)], cwd=root, capture_output=True, text=True,
+                          timeout=60)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -93,7 +103,8 @@ def test_the_real_stage_takes_the_same_frames_again(tmp_path):
     assert len(before) == 7
     capture.keep_hashes({"frames": {"frames/": slimmed.hash_tree(capture.frames)}})
     shutil.rmtree(capture.frames)
-    assert isinstance(runner.run_job(write_job(capture, tool="white_point"), lambda message: None), Failed), "no card is on it"
+    assert isinstance(runner.run_job(write_job(capture, tool="white_point"), lambda message: None),
+                      Failed), "no card is on it"
     assert pictures(capture) == before and slimmed.hashes_of(capture.read()) == {}
     capture.delit.mkdir()
     counted = Reporter("bring_back")

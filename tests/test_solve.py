@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solve stage on a small capture with the shipped prior: its maps, the tone control, cancel and resume, what bad inputs give."""
+"""The solve stage on a small capture with the shipped prior: its maps, the tone control, cancel and resume, what bad
+inputs give."""
 
 import json
 from dataclasses import replace
@@ -56,13 +57,15 @@ def test_solve_writes_all_maps_of_the_asked_tone(capture):
 
 
 def test_what_the_solve_is_compared_with_has_the_albedos_exposure(capture):
-    """The delit and the filmed texture in comparison/, whatever exposure they came in: the facial skin is as bright on average, its light still there."""
+    """The delit and the filmed texture in comparison/, whatever exposure they came in: the facial skin is as bright on
+    average, its light still there."""
     texture = images.read_linear(capture.texture)
     images.write_srgb(capture.texture_filmed, images.linear_to_srgb(0.5 * texture))
     solve.run(capture, settings(steps=4), Reporter("solve"))
     skin = template.mask("skin", SIZE) * (1 - template.mask("eyes", SIZE))
     luminance = {name: images.read_linear(path) @ np.float32([0.2126, 0.7152, 0.0722]) for name, path in (
-        ("albedo", capture.maps / "diffuse_albedo.exr"), ("delit", capture.comparison / "delit.png"), ("filmed", capture.comparison / "filmed.png"))}
+        ("albedo", capture.maps / "diffuse_albedo.exr"), ("delit", capture.comparison / "delit.png"),
+        ("filmed", capture.comparison / "filmed.png"))}
     means = {name: float(np.average(values, weights=skin)) for name, values in luminance.items()}
     assert abs(means["delit"] / means["albedo"] - 1) < 0.03 and abs(means["filmed"] / means["albedo"] - 1) < 0.03, means
     assert np.corrcoef(luminance["filmed"].ravel(), texture.mean(-1).ravel())[0, 1] > 0.99
@@ -82,12 +85,14 @@ def test_cancel_then_run_again_gives_the_same_bytes(capture):
     solve.run(capture, settings(guidance="dps"), Reporter("solve"))
     unbroken = maps_of(capture)
     steps = []
-    report = Reporter("solve", emit=lambda message: steps.append(message), cancelled=lambda: any("step 5 of" in getattr(m, "text", "") for m in steps))
+    report = Reporter("solve", emit=lambda message: steps.append(message),
+                      cancelled=lambda: any("step 5 of" in getattr(m, "text", "") for m in steps))
     with pytest.raises(CancelledError):
         solve.run(capture, settings(guidance="dps"), report)
     assert (capture.checkpoints / "solve.safetensors").is_file()
     logged = []
-    solve.run(capture, settings(guidance="dps"), Reporter("solve", emit=lambda message: logged.append(getattr(message, "text", ""))))
+    solve.run(capture, settings(guidance="dps"),
+              Reporter("solve", emit=lambda message: logged.append(getattr(message, "text", ""))))
     assert "Going on after step 4 of 8." in logged
     assert maps_of(capture) == unbroken
 
@@ -109,12 +114,14 @@ def test_the_artists_masks_win(capture):
 
 
 def test_a_shadow_that_the_artist_added_to_the_proposal_is_taken_away(capture):
-    """After a delighter the lights are held back, for a proposal takes dark skin along; where the artist has added to it, they are not."""
+    """After a delighter the lights are held back, for a proposal takes dark skin along; where the artist has added to
+    it, they are not."""
     images.write_data(capture.shadow_mask, images.read_mask(capture.shadow_mask_auto))
     y, x = np.mgrid[:SIZE, :SIZE] / SIZE
     distance = np.hypot(x - 0.66, y - 0.55)
     inside, around = distance < 0.07, (distance > 0.11) & (distance < 0.15)
-    truth = images.read_linear(capture.texture) / ((0.7 + 0.3 * x) * (1 - 0.5 / (1 + np.exp((distance - 0.09) / 0.006))))[..., None]
+    truth = images.read_linear(capture.texture) / ((0.7 + 0.3 * x)
+                                                   * (1 - 0.5 / (1 + np.exp((distance - 0.09) / 0.006))))[..., None]
     kept = []
     for proposal in (images.read_mask(capture.shadow_mask_auto), np.zeros((SIZE, SIZE), np.float32)):
         images.write_data(capture.shadow_mask_auto, proposal)

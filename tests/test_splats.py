@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gaussian splatting on tiny pictures with a plain rasteriser: training moves surfels onto the surface that the pictures show."""
+"""Gaussian splatting on tiny pictures with a plain rasteriser: training moves surfels onto the surface that the
+pictures show."""
 
 import numpy as np
 import pytest
@@ -22,7 +23,8 @@ POLE = np.array([0.0, -RADIUS, 0.0])
 def patch(radius: float, columns: int, reach: float) -> Mesh:
     """The front of a ball, a grid over `reach` radians to each side."""
     across, up = np.meshgrid(np.linspace(-reach, reach, columns), np.linspace(-reach, reach, columns))
-    points = radius * np.stack([np.sin(across) * np.cos(up), -np.cos(across) * np.cos(up), np.sin(up)], -1).reshape(-1, 3)
+    points = radius * np.stack([np.sin(across) * np.cos(up), -np.cos(across) * np.cos(up), np.sin(up)],
+                               -1).reshape(-1, 3)
     index = np.arange(columns**2).reshape(columns, columns)
     a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
     return Mesh(points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
@@ -38,10 +40,12 @@ def photograph(yaw: float, pitch: float) -> tuple[splats.UndistortedFrame, np.nd
     rotation = np.stack([x, np.cross(z, x), z])
     rows, columns = np.mgrid[0:SIDE, 0:SIDE]
     origin = np.array([-SIDE / 2, -SIDE / 2])
-    rays = np.stack([(columns.ravel() + 0.5 + origin[0]) / FOCAL, (rows.ravel() + 0.5 + origin[1]) / FOCAL, np.ones(SIDE * SIDE)], -1)
+    rays = np.stack([(columns.ravel() + 0.5 + origin[0]) / FOCAL, (rows.ravel() + 0.5 + origin[1]) / FOCAL,
+                     np.ones(SIDE * SIDE)], -1)
     length = np.linalg.norm(rays, axis=1)
     mesh = patch(RADIUS, 100, 0.07)
-    face, bary, distance = RayCaster(mesh).first_hits(np.repeat(centre[None], len(rays), 0), rays / length[:, None] @ rotation)
+    face, bary, distance = RayCaster(mesh).first_hits(np.repeat(centre[None], len(rays), 0),
+                                                      rays / length[:, None] @ rotation)
     points = interpolate(mesh.vertices, mesh.faces, face, bary)
     hit = (face >= 0).reshape(SIDE, SIDE)
     colour = 0.5 + 0.22 * np.stack([np.sin(points @ w) for w in ([330, 0, 150], [-150, 0, 300], [200, 0, -280])], -1)
@@ -80,7 +84,8 @@ def test_training_lowers_the_depth_error(seen):
     assert errors_of(after, seen) < 0.65 * errors_of(before, seen)
     assert np.mean(losses[-10:]) < 0.7 * np.mean(losses[:10])
     fused = fuse(after, np.array([[-0.05, -1.03, -0.05], [0.05, -0.96, 0.05]]), 0.003)
-    assert np.median(np.abs(np.linalg.norm(fused.mesh.vertices, axis=1) - RADIUS)) < 0.0015, "the same fusion makes a scan of them"
+    assert np.median(np.abs(np.linalg.norm(fused.mesh.vertices, axis=1)
+                            - RADIUS)) < 0.0015, "the same fusion makes a scan of them"
 
 
 def test_splats_without_a_gpu_are_a_problem_only_when_asked_for():

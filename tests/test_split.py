@@ -28,8 +28,11 @@ def face():
     normal = raster.bleed(raster.interpolate(vertex_normals(mesh), mesh.faces, index, bary), index >= 0)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     skin = [template.mask(name, 512)[::1] for name in ("skin", "face")]
-    small = raster.sample(skin[0] * skin[1], np.stack(np.meshgrid(np.arange(SIZE), np.arange(SIZE)), -1).reshape(-1, 2) * 512 / SIZE + 1).reshape(SIZE, SIZE)
-    return torch.from_numpy(normal.transpose(2, 0, 1).astype(np.float32)), torch.from_numpy((small > 0.9).astype(np.float32))
+    small = raster.sample(skin[0] * skin[1],
+                          np.stack(np.meshgrid(np.arange(SIZE), np.arange(SIZE)), -1).reshape(-1, 2) * 512 / SIZE
+                          + 1).reshape(SIZE, SIZE)
+    return torch.from_numpy(normal.transpose(2, 0,
+                                             1).astype(np.float32)), torch.from_numpy((small > 0.9).astype(np.float32))
 
 
 def lamp(seed, amount):
@@ -50,7 +53,10 @@ def drawn(seed, scales, parts=("traits",)):
     rng, values = np.random.default_rng(seed), np.zeros((3, len(cells.places)))
     for part in parts:
         lower = np.linalg.cholesky(getattr(model, part) + 1e-6 * np.eye(len(cells.places)))
-        values += getattr(scales, part) * skin_or_light.OF_AXES[:, None] * (lower @ rng.standard_normal((len(cells.places), 3))).T
+        values += getattr(scales, part) * skin_or_light.OF_AXES[:,
+                                                                None] * (lower
+                                                                         @ rng.standard_normal((len(cells.places),
+                                                                                                3))).T
     return enlarged(torch.from_numpy(skin_or_light._spread(AXES.T @ values, cells.covered)), SIZE)
 
 
@@ -74,7 +80,8 @@ def test_a_lamp_on_even_skin_is_light_in_strength_and_shape():
 
 def test_traits_alone_are_mostly_left_to_the_skin():
     scales = Scales(0.2, 0.08, 0.08, 0.07)
-    taken = [deviation(split([shapes(traits)]).light(face()[0]).log()) / deviation(traits) for traits in (drawn(seed, scales) for seed in range(3))]
+    taken = [deviation(split([shapes(traits)]).light(face()[0]).log()) / deviation(traits)
+             for traits in (drawn(seed, scales) for seed in range(3))]
     assert np.mean(taken) < 0.4, taken
 
 
@@ -108,7 +115,8 @@ def test_the_probability_is_the_gaussians():
     seen, values = seen_together([cells])
     together = skin_or_light.model(seen, seen)
     scales = skin_or_light.TYPICAL
-    by_scipy = sum(multivariate_normal(cov=together.covariance(scales, axis), allow_singular=True).logpdf(values[:, axis]) for axis in range(3))
+    by_scipy = sum(multivariate_normal(cov=together.covariance(scales, axis),
+                                       allow_singular=True).logpdf(values[:, axis]) for axis in range(3))
     constant = -1.5 * len(values) * np.log(2 * np.pi)
     assert log_probability(together, values, scales) + constant == pytest.approx(by_scipy, rel=1e-6)
 
@@ -120,7 +128,8 @@ def test_of_two_captures_what_differs_is_light_and_what_agrees_is_skin():
     first, second = shapes(traits + lights[0] + local), shapes(traits + lights[1])
     alone, both = split([first]), split([first, second])
     alone_left = deviation(lights[0] + local - alone.light(normal).log())
-    assert deviation(lights[0] + local - both.light(normal).log() - enlarged(torch.from_numpy(both.local), SIZE)) < 0.7 * alone_left
+    assert deviation(lights[0] + local - both.light(normal).log()
+                     - enlarged(torch.from_numpy(both.local), SIZE)) < 0.7 * alone_left
     told = enlarged(torch.from_numpy(both.local), SIZE).mean(0)[skin > 0]
     assert np.corrcoef(told.numpy(), local.mean(0)[skin > 0].numpy())[0, 1] > 0.75
 

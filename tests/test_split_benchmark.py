@@ -22,11 +22,15 @@ def test_the_correlation_of_a_known_field_falls_as_it_was_made():
 
 
 def test_a_record_holds_plain_figures_and_the_tables_their_numbers():
-    scores = {method: {"somebody": dict.fromkeys(split.COLUMNS, value)} for method, value in ((split.DELIT, 20.0), (split.SOLVED, 21.5))}
+    scores = {method: {"somebody": dict.fromkeys(split.COLUMNS, value)}
+              for method, value in ((split.DELIT, 20.0), (split.SOLVED, 21.5))}
     skins = {"skins": 9, "deviation": 0.2, "same side": {"0 to 4 mm": 1.0}, "mirror image": {"0 to 4 mm": 0.7}}
     scales = {"somebody": {"traits": 0.1, "light": 0.2, "local": 0.3, "noise": 0.4}}
     captures = {"somebody": {split.DELIT: 20.0, split.SOLVED: 21.5}}
-    record = {**to_record(summarise(scores, split.COLUMNS, split.DELIT), scores), "captures": captures, "scales": scales, "skins": skins}
+    record = {**to_record(summarise(scores, split.COLUMNS, split.DELIT), scores), "captures": captures,
+              "scales": scales, "skins": skins}
     assert figures.plain(record)["captures"]["somebody"][split.SOLVED] == pytest.approx(21.5)
-    assert "+1.50" in split.capture_table(captures) and "| somebody | 0.100 | 0.200 | 0.300 | 0.400 |" in split.scale_table(scales)
+    assert "+1.50" in split.capture_table(
+        captures
+    ) and "| somebody | 0.100 | 0.200 | 0.300 | 0.400 |" in split.scale_table(scales)
     assert "| mirror image | 0.7 |" in split.reach_table(skins)

@@ -39,7 +39,8 @@ class Drawn:
 
 @pytest.fixture(scope="module")
 def person(tmp_path_factory):
-    """Two captures of a person: filmed under opposite lights, delit with a tenth of each left, solved with a light that both share."""
+    """Two captures of a person: filmed under opposite lights, delit with a tenth of each left, solved with a light that
+    both share."""
     where = template.mask("face", SIZE) > 0.5
     y, x = (np.mgrid[0:SIZE, 0:SIZE] + 0.5) / SIZE * 2 - 1
     normals = np.stack([x, -np.ones_like(x), -y], -1) * where[..., None]
@@ -48,7 +49,8 @@ def person(tmp_path_factory):
     truth = np.where(template.mask("brows", SIZE)[..., None] > 0.5, 0.4 * truth, truth).astype(np.float32)
     basis = sh_basis(normals)
     light, shared = (np.exp(basis @ (scale * np.eye(9)[k]))[..., None] for scale, k in ((0.8, 3), (0.5, 2)))
-    maps = [{NOTHING: truth * lit, FLAT: np.broadcast_to(SKIN, truth.shape), TRUE: truth, DELIT: truth * lit**0.1, SOLVED: truth * shared}
+    maps = [{NOTHING: truth * lit, FLAT: np.broadcast_to(SKIN, truth.shape), TRUE: truth, DELIT: truth * lit**0.1,
+             SOLVED: truth * shared}
             for lit in (light, 1 / light)]
     captures = [Drawn(name, where, normals, Capture(tmp_path_factory.mktemp(name))) for name in ("one", "two")]
     return captures, [{name: np.asarray(value, np.float32) for name, value in each.items()} for each in maps]
@@ -68,21 +70,40 @@ def test_a_shared_light_is_no_error_and_lights_that_differ_are(jointly):
 
 def test_slope_and_agreement_of_a_person(jointly):
     together, _ = jointly
-    assert together[NOTHING]["light_slope"] == pytest.approx(1) and together[DELIT]["light_slope"] == pytest.approx(0.1, abs=1e-3)
-    assert together[FLAT]["light_slope"] == pytest.approx(0, abs=1e-6) and together[FLAT]["agreement"] == BEST_PSNR == together[SOLVED]["agreement"]
+    assert together[NOTHING]["light_slope"] == pytest.approx(1) and together[DELIT]["light_slope"] == pytest.approx(
+        0.1, abs=1e-3
+    )
+    assert (
+        together[FLAT]["light_slope"] == pytest.approx(0, abs=1e-6)
+        and together[FLAT]["agreement"] == BEST_PSNR == together[SOLVED]["agreement"]
+    )
     assert together[DELIT]["agreement"] > together[NOTHING]["agreement"] + 15
-    assert together[TRUE]["lost"] == 0 and together[FLAT]["lost"] == pytest.approx(1, abs=1e-3) and together[NOTHING]["captures"] == 2
+    assert (
+        together[TRUE]["lost"] == 0
+        and together[FLAT]["lost"] == pytest.approx(1, abs=1e-3)
+        and together[NOTHING]["captures"] == 2
+    )
 
 
 def test_one_capture_tells_nothing_across_lights(person):
     together, _ = state_scores.of_person(person[0][:1], [{name: person[1][0][name] for name in (NOTHING, TRUE, DELIT)}])
-    assert together[DELIT].get("agreement") is None and together[DELIT]["between_lights"] is None and together[DELIT]["psnr_shared"] == BEST_PSNR
+    assert (
+        together[DELIT].get("agreement") is None
+        and together[DELIT]["between_lights"] is None
+        and together[DELIT]["psnr_shared"] == BEST_PSNR
+    )
 
 
 def test_one_captures_figures(person):
     found = state_scores.in_uv(person[0][0], person[1][0])
-    assert found[TRUE]["psnr_uv"] == BEST_PSNR and found[NOTHING]["psnr_uv"] < 30 and found[NOTHING]["psnr_alone"] == BEST_PSNR
-    assert found[DELIT]["kept_brows"] == pytest.approx(1, abs=0.05) and found[FLAT]["kept_brows"] == pytest.approx(0, abs=1e-3)
+    assert (
+        found[TRUE]["psnr_uv"] == BEST_PSNR
+        and found[NOTHING]["psnr_uv"] < 30
+        and found[NOTHING]["psnr_alone"] == BEST_PSNR
+    )
+    assert found[DELIT]["kept_brows"] == pytest.approx(1, abs=0.05) and found[FLAT]["kept_brows"] == pytest.approx(
+        0, abs=1e-3
+    )
     assert found[FLAT]["bias_brows"] - found[FLAT]["bias_skin"] == pytest.approx(-np.log(0.4), abs=0.02)
     assert "coverage" not in found[SOLVED]
 
@@ -95,19 +116,27 @@ def test_confidence_that_knows_the_errors_gains_likelihood(person):
     images.write_data(capture.capture.maps / "confidence.png", np.where(poor, 0.02, 0.92).astype(np.float32))
     found = state_scores.in_uv(capture, {TRUE: maps[TRUE], SOLVED: solved.astype(np.float32)})[SOLVED]
     assert found["coverage"] == pytest.approx(0.68, abs=0.03)
-    assert found["likelihood_gained"] == pytest.approx(np.log(np.sqrt(0.3 * 0.01 + 0.7 * 0.0001)) - 0.3 * np.log(0.1) - 0.7 * np.log(0.01), abs=0.03)
+    assert found["likelihood_gained"] == pytest.approx(np.log(np.sqrt(0.3 * 0.01 + 0.7 * 0.0001)) - 0.3 * np.log(0.1)
+                                                       - 0.7 * np.log(0.01), abs=0.03)
 
 
 def test_pictures_are_judged_as_the_maps_are_seen():
     side, rng = 160, np.random.default_rng(3)
     truth = (SKIN * np.exp(0.1 * rng.standard_normal((side, side, 1)))).astype(np.float32)
     y, x = (np.mgrid[0:side, 0:side] + 0.5) / side
-    uv, face, shadow = np.stack([x.ravel(), 1 - y.ravel()], 1), (np.abs(x - 0.5) < 0.45) & (np.abs(y - 0.5) < 0.45), x > 0.5
+    uv, face, shadow = np.stack([x.ravel(), 1 - y.ravel()],
+                                1), (np.abs(x - 0.5) < 0.45) & (np.abs(y - 0.5) < 0.45), x > 0.5
     look = HeadInView(AlbedoTruth(0, images.linear_to_srgb(truth), face, shadow), np.ones((side, side), bool), uv)
     filmed = truth * np.where(shadow, 0.4, 1.0)[..., None]
     found = state_scores.in_pictures({NOTHING: filmed, TRUE: truth, FLAT: np.broadcast_to(SKIN, truth.shape)}, [look])
-    assert found[TRUE]["psnr"] > 50 and found[TRUE]["detail"] == pytest.approx(1, abs=1e-3) and found[TRUE]["overshoot"] < 0.01
-    assert found[NOTHING]["shadow_step"] == pytest.approx(-np.log(0.4), abs=0.02) and found[NOTHING]["edge_step"] == pytest.approx(-np.log(0.4), abs=0.05)
+    assert (
+        found[TRUE]["psnr"] > 50
+        and found[TRUE]["detail"] == pytest.approx(1, abs=1e-3)
+        and found[TRUE]["overshoot"] < 0.01
+    )
+    assert found[NOTHING]["shadow_step"] == pytest.approx(-np.log(0.4), abs=0.02) and found[NOTHING][
+        "edge_step"
+    ] == pytest.approx(-np.log(0.4), abs=0.05)
     assert found[FLAT]["detail"] == 0 and found[FLAT]["psnr"] < found[TRUE]["psnr"]
 
 
@@ -125,7 +154,8 @@ def test_captures_of_one_true_head_are_one_person(tmp_path):
         filled(tmp_path, name, head)
     Capture(tmp_path / "new.wildcap").claim()
     found = state_captures.find(tmp_path, tmp_path, tmp_path / "state")
-    assert [(filmed.name, filmed.person) for filmed in found] == [("anna", "anna"), ("anna_flash", "anna"), ("ben", "ben"), ("scan", "scan")]
+    assert [(filmed.name, filmed.person)
+            for filmed in found] == [("anna", "anna"), ("anna_flash", "anna"), ("ben", "ben"), ("scan", "scan")]
 
 
 def test_a_subjects_own_parts_come_before_the_built_in_heads(tmp_path):
@@ -135,7 +165,8 @@ def test_a_subjects_own_parts_come_before_the_built_in_heads(tmp_path):
     for name, mask in (("beard", beard), ("brows", brows)):
         images.write_data(tmp_path / "anna" / "maps" / f"part_{name}.png", mask)
     parts = state_captures.find(tmp_path, tmp_path, tmp_path / "state")[0].parts()
-    assert parts["beard"][SIZE * 45 // 64, SIZE * 30 // 64] and parts["beard"].sum() == pytest.approx(200 * (SIZE / 64) ** 2, rel=0.15)
+    assert parts["beard"][SIZE * 45 // 64,
+                          SIZE * 30 // 64] and parts["beard"].sum() == pytest.approx(200 * (SIZE / 64) ** 2, rel=0.15)
     assert parts["brows"].sum() == pytest.approx(80 * (SIZE / 64) ** 2, rel=0.2) and parts["lips"].any()
     assert not (parts["skin"] & (parts["beard"] | parts["brows"] | parts["lips"])).any() and parts["skin"].any()
 
@@ -167,8 +198,10 @@ def test_figures_in_pictures_are_kept_until_something_changes(tmp_path, monkeypa
 def test_people_measured_before_by_the_same_code_stay_in_the_record():
     code, row = {"solve": "a", "measures": "b"}, {"psnr": 30.0}
     record = {"people": {DELIT: {"anna": row}}, "captures": {"anna": {DELIT: row}}, "code": code}
-    scores, by_capture = state.with_earlier(record, {SOLVED: {"ben": row}, DELIT: {"ben": row}}, {"ben": {DELIT: row}}, code)
-    assert scores == {DELIT: {"anna": row, "ben": row}, SOLVED: {"ben": row}} and list(scores) == [DELIT, SOLVED] and set(by_capture) == {"anna", "ben"}
+    scores, by_capture = state.with_earlier(record, {SOLVED: {"ben": row}, DELIT: {"ben": row}}, {"ben": {DELIT: row}},
+                                            code)
+    assert scores == {DELIT: {"anna": row, "ben": row},
+                      SOLVED: {"ben": row}} and list(scores) == [DELIT, SOLVED] and set(by_capture) == {"anna", "ben"}
     assert state.with_earlier(record, {}, {}, {**code, "solve": "c"}) == ({}, {})
 
 
@@ -177,11 +210,17 @@ def test_what_made_the_figures_is_told_by_the_stages_and_the_measures(tmp_path):
     captures = state_captures.find(tmp_path, tmp_path, tmp_path / "state")
     before = state.code_of(captures)
     record = captures[0].capture.read()
-    record["stages"]["solve"] = {"finished": "2026-11-22T00:00:00", "seconds": 1.0, "settings": {}, "seed": 0, "device": "cpu", "figures": {}, "inputs": {},
+    record["stages"]["solve"] = {"finished": "2026-11-22T00:00:00", "seconds": 1.0, "settings": {}, "seed": 0,
+                                 "device": "cpu", "figures": {}, "inputs": {},
                                  "code": "1234567890abcdef", "version": "0.2.0"}
     captures[0].capture.json.write_text(json.dumps(record))
     after = state.code_of(captures)
-    assert before["solve"] == "" and after["solve"] == "1234567890ab" and len(after["measures"]) == 12 and after["delight"] == ""
+    assert (
+        before["solve"] == ""
+        and after["solve"] == "1234567890ab"
+        and len(after["measures"]) == 12
+        and after["delight"] == ""
+    )
 
 
 def test_a_capture_that_cannot_be_solved_is_named_and_the_others_go_on(tmp_path, monkeypatch, capsys):
@@ -195,9 +234,14 @@ def test_a_capture_that_cannot_be_solved_is_named_and_the_others_go_on(tmp_path,
 
 def test_the_page_says_what_the_solve_adds():
     row = {"psnr": 30.0, "psnr_shared": 31.0}
-    text = state.by_capture_table({"anna": {DELIT: row, SOLVED: {"psnr": 30.5, "psnr_shared": 30.75}}, "ben": {DELIT: row}})
+    text = state.by_capture_table({"anna": {DELIT: row, SOLVED: {"psnr": 30.5, "psnr_shared": 30.75}},
+                                   "ben": {DELIT: row}})
     assert "| anna | - | - | - | - | 30.00 | 30.50 | +0.50 | 31.00 | 30.75 | -0.25 |" in text
     assert "| ben | - | - | - | - | 30.00 | - | - | 31.00 | - | - |" in text
     scores = {DELIT: {"anna": row, "ben": row}, SOLVED: {"anna": {"psnr": 30.5}, "ben": {"psnr": 31.0}}}
     page = dict(state.sections(scores, {"anna": {DELIT: row}}))
-    assert "2 people" in page[""] and "| solved | **+0.75 ± 0.25** |" in page["In the picture"] and "Features kept" not in page
+    assert (
+        "2 people" in page[""]
+        and "| solved | **+0.75 ± 0.25** |" in page["In the picture"]
+        and "Features kept" not in page
+    )

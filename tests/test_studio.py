@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A studio: sixteen photographs under even light with the cameras of its calibration; the mask ends empty. Blender's own cameras are such a calibration."""
+"""A studio: sixteen photographs under even light with the cameras of its calibration; the mask ends empty. Blender's
+own cameras are such a calibration."""
 
 import json
 from dataclasses import replace
@@ -28,7 +29,8 @@ def calibration(views: list) -> str:
         matrix[:3, :3], matrix[:3, 3] = view.rotation.T @ np.diag([1, -1, -1]), view.centre
         entries.append({"name": f"cam_{i:02d}", "matrix_world": matrix.tolist()})
     camera = views[0].camera
-    return json.dumps({"width": camera.width, "height": camera.height, "focal_px": camera.mean_focal_length(), "cameras": entries})
+    return json.dumps({"width": camera.width, "height": camera.height, "focal_px": camera.mean_focal_length(),
+                       "cameras": entries})
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +43,8 @@ def studio(tmp_path_factory):
     capture = Capture(root / "face.wildcap")
     capture.root.mkdir()
     capture.set_source(root / "photos")
-    settings = from_json({"cameras": {"import_from": str(root / "rig.json")}, "delight": {"delighter": "none"}, "texture": {"size": 256}})
+    settings = from_json({"cameras": {"import_from": str(root / "rig.json")}, "delight": {"delighter": "none"},
+                          "texture": {"size": 256}})
     frames.run(capture, settings, Reporter("frames"))
     report = Reporter("cameras")
     cameras.run(capture, settings, report)
@@ -52,18 +55,23 @@ def test_the_rigs_cameras_stand_in_the_heads_world(studio):
     capture, _, report, true = studio
     found = read_views(capture)
     assert report.figures["frames_registered"] == 16 and report.figures["features"] == "imported"
-    scale, rotation, shift = similarity(np.array([view.centre for view in found]), np.array([view.centre for view in true]))
-    assert np.allclose([scale * rotation @ view.centre + shift for view in found], [view.centre for view in true], atol=1e-9)
-    assert scale == pytest.approx(1, abs=0.06) and rotation[2, 2] > np.cos(np.radians(8))  # a person's pupils are not 63 mm apart
+    scale, rotation, shift = similarity(np.array([view.centre for view in found]),
+                                        np.array([view.centre for view in true]))
+    assert np.allclose([scale * rotation @ view.centre + shift for view in found], [view.centre for view in true],
+                       atol=1e-9)
+    # a person's pupils are not 63 mm apart
+    assert scale == pytest.approx(1, abs=0.06) and rotation[2, 2] > np.cos(np.radians(8))
     assert report.figures["pupils_apart_in_imported_units"] == pytest.approx(0.062, abs=0.003)
-    assert not [finding for finding in report.findings if "fit" in finding["problem"] or "expression" in finding["problem"]]
+    assert not [finding for finding in report.findings if "fit" in finding["problem"]
+                or "expression" in finding["problem"]]
 
 
 def test_even_light_ends_with_an_empty_mask(studio):
     """On the true head, so that registration has no part in it."""
     capture, settings, _, true = studio
     found = read_views(capture)
-    scale, rotation, shift = similarity(np.array([view.centre for view in true]), np.array([view.centre for view in found]))
+    scale, rotation, shift = similarity(np.array([view.centre for view in true]),
+                                        np.array([view.centre for view in found]))
     head = painted_head.person()[0].mesh
     meshes.write_obj(capture.head, head.moved(scale * head.vertices @ rotation.T + shift))
     for stage, name in ((delight, "delight"), (texture, "texture"), (shadow_mask, "shadow_mask")):
@@ -74,20 +82,24 @@ def test_even_light_ends_with_an_empty_mask(studio):
 def test_another_rigs_calibration_is_refused(studio, tmp_path):
     capture, settings, _, true = studio
     (tmp_path / "rig.json").write_text(calibration(true[::-1]))
-    with pytest.raises(Problem, match="do not fit these pictures"):  # in the opposite order: rays meet, but in a hollow face
+    # in the opposite order: rays meet, but in a hollow face
+    with pytest.raises(Problem, match="do not fit these pictures"):
         cameras.run(capture, from_json({"cameras": {"import_from": str(tmp_path / "rig.json")}}), Reporter("cameras"))
 
 
 def test_cameras_that_are_some_pixels_off_are_refined_and_not_refused(tmp_path):
     rng = np.random.default_rng(1)
-    true = [painted_head.camera(azimuth, 0.04 * (i % 3), 1.0, scale=1.5) for i, azimuth in enumerate(np.linspace(-48, 48, 8))]
+    true = [painted_head.camera(azimuth, 0.04 * (i % 3), 1.0, scale=1.5)
+            for i, azimuth in enumerate(np.linspace(-48, 48, 8))]
     off = []
     for i, view in enumerate(true):
         images.write_srgb(tmp_path / "photos" / f"cam_{i:02d}.png", painted_head.photograph(view))
         turn = cv2.Rodrigues(np.radians(rng.normal(0, 0.6, 3)))[0]
         off.append(replace(view, rotation=turn @ view.rotation, translation=turn @ view.translation))
     (tmp_path / "rig.json").write_text(calibration(off))
-    capture, settings, told = Capture(tmp_path / "face.wildcap"), from_json({"cameras": {"import_from": str(tmp_path / "rig.json")}}), []
+    capture, settings, told = Capture(tmp_path
+                                      / "face.wildcap"), from_json({"cameras": {"import_from": str(tmp_path
+                                                                                                   / "rig.json")}}), []
     capture.root.mkdir()
     capture.set_source(tmp_path / "photos")
     frames.run(capture, settings, Reporter("frames"))
@@ -117,7 +129,14 @@ def test_blenders_cameras_are_written_as_they_are_read(addon, tmp_path):
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 600, 800, 100
     for i, fit in enumerate(('AUTO', 'HORIZONTAL', 'VERTICAL')):
         data = bpy.data.cameras.new(f"lens {i}")
-        data.lens, data.sensor_width, data.sensor_height, data.sensor_fit, data.shift_x, data.shift_y = 70 + i, 32, 20, fit, 0.05, -0.03
+        data.lens, data.sensor_width, data.sensor_height, data.sensor_fit, data.shift_x, data.shift_y = (
+            70 + i,
+            32,
+            20,
+            fit,
+            0.05,
+            -0.03,
+        )
         thing = bpy.data.objects.new(f"IMG_{i}", data)
         thing.location, thing.rotation_euler = (0.1 * i, -0.7, 0.1), (1.5, 0.1, 0.05 * i)
         scene.collection.objects.link(thing)

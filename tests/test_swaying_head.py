@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cameras of a film whose subject swayed before the room: known poses of a head found again by what matches on it, and a head at rest left alone."""
+"""Cameras of a film whose subject swayed before the room: known poses of a head found again by what matches on it, and
+a head at rest left alone."""
 
 import numpy as np
 import pycolmap
@@ -21,8 +22,8 @@ IN_HEAD = HeadFrame(pycolmap.Sim3d(), 1.0, 0.01, 0.062, 0.001)
 
 
 def filmed(sway_m: float, sway_deg: float, count: int = 700, ragged: float = 0.0):
-    """The model of the cameras in the room's world, all matches, and where the head was: its rotations [N, 3, 3] and shifts [N, 3]. `ragged`: share of the
-    head's points that are seen elsewhere in every frame, as hair is."""
+    """The model of the cameras in the room's world, all matches, and where the head was: its rotations [N, 3, 3] and
+    shifts [N, 3]. `ragged`: share of the head's points that are seen elsewhere in every frame, as hair is."""
     rng = np.random.default_rng(1)
     views = [camera(azimuth, 0.05 * np.sin(i), scale=1.5) for i, azimuth in enumerate(AZIMUTHS)]
     head = template.load().vertices
@@ -51,12 +52,14 @@ def filmed(sway_m: float, sway_deg: float, count: int = 700, ragged: float = 0.0
 
 
 def missed_px(model, true, turns, shifts) -> np.ndarray:
-    """How far the face's points lie from where they were filmed, per frame, if the head is laid where the frames together see it best: [N]."""
+    """How far the face's points lie from where they were filmed, per frame, if the head is laid where the frames
+    together see it best: [N]."""
     points = template.load().vertices
     points = points[(points[:, 1] < -0.03) & (points[:, 2] > -0.09)][::20]
     found = {image.name: image for image in model.images.values()}
     aims, poses = [], []
-    for image, turn, shift in zip(sorted(true.images.values(), key=lambda image: image.name), turns, shifts, strict=True):
+    for image, turn, shift in zip(sorted(true.images.values(), key=lambda image: image.name), turns, shifts,
+                                  strict=True):
         poses.append(pose_of(found[image.name]))
         local = (points @ turn.T + shift) @ pose_of(image).rotation.matrix().T + pose_of(image).translation
         aims.append(np.asarray(true.cameras[1].img_from_cam(local)))
@@ -69,7 +72,8 @@ def missed_px(model, true, turns, shifts) -> np.ndarray:
         origin.append(-pose.rotation.matrix().T @ pose.translation)
     rows = np.stack(rows)
     place = np.linalg.solve(rows.sum(0), np.einsum("vnij,vj->ni", rows, np.array(origin))[..., None])[..., 0]
-    return np.array([np.linalg.norm(np.asarray(model.cameras[1].img_from_cam(place @ pose.rotation.matrix().T + pose.translation)) - aim, axis=1).mean()
+    return np.array([np.linalg.norm(np.asarray(model.cameras[1].img_from_cam(place @ pose.rotation.matrix().T
+                                                                             + pose.translation)) - aim, axis=1).mean()
                      for pose, aim in zip(poses, aims, strict=True)])
 
 
@@ -96,7 +100,8 @@ def test_frames_that_do_not_tell_are_placed_by_those_that_do():
 
 @pytest.mark.parametrize("noise_px", [0.3, 1.0])
 def test_a_head_at_rest_keeps_the_cameras_of_the_room(monkeypatch, noise_px):
-    """However noisy: poses of its own would fit all matches better, and tell nothing of those that had no say in them."""
+    """However noisy: poses of its own would fit all matches better, and tell nothing of those that had no say in
+    them."""
     monkeypatch.setattr(f"{__name__}.NOISE_PX", noise_px)
     model, matches, _, _ = filmed(0.0, 0.0)
     settled, left = settle(model, IN_HEAD, matches, Reporter("cameras"))
@@ -128,4 +133,5 @@ def test_only_what_matches_on_the_head_counts():
     kept = on_head(model, images, matches)
     index = np.concatenate(list(kept.pairs.values()))
     of_room = (index >= 300).any(1).mean()
-    assert 0.9 * len(np.concatenate(list(matches.pairs.values()))) / 2 * 0.8 < len(index) and of_room < 0.25  # the wall behind the head's outline stays
+    # the wall behind the head's outline stays
+    assert 0.9 * len(np.concatenate(list(matches.pairs.values()))) / 2 * 0.8 < len(index) and of_room < 0.25

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The SwitchLight delighter against a server on this machine that speaks its protocol, with all its ways to fail. The live service was not asked."""
+"""The SwitchLight delighter against a server on this machine that speaks its protocol, with all its ways to fail. The
+live service was not asked."""
 
 from __future__ import annotations
 
@@ -83,16 +84,25 @@ def test_the_selected_frames_go_out_and_come_back_at_their_size(capture, serve):
         report = Reporter("delight", lambda message: said.append((len(server.calls), getattr(message, "text", ""))))
         run(capture, SETTINGS, report)
         assert report.figures["switchlight_calls"] == 3 and report.figures["switchlight_credits"] == 3.0
-        assert any(calls == 0 and "3 credits" in text and "3 frames" not in text for calls, text in said), "what it costs is said before the first call"
-        assert sorted(path.name for path in capture.delit.iterdir()) == ["00000.png", "00001.png", "00002.png"], "and nothing about shadows"
+        assert any(calls == 0 and "3 credits" in text and "3 frames" not in text
+                   for calls, text in said), "what it costs is said before the first call"
+        assert sorted(path.name
+                      for path in capture.delit.iterdir()) == ["00000.png", "00001.png",
+                                                               "00002.png"], "and nothing about shadows"
         assert images.size(capture.delit / "00001.png") == SIZE
         assert images.read_srgb(capture.delit / "00001.png")[40, 30] * 255 == pytest.approx([200, 150, 120], abs=0.6)
         for call in server.calls:
-            assert (call["key"], call["preview"], call["auto_key"], call["type"], call["file"]) == (KEY, "false", "true", "image/png", "frame.png")
+            assert (call["key"], call["preview"], call["auto_key"], call["type"],
+                    call["file"]) == (KEY, "false", "true", "image/png", "frame.png")
             assert "WildCap" in call["agent"]
-        assert {call["picture"] for call in server.calls} == {(capture.frames / f"0000{i}.png").read_bytes() for i in range(3)}
+        assert {call["picture"] for call in server.calls} == {(capture.frames / f"0000{i}.png").read_bytes()
+                                                              for i in range(3)}
         run(capture, SETTINGS, again := Reporter("delight"))
-        assert len(server.calls) == 3 and again.figures["switchlight_credits"] == 0 and again.figures["switchlight_frames_kept_before"] == 3
+        assert (
+            len(server.calls) == 3
+            and again.figures["switchlight_credits"] == 0
+            and again.figures["switchlight_frames_kept_before"] == 3
+        )
 
 
 def test_the_background_that_was_cut_away_is_the_frames_own(capture, serve):
@@ -101,7 +111,8 @@ def test_the_background_that_was_cut_away_is_the_frames_own(capture, serve):
     with serve(answer=(capture.root / "answer.png").read_bytes()):
         agree(capture)
         image = delight(capture)[1].image * 255
-    assert image[40, 10] == pytest.approx([200, 150, 120], abs=0.6) and image[40, 50] == pytest.approx([110, 80, 60], abs=0.6)
+    assert image[40, 10] == pytest.approx([200, 150, 120],
+                                          abs=0.6) and image[40, 50] == pytest.approx([110, 80, 60], abs=0.6)
 
 
 def test_an_answer_of_another_section_is_refused_and_kept(capture, serve):
@@ -115,7 +126,8 @@ def test_an_answer_of_another_section_is_refused_and_kept(capture, serve):
 
 def test_nothing_is_sent_without_consent_a_key_or_a_network(capture, serve, monkeypatch):
     with serve() as server:
-        with pytest.raises(Problem, match=r"waits for your consent: 3 frames .* 3 credits.* Nothing was sent.*--send-frames"):
+        with pytest.raises(Problem,
+                           match=r"waits for your consent: 3 frames .* 3 credits.* Nothing was sent.*--send-frames"):
             delight(capture)
         agree(capture)
         monkeypatch.setenv(switchlight_api.OFFLINE_VARIABLE, "1")
@@ -136,7 +148,9 @@ def test_consent_holds_for_these_pictures_here_and_nothing_else(capture, serve, 
     assert consent.is_given(capture, consent.sending(capture, False))
     other = make(tmp_path / "other.wildcap", selected=4)
     other.consent.write_bytes(capture.consent.read_bytes())
-    assert not consent.is_given(other, consent.sending(other, False)), "copied to another capture, though its frames are the same"
+    assert not consent.is_given(other,
+                                consent.sending(other,
+                                                False)), "copied to another capture, though its frames are the same"
     with pytest.raises(Problem, match="consent"):
         consent.require(other, consent.sending(other, False))
     kept = (capture.frames / "00001.png").read_bytes()
@@ -144,7 +158,8 @@ def test_consent_holds_for_these_pictures_here_and_nothing_else(capture, serve, 
     assert not consent.is_given(capture, consent.sending(capture, False)), "another picture under the same name"
     (capture.frames / "00001.png").write_bytes(kept)
     assert consent.is_given(capture, consent.sending(capture, False))
-    assert not consent.is_given(capture, consent.sending(capture, False, [f"0000{i}.png" for i in range(4)])), "one more frame"
+    assert not consent.is_given(capture,
+                                consent.sending(capture, False, [f"0000{i}.png" for i in range(4)])), "one more frame"
     assert not consent.is_given(capture, consent.sending(capture, True)), "other answers"
     serve()
     assert consent.is_given(capture, consent.sending(capture, False)), "the same machine"
@@ -171,7 +186,9 @@ def test_the_key_goes_to_safe_addresses_only(capture, serve, monkeypatch):
         agree(capture)
         with pytest.raises(Problem, match="307"):
             delight(capture)
-        assert elsewhere.calls == [] and 1 <= len(server.calls) <= 3, "a redirection is not followed, and nothing new is begun"
+        assert elsewhere.calls == [] and 1 <= len(server.calls) <= 3, (
+            "a redirection is not followed, and nothing new is begun"
+        )
 
 
 def test_a_busy_service_gets_time_and_each_frame_is_charged_once(tmp_path, capture, serve):
@@ -183,7 +200,9 @@ def test_a_busy_service_gets_time_and_each_frame_is_charged_once(tmp_path, captu
         assert len(found) == 9 and all(each.shadow is None for each in found)
         assert len(server.calls) == 9 + len(busy) and set(server.charged.values()) == {1} and len(server.charged) == 9
         assert server.most_at_once == switchlight_api.MOST_AT_ONCE == 3
-        assert max(b - a for a, b in zip(server.times, server.times[1:], strict=False)) > 0.9, "the service asked for a second"
+        assert max(b - a
+                   for a, b in zip(server.times, server.times[1:],
+                                   strict=False)) > 0.9, "the service asked for a second"
 
 
 @pytest.mark.parametrize("fault", ["truncated", "cut", "garbage", "hang", "slow"])
@@ -193,15 +212,18 @@ def test_a_broken_answer_is_none_and_is_asked_for_again(capture, serve, monkeypa
     with serve(fault) as server:
         agree(capture)
         assert len(delight(capture)) == 3
-        assert len(server.calls) == 4 or len(server.calls) > 4 and fault in ("hang", "slow"), "a busy machine may be late, too"
+        assert len(server.calls) == 4 or len(server.calls) > 4 and fault in ("hang",
+                                                                             "slow"), "a busy machine may be late, too"
         assert len(list(capture.switchlight.iterdir())) == 3
         for path in capture.switchlight.iterdir():
             assert path.read_bytes() == server.answer
 
 
 @pytest.mark.parametrize(("refusal", "words"), [
-    ((402, {}, {"message": "Payment required"}), "no credits left"), ((200, {}, {"message": "No Credit. Please purchase credit."}), "no credits left"),
-    ((401, {}, {"message": f"Unauthorized key {KEY}."}), r"does not accept the key \(401: Unauthorized key \(the key\)\)"),
+    ((402, {}, {"message": "Payment required"}), "no credits left"),
+    ((200, {}, {"message": "No Credit. Please purchase credit."}), "no credits left"),
+    ((401, {}, {"message": f"Unauthorized key {KEY}."}),
+     r"does not accept the key \(401: Unauthorized key \(the key\)\)"),
     ((413, {}, {"detail": [{"msg": "too large"}]}), "413: .*too large"), ((400, {}, []), r"documents say \(400\)"),
     ((429, {"Retry-After": "86400"}, {}), "left alone for 1440 minutes"),
 ])
@@ -216,7 +238,9 @@ def test_a_refusal_is_said_and_not_repeated(capture, serve, refusal, words):
 def test_what_came_is_kept_when_the_service_stays_busy(capture, serve):
     with serve("fine", *[BUSY] * 40) as server:
         agree(capture)
-        with pytest.raises(Problem, match=r"did not serve the frame 0000.\.png: it is busy \(503\), after 4 tries.*the 1 of 3 answers"):
+        with pytest.raises(Problem,
+                           match=r"did not serve the frame 0000.\.png: it is busy \(503\), after 4 tries.*the 1 of 3 "
+                                 r"answers"):
             delight(capture)
         server.plan.clear()
         assert len(delight(capture)) == 3 and sorted(server.charged.values()) == [1, 1, 1]
@@ -233,7 +257,8 @@ def test_an_answer_that_comes_broken_may_have_been_charged_and_is_not_risked_for
 def test_credits_are_counted_before_the_first_frame_leaves(capture, serve):
     with serve(credits=2.0) as server:
         agree(capture)
-        with pytest.raises(Problem, match="3 credits are needed, and your SwitchLight account has 2 credits: nothing was sent"):
+        with pytest.raises(Problem,
+                           match="3 credits are needed, and your SwitchLight account has 2 credits: nothing was sent"):
             delight(capture)
         assert server.calls == []
         server.credits = None
@@ -247,7 +272,8 @@ def test_credits_are_counted_before_the_first_frame_leaves(capture, serve):
 def test_a_service_that_is_not_there_or_does_not_know_the_key_gets_no_picture(capture, serve, monkeypatch):
     with serve() as server:
         agree(capture)
-    with pytest.raises(Problem, match=r"cannot be used now: it cannot be reached \(Connection refused\)\. Nothing was sent"):
+    with pytest.raises(Problem,
+                       match=r"cannot be used now: it cannot be reached \(Connection refused\)\. Nothing was sent"):
         delight(capture)
     with serve() as server:
         monkeypatch.setenv(switchlight_api.KEY_VARIABLE, "another")
@@ -294,7 +320,11 @@ def test_pictures_are_judged_whole_to_their_last_byte():
 
 
 def test_the_service_may_ask_for_time_in_seconds_or_until_a_date():
-    assert switchlight_calls._after("7") == 7 and switchlight_calls._after(None) is None and switchlight_calls._after("soon") is None
+    assert (
+        switchlight_calls._after("7") == 7
+        and switchlight_calls._after(None) is None
+        and switchlight_calls._after("soon") is None
+    )
     assert switchlight_calls._after(formatdate(time.time() + 30, usegmt=True)) == pytest.approx(30, abs=2)
     assert switchlight_calls._after(formatdate(time.time() - 30, usegmt=True)) == 0
     assert KEY not in repr(switchlight_calls.Account("https://x", KEY))

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""SwitchLight in a job of its own process: killed in the middle, continued without paying twice, and no key in anything a run leaves; and its flags."""
+"""SwitchLight in a job of its own process: killed in the middle, continued without paying twice, and no key in anything
+a run leaves; and its flags."""
 
 import os
 import subprocess
@@ -21,7 +22,8 @@ from .test_switchlight import make
 
 ROOT = Path(__file__).resolve().parent.parent
 STAGE = ["--from", "delight", "--until", "delight", "--delighter", "switchlight"]
-JOB = [sys.executable, "-B", "-c", "import sys, pathlib; from core.worker.runner import run_job; print(run_job(pathlib.Path(sys.argv[1]), print))"]
+JOB = [sys.executable, "-B", "-c",
+       "import sys, pathlib; from core.worker.runner import run_job; print(run_job(pathlib.Path(sys.argv[1]), print))"]
 """What the worker does, at the priority of a test and without the pipe that would tell it of its starter's end."""
 
 
@@ -35,9 +37,11 @@ def capture(tmp_path):
 
 
 def begin(command: list[str], server: Service, **more) -> subprocess.Popen:
-    environment = {name: value for name, value in os.environ.items() if name not in (consent.GIVEN_VARIABLE, service.OFFLINE_VARIABLE)}
+    environment = {name: value for name, value in os.environ.items()
+                   if name not in (consent.GIVEN_VARIABLE, service.OFFLINE_VARIABLE)}
     environment |= {service.KEY_VARIABLE: KEY, service.BASE_VARIABLE: server.url, **more}
-    return subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, encoding="utf-8")
+    return subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                            text=True, encoding="utf-8")
 
 
 def command_lines() -> list[bytes]:
@@ -67,10 +71,13 @@ def test_killed_in_the_middle_and_continued_each_frame_is_paid_once_and_the_key_
         with begin([*JOB, str(job)], server) as second:
             said += second.communicate(timeout=120)[0] + (capture.logs / "delight.log").read_text(encoding="utf-8")
         assert "Done(" in said, said
-        assert len(server.charged) == 6 and set(server.charged.values()) == {1}, "and the consent holds for what is left"
+        assert len(server.charged) == 6 and set(server.charged.values()) == {1}, (
+            "and the consent holds for what is left"
+        )
         assert "with 3 credits." in said and "3 more have their answer already" in said
         left = [path for path in capture.root.rglob("*") if path.is_file()]
-        assert {"capture.json", "job.json", "consent.json", "report.html", "delight.log"} <= {path.name for path in left}
+        assert {"capture.json", "job.json", "consent.json", "report.html",
+                "delight.log"} <= {path.name for path in left}
         assert not [path for path in left if KEY.encode() in path.read_bytes()] and KEY not in said
 
 
@@ -86,6 +93,7 @@ def test_the_flag_reaches_the_worker_by_its_environment_alone(capture, capsys, m
 
     followed = []
     monkeypatch.setattr(terminal, "follow", lambda *arguments: followed.append(arguments) or 0)
-    assert main(["run", "-", str(capture.root), *STAGE, "--send-frames", "--preview"]) == 0 == main(["run", "-", str(capture.root), *STAGE])
+    assert main(["run", "-", str(capture.root), *STAGE, "--send-frames",
+                 "--preview"]) == 0 == main(["run", "-", str(capture.root), *STAGE])
     assert followed[0][3] == {consent.GIVEN_VARIABLE: str(capture.root.resolve())} and followed[1][3] == {}
     assert consent.GIVEN_VARIABLE not in capture.job.read_text(encoding="utf-8") and not capture.consent.exists()

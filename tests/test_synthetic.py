@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The synthetic subjects and the sample: what its files claim about each other, and that nothing was trained on its subject."""
+"""The synthetic subjects and the sample: what its files claim about each other, and that nothing was trained on its
+subject."""
 
 import json
 from pathlib import Path
@@ -32,7 +33,8 @@ def frames():
 
 @pytest.fixture(scope="module")
 def cameras():
-    return {c["frame"]: np.array(c["matrix_world"]) for c in json.loads((sample.SAMPLE / "cameras.json").read_text(encoding="utf-8"))["cameras"]}
+    return {c["frame"]: np.array(c["matrix_world"])
+            for c in json.loads((sample.SAMPLE / "cameras.json").read_text(encoding="utf-8"))["cameras"]}
 
 
 def test_a_seed_is_one_head_and_another_seed_another():
@@ -76,7 +78,8 @@ def test_a_point_in_the_sun_and_one_behind_the_head():
 
 def test_the_sample_is_complete_and_small(frames, cameras):
     assert len(frames) == len(cameras) >= 60 and frames[0].shape == (960, 720, 3)
-    names = {folder: sorted(p.name for p in (sample.SAMPLE / folder).glob("*.png")) for folder in ("albedo", "face", "shadow")}
+    names = {folder: sorted(p.name for p in (sample.SAMPLE / folder).glob("*.png"))
+             for folder in ("albedo", "face", "shadow")}
     assert names["albedo"] == names["face"] == names["shadow"] and len(names["albedo"]) == 14
     assert sum(p.stat().st_size for p in sample.SAMPLE.rglob("*") if p.is_file()) < 12e6
 
@@ -94,14 +97,17 @@ def test_the_video_is_darker_where_the_truth_says_shadow(frames):
     ratios = []
     for path in sorted((sample.SAMPLE / "shadow").glob("*.png")):
         shadow, face = images.read_mask(path) > 0.5, images.read_mask(sample.SAMPLE / "face" / path.name) > 0.5
-        light = images.srgb_to_linear(frames[int(path.stem)]).mean(-1) / np.maximum(images.read_linear(sample.SAMPLE / "albedo" / path.name).mean(-1), 1e-3)
+        light = images.srgb_to_linear(frames[int(path.stem)]).mean(-1) / np.maximum(
+            images.read_linear(sample.SAMPLE / "albedo" / path.name).mean(-1), 1e-3
+        )
         assert (shadow & face).sum() > 1000 and (~shadow & face).sum() > 1000
         ratios.append(np.median(light[~shadow & face]) / np.median(light[shadow & face]))
     assert min(ratios) > 1.5
 
 
 def test_faces_are_found_and_landmarks_lie_on_the_template(frames, cameras):
-    """Found in nine frames of ten within 60 degrees of frontal; lifted to the true head and averaged, within 4 mm of the template's landmarks."""
+    """Found in nine frames of ten within 60 degrees of frontal; lifted to the true head and averaged, within 4 mm of
+    the template's landmarks."""
     head = subject_mesh(SEED)
     triangle, bary = template.landmarks()
     truth = (head.vertices[head.faces[triangle]] * bary[..., None]).sum(1)
@@ -116,7 +122,8 @@ def test_faces_are_found_and_landmarks_lie_on_the_template(frames, cameras):
             found += 1
             rays = view.rays(face.landmarks[:, :2])
             hit, weights, _ = caster.first_hits(np.repeat(view.centre[None], 468, 0), rays)
-            facing = ((normals[head.faces[hit]] * weights[..., None]).sum(1) * -rays).sum(1) > 0.5  # else a pixel beside is centimetres beside
+            # else a pixel beside is centimetres beside
+            facing = ((normals[head.faces[hit]] * weights[..., None]).sum(1) * -rays).sum(1) > 0.5
             points = (head.vertices[head.faces[hit]] * weights[..., None]).sum(1)
             lifted.append(np.where(((hit >= 0) & facing)[:, None], points, np.nan))
     assert found >= 0.9 * asked

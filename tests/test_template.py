@@ -10,7 +10,8 @@ pytest.importorskip("OpenImageIO")
 from core.face import template
 from core.geometry import raster  # noqa: E402
 
-FROZEN = "d77cc1f89fd306ed5b300c0877415150"  # every shipped weight depends on this topology and these UVs: never change it
+# every shipped weight depends on this topology and these UVs: never change it
+FROZEN = "d77cc1f89fd306ed5b300c0877415150"
 
 
 def landmark_points():
@@ -49,8 +50,10 @@ def test_landmarks_are_where_their_names_say():
     points = landmark_points()
     assert points[263, 0] > 0.03 and points[33, 0] < -0.03  # the left eye's outer corner at +X
     assert points[1, 1] < points[[263, 33], 1].min() - 0.02  # the nose's tip is the foremost, at -Y
-    assert points[152, 2] < points[13, 2] < points[1, 2] < points[168, 2] < points[10, 2]  # chin, mouth, tip, bridge, forehead
-    assert np.linalg.norm(points[[263, 362]].mean(0) - points[[33, 133]].mean(0)) == pytest.approx(0.063, abs=0.003)  # pupils
+    # chin, mouth, tip, bridge, forehead
+    assert points[152, 2] < points[13, 2] < points[1, 2] < points[168, 2] < points[10, 2]
+    # pupils
+    assert np.linalg.norm(points[[263, 362]].mean(0) - points[[33, 133]].mean(0)) == pytest.approx(0.063, abs=0.003)
     assert (template.landmark_weights() > 0).sum() > 400
 
 
@@ -64,7 +67,8 @@ def test_the_persons_left_is_right_of_the_middle_of_the_map():
 def test_masks_do_not_contradict_each_other():
     skin, lips, brows, face = (template.mask(name, 512) > 0.5 for name in ("skin", "lips", "brows", "face"))
     assert not (skin & (lips | brows)).any() and (lips <= face).all()
-    assert sum((template.mask(name, 512) > 0.5).mean() for name in ("face", "ears", "neck", "scalp")) == pytest.approx(1, abs=0.01)
+    assert sum((template.mask(name, 512) > 0.5).mean()
+               for name in ("face", "ears", "neck", "scalp")) == pytest.approx(1, abs=0.01)
 
 
 def test_identities_differ_by_millimetres_and_stay_symmetric_on_average():

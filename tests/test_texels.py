@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighter of the head's own UV space: what it is told of a head, what it learns from, and the way back into the frames."""
+"""The delighter of the head's own UV space: what it is told of a head, what it learns from, and the way back into the
+frames."""
 
 import numpy as np
 import pytest
@@ -56,7 +57,8 @@ def test_the_border_of_the_sun_is_a_signed_distance():
     lit, covered = np.zeros((64, 64), bool), np.ones((64, 64), bool)
     lit[:, 20:] = True
     distance = texels.border_distance(lit, covered)
-    expected = np.tanh((np.arange(64) - 19.5 + 0.5 * np.sign(np.arange(64) - 19.5)) * texels.SIDE / 64 / texels.BORDER_TEXELS)
+    expected = np.tanh((np.arange(64) - 19.5 + 0.5 * np.sign(np.arange(64) - 19.5)) * texels.SIDE / 64
+                       / texels.BORDER_TEXELS)
     assert np.abs(distance - expected).max() < 0.02
     assert not texels.border_distance(covered, covered).any() and not texels.border_distance(lit & False, covered).any()
 
@@ -64,7 +66,8 @@ def test_the_border_of_the_sun_is_a_signed_distance():
 def head_in_light(side=64) -> Texels:
     rng = np.random.default_rng(3)
     maps = {name: rng.random((side, side, *shape)).astype(np.float32) for name, shape in
-            (("log", (3,)), ("spread", ()), ("seen", ()), ("normal", (3,)), ("open", ()), ("ambient", (3,)), ("direct", (3,)), ("free", ()))}
+            (("log", (3,)), ("spread", ()), ("seen", ()), ("normal", (3,)), ("open", ()), ("ambient", (3,)),
+             ("direct", (3,)), ("free", ()))}
     return Texels(**maps, covered=np.ones((side, side), bool))
 
 
@@ -77,14 +80,16 @@ def test_the_mirror_image_of_a_head_is_the_mirror_image_of_what_the_network_read
     layers[5] *= -1
     assert layers.shape == (CHANNELS, 64, 64) and np.abs(middle - other).max() < 0.02
     assert np.abs(light[:, :, ::-1] - other_light).max() < 0.1
-    assert np.abs(layers[3:] - mirrored[3:]).max() < 0.05, "the template's masks are alike on both sides but for a texel's share"
+    assert np.abs(layers[3:]
+                  - mirrored[3:]).max() < 0.05, "the template's masks are alike on both sides but for a texel's share"
 
 
 def test_the_network_begins_with_the_fitted_light_half_of_its_sun_blocked():
     light = torch.rand(2, 6, 128, 128) + 0.1
     shading, shadow, spread = TexelNet(**MODEL)(torch.randn(2, CHANNELS, 128, 128), light)
     assert shading.shape == (2, 3, 128, 128) and shadow.shape == (2, 1, 128, 128) and spread.shape == (2, 3, 32, 32)
-    assert torch.allclose(shading, torch.log(light[:, :3] + 0.5 * light[:, 3:])) and not shadow.any() and (spread == -2).all()
+    assert torch.allclose(shading,
+                          torch.log(light[:, :3] + 0.5 * light[:, 3:])) and not shadow.any() and (spread == -2).all()
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +98,8 @@ def person():
 
 
 def test_light_is_alike_on_whatever_it_falls_and_what_is_divided_by_it_is_the_albedo(person):
-    """The same light on the person's own colours and on a face with stains: its shading differs by what a camera's curve makes of another exposure."""
+    """The same light on the person's own colours and on a face with stains: its shading differs by what a camera's
+    curve makes of another exposure."""
     plain = np.full((128, 128, 3), 0.3, np.float32)
     stained = plain.copy()
     stained[40:60, 30:60] *= 0.3
@@ -140,7 +146,8 @@ def test_a_mirrored_batch_is_that_of_a_mirrored_person(person, tmp_path):
 
 @pytest.fixture(scope="module")
 def evenly_lit(tmp_path_factory):
-    """A painted head under even light in five frames, each of another exposure: the head, the views, and its albedo in the head's UVs."""
+    """A painted head under even light in five frames, each of another exposure: the head, the views, and its albedo in
+    the head's UVs."""
     folder, mesh = tmp_path_factory.mktemp("frames"), subject_mesh(painted_head.SEED)
     gains, views = (0.7, 0.8, 0.9, 1.0, 0.75), []
     for number, (azimuth, gain) in enumerate(zip((-50, -25, 0, 25, 50), gains, strict=True)):
@@ -152,8 +159,10 @@ def evenly_lit(tmp_path_factory):
     normals = vertex_normals(mesh)
     transfer = np.zeros((len(normals), 9))
     transfer[:, 0] = 1
-    light = Light(np.full((9, 3), 0.3) * (np.arange(9) == 0)[:, None], np.array([0.0, 0, 1]), np.zeros(3), np.full(3, 0.01))
-    return LitHead(Head(mesh), normals, transfer, np.ones(len(normals)), *np.zeros((2, len(normals))), light, np.full(3, 0.4)), views, painted_head.person()[2]
+    light = Light(np.full((9, 3), 0.3) * (np.arange(9) == 0)[:, None], np.array([0.0, 0, 1]), np.zeros(3),
+                  np.full(3, 0.01))
+    return LitHead(Head(mesh), normals, transfer, np.ones(len(normals)), *np.zeros((2, len(normals))), light,
+                   np.full(3, 0.4)), views, painted_head.person()[2]
 
 
 def test_what_the_views_of_a_head_agree_on_is_its_colour_whatever_their_exposures(evenly_lit):

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The texture's optional perceptual step, its network slot, what is not the head, and the measure of moles and pores."""
+"""The texture's optional perceptual step, its network slot, what is not the head, and the measure of moles and
+pores."""
 
 import importlib
 from types import SimpleNamespace
@@ -63,15 +64,19 @@ def test_the_package_is_asked_for_only_when_it_is_used(monkeypatch):
 def test_a_vgg_of_the_users_is_read_and_is_lpips_only_with_its_weights(tmp_path):
     from safetensors.torch import save_file
 
-    sizes = {0: (64, 3), 2: (64, 64), 5: (128, 64), 7: (128, 128), 10: (256, 128), 12: (256, 256), 14: (256, 256), 17: (512, 256), 19: (512, 512),
-             21: (512, 512), 24: (512, 512), 26: (512, 512), 28: (512, 512)}
+    sizes = {0: (64, 3), 2: (64, 64), 5: (128, 64), 7: (128, 128), 10: (256, 128), 12: (256, 256), 14: (256, 256),
+             17: (512, 256), 19: (512, 512), 21: (512, 512), 24: (512, 512), 26: (512, 512), 28: (512, 512)}
     state = {f"features.{i}.weight": torch.full((*shape, 3, 3), 0.02) for i, shape in sizes.items()}
-    save_file({**state, **{f"features.{i}.bias": torch.zeros(shape[0]) for i, shape in sizes.items()}}, tmp_path / "vgg16.safetensors")
+    save_file({**state, **{f"features.{i}.bias": torch.zeros(shape[0]) for i, shape in sizes.items()}},
+              tmp_path / "vgg16.safetensors")
     network = features.load_features(str(tmp_path / "vgg16.safetensors"))
     layers = network.layers(torch.rand(1, 3, 32, 32, generator=torch.Generator().manual_seed(0)))
-    assert network.name == "VGG16 features" and [layer.shape[1] for layer in layers] == [64, 128, 256, 512, 512] and layers[-1].shape[-1] == 2
+    assert network.name == "VGG16 features" and [layer.shape[1]
+                                                 for layer in layers] == [64, 128, 256, 512,
+                                                                          512] and layers[-1].shape[-1] == 2
     assert float(network.distance(layers, layers)) == 0
-    torch.save({f"lin{i}.model.1.weight": torch.ones(1, n, 1, 1) for i, n in enumerate((64, 128, 256, 512, 512))}, tmp_path / "vgg.pth")
+    torch.save({f"lin{i}.model.1.weight": torch.ones(1, n, 1, 1) for i, n in enumerate((64, 128, 256, 512, 512))},
+               tmp_path / "vgg.pth")
     assert features.load_features(str(tmp_path)).name == "LPIPS (VGG16)"
 
 
@@ -92,7 +97,8 @@ def test_a_cloth_at_the_neck_is_found_and_skin_is_not(head):
     seen = np.where(head.covered, np.float32(1), 0)
     bare = foreign.clothes(log, seen, head)
     assert bare.mean() < 0.03, "a bare neck loses its rim only"
-    log[(template.mask("neck", SIZE) > 0.5) & (np.arange(SIZE) < 0.9 * SIZE)[:, None]] += np.float32([0.02, 0.1, 0.1])  # a little paler: still skin
+    # a little paler: still skin
+    log[(template.mask("neck", SIZE) > 0.5) & (np.arange(SIZE) < 0.9 * SIZE)[:, None]] += np.float32([0.02, 0.1, 0.1])
     log[template.mask("lips", SIZE) > 0.5] += np.float32([0.2, -0.5, -0.4])  # not at the rim: the person's own
     assert np.array_equal(foreign.clothes(log, seen, head), bare)
     shirt = np.zeros((SIZE, SIZE), bool)
@@ -113,14 +119,18 @@ def test_background_takes_a_views_weight_outside_the_face_only(head, tmp_path, m
 
     def seen(person):
         monkeypatch.setattr(foreign.faces, "segment_person", lambda srgb: person)
-        observation = texture.UnwrappedView(SimpleNamespace(name="x", path=path), np.zeros((64, 64, 3), np.float32), pixels, ones, ones, ones)
+        observation = texture.UnwrappedView(SimpleNamespace(name="x", path=path), np.zeros((64, 64, 3), np.float32),
+                                            pixels, ones, ones, ones)
         return foreign.leave_out_background([observation], Reporter("texture")), observation.weight
 
     person = np.ones((64, 64), np.float32)
     person[:, :8] = 0
     cut, weight = seen(person)
     face = template.mask("face", SIZE)
-    assert cut == 1 and weight[:, :20][face[:, :20] < 0.01].max() < 0.01 and weight[:, 64:].min() == 1 and weight[face > 0.99].min() > 0.99
+    assert cut == 1 and weight[:,
+                               :20][face[:, :20]
+                                    < 0.01].max() < 0.01 and weight[:,
+                                                                    64:].min() == 1 and weight[face > 0.99].min() > 0.99
     assert seen(np.zeros((64, 64), np.float32))[0] == 0, "a segmentation that misses the face is not believed"
 
 
@@ -134,7 +144,8 @@ def test_moles_are_found_where_they_are_and_lines_are_none():
 
 
 def test_a_texture_larger_than_its_views_maps_is_read_from_the_frames(tmp_path):
-    """Observed at half the side and read at the whole, a texture shows what it does where all is done at the whole, and not the small one enlarged."""
+    """Observed at half the side and read at the whole, a texture shows what it does where all is done at the whole, and
+    not the small one enlarged."""
     paint = skin(2 * SIZE)
     capture = capture_of(tmp_path / "egg", paint, (-40, 0, 40))
     head, report = read_head(capture), Reporter("texture")
@@ -148,4 +159,5 @@ def test_a_texture_larger_than_its_views_maps_is_read_from_the_frames(tmp_path):
     apart, lost = (np.abs(fine(each) - fine(whole.log_texture))[inner].mean() for each in (large.log_texture, enlarged))
     assert large.log_texture.shape == whole.log_texture.shape and inner.sum() > 1000
     assert apart < 0.3 * lost and np.abs(large.confidence - whole.confidence)[inner].mean() < 0.05
-    assert (large.log_texture[large.confidence > 0] < -0.01).all(), "what no view sees has no colour, and must not be trusted for one"
+    assert (large.log_texture[large.confidence > 0]
+            < -0.01).all(), "what no view sees has no colour, and must not be trusted for one"

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Captures of one person in other light, solved together: what differs is light, what agrees is skin; and what a solve depends on of them."""
+"""Captures of one person in other light, solved together: what differs is light, what agrees is skin; and what a solve
+depends on of them."""
 
 import shutil
 from dataclasses import replace
@@ -21,7 +22,8 @@ from .painted_skin import SIZE, brief_confidence, make, settings  # noqa: F401
 
 @pytest.fixture
 def two(tmp_path):
-    """Two captures of the same skin: the first in a soft spot of shade that no mask shows, the second in light from the other side."""
+    """Two captures of the same skin: the first in a soft spot of shade that no mask shows, the second in light from the
+    other side."""
     first, second = (make(tmp_path / name / "Zoë.wildcap") for name in ("one", "two"))
     y, x = np.mgrid[:SIZE, :SIZE] / SIZE
     texture = images.read_linear(first.texture)
@@ -50,7 +52,8 @@ def test_shade_that_another_capture_does_not_have_is_light(two):
     assert abs(both - truth) < 0.7 * abs(alone - truth), (alone, both, truth)
     explained = images.read_linear(first.maps / "diffuse_albedo.exr") * images.read_linear(first.maps / "shading.exr")
     texture = images.read_linear(first.texture)
-    assert np.abs(explained - texture)[skin].mean() < 0.06 * texture[skin].mean(), "albedo times shading is the texture still"
+    assert np.abs(explained
+                  - texture)[skin].mean() < 0.06 * texture[skin].mean(), "albedo times shading is the texture still"
 
 
 def test_a_folder_of_captures_names_all_of_them_but_the_one_that_is_solved(two, tmp_path):
@@ -70,7 +73,8 @@ def test_what_cannot_be_solved_together_is_refused(two, tmp_path):
     built_in = template.load()
     meshes.write_obj(other.head, replace(built_in, uvs=built_in.uvs * 0.5))
     second.texture.unlink()
-    for named, problem in ((first.root, "this capture itself"), (tmp_path / "nothing", "no capture"), (second.root, "no texture"), (other.root, "other UVs")):
+    for named, problem in ((first.root, "this capture itself"), (tmp_path / "nothing", "no capture"),
+                           (second.root, "no texture"), (other.root, "other UVs")):
         with pytest.raises(Problem, match=problem):
             albedo_of(first, together=str(named))
     assert not first.maps.exists()
@@ -90,9 +94,11 @@ def test_of_another_capture_only_what_is_read_counts(two):
 def test_in_a_light_that_is_too_strong_to_be_told_the_others_are_left_out_and_it_is_said(two):
     first, second, _ = two
     y, x = np.mgrid[:SIZE, :SIZE] / SIZE
-    images.write_linear(first.texture, images.read_linear(first.texture) * np.exp(3 * (x - 0.5))[..., None].astype(np.float32))
+    images.write_linear(first.texture,
+                        images.read_linear(first.texture) * np.exp(3 * (x - 0.5))[..., None].astype(np.float32))
     said = []
-    solve.run(first, settings(steps=4, together=str(second.root)), Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))))
+    solve.run(first, settings(steps=4, together=str(second.root)),
+              Reporter("solve", emit=lambda message: said.append(getattr(message, "text", ""))))
     assert any("The other captures were not used" in text for text in said)
     with_others = images.read_linear(first.maps / "diffuse_albedo.exr")
     assert np.array_equal(albedo_of(first), with_others)

@@ -31,9 +31,11 @@ def smooth(seed: int, channels: int, size: int = skins.SIZE) -> np.ndarray:
 
 def fake_skin(seed: int) -> np.ndarray:
     """Maps [S, S, 7] of one subject: a blotchy skin colour, nearly flat normals, some gloss."""
-    albedo = pigment.reflectance(0.05 * np.exp(0.4 * smooth(seed, 1)[..., 0]), 0.02 * np.exp(0.3 * smooth(seed + 50, 1)[..., 0]))
+    albedo = pigment.reflectance(0.05 * np.exp(0.4 * smooth(seed, 1)[..., 0]),
+                                 0.02 * np.exp(0.3 * smooth(seed + 50, 1)[..., 0]))
     normal = np.dstack([0.03 * smooth(seed + 100, 2), np.ones((skins.SIZE, skins.SIZE))])
-    return np.dstack([2 * albedo - 1, normal / np.linalg.norm(normal, axis=-1, keepdims=True), 0.1 * smooth(seed + 150, 1) - 0.3]).astype(np.float32)
+    return np.dstack([2 * albedo - 1, normal / np.linalg.norm(normal, axis=-1, keepdims=True),
+                      0.1 * smooth(seed + 150, 1) - 0.3]).astype(np.float32)
 
 
 @pytest.fixture(scope="module")
@@ -78,16 +80,19 @@ def test_baked_shading_is_divided_out(seen):
     shading = np.maximum(np.tensordot(sky, skins._sky_basis(), 1), 0.01)
     lit = np.clip(0.25 * face * cv2.resize(shading / shading.mean(), (512, 512)), 0, 1).transpose(1, 2, 0)
     where = (skins._bare(512) > 0.9) & (template.mask("lips", 512) < 0.1)
-    relative = [np.log(image.mean(-1) / face.mean(0))[where] for image in (lit, skins.unshaded(lit.astype(np.float32), mean))]
+    relative = [np.log(image.mean(-1) / face.mean(0))[where]
+                for image in (lit, skins.unshaded(lit.astype(np.float32), mean))]
     assert relative[0].std() > 0.15 and relative[1].std() < 0.2 * relative[0].std()
 
 
 def test_the_same_photographs_painted_over_are_one_cluster(tmp_path):
     rng = np.random.default_rng(0)
     pores = [cv2.GaussianBlur(rng.normal(size=(512, 512)).astype(np.float32), (0, 0), 2) for _ in range(2)]
-    pictures = {"a": 0.3 + pores[0], "a_painted": 0.2 + 0.8 * pores[0] + 0.2 * rng.normal(0, 0.1, (512, 512)), "b": 0.3 + pores[1]}
+    pictures = {"a": 0.3 + pores[0], "a_painted": 0.2 + 0.8 * pores[0] + 0.2 * rng.normal(0, 0.1, (512, 512)),
+                "b": 0.3 + pores[1]}
     for name, picture in pictures.items():
-        images.write_srgb(tmp_path / f"{name}.png", np.repeat(np.clip(picture, 0, 1)[..., None], 3, 2).astype(np.float32))
+        images.write_srgb(tmp_path / f"{name}.png",
+                          np.repeat(np.clip(picture, 0, 1)[..., None], 3, 2).astype(np.float32))
     assert skins.clusters(tmp_path, list(pictures)) == [["a", "a_painted"], ["b"]]
 
 
@@ -129,12 +134,14 @@ def test_carried_skins_teach_only_the_diffuse_they_know(carried, cache, seen):
     network = build(prior.CONFIGS["cpu"])
     torch.nn.init.normal_(network.proj_out.weight, std=0.05)
     other = torch.where(batch.known > 0, batch.clean, torch.rand_like(batch.clean))
-    losses = [prior._loss(network, statistics, b, np.random.default_rng(0), "cpu") for b in (batch, type(batch)(other, *list(vars(batch).values())[1:]))]
+    losses = [prior._loss(network, statistics, b, np.random.default_rng(0), "cpu")
+              for b in (batch, type(batch)(other, *list(vars(batch).values())[1:]))]
     assert torch.equal(*losses) and torch.isfinite(losses[0]).all()  # what is not known has no say
 
 
 def test_a_training_goes_on_where_it_stopped(carried, cache, tmp_path, monkeypatch):
-    tiny = prior.CONFIGS["cpu"] | {"model": prior.CONFIGS["cpu"]["model"] | {"channels": [8, 8, 8], "depths": [1, 1, 1]}}
+    tiny = prior.CONFIGS["cpu"] | {"model": prior.CONFIGS["cpu"]["model"]
+                                   | {"channels": [8, 8, 8], "depths": [1, 1, 1]}}
     tiny["training"] = tiny["training"] | {"batch": 4, "patch": 32, "skins": 2, "held_out": 1}
     monkeypatch.setitem(prior.CONFIGS, "cpu", tiny)
     out = tmp_path / "prior.safetensors"
@@ -144,8 +151,10 @@ def test_a_training_goes_on_where_it_stopped(carried, cache, tmp_path, monkeypat
     second = prior.train_prior("cpu", out, QUIET, TrainingRun(0.02, cache), carried, ["b"])
     assert 0 < first["steps"] < second["steps"]
     assert second["skins"] == ["a"] and second["held_out_skins"] == ["b"] and second["notices"] == ["Theirs."]
-    assert set(second["held_out"]["loss"]) == {"synthetic", "carried"} and not set(second["seeds"]) & set(second["held_out_seeds"])
+    assert set(second["held_out"]["loss"]) == {"synthetic",
+                                               "carried"} and not set(second["seeds"]) & set(second["held_out_seeds"])
     conditioned = load(out).of_tone(SkinTone((0.4, 0.3, 0.2), GIVEN))
-    assert conditioned(torch.zeros(1, 7, 32, 32), 1.0, torch.zeros(1, 2, 32, 32) + torch.linspace(0, 0.1, 32)).isfinite().all()
+    assert conditioned(torch.zeros(1, 7, 32, 32), 1.0,
+                       torch.zeros(1, 2, 32, 32) + torch.linspace(0, 0.1, 32)).isfinite().all()
     with pytest.raises(Problem, match="other data"):
         prior.train_prior("cpu", out, QUIET, TrainingRun(0.03, cache))

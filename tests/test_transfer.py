@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Maps baked into other UVs: known functions of position arrive where they belong, seams or not; and the scan is delivered."""
+"""Maps baked into other UVs: known functions of position arrive where they belong, seams or not; and the scan is
+delivered."""
 
 import json
 import shutil
@@ -34,7 +35,8 @@ def painted(mesh: Mesh, size: int, values=lambda points, face, bary: colour_at(p
     """values(points, face, bary) at the texels of a mesh's map [size, size, 3], bled."""
     face, bary = raster.rasterize_uv(mesh, size)
     inside, out = face >= 0, np.zeros((size, size, 3), np.float32)
-    out[inside] = values(raster.interpolate(mesh.vertices, mesh.faces, face[inside], bary[inside]), face[inside], bary[inside])
+    out[inside] = values(raster.interpolate(mesh.vertices, mesh.faces, face[inside], bary[inside]), face[inside],
+                         bary[inside])
     return raster.bleed(out, inside)
 
 
@@ -50,7 +52,8 @@ def source() -> baking.Source:
 
 @pytest.fixture(scope="module")
 def target() -> Mesh:
-    """The same egg with half as many triangles, seams elsewhere, half of it in tile 1002, and the chart of that half mirrored."""
+    """The same egg with half as many triangles, seams elsewhere, half of it in tile 1002, and the chart of that half
+    mirrored."""
     mesh = egg(70, 46)
     other = atlas.unwrap(Mesh(*_sewn(mesh)), SIZE)
     left = other.vertices[other.faces].mean(1)[:, 0] > 0
@@ -110,7 +113,8 @@ def test_normals_are_turned_into_the_other_tangent_frame(source, target):
         got = baked[:, :1] * t + baked[:, 1:2] * b + baked[:, 2:] * n
         off = np.degrees(np.arccos(np.clip((got * world(n)).sum(1) / np.linalg.norm(got, axis=1), -1, 1)))
         assert np.median(off) < 0.6 and np.percentile(off, 99) < 3
-        assert np.median(np.degrees(np.arccos(np.clip((n * world(n)).sum(1), -1, 1)))) > 10, "there was something to carry"
+        assert np.median(np.degrees(np.arccos(np.clip((n * world(n)).sum(1), -1,
+                                                      1)))) > 10, "there was something to carry"
 
 
 def test_strips_do_not_show(source, target, monkeypatch):
@@ -123,7 +127,8 @@ def test_strips_do_not_show(source, target, monkeypatch):
 def test_a_surface_that_faces_away_is_no_partner():
     outer, inner = egg(48, 32), egg(48, 32)
     inner = inner.moved(inner.vertices * 0.97)
-    shell = Mesh(np.concatenate([outer.vertices, inner.vertices]), np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)]))
+    shell = Mesh(np.concatenate([outer.vertices, inner.vertices]),
+                 np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)]))
     points, normals = outer.vertices * 0.98, vertex_normals(outer)
     middle = np.abs(outer.uvs[:, 1] - 0.5) < 0.4  # nearer to the inner sheet, which faces the other way
     face, _ = surfaces.Surface(shell).partners(points[middle], normals[middle], 0.02)
@@ -149,7 +154,8 @@ def test_the_displacement_is_the_known_one_in_metres():
     half = head.moved(head.vertices + 0.002 * vertex_normals(surfaces.welded(head)[0])[surfaces.welded(head)[1]])
     front = replace(half, faces=half.faces[half.vertices[half.faces].mean(1)[:, 1] < 0], uvs=None, face_uvs=None)
     height = scan.displacement(head, front, 128, lambda done: None)
-    assert np.isclose(np.median(height[40:90, 48:80]), 0.002, atol=1e-4) and (height[:, :20] == 0).all() and height.max() < 0.003
+    assert np.isclose(np.median(height[40:90, 48:80]), 0.002,
+                      atol=1e-4) and (height[:, :20] == 0).all() and height.max() < 0.003
 
 
 @pytest.fixture(scope="module")
@@ -158,12 +164,15 @@ def finished(tmp_path_factory) -> Capture:
     texture = skin(256)
     capture = capture_of(tmp_path_factory.mktemp("finished") / "é.wildcap", texture, (-30, 0, 30))
     for frame in json.loads(capture.frames_json.read_text())["frames"]:
-        images.write_srgb(capture.frames / frame["name"], images.read_srgb((capture.delit / frame["name"]).with_suffix(".png")))
+        images.write_srgb(capture.frames / frame["name"],
+                          images.read_srgb((capture.delit / frame["name"]).with_suffix(".png")))
     meshes.write_ply(capture.scan, surfaces.welded(egg())[0])
     images.write_linear(capture.maps / "diffuse_albedo.exr", texture * 1.2)
     for name in stages.MAPS:
         if not (capture.maps / name).is_file():
-            images.write_data(capture.maps / name, np.full((256, 256, 3), 0.5, np.float32) if name not in ("specular_albedo.png", "confidence.png")
+            images.write_data(capture.maps / name,
+                              np.full((256, 256, 3), 0.5, np.float32)
+                              if name not in ("specular_albedo.png", "confidence.png")
                               else np.full((256, 256), 0.6, np.float32))
     return capture
 
@@ -184,11 +193,14 @@ def test_the_scan_is_delivered_with_its_colours(capture):
         "delivery.json", "scan.obj", "scan_lit.png", "scan_albedo.png", "scan_albedo_known.png", "displacement.exr"}
     mesh = meshes.read_obj(capture.delivery / "scan.obj")
     assert atlas.overlap_share(mesh, 256) < 0.01
-    lit, albedo = images.read_linear(capture.delivery / "scan_lit.png"), images.read_linear(capture.delivery / "scan_albedo.png")
+    lit, albedo = images.read_linear(capture.delivery
+                                     / "scan_lit.png"), images.read_linear(capture.delivery / "scan_albedo.png")
     face, bary = raster.rasterize_uv(mesh, 256)
     points = raster.interpolate(mesh.vertices, mesh.faces, face, bary)
     front = (face >= 0) & (points[..., 1] < -0.06)
-    assert np.median(np.abs(albedo / lit - 1.2)[front]) < 0.06, "the texture of the frames, and the maps, which were made a fifth brighter"
+    assert np.median(np.abs(albedo / lit - 1.2)[front]) < 0.06, (
+        "the texture of the frames, and the maps, which were made a fifth brighter"
+    )
     assert report.figures["scan_albedo_known_percent"] > 95 and report.figures["displacement_p95_mm"] < 0.5
     assert capture.picture("transfer", "scan").is_file()
     assert "metres" in json.loads((capture.delivery / "delivery.json").read_text())["scan"]["displacement"]
@@ -200,7 +212,8 @@ def test_tiles_of_the_artists_mesh_are_baked_and_named(capture, target):
     transfer.run(capture, settings_of(scan=False), Reporter("transfer"))
     names = {path.name for path in capture.delivery.iterdir()}
     assert names == {"delivery.json", "own_head.obj"} | {
-        f"own_{kind}.{tile}.png" for kind in ("diffuse_albedo", "specular_albedo", "normal", "confidence") for tile in (1001, 1002)}
+        f"own_{kind}.{tile}.png" for kind in ("diffuse_albedo", "specular_albedo", "normal", "confidence")
+        for tile in (1001, 1002)}
     assert (capture.delivery / "own_head.obj").read_bytes() == capture.own_head.read_bytes()
     assert images.read_mask(capture.delivery / "own_confidence.1002.png").max() > 0.5
 

@@ -24,16 +24,20 @@ SCALE = 1.5
 
 
 def shot(root, azimuths=AZIMUTHS, points: int = 300) -> Capture:
-    """A capture up to a scan that measured no surface: photographs of the person, their cameras, and points of the skin that matched, good to 0.3 mm."""
+    """A capture up to a scan that measured no surface: photographs of the person, their cameras, and points of the skin
+    that matched, good to 0.3 mm."""
     capture, model, rng = Capture(root), pycolmap.Reconstruction(), np.random.default_rng(0)
     capture.frames.mkdir(parents=True)
     mesh = painted_head.person()[0].mesh
     normals = meshes.vertex_normals(mesh)
     views = [painted_head.camera(azimuth, 0.03 * i, scale=SCALE) for i, azimuth in enumerate(azimuths)]
     names = [f"{i:05d}.jpg" for i in range(len(views))]
-    model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="PINHOLE", width=views[0].width, height=views[0].height, params=views[0].camera.params
-                                                      if len(views[0].camera.params) == 4 else [*views[0].camera.params[:1], *views[0].camera.params[:3]]))
-    front = rng.choice(np.flatnonzero((mesh.vertices[:, 1] < 0.02) & (mesh.vertices[:, 2] > -0.11) & (mesh.vertices[:, 2] < 0.06)), points)
+    model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=1, model="PINHOLE", width=views[0].width,
+                                                      height=views[0].height, params=views[0].camera.params
+                                                      if len(views[0].camera.params) == 4
+                                                      else [*views[0].camera.params[:1], *views[0].camera.params[:3]]))
+    front = rng.choice(np.flatnonzero((mesh.vertices[:, 1] < 0.02) & (mesh.vertices[:, 2] > -0.11)
+                                      & (mesh.vertices[:, 2] < 0.06)), points)
     places, members = mesh.vertices[front] + rng.normal(0, 3e-4, (points, 3)), [[] for _ in front]
     for number, (name, view) in enumerate(zip(names, views, strict=True), 1):
         images.write_srgb(capture.frames / name, painted_head.photograph(view))
@@ -41,7 +45,9 @@ def shot(root, azimuths=AZIMUTHS, points: int = 300) -> Capture:
         image = pycolmap.Image(name=name, camera_id=1, image_id=number, keypoints=view.project(places[seen])[0])
         for k, i in enumerate(seen):
             members[i].append(pycolmap.TrackElement(number, k))
-        model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(np.concatenate([view.rotation, view.translation[:, None]], 1)))
+        model.add_image_with_trivial_frame(image,
+                                           pycolmap.Rigid3d(np.concatenate([view.rotation, view.translation[:, None]],
+                                                                           1)))
     for place, elements in zip(places, members, strict=True):
         if len(elements) > 1:
             model.add_point3D(place, pycolmap.Track(elements), np.zeros(3, np.uint8))
@@ -83,7 +89,10 @@ def test_two_sides_make_a_draft_that_says_so(tmp_path):
     capture, report = shot(tmp_path / "draft.wildcap", (-12, 0, 12), points=0), Reporter("registration")
     registration.run(capture, from_json({}), report)
     assert capture.head.is_file() and report.figures["views_apart"] < 3
-    assert report.findings[0]["problem"].startswith("This head is a draft") and "from each side" in report.findings[0]["remedy"]
+    assert (
+        report.findings[0]["problem"].startswith("This head is a draft")
+        and "from each side" in report.findings[0]["remedy"]
+    )
 
 
 def test_landmarks_that_the_artist_puts_win(fitted, tmp_path):
@@ -102,7 +111,8 @@ def test_landmarks_that_the_artist_puts_win(fitted, tmp_path):
 
 
 def test_an_outline_is_found_to_a_fraction_of_a_millimetre(fitted):
-    """The true head against its own pictures: what its outline should move by is nothing; and of one that is moved, what it was moved by."""
+    """The true head against its own pictures: what its outline should move by is nothing; and of one that is moved,
+    what it was moved by."""
     capture, _ = fitted
     truth, model = painted_head.person()[0].mesh, registration.load_model()
     follow, edges = registration.weights_of(model)[0], silhouettes.edges_of(truth)
@@ -124,7 +134,8 @@ def test_points_behind_the_skin_or_of_its_far_side_do_not_pull():
     assert len(found) == 1 and found.distance[0] == pytest.approx(0.001)
 
 
-@pytest.mark.parametrize(("azimuths", "count"), [((0, 30, 60, 90), 4), ((0, 10, 20), 1), ((-20, 0, 20), 2), ((-13, 0, 13, 40), 3)])
+@pytest.mark.parametrize(("azimuths", "count"),
+                         [((0, 30, 60, 90), 4), ((0, 10, 20), 1), ((-20, 0, 20), 2), ((-13, 0, 13, 40), 3)])
 def test_views_are_counted_by_how_far_they_lie_apart(azimuths, count):
     head = painted_head.person()[0].mesh
     middle = head.vertices.mean(0)

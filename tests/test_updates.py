@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An update of the extension loses nobody a head: what older code made is shown as such, painted on, assembled and rendered, and nothing runs by itself."""
+"""An update of the extension loses nobody a head: what older code made is shown as such, painted on, assembled and
+rendered, and nothing runs by itself."""
 
 import json
 import sys
@@ -30,7 +31,8 @@ def updated(addon, tmp_path, monkeypatch):
     for stage in stages.STAGES:
         for path in (root / name for name in (*stage.reads, *stage.writes) if not made.has(name)):
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.mkdir() if path.suffix == "" else path.write_bytes((root / "maps" / path.name).read_bytes() if path.parent.name == "maps_4k" else b"stands in")
+            path.mkdir() if path.suffix == "" else path.write_bytes((root / "maps" / path.name).read_bytes()
+                                                                    if path.parent.name == "maps_4k" else b"stands in")
     (root / "delivery" / "one").write_bytes(b"stands in")
     bpy.ops.wildcap.open_capture(directory=str(root))
     settings = addon("properties").settings(addon("captures").active(bpy.context))
@@ -48,7 +50,8 @@ def look(addon):
 
 
 def next_operator(addon) -> str:
-    return addon("next_step").next_step(addon("panel").gather(bpy.context, addon("captures").active(bpy.context))).operator
+    return addon("next_step").next_step(addon("panel").gather(bpy.context,
+                                                              addon("captures").active(bpy.context))).operator
 
 
 def test_what_older_code_made_is_shown_as_such_and_can_be_made_again_by_a_click(addon, updated, monkeypatch):
@@ -63,7 +66,8 @@ def test_what_older_code_made_is_shown_as_such_and_can_be_made_again_by_a_click(
     assert started == ["scan"], "begun with this stage, which makes it again"
 
 
-def test_a_head_that_older_code_made_is_painted_on_assembled_and_rendered_and_no_stage_runs(addon, updated, monkeypatch):
+def test_a_head_that_older_code_made_is_painted_on_assembled_and_rendered_and_no_stage_runs(addon, updated,
+                                                                                            monkeypatch):
     started: list = []
     monkeypatch.setattr(addon("jobs"), "start", lambda *given, **named: started.append((given, named)))
     before = {path: path.read_bytes() for path in updated.rglob("*") if path.is_file()}
@@ -90,7 +94,8 @@ def test_a_mask_painted_after_the_update_asks_for_a_solve_alone(addon, updated):
     bpy.ops.wildcap.bring_in_head()
     look(addon)
     assert next_operator(addon) == "wildcap.solve"
-    assert {name for name, state in states.items() if state == "older"} == set(states) - {"solve"}, "what lies under the mask stays as it is"
+    assert {name for name, state in states.items()
+            if state == "older"} == set(states) - {"solve"}, "what lies under the mask stays as it is"
 
 
 def test_a_capture_of_0_1_0_opens_with_all_its_work(addon, tmp_path):

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Upscale: the same maps, larger; smooth signals are met, normals stay unit, strips leave no seam, and it says what it is."""
+"""Upscale: the same maps, larger; smooth signals are met, normals stay unit, strips leave no seam, and it says what it
+is."""
 
 from functools import partial
 
@@ -59,13 +60,15 @@ def test_every_map_is_met_at_the_new_size(capture):
     truth, inner = wave(LARGE), np.s_[16:-16, 16:-16]  # the border has no neighbours to interpolate from
     linear = np.stack([truth, truth ** 2, truth / 2], 2)
     for name, read, expected, tolerance in (
-        ("diffuse_albedo.exr", images.read_linear, linear, 2e-3), ("diffuse_albedo.png", images.read_linear, linear, 2e-3),
+        ("diffuse_albedo.exr", images.read_linear, linear, 2e-3),
+        ("diffuse_albedo.png", images.read_linear, linear, 2e-3),
         ("shading.exr", images.read_linear, 3 * linear, 6e-3), ("specular_albedo.png", images.read_mask, truth, 2e-3),
         ("normal.png", lambda path: images.read_data(path)[..., :3] * 2 - 1, tilted(LARGE), 4e-3),
     ):
         got = read(capture.maps_4k / name)
         assert got.shape == expected.shape and np.abs(got - expected)[inner].max() < tolerance, name
-    assert report.figures["method"] == "lanczos" and (report.figures["size_from_px"], report.figures["size_px"]) == (SMALL, LARGE)
+    assert report.figures["method"] == "lanczos" and (report.figures["size_from_px"],
+                                                      report.figures["size_px"]) == (SMALL, LARGE)
 
 
 def test_normals_are_unit_edges_do_not_overshoot_and_files_keep_their_depth(capture):
@@ -78,8 +81,8 @@ def test_normals_are_unit_edges_do_not_overshoot_and_files_keep_their_depth(capt
     assert np.percentile(np.abs(lengths - 1), 99) < 1e-3
     albedo = images.read_linear(capture.maps_4k / "diffuse_albedo.exr")
     assert albedo.min() >= 0 and albedo.max() < 0.701
-    for name, kind in (("diffuse_albedo.png", "uint16"), ("specular_albedo.png", "uint16"), ("normal.png", "uint16"), ("confidence.png", "uint8"),
-                       ("shading.exr", "half")):
+    for name, kind in (("diffuse_albedo.png", "uint16"), ("specular_albedo.png", "uint16"), ("normal.png", "uint16"),
+                       ("confidence.png", "uint8"), ("shading.exr", "half")):
         assert str(oiio.ImageBuf(str(capture.maps_4k / name)).spec().format) == kind, name
 
 
@@ -96,7 +99,8 @@ def test_maps_of_the_wanted_size_are_left_as_they_are(capture):
 
 @pytest.mark.parametrize("name", ["normal.png", "specular_albedo.png", "confidence.png", "shading.exr"])
 def test_a_map_of_another_size_is_named(capture, name):
-    (images.write_linear if name.endswith(".exr") else images.write_data)(capture.maps / name, np.full((33, 33, 3) if name[0] in "ns" else (33, 33), 0.5))
+    (images.write_linear if name.endswith(".exr")
+     else images.write_data)(capture.maps / name, np.full((33, 33, 3) if name[0] in "ns" else (33, 33), 0.5))
     with pytest.raises(Problem, match=f"{name} is 33 x 33 pixels, but diffuse_albedo.exr is 256 x 256") as caught:
         read_maps(capture.maps)
     assert caught.value.remedy == "Run the stage solve again."
@@ -110,15 +114,18 @@ def test_a_cancel_between_maps_leaves_no_folder(capture):
         return left[0] < 0
 
     with pytest.raises(CancelledError):
-        upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos", **PLAIN}}), Reporter("upscale", cancelled=soon))
+        upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "lanczos", **PLAIN}}),
+                    Reporter("upscale", cancelled=soon))
     assert not capture.maps_4k.exists() and not list(capture.root.glob(".*"))
 
 
 def rough_maps(size: int) -> HeadMaps:
     rng = np.random.default_rng(0)
     normal = rng.normal(0, 0.2, (size, size, 3)).astype(np.float32) + np.float32([0, 0, 1])
-    return HeadMaps(rng.random((size, size, 3)).astype(np.float32), normal / np.linalg.norm(normal, axis=2, keepdims=True),
-                    rng.random((size, size)).astype(np.float32), np.ones((size, size), np.float32), np.ones((size, size, 3), np.float32))
+    return HeadMaps(rng.random((size, size, 3)).astype(np.float32),
+                    normal / np.linalg.norm(normal, axis=2, keepdims=True),
+                    rng.random((size, size)).astype(np.float32), np.ones((size, size), np.float32),
+                    np.ones((size, size, 3), np.float32))
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +141,9 @@ def busy() -> network.Rcan:
 def test_strips_are_the_whole(busy, monkeypatch):
     maps = rough_maps(70)
     stripped = {rows: _with_strips(monkeypatch, rows, maps, busy) for rows in (9, 32, 70)}
-    assert np.ptp(stripped[70][..., :3]) > 0.9 and np.abs(stripped[70] - enlarge(maps, lambda share: None, network=network.Rcan(1, 1, 16))).max() > 0.01
+    assert np.ptp(stripped[70][..., :3]) > 0.9 and np.abs(stripped[70]
+                                                          - enlarge(maps, lambda share: None,
+                                                                    network=network.Rcan(1, 1, 16))).max() > 0.01
     for rows in (9, 32):
         assert np.abs(stripped[rows] - stripped[70]).max() < 1e-5, rows
 
@@ -149,7 +158,8 @@ def test_the_body_sees_the_whole_map(busy):
     maps, changed = rough_maps(40), rough_maps(40)
     changed.diffuse[:8, :8] = 1
     far = np.s_[-16:, -16:]
-    assert np.abs(enlarge(maps, lambda share: None, network=busy)[far] - enlarge(changed, lambda share: None, network=busy)[far]).max() > 1e-5
+    assert np.abs(enlarge(maps, lambda share: None, network=busy)[far]
+                  - enlarge(changed, lambda share: None, network=busy)[far]).max() > 1e-5
 
 
 def test_an_untrained_network_resamples(capture):
@@ -158,7 +168,8 @@ def test_an_untrained_network_resamples(capture):
     truth, inner = wave(LARGE), np.s_[16:-16, 16:-16]
     linear = np.stack([truth, truth ** 2, truth / 2], 2)
     assert np.abs(images.srgb_to_linear(large[..., :3]) - linear)[inner].max() < 2e-3
-    assert np.abs(large[..., 3:6] - tilted(LARGE))[inner].max() < 4e-3 and np.abs(large[..., 6] - truth)[inner].max() < 2e-3
+    assert np.abs(large[..., 3:6]
+                  - tilted(LARGE))[inner].max() < 4e-3 and np.abs(large[..., 6] - truth)[inner].max() < 2e-3
 
 
 def test_a_block_begins_as_the_identity():
@@ -171,9 +182,12 @@ def test_the_stage_takes_the_network(capture, busy, monkeypatch):
     report = Reporter("upscale")
     upscale.run(capture, from_json({"upscale": {"size": LARGE, "method": "network", **PLAIN}}), report)
     assert report.figures["method"] == "network"
-    linear, coded = images.read_linear(capture.maps_4k / "diffuse_albedo.exr"), images.read_linear(capture.maps_4k / "diffuse_albedo.png")
+    linear, coded = images.read_linear(capture.maps_4k
+                                       / "diffuse_albedo.exr"), images.read_linear(capture.maps_4k
+                                                                                   / "diffuse_albedo.png")
     assert coded.shape == (LARGE, LARGE, 3) and np.abs(linear - coded).max() < 2e-3
-    assert np.abs(coded - images.resize(images.read_linear(capture.maps / "diffuse_albedo.exr"), LARGE, LARGE)).max() > 0.02
+    assert np.abs(coded
+                  - images.resize(images.read_linear(capture.maps / "diffuse_albedo.exr"), LARGE, LARGE)).max() > 0.02
 
 
 @pytest.mark.parametrize("size", [96, 128, 200])
@@ -196,7 +210,8 @@ def test_a_cancel_ends_the_writing_and_leaves_nothing(tmp_path):
 
     with pytest.raises(CancelledError):
         blank = np.zeros((4 * images.ROWS_BETWEEN_CHECKS, 8))
-        upscale._write_together([partial(images.write_data, tmp_path / f"{i}.png", blank, check=cancelled) for i in range(3)],
+        upscale._write_together([partial(images.write_data, tmp_path / f"{i}.png", blank, check=cancelled)
+                                 for i in range(3)],
                                 lambda done: None)
     assert not list(tmp_path.iterdir()) and len(asked) <= 5, "what had not begun did not begin"
 
@@ -206,7 +221,8 @@ def test_a_map_of_many_strips_is_whole(tmp_path):
         truth = np.linspace(0, 1, 3 * rows * 5, dtype=np.float32).reshape(rows, 5, 3)
         images.write_data(tmp_path / "a.png", truth, bits=16)
         images.write_data(tmp_path / "a.exr", truth)
-        assert np.abs(images.read_data(tmp_path / "a.png") - truth).max() < 1e-5 and np.abs(images.read_data(tmp_path / "a.exr") - truth).max() < 1e-3
+        assert np.abs(images.read_data(tmp_path / "a.png")
+                      - truth).max() < 1e-5 and np.abs(images.read_data(tmp_path / "a.exr") - truth).max() < 1e-3
 
 
 def test_missing_weights_are_told(tmp_path):
@@ -229,12 +245,15 @@ def windows(tmp_path_factory):
 
 def test_a_training_goes_on_where_it_stopped(windows, tmp_path, monkeypatch):
     tiny = {"model": {"groups": 1, "blocks": 2, "width": 16},
-            "training": {"patch": 8, "batch": 4, "rate": 5e-3, "minutes": 1, "skins": 2, "views": 1, "held_out": 1, "seed": 0, "workers": 0}}
+            "training": {"patch": 8, "batch": 4, "rate": 5e-3, "minutes": 1, "skins": 2, "views": 1, "held_out": 1,
+                         "seed": 0, "workers": 0}}
     monkeypatch.setitem(upscaler.CONFIGS, "cpu", tiny)
     out = tmp_path / "upscaler.safetensors"
     first = upscaler.train_upscaler("cpu", out, Reporter("train"), TrainingRun(0.01, windows))
     second = upscaler.train_upscaler("cpu", out, Reporter("train"), TrainingRun(0.02, windows))
-    assert second["steps"] > first["steps"] > 0 and second["parameters"] == sum(p.numel() for p in network.Rcan(**tiny["model"]).parameters())
+    assert second["steps"] > first["steps"] > 0 and second["parameters"] == sum(
+        p.numel() for p in network.Rcan(**tiny["model"]).parameters()
+    )
     assert load_network(out).tail.weight.abs().max() > 0 and out.with_suffix(".json").is_file()
     monkeypatch.setitem(upscaler.CONFIGS, "gpu", tiny)
     with pytest.raises(Problem, match="other data or of another configuration"):
@@ -245,7 +264,8 @@ def test_degrading_keeps_the_mean_and_halves_a_relief_as_asked():
     large = np.zeros((7, 32, 32), np.float32)
     large[:3], large[3], large[5], large[6] = images.linear_to_srgb(np.float32(0.25)), 0.3, np.sqrt(1 - 0.09), 0.4
     small = fine_windows.degraded(large, fine_windows.Degradation(0.0, 0.0, 0.0, 0.5), np.random.default_rng(0))
-    assert small.shape == (7, 8, 8) and np.allclose(images.srgb_to_linear(small[:3]), 0.25, atol=1e-4) and np.allclose(small[6], 0.4)
+    assert small.shape == (7, 8, 8) and np.allclose(images.srgb_to_linear(small[:3]), 0.25,
+                                                    atol=1e-4) and np.allclose(small[6], 0.4)
     tilt = small[3] / small[5]
     assert np.allclose(tilt, 0.5 * 0.3 / np.sqrt(1 - 0.09), rtol=1e-3)
 
@@ -255,7 +275,8 @@ def test_a_turned_window_is_a_turned_surface(seed):
     """The normals of a turned height field are the turned normals."""
     height = np.random.default_rng(9).normal(0, 0.2, (16, 16)).astype(np.float32)
     turned = fine_windows._turned(_relief(height), np.random.default_rng(seed))
-    candidates = [np.transpose(h) if t else h for h in (height, height[:, ::-1], height[::-1], height[::-1, ::-1]) for t in (False, True)]
+    candidates = [np.transpose(h) if t else h for h in (height, height[:, ::-1], height[::-1], height[::-1, ::-1])
+                  for t in (False, True)]
     assert any(np.allclose(turned, _relief(candidate), atol=1e-5) for candidate in candidates)
 
 

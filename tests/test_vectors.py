@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parity with the authors' released modules, by input and output arrays alone. The folder is WILDCAP_VECTORS, or shared/vectors beside the checkout;
-every set found there is run."""
+"""Parity with the authors' released modules, by input and output arrays alone. The folder is WILDCAP_VECTORS, or
+shared/vectors beside the checkout; every set found there is run."""
 
 import os
 import re
@@ -98,7 +98,9 @@ def test_vectors_losses():
     o = Observation(torch.zeros_like(shade), none, none, torch.zeros(1), Given(), ring)
     zero = torch.zeros(1, 7, *ring.shape)
     assert light_loss(None, zero, o, Recipe(tv=0.0, smooth=0.0)).item() == pytest.approx(v["neg_reg"].item(), rel=1e-5)
-    assert light_loss(None, zero, o, Recipe(tv=1.0, neg=0.0, smooth=0.0)).item() == pytest.approx(v["tv_ring_of_shade"].item(), rel=1e-5)
+    assert light_loss(None, zero, o,
+                      Recipe(tv=1.0, neg=0.0, smooth=0.0)).item() == pytest.approx(v["tv_ring_of_shade"].item(),
+                                                                                   rel=1e-5)
 
 
 @pytest.mark.parametrize("folder", PRIORS or ["prior_v1_coord"])
@@ -107,7 +109,8 @@ def test_vectors_released_prior(folder):
     v = arrays(f"{folder}/io.npz")
     network = prior.load(VECTORS / folder, dtype=torch.float32).network
     mapping = v.get("mapping_cond")
-    if mapping is not None and mapping.shape[1] < network.mapping_cond.in_features:  # the augmentation's nine numbers are zero, and come first
+    # the augmentation's nine numbers are zero, and come first
+    if mapping is not None and mapping.shape[1] < network.mapping_cond.in_features:
         mapping = torch.nn.functional.pad(mapping, (network.mapping_cond.in_features - mapping.shape[1], 0))
     if "inner_on_raw_input" in v:
         close(network(torch.cat([v["x"], v["cond"]], 1), v["sigma"], mapping), v["inner_on_raw_input"])
@@ -119,7 +122,8 @@ def test_vectors_released_prior(folder):
 
 @pytest.mark.parametrize("run", LOOPS or ["pho1"])
 def test_vectors_miniloop(run):
-    """The whole released loop, step by step: proximal candidates, decade clip, lights in stages, and the traces of x, denoised and both lights."""
+    """The whole released loop, step by step: proximal candidates, decade clip, lights in stages, and the traces of x,
+    denoised and both lights."""
     v = arrays(f"miniloop/{run}.npz")
     rows, columns = slice(2, 34), slice(4, 36)
     if "prior_v1_coord" not in PRIORS:
@@ -131,10 +135,11 @@ def test_vectors_miniloop(run):
 
     normal, weight = crop("in_obj_normal"), crop("in_face_mask")[0]
     shader = Shader(normal, v["in_light_support"][0, 0], (8, 8))
-    o = Observation(crop("in_texture_linear_blurred"), weight, torch.ones_like(weight), prior.coordinates(40, rows, columns, centred=False), shader,
-                    v["in_tv_ring"][0, 0] > 0.5)
+    o = Observation(crop("in_texture_linear_blurred"), weight, torch.ones_like(weight),
+                    prior.coordinates(40, rows, columns, centred=False), shader, v["in_tv_ring"][0, 0] > 0.5)
     reference = torch.cat([2 * crop("in_init_diff") - 1, crop("in_init_normal"), 2 * crop("in_init_spec") - 1])[None]
-    recipe = replace(RECIPES["released"], steps=12, start=0.6, candidates=3, phases=(("main", 0.0, 5 / 12), ("grid", 5 / 12, 10 / 12)),
+    recipe = replace(RECIPES["released"], steps=12, start=0.6, candidates=3,
+                     phases=(("main", 0.0, 5 / 12), ("grid", 5 / 12, 10 / 12)),
                      zeta=0.0 if run.startswith("pho0") else 1.0)
 
     def noise(step):
@@ -157,4 +162,5 @@ def test_vectors_miniloop(run):
         diffuse, skin = torch.zeros(3, 40, 40), v["in_skin_mask"][0, 0]
         diffuse[:, rows, columns] = albedo(last.denoised).clamp_min(0)
         tone = mean_tone(v["in_init_diff"][0] ** (1 / 2.2), skin) ** 2.2
-        close((diffuse * maps._gain(diffuse, skin, tone, "srgb")[:, None, None]) ** (1 / 2.2), v["out_diff_srgb_rescaled"][0], 1e-3)
+        close((diffuse * maps._gain(diffuse, skin, tone, "srgb")[:, None, None]) ** (1 / 2.2),
+              v["out_diff_srgb_rescaled"][0], 1e-3)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Videos as phones record them: HDR and wide gamut in known colours, any orientation, mirrored, variable frame rate, long and large."""
+"""Videos as phones record them: HDR and wide gamut in known colours, any orientation, mirrored, variable frame rate,
+long and large."""
 
 import struct
 import tracemalloc
@@ -27,18 +28,23 @@ def planes(signal: np.ndarray, matrix: int, bits: int, full: bool) -> list[np.nd
     step, top = 2 ** (bits - 8), 2**bits - 1
     scale, low, chroma = (top, 0, top) if full else (219 * step, 16 * step, 224 * step)
     kind = np.uint16 if bits > 8 else np.uint8
-    return [np.round(p).astype(kind) for p in (low + scale * y, 128 * step + chroma * cb[::2, ::2], 128 * step + chroma * cr[::2, ::2])]
+    return [np.round(p).astype(kind)
+            for p in (low + scale * y, 128 * step + chroma * cb[::2, ::2], 128 * step + chroma * cr[::2, ::2])]
 
 
-def write(path, signals, trc=1, primaries=1, matrix=1, bits=8, full=False, codec="libx265", times=None, base=1000, **options):
+def write(path, signals, trc=1, primaries=1, matrix=1, bits=8, full=False, codec="libx265", times=None, base=1000,
+          **options):
     """A video of full-range R'G'B' signals; `times` in units of 1/base second."""
     with av.open(str(path), "w") as container:
-        stream = container.add_stream(codec, rate=Fraction(24), options={"preset": "ultrafast", "crf": "1", "x265-params": "log-level=none", **options})
+        stream = container.add_stream(codec, rate=Fraction(24),
+                                      options={"preset": "ultrafast", "crf": "1", "x265-params": "log-level=none",
+                                               **options})
         stream.height, stream.width = signals[0].shape[:2]
         stream.pix_fmt = f"yuv420p{bits}le" if bits > 8 else "yuv420p"
         stream.time_base = stream.codec_context.time_base = Fraction(1, base)
         context = stream.codec_context
-        context.color_trc, context.color_primaries, context.colorspace, context.color_range = trc, primaries, matrix, 2 if full else 1
+        context.color_trc, context.color_primaries, context.colorspace, context.color_range = (trc, primaries, matrix,
+                                                                                               2 if full else 1)
         for i, signal in enumerate(signals):
             frame = av.VideoFrame(stream.width, stream.height, stream.pix_fmt)
             for plane, values in zip(frame.planes, planes(signal, matrix, bits, full), strict=True):
@@ -73,15 +79,17 @@ def pq(nits: float) -> float:
 
 
 HDR = [
-    # BT.2408, table 1: an 18 % grey card is a signal of 38 % in both, 26 nits; white is 203 nits, at 75 % and 58 %. 26 / 203 of linear light is sRGB 0.394
+    # BT.2408, table 1: an 18 % grey card is a signal of 38 % in both, 26 nits; white is 203 nits, at 75 % and 58 %. 26
+    # / 203 of linear light is sRGB 0.394
     ("grey card", HLG, [0.38] * 3, [0.394] * 3),
     ("grey card", PQ, [0.38] * 3, [0.394] * 3),
-    ("reference white", HLG, [0.75] * 3, [0.955] * 3),  # 0.9 of linear light: the shoulder keeps the last tenth for highlights
-    ("reference white", PQ, [0.5807] * 3, [0.955] * 3),
+    # 0.9 of linear light: the shoulder keeps the last tenth for highlights
+    ("reference white", HLG, [0.75] * 3, [0.955] * 3), ("reference white", PQ, [0.5807] * 3, [0.955] * 3),
     ("1000 nits", HLG, [1.0] * 3, [0.996] * 3),
     ("1000 nits", PQ, [0.7518] * 3, [0.996] * 3),
     ("black", HLG, [0.0] * 3, [0.0] * 3),
-    # A red of Rec. 709 at 100 and 20 nits is (70.2, 25.5, 21.3) nits of Rec. 2020 (BT.2087); 100 / 203 and 20 / 203 are sRGB 0.731 and 0.347
+    # A red of Rec. 709 at 100 and 20 nits is (70.2, 25.5, 21.3) nits of Rec. 2020 (BT.2087); 100 / 203 and 20 / 203 are
+    # sRGB 0.731 and 0.347
     ("red of Rec. 709", PQ, [pq(70.2), pq(25.5), pq(21.3)], [0.731, 0.347, 0.347]),
 ]
 
@@ -90,7 +98,8 @@ HDR = [
 def test_hdr_of_ten_bits_shows_known_patches_in_known_colours(tmp_path, codec):
     for transfer in (HLG, PQ):
         known = [(signal, srgb) for _, kind, signal, srgb in HDR if kind == transfer]
-        path = write(tmp_path / f"{transfer}.mov", [patches([signal for signal, _ in known])] * 4, transfer, REC2020, 9, 10, codec=codec)
+        path = write(tmp_path / f"{transfer}.mov", [patches([signal for signal, _ in known])] * 4, transfer, REC2020, 9,
+                     10, codec=codec)
         assert np.abs(shown(path) - [srgb for _, srgb in known]).max() < 0.015
 
 
@@ -112,14 +121,16 @@ def test_saturated_colours_keep_luminance_and_hue_and_nothing_leaves_the_gamut()
 def test_wide_gamut_without_hdr_is_converted(tmp_path):
     # Display P3's (0.8, 0.5, 0.4) is sRGB's (0.838, 0.486, 0.374), by the matrices of both standards
     path = write(tmp_path / "p3.mov", [patches([[0.8, 0.5, 0.4], [0.5] * 3])] * 3, primaries=P3, bits=10)
-    linear = ((np.array([0.8, 0.5, 0.4]) + 0.055) / 1.055) ** 2.4 @ np.array([[1.2249, -0.2249, 0], [-0.0421, 1.0421, 0], [-0.0196, -0.0786, 1.0983]]).T
+    linear = ((np.array([0.8, 0.5, 0.4]) + 0.055)
+              / 1.055) ** 2.4 @ np.array([[1.2249, -0.2249, 0], [-0.0421, 1.0421, 0], [-0.0196, -0.0786, 1.0983]]).T
     assert np.abs(shown(path) - [1.055 * linear ** (1 / 2.4) - 0.055, [0.5] * 3]).max() < 0.012
 
 
 @pytest.mark.parametrize("full", [False, True])
 def test_full_and_narrow_range_are_told_apart(tmp_path, full):
     colours = [[0.2] * 3, [0.8] * 3, [0.7, 0.5, 0.4], [0.1, 0.3, 0.2]]
-    assert np.abs(shown(write(tmp_path / "a.mp4", [patches(colours)] * 3, full=full, codec="libx264")) - colours).max() < 0.012
+    assert np.abs(shown(write(tmp_path / "a.mp4", [patches(colours)] * 3, full=full, codec="libx264"))
+                  - colours).max() < 0.012
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -148,13 +159,17 @@ def test_frames_of_a_variable_rate_are_even_in_time(tmp_path):
     pictures = read(path, 13)
     assert [p.time_s for p in pictures] == pytest.approx(np.arange(13) / 4, abs=0.051)
     assert [p.time_s for p in pictures] == pytest.approx([times[p.index] / 1000 for p in pictures], abs=0.002)
-    assert [p.srgb.mean() for p in pictures] == pytest.approx([p.index / 130 for p in pictures], abs=0.01), "the frames they say they are"
+    assert [p.srgb.mean() for p in pictures] == pytest.approx([p.index / 130 for p in pictures],
+                                                              abs=0.01), "the frames they say they are"
 
 
 def test_a_pause_in_the_recording_takes_no_frames():
     times = np.concatenate([np.arange(50), 100000 + np.arange(50)])
-    assert len(evenly_in_time(times, 20)) > 13 and np.diff(evenly_in_time(times, 20)).max() < 10, "of 20, as many as the pause's 30 frames leave"
-    assert evenly_in_time(np.arange(1000) * 512, 300).tolist() == np.round(np.linspace(0, 999, 300)).astype(int).tolist()
+    assert len(evenly_in_time(times, 20)) > 13 and np.diff(evenly_in_time(times, 20)).max() < 10, (
+        "of 20, as many as the pause's 30 frames leave"
+    )
+    assert evenly_in_time(np.arange(1000) * 512,
+                          300).tolist() == np.round(np.linspace(0, 999, 300)).astype(int).tolist()
 
 
 def test_what_lies_between_wanted_frames_is_jumped_over(tmp_path, monkeypatch):

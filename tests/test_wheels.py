@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The commands that set a machine up: a folder of wheels, and an installation from it without a network, for any platform that has a lock."""
+"""The commands that set a machine up: a folder of wheels, and an installation from it without a network, for any
+platform that has a lock."""
 
 import hashlib
 import sys
@@ -18,7 +19,8 @@ HERE = locks.lock_name(environment.answer(sys.executable, locks.DESCRIBE))
 
 @pytest.fixture
 def index(tmp_path, monkeypatch) -> Path:
-    """Requirements of one small package, and of a small pip, which pip finds in a folder and nowhere else; our commands go by them."""
+    """Requirements of one small package, and of a small pip, which pip finds in a folder and nowhere else; our commands
+    go by them."""
     found, requirements = tmp_path / "index", tmp_path / "requirements"
     found.mkdir()
     (requirements / "locks").mkdir(parents=True)
@@ -29,9 +31,12 @@ def index(tmp_path, monkeypatch) -> Path:
             info = f"{name}-1.0.dist-info"
             wheel.writestr(f"{name}/__init__.py", "")
             wheel.writestr(f"{info}/METADATA", f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-            wheel.writestr(f"{info}/WHEEL", "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
-            wheel.writestr(f"{info}/RECORD", f"{name}/__init__.py,,\n{info}/METADATA,,\n{info}/WHEEL,,\n{info}/RECORD,,\n")
-        (requirements / "locks" / f"{lock}.txt").write_text(f"{name}==1.0 --hash=sha256:{hashlib.sha256(path.read_bytes()).hexdigest()}\n")
+            wheel.writestr(f"{info}/WHEEL",
+                           "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+            wheel.writestr(f"{info}/RECORD",
+                           f"{name}/__init__.py,,\n{info}/METADATA,,\n{info}/WHEEL,,\n{info}/RECORD,,\n")
+        (requirements / "locks"
+         / f"{lock}.txt").write_text(f"{name}==1.0 --hash=sha256:{hashlib.sha256(path.read_bytes()).hexdigest()}\n")
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     monkeypatch.setenv("PIP_FIND_LINKS", str(found))
     monkeypatch.setattr(setup_commands, "REQUIREMENTS", requirements)
@@ -47,7 +52,8 @@ def test_a_folder_of_wheels_is_made_and_installed_from(index, tmp_path, monkeypa
     monkeypatch.delenv("PIP_FIND_LINKS")
     assert main(["install", str(target), "--wheels", str(folder), "--compute", "cpu"]) == 0
     python = environment.python_of(target)
-    assert str(python) in capsys.readouterr().out and environment.verify(python, setup_commands.REQUIREMENTS, importing=True) == []
+    assert str(python) in capsys.readouterr().out and environment.verify(python, setup_commands.REQUIREMENTS,
+                                                                         importing=True) == []
 
 
 def test_what_keeps_wheels_from_coming_is_said(index, tmp_path, capsys):

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The white point and the tone's certainty in the panel: a click on a card in a frame, a ColorChecker by the solver, and words that are true."""
+"""The white point and the tone's certainty in the panel: a click on a card in a frame, a ColorChecker by the solver,
+and words that are true."""
 
 import numpy as np
 import pytest
@@ -14,7 +15,8 @@ bpy = pytest.importorskip("bpy")
 def item(addon, capture):
     """The standin capture with one frame, upper half grey card, lower half burnt out."""
     (capture / "frames").mkdir(exist_ok=True)
-    (capture / "frames" / "00000.jpg").write_bytes(standin.png([[(118, 110, 100)] * 32] * 16 + [[(255, 255, 255)] * 32] * 16))
+    (capture / "frames"
+     / "00000.jpg").write_bytes(standin.png([[(118, 110, 100)] * 32] * 16 + [[(255, 255, 255)] * 32] * 16))
     return addon("captures").active(bpy.context)
 
 
@@ -28,15 +30,20 @@ def test_a_click_on_a_card_gives_the_white_point_and_the_cross_takes_it_away(add
     bpy.ops.wildcap.pick_white_point(card=card, frame="00000.jpg", uv=(0.5, 0.75))
     found = [float(v) for v in item.solve.white_point.split(",")]
     assert np.allclose(found, [linear(v) / reflectance for v in (118, 110, 100)], rtol=0.01)
-    assert addon("properties").job_settings(item)["solve"]["white_point"] == item.solve.white_point and len(bpy.data.images) == images_before
+    assert (
+        addon("properties").job_settings(item)["solve"]["white_point"] == item.solve.white_point
+        and len(bpy.data.images) == images_before
+    )
     item.quality = "draft"
     assert item.solve.white_point != "auto", "a quality says nothing about the light"
     bpy.ops.wildcap.clear_white_point()
     assert item.solve.white_point == "auto"
 
 
-@pytest.mark.parametrize(("frame", "uv", "said"), [("00000.jpg", (0.5, 0.2), "burnt out or black"), ("00000.jpg", (1.2, 0.2), "beside the frame"),
-                                                   ("00009.jpg", (0.5, 0.7), "no such frame")])
+@pytest.mark.parametrize(("frame", "uv", "said"),
+                         [("00000.jpg", (0.5, 0.2), "burnt out or black"),
+                          ("00000.jpg", (1.2, 0.2), "beside the frame"),
+                          ("00009.jpg", (0.5, 0.7), "no such frame")])
 def test_a_click_that_measures_nothing_says_why(item, frame, uv, said):
     with pytest.raises(RuntimeError, match=said):
         bpy.ops.wildcap.pick_white_point(frame=frame, uv=uv)
@@ -48,7 +55,8 @@ def test_the_chart_that_the_solver_finds_reaches_the_settings(addon, item, monke
         figures = {"white_point": [0.9, 0.8, 0.6]}
 
     started = []
-    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool, **options: started.append((tool, options)) or Job())
+    monkeypatch.setattr(addon("jobs"), "start_tool", lambda item, tool,
+                        **options: started.append((tool, options)) or Job())
     bpy.ops.wildcap.find_color_checker()
     assert started[0][0] == "white_point"
     started[0][1]["then"]()
@@ -58,9 +66,13 @@ def test_the_chart_that_the_solver_finds_reaches_the_settings(addon, item, monke
 def test_the_panel_says_where_the_tone_comes_from(addon, capture, item):
     words, set_tone = addon("solve.panel").tone_words, addon("solve.operators").set_tone
     root = addon("captures").root(item)
-    set_tone(root, {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_group": "tan", "skin_tone_deviation_l": 6.4, "skin_tone_source": "scene"})
+    set_tone(root,
+             {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_group": "tan", "skin_tone_deviation_l": 6.4,
+              "skin_tone_source": "scene"})
     assert words(item) == "tan, ± 6 L*, by scene" and item.use_skin_tone
-    set_tone(root, {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_group": "tan", "skin_tone_deviation_l": 2.0, "skin_tone_source": "white point"})
+    set_tone(root,
+             {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_group": "tan", "skin_tone_deviation_l": 2.0,
+              "skin_tone_source": "white point"})
     assert words(item) == "tan, ± 2 L*, by white point"
     set_tone(root, {"skin_tone_srgb": [0.5, 0.4, 0.3], "skin_tone_source": "texture"})
     assert words(item) == "Told by the texture alone"

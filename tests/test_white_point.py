@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The white point: a ColorChecker drawn into a frame under a known light, a grey card and paper that are pointed at, and what is neither."""
+"""The white point: a ColorChecker drawn into a frame under a known light, a grey card and paper that are pointed at,
+and what is neither."""
 
 import cv2
 import numpy as np
@@ -21,14 +22,16 @@ QUAD = [[120, 140], [340, 160], [330, 300], [115, 285]]
 CHART = np.array([(115, 82, 68), (194, 150, 130), (98, 122, 157), (87, 108, 67), (133, 128, 177), (103, 189, 170),
                   (214, 126, 44), (80, 91, 166), (193, 90, 99), (94, 60, 108), (157, 188, 64), (224, 163, 46),
                   (56, 61, 150), (70, 148, 73), (175, 54, 60), (231, 199, 31), (187, 86, 149), (8, 133, 161),
-                  (243, 243, 242), (200, 200, 200), (160, 160, 160), (122, 122, 121), (85, 85, 85), (52, 52, 52)], np.float32) / 255
+                  (243, 243, 242), (200, 200, 200), (160, 160, 160), (122, 122, 121), (85, 85, 85), (52, 52, 52)],
+                 np.float32) / 255
 """The published sRGB of a ColorChecker Classic's patches."""
 
 
 def frame(light=None, quad=QUAD, width=480, height=400) -> np.ndarray:
     """A noisy, uneven sRGB frame, with a chart lit by `light` (linear) where one is given."""
     rng = np.random.default_rng(3)
-    picture = cv2.resize(rng.uniform(0.05, 0.4, (6, 7, 3)).astype(np.float32), (width, height), interpolation=cv2.INTER_CUBIC)
+    picture = cv2.resize(rng.uniform(0.05, 0.4, (6, 7, 3)).astype(np.float32), (width, height),
+                         interpolation=cv2.INTER_CUBIC)
     if light is not None:
         chart = np.full((200, 296, 3), 0.012, np.float32)
         for k, colour in enumerate(images.srgb_to_linear(CHART)):
@@ -62,7 +65,8 @@ def test_the_tool_finds_the_chart_in_whichever_frame(tmp_path, capsys):
     capture = filmed(tmp_path, frame(), frame(), frame(LIGHT))
     report = Reporter("white_point")
     white_point.run(capture, Settings(), report)
-    assert report.figures["white_point_frame"] == "00002.jpg" and np.abs(np.array(report.figures["white_point"]) / LIGHT - 1).max() < 0.02
+    assert report.figures["white_point_frame"] == "00002.jpg" and np.abs(np.array(report.figures["white_point"]) / LIGHT
+                                                                         - 1).max() < 0.02
     assert main(["white", str(capture.root)]) == 0 and "--white-point 0." in capsys.readouterr().out
 
 
@@ -83,8 +87,9 @@ def test_a_card_that_is_pointed_at_gives_its_light(tmp_path, capsys, card, refle
     assert np.abs(found / LIGHT - 1).max() < 0.02
 
 
-@pytest.mark.parametrize(("where", "colour", "said"), [((900, 20), 0.5, "outside of the frame"), ((20, 20), 1.0, "burnt out or black"),
-                                                       ((20, 20), None, "not of one colour")])
+@pytest.mark.parametrize(("where", "colour", "said"),
+                         [((900, 20), 0.5, "outside of the frame"), ((20, 20), 1.0, "burnt out or black"),
+                          ((20, 20), None, "not of one colour")])
 def test_a_place_that_tells_nothing_is_refused(where, colour, said):
     picture = np.full((60, 80, 3), 0.5 if colour is None else colour, np.float32)
     picture[:, 20:] = 0.2 if colour is None else colour
@@ -92,13 +97,16 @@ def test_a_place_that_tells_nothing_is_refused(where, colour, said):
         white_point.card_white(picture, *where, "grey")
 
 
-@pytest.mark.parametrize(("words", "said"), [(["--frame", "00000.jpg"], "go together"), (["--frame", "9.jpg", "--at", "1", "1"], "There is no frame")])
+@pytest.mark.parametrize(("words", "said"),
+                         [(["--frame", "00000.jpg"], "go together"),
+                          (["--frame", "9.jpg", "--at", "1", "1"], "There is no frame")])
 def test_the_command_says_what_is_missing(tmp_path, capsys, words, said):
     assert main(["white", str(filmed(tmp_path, frame()).root), *words]) == 2 and said in capsys.readouterr().err
 
 
 def test_a_white_point_that_is_none_is_refused():
-    assert white_point.given_white("auto") is None and np.allclose(white_point.given_white("0.9,0.8,1.6"), [0.9, 0.8, 1.6])
+    assert white_point.given_white("auto") is None and np.allclose(white_point.given_white("0.9,0.8,1.6"),
+                                                                   [0.9, 0.8, 1.6])
     for wrong in ("white", "1,1", "0,1,1", "1,nan,1"):
         with pytest.raises(Problem, match="is not a colour"):
             white_point.given_white(wrong)

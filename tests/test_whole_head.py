@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whole head: a painted head known everywhere loses all but its face, and is completed; nothing seen changes, no seam shows."""
+"""Whole head: a painted head known everywhere loses all but its face, and is completed; nothing seen changes, no seam
+shows."""
 
 from dataclasses import replace
 
@@ -30,8 +31,10 @@ def cut(truth) -> HeadMaps:
     seen = template.mask("face", SIZE)
     hidden = seen < 0.5
     plain = truth.diffuse[template.mask("skin", SIZE) > 0.99].mean(0) * WRONG
-    return replace(truth, confidence=0.7 * seen, diffuse=np.where(hidden[..., None], plain, truth.diffuse).astype(np.float32),
-                   normal=np.where(hidden[..., None], np.float32([0, 0, 1]), truth.normal), specular=np.where(hidden, np.float32(0.2), truth.specular))
+    return replace(truth, confidence=0.7 * seen,
+                   diffuse=np.where(hidden[..., None], plain, truth.diffuse).astype(np.float32),
+                   normal=np.where(hidden[..., None], np.float32([0, 0, 1]), truth.normal),
+                   specular=np.where(hidden, np.float32(0.2), truth.specular))
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +68,8 @@ def test_the_hidden_skin_comes_nearer_to_its_tone(truth, cut, done):
 
 
 def test_pores_go_on_with_the_strength_they_have_on_the_face(truth, done):
-    """A fine band's spread of log albedo, and the normals' tilt, on the hidden neck beside the seen face, within a factor of 1.6."""
+    """A fine band's spread of log albedo, and the normals' tilt, on the hidden neck beside the seen face, within a
+    factor of 1.6."""
     neck = hidden() & (template.mask("neck", SIZE) > 0.9) & (surface().texel < 1.5 * np.median(surface().texel))
     face = template.mask("skin", SIZE) > 0.99
     assert neck.sum() > 300
@@ -79,17 +83,21 @@ def test_pores_go_on_with_the_strength_they_have_on_the_face(truth, done):
 
 
 def test_the_border_of_the_seen_part_is_no_step(cut, done):
-    """Means on both sides of the border, 6 mm apart, differ by no more than those of bands as far apart within the skin; before, by far more."""
+    """Means on both sides of the border, 6 mm apart, differ by no more than those of bands as far apart within the
+    skin; before, by far more."""
     signed = template.mask("face", SIZE)
     soft = grain.blurred(signed[..., None], np.ones_like(signed), 12.0)[..., 0]
     inner, outer = (soft > 0.60) & (soft < 0.75), (soft > 0.25) & (soft < 0.40)
-    step = [np.abs(np.log(maps.diffuse[inner]).mean(0) - np.log(maps.diffuse[outer]).mean(0)).max() for maps in (cut, done)]
-    within = np.abs(np.log(done.diffuse[(soft > 0.75) & (soft < 0.9)]).mean(0) - np.log(done.diffuse[inner]).mean(0)).max()
+    step = [np.abs(np.log(maps.diffuse[inner]).mean(0) - np.log(maps.diffuse[outer]).mean(0)).max()
+            for maps in (cut, done)]
+    within = np.abs(np.log(done.diffuse[(soft > 0.75) & (soft < 0.9)]).mean(0)
+                    - np.log(done.diffuse[inner]).mean(0)).max()
     assert step[1] < within + 0.05 and step[1] < 0.5 * step[0]
 
 
 def test_no_uv_seam_shows(done):
-    """Texels on both edges of the map's cut that lie within a millimetre and a half of each other differ no more than neighbours do."""
+    """Texels on both edges of the map's cut that lie within a millimetre and a half of each other differ no more than
+    neighbours do."""
     edge = np.zeros((SIZE, SIZE), bool)
     edge[[0, -1]] = edge[:, [0, -1]] = True
     at, place = np.argwhere(edge & hidden()), surface().position[edge & hidden()]
@@ -99,7 +107,8 @@ def test_no_uv_seam_shows(done):
     assert len(first) > 50
     light = np.log(done.diffuse).mean(2)
     across = np.abs(light[tuple(at[first].T)] - light[tuple(at[second].T)]).mean()
-    beside = np.abs(np.diff(light, axis=1))[hidden()[:, 1:] & (surface().texel[:, 1:] > 2 * np.median(surface().texel))].mean()
+    beside = np.abs(np.diff(light, axis=1))[hidden()[:, 1:]
+                                            & (surface().texel[:, 1:] > 2 * np.median(surface().texel))].mean()
     assert across < 1.5 * beside + 0.01
 
 
@@ -116,10 +125,12 @@ def test_seen_hair_is_carried_on_over_the_scalp(cut):
 
 
 def test_a_stray_patch_that_was_seen_at_a_glance_goes_and_a_mark_that_was_seen_well_stays(truth, cut):
-    """Two patches of the neck seen with half of the usual confidence, one of them three times as bright as its skin; and a mark on the cheek as dark."""
+    """Two patches of the neck seen with half of the usual confidence, one of them three times as bright as its skin;
+    and a mark on the cheek as dark."""
     position, texel = surface().position, surface().texel
     below = np.argwhere((template.mask("neck", SIZE) > 0.9) & (texel < 1.5 * np.median(texel)))
-    sides = [tuple(below[np.argsort(position[tuple(below.T)][:, 0])[k]]) for k in (len(below) // 5, 4 * len(below) // 5)]
+    sides = [tuple(below[np.argsort(position[tuple(below.T)][:, 0])[k]])
+             for k in (len(below) // 5, 4 * len(below) // 5)]
     stray, plain = (np.linalg.norm(position - position[at], axis=2) < 14 for at in sides)
     well = (template.mask("face", SIZE) > 0.99) & (seen_well(cut.confidence, surface()) >= 1)
     cheek = tuple(np.argwhere(well & (template.mask("skin", SIZE) > 0.99))[5000])
@@ -127,7 +138,8 @@ def test_a_stray_patch_that_was_seen_at_a_glance_goes_and_a_mark_that_was_seen_w
     confidence = np.where(stray | plain, np.float32(0.35), cut.confidence)
     diffuse = np.where((stray | plain)[..., None], truth.diffuse, cut.diffuse)
     diffuse[stray], diffuse[mark] = np.minimum(3 * diffuse[stray], 1), diffuse[mark] / 3
-    told = complete(replace(cut, confidence=confidence, diffuse=diffuse.astype(np.float32)), surface(), Reporter("upscale"))
+    told = complete(replace(cut, confidence=confidence, diffuse=diffuse.astype(np.float32)), surface(),
+                    Reporter("upscale"))
     inner = [np.linalg.norm(position - position[at], axis=2) < 4 for at in sides]
     off = [float(np.abs(np.log(told.diffuse[at] / truth.diffuse[at])).mean()) for at in inner]
     assert off[0] < 0.3 and off[1] < 0.2, off  # the stray one was off by 1.1

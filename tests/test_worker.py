@@ -66,8 +66,11 @@ def test_a_job_runs_every_stage_in_order_and_a_second_run_skips_them(root, captu
 
 def test_from_forces_and_until_ends(root, capture, video):
     follow(start(root, capture, source=video, last="texture"))
-    assert finished(follow(start(root, capture, first="scan", last="delight"))) == {"scan": False, "registration": False, "delight": False}
-    assert finished(follow(start(root, capture, last="shadow_mask"))) == {**dict.fromkeys(stages.NAMES[:6], True), "shadow_mask": False}
+    assert finished(follow(start(root, capture, first="scan", last="delight"))) == {"scan": False,
+                                                                                    "registration": False,
+                                                                                    "delight": False}
+    assert finished(follow(start(root, capture, last="shadow_mask"))) == {**dict.fromkeys(stages.NAMES[:6], True),
+                                                                          "shadow_mask": False}
 
 
 def test_a_stage_without_its_inputs_is_refused(root, capture, video):
@@ -236,6 +239,7 @@ def test_only_protocol_lines_leave_by_stdout(root, capture, video):
     job = tiny_chain.write_job(capture, source=video, last="frames")
     command = [sys.executable, "-E", "-s", "-B", "-m", "core.worker", str(job)]
     with subprocess.Popen(command, cwd=root, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-                          start_new_session=True) as process:  # it steps back with its whole session, which shall not be this one
+                          # it steps back with its whole session, which shall not be this one
+                          start_new_session=True) as process:
         lines = process.stdout.read().splitlines()
     assert [json.loads(line)["kind"] for line in lines][-2:] == ["StageDone", "Done"]

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the worker, its installation and the capture's folder say when they cannot go on, where no other file tests it already."""
+"""What the worker, its installation and the capture's folder say when they cannot go on, where no other file tests it
+already."""
 
 import errno
 import json
@@ -66,7 +67,8 @@ def test_job_files_that_make_no_sense(capture, tmp_path):
 
 
 @pytest.mark.parametrize(("error", "words"), [
-    (MemoryError(), "not enough memory for the stage solve"), (ModuleNotFoundError("No module named 'x'", name="x"), "has no module named x"),
+    (MemoryError(), "not enough memory for the stage solve"),
+    (ModuleNotFoundError("No module named 'x'", name="x"), "has no module named x"),
     (ZeroDivisionError("division by zero"), "ZeroDivisionError: division by zero)."),
     (OSError(errno.ENOSPC, "No space left on device", "/disk/x.exr"), "The disk is full"),
     (OSError(errno.EROFS, "Read-only file system", "/disk/x.exr"), "the folder is read-only"),
@@ -77,20 +79,24 @@ def test_what_stops_a_stage_is_explained(tmp_path, error, words):
 
 
 def test_a_write_is_named_by_the_file_it_was_for():
-    assert "maps" in storage_problem(OSError(errno.EACCES, "Permission denied"), Path("/face.wildcap/.maps.123.tmp/normal.png")).problem
+    assert "maps" in storage_problem(OSError(errno.EACCES, "Permission denied"),
+                                     Path("/face.wildcap/.maps.123.tmp/normal.png")).problem
 
 
 @pytest.mark.parametrize(("said", "words"), [
     ("ERROR: Could not install packages due to an OSError: [Errno 28] No space left on device", "The disk that holds"),
-    ("ERROR: Connection reset by peer", "could not be downloaded"), ("ERROR: It is Tuesday.", "The installation stopped (It is Tuesday)."),
+    ("ERROR: Connection reset by peer", "could not be downloaded"),
+    ("ERROR: It is Tuesday.", "The installation stopped (It is Tuesday)."),
     ("ERROR: THESE PACKAGES DO NOT MATCH THE HASHES FROM THE REQUIREMENTS FILE.", "its hash is another"),
     ("Killed", "The installation stopped (no message).")])
 def test_an_installation_that_stops_says_why(tmp_path, monkeypatch, said, words):
     monkeypatch.setattr(installation, "lock_of", lambda *_: Lock("manylinux_x86_64-3.11", {}))
     monkeypatch.setattr(installation.bare_environment, "make", lambda *_, **__: None)
     monkeypatch.setattr(installation, "steps", lambda *_: [PipStep((said,))])
-    monkeypatch.setattr(installation.BackgroundTask, "run", lambda task, command, hear: hear(said) or (1, said if "ERROR" in said else ""))
-    task = installation.installation(tmp_path / "env", REQUIREMENTS, tmp_path / "env.log", Path(sys.executable), installation.PackageSource())
+    monkeypatch.setattr(installation.BackgroundTask, "run", lambda task, command,
+                        hear: hear(said) or (1, said if "ERROR" in said else ""))
+    task = installation.installation(tmp_path / "env", REQUIREMENTS, tmp_path / "env.log", Path(sys.executable),
+                                     installation.PackageSource())
     assert words in finish(task).problem and said in (tmp_path / "env.log").read_text()
 
 

@@ -109,7 +109,8 @@ def copy_ground(core: Path) -> None:
 
 
 def keep_pace(root: Path) -> None:
-    """Has the workers of a code tree not step back for others, beside which they would get a thirtieth of a core while other tests run."""
+    """Has the workers of a code tree not step back for others, beside which they would get a thirtieth of a core while
+    other tests run."""
     main = root / "core" / "worker" / "__main__.py"
     text = main.read_text(encoding="utf-8")
     assert f"PRIORITY = {PRIORITY}\n" in text

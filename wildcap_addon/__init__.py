@@ -29,8 +29,8 @@ from . import (
     timings,
 )
 
-ROOMS = (frame_icons, preferences, properties, panel, setup, capture, reconstruct, paint, solve, relight, make, acting, groom, deliver, links, status, timings,
-         jobs, batches, batch, terminal)
+ROOMS = (frame_icons, preferences, properties, panel, setup, capture, reconstruct, paint, solve, relight, make, acting,
+         groom, deliver, links, status, timings, jobs, batches, batch, terminal)
 
 
 

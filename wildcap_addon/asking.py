@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a dialog has to say and takes seconds to find out (how much to download, what is deleted): found in the background, then the dialog opens."""
+"""What a dialog has to say and takes seconds to find out (how much to download, what is deleted): found in the
+background, then the dialog opens."""
 
 from collections.abc import Callable
 
@@ -33,7 +34,8 @@ def ask(key: tuple, work: Callable[[BackgroundTask], object], operator: str) -> 
 
 
 def _click(operator: str) -> None:
-    """Opens the operator's dialog; not under an artist who is in the middle of something: then the next click shows it at once."""
+    """Opens the operator's dialog; not under an artist who is in the middle of something: then the next click shows it
+    at once."""
     windows = [] if bpy.app.background else bpy.context.window_manager.windows
     if windows and not any(window.modal_operators for window in windows):
         with bpy.context.temp_override(window=windows[0]):

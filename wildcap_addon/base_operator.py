@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all operators share: any exception becomes a problem and a remedy in the panel, never a traceback in the artist's face; and how they ask first."""
+"""What all operators share: any exception becomes a problem and a remedy in the panel, never a traceback in the
+artist's face; and how they ask first."""
 
 from pathlib import Path
 
@@ -40,7 +41,8 @@ class BaseOperator:
 
     @classmethod
     def with_capture(cls, context) -> bool:
-        return cls.allowed(captures.active(context) is not None, "There is no face to work on yet: choose a video, or open the sample head")
+        return cls.allowed(captures.active(context) is not None,
+                           "There is no face to work on yet: choose a video, or open the sample head")
 
     def execute(self, context):
         root = captures.root(captures.active(context))
@@ -49,7 +51,9 @@ class BaseOperator:
         except Problem as problem:
             return self._refuse(root, problem)
         except Exception as error:  # the one place that catches everything: an artist reads problems, not tracebacks
-            return self._refuse(root, unforeseen.explain(error, self.bl_label, Path(root) / "logs" / unforeseen.LOG if root else None))
+            return self._refuse(root,
+                                unforeseen.explain(error, self.bl_label,
+                                                   Path(root) / "logs" / unforeseen.LOG if root else None))
         for key in ("", root, captures.root(captures.active(context))):
             problems.clear(key)
         status.refresh(context)
@@ -70,7 +74,8 @@ class BaseOperator:
 
 
 class Dialog(BaseOperator):
-    """Mixin: an operator that asks for a yes to `lines`. `tell()` gives them, or None while they are being found out."""
+    """Mixin: an operator that asks for a yes to `lines`. `tell()` gives them, or None while they are being found
+    out."""
 
     lines: tuple[str, ...] = ()
 
@@ -82,7 +87,8 @@ class Dialog(BaseOperator):
         if self.lines is None:
             return {'CANCELLED'}
         title = f"{iface_(self.bl_label, 'Operator')}?"
-        return context.window_manager.invoke_props_dialog(self, width=WIDTH, title=title, confirm_text=self.bl_label.partition(" ")[0])
+        return context.window_manager.invoke_props_dialog(self, width=WIDTH, title=title,
+                                                          confirm_text=self.bl_label.partition(" ")[0])
 
     def draw(self, context):
         for line in self.lines:

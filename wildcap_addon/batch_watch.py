@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The thread that looks at a batch: who runs it and how far that is, and where its faces are. A face that is seen for the first time costs the reading of all
-its files, later a few file times. Nothing here touches Blender."""
+"""The thread that looks at a batch: who runs it and how far that is, and where its faces are. A face that is seen for
+the first time costs the reading of all its files, later a few file times. Nothing here touches Blender."""
 
 import contextlib
 import os
@@ -22,14 +22,14 @@ from ..core.contract.messages import Problem
 EVERY_S = 0.5
 """Between two looks at who runs the batch, and how far that is."""
 REST, LONGEST_REST_S = 10, 5.0
-"""A look at all faces is followed by a rest of so many times its length: Python runs one thread at a time, and Blender's own is to be held up by a tenth at
-most. In the longest rest an artist would begin to wonder."""
+"""A look at all faces is followed by a rest of so many times its length: Python runs one thread at a time, and
+Blender's own is to be held up by a tenth at most. In the longest rest an artist would begin to wonder."""
 
 
 @dataclass(frozen=True)
 class BatchView:
-    """A batch as it was seen last. `states` has the faces that were looked at, by name; `runner` is the machine that runs it, '' for none; `progress` is what
-    it says of its run meanwhile; `problem` is why it cannot be used."""
+    """A batch as it was seen last. `states` has the faces that were looked at, by name; `runner` is the machine that
+    runs it, '' for none; `progress` is what it says of its run meanwhile; `problem` is why it cannot be used."""
 
     batch: Batch | None = None
     states: dict[str, FaceState] = field(default_factory=dict)
@@ -50,15 +50,18 @@ class BatchView:
 
 
 class Watch(threading.Thread):
-    """Looks at a batch for as long as it is wanted; without one, for a remembered batch that is worth showing (`found`). Touches nothing of Blender's."""
+    """Looks at a batch for as long as it is wanted; without one, for a remembered batch that is worth showing
+    (`found`). Touches nothing of Blender's."""
 
     def __init__(self, root: Path | None, memory: Path):
         super().__init__(name="wildcap-batch", daemon=True)
         self.root, self._memory = root, memory
         self.view, self.found, self.listed = BatchView(), None, frozenset()
-        self._read: tuple[int, Batch | None] = 0, None  # when the record was changed that was read last, and what it said
+        # when the record was changed that was read last, and what it said
+        self._read: tuple[int, Batch | None] = 0, None
         self._stamps: dict[str, tuple] = {}  # face -> what its state was derived from
-        self._refreshed: tuple[int, float] = 0, 0.0  # the time of the lease's last refresh, and when that was first seen (time.monotonic)
+        # the time of the lease's last refresh, and when that was first seen (time.monotonic)
+        self._refreshed: tuple[int, float] = 0, 0.0
         self._due = 0.0  # when all faces are looked at again (time.monotonic)
         self._searched: tuple = ()
         self._ended = threading.Event()
@@ -102,7 +105,8 @@ class Watch(threading.Thread):
 
     def _look_at_face(self, batch: Batch, face: BatchFace) -> None:
         stamp = _stamp(face)
-        if stamp[0] or self._stamps.get(face.name) != stamp or face.name not in self.view.states:  # who holds a lock may have ended
+        # who holds a lock may have ended
+        if stamp[0] or self._stamps.get(face.name) != stamp or face.name not in self.view.states:
             found = _ask(batch, face)
             self.view = replace(self.view, states={**self.view.states, face.name: found})
             self._stamps[face.name] = () if found.state == STOPPED and found.group is None else stamp
@@ -115,14 +119,16 @@ class Watch(threading.Thread):
         self.view = BatchView(batch, states, runner, _read_progress(batch.root) if runner else {})
 
     def _ask_runner(self, root: Path) -> str:
-        """As `_runner`; a machine that has refreshed its lease for a whole term no more has gone, and what it left is no obstacle."""
+        """As `_runner`; a machine that has refreshed its lease for a whole term no more has gone, and what it left is
+        no obstacle."""
         stamp = _changed(root / "lock")
         if stamp != self._refreshed[0]:
             self._refreshed = stamp, time.monotonic()
         return _runner(root) if time.monotonic() - self._refreshed[1] <= lease.TERM_S else ""
 
     def _search(self) -> None:
-        """The newest that is being run; or else, when there is something new to compare, the newest with a capture of the scenes."""
+        """The newest that is being run; or else, when there is something new to compare, the newest with a capture of
+        the scenes."""
         roots, listed = remembered(self._memory), self.listed
         self.found = next((root for root in roots if _runner(root)), None)
         if self.found is None and (roots, listed) != self._searched:
@@ -133,8 +139,8 @@ class Watch(threading.Thread):
 def _stamp(face: BatchFace) -> tuple:
     """What a face's state depends on, as far as one look at its folder tells."""
     capture = face.capture
-    watched = (capture.json, capture.root / gate.NAME, capture.shadow_mask_auto, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved,
-               capture.renders / state.SHEET)
+    watched = (capture.json, capture.root / gate.NAME, capture.shadow_mask_auto, capture.shadow_mask,
+               capture.protect_mask, capture.texture, capture.solved, capture.renders / state.SHEET)
     return (os.path.lexists(capture.lock), *(_changed(path) for path in watched))
 
 
@@ -167,7 +173,8 @@ def _read_progress(root: Path) -> dict:
     """progress.json, as far as it makes sense; {} for none."""
     try:
         told = read_json(root / local.PROGRESS)
-        working = {str(name): {"stage": str(each["stage"]), "share": each["share"]} for name, each in told["working"].items() if is_number(each["share"])}
+        working = {str(name): {"stage": str(each["stage"]), "share": each["share"]}
+                   for name, each in told["working"].items() if is_number(each["share"])}
         ended, of, left = told["ended"], told["of"], told["left_s"]
         sound = is_number(ended, 0) and is_number(of, 0) and (left is None or is_number(left, 0))
         return {"ended": ended, "of": of, "left_s": left, "working": working} if sound else {}

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The batch that the tab shows: many faces that a process of its own, or a farm, works on. It goes on when Blender closes, and is found again.
+"""The batch that the tab shows: many faces that a process of its own, or a farm, works on. It goes on when Blender
+closes, and is found again.
 
-What is done stands in the captures; a thread looks there, for a face that it sees for the first time costs the reading of all its files, and `poll` takes in
-what it saw. Panels only read that. Which batch it is, the extension's user folder remembers: no .blend has to. Run-time state only.
+What is done stands in the captures; a thread looks there, for a face that it sees for the first time costs the reading
+of all its files, and `poll` takes in what it saw. Panels only read that. Which batch it is, the extension's user folder
+remembers: no .blend has to. Run-time state only.
 """
 
 import contextlib
@@ -65,19 +67,22 @@ def state_of(root: str) -> FaceState | None:
 def works_on(root: str) -> bool:
     """Whether the batch has a capture in hand, or somebody else has one of its."""
     face, found = view().face(root), state_of(root)
-    return face is not None and (face.name in view().progress.get("working", {}) or found is not None and found.state == WORKING)
+    return face is not None and (face.name in view().progress.get("working", {}) or found is not None
+                                 and found.state == WORKING)
 
 
 def waiting() -> list[BatchFace]:
     """The faces whose masks wait to be looked at, in the batch's order."""
     known = view()
-    return [face for face in known.batch.faces if (found := state_of(str(face.root))) and found.state == WAITING] if known.batch else []
+    return ([face for face in known.batch.faces if (found := state_of(str(face.root))) and found.state == WAITING]
+            if known.batch else [])
 
 
 def ready() -> int:
     """How many faces are to be solved with a mask that was looked at."""
     found = [state_of(str(face.root)) for face in view().batch.faces] if view().batch else []
-    return sum(each is not None and each.state == TO_DO and each.group is not None and each.group.name == GATE for each in found)
+    return sum(each is not None and each.state == TO_DO and each.group is not None and each.group.name == GATE
+               for each in found)
 
 
 def accept(face: BatchFace) -> None:
@@ -87,7 +92,8 @@ def accept(face: BatchFace) -> None:
 
 
 def poll() -> bool:
-    """Takes in what was seen since the last call; whether the tab shows something else now. Tests call it in place of the timer."""
+    """Takes in what was seen since the last call; whether the tab shows something else now. Tests call it in place of
+    the timer."""
     global _shown
     if _watch is None:
         _replace_watch(None)
@@ -99,13 +105,16 @@ def poll() -> bool:
         face = known.face(root)
         if face is None or face.name in known.states and known.states[face.name].state != WAITING:
             _accepted.discard(root)
-    before, _shown = _shown, (current(), known.states, known.runner, bool(known.problem), line(known), share(known), frozenset(_accepted))
+    before, _shown = _shown, (current(), known.states, known.runner, bool(known.problem), line(known), share(known),
+                              frozenset(_accepted))
     return before != _shown
 
 
 def line(known: BatchView) -> str:
-    """What is being done, and how long all of it takes: 'Anna: Cameras 40 %, about 20 min left'; '' where nothing is told."""
-    words = [iface_("{}: {} {}").format(name, iface_(each["stage"]), f"{each['share']:.0%}") for name, each in known.progress.get("working", {}).items()][:3]
+    """What is being done, and how long all of it takes: 'Anna: Cameras 40 %, about 20 min left'; '' where nothing is
+    told."""
+    words = [iface_("{}: {} {}").format(name, iface_(each["stage"]), f"{each['share']:.0%}")
+             for name, each in known.progress.get("working", {}).items()][:3]
     if known.progress.get("left_s") is not None:
         words.append(iface_("about {} min left").format(max(1, round(known.progress["left_s"] / 60))))
     return ", ".join(words)
@@ -129,7 +138,8 @@ def _memory() -> Path:
 
 
 def _remember(roots: Iterable[Path]) -> None:
-    with contextlib.suppress(Problem, OSError, ValueError):  # a folder that cannot be written: it is found no more when Blender was closed
+    # a folder that cannot be written: it is found no more when Blender was closed
+    with contextlib.suppress(Problem, OSError, ValueError):
         write_json(_memory(), [str(root) for root in roots][:MOST])
 
 

@@ -8,8 +8,8 @@ BEGUN = "This was slimmed away and is made again from the video: click again whe
 
 
 def begin(operator, item, *names: str) -> bool:
-    """Whether any of the artefacts `names` was slimmed away: then a worker begins to make it again, and the operator says so and has nothing to show yet.
-    Raises Problem where it cannot begin."""
+    """Whether any of the artefacts `names` was slimmed away: then a worker begins to make it again, and the operator
+    says so and has nothing to show yet. Raises Problem where it cannot begin."""
     capture = captures.folder(item)
     if all(capture.holds(name) or not capture.has(name) for name in names):
         return False

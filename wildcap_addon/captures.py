@@ -41,7 +41,8 @@ def require(context) -> bpy.types.PropertyGroup:
 
 
 def folder(item) -> Capture:
-    """The item's capture; `links` sees to it that the path leads there. Asks no disk: panels call this when they draw."""
+    """The item's capture; `links` sees to it that the path leads there. Asks no disk: panels call this when they
+    draw."""
     return Capture(Path(bpy.path.abspath(item.path)))
 
 
@@ -66,8 +67,8 @@ def add(context, path: Path) -> bpy.types.PropertyGroup:
 
 
 def choose(context) -> None:
-    """After a click in the list: that capture's head becomes the active object, or at least no other capture's stays it, for the active head decides.
-    Only in Object Mode: nobody is thrown out of a stroke."""
+    """After a click in the list: that capture's head becomes the active object, or at least no other capture's stays
+    it, for the active head decides. Only in Object Mode: nobody is thrown out of a stroke."""
     props = context.scene.wildcap
     if context.view_layer is None or context.mode != 'OBJECT' or not 0 <= props.active_index < len(props.captures):
         return
@@ -121,5 +122,6 @@ def head(context, item) -> bpy.types.Object | None:
 def require_head(context, item) -> bpy.types.Object:
     found = head(context, item)
     if found is None:
-        raise Problem("The head is not in this scene.", "Click Bring In Head; if it was never reconstructed, click Reconstruct.")
+        raise Problem("The head is not in this scene.",
+                      "Click Bring In Head; if it was never reconstructed, click Reconstruct.")
     return found

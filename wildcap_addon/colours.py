@@ -2,15 +2,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Colour spaces and views by what they are for, as a studio's own OCIO configuration need not have Blender's names.
 
-Data (masks, normals, specular) goes by OCIO's role `data`; pictures by the names that sRGB for textures has in the usual configurations, else by the role
-`default_byte`, which a configuration gives to pictures of 8 bits.
+Data (masks, normals, specular) goes by OCIO's role `data`; pictures by the names that sRGB for textures has in the
+usual configurations, else by the role `default_byte`, which a configuration gives to pictures of 8 bits.
 """
 
 import bpy
 
-SRGB = ("sRGB", "sRGB - Texture", "Utility - sRGB - Texture", "Input - Generic - sRGB - Texture", "srgb_texture", "srgb_tx",
-        "sRGB Encoded Rec.709 (sRGB)")
-"""Of Blender, ACES 1.3 and newer, ACES 1.0 to 1.2, the same by its family, their short forms, and the Color Interop Forum's (2024)."""
+SRGB = ("sRGB", "sRGB - Texture", "Utility - sRGB - Texture", "Input - Generic - sRGB - Texture", "srgb_texture",
+        "srgb_tx", "sRGB Encoded Rec.709 (sRGB)")
+"""Of Blender, ACES 1.3 and newer, ACES 1.0 to 1.2, the same by its family, their short forms, and the Color Interop
+Forum's (2024)."""
 VIEWS = ("Standard", "Un-tone-mapped", "Raw")
 """Views that show colours as they are."""
 
@@ -46,14 +47,17 @@ def of_pictures() -> str:
 def missing(image: bpy.types.Image) -> str:
     """What the artist is to know about how a picture is read; '' where it is read as sRGB."""
     name = image.colorspace_settings.name
-    return "" if name in SRGB else f"This OCIO configuration has no sRGB by a known name: pictures are read as {name}, its space for 8 bits."
+    return ("" if name in SRGB
+            else f"This OCIO configuration has no sRGB by a known name: pictures are read as {name}, its space for 8 "
+                 "bits.")
 
 
 def missing_view(scene: bpy.types.Scene) -> str:
     """What the artist is to know about how a render will look; '' where it looks as it is."""
     settings, now = scene.view_settings, scene.view_settings.view_transform
     try:
-        return "" if _choose(settings, "view_transform", VIEWS) else f"This OCIO configuration has no view without a look: the render is shown by {now}."
+        return ("" if _choose(settings, "view_transform", VIEWS)
+                else f"This OCIO configuration has no view without a look: the render is shown by {now}.")
     finally:
         settings.view_transform = now
 

@@ -11,7 +11,8 @@ _icons: bpy.utils.previews.ImagePreviewCollection | None = None
 
 
 def load(path: Path) -> int:
-    """The icon of a frame as it is on disk now; 0 where it is missing. Its picture is read when Blender first draws it."""
+    """The icon of a frame as it is on disk now; 0 where it is missing. Its picture is read when Blender first draws
+    it."""
     global _icons
     if not path.is_file():
         return 0

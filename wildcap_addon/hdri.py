@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light from a picture of the surroundings (HDRI): one of Blender's own worlds, one installed in the preferences' lights, or a file."""
+"""Light from a picture of the surroundings (HDRI): one of Blender's own worlds, one installed in the preferences'
+lights, or a file."""
 
 from dataclasses import dataclass
 from math import tau
@@ -34,16 +35,19 @@ def light(props) -> str | Hdri:
 
 
 def named(name: str) -> Hdri:
-    """One of the worlds that Blender knows, by its file's name with or without the suffix. Raises Problem where there is none."""
+    """One of the worlds that Blender knows, by its file's name with or without the suffix. Raises Problem where there
+    is none."""
     for world in _worlds():
         if name in (world.name, Path(world.name).stem):
             return Hdri(Path(world.path))
-    raise Problem(f"There is no light named {name}.", f"Blender's worlds here are {', '.join(sorted(Path(world.name).stem for world in _worlds()))}.")
+    raise Problem(f"There is no light named {name}.",
+                  f"Blender's worlds here are {', '.join(sorted(Path(world.name).stem for world in _worlds()))}.")
 
 
 def chosen_hdri(props) -> Hdri:
     """What the scene's settings ask for. Raises Problem where there is no such picture."""
-    path = Path(bpy.path.abspath(props.hdri_file)) if props.hdri_file else next((Path(light.path) for light in _worlds() if light.name == props.hdri), None)
+    path = (Path(bpy.path.abspath(props.hdri_file)) if props.hdri_file
+            else next((Path(light.path) for light in _worlds() if light.name == props.hdri), None))
     if path is None:
         raise Problem("This Blender came without pictures of surroundings.", "Choose an HDRI file of your own.")
     if not path.is_file():
@@ -55,7 +59,9 @@ def light_with(world: bpy.types.World, hdri: Hdri, turned: float) -> None:
     """Makes the picture the world's background, turned about +Z by `turned` radians, counter-clockwise from above."""
     nodes, links = world.node_tree.nodes, world.node_tree.links
     background = next(n for n in nodes if n.type == 'BACKGROUND')
-    coordinates, mapping, picture = (nodes.new(kind) for kind in ('ShaderNodeTexCoord', 'ShaderNodeMapping', 'ShaderNodeTexEnvironment'))
+    coordinates, mapping, picture = (nodes.new(kind)
+                                     for kind in ('ShaderNodeTexCoord', 'ShaderNodeMapping',
+                                                  'ShaderNodeTexEnvironment'))
     for node, x in ((coordinates, -900), (mapping, -700), (picture, -450)):
         node.location = (x, 0)
     # Turning what is looked up one way turns the surroundings the other way.

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The head object of a capture: head.obj brought into the scene with its UVs and its texture; again in place when it changed."""
+"""The head object of a capture: head.obj brought into the scene with its UVs and its texture; again in place when it
+changed."""
 
 from pathlib import Path
 
@@ -16,13 +17,16 @@ PREVIEW = "WildCap Preview"
 OUTER = "wildcap_outer_polygons"
 """Custom property of a mesh that has more than the head's skin: how many polygons that has. They come first."""
 HAIR_UVS = "WildCap Hair"
-"""UV map of such a mesh in which those of the skin are alone, as hair that is rooted by them needs it: sockets continue the lids' maps."""
+"""UV map of such a mesh in which those of the skin are alone, as hair that is rooted by them needs it: sockets continue
+the lids' maps."""
 
 FOLLOWERS = []
-"""Functions (head object, new mesh) of rooms that made more of a head's mesh: whether it now has the new mesh's shape, which is then not needed."""
+"""Functions (head object, new mesh) of rooms that made more of a head's mesh: whether it now has the new mesh's shape,
+which is then not needed."""
 
 COMPLETERS = []
-"""Functions (head object, capture) of rooms that add to a head whose skin is assembled: the eyes that it was filmed with."""
+"""Functions (head object, capture) of rooms that add to a head whose skin is assembled: the eyes that it was filmed
+with."""
 
 
 def complete(obj, capture: Capture) -> None:
@@ -31,7 +35,8 @@ def complete(obj, capture: Capture) -> None:
 
 
 def bring_in(context, item) -> bpy.types.Object:
-    """The capture's head in the scene, active and selected. An existing head keeps its place and materials and gets the new mesh."""
+    """The capture's head in the scene, active and selected. An existing head keeps its place and materials and gets the
+    new mesh."""
     capture = captures.folder(item)
     if not capture.head.is_file():
         raise Problem("This capture has no head yet.", "Click Reconstruct first.")
@@ -68,7 +73,8 @@ def _in_place(head, mesh) -> bpy.types.Mesh:
 
 
 def look_at(context, head: bpy.types.Object) -> None:
-    """Turns the window's 3D views to the face, alone (Local View): a start-up cube would swallow a head of real size."""
+    """Turns the window's 3D views to the face, alone (Local View): a start-up cube would swallow a head of real
+    size."""
     if bpy.app.background or context.window is None:
         return
     for area in context.window.screen.areas:
@@ -91,7 +97,8 @@ def read_mesh(context, capture: Capture) -> bpy.types.Mesh:
 def read_mesh_file(context, path: Path) -> bpy.types.Mesh:
     """As `read_mesh`, of any of a capture's OBJ files."""
     before = set(context.scene.objects)
-    bpy.ops.wm.obj_import(filepath=str(path), forward_axis='Y', up_axis='Z', import_vertex_groups=False, validate_meshes=False)
+    bpy.ops.wm.obj_import(filepath=str(path), forward_axis='Y', up_axis='Z', import_vertex_groups=False,
+                          validate_meshes=False)
     new = [o for o in context.scene.objects if o not in before]
     if len(new) != 1 or new[0].type != 'MESH' or not new[0].data.uv_layers:
         for o in new:

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The running jobs, one per capture, and the solver's installation: started by an operator, polled by a timer, stopped when Blender closes.
+"""The running jobs, one per capture, and the solver's installation: started by an operator, polled by a timer, stopped
+when Blender closes.
 
-One worker runs at a time, for each takes all cores; jobs of other captures wait in line. Run-time state only, nothing of it reaches the .blend. A job
-belongs to its capture: opening another .blend, a new scene or an undo past its start changes nothing; disabling the add-on or closing Blender ends it,
-and what was finished is kept.
+One worker runs at a time, for each takes all cores; jobs of other captures wait in line. Run-time state only, nothing
+of it reaches the .blend. A job belongs to its capture: opening another .blend, a new scene or an undo past its start
+changes nothing; disabling the add-on or closing Blender ends it, and what was finished is kept.
 """
 
 import contextlib
@@ -25,20 +26,24 @@ from ..core.worker.job import read_job, write_job
 from . import batches, captures, preferences, problems, properties, status, timings
 
 INTERVAL_S = 0.2
-ROOT = Path(__file__).resolve().parent.parent  # the folder that holds core/, where the worker starts; nothing is written there
+# the folder that holds core/, where the worker starts; nothing is written there
+ROOT = Path(__file__).resolve().parent.parent
 
 
 @dataclass
 class Job:
     """A worker at a capture, and the last thing it said. `previews` counts the preview pictures so far."""
 
-    goal: str  # 'make', 'reconstruct', 'solve', 'install', 'test', or 'ask' for what is found out or tidied up in seconds
+    # 'make', 'reconstruct', 'solve', 'install', 'test', or 'ask' for what is found out or tidied up in seconds
+    goal: str
     worker: Worker | BackgroundTask
     then: Callable[[], None] | None = None  # called when it ended well
     ended: Callable[[], None] | None = None  # called before that, however it ended
     well: bool = False
-    on_preview: Callable[[str], None] | None = None  # called with the capture's folder when a preview is new, and when the job has ended
-    on_stage: Callable[[str], object] | None = None  # called with the name of each stage that is done, or was done before
+    # called with the capture's folder when a preview is new, and when the job has ended
+    on_preview: Callable[[str], None] | None = None
+    # called with the name of each stage that is done, or was done before
+    on_stage: Callable[[str], object] | None = None
     planned: tuple[str, ...] = ()  # the stages that it goes through
     settings: Settings | None = None
     waiting: bool = False  # in line behind another capture's job
@@ -51,14 +56,16 @@ class Job:
 
 @dataclass(frozen=True)
 class Results:
-    """take(context, list item) is called in Object Mode when nobody is in the middle of a move, for as long as wanted(its folder) says that something waits."""
+    """take(context, list item) is called in Object Mode when nobody is in the middle of a move, for as long as
+    wanted(its folder) says that something waits."""
 
     take: Callable
     wanted: Callable[[str], bool]
 
 
 before_start: list[Callable[[], None]] = []
-"""What rooms do before a worker reads a capture: the mask that is being painted is saved. May raise Problem, and then nothing starts."""
+"""What rooms do before a worker reads a capture: the mask that is being painted is saved. May raise Problem, and then
+nothing starts."""
 on_results: list["Results"] = []
 """What rooms do with new results of the active capture."""
 _jobs: dict[str, Job] = {}  # capture folder -> its job; '' -> the installation
@@ -75,11 +82,14 @@ def elsewhere(root: str) -> list[tuple[str, Job]]:
 
 
 def can_start(operator, context) -> bool:
-    """Whether there is a capture that no job and no batch works on; says in the tooltip of a greyed-out button why not."""
+    """Whether there is a capture that no job and no batch works on; says in the tooltip of a greyed-out button why
+    not."""
     root = captures.root(captures.active(context))
     return (operator.with_capture(context)
             and operator.allowed(of(root) is None, "This capture is being worked on: wait for it, or click Cancel")
-            and operator.allowed(not batches.works_on(root), "This capture is being worked on by a batch or another Blender: wait for it, or cancel it there"))
+            and operator.allowed(not batches.works_on(root),
+                                 "This capture is being worked on by a batch or another Blender: wait for it, or "
+                                 "cancel it there"))
 
 
 def start(item, goal: str, *, first: str | None = None, last: str | None = None, then: Callable[[], None] | None = None,
@@ -94,14 +104,17 @@ def start(item, goal: str, *, first: str | None = None, last: str | None = None,
     shared : settings for this once
     """
     capture = captures.folder(item)
-    job = _launch(item, goal, capture, then, lambda: write_job(capture, first=first, last=last, settings={**properties.job_settings(item), **shared}))
+    job = _launch(item, goal, capture, then,
+                  lambda: write_job(capture, first=first, last=last,
+                                    settings={**properties.job_settings(item), **shared}))
     job.on_stage = on_stage
-    job.planned = stages.NAMES[stages.NAMES.index(first or stages.NAMES[0]):stages.NAMES.index(last or stages.NAMES[-1]) + 1]
+    job.planned = stages.NAMES[stages.NAMES.index(first or stages.NAMES[0]):stages.NAMES.index(last or stages.NAMES[-1])
+                               + 1]
     return job
 
 
-def start_tool(item, tool: str, goal: str = "tool", *, then: Callable[[], None] | None = None, ended: Callable[[], None] | None = None,
-               at: Capture | None = None, **shared) -> Job:
+def start_tool(item, tool: str, goal: str = "tool", *, then: Callable[[], None] | None = None,
+               ended: Callable[[], None] | None = None, at: Capture | None = None, **shared) -> Job:
     """Starts one of core.contract.stages.TOOLS at a capture. Raises Problem when it cannot.
 
     Parameters
@@ -113,7 +126,8 @@ def start_tool(item, tool: str, goal: str = "tool", *, then: Callable[[], None] 
     shared : settings for this once
     """
     capture = at or captures.folder(item)
-    job = _launch(item, goal, capture, then, lambda: write_job(capture, tool=tool, settings={**properties.job_settings(item), **shared}))
+    job = _launch(item, goal, capture, then,
+                  lambda: write_job(capture, tool=tool, settings={**properties.job_settings(item), **shared}))
     job.ended = ended
     return job
 
@@ -128,13 +142,16 @@ def _launch(item, goal: str, capture: Capture, then: Callable[[], None] | None, 
         prepare()
     path = write()
     settings = read_job(path).settings
-    job = begin(root, goal, Worker(python, ROOT, path, capture.logs / "worker.log", preferences.worker_environment(settings.delight.delighter)), then)
+    job = begin(root, goal,
+                Worker(python, ROOT, path, capture.logs / "worker.log",
+                       preferences.worker_environment(settings.delight.delighter)), then)
     job.settings = settings
     return job
 
 
 def begin(root: str, goal: str, worker: Worker | BackgroundTask, then: Callable[[], None] | None = None) -> Job:
-    """Starts a worker, or puts it in line behind the one that runs, and listens to it. Raises Problem when it cannot."""
+    """Starts a worker, or puts it in line behind the one that runs, and listens to it. Raises Problem when it
+    cannot."""
     waiting = root != "" and _busy()
     if not waiting:
         worker.start()
@@ -146,7 +163,8 @@ def begin(root: str, goal: str, worker: Worker | BackgroundTask, then: Callable[
 
 
 def cancel(root: str) -> None:
-    """Asks the capture's job ('': the installation) to stop; it does so within two seconds. One that waits leaves the line."""
+    """Asks the capture's job ('': the installation) to stop; it does so within two seconds. One that waits leaves the
+    line."""
     if root in _jobs and _jobs[root].waiting:
         _leave(root)
     elif root in _jobs:
@@ -154,7 +172,8 @@ def cancel(root: str) -> None:
 
 
 def poll() -> bool:
-    """Takes in what the workers said. True while one is running. Makes no data-blocks; tests call it in place of the timer."""
+    """Takes in what the workers said. True while one is running. Makes no data-blocks; tests call it in place of the
+    timer."""
     for root, job in list(_jobs.items()):
         if job.waiting:
             continue
@@ -218,7 +237,12 @@ def _hear(root: str, job: Job, message: messages.Message) -> None:
                 job.on_stage(message.stage)
             if not message.skipped:
                 timings.record_stage(message.stage, message.seconds)
-            if message.stage == "solve" and not message.skipped and job.settings is not None and not any("Going on after" in line for line in job.log):
+            if (
+                message.stage == "solve"
+                and not message.skipped
+                and job.settings is not None
+                and not any("Going on after" in line for line in job.log)
+            ):
                 timings.record(job.settings, message.seconds)
         case messages.Done():
             job.well = True
@@ -253,8 +277,8 @@ def _shown() -> list[tuple]:
 
 
 def bring_in_results(ended: bool) -> None:
-    """What is new comes in at once if the artist is in Object Mode and not in the middle of a move: a new head when a job has ended, and what rooms do with
-    results. Otherwise it waits."""
+    """What is new comes in at once if the artist is in Object Mode and not in the middle of a move: a new head when a
+    job has ended, and what rooms do with results. Otherwise it waits."""
     window = next(iter(bpy.context.window_manager.windows), None)
     if window is None or window.modal_operators:
         return
@@ -272,18 +296,22 @@ def bring_in_results(ended: bool) -> None:
 
 
 def eta(job: Job) -> str:
-    """What is left of the stage, and of the whole where the next ones' times are known from before, in words; '' when unknown."""
+    """What is left of the stage, and of the whole where the next ones' times are known from before, in words; '' when
+    unknown."""
     seconds = job.progress.eta_s if job.progress else None
-    words = "" if seconds is None else iface_("{} s left").format(f"{seconds:.0f}") if seconds < 90 else iface_("{} min left").format(f"{seconds / 60:.0f}")
+    words = ("" if seconds is None else iface_("{} s left").format(f"{seconds:.0f}") if seconds < 90
+             else iface_("{} min left").format(f"{seconds / 60:.0f}"))
     later = job.planned[job.planned.index(job.stage) + 1:] if job.stage in job.planned else ()
     ahead = timings.of_stages(later) if later and seconds is not None else None
-    return words if ahead is None else iface_("{}, about {} min in all").format(words, max(1, round((seconds + ahead) / 60)))
+    return (words if ahead is None
+            else iface_("{}, about {} min in all").format(words, max(1, round((seconds + ahead) / 60))))
 
 
 def stage_label(job: Job) -> str:
     if job.waiting:
         return "Waiting"
-    return stages.LABELS[job.stage] if job.stage in stages.LABELS else {"install": "Installing", "ask": "Looking"}.get(job.goal, "Starting")
+    return (stages.LABELS[job.stage] if job.stage in stages.LABELS
+            else {"install": "Installing", "ask": "Looking"}.get(job.goal, "Starting"))
 
 
 def register():

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The link from a .blend to its captures: kept by Save As, found again when both were moved or copied together, mended by Locate.
+"""The link from a .blend to its captures: kept by Save As, found again when both were moved or copied together, mended
+by Locate.
 
-In a session a capture's path is absolute. Saving notes beside it how it is reached from the .blend, and that wins on opening where it leads
-to a folder: a copied project works on its own copy. Otherwise the absolute path holds, as for a .blend that was moved alone.
+In a session a capture's path is absolute. Saving notes beside it how it is reached from the .blend, and that wins on
+opening where it leads to a folder: a copied project works on its own copy. Otherwise the absolute path holds, as for a
+.blend that was moved alone.
 """
 
 import os
@@ -20,13 +22,15 @@ def is_capture(path: Path) -> bool:
 
 
 def move(item, path: Path) -> None:
-    """The list item, its head, cameras and landmarks, and the pictures of the capture that are in the .blend, now mean the folder `path`."""
+    """The list item, its head, cameras and landmarks, and the pictures of the capture that are in the .blend, now mean
+    the folder `path`."""
     old, before = Path(bpy.path.abspath(item.path)), item.path
     for thing in bpy.data.objects:
         if thing.get(captures.HEAD_KEY) == before:
             thing[captures.HEAD_KEY] = str(path)
     for image in bpy.data.images:
-        file = Path(bpy.path.abspath(image.filepath)) if image.source == 'FILE' and image.filepath and not image.packed_file else Path()
+        file = (Path(bpy.path.abspath(image.filepath)) if image.source == 'FILE' and image.filepath
+                and not image.packed_file else Path())
         if file.is_relative_to(old) and (path / file.relative_to(old)).is_file():
             moved = str(path / file.relative_to(old))
             image.filepath = bpy.path.relpath(moved) if image.filepath.startswith("//") and bpy.data.filepath else moved
@@ -34,8 +38,8 @@ def move(item, path: Path) -> None:
 
 
 def find(item) -> Path | None:
-    """A missing capture where it is likely to be: beside the .blend or one folder further down, among the captures of the preferences,
-    where 0.1.0 put them, or beside another one of the scene. None where there is none of its name."""
+    """A missing capture where it is likely to be: beside the .blend or one folder further down, among the captures of
+    the preferences, where 0.1.0 put them, or beside another one of the scene. None where there is none of its name."""
     name = Path(item.path).name
     parents = [captures.folder(other).root.parent for scene in bpy.data.scenes for other in scene.wildcap.captures]
     parents += [preferences.captures_folder(saved=False), preferences.CAPTURES_0_1]
@@ -47,7 +51,8 @@ def find(item) -> Path | None:
 
 def missing() -> list:
     """The items of all scenes whose folder is not there."""
-    return [item for scene in bpy.data.scenes for item in scene.wildcap.captures if not captures.folder(item).root.is_dir()]
+    return [item for scene in bpy.data.scenes for item in scene.wildcap.captures
+            if not captures.folder(item).root.is_dir()]
 
 
 @bpy.app.handlers.persistent
@@ -60,7 +65,8 @@ def note_on_saving(path, *_):
 
 @bpy.app.handlers.persistent
 def follow_on_opening(*_):
-    """The folder that the note leads to from where the .blend is now; or, where neither it nor the old one is there, one of its name beside."""
+    """The folder that the note leads to from where the .blend is now; or, where neither it nor the old one is there,
+    one of its name beside."""
     if not bpy.data.filepath:
         return
     blend = Path(bpy.data.filepath).parent

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shader nodes of materials and worlds: from Blender 5.0 on each has them from the start, and switching them on is deprecated."""
+"""The shader nodes of materials and worlds: from Blender 5.0 on each has them from the start, and switching them on is
+deprecated."""
 
 import bpy
 

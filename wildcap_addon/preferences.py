@@ -15,12 +15,17 @@ from ..core.worker import environment
 from . import extension
 
 COMPUTES = [('auto', "Automatic", "For the GPU where there is an NVIDIA one or an Apple one, else for the CPU"),
-            *([('apple', "Apple", "For Apple GPUs, by Metal; the CPU can be chosen as well")] if sys.platform == "darwin" else
+            *([('apple', "Apple", "For Apple GPUs, by Metal; the CPU can be chosen as well")]
+              if sys.platform == "darwin" else
               [('cuda', "CUDA", "For NVIDIA GPUs; several times larger")]),
             ('cpu', "CPU", "For the processor alone: the smallest")]
-SOURCES = [('pytorch', "PyTorch and PyPI", "PyTorch from its own package index where PyPI lacks the build for your device, all others from PyPI"),
-           ('folder', "A Folder of Wheels", "All packages from a folder, as `python -m core wheels` makes one: no network needed"),
-           ('pip', "As pip Is Set Up", "All packages from where this machine's pip is set up to look (pip.conf, PIP_INDEX_URL), as with a studio's own index; "
+SOURCES = [('pytorch', "PyTorch and PyPI",
+            "PyTorch from its own package index where PyPI lacks the build for your device, all others from PyPI"),
+           ('folder', "A Folder of Wheels",
+            "All packages from a folder, as `python -m core wheels` makes one: no network needed"),
+           ('pip', "As pip Is Set Up",
+            "All packages from where this machine's pip is set up to look (pip.conf, PIP_INDEX_URL), as with a "
+            "studio's own index; "
             "that also decides what its PyTorch computes on")]
 DEVICES = {"cpu": "CPU", "cuda": "CUDA", "mps": "Metal", "": ""}
 _aside: set[str] = set()  # Pythons that were found not to answer, in this session
@@ -40,20 +45,26 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
         name="Solver Folder", subtype='DIR_PATH',
         description="Where Install Solver puts its packages; empty: .wildcap/solver in your home folder",
     )
-    compute: bpy.props.EnumProperty(name="Compute On", items=COMPUTES, default='auto', description="What Install Solver downloads PyTorch for")
-    packages: bpy.props.EnumProperty(name="Packages From", items=SOURCES, default='pytorch', description="Where Install Solver downloads from")
-    wheels: bpy.props.StringProperty(name="Wheels", subtype='DIR_PATH', description="The folder of wheels that Install Solver takes all packages from")
+    compute: bpy.props.EnumProperty(name="Compute On", items=COMPUTES, default='auto',
+                                    description="What Install Solver downloads PyTorch for")
+    packages: bpy.props.EnumProperty(name="Packages From", items=SOURCES, default='pytorch',
+                                     description="Where Install Solver downloads from")
+    wheels: bpy.props.StringProperty(name="Wheels", subtype='DIR_PATH',
+                                     description="The folder of wheels that Install Solver takes all packages from")
     device: bpy.props.StringProperty(name="Device", description="What the solver's Python was found to compute on")
-    device_reason: bpy.props.StringProperty(name="Why This Device", description="What was found when the solver's devices were tried")
+    device_reason: bpy.props.StringProperty(name="Why This Device",
+                                            description="What was found when the solver's devices were tried")
     tested: bpy.props.StringProperty(name="Self-Test", description="How the last self-test ended")
     captures: bpy.props.StringProperty(
         name="Captures Folder", subtype='DIR_PATH',
-        description="Where new captures go while the .blend is not saved; empty: WildCap in your home folder, which no cloud copies",
+        description="Where new captures go while the .blend is not saved; empty: WildCap in your home folder, which no "
+                    "cloud copies",
     )
 
     switchlight_key: bpy.props.StringProperty(
         name="SwitchLight Key", subtype='PASSWORD',
-        description="Your key for SwitchLight, a paid service. Blender keeps it readable in its preferences file; an environment variable does not",
+        description="Your key for SwitchLight, a paid service. Blender keeps it readable in its preferences file; an "
+                    "environment variable does not",
     )
 
     def draw(self, context):
@@ -67,7 +78,8 @@ class WILDCAP_AP_preferences(bpy.types.AddonPreferences):
 
 
 def draw_solver(layout, preferences) -> None:
-    """Whether there is a solver, and the buttons that make, choose and remove one: here, and in the tab until there is one."""
+    """Whether there is a solver, and the buttons that make, choose and remove one: here, and in the tab until there is
+    one."""
     ready = python() is not None
     device = DEVICES.get(preferences.device, preferences.device)
     if ready and device:
@@ -75,7 +87,8 @@ def draw_solver(layout, preferences) -> None:
         if preferences.device_reason:
             layout.label(text=preferences.device_reason, translate=False)
     else:
-        layout.label(text="The solver is ready" if ready else "There is no solver yet", icon='CHECKMARK' if ready else 'INFO')
+        layout.label(text="The solver is ready" if ready else "There is no solver yet",
+                     icon='CHECKMARK' if ready else 'INFO')
     if ready and preferences.tested:
         layout.label(text=preferences.tested, translate=False, icon='CHECKMARK')
     column = layout.column()
@@ -119,16 +132,18 @@ def has_switchlight_key() -> bool:
 
 
 def worker_environment(delighter: str) -> dict[str, str]:
-    """What a worker is told by its environment alone: the key of a paid delighter, the machine's own first, and that Blender is to stay offline. Others do
-    not get to know the key."""
+    """What a worker is told by its environment alone: the key of a paid delighter, the machine's own first, and that
+    Blender is to stay offline. Others do not get to know the key."""
     if delighter != "switchlight":
         return {}
     key = os.environ.get(switchlight_api.KEY_VARIABLE) or get().switchlight_key
-    return {switchlight_api.KEY_VARIABLE: key, **({} if bpy.app.online_access else {switchlight_api.OFFLINE_VARIABLE: "1"})}
+    return {switchlight_api.KEY_VARIABLE: key,
+            **({} if bpy.app.online_access else {switchlight_api.OFFLINE_VARIABLE: "1"})}
 
 
 def require_online(otherwise: str) -> None:
-    """Raises Problem while Blender is told to stay off the network; `otherwise` is what else the artist can do, as the end of a sentence."""
+    """Raises Problem while Blender is told to stay off the network; `otherwise` is what else the artist can do, as the
+    end of a sentence."""
     if not bpy.app.online_access:
         where = "" if bpy.app.online_access_override else " (Preferences, System, Network)"
         raise Problem("Blender is set to work offline.", f"Allow online access{where}, or {otherwise}.")
@@ -144,7 +159,8 @@ def require_python() -> Path:
     """As `python`. Raises Problem where there is none."""
     path = python()
     if path is None:
-        raise Problem("The solver is not set up on this machine.", "Click Install Solver in the Setup panel, or Use an Existing Python.")
+        raise Problem("The solver is not set up on this machine.",
+                      "Click Install Solver in the Setup panel, or Use an Existing Python.")
     return path
 
 
@@ -163,8 +179,8 @@ def set_python(path: Path | None, device: str = "", reason: str = "") -> None:
 
 
 def environment_folder() -> Path:
-    """Where Install Solver makes its environment: kept across updates, outside the extension's own files. One that 0.1.0 made stays where it put it,
-    but on Windows, where paths there grow too long."""
+    """Where Install Solver makes its environment: kept across updates, outside the extension's own files. One that
+    0.1.0 made stays where it put it, but on Windows, where paths there grow too long."""
     chosen, earlier = get().environment, Path(bpy.utils.extension_path_user(extension.NAME, path="solver"))
     if chosen:
         return Path(bpy.path.abspath(chosen))
@@ -172,19 +188,21 @@ def environment_folder() -> Path:
 
 
 def wheels_folder() -> Path | None:
-    """The folder of wheels to install from; None where packages come from elsewhere. Raises Problem where it is none."""
+    """The folder of wheels to install from; None where packages come from elsewhere. Raises Problem where it is
+    none."""
     if get().packages != 'folder':
         return None
     folder = Path(bpy.path.abspath(get().wheels))
     if not get().wheels or not any(folder.glob("*.whl")):
         raise Problem(f"There are no wheels in {folder if get().wheels else 'a folder that is not chosen'}.",
-                      "Choose the folder that `python -m core wheels` made, in the extension's preferences under Wheels.")
+                      "Choose the folder that `python -m core wheels` made, in the extension's preferences under "
+                      "Wheels.")
     return folder
 
 
 def captures_folder(saved: bool = True) -> Path:
-    """Beside the .blend; while it is unsaved (or with saved=False), the preferences' folder or WildCap in the user's home: clouds copy Documents and Desktop,
-    and a capture holds gigabytes of a person's face."""
+    """Beside the .blend; while it is unsaved (or with saved=False), the preferences' folder or WildCap in the user's
+    home: clouds copy Documents and Desktop, and a capture holds gigabytes of a person's face."""
     if bpy.data.filepath and saved:
         return Path(bpy.data.filepath).parent
     chosen = get().captures

@@ -24,12 +24,15 @@ SHARED_TOOLTIPS = core_settings.tooltips(core_settings.Settings)
 def settings_group(stage: str, kind: type) -> type:
     """A PropertyGroup with one property per field of a stage's settings."""
     annotations = {f.name: _property(f, core_settings.tooltips(kind)[f.name]) for f in fields(kind)}
-    return type(f"WILDCAP_PG_{stage}", (bpy.types.PropertyGroup,), {"__annotations__": annotations, "__doc__": kind.__doc__})
+    return type(f"WILDCAP_PG_{stage}", (bpy.types.PropertyGroup,),
+                {"__annotations__": annotations, "__doc__": kind.__doc__})
 
 
 def _property(field, tooltip: str):
     unit = field.metadata.get("unit")
-    name = field.metadata.get("label") or field.name.removesuffix(f"_{unit}").replace("_", " ").title() + (f" ({unit})" if unit else "")
+    name = field.metadata.get("label") or field.name.removesuffix(f"_{unit}").replace("_",
+                                                                                      " ").title() + (f" ({unit})"
+                                                                                                      if unit else "")
     common = {"name": name, "description": tooltip, "default": field.default}
     limits = {k: field.metadata[k] for k in ("min", "max") if k in field.metadata}
     if "choices" in field.metadata:
@@ -69,32 +72,39 @@ def _apply_quality(self, context):
 class WILDCAP_PG_capture(bpy.types.PropertyGroup):
     """One capture folder in the scene's list."""
 
-    path: bpy.props.StringProperty(name="Capture Folder", subtype='DIR_PATH', description="The folder that holds everything about this face")
+    path: bpy.props.StringProperty(name="Capture Folder", subtype='DIR_PATH',
+                                   description="The folder that holds everything about this face")
     from_blend: bpy.props.StringProperty(
-        name="From the .blend", options={'HIDDEN'}, description="The folder as it was reached from the .blend when that was last saved",
+        name="From the .blend", options={'HIDDEN'},
+        description="The folder as it was reached from the .blend when that was last saved",
     )
     head: bpy.props.PointerProperty(name="Head", type=bpy.types.Object, description="The head object of this capture")
     quality: bpy.props.EnumProperty(
-        name="Quality", items=[(q, q.title(), "") for q in core_settings.QUALITIES], default="standard", update=_apply_quality,
-        description="A set of settings: draft to look, standard to work, film to deliver",
+        name="Quality", items=[(q, q.title(), "") for q in core_settings.QUALITIES], default="standard",
+        update=_apply_quality, description="A set of settings: draft to look, standard to work, film to deliver",
     )
     device: bpy.props.EnumProperty(
         name="Device", default="auto", description=SHARED_TOOLTIPS["device"],
-        items=[("auto", "Automatic", "Where a pass of the solver's network ran fastest when it was set up"), ("cpu", "CPU", ""), ("cuda", "CUDA", ""),
-               ("mps", "Metal", "")],
+        items=[("auto", "Automatic", "Where a pass of the solver's network ran fastest when it was set up"),
+               ("cpu", "CPU", ""), ("cuda", "CUDA", ""), ("mps", "Metal", "")],
     )
     seed: bpy.props.IntProperty(name="Seed", min=0, default=0, description=SHARED_TOOLTIPS["seed"])
     use_skin_tone: bpy.props.BoolProperty(
-        name="Set Skin Tone", default=False, description="Use the colour below as the mean skin colour; off: it is estimated from the video",
+        name="Set Skin Tone", default=False,
+        description="Use the colour below as the mean skin colour; off: it is estimated from the video",
     )
     skin_tone: bpy.props.FloatVectorProperty(
         name="Skin Tone", subtype='COLOR_GAMMA', size=3, min=0, max=1, default=(0.69, 0.54, 0.45),
         description="Mean colour of the facial skin without lips, brows and stubble, as the eye sees it (sRGB)",
     )
-    estimated_tone: bpy.props.FloatVectorProperty(name="Estimated Tone", size=3, options={'HIDDEN'}, description="What the last estimate was")
-    tone_group: bpy.props.StringProperty(name="Tone Group", options={'HIDDEN'}, description="What such a tone is called")
-    tone_source: bpy.props.StringProperty(name="Tone Source", options={'HIDDEN'}, description="What the last estimate was taken from")
-    tone_deviation: bpy.props.FloatProperty(name="Tone Deviation", options={'HIDDEN'}, description="One deviation of its lightness L*")
+    estimated_tone: bpy.props.FloatVectorProperty(name="Estimated Tone", size=3, options={'HIDDEN'},
+                                                  description="What the last estimate was")
+    tone_group: bpy.props.StringProperty(name="Tone Group", options={'HIDDEN'},
+                                         description="What such a tone is called")
+    tone_source: bpy.props.StringProperty(name="Tone Source", options={'HIDDEN'},
+                                          description="What the last estimate was taken from")
+    tone_deviation: bpy.props.FloatProperty(name="Tone Deviation", options={'HIDDEN'},
+                                            description="One deviation of its lightness L*")
 
 
 WILDCAP_PG_capture.__annotations__ |= {stage: bpy.props.PointerProperty(type=group) for stage, group in GROUPS.items()}
@@ -121,42 +131,62 @@ class WILDCAP_PG_scene(bpy.types.PropertyGroup):
     """The scene's captures and how they are lit."""
 
     captures: bpy.props.CollectionProperty(type=WILDCAP_PG_capture)
-    active_index: bpy.props.IntProperty(name="Capture", update=_show_chosen, description="The capture that the panel shows while no head is active")
+    active_index: bpy.props.IntProperty(name="Capture", update=_show_chosen,
+                                        description="The capture that the panel shows while no head is active")
     light: bpy.props.EnumProperty(
-        name="Light", default='three_point', items=[(name, label, what, "", number) for name, label, what, number in LIGHTS],
+        name="Light", default='three_point',
+        items=[(name, label, what, "", number) for name, label, what, number in LIGHTS],
         description="The light for Render",
     )
-    hdri: bpy.props.EnumProperty(name="Surroundings", items=worlds.items, description="Blender's own worlds, and those installed in its preferences (Lights)")
-    hdri_file: bpy.props.StringProperty(name="Own File", subtype='FILE_PATH', description="A panoramic HDR picture of your own; it comes before the one above")
-    hdri_rotation: bpy.props.FloatProperty(name="Rotation", subtype='ANGLE', description="Turns the light about the head, counter-clockwise from above")
-    hdri_strength: bpy.props.FloatProperty(name="Strength", min=0, soft_max=4, default=1, description="How bright the surroundings are")
+    hdri: bpy.props.EnumProperty(name="Surroundings", items=worlds.items,
+                                 description="Blender's own worlds, and those installed in its preferences (Lights)")
+    hdri_file: bpy.props.StringProperty(
+        name="Own File",
+        subtype='FILE_PATH',
+        description="A panoramic HDR picture of your own; it comes before the one above",
+    )
+    hdri_rotation: bpy.props.FloatProperty(name="Rotation", subtype='ANGLE',
+                                           description="Turns the light about the head, counter-clockwise from above")
+    hdri_strength: bpy.props.FloatProperty(name="Strength", min=0, soft_max=4, default=1,
+                                           description="How bright the surroundings are")
     shadow_tint: bpy.props.FloatVectorProperty(
-        name="Shadow Tint", subtype='COLOR', size=3, min=0, max=1, default=(1.0, 0.0, 0.0), description="Colour in which the shadow mask is shown",
+        name="Shadow Tint", subtype='COLOR', size=3, min=0, max=1, default=(1.0, 0.0, 0.0),
+        description="Colour in which the shadow mask is shown",
     )
     protect_tint: bpy.props.FloatVectorProperty(
-        name="Protect Tint", subtype='COLOR', size=3, min=0, max=1, default=(0.0, 0.6, 0.1), description="Colour in which the protect mask is shown",
+        name="Protect Tint", subtype='COLOR', size=3, min=0, max=1, default=(0.0, 0.6, 0.1),
+        description="Colour in which the protect mask is shown",
     )
-    tint_strength: bpy.props.FloatProperty(name="Tint Strength", min=0.05, max=1, default=0.45, description="How strongly a mask covers the texture")
-    resolution: bpy.props.IntProperty(name="Resolution", subtype='PIXEL', min=16, max=8192, default=1024, description="Side of the rendered picture")
-    samples: bpy.props.IntProperty(name="Samples", min=1, max=65536, default=128, description="Cycles samples per pixel")
+    tint_strength: bpy.props.FloatProperty(name="Tint Strength", min=0.05, max=1, default=0.45,
+                                           description="How strongly a mask covers the texture")
+    resolution: bpy.props.IntProperty(name="Resolution", subtype='PIXEL', min=16, max=8192, default=1024,
+                                      description="Side of the rendered picture")
+    samples: bpy.props.IntProperty(name="Samples", min=1, max=65536, default=128,
+                                   description="Cycles samples per pixel")
     view: bpy.props.EnumProperty(
-        name="View", default='Standard', description="How the picture is shown; the linear EXR beside it is the same in both",
+        name="View", default='Standard',
+        description="How the picture is shown; the linear EXR beside it is the same in both",
         items=[('Standard', "Standard", "Colours as they are; what is brighter than white is cut off"),
-               ('AgX', "AgX", "As on film: bright lights and strong colours fade softly; a skin's tone is not what it was")],
+               ('AgX', "AgX",
+                "As on film: bright lights and strong colours fade softly; a skin's tone is not what it was")],
     )
     turns: bpy.props.EnumProperty(
         name="Turns", default='HEAD', description="What goes once around",
-        items=[('HEAD', "Head", "The head, under a light that stays"), ('LIGHT', "Light", "The light, around a head that stays")],
+        items=[('HEAD', "Head", "The head, under a light that stays"),
+               ('LIGHT', "Light", "The light, around a head that stays")],
     )
-    turn_frames: bpy.props.IntProperty(name="Frames", min=2, max=1000, default=48, description="Pictures of one turn; a film shows 24 in a second")
+    turn_frames: bpy.props.IntProperty(name="Frames", min=2, max=1000, default=48,
+                                       description="Pictures of one turn; a film shows 24 in a second")
     turn_file: bpy.props.EnumProperty(
-        name="As", default='MP4', description="What renders/turntable gets", items=[('MP4', "Film", "One MP4"), ('PNG', "Frames", "A PNG per frame")],
+        name="As", default='MP4', description="What renders/turntable gets",
+        items=[('MP4', "Film", "One MP4"), ('PNG', "Frames", "A PNG per frame")],
     )
 
 
 def job_settings(item: WILDCAP_PG_capture) -> dict:
     """The settings of a capture as a job file holds them: stage -> {name: value}, seed, device. Paths are absolute."""
-    found = {stage: {f.name: _value(getattr(item, stage), f) for f in fields(kind)} for stage, kind in STAGE_KINDS.items()}
+    found = {stage: {f.name: _value(getattr(item, stage), f) for f in fields(kind)}
+             for stage, kind in STAGE_KINDS.items()}
     found["solve"]["skin_tone"] = _tone(item) if item.use_skin_tone else "auto"
     return {**found, "seed": item.seed, "device": device(item)}
 
@@ -174,7 +204,8 @@ def take(item: WILDCAP_PG_capture, quality: str, chosen: core_settings.Settings)
 
 
 def _tone(item: WILDCAP_PG_capture) -> str:
-    """The skin tone as a job is told it: as the record wrote it from which the fields were taken, for as long as it is that tone."""
+    """The skin tone as a job is told it: as the record wrote it from which the fields were taken, for as long as it is
+    that tone."""
     told = _colour(item.solve.skin_tone)
     same = told is not None and max(abs(a - b) for a, b in zip(told, item.skin_tone, strict=True)) < 1e-4
     return item.solve.skin_tone if same else ",".join(f"{c:.4f}" for c in item.skin_tone)
@@ -195,7 +226,8 @@ def _value(group, field):
 
 
 def device(item: WILDCAP_PG_capture) -> str:
-    """'cpu', 'cuda' or 'mps': the capture's own choice, else what the solver's Python was found to compute on; 'auto' where that is not known yet."""
+    """'cpu', 'cuda' or 'mps': the capture's own choice, else what the solver's Python was found to compute on; 'auto'
+    where that is not known yet."""
     return item.device if item.device != "auto" else preferences.get().device or "auto"
 
 

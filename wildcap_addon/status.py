@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is finished and fresh in a capture's folder, looked up outside of `draw` and kept until the folder or the settings change.
+"""What is finished and fresh in a capture's folder, looked up outside of `draw` and kept until the folder or the
+settings change.
 
 A panel asks `of(item)`, which only reads the last answer and notes that somebody wants to know; a timer looks.
 """
@@ -22,8 +23,9 @@ INTERVAL_S = 1.0
 
 @dataclass(frozen=True)
 class Status:
-    """What a capture's folder says. `stages`: name -> 'to do', 'done', 'stale', 'older' (made by older code, kept) or 'absent' (outputs came from elsewhere,
-    without a record); `versions`: name -> the WildCap that made what is older."""
+    """What a capture's folder says. `stages`: name -> 'to do', 'done', 'stale', 'older' (made by older code, kept) or
+    'absent' (outputs came from elsewhere, without a record); `versions`: name -> the WildCap that made what is
+    older."""
 
     source: str = ""
     stages: dict = field(default_factory=dict)
@@ -40,7 +42,8 @@ class Status:
     findings: tuple[dict, ...] = ()  # what is wrong with the capture, as core.contract.report.findings tells it
     problem: Problem | None = None
     missing: bool = False  # the folder is not there
-    sending: consent.Sending | None = None  # what SwitchLight, where it is chosen, would get of the frames; None before there are any
+    # what SwitchLight, where it is chosen, would get of the frames; None before there are any
+    sending: consent.Sending | None = None
     agreed: bool = False  # whether the artist agreed to that
 
 
@@ -70,7 +73,8 @@ def look(capture: Capture, settings) -> Status:
     """Reads the folder; hashes only files that changed since they were last hashed."""
     if not capture.root.is_dir():
         return Status(missing=True, problem=Problem(f"The capture folder {capture.root} is not there any more.",
-                                                    "Connect its disk, or click Locate Capture and show where it is now."))
+                                                    "Connect its disk, or click Locate Capture and show where it is "
+                                                    "now."))
     try:
         record = capture.read()
         verdicts = {stage.name: _verdict(capture, stage, record, settings) for stage in stages.STAGES}
@@ -83,13 +87,14 @@ def look(capture: Capture, settings) -> Status:
     render = max(capture.renders.glob("[!.]*.png"), key=_time, default=Path())
     states = {name: verdict.state for name, verdict in verdicts.items()}
     return Status(
-        source=str(capture.source or ""), stages=states, versions={name: verdict.version for name, verdict in verdicts.items()},
+        source=str(capture.source or ""), stages=states,
+        versions={name: verdict.version for name, verdict in verdicts.items()},
         whole_solve=_whole_solve(capture, states["solve"], settings),
         seconds={name: done["seconds"] for name, done in record["stages"].items()},
         has_head=capture.head.is_file(), head_time=_time(capture.head), has_mask=capture.shadow_mask.is_file(),
         findings=tuple(report.findings(record)), interrupted=_interrupted(capture),
-        has_maps=all(path.is_file() for path in delivered(capture)), maps_time=maps_time, render=render.name if _time(render) >= maps_time else "",
-        **_sending(capture, settings),
+        has_maps=all(path.is_file() for path in delivered(capture)), maps_time=maps_time,
+        render=render.name if _time(render) >= maps_time else "", **_sending(capture, settings),
     )
 
 
@@ -103,8 +108,10 @@ def delivered(capture: Capture) -> list[Path]:
 
 def _verdict(capture: Capture, stage: stages.Stage, record: dict, settings) -> freshness.Verdict:
     if stage.name not in record["stages"]:
-        begun = (capture.logs / f"{stage.name}.log").is_file()  # and did not end: what is there is of another run, or half new
-        return freshness.Verdict("absent" if all(capture.has(name) for name in stage.writes) and not begun else freshness.TO_DO)
+        # and did not end: what is there is of another run, or half new
+        begun = (capture.logs / f"{stage.name}.log").is_file()
+        return freshness.Verdict("absent" if all(capture.has(name) for name in stage.writes) and not begun
+                                 else freshness.TO_DO)
     return capture.verdict(stage, settings)
 
 
@@ -119,17 +126,21 @@ def _sending(capture: Capture, settings) -> dict:
 
 
 def _whole_solve(capture: Capture, state: str, settings) -> str:
-    return "The mask is as it was at the last solve." if state in freshness.FINISHED else mask_edit.obstacle(capture, settings)
+    return ("The mask is as it was at the last solve." if state in freshness.FINISHED
+            else mask_edit.obstacle(capture, settings))
 
 
 def _interrupted(capture: Capture) -> bool:
-    """Whether a stopped solve left a checkpoint, and no mask was painted since it began: it goes on from there only with the masks it began with."""
+    """Whether a stopped solve left a checkpoint, and no mask was painted since it began: it goes on from there only
+    with the masks it began with."""
     began = _time(capture.job) or float("inf")
-    return (capture.checkpoints / "solve.safetensors").is_file() and max(map(_time, (capture.shadow_mask, capture.protect_mask))) <= began
+    return (capture.checkpoints
+            / "solve.safetensors").is_file() and max(map(_time, (capture.shadow_mask, capture.protect_mask))) <= began
 
 
 def _time(path: Path) -> float:
-    """When a file was last written, as the objects of the scene remember it (`st_mtime`, which nanoseconds divided by 1e9 miss by the last bit)."""
+    """When a file was last written, as the objects of the scene remember it (`st_mtime`, which nanoseconds divided by
+    1e9 miss by the last bit)."""
     try:
         return path.stat().st_mtime if path.is_file() else 0.0
     except OSError:
@@ -137,7 +148,8 @@ def _time(path: Path) -> float:
 
 
 def _changed(path: Path) -> int:
-    """When a file or folder was last written, in nanoseconds; 0 where there is none, also where it has just been replaced or taken away."""
+    """When a file or folder was last written, in nanoseconds; 0 where there is none, also where it has just been
+    replaced or taken away."""
     try:
         return path.stat().st_mtime_ns
     except OSError:
@@ -154,15 +166,16 @@ def _stamp(item) -> tuple[Capture, tuple]:
     """The capture, and what its status depends on: a few file times and the settings."""
     capture = captures.folder(item)
     values = properties.job_settings(item)
-    watched = (capture.json, capture.head, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved, capture.checkpoints,
-               capture.frames_json, capture.consent, capture.switchlight,
+    watched = (capture.json, capture.head, capture.shadow_mask, capture.protect_mask, capture.texture, capture.solved,
+               capture.checkpoints, capture.frames_json, capture.consent, capture.switchlight,
                *delivered(capture), capture.renders)
     stamp = (repr(values), *map(_changed, watched))
     return capture, stamp
 
 
 def _tick() -> float:
-    """Has what changed looked at aside: hashing a new capture takes seconds, and longer while a solver takes all cores."""
+    """Has what changed looked at aside: hashing a new capture takes seconds, and longer while a solver takes all
+    cores."""
     while not _found.empty():
         root, stamp, status = _found.get()
         _looking.discard(root)
@@ -176,7 +189,8 @@ def _tick() -> float:
             capture, stamp = _stamp(item)
             if root not in _known or _known[root][0] != stamp:
                 _looking.add(root)
-                threading.Thread(target=_look_aside, args=(root, stamp, capture, properties.settings(item)), name="wildcap-status", daemon=True).start()
+                threading.Thread(target=_look_aside, args=(root, stamp, capture, properties.settings(item)),
+                                 name="wildcap-status", daemon=True).start()
     return INTERVAL_S
 
 
@@ -184,7 +198,9 @@ def _look_aside(root: str, stamp: tuple, capture: Capture, settings) -> None:
     try:
         _found.put((root, stamp, look(capture, settings)))
     except Exception as error:  # of a folder that changes under the look: the next stamp is another one
-        _found.put((root, stamp, Status(problem=Problem(f"The capture folder {capture.root} cannot be read ({error}).", "It is looked at again in a second."))))
+        _found.put((root, stamp,
+                    Status(problem=Problem(f"The capture folder {capture.root} cannot be read ({error}).",
+                                           "It is looked at again in a second."))))
 
 
 def redraw() -> None:

@@ -23,7 +23,8 @@ NAME = "wildcap"
 
 @dataclass(frozen=True)
 class Command:
-    """One word after `wildcap`: `options` adds its arguments to a parser, `carry_out` does it and returns the files it made, or an exit code."""
+    """One word after `wildcap`: `options` adds its arguments to a parser, `carry_out` does it and returns the files it
+    made, or an exit code."""
 
     name: str
     help: str
@@ -57,7 +58,8 @@ def execute(words: list[str]) -> int:
 
 def parser() -> argparse.ArgumentParser:
     """What can be asked for."""
-    whole = argparse.ArgumentParser(prog=f"blender --command {NAME}", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    whole = argparse.ArgumentParser(prog=f"blender --command {NAME}", description=__doc__,
+                                    formatter_class=argparse.RawDescriptionHelpFormatter)
     kinds = whole.add_subparsers(dest="what", required=True)
     for command in commands:
         one = kinds.add_parser(command.name, help=command.help)

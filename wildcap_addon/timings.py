@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How long stages take on this machine: learned from the last ones that ran here, kept in the extension's user folder.
 
-Of a solve by its settings: a sampling step costs in proportion to the map's texels, and twice as much with the gradient through the network. Of the others as
-they last took.
+Of a solve by its settings: a sampling step costs in proportion to the map's texels, and twice as much with the gradient
+through the network. Of the others as they last took.
 """
 
 import contextlib
@@ -31,11 +31,13 @@ def minutes(quality: str, device: str) -> float | None:
 
 def describe_minutes(device: str) -> str:
     """All qualities in one line; '' before the first solve."""
-    return ", ".join(f"{quality.title()} {_spoken(minutes(quality, device))}" for quality in QUALITIES) if device in _rates else ""
+    return (", ".join(f"{quality.title()} {_spoken(minutes(quality, device))}" for quality in QUALITIES)
+            if device in _rates else "")
 
 
 def record(settings: Settings, seconds: float) -> None:
-    """Takes note of a solve that ran from its first step to its last, by the default recipe; others are no measure of it."""
+    """Takes note of a solve that ran from its first step to its last, by the default recipe; others are no measure of
+    it."""
     if settings.edited_part or settings.solve.recipe != "wildcap" or settings.solve.prior:
         return
     _rates[settings.compute_device] = seconds / work(settings)
@@ -54,7 +56,8 @@ def of_stages(names: Iterable[str]) -> float | None:
 
 
 def _keep() -> None:
-    with contextlib.suppress(Problem, OSError, ValueError):  # a folder that cannot be written: it is learned again the next time
+    # a folder that cannot be written: it is learned again the next time
+    with contextlib.suppress(Problem, OSError, ValueError):
         write_json(_file(), {**_rates, STAGES: _stages})
 
 

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How well the albedos of one head, answered from captures under different lights, agree: there is one skin.
 
-Each answer first gets the gain per channel that brings it to one tone, the truth's mean over the texels that all captures see: exposures and white
-balances are not what is asked. A flat colour agrees perfectly, so agreement is read beside error to truth and detail; and two registrations never agree
-perfectly, so the true map, filmed through the same ones, says how well an answer can.
+Each answer first gets the gain per channel that brings it to one tone, the truth's mean over the texels that all
+captures see: exposures and white balances are not what is asked. A flat colour agrees perfectly, so agreement is read
+beside error to truth and detail; and two registrations never agree perfectly, so the true map, filmed through the same
+ones, says how well an answer can.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from .tone import squared_error, to_decibels, to_tone
 
 
 def disagreement(answers: list[np.ndarray], tone: np.ndarray) -> float | None:
-    """Mean squared difference in sRGB over all pairs of answers, linear [N, 3] at the same texels; None for fewer than two. `tone`: linear [3]."""
+    """Mean squared difference in sRGB over all pairs of answers, linear [N, 3] at the same texels; None for fewer than
+    two. `tone`: linear [3]."""
     toned = [to_tone(answer, tone) for answer in answers]
     pairs = [squared_error(one, other) for one, other in combinations(toned, 2)]
     return float(np.mean(pairs)) if pairs else None

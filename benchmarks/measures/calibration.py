@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether an uncertainty is one: log-likelihood of the errors under it, against the best that one number for all could do, and coverage of one sigma.
+"""Whether an uncertainty is one: log-likelihood of the errors under it, against the best that one number for all could
+do, and coverage of one sigma.
 
 Errors and sigmas are differences of natural logarithms of albedo, or of anything else that both share; [N].
 """
@@ -17,8 +18,8 @@ WITHIN_ONE = 0.6827
 
 @dataclass(frozen=True)
 class Calibration:
-    """likelihood: mean negative log-likelihood in nats; constant: the same under the best constant sigma; gained: how much lower the first is; coverage:
-    share of the errors within one sigma; count: how many there are."""
+    """likelihood: mean negative log-likelihood in nats; constant: the same under the best constant sigma; gained: how
+    much lower the first is; coverage: share of the errors within one sigma; count: how many there are."""
 
     likelihood: float
     constant: float
@@ -31,7 +32,8 @@ class Calibration:
 
 
 def negative_log_likelihood(error: np.ndarray, sigma: np.ndarray | float) -> float:
-    """Mean of (e / s)^2 / 2 + log s + log(2 pi) / 2 over errors [N] of zero mean, in nats. Raises ValueError for a sigma that is not positive."""
+    """Mean of (e / s)^2 / 2 + log s + log(2 pi) / 2 over errors [N] of zero mean, in nats. Raises ValueError for a
+    sigma that is not positive."""
     sigma = np.asarray(sigma, np.float64)
     if not (sigma > 0).all():
         raise ValueError("a standard deviation is positive")
@@ -41,9 +43,12 @@ def negative_log_likelihood(error: np.ndarray, sigma: np.ndarray | float) -> flo
 def calibrate(error: np.ndarray, sigma: np.ndarray) -> Calibration:
     """Of errors [N] and their sigmas [N]. The best constant is the errors' root mean square."""
     best = max(float(np.sqrt(np.mean(np.asarray(error, np.float64) ** 2))), 1e-12)
-    return Calibration(negative_log_likelihood(error, sigma), negative_log_likelihood(error, best), float(np.mean(np.abs(error) <= sigma)), len(error))
+    return Calibration(negative_log_likelihood(error, sigma), negative_log_likelihood(error, best),
+                       float(np.mean(np.abs(error) <= sigma)), len(error))
 
 
-def by_group(error: np.ndarray, sigma: np.ndarray, groups: dict[str, np.ndarray], least: int = 100) -> dict[str, Calibration]:
-    """The same for each group (a tone, a region: bool [N]) of at least so many errors. A constant is the best of its own group."""
+def by_group(error: np.ndarray, sigma: np.ndarray, groups: dict[str, np.ndarray],
+             least: int = 100) -> dict[str, Calibration]:
+    """The same for each group (a tone, a region: bool [N]) of at least so many errors. A constant is the best of its
+    own group."""
     return {name: calibrate(error[where], sigma[where]) for name, where in groups.items() if where.sum() >= least}

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an answer leaves along the edges of the true shadow, cast and self-shadow: a step, a line, and too little detail.
+"""What an answer leaves along the edges of the true shadow, cast and self-shadow: a step, a line, and too little
+detail.
 
-The residual log(answer / truth), green, is followed across the edge. A step is light that stayed (or was taken twice); a line brighter or darker than both
-sides is what a border that was misplaced or blurred leaves, and an eye sees it first. Lengths are shares of the face's height, so that pictures of any
-size compare.
+The residual log(answer / truth), green, is followed across the edge. A step is light that stayed (or was taken twice);
+a line brighter or darker than both sides is what a border that was misplaced or blurred leaves, and an eye sees it
+first. Lengths are shares of the face's height, so that pictures of any size compare.
 """
 
 from __future__ import annotations
@@ -17,9 +18,11 @@ import numpy as np
 from core.light.shadow_edges import signed_distance
 
 LINE, SIDES = 0.008, (0.016, 0.048)
-"""Half width of the line at the edge, and where the two sides lie, as shares of the face's height: 4 px, and 8 to 24 px, of a face of 500 px."""
+"""Half width of the line at the edge, and where the two sides lie, as shares of the face's height: 4 px, and 8 to 24
+px, of a face of 500 px."""
 ALONG = 0.03
-"""Deviation of the window along the edge in which line and sides are averaged, so that pores do not count as lines; a share of the face's height."""
+"""Deviation of the window along the edge in which line and sides are averaged, so that pores do not count as lines; a
+share of the face's height."""
 LEAST_SHARE = 0.04
 """Share of a window that each of line and sides must have."""
 LEAST_PIXELS = 200
@@ -27,9 +30,10 @@ LEAST_PIXELS = 200
 
 @dataclass(frozen=True)
 class EdgeScores:
-    """Of one picture, differences of natural logarithms, means over the pixels of the edge: step, the lit side less the dark one, with its sign; bright
-    and dark, how far the line lies above or below both sides; overshoot, their sum. Then the correlation of the detail with the truth's within the band of
-    the edge, and away from it. None where there is no such edge."""
+    """Of one picture, differences of natural logarithms, means over the pixels of the edge: step, the lit side less the
+    dark one, with its sign; bright and dark, how far the line lies above or below both sides; overshoot, their sum.
+    Then the correlation of the detail with the truth's within the band of the edge, and away from it. None where there
+    is no such edge."""
 
     step: float | None
     bright: float | None
@@ -43,18 +47,22 @@ class EdgeScores:
 
 
 def profile(residual: np.ndarray, shadow: np.ndarray, mask: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Median of a residual [H, W] over the pixels of `mask` by signed distance to the border of a shadow, bool [H, W]: [B], nan where none falls.
+    """Median of a residual [H, W] over the pixels of `mask` by signed distance to the border of a shadow, bool [H, W]:
+    [B], nan where none falls.
 
     `edges` [B + 1]: the bins' limits in pixels, negative inside the shadow.
     """
     distance = signed_distance(shadow)
-    bins = [residual[mask & (distance >= low) & (distance < high)] for low, high in zip(edges[:-1], edges[1:], strict=True)]
+    bins = [residual[mask & (distance >= low) & (distance < high)]
+            for low, high in zip(edges[:-1], edges[1:], strict=True)]
     return np.array([np.median(values) if len(values) else np.nan for values in bins])
 
 
-def score_edges(log: np.ndarray, log_true: np.ndarray, shadow: np.ndarray, mask: np.ndarray, height: float, lit: np.ndarray | None = None) -> EdgeScores:
-    """Logarithms of linear green of answer and truth [H, W]; shadow, mask bool [H, W]; height: the face's, in pixels. `lit` bool [H, W]: where along the
-    edge the light really steps (a terminator fades, and is no edge for a narrow window); everywhere if None."""
+def score_edges(log: np.ndarray, log_true: np.ndarray, shadow: np.ndarray, mask: np.ndarray, height: float,
+                lit: np.ndarray | None = None) -> EdgeScores:
+    """Logarithms of linear green of answer and truth [H, W]; shadow, mask bool [H, W]; height: the face's, in pixels.
+    `lit` bool [H, W]: where along the edge the light really steps (a terminator fades, and is no edge for a narrow
+    window); everywhere if None."""
     if not (shadow & mask).any() or not (~shadow & mask).any():
         return EdgeScores(None, None, None, None, None)
     distance, residual = signed_distance(shadow), np.where(mask, log - log_true, 0).astype(np.float32)
@@ -72,15 +80,18 @@ def score_edges(log: np.ndarray, log_true: np.ndarray, shadow: np.ndarray, mask:
     above = np.maximum(line - np.maximum(bright_side, dark_side), 0)
     below = np.maximum(np.minimum(bright_side, dark_side) - line, 0)
     band = cv2.dilate(at.astype(np.uint8), np.ones((2 * max(round(LINE * height), 1) + 1,) * 2, np.uint8)) > 0
-    return EdgeScores(float((bright_side - dark_side).mean()), float(above.mean()), float(below.mean()), *_detail(log, log_true, mask, band))
+    return EdgeScores(float((bright_side - dark_side).mean()), float(above.mean()), float(below.mean()),
+                      *_detail(log, log_true, mask, band))
 
 
 def _between(distance: np.ndarray, height: float) -> np.ndarray:
     return (distance > SIDES[0] * height) & (distance < SIDES[1] * height)
 
 
-def _detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray, band: np.ndarray) -> tuple[float | None, float | None]:
-    """Correlation of the two logarithms between 1 and 3 px, as pictures.detail has it, within a band [H, W] and off it."""
+def _detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray,
+            band: np.ndarray) -> tuple[float | None, float | None]:
+    """Correlation of the two logarithms between 1 and 3 px, as pictures.detail has it, within a band [H, W] and off
+    it."""
     inner = cv2.erode(mask.astype(np.uint8), np.ones((15, 15))) > 0
     filtered = []
     for picture in (log, log_true):
@@ -89,5 +100,6 @@ def _detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray, band: np.nd
     found = []
     for where in (inner & band, inner & ~band):
         one, true = (picture[where] for picture in filtered)
-        found.append(None if len(one) < LEAST_PIXELS else float(np.corrcoef(one, true)[0, 1]) if one.std() > 1e-9 else 0.0)
+        found.append(None if len(one) < LEAST_PIXELS else float(np.corrcoef(one, true)[0, 1]) if one.std() > 1e-9
+                     else 0.0)
     return found[0], found[1]

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skin, brows, lips and beard scored apart: a mean over a face is a mean over its skin, and hides what became of the rest.
+"""Skin, brows, lips and beard scored apart: a mean over a face is a mean over its skin, and hides what became of the
+rest.
 
 All parts share the one gain per channel of the whole face: a brow that is bleached is an error, not a tone.
 """
@@ -19,8 +20,8 @@ LEAST_TEXELS = 100
 
 @dataclass(frozen=True)
 class PartScore:
-    """psnr in dB, in sRGB; bias: median of the grey log(answer / truth), above 0 where the part is too bright; deviation: its standard deviation within
-    the part; texels: how many there are."""
+    """psnr in dB, in sRGB; bias: median of the grey log(answer / truth), above 0 where the part is too bright;
+    deviation: its standard deviation within the part; texels: how many there are."""
 
     psnr: float
     bias: float
@@ -32,5 +33,6 @@ def score_parts(answer: np.ndarray, truth: np.ndarray, parts: dict[str, np.ndarr
     """Linear colours of the face's texels [N, 3]; parts: bool [N] each. Parts of few texels are left out."""
     toned = to_tone(answer, truth.mean(0))
     ratio = log_ratio(toned, truth)
-    return {name: PartScore(to_decibels(squared_error(toned[where], truth[where])), float(np.median(ratio[where])), float(ratio[where].std()), int(where.sum()))
+    return {name: PartScore(to_decibels(squared_error(toned[where], truth[where])), float(np.median(ratio[where])),
+                            float(ratio[where].std()), int(where.sum()))
             for name, where in parts.items() if where.sum() >= LEAST_TEXELS}

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measures of one picture against its truth: PSNR, SSIM, FLIP, the pores' correlation, and what is left of a shadow's step.
+"""Measures of one picture against its truth: PSNR, SSIM, FLIP, the pores' correlation, and what is left of a shadow's
+step.
 
-Pictures are sRGB float32 [H, W, 3] in [0, 1], masks bool [H, W]. The gain per channel, in linear light, takes out what a skin tone would supply.
+Pictures are sRGB float32 [H, W, 3] in [0, 1], masks bool [H, W]. The gain per channel, in linear light, takes out what
+a skin tone would supply.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ from core.imaging import images
 
 def face_box(mask: np.ndarray) -> tuple[slice, slice]:
     """Rows and columns about a mask [H, W], by a margin wider than any of the measures' filters."""
-    return tuple(slice(max(side[0] - 40, 0), side[-1] + 41) for side in (np.flatnonzero(mask.any(axis)) for axis in (1, 0)))
+    return tuple(slice(max(side[0] - 40, 0), side[-1] + 41)
+                 for side in (np.flatnonzero(mask.any(axis)) for axis in (1, 0)))
 
 
 def with_gain(predicted: np.ndarray, true: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -38,8 +41,10 @@ def differences(predicted: np.ndarray, true: np.ndarray, mask: np.ndarray) -> di
     a, b = (np.where(mask[..., None], picture, 0.5).astype(np.float64) for picture in (predicted, true))
     error = ((a - b)[mask] ** 2).mean()
     _, ssim = structural_similarity(a, b, channel_axis=2, data_range=1.0, full=True)
-    flip, _, _ = flip_evaluate(b.astype(np.float32), a.astype(np.float32), "LDR", applyMagma=False, computeMeanError=False)
-    return {"psnr": float(-10 * np.log10(max(error, 1e-12))), "ssim": float(ssim[mask].mean()), "flip": float(np.squeeze(flip)[mask].mean())}
+    flip, _, _ = flip_evaluate(b.astype(np.float32), a.astype(np.float32), "LDR", applyMagma=False,
+                               computeMeanError=False)
+    return {"psnr": float(-10 * np.log10(max(error, 1e-12))), "ssim": float(ssim[mask].mean()),
+            "flip": float(np.squeeze(flip)[mask].mean())}
 
 
 def detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray) -> float:
@@ -53,7 +58,8 @@ def detail(log: np.ndarray, log_true: np.ndarray, mask: np.ndarray) -> float:
 
 
 def shadow_step(residual: np.ndarray, mask: np.ndarray, shadow: np.ndarray) -> float:
-    """Median of log(predicted / true) [H, W] along the lit side of the shadow's edge less the dark side's; nan where the boundary is too short to speak of."""
+    """Median of log(predicted / true) [H, W] along the lit side of the shadow's edge less the dark side's; nan where
+    the boundary is too short to speak of."""
     sides = [residual[band & mask] for band in edge_bands(shadow)]
     return float(np.median(sides[0]) - np.median(sides[1])) if min(map(len, sides)) > 500 else math.nan
 

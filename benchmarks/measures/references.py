@@ -26,12 +26,14 @@ def flat_colour(filmed: np.ndarray, where: np.ndarray) -> np.ndarray:
 
 
 def blur_divided_out(filmed: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """Linear [H, W, 3] over its own blur, each channel apart, times the mean; only the pixels `where` bool [H, W] enter the blur."""
+    """Linear [H, W, 3] over its own blur, each channel apart, times the mean; only the pixels `where` bool [H, W] enter
+    the blur."""
     deviation = BLURRED * face_height(where)
     weight = where.astype(np.float32)
     share = np.maximum(cv2.GaussianBlur(weight, (0, 0), deviation), 1e-4)[..., None]
     blurred = cv2.GaussianBlur((filmed * weight[..., None]).astype(np.float32), (0, 0), deviation) / share
-    return np.where(where[..., None], filmed / np.maximum(blurred, DARKEST) * filmed[where].mean(0), filmed).astype(np.float32)
+    return np.where(where[..., None], filmed / np.maximum(blurred, DARKEST) * filmed[where].mean(0),
+                    filmed).astype(np.float32)
 
 
 def face_height(where: np.ndarray) -> float:

@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Albedo error up to one light that all captures of a head share.
 
-A soft light of the normals cannot be told from skin by one capture, and a scan's own map holds some: no answer is blamed for it. What differs between the
-captures of one head is the light that was filmed, and stays an error.
+A soft light of the normals cannot be told from skin by one capture, and a scan's own map holds some: no answer is
+blamed for it. What differs between the captures of one head is the light that was filmed, and stays an error.
 
-The light is grey and of second order: log(answer / truth) = c . Y(n), nine numbers c. It is fitted in the logarithm, where it is positive whatever c is,
-where an answer twice too bright counts like one twice too dark, and where the fit is linear. Least squares with Huber's weights (Huber 1964), so that a
-shadow that was left in, which is local, does not bend a light that is not.
+The light is grey and of second order: log(answer / truth) = c . Y(n), nine numbers c. It is fitted in the logarithm,
+where it is positive whatever c is, where an answer twice too bright counts like one twice too dark, and where the fit
+is linear. Least squares with Huber's weights (Huber 1964), so that a shadow that was left in, which is local, does not
+bend a light that is not.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ TO_DEVIATION = 1.4826
 
 @dataclass(frozen=True)
 class SharedLight:
-    """coefficients [9] of the orthonormal functions; deviation: the standard deviation of the light's logarithm over the texels it was fitted to."""
+    """coefficients [9] of the orthonormal functions; deviation: the standard deviation of the light's logarithm over
+    the texels it was fitted to."""
 
     coefficients: np.ndarray
     deviation: float
@@ -41,7 +43,8 @@ def log_ratio(answer: np.ndarray, truth: np.ndarray) -> np.ndarray:
 
 
 def fit_light(ratios: list[np.ndarray], normals: list[np.ndarray]) -> SharedLight:
-    """One light for all captures. Per capture a grey log ratio [N_k] and unit normals [N_k, 3] in axes of the head; each capture has the same say.
+    """One light for all captures. Per capture a grey log ratio [N_k] and unit normals [N_k, 3] in axes of the head;
+    each capture has the same say.
 
     The captures' exposures are not the light's: each ratio is taken about its own median.
     """

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Two slopes that tell skin from light, on pairs of pictures that differ in one of them alone.
 
-Change only the pigment: the answer's albedo should follow (slope 1). Change only the light: it should not (slope 0). Doing nothing scores 1 and 1, a flat
-colour 0 and 0; no answer that treats pigment and light alike can score better than one number for both.
+Change only the pigment: the answer's albedo should follow (slope 1). Change only the light: it should not (slope 0).
+Doing nothing scores 1 and 1, a flat colour 0 and 0; no answer that treats pigment and light alike can score better than
+one number for both.
 """
 
 from __future__ import annotations
@@ -13,11 +14,14 @@ import numpy as np
 DARKEST = 1e-3
 
 
-def slope(answers: tuple[np.ndarray, np.ndarray], causes: tuple[np.ndarray, np.ndarray], where: np.ndarray) -> float | None:
-    """How far the change between two answers follows the change between their causes: least squares over the pixels `where` bool [H, W], all channels.
+def slope(answers: tuple[np.ndarray, np.ndarray], causes: tuple[np.ndarray, np.ndarray],
+          where: np.ndarray) -> float | None:
+    """How far the change between two answers follows the change between their causes: least squares over the pixels
+    `where` bool [H, W], all channels.
 
-    answers: two albedos; causes: the two true albedos, or the two pictures; linear [H, W, 3]. Changes are of logarithms, each channel about its mean, for
-    a gain is not judged. None where the causes hardly differ (by less than 1 % in deviation).
+    answers: two albedos; causes: the two true albedos, or the two pictures; linear [H, W, 3]. Changes are of
+    logarithms, each channel about its mean, for a gain is not judged. None where the causes hardly differ (by less than
+    1 % in deviation).
     """
     moved, cause = (_change(pair, where) for pair in (answers, causes))
     return float((moved * cause).sum() / (cause * cause).sum()) if cause.std() > 0.01 else None

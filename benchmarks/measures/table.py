@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one form of table: methods down, measures across; per cell the mean over people and their spread, and of each method's difference from another,
-person by person, the mean and its standard error.
+"""The one form of table: methods down, measures across; per cell the mean over people and their spread, and of each
+method's difference from another, person by person, the mean and its standard error.
 
-People differ far more than methods do: means of four to ten of them that differ by less than the spread may yet differ for sure, and the paired
-differences tell. A cell holds only people who have that measure.
+People differ far more than methods do: means of four to ten of them that differ by less than the spread may yet differ
+for sure, and the paired differences tell. A cell holds only people who have that measure.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ Scores = dict[str, dict[str, dict[str, float | None]]]
 
 @dataclass(frozen=True)
 class Column:
-    """A measure: its heading with the unit, decimals, and which way is better: more (+1), less (-1), or neither (0), as of what is best near a value."""
+    """A measure: its heading with the unit, decimals, and which way is better: more (+1), less (-1), or neither (0), as
+    of what is best near a value."""
 
     label: str
     digits: int = 2
@@ -31,8 +32,8 @@ class Column:
 
 @dataclass(frozen=True)
 class Cell:
-    """mean and spread (standard deviation, None for one) over the people; difference and error: mean of the paired differences from the compared method
-    and its standard error (None for fewer than two people); people: how many."""
+    """mean and spread (standard deviation, None for one) over the people; difference and error: mean of the paired
+    differences from the compared method and its standard error (None for fewer than two people); people: how many."""
 
     mean: float
     spread: float | None
@@ -50,9 +51,11 @@ def summarise(scores: Scores, columns: dict[str, Column], against: str | None = 
             known = {person: value for person, row in people.items() if _is_known(value := row.get(measure))}
             if not known:
                 continue
-            pairs = [value - theirs for person, value in known.items() if _is_known(theirs := other.get(person, {}).get(measure))]
+            pairs = [value - theirs for person, value in known.items()
+                     if _is_known(theirs := other.get(person, {}).get(measure))]
             values = list(known.values())
-            found.setdefault(method, {})[measure] = Cell(float(np.mean(values)), _deviation(values), float(np.mean(pairs)) if pairs else None,
+            found.setdefault(method, {})[measure] = Cell(float(np.mean(values)), _deviation(values),
+                                                         float(np.mean(pairs)) if pairs else None,
                                                          standard_error(pairs), len(values))
     return found
 
@@ -63,38 +66,47 @@ def standard_error(differences: list[float]) -> float | None:
     return None if deviation is None else deviation / math.sqrt(len(differences))
 
 
-def to_markdown(found: dict[str, dict[str, Cell]], columns: dict[str, Column], title: str, against: str | None = None) -> str:
-    """A line per method: mean +- spread over people; with `against`, a second table of the paired differences +- their standard errors. A column that
-    nobody has is left out."""
+def to_markdown(found: dict[str, dict[str, Cell]], columns: dict[str, Column], title: str,
+                against: str | None = None) -> str:
+    """A line per method: mean +- spread over people; with `against`, a second table of the paired differences +- their
+    standard errors. A column that nobody has is left out."""
     shown = {name: column for name, column in columns.items() if any(name in row for row in found.values())}
     tables = [markdown([title, *(column.label for column in shown.values())],
-                       [[method, *(_mean_text(row.get(name), column) for name, column in shown.items())] for method, row in found.items()])]
+                       [[method, *(_mean_text(row.get(name), column) for name, column in shown.items())]
+                        for method, row in found.items()])]
     if against in found:
-        rows = [[method, *(_difference_text(row.get(name), column) for name, column in shown.items())] for method, row in found.items() if method != against]
+        rows = [[method, *(_difference_text(row.get(name), column) for name, column in shown.items())]
+                for method, row in found.items() if method != against]
         if any(cell is not None for row in rows for cell in row[1:]):
-            tables.append(markdown([f"less *{against}*, person by person", *(column.label for column in shown.values())], rows))
+            tables.append(markdown([f"less *{against}*, person by person",
+                                    *(column.label for column in shown.values())], rows))
     return "\n\n".join(tables)
 
 
 def to_record(found: dict[str, dict[str, Cell]], scores: Scores) -> dict:
     """What figures.write takes: per method the cells, and every person's figures behind them."""
-    return {"summary": {method: {name: {key: value for key, value in vars(cell).items() if value is not None} for name, cell in row.items()}
+    return {"summary": {method: {name: {key: value for key, value in vars(cell).items() if value is not None}
+                                 for name, cell in row.items()}
                         for method, row in found.items()},
-            "people": {method: {person: {name: value for name, value in row.items() if _is_known(value)} for person, row in people.items()}
+            "people": {method: {person: {name: value for name, value in row.items() if _is_known(value)}
+                                for person, row in people.items()}
                        for method, people in scores.items()}}
 
 
 def _mean_text(cell: Cell | None, column: Column) -> str | None:
     if cell is None:
         return None
-    return f"{round(cell.mean, column.digits) + 0.0:.{column.digits}f}" + ("" if cell.spread is None else f" ± {cell.spread:.{column.digits}f}")
+    return f"{round(cell.mean, column.digits) + 0.0:.{column.digits}f}" + ("" if cell.spread is None
+                                                                           else f" ± {cell.spread:.{column.digits}f}")
 
 
 def _difference_text(cell: Cell | None, column: Column) -> str | None:
-    """In bold where it is better than the compared method by more than two standard errors, in italics where it is worse by as much."""
+    """In bold where it is better than the compared method by more than two standard errors, in italics where it is
+    worse by as much."""
     if cell is None or cell.difference is None:
         return None
-    text = f"{cell.difference:+.{column.digits}f}" + ("" if cell.error is None else f" ± {cell.error:.{column.digits}f}")
+    text = f"{cell.difference:+.{column.digits}f}" + ("" if cell.error is None
+                                                      else f" ± {cell.error:.{column.digits}f}")
     if cell.error is None or not column.better or abs(cell.difference) <= 2 * cell.error:
         return text
     return f"**{text}**" if cell.difference * column.better > 0 else f"*{text}*"

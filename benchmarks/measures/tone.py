@@ -9,7 +9,8 @@ import numpy as np
 from core.imaging import images
 
 BEST_PSNR = 60.0
-"""What two equal pictures get, in dB, and all that differ by less than eight bits can tell: a mean over people stays one."""
+"""What two equal pictures get, in dB, and all that differ by less than eight bits can tell: a mean over people stays
+one."""
 
 
 def to_tone(answer: np.ndarray, tone: np.ndarray) -> np.ndarray:
@@ -19,7 +20,8 @@ def to_tone(answer: np.ndarray, tone: np.ndarray) -> np.ndarray:
 
 def squared_error(answer: np.ndarray, truth: np.ndarray) -> float:
     """Mean squared difference in sRGB of linear colours [N, 3]."""
-    one, other = (images.linear_to_srgb(np.asarray(values, np.float32)).astype(np.float64) for values in (answer, truth))
+    one, other = (images.linear_to_srgb(np.asarray(values, np.float32)).astype(np.float64)
+                  for values in (answer, truth))
     return float(((one - other) ** 2).mean())
 
 
@@ -29,5 +31,6 @@ def to_decibels(error: float) -> float:
 
 
 def psnr_after_gain(answer: np.ndarray, truth: np.ndarray) -> float:
-    """PSNR in dB, in sRGB, of linear colours [N, 3] after the gain per channel that gives the answer the truth's mean."""
+    """PSNR in dB, in sRGB, of linear colours [N, 3] after the gain per channel that gives the answer the truth's
+    mean."""
     return to_decibels(squared_error(to_tone(answer, truth.mean(0)), truth))

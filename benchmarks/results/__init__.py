@@ -6,8 +6,8 @@
 
 Runs no benchmark: each leaves its record by its own --json (benchmarks/figures.py). NAME.py in here is the page
 docs/results/NAME.md: TITLE, SAYS (its line in the index), RECORDS, and `sections`, which takes the figures of these
-records in that order and gives headings with Markdown. told.py has the phrases with figures in the README and elsewhere.
---check writes nothing and ends with code 1 where a text is not as the records have it.
+records in that order and gives headings with Markdown. told.py has the phrases with figures in the README and
+elsewhere. --check writes nothing and ends with code 1 where a text is not as the records have it.
 
 No picture is made here of what is in the repository alone. teaser.jpg and gallery_NAME.jpg show solved captures:
 --captures names a folder with sample.wildcap (as `make demo` leaves it) and NAME.wildcap (benchmarks/people.py). Others

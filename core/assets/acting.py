@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built-in head cut open: lips and lids in two, with sockets and a mouth bag behind them, eyeballs, teeth and tongue.
+"""The built-in head cut open: lips and lids in two, with sockets and a mouth bag behind them, eyeballs, teeth and
+tongue.
 
-The head's vertices keep their numbers; what the cut doubles and what lies inside come after them. Everything is MakeHuman's
-(see NOTICE.md) but the eyeballs, which are spheres with a cornea where its eyes are.
+The head's vertices keep their numbers; what the cut doubles and what lies inside come after them. Everything is
+MakeHuman's (see NOTICE.md) but the eyeballs, which are spheres with a cornea where its eyes are.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ STRIP = 0.004  # UV: how far into the neighbouring skin a ring of the inner rim 
 
 @dataclass(frozen=True)
 class ActingHead:
-    """V vertices of the head, C copies on the lower side of the seams, P inner ones; the order of every array with V + C + P rows."""
+    """V vertices of the head, C copies on the lower side of the seams, P inner ones; the order of every array with V +
+    C + P rows."""
 
     copies: np.ndarray  # [C] the vertex that each copy doubles
     corners: np.ndarray  # [n, 3]: face of the head, corner, the copy it has now
@@ -45,7 +47,8 @@ class ActingHead:
     balls: np.ndarray  # [2, 4] centre and radius of the left and the right eyeball, metres
 
     def moved(self, offset: np.ndarray) -> np.ndarray:
-        """A displacement of the body [N, 3], decimetres, as one of the open head [V + C + P, 3], decimetres, in our axes."""
+        """A displacement of the body [N, 3], decimetres, as one of the open head [V + C + P, 3], decimetres, in our
+        axes."""
         fine = self.matrix @ offset
         return np.stack([fine[:, 0], -fine[:, 2], fine[:, 1]], -1)
 
@@ -105,14 +108,20 @@ def open_head(base: Base, builder: HeadBuilder, body: np.ndarray, uvs: np.ndarra
     balls = [_ball(base, body, side) for side in "lr"]
     scale = _scale(base, body)
     balls = np.array([[*_placed(centre[None], body, base)[0], radius * scale] for centre, radius in balls])
-    return ActingHead(copies, np.stack([face, corner, outer[face, corner]], 1), np.concatenate(faces), np.concatenate(slot_rows), np.concatenate(uv_rows),
-                      kinds, np.pad(anchors, ((0, missing), (0, 0))), np.pad(weights, ((0, missing), (0, 0))), rest, _seam(rest, copies),
-                      np.searchsorted(builder.used, [[chain[0], chain[-1]] for chain in (builder._lips[0], *(upper for upper, _ in builder._lids.values()))]),
+    return ActingHead(copies, np.stack([face, corner, outer[face, corner]], 1), np.concatenate(faces),
+                      np.concatenate(slot_rows), np.concatenate(uv_rows),
+                      kinds, np.pad(anchors, ((0, missing), (0, 0))), np.pad(weights, ((0, missing), (0, 0))), rest,
+                      _seam(rest, copies),
+                      np.searchsorted(builder.used,
+                                      [[chain[0], chain[-1]]
+                                       for chain in (builder._lips[0],
+                                                     *(upper for upper, _ in builder._lids.values()))]),
                       sparse.vstack(matrices).tocsr(), balls)
 
 
 def _split(base: Base, builder: HeadBuilder) -> tuple[list, list, np.ndarray, sparse.csr_matrix]:
-    """Outer and inner polygons with both rims of each seam; which vertex of the welded head stands for each [N']; body -> vertices [N', N].
+    """Outer and inner polygons with both rims of each seam; which vertex of the welded head stands for each [N']; body
+    -> vertices [N', N].
 
     The lower lip has fewer vertices than the upper one: it gets new ones, numbered after the body's.
     """
@@ -129,10 +138,12 @@ def _split(base: Base, builder: HeadBuilder) -> tuple[list, list, np.ndarray, sp
             rows += [(between[-1] - count, lower[a], 1 - t), (between[-1] - count, lower[b], t)]
         extra[lower[a], lower[b]], extra[lower[b], lower[a]] = between, between[::-1]
     r, c, v = zip(*rows, strict=True)
-    extended = sparse.vstack([sparse.identity(count), sparse.csr_matrix((v, (r, c)), shape=(len(parent) - count, count))]).tocsr()
+    extended = sparse.vstack([sparse.identity(count),
+                              sparse.csr_matrix((v, (r, c)), shape=(len(parent) - count, count))]).tocsr()
 
     def grown(polygon):
-        return [i for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True) for i in (int(a), *extra.get((a, b), ()))]
+        return [i for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True)
+                for i in (int(a), *extra.get((a, b), ()))]
 
     cavities = torch.load(base.folder / "template_mesh_internal_cavities.pth", weights_only=True)
     inner = [base.faces[int(i)] for i in cavities["face_indices"]]
@@ -146,7 +157,8 @@ def _split(base: Base, builder: HeadBuilder) -> tuple[list, list, np.ndarray, sp
     return [grown(p) for p in builder._open_polygons()], [grown(p) for p in kept], parent, extended
 
 
-def _targets(builder: HeadBuilder, polygons: list, inner: list, parent: np.ndarray, used: np.ndarray, number: np.ndarray) -> np.ndarray:
+def _targets(builder: HeadBuilder, polygons: list, inner: list, parent: np.ndarray, used: np.ndarray,
+             number: np.ndarray) -> np.ndarray:
     """The vertex of the subdivided head that each vertex of the subdivided open head came from, -1 for inner ones."""
     coarse = np.full(len(parent), -1)
     coarse[builder.used] = np.arange(len(builder.used))
@@ -208,11 +220,14 @@ def _soft(placed: np.ndarray, strips: np.ndarray, copies: np.ndarray, welded: in
     weights = 1 / (distance**2 + 1e-8)
     depth = ring[strips].min(1)
     eye = placed[strips].mean(1)[:, 2] > -0.02
-    return np.full(len(inner), SOFT), uv, source[rim[nearest]], weights / weights.sum(1, keepdims=True), np.where(eye | (depth < 3), SKIN, MOUTH)
+    return np.full(len(inner),
+                   SOFT), uv, source[rim[nearest]], weights / weights.sum(1, keepdims=True), np.where(eye | (depth < 3),
+                                                                                                      SKIN, MOUTH)
 
 
 def _ball(base: Base, body: np.ndarray, side: str) -> tuple[np.ndarray, float]:
-    """Centre [3] and radius of an eye, decimetres: half as wide as MakeHuman's eye, which is a sphere but for its cornea, and touching its back."""
+    """Centre [3] and radius of an eye, decimetres: half as wide as MakeHuman's eye, which is a sphere but for its
+    cornea, and touching its back."""
     points = body[base.groups[f"helper-{side}-eye"]]
     low, high = points.min(0), points.max(0)
     radius = (high[0] - low[0]) / 2
@@ -220,15 +235,19 @@ def _ball(base: Base, body: np.ndarray, side: str) -> tuple[np.ndarray, float]:
 
 
 def _balls(base: Base, body: np.ndarray) -> list[tuple]:
-    """Both eyeballs: rings around the gaze; UV grows with the angle from the pupil, so that iris and white are rings of a picture."""
+    """Both eyeballs: rings around the gaze; UV grows with the angle from the pupil, so that iris and white are rings of
+    a picture."""
     around, along = 32, 20
     angle = np.concatenate([np.linspace(0, 0.62, 10), np.linspace(0.62, np.pi, along - 9)[1:]])  # finer on the cornea
-    bulge = 1 + 0.06 * np.clip(1 - (angle / 0.52) ** 2, 0, None)  # the cornea's summit stands 0.7 mm before the white's sphere
+    # the cornea's summit stands 0.7 mm before the white's sphere
+    bulge = 1 + 0.06 * np.clip(1 - (angle / 0.52) ** 2, 0, None)
     turn = np.arange(around) * 2 * np.pi / around
     ring = np.sin(angle)[1:-1, None] * bulge[1:-1, None]
-    body_of = np.stack([ring * np.cos(turn), ring * np.sin(turn), (np.cos(angle) * bulge)[1:-1, None] * np.ones(around)], -1).reshape(-1, 3)
+    body_of = np.stack([ring * np.cos(turn), ring * np.sin(turn),
+                        (np.cos(angle) * bulge)[1:-1, None] * np.ones(around)], -1).reshape(-1, 3)
     unit = np.concatenate([[[0, 0, bulge[0]]], body_of, [[0, 0, -1]]])
-    radius = 0.5 * (np.concatenate([[0], np.repeat(angle[1:-1], around), [np.pi]]) / np.pi) ** 0.6  # the iris gets the most of the picture
+    # the iris gets the most of the picture
+    radius = 0.5 * (np.concatenate([[0], np.repeat(angle[1:-1], around), [np.pi]]) / np.pi) ** 0.6
     turns = np.concatenate([[0], np.tile(turn, len(angle) - 2), [0]])
     uv = 0.5 + np.stack([radius * np.cos(turns), radius * np.sin(turns)], 1)
     rows = len(angle) - 2
@@ -238,7 +257,8 @@ def _balls(base: Base, body: np.ndarray) -> list[tuple]:
     for r in range(rows - 1):
         a, b = 1 + r * around, 1 + (r + 1) * around
         faces.append(np.stack([a + k, b + k, b + n, a + n], 1))
-    faces.append(np.stack([1 + (rows - 1) * around + n, 1 + (rows - 1) * around + k, np.full(around, len(unit) - 1), np.full(around, -1)], 1))
+    faces.append(np.stack([1 + (rows - 1) * around + n, 1 + (rows - 1) * around + k, np.full(around, len(unit) - 1),
+                           np.full(around, -1)], 1))
     faces = np.concatenate(faces)
     result = []
     for side, kind in (("l", LEFT_EYE), ("r", RIGHT_EYE)):
@@ -255,7 +275,8 @@ def _jaws(base: Base) -> list[tuple]:
         number = np.full(len(base.vertices), -1)
         number[members] = np.arange(len(members))
         faces = np.array([[number[i] for i in f] + [-1] * (4 - len(f)) for f in base.helper_faces(group)])
-        matrix = sparse.csr_matrix((np.ones(len(members)), (np.arange(len(members)), members)), shape=(len(members), len(base.vertices)))
+        matrix = sparse.csr_matrix((np.ones(len(members)), (np.arange(len(members)), members)),
+                                   shape=(len(members), len(base.vertices)))
         result.append((None, faces, np.full((len(members), 2), 0.5), JAWS, slot, matrix))
     return result
 

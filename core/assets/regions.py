@@ -17,7 +17,8 @@ _NOSE = (168, 417, 465, 343, 437, 420, 279, 358, 327, 326, 2, 97, 98, 129, 49, 1
 
 
 def face_outline(points: np.ndarray) -> np.ndarray:
-    """The outline of the face [72, 2] in `around`'s coordinates: the hull of MediaPipe's oval, a little higher on the forehead and fuller under the chin."""
+    """The outline of the face [72, 2] in `around`'s coordinates: the hull of MediaPipe's oval, a little higher on the
+    forehead and fuller under the chin."""
     outline = cv2.convexHull(around(points[list(OVAL)]).astype(np.float32))[:, 0].astype(np.float64)
     outline = _resampled(outline, 72)
     outline = (outline + np.roll(outline, 1, 0) + np.roll(outline, -1, 0)) / 3
@@ -34,18 +35,21 @@ def _resampled(outline: np.ndarray, count: int) -> np.ndarray:
 
 
 def around(points: np.ndarray) -> np.ndarray:
-    """[..., 3] -> cylinder coordinates [..., 2]: the angle around the head's vertical axis times 0.08 m, and height, both in metres."""
+    """[..., 3] -> cylinder coordinates [..., 2]: the angle around the head's vertical axis times 0.08 m, and height,
+    both in metres."""
     return np.stack([np.arctan2(points[..., 0], 0.05 - points[..., 1]) * 0.08, points[..., 2]], -1)
 
 
 def distance_inside(points: np.ndarray, outline: np.ndarray) -> np.ndarray:
-    """Signed distance [N] in metres of surface points [N, 3] to an outline in `around`'s coordinates, positive inside."""
+    """Signed distance [N] in metres of surface points [N, 3] to an outline in `around`'s coordinates, positive
+    inside."""
     polygon = outline.astype(np.float32)
     return np.array([cv2.pointPolygonTest(polygon, (float(a), float(b)), True) for a, b in around(points)])
 
 
 def wanted_scale(vertices: np.ndarray, faces: np.ndarray, outline: np.ndarray, share: float = 0.70) -> np.ndarray:
-    """UV length per metre [F]: `share` of the unit square for the face, the rest for everything else, blended over 2 cm outside the outline."""
+    """UV length per metre [F]: `share` of the unit square for the face, the rest for everything else, blended over 2 cm
+    outside the outline."""
     centres = vertices[faces].mean(1)
     inside = distance_inside(centres, outline)
     blend = np.clip(1 + inside / 0.012, 0, 1)
@@ -71,7 +75,8 @@ def draw_masks(mesh: Mesh, points: np.ndarray) -> dict[str, np.ndarray]:
     signed = distance_inside(position.reshape(-1, 3), outline).reshape(size, size)
     soft = np.clip(signed / 0.0015 + 0.5, 0, 1)
     ears = _connected(_ear(position), size)
-    below = np.clip((-0.075 - 0.55 * position[..., 1] + 0.028 - position[..., 2]) / 0.003, 0, 1)  # a slanted plane from under the chin to the nape
+    # a slanted plane from under the chin to the nape
+    below = np.clip((-0.075 - 0.55 * position[..., 1] + 0.028 - position[..., 2]) / 0.003, 0, 1)
     masks = {"face": soft * (1 - ears)}
     masks["lips"] = _filled(uv[list(LIPS)], size)
     masks["brows"] = np.maximum(*(_filled(uv[list(b)], size, grow=6) for b in BROWS))
@@ -116,7 +121,8 @@ def _ear(position: np.ndarray) -> np.ndarray:
 def _connected(mask: np.ndarray, size: int) -> np.ndarray:
     """Holes closed, specks removed, edge softened."""
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
-    closed = cv2.morphologyEx(cv2.morphologyEx(mask.astype(np.uint8) * 255, cv2.MORPH_CLOSE, disc), cv2.MORPH_OPEN, disc)
+    closed = cv2.morphologyEx(cv2.morphologyEx(mask.astype(np.uint8) * 255, cv2.MORPH_CLOSE, disc), cv2.MORPH_OPEN,
+                              disc)
     return cv2.GaussianBlur(cv2.dilate(closed, disc), (0, 0), 2).astype(np.float32) / 255
 
 
@@ -138,4 +144,5 @@ def _nostrils(mesh: Mesh, position: np.ndarray, nose: np.ndarray) -> np.ndarray:
     dark = np.zeros(len(mesh.vertices))
     dark[index] = np.clip((0.36 - free / 48) / 0.08, 0, 1)
     face, bary = rasterize_uv(mesh, len(nose))
-    return cv2.GaussianBlur(interpolate(dark[:, None], mesh.faces, face, bary)[..., 0].astype(np.float32), (0, 0), 2) * (nose > 0.05)
+    return cv2.GaussianBlur(interpolate(dark[:, None], mesh.faces, face, bary)[..., 0].astype(np.float32), (0, 0),
+                            2) * (nose > 0.05)

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The finished head that the extension opens without a solver: python -m core.assets.sample_head CAPTURE
 
-CAPTURE is the demo's, solved from the sample video. Maps and textures are stored at 1K with 8 bits and packed tightly, so that the extension stays
-small; the texture keeps a linear EXR, so that the head can be solved again after a stroke of the mask. Of the head there are the vertices only: UVs and
-faces are those of assets/head.obj.
+CAPTURE is the demo's, solved from the sample video. Maps and textures are stored at 1K with 8 bits and packed tightly,
+so that the extension stays small; the texture keeps a linear EXR, so that the head can be solved again after a stroke
+of the mask. Of the head there are the vertices only: UVs and faces are those of assets/head.obj.
 """
 
 from __future__ import annotations
@@ -43,17 +43,21 @@ def main() -> None:
         images.write_srgb(folder / "maps/clean_albedo.png", images.linear_to_srgb(below), small=True)
         shutil.copyfile(capture.maps_4k / STRANDS, folder / "maps" / STRANDS)
         for name in ("specular_albedo.png", "normal.png"):
-            images.write_data(folder / "maps" / name, images.resize(images.read_data(capture.maps_4k / name), SIZE, SIZE), small=True)
+            images.write_data(folder / "maps" / name,
+                              images.resize(images.read_data(capture.maps_4k / name), SIZE, SIZE), small=True)
         images.write_linear(folder / "texture.exr", images.read_linear(capture.texture), small=True)
         images.write_data(folder / "texture_confidence.exr", images.read_data(capture.texture_confidence), small=True)
-        images.write_data(folder / "maps/confidence.png", images.resize(images.read_mask(capture.maps / "confidence.png"), SURE, SURE), small=True)
+        images.write_data(folder / "maps/confidence.png",
+                          images.resize(images.read_mask(capture.maps / "confidence.png"), SURE, SURE), small=True)
 
 
 def _vertices(head: Path) -> str:
-    """The lines of an OBJ that place its vertices. Raises Problem where the others are not those of the built-in head."""
+    """The lines of an OBJ that place its vertices. Raises Problem where the others are not those of the built-in
+    head."""
     lines, own = (path.read_text(encoding="utf-8").splitlines() for path in (head, ASSETS / "head.obj"))
     if [line for line in lines if not line.startswith("v ")] != [line for line in own if not line.startswith("v ")]:
-        raise Problem(f"{head} has not the built-in head's faces and UVs.", "Name a capture whose template is the built-in head.")
+        raise Problem(f"{head} has not the built-in head's faces and UVs.",
+                      "Name a capture whose template is the built-in head.")
     return "".join(line + "\n" for line in lines if line.startswith("v "))
 
 

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The unwrap: a disc (head cut open along the back) laid out on the whole unit square with a wanted scale per triangle, without overlap.
+"""The unwrap: a disc (head cut open along the back) laid out on the whole unit square with a wanted scale per triangle,
+without overlap.
 
-It starts from a mean-value embedding, which is free of overlap (Floater 2003), and minimises the symmetric Dirichlet energy
-(Smith and Schaefer 2015) by scalable locally injective mappings (Rabinovich et al. 2017); steps never pass the first flip.
+It starts from a mean-value embedding, which is free of overlap (Floater 2003), and minimises the symmetric Dirichlet
+energy (Smith and Schaefer 2015) by scalable locally injective mappings (Rabinovich et al. 2017); steps never pass the
+first flip.
 """
 
 from __future__ import annotations
@@ -13,8 +15,10 @@ import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
 
-def unwrap(vertices: np.ndarray, faces: np.ndarray, mirror: np.ndarray, scale: np.ndarray, steps: int = 60) -> tuple[np.ndarray, np.ndarray]:
-    """UVs [T, 2] in the unit square, u = 0.5 the middle, and face_uvs [F, 3]. `scale` [F]: wanted UV length per metre; `mirror` [V]: the mirrored vertex."""
+def unwrap(vertices: np.ndarray, faces: np.ndarray, mirror: np.ndarray, scale: np.ndarray,
+           steps: int = 60) -> tuple[np.ndarray, np.ndarray]:
+    """UVs [T, 2] in the unit square, u = 0.5 the middle, and face_uvs [F, 3]. `scale` [F]: wanted UV length per metre;
+    `mirror` [V]: the mirrored vertex."""
     cut_faces, origin, twin, seam_left, seam_right, ring = _cut_open(vertices, faces, mirror)
     points = vertices[origin]
     fixed, start = _boundary(points, seam_left, seam_right, ring)
@@ -59,7 +63,8 @@ def _cut_open(vertices, faces, mirror):
 
 
 def _boundary(points, seam_left, seam_right, ring):
-    """Which coordinates are held (bool [T, 2]) and the boundary's start: neck below, seam on the sides and from both sides along the top."""
+    """Which coordinates are held (bool [T, 2]) and the boundary's start: neck below, seam on the sides and from both
+    sides along the top."""
     fixed, start = np.zeros((len(points), 2), bool), np.full((len(points), 2), np.nan)
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points[seam_left], axis=0), axis=1))])
     length /= length[-1]
@@ -91,7 +96,8 @@ def _mean_value_embedding(points, faces, fixed, start):
         rows += [i, i]
         columns += [j, o]
         values += [half / la, half / lb]
-    weights = sparse.csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(len(points),) * 2)
+    weights = sparse.csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
+                                shape=(len(points),) * 2)
     laplacian = sparse.diags(np.asarray(weights.sum(1)).ravel()) - weights
     uv = np.where(held[:, None], start, 0)
     solver = splu(laplacian[~held][:, ~held].tocsc())
@@ -108,14 +114,17 @@ def _rest_shapes(corners):
     shape = np.stack([np.stack([la, x], -1), np.stack([np.zeros_like(la), y], -1)], 1)
     equilateral = np.array([[1, 0.5], [0, np.sqrt(0.75)]])
     u, sigma, vt = np.linalg.svd(shape @ np.linalg.inv(equilateral))
-    sigma[:, 1] = np.maximum(sigma[:, 1], sigma[:, 0] / 5)  # a sliver may open up: nothing else would gain from keeping it thin
+    # a sliver may open up: nothing else would gain from keeping it thin
+    sigma[:, 1] = np.maximum(sigma[:, 1], sigma[:, 0] / 5)
     return (u * sigma[:, None]) @ vt @ equilateral
 
 
 def _minimise(uv, faces, rest, fixed, twin, steps):
-    """SLIM: the energy's quadratic proxy at the present map (weights in closed form from its singular values), solved, then a line search."""
+    """SLIM: the energy's quadratic proxy at the present map (weights in closed form from its singular values), solved,
+    then a line search."""
     inverse, area = np.linalg.inv(rest), np.linalg.det(rest) / 2
-    hats = np.stack([-inverse.sum(1), inverse[:, 0], inverse[:, 1]], 1)  # [F, 3, 2] gradients of the corners' hat functions
+    # [F, 3, 2] gradients of the corners' hat functions
+    hats = np.stack([-inverse.sum(1), inverse[:, 0], inverse[:, 1]], 1)
     products = np.einsum("fkb,flb->fkl", hats, hats) * area[:, None, None]
     dof = 2 * faces[:, :, None] + np.arange(2)  # [F, 3, 2]
     dof = dof.reshape(-1, 6)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m core batch: plan, run, status, retry, accept, review, commands, task. Standard library only; Ray is imported where a batch runs on it."""
+"""python -m core batch: plan, run, status, retry, accept, review, commands, task. Standard library only; Ray is
+imported where a batch runs on it."""
 
 from __future__ import annotations
 
@@ -37,26 +38,46 @@ NONE = "none"
 def add_commands(commands) -> None:
     """Adds `batch` and `slim` to the subparsers of `python -m core`."""
     slim_command.add_commands(commands)
-    many = commands.add_parser("batch", help="many faces: plan them from a table, run them here or on a farm, review them")
+    many = commands.add_parser("batch",
+                               help="many faces: plan them from a table, run them here or on a farm, review them")
     many = many.add_subparsers(required=True, metavar="plan|run|status|retry|accept|review|commands|task")
-    plan = many.add_parser("plan", help="make a batch of a table of videos, or of a folder of them; planned again, it takes in what is new")
-    plan.add_argument("shots", metavar="SHOTS", type=Path, help=f"a CSV with the columns {', '.join(HEADINGS)}, of which video alone is needed; or a folder")
+    plan = many.add_parser("plan",
+                           help="make a batch of a table of videos, or of a folder of them; planned again, it takes in "
+                                "what is new")
+    plan.add_argument("shots", metavar="SHOTS", type=Path,
+                      help=f"a CSV with the columns {', '.join(HEADINGS)}, of which video alone is needed; or a folder")
     plan.add_argument("batch", metavar="BATCH", type=Path, help="the batch's folder, with a capture for each face")
     plan.add_argument("--quality", choices=settings.QUALITIES, default="standard")
-    plan.add_argument("--gate", choices=GATES, help="artist: no face is solved before somebody has looked at its shadow mask; automatic: at once")
-    plan.add_argument("--deliver", metavar="PRESET", help="deliver each head for that program as well (`presets` lists them); none: no more")
-    plan.add_argument("--to", metavar="FOLDER", type=Path, help="folder of the deliveries; without it they lie in the captures")
-    plan.add_argument("--blender", metavar="PROGRAM", help="a Blender with the extension, which renders a contact sheet of each face; none: no more")
+    plan.add_argument(
+        "--gate",
+        choices=GATES,
+        help="artist: no face is solved before somebody has looked at its shadow mask; automatic: at once",
+    )
+    plan.add_argument("--deliver", metavar="PRESET",
+                      help="deliver each head for that program as well (`presets` lists them); none: no more")
+    plan.add_argument("--to", metavar="FOLDER", type=Path,
+                      help="folder of the deliveries; without it they lie in the captures")
+    plan.add_argument("--blender", metavar="PROGRAM",
+                      help="a Blender with the extension, which renders a contact sheet of each face; none: no more")
     command_settings.add_assignments(plan, "run")
     plan.set_defaults(command=_plan)
-    for word, words in (("run", "do what is left; what has stopped with a problem stays"), ("retry", "the same, and what has stopped is tried again")):
+    for word, words in (("run", "do what is left; what has stopped with a problem stays"),
+                        ("retry", "the same, and what has stopped is tried again")):
         run = many.add_parser(word, help=words)
         run.add_argument("batch", metavar="BATCH", type=Path)
         run.add_argument("names", metavar="NAME", nargs="*", help="faces; without one, all")
         run.add_argument("--on", choices=("local", "ray"), default="local", help="this machine, or a cluster of Ray's")
-        run.add_argument("--address", help="Ray's head node, as `ray start` tells it; without it, this machine becomes a cluster of one")
-        run.add_argument("--at-once", metavar="N", type=int, help="faces that this machine works on at the same time, else 1")
-        run.add_argument("--cores", metavar="N", type=int, help="cores of a node of Ray's that a task takes, else 2: the same number gives the same bytes")
+        run.add_argument("--address",
+                         help="Ray's head node, as `ray start` tells it; without it, this machine becomes a cluster of "
+                              "one")
+        run.add_argument("--at-once", metavar="N", type=int,
+                         help="faces that this machine works on at the same time, else 1")
+        run.add_argument(
+            "--cores",
+            metavar="N",
+            type=int,
+            help="cores of a node of Ray's that a task takes, else 2: the same number gives the same bytes",
+        )
         run.add_argument("--until", choices=[group.name for group in GROUPS], help="end each face with this task")
         run.set_defaults(command=_run, retry=word == "retry")
     status = many.add_parser("status", help="say how far each face is")
@@ -69,11 +90,16 @@ def add_commands(commands) -> None:
     review = many.add_parser("review", help="write the page that shows all faces, those to look at first in front")
     review.add_argument("batch", metavar="BATCH", type=Path)
     review.set_defaults(command=_review)
-    lines = many.add_parser("commands", help="one line for each task that is left: its name, the task it waits for, and the command")
+    lines = many.add_parser(
+        "commands", help="one line for each task that is left: its name, the task it waits for, and the command"
+    )
     lines.add_argument("batch", metavar="BATCH", type=Path)
-    lines.add_argument("--python", default=sys.executable, help="the solver's Python on the machines that will run them")
-    lines.add_argument("--wildcap", metavar="FOLDER", default=ROOT, help="WildCap's folder on those machines, the one that holds core")
-    lines.add_argument("--flamenco", action="store_true", help="a line of JSON for each face instead: a job to submit to Flamenco (docs/farm.md)")
+    lines.add_argument("--python", default=sys.executable,
+                       help="the solver's Python on the machines that will run them")
+    lines.add_argument("--wildcap", metavar="FOLDER", default=ROOT,
+                       help="WildCap's folder on those machines, the one that holds core")
+    lines.add_argument("--flamenco", action="store_true",
+                       help="a line of JSON for each face instead: a job to submit to Flamenco (docs/farm.md)")
     lines.set_defaults(command=_commands)
     task = many.add_parser("task", help="do one task of one face, as a scheduler asks for it")
     task.add_argument("batch", metavar="BATCH", type=Path)
@@ -114,7 +140,8 @@ def _with_options(batch: Batch, options: argparse.Namespace) -> Batch:
 def _refuse_strangers(root: Path) -> None:
     """Raises Problem for a folder that holds something and is no batch."""
     try:
-        strangers = sorted(path.name for path in root.iterdir()) if root.is_dir() and not (root / NAME).is_file() else []
+        strangers = (sorted(path.name for path in root.iterdir()) if root.is_dir() and not (root / NAME).is_file()
+                     else [])
     except OSError as error:
         raise storage_problem(error, root) from error
     if strangers:
@@ -125,7 +152,8 @@ def _run(options: argparse.Namespace) -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     batch = read_batch(options.batch)
     faces = [batch.face(name) for name in dict.fromkeys(options.names)] or list(batch.faces)
-    for flag, value, where in (("--at-once", options.at_once, "local"), ("--cores", options.cores, "ray"), ("--address", options.address, "ray")):
+    for flag, value, where in (("--at-once", options.at_once, "local"), ("--cores", options.cores, "ray"),
+                               ("--address", options.address, "ray")):
         if value is not None and options.on != where:
             raise Problem(f"{flag} goes with --on {where} only.", f"Add --on {where}, or leave {flag} out.")
         if isinstance(value, int) and value < 1:
@@ -134,15 +162,16 @@ def _run(options: argparse.Namespace) -> int:
         if options.on == "ray":
             from .ray_cluster import run_on_ray
 
-            tally = run_on_ray(batch, faces, options.retry, _tell, options.until, options.address, options.cores or CORES)
+            tally = run_on_ray(batch, faces, options.retry, _tell, options.until, options.address,
+                               options.cores or CORES)
         else:
             tally = run_local(batch, faces, options.at_once or 1, options.retry, _tell, options.until)
     return _sum_up(tally, len(faces))
 
 
 def _sum_up(tally: Tally, of: int) -> int:
-    counts = [(tally.count(DONE), "done"), (tally.count(WAITING), "waiting for the artist"), (tally.count(STOPPED), "stopped"),
-              (of - len(tally.ended) + tally.count(CANCELLED), "not reached")]
+    counts = [(tally.count(DONE), "done"), (tally.count(WAITING), "waiting for the artist"),
+              (tally.count(STOPPED), "stopped"), (of - len(tally.ended) + tally.count(CANCELLED), "not reached")]
     print(f"{of} face{'' if of == 1 else 's'}: " + ", ".join(f"{count} {words}" for count, words in counts if count))
     return 2 if tally.count(STOPPED) else 130 if counts[-1][0] else 0
 
@@ -163,7 +192,8 @@ def _status(options: argparse.Namespace) -> int:
     with contextlib.suppress(Problem):
         holder = lease.holder(batch.root / "lock")
         if holder:
-            print(f"The batch is being run on {str(holder['host']).partition('/')[0]} (process {holder['pid']}, since {holder['since']}).")
+            print(f"The batch is being run on {str(holder['host']).partition('/')[0]} (process {holder['pid']}, since "
+                  f"{holder['since']}).")
     return 0
 
 
@@ -203,10 +233,12 @@ def _task(options: argparse.Namespace) -> int:
 
     for each in (signal.SIGINT, signal.SIGTERM):  # a scheduler ends a task by either
         signal.signal(each, stop)
-    final = run_task(batch, face, group, lambda message: print_message(message, face.capture, line), lambda: bool(stopped))
+    final = run_task(batch, face, group, lambda message: print_message(message, face.capture, line),
+                     lambda: bool(stopped))
     if isinstance(final, Failed):
         line.clear()
         raise Problem(final.problem, final.remedy)
-    line.keep("Cancelled; finished stages are kept." if isinstance(final, Cancelled) else f"{face.name}: {group.label.lower()} done")
+    line.keep("Cancelled; finished stages are kept." if isinstance(final, Cancelled)
+              else f"{face.name}: {group.label.lower()} done")
     return 130 if isinstance(final, Cancelled) else 0
 

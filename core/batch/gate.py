@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The artist's gate: a face whose mask has been looked at may be solved. Standard library only.
 
-CAPTURE/mask_accepted.json names the proposal that was looked at by its hash: where the frames or their light are worked out again, another proposal waits.
+CAPTURE/mask_accepted.json names the proposal that was looked at by its hash: where the frames or their light are worked
+out again, another proposal waits.
 """
 
 from __future__ import annotations
@@ -20,10 +21,13 @@ NAME = "mask_accepted.json"
 
 
 def accept_mask(capture: Capture) -> None:
-    """The mask as it is now, painted or proposed, is good enough to solve with. Raises Problem where there is no proposal."""
+    """The mask as it is now, painted or proposed, is good enough to solve with. Raises Problem where there is no
+    proposal."""
     if not capture.shadow_mask_auto.is_file():
-        raise Problem(f"{capture.root.stem} has no proposed shadow mask to accept yet.", "Run the batch up to its masks first.")
-    write_json(capture.root / NAME, {"proposal": hash_file(capture.shadow_mask_auto), "at": time.strftime("%Y-%m-%dT%H:%M:%S")})
+        raise Problem(f"{capture.root.stem} has no proposed shadow mask to accept yet.",
+                      "Run the batch up to its masks first.")
+    write_json(capture.root / NAME,
+               {"proposal": hash_file(capture.shadow_mask_auto), "at": time.strftime("%Y-%m-%dT%H:%M:%S")})
 
 
 def is_accepted(capture: Capture) -> bool:

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tasks of a face: groups of stages that run on one machine in one go, with what they need of it. Standard library only."""
+"""The tasks of a face: groups of stages that run on one machine in one go, with what they need of it. Standard library
+only."""
 
 from __future__ import annotations
 
@@ -17,8 +18,8 @@ DELIVER = "deliver"
 
 @dataclass(frozen=True)
 class StageGroup:
-    """`first` and `last` name its stages; `memory_gb` is what a machine should have free for it (the largest stage of the table of costs, rounded up);
-    `on_device` says that a GPU helps."""
+    """`first` and `last` name its stages; `memory_gb` is what a machine should have free for it (the largest stage of
+    the table of costs, rounded up); `on_device` says that a GPU helps."""
 
     name: str
     label: str
@@ -46,4 +47,5 @@ def group_named(name: str) -> StageGroup:
     for group in GROUPS:
         if group.name == name:
             return group
-    raise Problem(f"There is no task named {name!r}.", f"The tasks of a face are {', '.join(group.name for group in GROUPS)}.")
+    raise Problem(f"There is no task named {name!r}.",
+                  f"The tasks of a face are {', '.join(group.name for group in GROUPS)}.")

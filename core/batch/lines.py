@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A batch as tasks for somebody else's scheduler: what each is called, what it waits for, and the command that does it. Standard library only."""
+"""A batch as tasks for somebody else's scheduler: what each is called, what it waits for, and the command that does it.
+Standard library only."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ PARTS = ("all", "to the masks", "from the masks")
 
 @dataclass(frozen=True)
 class BatchTask:
-    """`after` names the task that must have ended well before, '' for none; `words` is the command, which runs in any folder."""
+    """`after` names the task that must have ended well before, '' for none; `words` is the command, which runs in any
+    folder."""
 
     face: str
     group: str
@@ -37,9 +39,10 @@ class BatchTask:
 
 
 def list_tasks(batch: Batch, python: str = sys.executable, root: Path = ROOT) -> list[BatchTask]:
-    """Every task that is left to do, in an order in which they could be done one by one; none beyond a mask that still has to be looked at. `python` and
-    `root`, WildCap's folder, are those of the machines that will run them."""
-    return [task for face in batch.faces for task in _of_face(batch, face.name, derive_state(batch, face), (python, str(root)))]
+    """Every task that is left to do, in an order in which they could be done one by one; none beyond a mask that still
+    has to be looked at. `python` and `root`, WildCap's folder, are those of the machines that will run them."""
+    return [task for face in batch.faces
+            for task in _of_face(batch, face.name, derive_state(batch, face), (python, str(root)))]
 
 
 def _of_face(batch: Batch, name: str, state: FaceState, program: tuple[str, str]) -> list[BatchTask]:
@@ -49,13 +52,14 @@ def _of_face(batch: Batch, name: str, state: FaceState, program: tuple[str, str]
     for group in GROUPS[GROUPS.index(state.group):]:
         if waits(batch, batch.face(name), group):
             break
-        found.append(BatchTask(name, group.name, found[-1].name if found else "", (*program, "batch", "task", str(batch.root), name, group.name)))
+        found.append(BatchTask(name, group.name, found[-1].name if found else "",
+                               (*program, "batch", "task", str(batch.root), name, group.name)))
     return found
 
 
 def list_flamenco_jobs(batch: Batch) -> list[dict]:
-    """A job for each face that has tasks left, as Flamenco's API takes one (its SubmittedJob). One each, for Flamenco ends a whole job when much of it
-    fails, and one face's film is no reason to end the others."""
+    """A job for each face that has tasks left, as Flamenco's API takes one (its SubmittedJob). One each, for Flamenco
+    ends a whole job when much of it fails, and one face's film is no reason to end the others."""
     left: dict[str, list[int]] = {}
     for task in list_tasks(batch):
         left.setdefault(task.face, []).append(GROUPS.index(group_named(task.group)))

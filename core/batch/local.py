@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A batch on this machine: some faces at a time, each through its tasks. What one face lacks does not keep the others. Standard library only.
+"""A batch on this machine: some faces at a time, each through its tasks. What one face lacks does not keep the others.
+Standard library only.
 
-Who runs a batch holds its lease. BATCH/progress.json is what a panel may show of it meanwhile; an empty file BATCH/stop asks it to end, as Ctrl-C does.
+Who runs a batch holds its lease. BATCH/progress.json is what a panel may show of it meanwhile; an empty file BATCH/stop
+asks it to end, as Ctrl-C does.
 """
 
 from __future__ import annotations
@@ -61,14 +63,17 @@ class Board:
         """Keeps what a face's worker says of its progress."""
         if isinstance(message, Progress):
             share = message.done / message.of if message.of else 0.0
-            self._working[face.name] = {"stage": LABELS[message.stage], "share": round(share, 3), "eta_s": message.eta_s}
+            self._working[face.name] = {"stage": LABELS[message.stage], "share": round(share, 3),
+                                        "eta_s": message.eta_s}
             self.write()
 
     def end(self, face: BatchFace, state: str, words: str) -> None:
         self._working.pop(face.name, None)
         self.tally.ended[face.name] = state
         left = self.left_s()
-        self.say(face, f"{words} ({len(self.tally.ended)} of {self._faces}{f', about {max(1, round(left / 60))} min left' if left else ''})")
+        self.say(face,
+                 f"{words} ({len(self.tally.ended)} of "
+                 f"{self._faces}{f', about {max(1, round(left / 60))} min left' if left else ''})")
         self.write(now=True)
 
     def left_s(self) -> float | None:
@@ -83,14 +88,16 @@ class Board:
                 return
             self._written = time.monotonic()
             with contextlib.suppress(Problem):  # a full disk keeps nobody from working on a capture that lies elsewhere
-                write_json(self._batch.root / PROGRESS, {"ended": len(self.tally.ended), "of": self._faces, "left_s": self.left_s(),
-                                                         "working": dict(self._working)})
+                write_json(self._batch.root / PROGRESS,
+                           {"ended": len(self.tally.ended), "of": self._faces, "left_s": self.left_s(),
+                            "working": dict(self._working)})
 
 
 def run_local(batch: Batch, faces: Iterable[BatchFace], at_once: int, retry: bool, tell: Callable[[str], None],
               until: str | None = None) -> Tally:
-    """Runs what is to be done of these faces, `at_once` at a time, up to the task `until` (None: all). A face that has stopped is left alone unless `retry`.
-    The caller holds the batch's lease. Ends early by KeyboardInterrupt or the file `stop`; what was finished is kept."""
+    """Runs what is to be done of these faces, `at_once` at a time, up to the task `until` (None: all). A face that has
+    stopped is left alone unless `retry`. The caller holds the batch's lease. Ends early by KeyboardInterrupt or the
+    file `stop`; what was finished is kept."""
     faces = list(faces)
     board, ended = Board(batch, len(faces), tell), threading.Event()
     threads = max(1, (os.cpu_count() or 1) // at_once) if at_once > 1 else None
@@ -136,8 +143,8 @@ def forget_stop(root: Path) -> None:
         (root / STOP).unlink(missing_ok=True)
 
 
-def run_face(batch: Batch, face: BatchFace, board: Board, retry: bool, cancelled: Callable[[], bool], until: str | None = None,
-             threads: int | None = None) -> None:
+def run_face(batch: Batch, face: BatchFace, board: Board, retry: bool, cancelled: Callable[[], bool],
+             until: str | None = None, threads: int | None = None) -> None:
     """One face's tasks, one after the other, as far as they go."""
     names = [group.name for group in GROUPS]
     last = names.index(until) if until else len(names) - 1
@@ -145,7 +152,8 @@ def run_face(batch: Batch, face: BatchFace, board: Board, retry: bool, cancelled
         state = derive_state(batch, face)
         if state.state == STOPPED and retry and state.group is not None:
             state, retry = FaceState(TO_DO, state.group), False
-        if state.state == DONE or (state.group is not None and names.index(state.group.name) > last and state.state != STOPPED):
+        if state.state == DONE or (state.group is not None and names.index(state.group.name) > last
+                                   and state.state != STOPPED):
             return board.end(face, DONE, "done")
         if state.state not in (TO_DO, WORKING):  # who works there may be a machine that has gone: the task finds out
             return board.end(face, WAITING if state.state == WAITING else STOPPED, state.words())
@@ -157,7 +165,8 @@ def run_face(batch: Batch, face: BatchFace, board: Board, retry: bool, cancelled
     board.end(face, CANCELLED, "cancelled; what was finished is kept")
 
 
-def _run(batch: Batch, face: BatchFace, group: StageGroup, board: Board, cancelled: Callable[[], bool], threads: int | None) -> Message:
+def _run(batch: Batch, face: BatchFace, group: StageGroup, board: Board, cancelled: Callable[[], bool],
+         threads: int | None) -> Message:
     began = time.monotonic()
     board.tally.worked.add(face.name)
     final = run_task(batch, face, group, lambda message: board.hear(face, message), cancelled, threads)
@@ -165,7 +174,8 @@ def _run(batch: Batch, face: BatchFace, group: StageGroup, board: Board, cancell
         if not is_left(batch, face, group):
             board.say(face, f"{group.label.lower()} done in {time.monotonic() - began:.0f} s")
         else:  # the next look would send it here again, for ever
-            final = Failed("", f"The task {group.name} ended well, and its result is not what was asked for.", "Look whether another program writes there.")
+            final = Failed("", f"The task {group.name} ended well, and its result is not what was asked for.",
+                           "Look whether another program writes there.")
     return final
 
 

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A batch on a cluster of Ray's: each face a chain of tasks, on whichever nodes have the cores, the memory and the GPU that a task declares.
+"""A batch on a cluster of Ray's: each face a chain of tasks, on whichever nodes have the cores, the memory and the GPU
+that a task declares.
 
-A Problem is an outcome and stops its face alone. A process or a node that dies is Ray's to notice: it gives the task to another one, which goes on from the
-capture's record. Ray is imported where a batch runs on it; otherwise standard library only.
+A Problem is an outcome and stops its face alone. A process or a node that dies is Ray's to notice: it gives the task to
+another one, which goes on from the capture's record. Ray is imported where a batch runs on it; otherwise standard
+library only.
 """
 
 from __future__ import annotations
@@ -25,20 +27,24 @@ from .state import DONE, STOPPED, TO_DO, WAITING, WORKING, FaceState, derive_sta
 from .task import ROOT
 
 CODE = "WILDCAP_CODE"
-"""Environment variable of a node: the folder that holds core/ there, where that is another one than where the batch is run from."""
+"""Environment variable of a node: the folder that holds core/ there, where that is another one than where the batch is
+run from."""
 EXAMINE_S = 60.0
 """How long a node may take to start its first process: it imports Ray, maybe from a network's disk."""
 AHEAD = 2
-"""Faces that are under way for each that could be worked on at once: enough that no core waits, and the first faces are done long before the last."""
+"""Faces that are under way for each that could be worked on at once: enough that no core waits, and the first faces are
+done long before the last."""
 OUT_S = 1.6
-"""How long tasks that are cancelled may take to give their captures back; those that are still there end with our connection."""
+"""How long tasks that are cancelled may take to give their captures back; those that are still there end with our
+connection."""
 
 
-def run_on_ray(batch: Batch, faces: Iterable[BatchFace], retry: bool, tell: Callable[[str], None], until: str | None, address: str | None,
-               cores: int) -> Tally:
-    """Runs what is to be done of these faces on the cluster whose head node is at `address` (HOST:PORT or auto), or, without one, on a cluster of this machine
-    alone, up to the task `until` (None: all). Each task takes `cores` cores. The caller holds the batch's lease. Ends early by KeyboardInterrupt or the file
-    `stop`; what was finished is kept. Raises Problem where there is no Ray, no cluster, or no node that could work on the batch."""
+def run_on_ray(batch: Batch, faces: Iterable[BatchFace], retry: bool, tell: Callable[[str], None], until: str | None,
+               address: str | None, cores: int) -> Tally:
+    """Runs what is to be done of these faces on the cluster whose head node is at `address` (HOST:PORT or auto), or,
+    without one, on a cluster of this machine alone, up to the task `until` (None: all). Each task takes `cores` cores.
+    The caller holds the batch's lease. Ends early by KeyboardInterrupt or the file `stop`; what was finished is kept.
+    Raises Problem where there is no Ray, no cluster, or no node that could work on the batch."""
     faces = list(faces)
     forget_stop(batch.root)
     with connect(address) as ray:
@@ -56,7 +62,8 @@ def run_on_ray(batch: Batch, faces: Iterable[BatchFace], retry: bool, tell: Call
 class _Run:
     """Faces on their way through the cluster. `advance` until nothing is under way, then `end`."""
 
-    def __init__(self, ray, batch: Batch, faces: list[BatchFace], retry: bool, board: Board, until: str | None, cores: int):
+    def __init__(self, ray, batch: Batch, faces: list[BatchFace], retry: bool, board: Board, until: str | None,
+                 cores: int):
         self._ray, self._batch, self._retry, self._cores = ray, batch, retry, cores
         self.board = board
         names = [group.name for group in GROUPS]
@@ -101,7 +108,8 @@ class _Run:
         for group in self._groups[self._groups.index(state.group):]:
             task = self._call.options(name=f"{face.name}.{group.name}", num_cpus=self._cores, memory=_bytes(group),
                                       num_gpus=int(has_gpu and group.on_device), max_retries=-1, retry_exceptions=False)
-            before = task.remote(before, str(ROOT), "do_task", self._post, str(self._batch.root), face.name, group.name, self._cores, stranger)
+            before = task.remote(before, str(ROOT), "do_task", self._post, str(self._batch.root), face.name, group.name,
+                                 self._cores, stranger)
             self._tasks[before] = face, group, group is self._groups[-1]
         return True
 
@@ -111,7 +119,9 @@ class _Run:
         except self._ray.exceptions.RayTaskError:
             raise  # an error of ours is told as one
         except self._ray.exceptions.RayError as error:
-            outcome = {"state": STOPPED, "words": f"Ray has given the task up ({type(error).__name__}). Run the batch again: finished stages are kept."}
+            outcome = {"state": STOPPED,
+                       "words": f"Ray has given the task up ({type(error).__name__}). Run the batch again: finished "
+                                "stages are kept."}
         self.board.tally.worked.add(face.name)
         self._places.pop(face.name, None)
         if outcome["state"] == DONE:
@@ -119,11 +129,15 @@ class _Run:
             if is_last:
                 self.board.end(face, DONE, "done")
             return
-        self._tasks = {other: task for other, task in self._tasks.items() if task[0].name != face.name}  # they pass the outcome on
-        self.board.end(face, outcome["state"], f"{group.label.lower()} stopped: {outcome['words']}" if outcome["state"] == STOPPED else outcome["words"])
+        # they pass the outcome on
+        self._tasks = {other: task for other, task in self._tasks.items() if task[0].name != face.name}
+        self.board.end(face, outcome["state"],
+                       f"{group.label.lower()} stopped: {outcome['words']}" if outcome["state"] == STOPPED
+                       else outcome["words"])
 
     def _hear(self) -> None:
-        """What tasks say of where they are and how far, asked for once in a while and not waited for; nothing is lost where that cannot be had."""
+        """What tasks say of where they are and how far, asked for once in a while and not waited for; nothing is lost
+        where that cannot be had."""
         if self._asked is None and time.monotonic() - self._heard > EVERY_S:
             self._asked, self._heard = self._post.take.remote(), time.monotonic()
         if self._asked is None or not self._ray.wait([self._asked], timeout=0)[0]:
@@ -138,8 +152,9 @@ class _Run:
             self._leave_dead_nodes(working)
 
     def _leave_dead_nodes(self, working: dict[str, BatchFace]) -> None:
-        """Has faces done elsewhere whose node has been given up. Ray does so by itself where a connection breaks; where one only falls silent, as at a power
-        cut, it waits for five minutes, and its setting for that (RAY_grpc_client_keepalive_time_ms) has the other side take us for an attack."""
+        """Has faces done elsewhere whose node has been given up. Ray does so by itself where a connection breaks; where
+        one only falls silent, as at a power cut, it waits for five minutes, and its setting for that
+        (RAY_grpc_client_keepalive_time_ms) has the other side take us for an attack."""
         alive = {node["NodeID"] for node in self._ray.nodes() if node["Alive"]}
         for name in [name for name, node in self._places.items() if node not in alive]:
             del self._places[name]
@@ -166,8 +181,8 @@ def _bytes(group: StageGroup) -> int:
 
 
 def _define_call(ray):
-    """The remote function in which every task runs. It goes to the nodes by its source and finds WildCap there by a path; `before` is the outcome of the face's
-    task before, which is passed on where that did not end well."""
+    """The remote function in which every task runs. It goes to the nodes by its source and finds WildCap there by a
+    path; `before` is the outcome of the face's task before, which is passed on where that did not end well."""
     variable, package = CODE, f"{__package__.rpartition('.')[0].rpartition('.')[2]}.batch.ray_task"
 
     @ray.remote
@@ -182,8 +197,10 @@ def _define_call(ray):
         if before is not None and before["state"] != "done":
             return before
         code = os.environ.get(variable, code)
-        if not os.path.isfile(os.path.join(code, *package.split(".")) + ".py"):  # another one may lie where this Python looks as well
-            return {"state": "stopped", "words": f"The node {socket.gethostname()} has no WildCap at {code}. Set {variable} there."}
+        # another one may lie where this Python looks as well
+        if not os.path.isfile(os.path.join(code, *package.split(".")) + ".py"):
+            return {"state": "stopped",
+                    "words": f"The node {socket.gethostname()} has no WildCap at {code}. Set {variable} there."}
         sys.path[:] = [code, *(place for place in sys.path if place != code)]
         module = importlib.import_module(package)
         if post is None:
@@ -211,24 +228,38 @@ def _define_post(ray):
             taken, (self.places, self.lines) = (self.places, self.lines), ({}, {})
             return taken
 
-    here = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(ray.get_runtime_context().get_node_id(), soft=False)
+    here = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(ray.get_runtime_context().get_node_id(),
+                                                                         soft=False)
     return Post.options(scheduling_strategy=here).remote()
 
 
 def _examine_nodes(ray, batch: Batch, cores: int) -> None:
-    """Raises Problem where no node has what a task needs, and for the first one that does not have the code or see the batch: it would stop face after face."""
+    """Raises Problem where no node has what a task needs, and for the first one that does not have the code or see the
+    batch: it would stop face after face."""
     need = max(GROUPS, key=lambda group: group.memory_gb)
-    fit = [node for node in ray.nodes() if node["Alive"] and node["Resources"].get("CPU", 0) >= cores and node["Resources"].get("memory", 0) >= _bytes(need)]
+    fit = [node for node in ray.nodes() if node["Alive"] and node["Resources"].get("CPU", 0) >= cores
+           and node["Resources"].get("memory", 0) >= _bytes(need)]
     if not fit:
-        raise Problem(f"No node of the cluster has {cores} core{'' if cores == 1 else 's'} and {need.memory_gb:.0f} GB, as the task {need.name} needs.",
-                      "Start one with `ray start` and its --num-cpus and --memory, or have each task take fewer cores with --cores.")
+        raise Problem(f"No node of the cluster has {cores} core{'' if cores == 1 else 's'} and {need.memory_gb:.0f} "
+                      f"GB, as the task {need.name} needs.",
+                      "Start one with `ray start` and its --num-cpus and --memory, or have each task take fewer cores "
+                      "with --cores.")
     call, words = _define_call(ray), ("examine", None, str(batch.root), __version__, hash_file(batch.root / NAME))
-    asked = [call.options(num_cpus=0, scheduling_strategy=ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(node["NodeID"], soft=False))
-             .remote(None, str(ROOT), *words) for node in fit]
+    asked = [
+        call.options(
+            num_cpus=0,
+            scheduling_strategy=ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(
+                node["NodeID"], soft=False
+            ),
+        ).remote(None, str(ROOT), *words)
+        for node in fit
+    ]
     answered, _ = ray.wait(asked, num_returns=len(asked), timeout=EXAMINE_S)
     for ref in answered:
         with contextlib.suppress(ray.exceptions.RayError):  # a node that has just gone harms nobody
             outcome = ray.get(ref)
             if outcome["words"]:
-                raise Problem(outcome["words"], "Give the node the same WildCap, its packages, and the batch's folder under the same path, as the page on farms"
+                raise Problem(outcome["words"],
+                              "Give the node the same WildCap, its packages, and the batch's folder under the same "
+                              "path, as the page on farms"
                               " (docs/farm.md) says; or stop Ray there.")

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The way to a cluster of Ray's, or to one of this machine alone: within seconds or not at all, in silence, and with a token. Standard library but for Ray."""
+"""The way to a cluster of Ray's, or to one of this machine alone: within seconds or not at all, in silence, and with a
+token. Standard library but for Ray."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from pathlib import Path
 
 from ..contract.messages import Problem
 
-QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_BACKEND_LOG_LEVEL": "fatal", "RAY_DEDUP_LOGS_SKIP_REGEX": "^", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
+QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_BACKEND_LOG_LEVEL": "fatal", "RAY_DEDUP_LOGS_SKIP_REGEX": "^",
+         "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
 """Ray tells nobody of its use, and nothing on our terminal."""
 REACH_S, JOIN_S = 3.0, 12.0
 """How long a head node may take to answer at all, and then to take us in: Ray itself would try for minutes."""
@@ -31,19 +33,22 @@ def connect(address: str | None) -> Iterator:
         os.environ["RAY_AUTH_MODE"] = "token"
         os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))
     elif "RAY_AUTH_MODE" not in os.environ:
-        has_token = {"RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"} & os.environ.keys() or (Path.home() / ".ray" / "auth_token").is_file()
+        has_token = {"RAY_AUTH_TOKEN",
+                     "RAY_AUTH_TOKEN_PATH"} & os.environ.keys() or (Path.home() / ".ray" / "auth_token").is_file()
         os.environ["RAY_AUTH_MODE"] = "token" if has_token else "disabled"
     try:
         with _mute():
             import ray
             import ray.util.scheduling_strategies
     except ImportError as error:
-        raise Problem(f"This Python has no Ray ({error}).", "Install what requirements/farm.txt names, or run the batch with --on local.") from error
+        raise Problem(f"This Python has no Ray ({error}).",
+                      "Install what requirements/farm.txt names, or run the batch with --on local.") from error
     quiet = {"log_to_driver": False, "configure_logging": False, "logging_level": "CRITICAL"}
     with _mute():
         try:
             if address is None:
-                _begin(lambda: ray.init("local", include_dashboard=False, object_store_memory=STORE_BYTES, _node_ip_address="127.0.0.1", **quiet))
+                _begin(lambda: ray.init("local", include_dashboard=False, object_store_memory=STORE_BYTES,
+                                        _node_ip_address="127.0.0.1", **quiet))
             else:
                 _reach(address)
                 _join(lambda: ray.init(address, **quiet), address)
@@ -67,12 +72,14 @@ def _mute() -> Iterator[None]:
 
 
 def _begin(begin: Callable[[], object]) -> None:
-    """Raises Problem where Ray does not come up, as within the 30 seconds that it gives itself on a machine that is busy with something else."""
+    """Raises Problem where Ray does not come up, as within the 30 seconds that it gives itself on a machine that is
+    busy with something else."""
     try:
         begin()
     except Exception as error:  # it has no class of its own for that
         said = str(error).strip().partition("\n")[0]
-        raise Problem(f"Ray could not be started on this machine: {said}", "Try again when it is less busy, or run the batch with --on local.") from error
+        raise Problem(f"Ray could not be started on this machine: {said}",
+                      "Try again when it is less busy, or run the batch with --on local.") from error
 
 
 def _reach(address: str) -> None:
@@ -81,7 +88,8 @@ def _reach(address: str) -> None:
         return
     host, _, port = address.rpartition(":")
     if not host or not port.isdecimal():
-        raise Problem(f"{address} is no address of Ray's head node.", "Write it as HOST:PORT; `ray start --head` tells it. The port is 6379 if you chose none.")
+        raise Problem(f"{address} is no address of Ray's head node.",
+                      "Write it as HOST:PORT; `ray start --head` tells it. The port is 6379 if you chose none.")
     try:
         socket.create_connection((host.strip("[]"), int(port)), REACH_S).close()
     except (OSError, OverflowError) as error:
@@ -108,5 +116,6 @@ def _join(begin: Callable[[], object], address: str) -> None:
 
 def _unreachable(address: str, why: str) -> Problem:
     return Problem(f"There is no cluster of Ray's to be reached at {address} ({why}).",
-                   "See that its head node runs (`ray status` there), that this machine is one of its nodes (`ray start --address=HOST:PORT --num-cpus=0` makes"
+                   "See that its head node runs (`ray status` there), that this machine is one of its nodes (`ray "
+                   "start --address=HOST:PORT --num-cpus=0` makes"
                    " it one), and that both have Ray's token.")

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a node of Ray's does of a batch: shows that it can, and runs the tasks it is given. Ray itself is not needed here. Standard library only.
+"""What a node of Ray's does of a batch: shows that it can, and runs the tasks it is given. Ray itself is not needed
+here. Standard library only.
 
-What goes back and forth are plain values: an outcome is {"state", "words", "seconds", "host"}. BATCH/logs/HOST.jsonl says, stage by stage, what a node began
-and what it finished; nothing is ever derived from it.
+What goes back and forth are plain values: an outcome is {"state", "words", "seconds", "host"}. BATCH/logs/HOST.jsonl
+says, stage by stage, what a node began and what it finished; nothing is ever derived from it.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ from .state import DONE, STOPPED, WAITING, FaceState, waits
 from .task import run_task
 
 BATCHES = "WILDCAP_BATCHES"
-"""Environment variable of a node: the folder in which the batches lie there, where that is another one than where they are run from."""
+"""Environment variable of a node: the folder in which the batches lie there, where that is another one than where they
+are run from."""
 LOGS = "logs"
 
 
@@ -41,7 +43,8 @@ def find_batch(root: str) -> Batch:
 
 
 def examine(root: str, version: str, record: str) -> str:
-    """What keeps this node from working on the batch, '' for nothing. `version` is WildCap's where the batch is run from, `record` the hash of batch.json."""
+    """What keeps this node from working on the batch, '' for nothing. `version` is WildCap's where the batch is run
+    from, `record` the hash of batch.json."""
     host = socket.gethostname()
     if __version__ != version:
         return f"The node {host} has WildCap {__version__}, and this is {version}."
@@ -56,8 +59,9 @@ def examine(root: str, version: str, record: str) -> str:
 
 
 def do_task(root: str, name: str, group_name: str, threads: int, stranger: str, say: Callable[[str], None]) -> dict:
-    """Runs a task of a face and returns how it ended. `say` hears of its progress, as lines of JSON. `stranger` is the token of the lease that somebody had on
-    the capture when the batch came to it, '' for nobody: whoever else has it is a task of ours whose process or node has died, and is waited for."""
+    """Runs a task of a face and returns how it ended. `say` hears of its progress, as lines of JSON. `stranger` is the
+    token of the lease that somebody had on the capture when the batch came to it, '' for nobody: whoever else has it is
+    a task of ours whose process or node has died, and is waited for."""
     began, stopped, outcome = time.monotonic(), [], {"state": STOPPED, "words": "", "host": socket.gethostname()}
     before = signal.signal(signal.SIGINT, lambda number, frame: stopped.append(number))  # as which Ray's cancel arrives
     try:
@@ -68,7 +72,8 @@ def do_task(root: str, name: str, group_name: str, threads: int, stranger: str, 
         _outlast(face.capture, stranger, stopped)
         final = run_task(batch, face, group, _listener(batch, name, say), lambda: bool(stopped), threads)
         if isinstance(final, Done) and is_left(batch, face, group):
-            final = Failed("", f"The task {group.name} ended well, and its result is not what was asked for.", "Look whether another program writes there.")
+            final = Failed("", f"The task {group.name} ended well, and its result is not what was asked for.",
+                           "Look whether another program writes there.")
     except Problem as problem:
         final = Failed("", problem.problem, problem.remedy)
     finally:
@@ -79,7 +84,8 @@ def do_task(root: str, name: str, group_name: str, threads: int, stranger: str, 
 
 
 def _outlast(capture: Capture, stranger: str, stopped: list) -> None:
-    """Waits until the worker of a Ray process that was killed beside us has ended, too, or that of a node that has gone has not been heard of for a term."""
+    """Waits until the worker of a Ray process that was killed beside us has ended, too, or that of a node that has gone
+    has not been heard of for a term."""
     deadline = time.monotonic() + 2 * lease.TERM_S
     while not stopped:
         found = lease.holder(capture.lock)
@@ -105,7 +111,8 @@ def _listener(batch: Batch, name: str, say: Callable[[str], None]) -> Callable[[
             said[0] = time.monotonic()
             say(to_line(message))
         if begins or isinstance(message, StageDone) and not message.skipped:
-            line = {"at": round(time.time(), 2), "face": name, "stage": message.stage, "finished": isinstance(message, StageDone), "pid": os.getpid()}
+            line = {"at": round(time.time(), 2), "face": name, "stage": message.stage,
+                    "finished": isinstance(message, StageDone), "pid": os.getpid()}
             with contextlib.suppress(OSError):
                 account.parent.mkdir(exist_ok=True)
                 with open(account, "a", encoding="utf-8") as file:

@@ -1,10 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""batch.json: which faces a batch has and what is asked for each. It says nothing of what has been done. Standard library only.
+"""batch.json: which faces a batch has and what is asked for each. It says nothing of what has been done. Standard
+library only.
 
-    {"format": 1, "gate": "automatic", "blender": "", "deliver": {}, "faces": [{"name", "source", "capture", "quality", "settings"}]}
+    {"format": 1, "gate": "automatic", "blender": "", "deliver": {}, "faces": [{"name", "source", "capture", "quality",
+    "settings"}]}
 
-Paths are relative to the batch's folder where they travel with it (portable_paths.py), so that machines may see it under different names.
+Paths are relative to the batch's folder where they travel with it (portable_paths.py), so that machines may see it
+under different names.
 """
 
 from __future__ import annotations
@@ -28,7 +31,8 @@ GATES = ("automatic", "artist")
 
 @dataclass(frozen=True)
 class BatchFace:
-    """`source` is a video or a folder of photographs; `settings` ({stage: {name: value}, seed, device}) lie over the preset `quality`; paths are absolute."""
+    """`source` is a video or a folder of photographs; `settings` ({stage: {name: value}, seed, device}) lie over the
+    preset `quality`; paths are absolute."""
 
     name: str
     source: Path
@@ -47,7 +51,8 @@ class BatchFace:
 
 @dataclass(frozen=True)
 class Batch:
-    """`deliver` holds the settings of what is delivered of each face, None: nothing is; `blender` is the program that renders contact sheets, '': none."""
+    """`deliver` holds the settings of what is delivered of each face, None: nothing is; `blender` is the program that
+    renders contact sheets, '': none."""
 
     root: Path
     faces: tuple[BatchFace, ...]
@@ -60,7 +65,8 @@ class Batch:
         for face in self.faces:
             if face.name == name:
                 return face
-        raise Problem(f"The batch {self.root} has no face named {name!r}.", f"`python -m core batch status {self.root}` lists them.")
+        raise Problem(f"The batch {self.root} has no face named {name!r}.",
+                      f"`python -m core batch status {self.root}` lists them.")
 
 
 def write_batch(batch: Batch) -> None:
@@ -68,10 +74,11 @@ def write_batch(batch: Batch) -> None:
     def portable(path: Path | str) -> str:
         return write_portable(path, batch.root)
 
-    faces = [{"name": face.name, "source": portable(face.source), "capture": portable(face.root), "quality": face.quality,
-              "settings": convert_settings(face.settings, portable)} for face in batch.faces]
+    faces = [{"name": face.name, "source": portable(face.source), "capture": portable(face.root),
+              "quality": face.quality, "settings": convert_settings(face.settings, portable)} for face in batch.faces]
     deliver = batch.deliver and convert_settings({"deliver": batch.deliver}, portable)["deliver"]
-    write_json(batch.root / NAME, {"format": FORMAT, "gate": batch.gate, "blender": batch.blender, "deliver": deliver, "faces": faces})
+    write_json(batch.root / NAME,
+               {"format": FORMAT, "gate": batch.gate, "blender": batch.blender, "deliver": deliver, "faces": faces})
 
 
 def read_batch(root: str | Path) -> Batch:
@@ -81,17 +88,23 @@ def read_batch(root: str | Path) -> Batch:
     try:
         told = read_json(path)
     except FileNotFoundError:
-        raise Problem(f"There is no batch at {root}.", "Check the name; `python -m core batch plan SHOTS.csv BATCH` makes one.") from None
+        raise Problem(f"There is no batch at {root}.",
+                      "Check the name; `python -m core batch plan SHOTS.csv BATCH` makes one.") from None
     except (OSError, ValueError) as error:
-        raise Problem(f"{path} cannot be read ({error}).", "Plan the batch again from its table: what its captures hold is kept.") from error
+        raise Problem(f"{path} cannot be read ({error}).",
+                      "Plan the batch again from its table: what its captures hold is kept.") from error
     if isinstance(told, dict) and isinstance(told.get("format"), int) and told["format"] > FORMAT:
-        raise Problem("This batch was planned by a newer version of WildCap.", "Update WildCap to run it; nothing was changed.")
+        raise Problem("This batch was planned by a newer version of WildCap.",
+                      "Update WildCap to run it; nothing was changed.")
     try:
         batch = _parse(root, told)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        raise Problem(f"{path} is not a batch record ({error!r}).", "Plan the batch again from its table: what its captures hold is kept.") from error
-    if len({face.name for face in batch.faces}) < len(batch.faces) or len({face.root for face in batch.faces}) < len(batch.faces):
-        raise Problem(f"{path} names a face or a capture twice.", "Plan the batch again from its table: what its captures hold is kept.")
+        raise Problem(f"{path} is not a batch record ({error!r}).",
+                      "Plan the batch again from its table: what its captures hold is kept.") from error
+    if len({face.name
+            for face in batch.faces}) < len(batch.faces) or len({face.root for face in batch.faces}) < len(batch.faces):
+        raise Problem(f"{path} names a face or a capture twice.",
+                      "Plan the batch again from its table: what its captures hold is kept.")
     return batch
 
 
@@ -108,7 +121,7 @@ def _parse(root: Path, told: dict) -> Batch:
 def _parse_face(root: Path, told: dict) -> BatchFace:
     if not plain_name(told["name"]):
         raise ValueError("a face's name is none")
-    face = BatchFace(told["name"], read_portable(told["source"], root), read_portable(told["capture"], root), told["quality"],
-                     convert_settings(told["settings"], lambda path: str(read_portable(path, root))))
+    face = BatchFace(told["name"], read_portable(told["source"], root), read_portable(told["capture"], root),
+                     told["quality"], convert_settings(told["settings"], lambda path: str(read_portable(path, root))))
     face.chosen()
     return face

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """review.html: the faces of a batch on one page, in the order in which somebody should look at them.
 
-First those that stopped, then those that wait for the artist, then all others; within each, the riskiest first. Risk has no threshold, for nobody has measured
-at which residual a face is bad: each measure of a face is the share of the batch's other faces that are better in it, and a face is as risky as its worst
-measure, for one thing gone wrong spoils a head, and a mean of five would hide it; where that is equal, the mean decides. So a face at the top is the first to
+First those that stopped, then those that wait for the artist, then all others; within each, the riskiest first. Risk
+has no threshold, for nobody has measured at which residual a face is bad: each measure of a face is the share of the
+batch's other faces that are better in it, and a face is as risky as its worst measure, for one thing gone wrong spoils
+a head, and a mean of five would hide it; where that is equal, the mean decides. So a face at the top is the first to
 look at, and not by that a bad one.
 
 Pictures are embedded as thumbnails, so the page can be sent to somebody; it loads nothing.
@@ -37,7 +38,8 @@ NAME = "review.html"
 
 @dataclass(frozen=True)
 class Measure:
-    """`figure` of `stage` in capture.json; `worse` is 1 where more is riskier, -1 where less is; `note` says what it is."""
+    """`figure` of `stage` in capture.json; `worse` is 1 where more is riskier, -1 where less is; `note` says what it
+    is."""
 
     label: str
     stage: str
@@ -50,12 +52,16 @@ class Measure:
 FINDINGS = "Findings"
 MEASURES = (
     Measure(FINDINGS, "", "", "", 1, "What the stages found wrong with the film"),
-    Measure("Mask", "shadow_mask", "masked_percent", " %", 1, "Share of the face that the proposed mask covers: there the albedo is guessed from the rest"),
-    Measure("Landmarks", "registration", "landmark_residual_mm", " mm", 1, "How far the fitted head's landmarks lie from those seen in the frames: the median"),
+    Measure("Mask", "shadow_mask", "masked_percent", " %", 1,
+            "Share of the face that the proposed mask covers: there the albedo is guessed from the rest"),
+    Measure("Landmarks", "registration", "landmark_residual_mm", " mm", 1,
+            "How far the fitted head's landmarks lie from those seen in the frames: the median"),
     Measure("Seen", "texture", "seen_percent", " %", -1, "Share of the head that the frames show with confidence"),
-    Measure("Explained", "solve", "residual_psnr_db", " dB", -1, "How well the solved maps and light give the texture again"),
+    Measure("Explained", "solve", "residual_psnr_db", " dB", -1,
+            "How well the solved maps and light give the texture again"),
 )
-PICTURES = (("registration", "registration_*.jpg", "The head over the frames"), ("shadow_mask", "shadow_mask_*.jpg", "As filmed, what was found, the mask"),
+PICTURES = (("registration", "registration_*.jpg", "The head over the frames"),
+            ("shadow_mask", "shadow_mask_*.jpg", "As filmed, what was found, the mask"),
             ("solve", "solve_texture*.jpg", "Texture, albedo, shading"))
 """Stage, its picture in CAPTURE/report, and what it shows."""
 FIRST_PICTURE = ("frames", "frames_*.jpg", "Frames")
@@ -71,7 +77,8 @@ STATES = {DONE: "done", TO_DO: "to do", WORKING: "being worked on", WAITING: "wa
 
 @dataclass(frozen=True)
 class ReviewRow:
-    """One face: `values` by a measure's label, `ranks` the share of the others that are better, in [0, 1]; `findings` as `report.findings` gives them."""
+    """One face: `values` by a measure's label, `ranks` the share of the others that are better, in [0, 1]; `findings`
+    as `report.findings` gives them."""
 
     face: BatchFace
     state: FaceState
@@ -99,19 +106,23 @@ class ReviewRow:
 
 
 def write_review(batch: Batch) -> tuple[Path, list[ReviewRow]]:
-    """Writes BATCH/review.html; its path, and the faces in its order. Raises Problem where it cannot be written, or something
-    else is in its place."""
+    """Writes BATCH/review.html; its path, and the faces in its order. Raises Problem where it cannot be written, or
+    something else is in its place."""
     path = batch.root / NAME
     if os.path.lexists(path) and not _is_ours(path):
         raise Problem(f"{path} is not a page that WildCap wrote.", "Move it away, then write the review again.")
     rows = sort_rows(read_rows(batch))
-    sections = "".join(_section(state, [row for row in rows if row.state.state == state or not state and row.state.state not in ORDER], batch)
+    sections = "".join(_section(state,
+                                [row for row in rows if row.state.state == state or not state
+                                 and row.state.state not in ORDER], batch)
                        for state in (*ORDER, ""))
     counts = {state: sum(row.state.state == state for row in rows) for state in STATES}
-    page = PAGE.format(mark=MARK, title=html.escape(batch.root.name), style=STYLE, sections=sections, version=__version__,
-                       written=time.strftime("%Y-%m-%d %H:%M"),
-                       counts="".join(f'<span class="badge {_kind(state)}">{count} {STATES[state]}</span>' for state, count in counts.items() if count),
-                       faces=f"{len(rows)} face{'' if len(rows) == 1 else 's'}", time=_duration(sum(row.seconds for row in rows)))
+    page = PAGE.format(mark=MARK, title=html.escape(batch.root.name), style=STYLE, sections=sections,
+                       version=__version__, written=time.strftime("%Y-%m-%d %H:%M"),
+                       counts="".join(f'<span class="badge {_kind(state)}">{count} {STATES[state]}</span>'
+                                      for state, count in counts.items() if count),
+                       faces=f"{len(rows)} face{'' if len(rows) == 1 else 's'}",
+                       time=_duration(sum(row.seconds for row in rows)))
     with replacing(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return path, rows
@@ -134,9 +145,12 @@ def read_rows(batch: Batch) -> list[ReviewRow]:
             record = face.capture.read()
         stages = record["stages"]
         found = [finding for finding in report.findings(record) if not finding["stopped"]]
-        values = {measure.label: stages[measure.stage]["figures"].get(measure.figure) for measure in MEASURES if measure.stage in stages}
-        values = {label: value for label, value in values.items() if isinstance(value, int | float) and value == value}  # NaN says nothing
-        told.append(({FINDINGS: len(found), **values} if stages else {}, sum(entry["seconds"] for entry in stages.values()), found))
+        values = {measure.label: stages[measure.stage]["figures"].get(measure.figure) for measure in MEASURES
+                  if measure.stage in stages}
+        # NaN says nothing
+        values = {label: value for label, value in values.items() if isinstance(value, int | float) and value == value}
+        told.append(({FINDINGS: len(found), **values} if stages else {},
+                     sum(entry["seconds"] for entry in stages.values()), found))
     ranks = rank([values for values, _, _ in told])
     return [ReviewRow(face, derive_state(batch, face), seconds, values, own, found)
             for face, (values, seconds, found), own in zip(batch.faces, told, ranks, strict=True)]
@@ -149,14 +163,16 @@ def rank(values: list[dict[str, float]]) -> list[dict[str, float]]:
         known = [own[measure.label] * measure.worse for own in values if measure.label in own]
         for own, found in zip(values, ranks, strict=True):
             if measure.label in own:
-                found[measure.label] = sum(other < own[measure.label] * measure.worse for other in known) / max(len(known) - 1, 1)
+                found[measure.label] = sum(other < own[measure.label] * measure.worse
+                                           for other in known) / max(len(known) - 1, 1)
     return ranks
 
 
 def sort_rows(rows: list[ReviewRow]) -> list[ReviewRow]:
     """Stopped, waiting, others; each the riskiest first, and by name where nothing tells them apart."""
     def key(row: ReviewRow) -> tuple:
-        return ORDER.index(row.state.state) if row.state.state in ORDER else len(ORDER), *(-share for share in row.risk), row.face.name
+        return (ORDER.index(row.state.state) if row.state.state in ORDER else len(ORDER),
+                *(-share for share in row.risk), row.face.name)
 
     return sorted(rows, key=key)
 
@@ -164,7 +180,8 @@ def sort_rows(rows: list[ReviewRow]) -> list[ReviewRow]:
 def _section(state: str, rows: list[ReviewRow], batch: Batch) -> str:
     if not rows:
         return ""
-    return f"<section><h2>{HEADINGS[state]} <small>{len(rows)}</small></h2>{''.join(_card(row, batch) for row in rows)}</section>"
+    cards = "".join(_card(row, batch) for row in rows)
+    return f"<section><h2>{HEADINGS[state]} <small>{len(rows)}</small></h2>{cards}</section>"
 
 
 def _card(row: ReviewRow, batch: Batch) -> str:
@@ -172,12 +189,18 @@ def _card(row: ReviewRow, batch: Batch) -> str:
     link = _link(row.face.capture.report, batch.root)
     title = f'<a href="{link}">{name}</a>' if link else name
     left = [group.label for group in GROUPS[GROUPS.index(state.group):]] if state.group else []
-    words = f"{_duration(row.seconds)} of work" + (f"; still to do: {', '.join(left).lower()}" if left else "") + (f"; on {state.who}" if state.who else "")
-    problem = f'<p class="problem">{html.escape(state.problem)} <b>{html.escape(state.remedy)}</b></p>' if state.state == STOPPED else ""
-    found = "".join(f"<li>{html.escape(finding['problem'])} <b>{html.escape(finding['remedy'])}</b></li>" for finding in row.findings)
-    told = f"<details><summary>{len(row.findings)} finding{'' if len(row.findings) == 1 else 's'}</summary><ul>{found}</ul></details>" if found else ""
-    return (f'<article><div class="told"><h3>{title} <span class="badge {_kind(state.state)}">{STATES[state.state]}</span></h3>'
-            f'<p class="when">{html.escape(words)}</p>{problem}{_bars(row)}{told}</div><div class="seen">{_thumbnails(row.face.capture, link)}</div></article>')
+    words = f"{_duration(row.seconds)} of work" + (f"; still to do: {', '.join(left).lower()}" if left
+                                                   else "") + (f"; on {state.who}" if state.who else "")
+    problem = (f'<p class="problem">{html.escape(state.problem)} <b>{html.escape(state.remedy)}</b></p>'
+               if state.state == STOPPED else "")
+    found = "".join(f"<li>{html.escape(finding['problem'])} <b>{html.escape(finding['remedy'])}</b></li>"
+                    for finding in row.findings)
+    told = (f"<details><summary>{len(row.findings)} "
+            f"finding{'' if len(row.findings) == 1 else 's'}</summary><ul>{found}</ul></details>" if found else "")
+    return (f'<article><div class="told"><h3>{title} <span class="badge '
+            f'{_kind(state.state)}">{STATES[state.state]}</span></h3>'
+            f'<p class="when">{html.escape(words)}</p>{problem}{_bars(row)}{told}</div><div '
+            f'class="seen">{_thumbnails(row.face.capture, link)}</div></article>')
 
 
 def _kind(state: str) -> str:
@@ -186,9 +209,14 @@ def _kind(state: str) -> str:
 
 def _bars(row: ReviewRow) -> str:
     """A line for each measure: its value, and a bar as long as the share of the others that are better."""
-    lines = "".join(f'<tr title="{html.escape(measure.note)}"{" class=worst" if measure.label == row.worst else ""}><th>{measure.label}</th>'
-                    f'<td>{_shown(row, measure.label)}</td><td class="bar"><i style="width:{row.ranks[measure.label]:.0%}"></i></td></tr>'
-                    for measure in MEASURES if measure.label in row.values)
+    lines = "".join(
+        f'<tr title="{html.escape(measure.note)}"{" class=worst" if measure.label == row.worst else ""}>'
+        f'<th>{measure.label}</th>'
+        f'<td>{_shown(row, measure.label)}</td><td class="bar"><i '
+        f'style="width:{row.ranks[measure.label]:.0%}"></i></td></tr>'
+        for measure in MEASURES
+        if measure.label in row.values
+    )
     return f"<table>{lines}</table>" if len(row.values) > 1 else ""
 
 
@@ -197,7 +225,8 @@ def _shown(row: ReviewRow, label: str) -> str:
 
 
 def _thumbnails(capture: Capture, link: str) -> str:
-    found = [(stage, path, words) for stage, pattern, words in PICTURES for path in sorted(capture.pictures.glob(pattern))[:1]]
+    found = [(stage, path, words) for stage, pattern, words in PICTURES
+             for path in sorted(capture.pictures.glob(pattern))[:1]]
     renders = [path for path in capture.renders.glob("[!.]*") if path.suffix.lower() in (".jpg", ".jpeg", ".png")]
     found += [("", path, "Render") for path in sorted(renders, key=lambda path: path.stat().st_mtime)[-1:]]
     if not found:
@@ -215,19 +244,23 @@ def _thumbnails(capture: Capture, link: str) -> str:
 
 
 def shrink(path: Path) -> tuple[bytes, float]:
-    """A picture as a JPEG of THUMBNAIL_PX rows, or of fewer where it has no more, and its width by its height. Raises Problem for one that cannot be read."""
+    """A picture as a JPEG of THUMBNAIL_PX rows, or of fewer where it has no more, and its width by its height. Raises
+    Problem for one that cannot be read."""
     from ..imaging import images  # needs OpenImageIO
 
     picture = images.read_srgb(path)
     height = min(THUMBNAIL_PX, len(picture))
     with tempfile.TemporaryDirectory(prefix="wildcap_review_") as folder:
         small = Path(folder) / "small.jpg"
-        images.write_srgb(small, images.resize(picture, max(1, round(picture.shape[1] * height / len(picture))), height), quality=QUALITY)
+        images.write_srgb(small,
+                          images.resize(picture, max(1, round(picture.shape[1] * height / len(picture))), height),
+                          quality=QUALITY)
         return small.read_bytes(), picture.shape[1] / len(picture)
 
 
 def _link(page: Path, root: Path) -> str:
-    """An address relative to the batch's folder, where the page is there; '' where it is not, or lies on another drive."""
+    """An address relative to the batch's folder, where the page is there; '' where it is not, or lies on another
+    drive."""
     if not page.is_file():
         return ""
     try:

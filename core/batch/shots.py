@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From a table of shots, or a folder of videos, to the faces of a batch. A row that cannot be used is told by its line; the others go on.
+"""From a table of shots, or a folder of videos, to the faces of a batch. A row that cannot be used is told by its line;
+the others go on.
 
-The table is CSV with a line of headings: video, and any of name, tone, white, template, quality, settings; as a spreadsheet writes it, with commas, semicolons
-or tabs. Relative paths begin at the table's folder. Standard library only.
+The table is CSV with a line of headings: video, and any of name, tone, white, template, quality, settings; as a
+spreadsheet writes it, with commas, semicolons or tabs. Relative paths begin at the table's folder. Standard library
+only.
 """
 
 from __future__ import annotations
@@ -30,8 +32,9 @@ MOST_BYTES = 16 << 20
 
 
 def read_faces(shots: Path, root: Path, quality: str, shared: dict) -> tuple[list[BatchFace], list[Problem]]:
-    """The faces of a table or a folder, captures in the batch's folder `root`, and what is wrong with the rows that were left out. `shared` settings lie
-    under each row's own. Raises Problem for a table that cannot be read, or has no usable row."""
+    """The faces of a table or a folder, captures in the batch's folder `root`, and what is wrong with the rows that
+    were left out. `shared` settings lie under each row's own. Raises Problem for a table that cannot be read, or has no
+    usable row."""
     rows = _rows_of_folder(shots, root) if shots.is_dir() else _rows_of_table(shots)
     faces, faults, taken = [], [], {}
     for place, row in rows:
@@ -39,12 +42,15 @@ def read_faces(shots: Path, root: Path, quality: str, shared: dict) -> tuple[lis
             face = _face(row, shots if shots.is_dir() else shots.parent, root, quality, shared)
             other = taken.setdefault(face.root.name.casefold(), place)  # some disks do not tell ANNA from Anna
             if other != place:
-                raise Problem(f"{face.name} is the name of {other}, too.", "Give each face a name of its own in the column name.")
+                raise Problem(f"{face.name} is the name of {other}, too.",
+                              "Give each face a name of its own in the column name.")
             faces.append(face)
         except Problem as problem:
             faults.append(Problem(f"{place}: {problem.problem}", problem.remedy))
     if not rows:
-        raise Problem(f"{shots} names no video.", f"A folder holds videos or folders of photographs; a table has a line of headings: {', '.join(HEADINGS)}.")
+        raise Problem(f"{shots} names no video.",
+                      f"A folder holds videos or folders of photographs; a table has a line of headings: "
+                      f"{', '.join(HEADINGS)}.")
     return faces, faults
 
 
@@ -57,10 +63,13 @@ def _rows_of_folder(folder: Path, root: Path) -> list[tuple[str, dict[str, str]]
     stems = [path.stem for path in inside]
     found = []
     for path in inside:
-        if path.is_dir() and path.absolute() != root and not any((path / name).exists() for name in (NAME, "capture.json")) and any(path.iterdir()):
+        if path.is_dir() and path.absolute() != root and not any((path / name).exists()
+                                                                 for name in (NAME,
+                                                                              "capture.json")) and any(path.iterdir()):
             found.append((path.name, {"video": path.name}))
         elif path.is_file() and path.suffix.lower() in VIDEOS:
-            found.append((path.name, {"video": path.name, "name": path.stem if stems.count(path.stem) == 1 else path.name}))
+            found.append((path.name,
+                          {"video": path.name, "name": path.stem if stems.count(path.stem) == 1 else path.name}))
     return found
 
 
@@ -71,7 +80,8 @@ def _rows_of_table(table: Path) -> list[tuple[str, dict[str, str]]]:
     except FileNotFoundError:
         raise Problem(f"There is no table or folder at {table}.", "Check its name.") from None
     except OSError as error:
-        raise Problem(f"{table} cannot be read ({error.strerror or error}).", "Check the disk and the file's permissions.") from error
+        raise Problem(f"{table} cannot be read ({error.strerror or error}).",
+                      "Check the disk and the file's permissions.") from error
     try:
         text = content.decode("utf-8-sig")
         if len(content) > MOST_BYTES or "\0" in text:
@@ -91,31 +101,39 @@ def _rows_of_table(table: Path) -> list[tuple[str, dict[str, str]]]:
                 names = [cell.lower() for cell in cells]
                 _check_headings(table, names)
             else:
-                rows.append((f"Line {reader.line_num}", dict(zip(names, cells, strict=False)) | {"": "more" if len(cells) > len(names) else ""}))
+                rows.append((f"Line {reader.line_num}",
+                             dict(zip(names, cells, strict=False)) | {"": "more" if len(cells) > len(names) else ""}))
     except csv.Error as error:
-        raise Problem(f"{table} cannot be read as a table (line {reader.line_num}: {error}).", "Save it from the spreadsheet as CSV, UTF-8.") from error
+        raise Problem(f"{table} cannot be read as a table (line {reader.line_num}: {error}).",
+                      "Save it from the spreadsheet as CSV, UTF-8.") from error
     return rows
 
 
 def _check_headings(table: Path, names: list[str]) -> None:
     unknown = [name for name in names if name and name not in HEADINGS]
     if "video" not in names or unknown or any(names.count(name) > 1 for name in names if name):
-        wrong = f"a column {unknown[0]!r} that means nothing" if unknown else "no column video" if "video" not in names else "a column twice"
-        raise Problem(f"{table} has {wrong}.", f"Its first line names the columns: video, and any of {', '.join(HEADINGS[1:])}.")
+        wrong = (f"a column {unknown[0]!r} that means nothing" if unknown else "no column video" if "video" not in names
+                 else "a column twice")
+        raise Problem(f"{table} has {wrong}.",
+                      f"Its first line names the columns: video, and any of {', '.join(HEADINGS[1:])}.")
 
 
 def _face(row: dict[str, str], folder: Path, root: Path, quality: str, shared: dict) -> BatchFace:
     """One row's face. Raises Problem."""
     if row.get(""):
-        raise Problem("It has more cells than there are columns.", "A cell that holds the separator is put in quotation marks, as a tone is: \"0.8,0.6,0.5\".")
+        raise Problem("It has more cells than there are columns.",
+                      "A cell that holds the separator is put in quotation marks, as a tone is: \"0.8,0.6,0.5\".")
     if not row.get("video"):
         raise Problem("It names no video.", "Name a video or a folder of photographs in the column video.")
     source = Path(absolute_path(row["video"], folder.absolute()))
     if not source.exists():
-        raise Problem(f"There is no video or folder at {source}.", "Check its name and whether the disk it is on is connected.")
+        raise Problem(f"There is no video or folder at {source}.",
+                      "Check its name and whether the disk it is on is connected.")
     name = row.get("name") or source.stem
-    if not plain_name(name) or name.startswith("-") or not name.isprintable():  # it becomes a word of commands, and of lists
-        raise Problem(f"{name!r} cannot be the name of a folder.", "Use letters, digits, spaces, hyphens and underscores.")
+    # it becomes a word of commands, and of lists
+    if not plain_name(name) or name.startswith("-") or not name.isprintable():
+        raise Problem(f"{name!r} cannot be the name of a folder.",
+                      "Use letters, digits, spaces, hyphens and underscores.")
     values = {stage: dict(own) if isinstance(own, dict) else own for stage, own in shared.items()}
     if row.get("settings"):
         for stage, own in read_file(Path(absolute_path(row["settings"], folder.absolute()))).items():
@@ -128,14 +146,16 @@ def _face(row: dict[str, str], folder: Path, root: Path, quality: str, shared: d
             values[stage] = {**values.get(stage, {}), setting: value}
     template = values.get("registration", {}).get("template")
     if template and not Path(template).exists():
-        raise Problem(f"There is no head mesh at {template}.", "Check its name, or leave the cell empty for the built-in head.")
+        raise Problem(f"There is no head mesh at {template}.",
+                      "Check its name, or leave the cell empty for the built-in head.")
     chosen = row.get("quality") or quality
     known.from_json(values, known.preset(chosen))
     return BatchFace(name, source, root / f"{name}.wildcap", chosen, values)
 
 
 def _check_colour(column: str, text: str) -> None:
-    """Raises Problem for what is neither auto nor three numbers: the stage that reads it would find out only after minutes."""
+    """Raises Problem for what is neither auto nor three numbers: the stage that reads it would find out only after
+    minutes."""
     try:
         parts = [float(part) for part in text.split(",")] if text != "auto" else [0.5] * 3
     except ValueError:

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m core slim: a finished face, or those of a batch, without what their videos give again. Standard library only."""
+"""python -m core slim: a finished face, or those of a batch, without what their videos give again. Standard library
+only."""
 
 from __future__ import annotations
 
@@ -22,7 +23,9 @@ from .task import ROOT
 
 def add_commands(commands) -> None:
     """Adds `slim` to the subparsers of `python -m core`."""
-    slim = commands.add_parser("slim", help="remove what the video gives again in a minute, of a face that is done, or of a batch's; without --yes, list it")
+    slim = commands.add_parser("slim",
+                               help="remove what the video gives again in a minute, of a face that is done, or of a "
+                                    "batch's; without --yes, list it")
     slim.add_argument("folder", metavar="CAPTURE|BATCH", type=Path)
     what = slim.add_mutually_exclusive_group()
     what.add_argument("--yes", action="store_true", help="remove it; a stage that needs it later has it made again")
@@ -60,8 +63,10 @@ def _slim_batch(batch: Batch, yes: bool) -> int:
             print(f"{face.name:20} left: {problem.problem} {problem.remedy}", flush=True)
             continue
         size, count = size + found.size, count + bool(found.going)
-        print(f"{face.name:20} {len(found.going)} files, {megabytes(found.size)}" + "".join(f"; {note}" for note in found.notes), flush=True)
-    print(f"{count} of {len(batch.faces)} faces, {megabytes(size)}" + ("" if yes else ". Nothing was removed; --yes does it."))
+        print(f"{face.name:20} {len(found.going)} files, {megabytes(found.size)}"
+              + "".join(f"; {note}" for note in found.notes), flush=True)
+    print(f"{count} of {len(batch.faces)} faces, {megabytes(size)}"
+          + ("" if yes else ". Nothing was removed; --yes does it."))
     return 0
 
 
@@ -70,7 +75,9 @@ def _undo(captures: list[Capture]) -> int:
     for capture in captures:
         if not slimmed.hashes_of(capture.read()):
             print(f"{capture.root.stem}: nothing was slimmed away.")
-        elif code := terminal.follow(ROOT, capture, write_job(capture, tool="bring_back", settings=settings.to_json(_chosen(capture))), {}):
+        elif code := terminal.follow(ROOT, capture,
+                                     write_job(capture, tool="bring_back", settings=settings.to_json(_chosen(capture))),
+                                     {}):
             return code
     return 0
 

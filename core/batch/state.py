@@ -24,8 +24,8 @@ SHEET = "contact_sheet.png"
 
 @dataclass(frozen=True)
 class FaceState:
-    """`state` is one of the five; `group` is the task that is next, or that works or has stopped, None where all are done; `problem` and `remedy` say why
-    it stopped; `who` names the machine that works on it."""
+    """`state` is one of the five; `group` is the task that is next, or that works or has stopped, None where all are
+    done; `problem` and `remedy` say why it stopped; `who` names the machine that works on it."""
 
     state: str
     group: StageGroup | None = None
@@ -38,7 +38,8 @@ class FaceState:
         if self.state == DONE:
             return "done"
         label = self.group.label.lower() if self.group else ""
-        return {TO_DO: f"{label} is next", WORKING: f"{label}: working on {self.who}", WAITING: "its shadow mask waits to be looked at",
+        return {TO_DO: f"{label} is next", WORKING: f"{label}: working on {self.who}",
+                WAITING: "its shadow mask waits to be looked at",
                 STOPPED: f"{label} stopped: {self.problem} {self.remedy}"}[self.state]
 
 
@@ -49,7 +50,8 @@ def derive_state(batch: Batch, face: BatchFace) -> FaceState:
         group = next((group for group in GROUPS if not is_done(batch, face, group)), None)
         holder = lease.holder(capture.lock) if capture.root.is_dir() else None
         if holder is not None:
-            return FaceState(WORKING, group or GROUPS[-1], who=str(holder.get("host", "another machine")).partition("/")[0])
+            return FaceState(WORKING, group or GROUPS[-1],
+                             who=str(holder.get("host", "another machine")).partition("/")[0])
         if group is None:
             return FaceState(DONE)
         stopped = capture.read().get("stopped")
@@ -67,23 +69,27 @@ def waits(batch: Batch, face: BatchFace, group: StageGroup) -> bool:
 
 
 def is_done(batch: Batch, face: BatchFace, group: StageGroup) -> bool:
-    """Whether all stages of a task are finished as this batch asks for them; of the last one, whether it is delivered, too. Raises Problem."""
+    """Whether all stages of a task are finished as this batch asks for them; of the last one, whether it is delivered,
+    too. Raises Problem."""
     settings = face.chosen()
     if not all(face.capture.state(stage, settings) in FINISHED for stage in group.stages):
         return False
-    return group.name != DELIVER or (batch.deliver is None or is_delivered(batch, face)) and (not batch.blender or has_sheet(face.capture))
+    return group.name != DELIVER or (batch.deliver is None
+                                     or is_delivered(batch, face)) and (not batch.blender or has_sheet(face.capture))
 
 
 def deliver_settings(batch: Batch, face: BatchFace) -> dict:
-    """The settings of a face with those of the delivery, as a job has them: with its mesh, which is OBJ where no Blender writes it. In a folder that all
-    deliver to each face has one of its own: plain names may be alike where names are not (delivery_plan.safe_name)."""
+    """The settings of a face with those of the delivery, as a job has them: with its mesh, which is OBJ where no
+    Blender writes it. In a folder that all deliver to each face has one of its own: plain names may be alike where
+    names are not (delivery_plan.safe_name)."""
     asked = {"format": "obj", "whole": True, **(batch.deliver or {})}
     folder = {"folder": str(Path(asked["folder"]) / face.name)} if asked.get("folder") else {}
     return {**to_json(face.chosen()), "deliver": {**asked, **folder}}
 
 
 def is_delivered(batch: Batch, face: BatchFace) -> bool:
-    """Whether the delivery that is asked for is there, whole, and made of the stages as they stand now. Raises Problem for settings that do not fit."""
+    """Whether the delivery that is asked for is there, whole, and made of the stages as they stand now. Raises Problem
+    for settings that do not fit."""
     plan = delivery_plan.plan(face.capture, from_json(deliver_settings(batch, face)).deliver)
     try:
         told = read_json(plan.target / delivery_plan.PROVENANCE)

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One task of one face, run on this machine by a worker in a process of its own: what every kind of batch comes down to. Standard library only.
+"""One task of one face, run on this machine by a worker in a process of its own: what every kind of batch comes down
+to. Standard library only.
 
-Asked for what is done already, it ends well within seconds. The worker ends with the process that asked for it, however that ends.
+Asked for what is done already, it ends well within seconds. The worker ends with the process that asked for it, however
+that ends.
 """
 
 from __future__ import annotations
@@ -30,16 +32,19 @@ POLL_S = 0.1
 
 def run_task(batch: Batch, face: BatchFace, group: StageGroup, hear: Callable[[Message], None] = lambda message: None,
              cancelled: Callable[[], bool] = lambda: False, threads: int | None = None) -> Message:
-    """Runs a task, sends what its worker says through `hear`, and returns the final message: Done, Cancelled or Failed. `threads`: how many its libraries
-    may start, where other tasks run beside it; None: as many as the worker takes by itself."""
+    """Runs a task, sends what its worker says through `hear`, and returns the final message: Done, Cancelled or Failed.
+    `threads`: how many its libraries may start, where other tasks run beside it; None: as many as the worker takes by
+    itself."""
     environment = {} if threads is None else {name: str(threads) for name in THREAD_VARIABLES}
     began, capture = time.monotonic(), face.capture
     try:
         if waits(batch, face, group):
             raise Problem(f"The shadow mask of {face.name} waits to be looked at.",
-                          f"Open the batch in Blender, or accept it as it is: `python -m core batch accept {batch.root} {face.name}`.")
+                          f"Open the batch in Blender, or accept it as it is: `python -m core batch accept "
+                          f"{batch.root} {face.name}`.")
         _wait_for_lease(capture, hear)
-        job = write_job(capture, source=face.source if group is GROUPS[0] else "", last=group.last, settings=face.settings, quality=face.quality)
+        job = write_job(capture, source=face.source if group is GROUPS[0] else "", last=group.last,
+                        settings=face.settings, quality=face.quality)
         final = _follow(capture, job, hear, cancelled, environment)
         if group.name == DELIVER and isinstance(final, Done):
             final = _deliver(batch, face, hear, cancelled, environment)
@@ -49,15 +54,17 @@ def run_task(batch: Batch, face: BatchFace, group: StageGroup, hear: Callable[[M
 
 
 def _wait_for_lease(capture: Capture, hear: Callable[[Message], None]) -> None:
-    """Sees to it that nobody holds the capture: one that is left by a machine that has gone is taken over when its term is out. Raises Problem where
-    somebody works there."""
+    """Sees to it that nobody holds the capture: one that is left by a machine that has gone is taken over when its term
+    is out. Raises Problem where somebody works there."""
     if capture.json.is_file() and capture.lock.exists():
         with capture.locked(lambda text: hear(Log(text))):
             pass
 
 
-def _follow(capture: Capture, job: Path, hear: Callable[[Message], None], cancelled: Callable[[], bool], environment: dict[str, str]) -> Message:
-    """Runs a job to its end and returns its final message. A worker that dies is started once more, for what killed it may have been the task beside it."""
+def _follow(capture: Capture, job: Path, hear: Callable[[Message], None], cancelled: Callable[[], bool],
+            environment: dict[str, str]) -> Message:
+    """Runs a job to its end and returns its final message. A worker that dies is started once more, for what killed it
+    may have been the task beside it."""
     for again in (False, True):
         worker = Worker(Path(sys.executable), ROOT, job, capture.logs / "worker.log", {**environment, **_paid_key(job)})
         final = _listen(worker, hear, cancelled)
@@ -85,16 +92,20 @@ def _listen(worker: Worker, hear: Callable[[Message], None], cancelled: Callable
 
 
 def _paid_key(job: Path) -> dict[str, str]:
-    """The key of a paid service that this process was started with, for a job that asks for that service, and for no other."""
+    """The key of a paid service that this process was started with, for a job that asks for that service, and for no
+    other."""
     key = os.environ.get(switchlight_api.KEY_VARIABLE)
-    return {switchlight_api.KEY_VARIABLE: key} if key and read_job(job).settings.delight.delighter == "switchlight" else {}
+    return ({switchlight_api.KEY_VARIABLE: key} if key and read_job(job).settings.delight.delighter == "switchlight"
+            else {})
 
 
-def _deliver(batch: Batch, face: BatchFace, hear: Callable[[Message], None], cancelled: Callable[[], bool], environment: dict[str, str]) -> Message:
+def _deliver(batch: Batch, face: BatchFace, hear: Callable[[Message], None], cancelled: Callable[[], bool],
+             environment: dict[str, str]) -> Message:
     """What comes after the last stage: the delivery, and the contact sheet. Raises Problem."""
     capture, final = face.capture, Done(0.0)
     if batch.deliver is not None and not is_delivered(batch, face):
-        final = _follow(capture, write_job(capture, tool="deliver", settings=deliver_settings(batch, face)), hear, cancelled, environment)
+        final = _follow(capture, write_job(capture, tool="deliver", settings=deliver_settings(batch, face)), hear,
+                        cancelled, environment)
         # job.json is what the stages are judged by in `status` and in Blender
         write_job(capture, last=GROUPS[-1].last, settings=face.settings, quality=face.quality)
     if isinstance(final, Done) and batch.blender and not has_sheet(capture):
@@ -102,17 +113,20 @@ def _deliver(batch: Batch, face: BatchFace, hear: Callable[[Message], None], can
     return final
 
 
-def _render_sheet(blender: str, capture: Capture, hear: Callable[[Message], None], cancelled: Callable[[], bool]) -> Message:
-    """The contact sheet, by a Blender that has the extension. Raises Problem where it cannot be started, or gives none."""
+def _render_sheet(blender: str, capture: Capture, hear: Callable[[Message], None],
+                  cancelled: Callable[[], bool]) -> Message:
+    """The contact sheet, by a Blender that has the extension. Raises Problem where it cannot be started, or gives
+    none."""
     hear(Log("Rendering the contact sheet"))
     capture.logs.mkdir(parents=True, exist_ok=True)
     log = capture.logs / "contact_sheet.log"
     with open(log, "wb") as told:
         try:
-            process = subprocess.Popen([blender, "--command", "wildcap", "contact_sheet", str(capture.root)], stdin=subprocess.DEVNULL, stdout=told,
-                                       stderr=told)
+            process = subprocess.Popen([blender, "--command", "wildcap", "contact_sheet", str(capture.root)],
+                                       stdin=subprocess.DEVNULL, stdout=told, stderr=told)
         except OSError as error:
-            raise Problem(f"Blender could not be started as {blender} ({error.strerror or error}).", "Plan the batch with --blender and its path.") from error
+            raise Problem(f"Blender could not be started as {blender} ({error.strerror or error}).",
+                          "Plan the batch with --blender and its path.") from error
         try:
             while process.poll() is None:
                 if cancelled():
@@ -123,6 +137,7 @@ def _render_sheet(blender: str, capture: Capture, hear: Callable[[Message], None
                 process.kill()
             process.wait()
     if process.returncode or not has_sheet(capture):
-        raise Problem(f"Blender rendered no contact sheet of {capture.root.stem}.", f"Read {log}; the extension must be installed in that Blender.")
+        raise Problem(f"Blender rendered no contact sheet of {capture.root.stem}.",
+                      f"Read {log}; the extension must be installed in that Blender.")
     return Done(0.0)
 

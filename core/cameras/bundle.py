@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bundle adjustment of cameras over face landmarks and feature tracks at once, small enough for plain arrays.
 
-The landmarks' places are free, with a prior towards the template's head of the person's own identity, itself free with prior N(0, 1): so a face
-unlike the template does not bend the cameras. Points are eliminated first. Triggs et al., Bundle Adjustment: A Modern Synthesis (2000).
+The landmarks' places are free, with a prior towards the template's head of the person's own identity, itself free with
+prior N(0, 1): so a face unlike the template does not bend the cameras. Points are eliminated first. Triggs et al.,
+Bundle Adjustment: A Modern Synthesis (2000).
 """
 
 from __future__ import annotations
@@ -27,9 +28,10 @@ LEAST_LANDMARK_COSINE = 0.15
 
 @dataclass(frozen=True)
 class Bundle:
-    """State: rotations [N, 3, 3] and translations [N, 3] into the cameras; focal [G] px with prior [G] and known [G]; lens [N], the camera's focal;
-    centre [N, 2], principal points px; coefficients [K]; points [P, 3] metres in the head's frame, the first 468 the landmarks; feature_px, the deviation
-    of a match; focal_spread, that of the logarithm of an unknown focal length."""
+    """State: rotations [N, 3, 3] and translations [N, 3] into the cameras; focal [G] px with prior [G] and known [G];
+    lens [N], the camera's focal; centre [N, 2], principal points px; coefficients [K]; points [P, 3] metres in the
+    head's frame, the first 468 the landmarks; feature_px, the deviation of a match; focal_spread, that of the logarithm
+    of an unknown focal length."""
 
     rotations: np.ndarray
     translations: np.ndarray
@@ -84,7 +86,8 @@ def adjust(bundle: Bundle, seen: Observations, rounds: int = 15) -> Bundle:
 def _sigma_px(bundle: Bundle, seen: Observations) -> np.ndarray:
     """Expected deviation of each observation [M] in pixels: a landmark's is a length on the head."""
     depth = np.maximum(bundle.local(seen.camera, seen.point)[:, 2], 0.05)
-    return np.where(seen.point < len(template_landmarks().mean), SIGMA_M * bundle.focal[bundle.lens[seen.camera]] / depth, bundle.feature_px)
+    return np.where(seen.point < len(template_landmarks().mean),
+                    SIGMA_M * bundle.focal[bundle.lens[seen.camera]] / depth, bundle.feature_px)
 
 
 def _weights(bundle: Bundle, seen: Observations) -> np.ndarray:
@@ -103,15 +106,19 @@ def _weights(bundle: Bundle, seen: Observations) -> np.ndarray:
 
 
 def _priors(bundle: Bundle) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals of the landmarks against the head of the identity space [468, 3], and of the logarithms of the focal lengths [G], in deviations."""
+    """Residuals of the landmarks against the head of the identity space [468, 3], and of the logarithms of the focal
+    lengths [G], in deviations."""
     model = template_landmarks()
-    return (bundle.points[:len(model.mean)] - model.shape(bundle.coefficients)) / OFFSET_M, np.log(bundle.focal / bundle.focal_prior) / bundle.focal_spread
+    return (bundle.points[:len(model.mean)]
+            - model.shape(bundle.coefficients)) / OFFSET_M, np.log(bundle.focal
+                                                                   / bundle.focal_prior) / bundle.focal_spread
 
 
 def _cost(bundle: Bundle, seen: Observations, weights: np.ndarray) -> float:
     offset, focal = _priors(bundle)
     error = ((bundle.project(seen.camera, seen.point) - seen.pixel) ** 2).sum(1)
-    return float(weights @ error + (offset**2).sum() * _offset_weight() + (bundle.coefficients**2).sum() + (focal[~bundle.focal_known] ** 2).sum())
+    return float(weights @ error + (offset**2).sum() * _offset_weight() + (bundle.coefficients**2).sum()
+                 + (focal[~bundle.focal_known] ** 2).sum())
 
 
 def _offset_weight() -> float:
@@ -137,7 +144,9 @@ def _step(bundle: Bundle, seen: Observations, weights: np.ndarray, damping: floa
     by_camera[bundle.focal_known[bundle.lens[seen.camera]], :, 6] = 0
     by_point = by_local @ bundle.rotations[seen.camera]
 
-    columns = np.concatenate([6 * seen.camera[:, None] + np.arange(6), 6 * views + bundle.lens[seen.camera][:, None]], 1)  # [M, 7]
+    # [M, 7]
+    columns = np.concatenate([6 * seen.camera[:, None] + np.arange(6), 6 * views + bundle.lens[seen.camera][:, None]],
+                             1)
     heavy = weights[:, None, None]
     u, g = np.zeros((shared, shared)), np.zeros(shared)
     np.add.at(u, (columns[:, :, None], columns[:, None, :]), np.einsum("mia,mib->mab", by_camera * heavy, by_camera))
@@ -146,7 +155,8 @@ def _step(bundle: Bundle, seen: Observations, weights: np.ndarray, damping: floa
     np.add.at(v, seen.point, np.einsum("mia,mib->mab", by_point * heavy, by_point))
     np.add.at(h, seen.point, np.einsum("mia,mi->ma", by_point * heavy, residual))
     w = np.zeros((count, 3, shared))
-    np.add.at(w, (seen.point[:, None, None], np.arange(3)[None, :, None], columns[:, None, :]), np.einsum("mia,mib->mab", by_point * heavy, by_camera))
+    np.add.at(w, (seen.point[:, None, None], np.arange(3)[None, :, None], columns[:, None, :]),
+              np.einsum("mia,mib->mab", by_point * heavy, by_camera))
 
     offset, focal_off = _priors(bundle)
     tail, strength = slice(6 * views + groups, shared), _offset_weight() / OFFSET_M**2
@@ -170,6 +180,8 @@ def _step(bundle: Bundle, seen: Observations, weights: np.ndarray, damping: floa
     step = -np.linalg.solve(reduced, g - np.einsum("pis,pi->s", folded, h))
     points = bundle.points - np.einsum("pij,pj->pi", inverse, h) - folded @ step
     turns = step[:6 * views].reshape(views, 6)
-    rotations = np.array([cv2.Rodrigues(turn[:3])[0] @ rotation for turn, rotation in zip(turns, bundle.rotations, strict=True)])
+    rotations = np.array([cv2.Rodrigues(turn[:3])[0] @ rotation
+                          for turn, rotation in zip(turns, bundle.rotations, strict=True)])
     return replace(bundle, rotations=rotations, translations=bundle.translations + turns[:, 3:], points=points,
-                   focal=bundle.focal * np.exp(np.clip(step[lenses], -0.3, 0.3)), coefficients=bundle.coefficients + step[tail])
+                   focal=bundle.focal * np.exp(np.clip(step[lenses], -0.3, 0.3)),
+                   coefficients=bundle.coefficients + step[tail])

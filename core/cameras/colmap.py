@@ -24,22 +24,26 @@ CHOSEN = "chosen.json"
 """Beside the database: the frames that carry a film of which matches are all that is wanted."""
 PHONE = 1.0
 FOCALS = (PHONE, 2.0, 3.5)
-"""Focal lengths that photographs whose files tell none are tried with, as shares of the longer side: 53, 28 and 16 degrees of view."""
+"""Focal lengths that photographs whose files tell none are tried with, as shares of the longer side: 53, 28 and 16
+degrees of view."""
 CHUNK_PICTURES = 24
 """Pictures handed to COLMAP at once: enough to keep its threads busy, few enough to show progress."""
 FILM_FEATURES, LEAST_FEATURES = 2000, 400
-"""Of each frame of a film, whose neighbours share plenty; and below which (in the median frame) features are looked for at twice the frames' size."""
+"""Of each frame of a film, whose neighbours share plenty; and below which (in the median frame) features are looked for
+at twice the frames' size."""
 LEAST_CARRIED_SHARE = 0.9
 """Share of the frames chosen to carry a film's structure that must fit together; else more are chosen."""
 
 
 def reconstruct(job: dict) -> bool:
-    """Runs a job: images (folder), groups [{names, width, height, focal_px or null}] of one camera each, skin (feature settings), film (what skeleton.Film
-    says of the frames; null: all pairs are matched), photographs (few, of straight lenses whose focal length may be any), finer (features from twice the
-    pictures' size on), seed, masks (folder or null), database and output (paths; null: matches are all that is wanted). Writes the largest model to
-    output; False where there is none."""
+    """Runs a job: images (folder), groups [{names, width, height, focal_px or null}] of one camera each, skin (feature
+    settings), film (what skeleton.Film says of the frames; null: all pairs are matched), photographs (few, of straight
+    lenses whose focal length may be any), finer (features from twice the pictures' size on), seed, masks (folder or
+    null), database and output (paths; null: matches are all that is wanted). Writes the largest model to output; False
+    where there is none."""
     pycolmap.set_random_seed(job["seed"])
-    chosen = _extract_film(job) if job["film"] else _extract(job, [name for group in job["groups"] for name in group["names"]], job["finer"])
+    chosen = (_extract_film(job) if job["film"]
+              else _extract(job, [name for group in job["groups"] for name in group["names"]], job["finer"]))
     if not job["output"]:
         _match(job, skeleton.pairs_within(job["film"], chosen) + skeleton.pairs_between(job["film"], chosen))
         Path(job["database"]).with_name(CHOSEN).write_text(json.dumps(chosen), encoding="utf-8")
@@ -58,7 +62,8 @@ def reconstruct(job: dict) -> bool:
 
 
 def _extract_film(job: dict) -> list[str]:
-    """Features of a film's frames, at half their size of those that are only placed by others; and the frames that carry it."""
+    """Features of a film's frames, at half their size of those that are only placed by others; and the frames that
+    carry it."""
     film, finer = job["film"], job["finer"]
     chosen = _extract(job, skeleton.choose(film, skeleton.size(film)), finer)
     if not finer and _features(job) < LEAST_FEATURES:
@@ -94,18 +99,20 @@ def _extract(job: dict, names: list[str], finer: bool, part: int = 1) -> list[st
         options.max_image_size = -1 if part == 1 else max(group["width"], group["height"]) // part
         these = [name for name in group["names"] if name in missing and name in wanted]
         for chunk in [these[start:start + CHUNK_PICTURES] for start in range(0, len(these), CHUNK_PICTURES)]:
-            _aside(pycolmap.extract_features, job["database"], job["images"], chunk, pycolmap.CameraMode.SINGLE, reader, options, pycolmap.Device.cpu)
+            _aside(pycolmap.extract_features, job["database"], job["images"], chunk, pycolmap.CameraMode.SINGLE, reader,
+                   options, pycolmap.Device.cpu)
             done += len(chunk)
             _say("finding features", done, total)
     return names
 
 
 def _enter(job: dict) -> None:
-    """The pictures in their order, a camera for each group: extraction would number them as its threads finish, and the mapper's path depends on the
-    numbers."""
+    """The pictures in their order, a camera for each group: extraction would number them as its threads finish, and the
+    mapper's path depends on the numbers."""
     pycolmap.Database.open(job["database"]).close()  # makes the file
     for group in job["groups"]:
-        pycolmap.import_images(job["database"], job["images"], pycolmap.CameraMode.SINGLE, group["names"], _reader(job, group))
+        pycolmap.import_images(job["database"], job["images"], pycolmap.CameraMode.SINGLE, group["names"],
+                               _reader(job, group))
 
 
 def _reader(job: dict, group: dict) -> pycolmap.ImageReaderOptions:
@@ -145,7 +152,8 @@ def _match(job: dict, pairs: list[tuple[str, str]] | None = None) -> None:
         pairing.match_list_path.write_text("".join(f"{first} {second}\n" for first, second in pairs), encoding="utf-8")
         _aside(pycolmap.match_image_pairs, job["database"], options, pairing, verification, pycolmap.Device.cpu)
     else:
-        _aside(pycolmap.match_exhaustive, job["database"], options, pycolmap.ExhaustivePairingOptions(), verification, pycolmap.Device.cpu)
+        _aside(pycolmap.match_exhaustive, job["database"], options, pycolmap.ExhaustivePairingOptions(), verification,
+               pycolmap.Device.cpu)
     _say("matching features", 1, 1)
 
 
@@ -164,19 +172,22 @@ def _map_film(job: dict, chosen: list[str]) -> list[pycolmap.Reconstruction]:
     mapped = {image.name for image in best.images.values() if image.has_pose}
     _match(job, skeleton.pairs_between(film, [name for name in chosen if name in mapped]))
     others = [name for name, _, _ in film if name not in mapped]
-    skeleton.place_others(best, Path(job["database"]), others, job["seed"], lambda done, of: _say("placing cameras", len(mapped) + done, len(mapped) + of))
+    skeleton.place_others(best, Path(job["database"]), others, job["seed"], lambda done,
+                          of: _say("placing cameras", len(mapped) + done, len(mapped) + of))
     return [best]
 
 
 def _map_photographs(job: dict) -> list[pycolmap.Reconstruction]:
-    """The models from every focal length of FOCALS, where one is not told; what comes after the matches takes little time."""
+    """The models from every focal length of FOCALS, where one is not told; what comes after the matches takes little
+    time."""
     unknown = [(camera_id, group) for camera_id, group in enumerate(job["groups"], 1) if not group["focal_px"]]
     found = []
     for factor in FOCALS if unknown else (PHONE,):
         with pycolmap.Database.open(job["database"]) as stored:
             for camera_id, group in unknown:
                 camera = stored.read_camera(camera_id)
-                camera.params = [factor * max(group["width"], group["height"]), group["width"] / 2, group["height"] / 2, 0]
+                camera.params = [factor * max(group["width"], group["height"]), group["width"] / 2, group["height"] / 2,
+                                 0]
                 stored.update_camera(camera)
         found += _map(job)
     return found
@@ -192,15 +203,18 @@ def _map(job: dict, names: list[str] | None = None) -> list[pycolmap.Reconstruct
     options.random_seed = job["seed"]
     options.mapper.random_seed = job["seed"]
     options.triangulation.random_seed = job["seed"]
-    options.num_threads = 1  # sums in a fixed order: the same seed gives the same cameras, and the mapper gains little from a second thread
+    # sums in a fixed order: the same seed gives the same cameras, and the mapper gains little from a second thread
+    options.num_threads = 1
     options.min_model_size = 3
     options.extract_colors = True
-    options.ba_refine_extra_params = not job["photographs"]  # a few pictures of a face do not tell a lens's distortion from its focal length
+    # a few pictures of a face do not tell a lens's distortion from its focal length
+    options.ba_refine_extra_params = not job["photographs"]
     total = sum(len(group["names"]) for group in job["groups"])
     if names is not None:
         options.image_names = names
         options.max_model_overlap = len(names)  # where the first pair was a bad one, the next model may take all frames
-        options.ba_global_frames_ratio = options.ba_global_points_ratio = 1.3  # a film grows evenly: the whole need not be adjusted at every tenth more
+        # a film grows evenly: the whole need not be adjusted at every tenth more
+        options.ba_global_frames_ratio = options.ba_global_points_ratio = 1.3
     if job["skin"] or total < 12:
         options.min_num_matches = 12
         options.mapper.abs_pose_min_num_inliers = 12
@@ -215,12 +229,13 @@ def _map(job: dict, names: list[str] | None = None) -> list[pycolmap.Reconstruct
 
     folder = Path(job["output"]).with_name("models")
     folder.mkdir(parents=True, exist_ok=True)
-    return list(pycolmap.incremental_mapping(job["database"], job["images"], str(folder), options, next_image_callback=another).values())
+    return list(pycolmap.incremental_mapping(job["database"], job["images"], str(folder), options,
+                                             next_image_callback=another).values())
 
 
 def _aside(function, *arguments) -> None:
-    """While COLMAP's threads find and match features, the thread that called it spins and takes a core of its own. On Linux that thread is
-    set, once the others have begun, to get only time that nobody wants."""
+    """While COLMAP's threads find and match features, the thread that called it spins and takes a core of its own. On
+    Linux that thread is set, once the others have begun, to get only time that nobody wants."""
     with ThreadPoolExecutor(1, initializer=lambda: threads.append(threading.get_native_id())) as caller:
         threads = []
         call = caller.submit(function, *arguments)

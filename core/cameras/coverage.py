@@ -15,8 +15,11 @@ LEVEL_DEG = 5.0
 
 
 def angles(centres: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Camera centres [N, 3] in the head's world -> azimuth [N], 0 in front, positive on the person's left, and elevation [N], in degrees."""
-    return np.degrees(np.arctan2(centres[:, 0], -centres[:, 1])), np.degrees(np.arctan2(centres[:, 2], np.hypot(centres[:, 0], centres[:, 1])))
+    """Camera centres [N, 3] in the head's world -> azimuth [N], 0 in front, positive on the person's left, and
+    elevation [N], in degrees."""
+    return np.degrees(np.arctan2(centres[:, 0],
+                                 -centres[:, 1])), np.degrees(np.arctan2(centres[:, 2],
+                                                                         np.hypot(centres[:, 0], centres[:, 1])))
 
 
 def widest_deg(centres: np.ndarray) -> float:
@@ -26,7 +29,8 @@ def widest_deg(centres: np.ndarray) -> float:
 
 
 def missing(centres: np.ndarray) -> list[tuple[str, str]]:
-    """What was not seen: (problem, remedy) for each side without cameras, for gaps between them, and for one height only."""
+    """What was not seen: (problem, remedy) for each side without cameras, for gaps between them, and for one height
+    only."""
     azimuth, elevation = angles(centres)
     azimuth = np.sort(azimuth)
     found = []
@@ -34,12 +38,16 @@ def missing(centres: np.ndarray) -> list[tuple[str, str]]:
         if reach >= WANTED_DEG:
             continue
         other = "right" if side == "left" else "left"
-        where = f"{_degrees(reach)} to the person's {side} of the nose" if reach > 1 else f"before the nose, on the person's {other}"
-        found.append((f"{'Nothing' if reach < SIDE_DEG else 'Little'} was seen from the person's {side} side: the pictures end {where}.",
-                      f"Go on around the face until the person's {side} ear is in the middle of the picture; that side is guessed otherwise."))
+        where = (f"{_degrees(reach)} to the person's {side} of the nose" if reach > 1
+                 else f"before the nose, on the person's {other}")
+        found.append((f"{'Nothing' if reach < SIDE_DEG else 'Little'} was seen from the person's {side} side: the "
+                      f"pictures end {where}.",
+                      f"Go on around the face until the person's {side} ear is in the middle of the picture; that side "
+                      "is guessed otherwise."))
     for low, high in zip(azimuth[:-1], azimuth[1:], strict=True):
         if high - low > GAP_DEG:
-            found.append((f"Between {_place(low)} and {_place(high)} there is no picture: a gap of {high - low:.0f} degrees.",
+            found.append((f"Between {_place(low)} and {_place(high)} there is no picture: a gap of {high - low:.0f} "
+                          "degrees.",
                           "Take a picture at least every 15 degrees on the way around the face."))
     if len(centres) >= 6 and np.ptp(elevation) < LEVEL_DEG:
         found.append(("All pictures were taken from one height: under the chin and the nose little was seen.",
@@ -52,4 +60,5 @@ def _degrees(value: float) -> str:
 
 
 def _place(azimuth: float) -> str:
-    return "the front" if abs(azimuth) < 3 else f"{_degrees(abs(azimuth))} to the person's {'left' if azimuth > 0 else 'right'}"
+    return ("the front" if abs(azimuth) < 3
+            else f"{_degrees(abs(azimuth))} to the person's {'left' if azimuth > 0 else 'right'}")

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cameras that are nearly right, made right: poses, focal lengths, identity and matched points adjusted at once, with what structure from motion left out.
+"""Cameras that are nearly right, made right: poses, focal lengths, identity and matched points adjusted at once, with
+what structure from motion left out.
 
-Cameras say which of all matches can be true, and more of them make better cameras. The face's landmarks, on a head of people's size and shape, hold
-what a few photographs alone leave open.
+Cameras say which of all matches can be true, and more of them make better cameras. The face's landmarks, on a head of
+people's size and shape, hold what a few photographs alone leave open.
 """
 
 from __future__ import annotations
@@ -32,15 +33,18 @@ WIDE_WIDTH_SHARES = (0.06, 0.025)
 FEATURE_SIGMA_SHARE = 1 / 3000
 """Deviation of a match, as a share of a picture's longer side: features are looked for at 2,000 pixels."""
 FREE_SIGMA_LOG, TOLD_SIGMA_LOG = 3.0, 0.03
-"""Spreads of the logarithm of a focal length: of an unknown one, which what matches tells, and of one that a file told, which focusing changes."""
+"""Spreads of the logarithm of a focal length: of an unknown one, which what matches tells, and of one that a file told,
+which focusing changes."""
 FEWEST_TRACKS = 60
 
 
-def refine(model: pycolmap.Reconstruction, found: dict[str, faces.Face], matches: Matches, unknown_focal: bool, report: Reporter,
+def refine(model: pycolmap.Reconstruction, found: dict[str, faces.Face], matches: Matches, unknown_focal: bool,
+           report: Reporter,
            missing: Sequence[dict] = (), agree: Sequence[float] = AGREE_WIDTH_SHARES) -> pycolmap.Reconstruction:
-    """The refined model, in the head's world (metres), or `model` itself where too little matches or the refined one explains less. found: name -> face.
-    missing: [{names, width, height}] like camera groups, of frames that have no camera yet and may get one by their matches; they share the lens of
-    the frames of their size. agree: as AGREE_WIDTH_SHARES, wider first where the cameras may be off. Raises Problem where no face is found."""
+    """The refined model, in the head's world (metres), or `model` itself where too little matches or the refined one
+    explains less. found: name -> face. missing: [{names, width, height}] like camera groups, of frames that have no
+    camera yet and may get one by their matches; they share the lens of the frames of their size. agree: as
+    AGREE_WIDTH_SHARES, wider first where the cameras may be off. Raises Problem where no face is found."""
     head = find_head(model, found, 0.063)
     model = pycolmap.Reconstruction(model)
     model.transform(head.world_from_model)
@@ -58,13 +62,15 @@ def refine(model: pycolmap.Reconstruction, found: dict[str, faces.Face], matches
         before = before or (len(tracks) if share <= AGREE_WIDTH_SHARES[0] else None)
         if len(tracks) < FEWEST_TRACKS:
             return model
-        seen = Observations(*(np.concatenate([a, b]) for a, b in zip((marks.camera, marks.point, marks.pixel), added, strict=True)))
+        seen = Observations(*(np.concatenate([a, b])
+                              for a, b in zip((marks.camera, marks.point, marks.pixel), added, strict=True)))
         bundle = adjust(bundle, seen, 30)
     if len(tracks) < 0.8 * before:
         report.log("The cameras were not refined by the face: less would match than before.")
         return model
     lens_of = {(camera.width, camera.height): number for number, camera in model.cameras.items()}
-    groups = [{**group, "lens": lens_of[group["width"], group["height"]]} for group in missing if (group["width"], group["height"]) in lens_of]
+    groups = [{**group, "lens": lens_of[group["width"], group["height"]]} for group in missing
+              if (group["width"], group["height"]) in lens_of]
     late = _late(bundle, model, groups, names, tracks, straight)
     if late:
         report.log(f"Placed by what matches the refined cameras: {', '.join(sorted(late))}.")
@@ -77,10 +83,13 @@ def as_bundle(model: pycolmap.Reconstruction, registered: list, unknown_focal: b
     poses = [pose_of(image) for image in registered]
     focal = np.array([model.cameras[number].mean_focal_length() for number in numbers])
     used = [model.cameras[image.camera_id] for image in registered]
-    return Bundle(np.array([pose.rotation.matrix() for pose in poses]), np.array([pose.translation for pose in poses]), focal, focal.copy(),
+    return Bundle(np.array([pose.rotation.matrix() for pose in poses]), np.array([pose.translation for pose in poses]),
+                  focal, focal.copy(),
                   np.zeros(len(numbers), bool), np.array([numbers.index(image.camera_id) for image in registered]),
-                  np.array([[camera.principal_point_x, camera.principal_point_y] for camera in used]), np.zeros(len(template_landmarks().basis)),
-                  template_landmarks().mean.copy(), FEATURE_SIGMA_SHARE * max(max(camera.width, camera.height) for camera in used),
+                  np.array([[camera.principal_point_x, camera.principal_point_y] for camera in used]),
+                  np.zeros(len(template_landmarks().basis)),
+                  template_landmarks().mean.copy(),
+                  FEATURE_SIGMA_SHARE * max(max(camera.width, camera.height) for camera in used),
                   FREE_SIGMA_LOG if unknown_focal else TOLD_SIGMA_LOG)
 
 
@@ -89,7 +98,8 @@ def _landmarks(model: pycolmap.Reconstruction, registered: list, found: dict[str
     for i, image in enumerate(registered):
         if image.name in found:
             camera.append(np.full(count, i))
-            pixel.append(_straight(model.cameras[image.camera_id], found[image.name].landmarks[:, :2].astype(np.float64)))
+            pixel.append(_straight(model.cameras[image.camera_id],
+                                   found[image.name].landmarks[:, :2].astype(np.float64)))
     return Observations(np.concatenate(camera), np.tile(np.arange(count), len(camera)), np.concatenate(pixel))
 
 
@@ -102,20 +112,23 @@ def _straight(camera: pycolmap.Camera, pixels: np.ndarray) -> np.ndarray:
 def straightened(model: pycolmap.Reconstruction, registered: list, matches: Matches) -> Matches:
     """The matches with pixels as lenses without distortion would show them."""
     camera_of = {image.name: model.cameras[image.camera_id] for image in registered}
-    keypoints = {name: _straight(camera_of[name], pixels) if name in camera_of and len(pixels) else pixels for name, pixels in matches.keypoints.items()}
+    keypoints = {name: _straight(camera_of[name], pixels) if name in camera_of and len(pixels) else pixels
+                 for name, pixels in matches.keypoints.items()}
     return Matches(keypoints, matches.pairs)
 
 
-def _late(bundle: Bundle, model: pycolmap.Reconstruction, groups: list[dict], names: list[str], tracks: list, matches: Matches) -> dict[str, tuple]:
+def _late(bundle: Bundle, model: pycolmap.Reconstruction, groups: list[dict], names: list[str], tracks: list,
+          matches: Matches) -> dict[str, tuple]:
     numbers = sorted(model.cameras)
     focal = np.array([bundle.focal[numbers.index(group["lens"])] for group in groups])
     group_of = {name: i for i, group in enumerate(groups) for name in group["names"] if name in matches.keypoints}
     return place_by_matches(replace(bundle, focal=focal), groups, group_of, names, tracks, matches) if group_of else {}
 
 
-def rebuilt(model: pycolmap.Reconstruction, bundle: Bundle, registered: list, tracks: list, matches: Matches, late: Mapping[str, tuple] = MappingProxyType({}),
-            groups: Sequence[dict] = ()) -> pycolmap.Reconstruction:
-    """A model with the bundle's cameras and, as its points, the tracks; late: poses by name of frames of `groups` that were placed afterwards."""
+def rebuilt(model: pycolmap.Reconstruction, bundle: Bundle, registered: list, tracks: list, matches: Matches,
+            late: Mapping[str, tuple] = MappingProxyType({}), groups: Sequence[dict] = ()) -> pycolmap.Reconstruction:
+    """A model with the bundle's cameras and, as its points, the tracks; late: poses by name of frames of `groups` that
+    were placed afterwards."""
     rebuilt, numbers = pycolmap.Reconstruction(), sorted(model.cameras)
     for number in numbers:
         camera = pycolmap.Camera(model.cameras[number].todict())
@@ -123,8 +136,10 @@ def rebuilt(model: pycolmap.Reconstruction, bundle: Bundle, registered: list, tr
         params[list(camera.focal_length_idxs())] *= ratio
         camera.params = params
         rebuilt.add_camera_with_trivial_rig(camera)
-    poses = {image.name: (bundle.rotations[i], bundle.translations[i], image.camera_id) for i, image in enumerate(registered)}
-    poses |= {name: (*pose, next(group["lens"] for group in groups if name in group["names"])) for name, pose in late.items()}
+    poses = {image.name: (bundle.rotations[i], bundle.translations[i], image.camera_id)
+             for i, image in enumerate(registered)}
+    poses |= {name: (*pose, next(group["lens"] for group in groups if name in group["names"]))
+              for name, pose in late.items()}
     index: dict[str, list[int]] = {name: [] for name in poses}
     members: list[list] = []
     image_number = {name: number for number, name in enumerate(sorted(poses), 1)}
@@ -137,7 +152,9 @@ def rebuilt(model: pycolmap.Reconstruction, bundle: Bundle, registered: list, tr
         rotation, translation, lens = poses[name]
         keypoints = matches.keypoints[name][index[name]] if index[name] else np.zeros((0, 2))
         image = pycolmap.Image(name=name, camera_id=lens, image_id=image_number[name], keypoints=keypoints)
-        rebuilt.add_image_with_trivial_frame(image, pycolmap.Rigid3d(np.concatenate([rotation, np.reshape(translation, (3, 1))], 1)))
+        rebuilt.add_image_with_trivial_frame(image,
+                                             pycolmap.Rigid3d(np.concatenate([rotation,
+                                                                              np.reshape(translation, (3, 1))], 1)))
     first = len(template_landmarks().mean)
     for place, elements in zip(bundle.points[first:], members, strict=True):
         rebuilt.add_point3D(place, pycolmap.Track(elements), np.full(3, 128, np.uint8))

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Face landmarks: in the frames, on the template as a head of its identity space, and what lies between, a similarity.
 
-All 432 trusted landmarks have their say on scale and upright, not the corners of the eyes alone, which a net puts elsewhere
-when lids are closed. Umeyama, Least-squares Estimation of Transformation Parameters (1991).
+All 432 trusted landmarks have their say on scale and upright, not the corners of the eyes alone, which a net puts
+elsewhere when lids are closed. Umeyama, Least-squares Estimation of Transformation Parameters (1991).
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from ..imaging import images
 RIGHT_LIDS = (33, 7, 163, 144, 145, 153, 154, 155, 133, 173, 157, 158, 159, 160, 161, 246)
 LEFT_LIDS = (263, 249, 390, 373, 374, 380, 381, 382, 362, 398, 384, 385, 386, 387, 388, 466)
 PUPILS_PER_LIDS = 63.0 / 62.156 / 1.019
-"""The template's pupils are 63 mm apart, the middles of its lids' outlines a little less; and the head that fits a net's landmarks came out
-1.9 % too large over six synthetic heads of known size (benchmarks/head_scale.py)."""
+"""The template's pupils are 63 mm apart, the middles of its lids' outlines a little less; and the head that fits a
+net's landmarks came out 1.9 % too large over six synthetic heads of known size (benchmarks/head_scale.py)."""
 SIGMA_M = 0.003
 """How far a landmark of the net lies from the same point of a person's head, roughly."""
 INDEPENDENT = 120
@@ -35,7 +35,8 @@ INDEPENDENT = 120
 
 @dataclass(frozen=True)
 class TemplateLandmarks:
-    """The template's landmarks: mean [468, 3] and identity basis [K, 468, 3] in metres, outward normals [468, 3], trust [468] in [0, 1]."""
+    """The template's landmarks: mean [468, 3] and identity basis [K, 468, 3] in metres, outward normals [468, 3], trust
+    [468] in [0, 1]."""
 
     mean: np.ndarray
     basis: np.ndarray
@@ -55,13 +56,14 @@ def template_landmarks() -> TemplateLandmarks:
         return (values[..., mesh.faces[face], :] * bary[..., None]).sum(-2)
 
     normals = at(meshes.vertex_normals(mesh))
-    return TemplateLandmarks(at(mesh.vertices), at(template.identity()).astype(np.float64), normals / np.linalg.norm(normals, axis=1, keepdims=True),
-                             template.landmark_weights())
+    return TemplateLandmarks(at(mesh.vertices), at(template.identity()).astype(np.float64),
+                             normals / np.linalg.norm(normals, axis=1, keepdims=True), template.landmark_weights())
 
 
-def find_landmarks(records: Sequence[FrameRecord], folder: Path, report: Reporter, text: str = "finding the face") -> dict[str, faces.Face]:
-    """Name -> face of each of `records` where one is found; a turned head is followed from the frame before and the one after it, which are near in a
-    film: in a photograph that is only done where no face is found otherwise."""
+def find_landmarks(records: Sequence[FrameRecord], folder: Path, report: Reporter,
+                   text: str = "finding the face") -> dict[str, faces.Face]:
+    """Name -> face of each of `records` where one is found; a turned head is followed from the frame before and the one
+    after it, which are near in a film: in a photograph that is only done where no face is found otherwise."""
     found: dict[str, faces.Face] = {}
     last = None
     for done, record in enumerate(records):
@@ -82,12 +84,15 @@ def find_landmarks(records: Sequence[FrameRecord], folder: Path, report: Reporte
     return found
 
 
-def fit_rays(origins: np.ndarray, directions: np.ndarray, points: np.ndarray, rounds: int = 20) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-    """The template's head laid against landmarks seen along unit directions [N, 468, 3] from origins [N, 3]; points [468, 3]: roughly where they lie.
+def fit_rays(origins: np.ndarray, directions: np.ndarray, points: np.ndarray,
+             rounds: int = 20) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+    """The template's head laid against landmarks seen along unit directions [N, 468, 3] from origins [N, 3]; points
+    [468, 3]: roughly where they lie.
 
-    Gives scale, rotation [3, 3], translation [3] from the head's metres into the world of the rays, and identity coefficients [K] with prior N(0, 1).
-    Measured across the rays: a net's landmarks slide as the head turns, so that the depths at which they intersect are exaggerated.
-    Gauss-Newton; outliers are weighted down by their distance (Geman-McClure).
+    Gives scale, rotation [3, 3], translation [3] from the head's metres into the world of the rays, and identity
+    coefficients [K] with prior N(0, 1). Measured across the rays: a net's landmarks slide as the head turns, so that
+    the depths at which they intersect are exaggerated. Gauss-Newton; outliers are weighted down by their distance
+    (Geman-McClure).
     """
     model = template_landmarks()
     across = np.eye(3) - directions[..., :, None] * directions[..., None, :]  # [N, 468, 3, 3]
@@ -99,7 +104,8 @@ def fit_rays(origins: np.ndarray, directions: np.ndarray, points: np.ndarray, ro
         at = scale * model.shape(coefficients) @ rotation.T + translation
         miss = (across @ (at[None] - origins[:, None])[..., None])[..., 0] / scale  # [N, 468, 3] metres on the head
         weights = robust_weights(np.linalg.norm(miss, axis=-1), model.trust)
-        jacobian = np.zeros((len(at), 3, 7 + count))  # d point / d (rotation, translation, log scale, coefficients), in metres on the head
+        # d point / d (rotation, translation, log scale, coefficients), in metres on the head
+        jacobian = np.zeros((len(at), 3, 7 + count))
         arm = (at - translation) / scale
         for axis in range(3):
             jacobian[:, :, axis] = np.cross(np.eye(3)[axis], arm)
@@ -108,7 +114,8 @@ def fit_rays(origins: np.ndarray, directions: np.ndarray, points: np.ndarray, ro
         jacobian[:, :, 7:] = np.einsum("kpi,ji->pjk", model.basis, rotation)
         information = np.einsum("np,npij->pij", weights, across)
         normal = np.einsum("pia,pij,pjb->ab", jacobian, information, jacobian, optimize=True) + np.diag(prior)
-        right = -np.einsum("pia,pi->a", jacobian, np.einsum("np,npi->pi", weights, miss)) - prior * np.concatenate([np.zeros(7), coefficients])
+        right = -np.einsum("pia,pi->a", jacobian,
+                           np.einsum("np,npi->pi", weights, miss)) - prior * np.concatenate([np.zeros(7), coefficients])
         step = np.linalg.solve(normal, right)
         rotation = cv2.Rodrigues(step[:3])[0] @ rotation
         translation = translation + scale * step[3:6]

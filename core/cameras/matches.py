@@ -15,7 +15,8 @@ from scipy.sparse.csgraph import connected_components
 
 @dataclass(frozen=True)
 class Matches:
-    """keypoints: name -> pixels [K, 2], centres at +0.5; pairs: (name, name) -> indices [M, 2] into the keypoints of the two."""
+    """keypoints: name -> pixels [K, 2], centres at +0.5; pairs: (name, name) -> indices [M, 2] into the keypoints of
+    the two."""
 
     keypoints: dict[str, np.ndarray] = field(default_factory=dict)
     pairs: dict[tuple[str, str], np.ndarray] = field(default_factory=dict)
@@ -26,10 +27,12 @@ class Matches:
         return self.keypoints[first][index[:, 0]], self.keypoints[second][index[:, 1]]
 
     def scaled(self, scales: dict[str, tuple[float, float]]) -> Matches:
-        """The same matches in pictures of another size: name with its folder -> how much wider and higher. The names lose their folder."""
+        """The same matches in pictures of another size: name with its folder -> how much wider and higher. The names
+        lose their folder."""
         plain = {name: PurePosixPath(name).name for name in self.keypoints}
         keypoints = {plain[name]: pixels * scales[name] for name, pixels in self.keypoints.items()}
-        return Matches(keypoints, {(plain[first], plain[second]): index for (first, second), index in self.pairs.items()})
+        return Matches(keypoints,
+                       {(plain[first], plain[second]): index for (first, second), index in self.pairs.items()})
 
     def kept(self, keep: dict[tuple[str, str], np.ndarray]) -> Matches:
         """Only those matches of each pair that `keep` [M] says."""
@@ -40,7 +43,8 @@ def read_matches(database: Path) -> Matches:
     """All matches of a COLMAP database, verified or not."""
     with pycolmap.Database.open(str(database)) as stored:
         names = {image.image_id: image.name for image in stored.read_all_images()}
-        keypoints = {name: np.asarray(stored.read_keypoints(number), np.float64)[:, :2] for number, name in names.items()}
+        keypoints = {name: np.asarray(stored.read_keypoints(number), np.float64)[:, :2]
+                     for number, name in names.items()}
         numbers, indices = stored.read_all_matches()
         pairs = {}
         for number, index in zip(numbers, indices, strict=True):
@@ -51,7 +55,8 @@ def read_matches(database: Path) -> Matches:
 
 
 def tracks(matches: Matches) -> list[list[tuple[str, int]]]:
-    """Keypoints that are one point, as lists of (name, keypoint): what is matched hangs together. One that meets a frame twice is ambiguous and left out."""
+    """Keypoints that are one point, as lists of (name, keypoint): what is matched hangs together. One that meets a
+    frame twice is ambiguous and left out."""
     names = sorted({name for pair in matches.pairs for name in pair})
     start = dict(zip(names, np.cumsum([0] + [len(matches.keypoints[name]) for name in names])[:-1], strict=True))
     total = sum(len(matches.keypoints[name]) for name in names)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the person kept still: what face and background tell of the motion between two frames, and whether the expression changed.
+"""Whether the person kept still: what face and background tell of the motion between two frames, and whether the
+expression changed.
 
 Matches are COLMAP's before it chose one motion, so both motions are in them.
 """
@@ -26,11 +27,13 @@ LEAST_MATCHES = 20
 """Background matches that say something of a pair."""
 MOUTH, CORNERS, EYES = (13, 14), (61, 291), (33, 263)
 OPENED_SHARE, SMILED_SHARE = 0.12, 0.15
-"""Changes of the mouth's opening and width, as shares of the distance of the eyes' outer corners, that a net's noise does not make."""
+"""Changes of the mouth's opening and width, as shares of the distance of the eyes' outer corners, that a net's noise
+does not make."""
 
 
 def camera_stood_still(matches: Matches, found: dict[str, faces.Face]) -> bool | None:
-    """True where the background stays put while the head turns, False where it does not; None where too few pairs tell."""
+    """True where the background stays put while the head turns, False where it does not; None where too few pairs
+    tell."""
     stayed = []
     for (first, second), _ in matches.pairs.items():
         if first not in found or second not in found or abs(found[first].yaw_deg - found[second].yaw_deg) < TURNED_DEG:
@@ -50,8 +53,10 @@ def in_background(pixels: np.ndarray, face: faces.Face) -> np.ndarray:
     return (aside & (pixels[:, 1] < y1)) | (pixels[:, 1] < y0 - 0.7 * (y1 - y0))
 
 
-def head_masks(found: dict[str, faces.Face], records: Sequence[FrameRecord], folder: Path, out: Path, report: Reporter) -> None:
-    """out/NAME.png: white on the head, black elsewhere (all black without a face). A turning head leaves its shoulders behind."""
+def head_masks(found: dict[str, faces.Face], records: Sequence[FrameRecord], folder: Path, out: Path,
+               report: Reporter) -> None:
+    """out/NAME.png: white on the head, black elsewhere (all black without a face). A turning head leaves its shoulders
+    behind."""
     for done, record in enumerate(records):
         report.progress(done, len(records), "masking the head")
         width, height = images.size(folder / record.name)
@@ -59,7 +64,8 @@ def head_masks(found: dict[str, faces.Face], records: Sequence[FrameRecord], fol
         if record.name in found:
             x0, y0, x1, y1 = found[record.name].box
             w, h = x1 - x0, y1 - y0
-            cv2.ellipse(mask, (round((x0 + x1) / 2), round((y0 + y1) / 2 - 0.2 * h)), (round(0.85 * w), round(0.8 * h)), 0, 0, 360, 1.0, -1)
+            cv2.ellipse(mask, (round((x0 + x1) / 2), round((y0 + y1) / 2 - 0.2 * h)), (round(0.85 * w), round(0.8 * h)),
+                        0, 0, 360, 1.0, -1)
             mask[round(max(y1 + 0.05 * h, 0)):] = 0
             person = faces.segment_person(images.read_srgb(folder / record.name)) > 0.5
             if person[round(max(y0, 0)):round(y1), round(max(x0, 0)):round(x1)].mean() > 0.7:
@@ -72,7 +78,8 @@ def expression_changes(found: dict[str, faces.Face]) -> list[str]:
     names = [name for name, face in found.items() if abs(face.yaw_deg) < 30]
     if len(names) < 3:
         return []
-    shape = np.array([[_apart(found[name], pair) / _apart(found[name], EYES) for pair in (MOUTH, CORNERS)] for name in names])
+    shape = np.array([[_apart(found[name], pair) / _apart(found[name], EYES) for pair in (MOUTH, CORNERS)]
+                      for name in names])
     off = np.abs(shape - np.median(shape, 0)) > (OPENED_SHARE, SMILED_SHARE)
     return [name for name, changed in zip(names, off.any(1), strict=True) if changed]
 

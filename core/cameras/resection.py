@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The second way in, where frames do not match: cameras from the face's landmarks and the template's head, by PnP and bundle adjustment.
+"""The second way in, where frames do not match: cameras from the face's landmarks and the template's head, by PnP and
+bundle adjustment.
 
-Feature matches that agree with these first cameras then refine them, and bring in frames where no face is found (full profiles).
-Terzakis and Lourakis, A Consistently Fast and Globally Optimal Solution to the Perspective-n-Point Problem (2020).
+Feature matches that agree with these first cameras then refine them, and bring in frames where no face is found (full
+profiles). Terzakis and Lourakis, A Consistently Fast and Globally Optimal Solution to the Perspective-n-Point Problem
+(2020).
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ from .landmarks import template_landmarks
 from .matches import Matches, tracks
 
 FOCAL_SHARES = np.geomspace(0.7, 3.0, 16)
-"""Focal lengths that are tried where no file tells one, as shares of a picture's longer side: 71 to 19 degrees of view."""
+"""Focal lengths that are tried where no file tells one, as shares of a picture's longer side: 71 to 19 degrees of
+view."""
 PHONE_FOCAL_SHARE = 1.1
 """A phone's, in the same unit."""
 AGREE_WIDTH_SHARES = (0.05, 0.025, 0.0125)
@@ -38,9 +41,9 @@ LEAST_MATCHES = 12
 
 @dataclass(frozen=True)
 class Resection:
-    """A model in the head's world (metres); landmark_px, how far the landmarks miss [median px], and that as a share of the face's width; the
-    number of tracks that refined it, whether they are enough to trust it, the names of frames that came in through matches alone, and the identity
-    coefficients [K] of the head."""
+    """A model in the head's world (metres); landmark_px, how far the landmarks miss [median px], and that as a share of
+    the face's width; the number of tracks that refined it, whether they are enough to trust it, the names of frames
+    that came in through matches alone, and the identity coefficients [K] of the head."""
 
     model: pycolmap.Reconstruction
     landmark_px: float
@@ -52,8 +55,8 @@ class Resection:
 
 
 def resect(groups: list[dict], found: dict[str, faces.Face], matches: Matches, report: Reporter) -> Resection | None:
-    """Cameras of the frames with a face, and of those that match them. groups: [{names, width, height, focal_px or null}] of one camera each;
-    `found`: name -> face. None where no frame shows a face, or one of several."""
+    """Cameras of the frames with a face, and of those that match them. groups: [{names, width, height, focal_px or
+    null}] of one camera each; `found`: name -> face. None where no frame shows a face, or one of several."""
     group_of = {name: number for number, group in enumerate(groups) for name in group["names"]}
     names = sorted(name for name in found if name in group_of)
     if len(names) < min(2, len(group_of)):
@@ -64,23 +67,28 @@ def resect(groups: list[dict], found: dict[str, faces.Face], matches: Matches, r
     report.progress(0, 5, "placing cameras by the face")
     bundle = _first(groups, group_of, names, pixels)
     count = len(model.mean)
-    landmarks = Observations(np.repeat(np.arange(len(names)), count), np.tile(np.arange(count), len(names)), np.concatenate([pixels[n] for n in names]))
+    landmarks = Observations(np.repeat(np.arange(len(names)), count), np.tile(np.arange(count), len(names)),
+                             np.concatenate([pixels[n] for n in names]))
     bundle = adjust(bundle, landmarks)
     seen, used = landmarks, []
     for step, share in enumerate(AGREE_WIDTH_SHARES, 1):
         report.progress(step, 5, "refining cameras by what matches")
         added, used, bundle = agreeing(bundle, names, matches, share * width)
-        seen = Observations(*(np.concatenate([a, b]) for a, b in zip((landmarks.camera, landmarks.point, landmarks.pixel), added, strict=True)))
+        seen = Observations(*(np.concatenate([a, b])
+                              for a, b in zip((landmarks.camera, landmarks.point, landmarks.pixel), added,
+                                              strict=True)))
         bundle = adjust(bundle, seen, 10)
     late = place_by_matches(bundle, groups, group_of, names, used, matches)
     miss = np.linalg.norm(bundle.project(landmarks.camera, landmarks.point) - landmarks.pixel, axis=1)
     error = float(np.median(miss[model.trust[landmarks.point] > 0.2]))
-    return Resection(_model(bundle, groups, group_of, names, seen, late), error, error / width, len(used), _trusted(names, matches, used), sorted(late),
+    return Resection(_model(bundle, groups, group_of, names, seen, late), error, error / width, len(used),
+                     _trusted(names, matches, used), sorted(late),
                       bundle.coefficients)
 
 
 def _trusted(names: list[str], matches: Matches, used: list) -> bool:
-    """Whether every frame is held by tracks, and they are a good part of all that matches: chance agreements are few among many."""
+    """Whether every frame is held by tracks, and they are a good part of all that matches: chance agreements are few
+    among many."""
     held = Counter(name for track in used for name, _ in track)
     track_of = {member: number for number, track in enumerate(used) for member in track}
     pairs = [(a, b, index) for (a, b), index in matches.pairs.items() if a in names and b in names]
@@ -89,7 +97,8 @@ def _trusted(names: list[str], matches: Matches, used: list) -> bool:
 
 
 def _first(groups: list[dict], group_of: dict, names: list[str], pixels: dict) -> Bundle:
-    """Poses of the template's mean head by PnP at each focal length of FOCAL_SHARES, shared by all groups whose own is unknown; the one that fits best."""
+    """Poses of the template's mean head by PnP at each focal length of FOCAL_SHARES, shared by all groups whose own is
+    unknown; the one that fits best."""
     model = template_landmarks()
     trusted = model.trust > 0.2
     best = None
@@ -98,23 +107,30 @@ def _first(groups: list[dict], group_of: dict, names: list[str], pixels: dict) -
         poses, total = [], 0.0
         for name in names:
             group = groups[group_of[name]]
-            matrix = np.array([[focal[group_of[name]], 0, group["width"] / 2], [0, focal[group_of[name]], group["height"] / 2], [0, 0, 1.0]])
-            _, turn, shift = cv2.solvePnP(model.mean[trusted], pixels[name][trusted], matrix, None, flags=cv2.SOLVEPNP_SQPNP)
+            matrix = np.array([[focal[group_of[name]], 0, group["width"] / 2],
+                               [0, focal[group_of[name]], group["height"] / 2], [0, 0, 1.0]])
+            _, turn, shift = cv2.solvePnP(model.mean[trusted], pixels[name][trusted], matrix, None,
+                                          flags=cv2.SOLVEPNP_SQPNP)
             there = cv2.projectPoints(model.mean[trusted], turn, shift, matrix, None)[0][:, 0]
             total += np.median(np.linalg.norm(there - pixels[name][trusted], axis=1)) / np.ptp(pixels[name][:, 0])
             poses.append((cv2.Rodrigues(turn)[0], shift[:, 0]))
-        total += len(names) * 0.002 * (np.log(factor / PHONE_FOCAL_SHARE) / 0.35) ** 2  # a face far away looks much the same through any lens
+        # a face far away looks much the same through any lens
+        total += len(names) * 0.002 * (np.log(factor / PHONE_FOCAL_SHARE) / 0.35) ** 2
         if best is None or total < best[0]:
             best = total, focal, poses
     _, focal, poses = best
-    prior = np.array([group["focal_px"] or PHONE_FOCAL_SHARE * max(group["width"], group["height"]) for group in groups])
-    return Bundle(np.array([r for r, _ in poses]), np.array([t for _, t in poses]), focal, prior, np.array([bool(group["focal_px"]) for group in groups]),
-                  np.array([group_of[name] for name in names]), np.array([[groups[group_of[n]][side] / 2 for side in ("width", "height")] for n in names]),
+    prior = np.array([group["focal_px"] or PHONE_FOCAL_SHARE * max(group["width"], group["height"])
+                      for group in groups])
+    return Bundle(np.array([r for r, _ in poses]), np.array([t for _, t in poses]), focal, prior,
+                  np.array([bool(group["focal_px"]) for group in groups]),
+                  np.array([group_of[name] for name in names]),
+                  np.array([[groups[group_of[n]][side] / 2 for side in ("width", "height")] for n in names]),
                   np.zeros(len(model.basis)), model.mean.copy())
 
 
 def agreeing(bundle: Bundle, names: list[str], matches: Matches, reach_px: float) -> tuple[tuple, list, Bundle]:
-    """Tracks whose triangulated point projects within `reach_px` in two frames or more: their observations, themselves, and the bundle with the points."""
+    """Tracks whose triangulated point projects within `reach_px` in two frames or more: their observations, themselves,
+    and the bundle with the points."""
     number = {name: i for i, name in enumerate(names)}
     points, used, camera, point, pixel = [], [], [], [], []
     marks = len(template_landmarks().mean)
@@ -150,10 +166,12 @@ def _epipolar(bundle: Bundle, number: dict, matches: Matches, reach_px: float) -
         shift = bundle.translations[j] - rotation @ bundle.translations[i]
         essential = np.cross(np.eye(3), shift / max(np.linalg.norm(shift), 1e-9)) @ rotation
         fa, fb = bundle.focal[bundle.lens[i]], bundle.focal[bundle.lens[j]]
-        rays_a, rays_b = (np.concatenate([(p - bundle.centre[k]) / f, np.ones((len(p), 1))], 1) for p, k, f in ((a, i, fa), (b, j, fb)))
+        rays_a, rays_b = (np.concatenate([(p - bundle.centre[k]) / f, np.ones((len(p), 1))], 1)
+                          for p, k, f in ((a, i, fa), (b, j, fb)))
         lines_b, lines_a = rays_a @ essential.T, rays_b @ essential
         value = np.abs((rays_b * lines_b).sum(1))
-        keep[first, second] = np.maximum(fb * value / np.linalg.norm(lines_b[:, :2], axis=1), fa * value / np.linalg.norm(lines_a[:, :2], axis=1)) < reach_px
+        keep[first, second] = np.maximum(fb * value / np.linalg.norm(lines_b[:, :2], axis=1),
+                                         fa * value / np.linalg.norm(lines_a[:, :2], axis=1)) < reach_px
     return matches.kept(keep)
 
 
@@ -169,8 +187,10 @@ def _triangulate(bundle: Bundle, camera: np.ndarray, pixel: np.ndarray) -> np.nd
     return np.linalg.solve(across.sum(0), (across @ centres[:, :, None]).sum(0))[:, 0]
 
 
-def place_by_matches(bundle: Bundle, groups: list[dict], group_of: dict, names: list[str], used: list, matches: Matches) -> dict[str, tuple]:
-    """name -> rotation, translation of frames without a face, by PnP on the tracks' points that their keypoints match."""
+def place_by_matches(bundle: Bundle, groups: list[dict], group_of: dict, names: list[str], used: list,
+                     matches: Matches) -> dict[str, tuple]:
+    """name -> rotation, translation of frames without a face, by PnP on the tracks' points that their keypoints
+    match."""
     marks = len(template_landmarks().mean)
     place = {member: bundle.points[marks + i] for i, track in enumerate(used) for member in track}
     found = {}
@@ -178,7 +198,8 @@ def place_by_matches(bundle: Bundle, groups: list[dict], group_of: dict, names: 
         points, pixels = [], []
         for (first, second), index in matches.pairs.items():
             other, mine, theirs = (second, 0, 1) if first == name else (first, 1, 0) if second == name else (None, 0, 1)
-            hits = [(place[other, k], matches.keypoints[name][m]) for m, k in index[:, [mine, theirs]].tolist() if (other, k) in place] if other else []
+            hits = ([(place[other, k], matches.keypoints[name][m]) for m, k in index[:, [mine, theirs]].tolist()
+                     if (other, k) in place] if other else [])
             points += [point for point, _ in hits]
             pixels += [pixel for _, pixel in hits]
         if len(points) < LEAST_MATCHES:
@@ -187,19 +208,24 @@ def place_by_matches(bundle: Bundle, groups: list[dict], group_of: dict, names: 
         focal = bundle.focal[group_of[name]]
         matrix = np.array([[focal, 0, group["width"] / 2], [0, focal, group["height"] / 2], [0, 0, 1.0]])
         cv2.setRNGSeed(0)
-        good, turn, shift, inliers = cv2.solvePnPRansac(np.array(points), np.array(pixels), matrix, None, iterationsCount=2000, reprojectionError=4.0)
+        good, turn, shift, inliers = cv2.solvePnPRansac(np.array(points), np.array(pixels), matrix, None,
+                                                        iterationsCount=2000, reprojectionError=4.0)
         if good and inliers is not None and len(inliers) >= LEAST_MATCHES:
-            turn, shift = cv2.solvePnPRefineLM(np.array(points)[inliers[:, 0]], np.array(pixels)[inliers[:, 0]], matrix, None, turn, shift)
+            turn, shift = cv2.solvePnPRefineLM(np.array(points)[inliers[:, 0]], np.array(pixels)[inliers[:, 0]], matrix,
+                                               None, turn, shift)
             found[name] = cv2.Rodrigues(turn)[0], shift[:, 0]
     return found
 
 
-def _model(bundle: Bundle, groups: list[dict], group_of: dict, names: list[str], seen: Observations, late: dict[str, tuple]) -> pycolmap.Reconstruction:
+def _model(bundle: Bundle, groups: list[dict], group_of: dict, names: list[str], seen: Observations,
+           late: dict[str, tuple]) -> pycolmap.Reconstruction:
     """As COLMAP writes it: cameras, images, and as points the landmarks and tracks."""
     model = pycolmap.Reconstruction()
     for number, group in enumerate(groups):
-        model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=number + 1, model="SIMPLE_RADIAL", width=group["width"], height=group["height"],
-                                                          params=[bundle.focal[number], group["width"] / 2, group["height"] / 2, 0]))
+        model.add_camera_with_trivial_rig(pycolmap.Camera(camera_id=number + 1, model="SIMPLE_RADIAL",
+                                                          width=group["width"], height=group["height"],
+                                                          params=[bundle.focal[number], group["width"] / 2,
+                                                                  group["height"] / 2, 0]))
     poses = {name: (bundle.rotations[i], bundle.translations[i]) for i, name in enumerate(names)} | late
     members: list[list] = [[] for _ in bundle.points]
     for number, name in enumerate(sorted(poses), 1):

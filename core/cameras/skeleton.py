@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The frames of a film that carry its structure: which they are, which pairs are matched, and how the others are placed by them.
+"""The frames of a film that carry its structure: which they are, which pairs are matched, and how the others are placed
+by them.
 
-Structure from motion grows faster than the film, and neighbours in a film show nearly the same. So some frames along the arc are mapped, and each of the
-others is resected from the points of those around it (Schoenberger and Frahm, Structure-from-Motion Revisited, 2016, section 4.2).
+Structure from motion grows faster than the film, and neighbours in a film show nearly the same. So some frames along
+the arc are mapped, and each of the others is resected from the points of those around it (Schoenberger and Frahm,
+Structure-from-Motion Revisited, 2016, section 4.2).
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ CARRYING_FRAMES = 40
 ENOUGH = 0.5
 NEIGHBOURS = 6
 SAME_SIDE_DEG, SAME_SIDE = 8.0, 3
-"""A film that comes back to a side of the face: how near the head's turn must be, and so many frames of that side are matched beside the neighbours."""
+"""A film that comes back to a side of the face: how near the head's turn must be, and so many frames of that side are
+matched beside the neighbours."""
 LEAST_POINTS, REACH_PX = 30, 4.0
 """Points that hold a frame which is placed by the others, and how far they may miss."""
 
@@ -29,14 +32,16 @@ Film = Sequence[tuple[str, float, float | None]]
 
 
 def size(film: Film, richness: float = 1.0) -> int:
-    """How many frames carry a film: all of a short one, and of a long one twice as many, as often as needed, where each shows little. richness: the median
-    frame's features as a share of what a frame may have, of which ENOUGH will do. A plain head's frames cost less, and it takes more of them."""
+    """How many frames carry a film: all of a short one, and of a long one twice as many, as often as needed, where each
+    shows little. richness: the median frame's features as a share of what a frame may have, of which ENOUGH will do. A
+    plain head's frames cost less, and it takes more of them."""
     count = CARRYING_FRAMES * 2 ** max(0, math.ceil(math.log2(ENOUGH / max(richness, 1e-3))))
     return min(len(film), count)
 
 
 def choose(film: Film, count: int) -> list[str]:
-    """The sharpest frame of each of `count` equal parts of the film, in order; all of them where there are no more. Twice as many hold these, too."""
+    """The sharpest frame of each of `count` equal parts of the film, in order; all of them where there are no more.
+    Twice as many hold these, too."""
     if len(film) <= count:
         return [name for name, _, _ in film]
     bounds = np.linspace(0, len(film), count + 1).round().astype(int)
@@ -44,7 +49,8 @@ def choose(film: Film, count: int) -> list[str]:
 
 
 def pairs_within(film: Film, chosen: Sequence[str]) -> list[tuple[str, str]]:
-    """Each chosen frame with its neighbours, with those at powers of two, and with those that look from the same side at another time."""
+    """Each chosen frame with its neighbours, with those at powers of two, and with those that look from the same side
+    at another time."""
     turn = {name: degrees for name, _, degrees in film}
     pairs = set()
     for i, name in enumerate(chosen):
@@ -52,7 +58,8 @@ def pairs_within(film: Film, chosen: Sequence[str]) -> list[tuple[str, str]]:
         pairs |= {(i, j) for j in near if j < len(chosen)}
         if turn[name] is None:
             continue
-        apart = [(abs(turn[other] - turn[name]), j) for j, other in enumerate(chosen) if abs(i - j) > NEIGHBOURS and turn[other] is not None]
+        apart = [(abs(turn[other] - turn[name]), j) for j, other in enumerate(chosen) if abs(i - j) > NEIGHBOURS
+                 and turn[other] is not None]
         pairs |= {(min(i, j), max(i, j)) for degrees, j in sorted(apart)[:SAME_SIDE] if degrees < SAME_SIDE_DEG}
     return [(chosen[i], chosen[j]) for i, j in sorted(pairs)]
 
@@ -63,11 +70,14 @@ def pairs_between(film: Film, chosen: Sequence[str]) -> list[tuple[str, str]]:
     at = np.array([place[name] for name in chosen])
     rest = [name for name, _, _ in film if name not in set(chosen)]
     around = {name: int(np.searchsorted(at, place[name])) for name in rest}
-    return [(chosen[j], name) for name in rest for j in range(max(0, around[name] - 2), min(len(chosen), around[name] + 2))]
+    return [(chosen[j], name) for name in rest
+            for j in range(max(0, around[name] - 2), min(len(chosen), around[name] + 2))]
 
 
-def place_others(model: pycolmap.Reconstruction, database: Path, names: Sequence[str], seed: int, step: Callable[[int, int], None]) -> None:
-    """Adds those frames `names` to the model whose matches with its frames give a pose; their keypoints become observations of its points."""
+def place_others(model: pycolmap.Reconstruction, database: Path, names: Sequence[str], seed: int,
+                 step: Callable[[int, int], None]) -> None:
+    """Adds those frames `names` to the model whose matches with its frames give a pose; their keypoints become
+    observations of its points."""
     options, refined = pycolmap.AbsolutePoseEstimationOptions(), pycolmap.AbsolutePoseRefinementOptions()
     options.ransac.max_error, options.ransac.random_seed = REACH_PX, seed
     mapped = {number: image for number, image in model.images.items() if image.has_pose}
@@ -90,7 +100,8 @@ def place_others(model: pycolmap.Reconstruction, database: Path, names: Sequence
 
 
 def _points_of(model: pycolmap.Reconstruction, matched: list[tuple[int, np.ndarray]]) -> dict[int, int]:
-    """Point -> keypoint of the frame that shows it, by the matches with mapped frames; each keypoint and each point once."""
+    """Point -> keypoint of the frame that shows it, by the matches with mapped frames; each keypoint and each point
+    once."""
     found, taken = {}, set()
     for one, index in matched:
         seen = model.images[one].points2D
@@ -101,10 +112,12 @@ def _points_of(model: pycolmap.Reconstruction, matched: list[tuple[int, np.ndarr
     return found
 
 
-def _place(model: pycolmap.Reconstruction, image: pycolmap.Image, keypoints: np.ndarray, points: dict[int, int], options, refined) -> None:
+def _place(model: pycolmap.Reconstruction, image: pycolmap.Image, keypoints: np.ndarray, points: dict[int, int],
+           options, refined) -> None:
     numbers, own = np.array(list(points)), np.array(list(points.values()))
     places = np.array([model.points3D[number].xyz for number in numbers])
-    result = pycolmap.estimate_and_refine_absolute_pose(keypoints[own], places, model.cameras[image.camera_id], options, refined)
+    result = pycolmap.estimate_and_refine_absolute_pose(keypoints[own], places, model.cameras[image.camera_id], options,
+                                                        refined)
     if result is None or result["num_inliers"] < LEAST_POINTS:
         return
     added = pycolmap.Image(name=image.name, camera_id=image.camera_id, image_id=image.image_id, keypoints=keypoints)

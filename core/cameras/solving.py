@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From frames to cameras in the order of what it costs and gives: plain features, features that hold on skin, the face's landmarks;
-and on the head alone where it did not keep still. The first model that passes the gate is taken.
+"""From frames to cameras in the order of what it costs and gives: plain features, features that hold on skin, the
+face's landmarks; and on the head alone where it did not keep still. The first model that passes the gate is taken.
 """
 
 from __future__ import annotations
@@ -39,17 +39,19 @@ FEW_PHOTOGRAPHS = 12
 """Up to this many photographs the face's landmarks are tried before the costly features."""
 MOST_FACES = 24
 """Frames in which the face is looked for where structure from motion has found the cameras."""
-FILM_AGAIN = ("Film again: the person sits still, the camera moves slowly around the face at arm's length, and the background is busy rather than a white "
+FILM_AGAIN = ("Film again: the person sits still, the camera moves slowly around the face at arm's length, and the "
+              "background is busy rather than a white "
               "wall; or take a photograph every ten degrees around the face.")
 
 
 @dataclass(frozen=True)
 class Solved:
-    """A model in a world of its own; how it was found: plain, skin or face; the head in it; the faces it was found by; whether the head moved
-    before its background, and whether the camera stood still then; mirrored frames that were left out; tracks that refined a model from the face,
-    and whether they are enough to trust it; the matches it comes from, where more is to be made of them; whether
-    after that every frame is held by what matches; swayed: the share of the error of the head's matches that went when the room had no say;
-    to_place: the frames that were to be placed, where those are not all."""
+    """A model in a world of its own; how it was found: plain, skin or face; the head in it; the faces it was found by;
+    whether the head moved before its background, and whether the camera stood still then; mirrored frames that were
+    left out; tracks that refined a model from the face, and whether they are enough to trust it; the matches it comes
+    from, where more is to be made of them; whether after that every frame is held by what matches; swayed: the share of
+    the error of the head's matches that went when the room had no say; to_place: the frames that were to be placed,
+    where those are not all."""
 
     model: pycolmap.Reconstruction
     way: str
@@ -73,17 +75,21 @@ def solve(frames: Frames, capture: Capture, settings: Settings, report: Reporter
     found = find_landmarks(records if few else _spread(records), capture.frames, report)
     if frames.kind == VIDEO and not few and surroundings_stay(found, capture.frames):
         asked = spread_over(records)
-        report.log(f"All but the head stays where it is: the camera stood still. Only the head's own matches count, in {len(asked)} of {len(records)} frames.")
+        report.log(f"All but the head stays where it is: the camera stood still. Only the head's own matches count, in "
+                   f"{len(asked)} of {len(records)} frames.")
         found = find_landmarks(_spread(asked), capture.frames, report)
         return replace(_solve(Frames(asked, frames.kind), found, capture, settings, report, stood=True), to_place=asked)
     return _solve(frames, found, capture, settings, report)
 
 
-def _solve(frames: Frames, found: dict[str, faces.Face], capture: Capture, settings: Settings, report: Reporter, stood: bool = False) -> Solved:
-    """`solve` with these frames alone and the faces in some of them; `stood`: it is known that the camera stood still while the head turned."""
+def _solve(frames: Frames, found: dict[str, faces.Face], capture: Capture, settings: Settings, report: Reporter,
+           stood: bool = False) -> Solved:
+    """`solve` with these frames alone and the faces in some of them; `stood`: it is known that the camera stood still
+    while the head turned."""
     records = frames.records
     few = len(records) <= FEW_PHOTOGRAPHS
-    ways = {"auto": ("plain", "face", "skin", "face") if few else ("plain", "skin", "face")}.get(settings.cameras.features, (settings.cameras.features,))
+    ways = {"auto": ("plain", "face", "skin", "face") if few
+            else ("plain", "skin", "face")}.get(settings.cameras.features, (settings.cameras.features,))
     if len(records) < LEAST_VIEWS:  # a draft
         ways = ("face",)
     matches, faults, moved, partial = Matches(), [], stood, None
@@ -93,7 +99,8 @@ def _solve(frames: Frames, found: dict[str, faces.Face], capture: Capture, setti
                 found = find_landmarks(records, capture.frames, report)
             solved, fault = _by_face(records, capture, found, matches, settings, report)
             if solved and few and not solved.refined and "skin" in ways[turn:]:
-                report.log("The face gives cameras, but too little else matches to refine them; features that hold on skin are tried.")
+                report.log("The face gives cameras, but too little else matches to refine them; features that hold on "
+                           "skin are tried.")
                 continue
         else:
             skin, alone = way == "skin", stood
@@ -105,8 +112,10 @@ def _solve(frames: Frames, found: dict[str, faces.Face], capture: Capture, setti
         if solved and not fault:
             if partial and worth(partial) > worth(solved):
                 solved, matches = partial, partial.matches
-            rest = sorted({record.name for record in records} - {image.name for image in solved.model.images.values() if image.has_pose})
-            mirrored = tuple(_mirrored(frames, rest, solved.model, found, capture, report) if way != "face" else ()) or solved.mirrored
+            rest = sorted({record.name for record in records}
+                          - {image.name for image in solved.model.images.values() if image.has_pose})
+            mirrored = tuple(_mirrored(frames, rest, solved.model, found, capture, report) if way != "face"
+                             else ()) or solved.mirrored
             solved = replace(solved, head_moved=moved, stood_still=stood, mirrored=mirrored)
             partial = replace(solved, matches=matches)
             if few and len(rest) > len(mirrored) and ways[turn + 1:]:
@@ -121,41 +130,49 @@ def _solve(frames: Frames, found: dict[str, faces.Face], capture: Capture, setti
 
 
 def worth(solved: Solved) -> tuple[bool, int, bool]:
-    """Which of two ways found better cameras: those that something else than the face bears out first, then the more, then those by features."""
+    """Which of two ways found better cameras: those that something else than the face bears out first, then the more,
+    then those by features."""
     return solved.way != "face" or solved.refined, solved.model.num_reg_images(), solved.way != "face"
 
 
 def _refined(solved: Solved, frames: Frames, capture: Capture, settings: Settings, report: Reporter) -> Solved:
-    """A film with its cameras placed with respect to the head, if that swayed; photographs that lie far apart with their cameras adjusted together with the
-    face, and those that only then find a place."""
+    """A film with its cameras placed with respect to the head, if that swayed; photographs that lie far apart with
+    their cameras adjusted together with the face, and those that only then find a place."""
     apart = settings.cameras.interpupillary_mm / 1000
     if frames.kind == VIDEO and solved.way != "face" and not solved.head_moved:
         film = film_of(frames.records)
-        model, left = settle(solved.model, solved.head, solved.matches, report, skeleton.choose(film, skeleton.size(film)))
+        model, left = settle(solved.model, solved.head, solved.matches, report,
+                             skeleton.choose(film, skeleton.size(film)))
         if left is None or model is not solved.model:  # a room's features are too coarse for a head
             fine, chosen = match_crops(head_boxes(solved.model, solved.head), frames, capture, settings.seed, report)
             model, left = settle(solved.model, solved.head, fine, report, chosen)
         if model is solved.model:
             return solved
-        report.log(f"The head swayed before its surroundings: what matches on it misses by {100 * (1 - left):.0f} % less on its own; its cameras are taken.")
+        report.log(f"The head swayed before its surroundings: what matches on it misses by {100 * (1 - left):.0f} % "
+                   "less on its own; its cameras are taken.")
         return replace(solved, model=model, head=find_head(model, solved.found, apart), swayed=1 - left)
-    if frames.kind != PHOTOGRAPHS or len(frames.records) > ALL_PAIRS_FRAMES or not (solved.way != "face" or solved.refined):
+    if frames.kind != PHOTOGRAPHS or len(frames.records) > ALL_PAIRS_FRAMES or not (solved.way != "face"
+                                                                                    or solved.refined):
         return solved
     fits = {image.name for image in solved.model.images.values() if image.has_pose}
     missing = [record for record in frames.records if record.name not in fits and record.name not in solved.mirrored]
     unknown = any(record.focal_px is None for record in frames.records)
     model = refine(solved.model, solved.found, solved.matches, unknown, report, camera_groups(missing, capture.frames))
-    return replace(solved, model=model, head=find_head(model, solved.found, apart), every_frame_held=holds_every_frame(model))
+    return replace(solved, model=model, head=find_head(model, solved.found, apart),
+                   every_frame_held=holds_every_frame(model))
 
 
 def _by_features(skin: bool, frames: Frames, capture: Capture, found: dict, settings: Settings, report: Reporter,
                  alone: bool = False) -> tuple[Solved | None, Matches, str | None]:
-    """The model of one kind of features, the matches, and its shortcoming; `alone`: on the head only. A model whose head moved is given, with that fault."""
+    """The model of one kind of features, the matches, and its shortcoming; `alone`: on the head only. A model whose
+    head moved is given, with that fault."""
     with capture.workspace() as work:
         if alone:
-            found = found if len(found) > len(frames.records) / 2 else find_landmarks(frames.records, capture.frames, report)
+            found = (found if len(found) > len(frames.records) / 2
+                     else find_landmarks(frames.records, capture.frames, report))
             head_masks(found, frames.records, capture.frames, work, report)
-        model, matches = solve_structure(frames, capture, skin, settings.cameras.matching, settings.seed, report, work if alone else None)
+        model, matches = solve_structure(frames, capture, skin, settings.cameras.matching, settings.seed, report,
+                                         work if alone else None)
     fault = shortcoming(model, len(frames.records))
     if fault:
         return None, matches, fault
@@ -182,21 +199,30 @@ def shortcoming(model: pycolmap.Reconstruction | None, frames: int) -> str | Non
 
 def _by_face(records: Sequence[FrameRecord], capture: Capture, found: dict, matches: Matches, settings: Settings,
              report: Reporter) -> tuple[Solved | None, str | None]:
-    mirrored = find_mirrored(sorted(found), [], capture.frames, report, found) if len(records) <= FEW_PHOTOGRAPHS else []
-    result = resect(camera_groups(records, capture.frames), {name: face for name, face in found.items() if name not in mirrored}, matches, report)
+    mirrored = (find_mirrored(sorted(found), [], capture.frames, report, found) if len(records) <= FEW_PHOTOGRAPHS
+                else [])
+    result = resect(camera_groups(records, capture.frames),
+                    {name: face for name, face in found.items() if name not in mirrored}, matches, report)
     registered = result.model.num_reg_images() if result else 0
     if registered < min(LEAST_VIEWS, len(records)):
-        without = f"A face is found in only {len(found)} of {len(records)} frames" + (f", and {', '.join(mirrored)} is mirrored" if mirrored else "")
+        without = f"A face is found in only {len(found)} of {len(records)} frames" + (f", and {', '.join(mirrored)} is "
+                                                                                      "mirrored" if mirrored else "")
         return None, f"{without}; the landmarks of three could have placed the cameras."
     if result.landmark_miss > MOST_LANDMARK_MISS_SHARE:
-        return None, f"The face does not look like one still face in these frames: its landmarks miss by {100 * result.landmark_miss:.0f} % of its width."
+        return (
+            None,
+            f"The face does not look like one still face in these frames: its landmarks miss by "
+            f"{100 * result.landmark_miss:.0f} % of its width.",
+        )
     apart = settings.cameras.interpupillary_mm / 1000
-    head = find_head(result.model, found, apart) if registered > 1 else head_of_one(result.coefficients, result.landmark_px, result.landmark_miss, apart)
+    head = (find_head(result.model, found, apart) if registered > 1
+            else head_of_one(result.coefficients, result.landmark_px, result.landmark_miss, apart))
     return Solved(result.model, "face", head, found, mirrored=tuple(mirrored), tracks=result.tracks,
                   refined=result.refined), None
 
 
-def _mirrored(frames: Frames, rest: list[str], model: pycolmap.Reconstruction, found: dict, capture: Capture, report: Reporter) -> list[str]:
+def _mirrored(frames: Frames, rest: list[str], model: pycolmap.Reconstruction, found: dict, capture: Capture,
+              report: Reporter) -> list[str]:
     """Among photographs that did not fit, those that are mirrored."""
     if not rest or frames.kind == VIDEO or len(rest) > 2 * FEW_PHOTOGRAPHS:
         return []
@@ -210,20 +236,26 @@ def _spread(records: Sequence[FrameRecord]) -> list[FrameRecord]:
     seen = [record for record in records if record.yaw_deg is not None]
     frontal = [record for record in seen if abs(record.yaw_deg) < 45]
     seen = frontal if len(frontal) >= 4 else seen
-    return [seen[i] for i in np.unique(np.linspace(0, len(seen) - 1, min(MOST_FACES, len(seen))).round().astype(int))] if seen else []
+    return ([seen[i] for i in np.unique(np.linspace(0, len(seen) - 1, min(MOST_FACES, len(seen))).round().astype(int))]
+            if seen else [])
 
 
-def _explained(frames: Frames, faults: list[str], found: dict, moved: bool, stood: bool, capture: Capture, report: Reporter) -> Problem:
+def _explained(frames: Frames, faults: list[str], found: dict, moved: bool, stood: bool, capture: Capture,
+               report: Reporter) -> Problem:
     """The Problem that fits best what was tried."""
     records = frames.records
     names = {record.name: record.shown for record in records}
-    mirrored = find_mirrored(sorted(names), [], capture.frames, report, found) if frames.kind != VIDEO and len(names) <= FEW_PHOTOGRAPHS else []
+    mirrored = (find_mirrored(sorted(names), [], capture.frames, report, found) if frames.kind != VIDEO
+                and len(names) <= FEW_PHOTOGRAPHS else [])
     if mirrored:
         they = "is mirrored: it fits" if len(mirrored) == 1 else "are mirrored: they fit"
-        return Problem(f"{', '.join(names[name] for name in mirrored)} {they} the other pictures only when flipped left to right.",
+        return Problem(f"{', '.join(names[name] for name in mirrored)} {they} the other pictures only when flipped "
+                       "left to right.",
                        "Flip them back, or leave them out; on a phone, switch off the mirroring of the front camera.")
     if moved or stood:
-        return Problem("The head turned in front of a camera that stood still, and the face alone does not give its motion." if stood
-                       else "The face is not still with respect to its surroundings: the cameras follow the background, and the head moved.",
+        return Problem("The head turned in front of a camera that stood still, and the face alone does not give its "
+                       "motion." if stood
+                       else "The face is not still with respect to its surroundings: the cameras follow the "
+                            "background, and the head moved.",
                        "Let the person sit still, look at one point, and move the camera instead.")
     return Problem(" ".join(dict.fromkeys([faults[0], faults[-1]])), FILM_AGAIN)

@@ -35,17 +35,19 @@ NO_MODEL = 3
 def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str, seed: int, report: Reporter,
                     masks: Path | None = None) -> tuple[pycolmap.Reconstruction | None, Matches]:
     """The largest model of the capture's `frames`, in COLMAP's own world (None where nothing fits together),
-    and all matches. `masks`: folder with NAME.png, where black hides what moves otherwise. Photographs are looked at as large as they were kept,
-    though not with masks; pixels are the frames' in any case."""
+    and all matches. `masks`: folder with NAME.png, where black hides what moves otherwise. Photographs are looked at as
+    large as they were kept, though not with masks; pixels are the frames' in any case."""
     records, folder = frames.records, capture.frames
-    sequential = matching == "sequential" or (matching == "auto" and frames.kind == VIDEO and len(records) > ALL_PAIRS_FRAMES)
+    sequential = matching == "sequential" or (matching == "auto" and frames.kind == VIDEO
+                                              and len(records) > ALL_PAIRS_FRAMES)
     with capture.workspace() as work:
         groups = camera_groups(records, folder)
         few = frames.kind == PHOTOGRAPHS and len(records) <= ALL_PAIRS_FRAMES
         looked_at = groups if masks else _enlarged(groups, folder)
         name_of = {PurePosixPath(name).name: name for group in looked_at for name in group["names"]}
         job = {"images": str(folder.resolve()), "groups": looked_at, "skin": skin,
-               "film": [(name_of[name], *told) for name, *told in film_of(records)] if sequential else None, "photographs": few,
+               "film": [(name_of[name], *told) for name, *told in film_of(records)] if sequential else None,
+               "photographs": few,
                "finer": skin or not sequential, "masks": str(masks) if masks else None, "seed": seed,
                "database": str(work / "database.db"), "output": str(work / "model")}
         path = work / "job.json"
@@ -53,36 +55,45 @@ def solve_structure(frames: Frames, capture: Capture, skin: bool, matching: str,
         try:
             model = read_model(Path(job["output"])) if _follow(path, report) else None
         except (OSError, ValueError) as error:
-            raise Problem(f"The camera solver left a model that cannot be used ({error}).", "Run the stage cameras again.") from error
+            raise Problem(f"The camera solver left a model that cannot be used ({error}).",
+                          "Run the stage cameras again.") from error
         matches = read_matches(Path(job["database"]))
         sizes = {name: (group["width"], group["height"]) for group in groups for name in group["names"]}
-        scales = {name: [small / large for small, large in zip(sizes[PurePosixPath(name).name], (group["width"], group["height"]), strict=True)]
+        scales = {name: [small / large
+                         for small, large in zip(sizes[PurePosixPath(name).name], (group["width"], group["height"]),
+                                                 strict=True)]
                   for group in job["groups"] for name in group["names"]}
         if model is not None:
             _reduce(model, sizes)
         return model, matches.scaled(scales)
 
 
-def match_crops(boxes: dict[str, tuple[int, int, int, int]], frames: Frames, capture: Capture, seed: int, report: Reporter) -> tuple[Matches, list[str]]:
-    """Matches of fine features within a part of each frame of a film, in the frames' pixels, and the frames that carry the film there. boxes: name -> left,
-    top, right and bottom of that part."""
+def match_crops(boxes: dict[str, tuple[int, int, int, int]], frames: Frames, capture: Capture, seed: int,
+                report: Reporter) -> tuple[Matches, list[str]]:
+    """Matches of fine features within a part of each frame of a film, in the frames' pixels, and the frames that carry
+    the film there. boxes: name -> left, top, right and bottom of that part."""
     with capture.workspace() as work:
         (work / "parts").mkdir()
         names = {}
         for record in frames.records:
             if record.name in boxes:
                 left, top, right, bottom = boxes[record.name]
-                images.write_srgb(work / "parts" / record.name, images.read_srgb(capture.frames / record.name)[top:bottom, left:right], quality=100)
+                images.write_srgb(work / "parts" / record.name,
+                                  images.read_srgb(capture.frames / record.name)[top:bottom, left:right], quality=100)
                 names.setdefault((right - left, bottom - top), []).append(record.name)
                 report.check()
-        groups = [{"names": same, "width": width, "height": height, "focal_px": None} for (width, height), same in names.items()]
-        job = {"images": str(work / "parts"), "groups": groups, "skin": False, "photographs": False, "finer": True, "masks": None, "seed": seed,
-               "film": [frame for frame in film_of(frames.records) if frame[0] in boxes], "database": str(work / "parts.db"), "output": None}
+        groups = [{"names": same, "width": width, "height": height, "focal_px": None}
+                  for (width, height), same in names.items()]
+        job = {"images": str(work / "parts"), "groups": groups, "skin": False, "photographs": False, "finer": True,
+               "masks": None, "seed": seed,
+               "film": [frame for frame in film_of(frames.records) if frame[0] in boxes],
+               "database": str(work / "parts.db"), "output": None}
         path = work / "parts.json"
         path.write_text(json.dumps(job), encoding="utf-8")
         _follow(path, report)
         matches, chosen = read_matches(Path(job["database"])), json.loads((work / CHOSEN).read_text(encoding="utf-8"))
-    return Matches({name: pixels + boxes[name][:2] for name, pixels in matches.keypoints.items()}, matches.pairs), chosen
+    return Matches({name: pixels + boxes[name][:2] for name, pixels in matches.keypoints.items()},
+                   matches.pairs), chosen
 
 
 def film_of(records: Sequence[FrameRecord]) -> skeleton.Film:
@@ -91,7 +102,8 @@ def film_of(records: Sequence[FrameRecord]) -> skeleton.Film:
 
 
 def camera_groups(records: Sequence[FrameRecord], folder: Path) -> list[dict]:
-    """Frames that share a camera, those of one size and one focal length: [{names, width, height, focal_px or None}]."""
+    """Frames that share a camera, those of one size and one focal length: [{names, width, height, focal_px or
+    None}]."""
     groups = {}
     for record in records:
         width, height = images.size(folder / record.name)
@@ -101,14 +113,17 @@ def camera_groups(records: Sequence[FrameRecord], folder: Path) -> list[dict]:
 
 
 def _enlarged(groups: list[dict], folder: Path) -> list[dict]:
-    """The same groups of the larger pictures of these frames, whose names are full/NAME; those that have none stay as they are."""
+    """The same groups of the larger pictures of these frames, whose names are full/NAME; those that have none stay as
+    they are."""
     split: dict[tuple, dict] = {}
     for number, group in enumerate(groups):
         for name in group["names"]:
             there = (folder / FULL / name).is_file()
             width, height = images.size(folder / FULL / name) if there else (group["width"], group["height"])
-            focal = group["focal_px"] and group["focal_px"] * math.hypot(width, height) / math.hypot(group["width"], group["height"])
-            one = split.setdefault((number, width, height), {"names": [], "width": width, "height": height, "focal_px": focal})
+            focal = group["focal_px"] and group["focal_px"] * math.hypot(width, height) / math.hypot(group["width"],
+                                                                                                     group["height"])
+            one = split.setdefault((number, width, height),
+                                   {"names": [], "width": width, "height": height, "focal_px": focal})
             one["names"].append(f"{FULL}/{name}" if there else name)
     return list(split.values())
 
@@ -131,7 +146,8 @@ def _reduce(model: pycolmap.Reconstruction, sizes: dict[str, tuple[int, int]]) -
 def _follow(job: Path, report: Reporter) -> bool:
     """Runs COLMAP's process, reporting its progress; ends it at a cancel. True where it made a model."""
     command = [sys.executable, "-E", "-s", "-B", "-m", f"{__package__}.colmap", str(job)]
-    process = subprocess.Popen(command, cwd=Path(__file__).parents[2], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8")
+    process = subprocess.Popen(command, cwd=Path(__file__).parents[2], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                               text=True, encoding="utf-8")
     lines = queue.SimpleQueue()
     reader = threading.Thread(target=lambda: [lines.put(line) for line in process.stdout], daemon=True)
     reader.start()

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether all but the head stays put while the head turns: seen in a few pictures, before minutes go into features that would say so."""
+"""Whether all but the head stays put while the head turns: seen in a few pictures, before minutes go into features that
+would say so."""
 
 from __future__ import annotations
 
@@ -18,19 +19,21 @@ from .motion import LEAST_MATCHES, STILL_DIAGONAL_SHARE, TURNED_DEG
 LONG_SIDE_PX = 480
 """Long side, in pixels, at which the pictures are compared."""
 MOST_CORNERS, LEAST_QUALITY_SHARE = 400, 0.02
-"""The most corners of a picture, and the least of one as a share of the best: that is one of the face's, beside which the noise of a bare wall is none."""
+"""The most corners of a picture, and the least of one as a share of the best: that is one of the face's, beside which
+the noise of a bare wall is none."""
 MOST_FRAMES = 72
-"""Frames of a film of a turning head that its cameras are solved from, spread over it: only the head tells of its motion, and every frame has the whole
-of it."""
+"""Frames of a film of a turning head that its cameras are solved from, spread over it: only the head tells of its
+motion, and every frame has the whole of it."""
 
 
 def surroundings_stay(found: dict[str, faces.Face], folder: Path) -> bool:
-    """Whether what is not the head (wall, shoulders, clothes) stays where it is between pictures in which the head has turned. False where a bare wall
-    and what else there is do not tell."""
+    """Whether what is not the head (wall, shoulders, clothes) stays where it is between pictures in which the head has
+    turned. False where a bare wall and what else there is do not tell."""
     names, stayed = sorted(found), []
     small = {name: _read(folder / name) for name in names}
     for i, first in enumerate(names):
-        second = next((name for name in names[i + 1:] if abs(found[name].yaw_deg - found[first].yaw_deg) >= TURNED_DEG), None)
+        second = next((name for name in names[i + 1:] if abs(found[name].yaw_deg - found[first].yaw_deg) >= TURNED_DEG),
+                      None)
         share = None if second is None else _share_that_stays(small[first], small[second], found[first], found[second])
         stayed += [] if share is None else [share > 0.6]
     return len(stayed) >= 2 and bool(np.mean(stayed) > 0.6)
@@ -51,7 +54,8 @@ def _read(path: Path) -> tuple[np.ndarray, float]:
 
 
 def _share_that_stays(one: tuple, other: tuple, face: faces.Face, turned: faces.Face) -> float | None:
-    """Of the corners off both heads in one picture, how many are at the same place in the other; None where there are too few."""
+    """Of the corners off both heads in one picture, how many are at the same place in the other; None where there are
+    too few."""
     (first, scale), (second, _) = one, other
     corners = cv2.goodFeaturesToTrack(first, MOST_CORNERS, LEAST_QUALITY_SHARE, 4)
     if corners is None or first.shape != second.shape:
@@ -62,12 +66,15 @@ def _share_that_stays(one: tuple, other: tuple, face: faces.Face, turned: faces.
         return None
     there, found, _ = cv2.calcOpticalFlowPyrLK(first, second, corners[off], None)
     back, again, _ = cv2.calcOpticalFlowPyrLK(second, first, there, None)
-    still = np.linalg.norm((there - corners[off]).reshape(-1, 2), axis=1) < STILL_DIAGONAL_SHARE * np.hypot(*first.shape)
-    sure = (found.ravel() > 0) & (again.ravel() > 0) & (np.linalg.norm((back - corners[off]).reshape(-1, 2), axis=1) < 1)
+    still = np.linalg.norm((there - corners[off]).reshape(-1, 2),
+                           axis=1) < STILL_DIAGONAL_SHARE * np.hypot(*first.shape)
+    sure = (found.ravel() > 0) & (again.ravel() > 0) & (np.linalg.norm((back - corners[off]).reshape(-1, 2), axis=1)
+                                                        < 1)
     return float((still & sure).mean())
 
 
 def _on_head(pixels: np.ndarray, face: faces.Face) -> np.ndarray:
     """Which pixels [N, 2] lie on the head, its hair or its neck [N], roughly."""
     x0, y0, x1, y1 = face.box
-    return (np.abs(pixels[:, 0] - (x0 + x1) / 2) < 1.1 * (x1 - x0)) & (pixels[:, 1] > y0 - 0.7 * (y1 - y0)) & (pixels[:, 1] < y1 + 0.4 * (y1 - y0))
+    return (np.abs(pixels[:, 0] - (x0 + x1) / 2) < 1.1
+            * (x1 - x0)) & (pixels[:, 1] > y0 - 0.7 * (y1 - y0)) & (pixels[:, 1] < y1 + 0.4 * (y1 - y0))

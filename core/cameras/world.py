@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From any world of cameras to the head's: metres, +Z up, face towards -Y, origin midway between the eyes.
 
-Face landmarks of several frames are rays; the template's head laid against them gives upright and, by its pupils, scale.
+Face landmarks of several frames are rays; the template's head laid against them gives upright and, by its pupils,
+scale.
 """
 
 from __future__ import annotations
@@ -17,21 +18,22 @@ from ..face import faces
 from .landmarks import fit_rays, pupils, template_landmarks
 
 ASTRAY_RATIO, ASTRAY_WIDTH_SHARE = 4.0, 0.1
-"""A frame whose landmarks miss those of the others by so many times the usual, and by such a share of the face's width, shows a face that the net did
-not find: a profile, mostly."""
+"""A frame whose landmarks miss those of the others by so many times the usual, and by such a share of the face's width,
+shows a face that the net did not find: a profile, mostly."""
 SURE_SCORE = 0.8
 """Score of a face that was found; the net gives one that is there 0.95 and more."""
 FRONTAL_DEG = 45.0
 """Landmarks slide along the silhouette of a turned head, so frames within this yaw are taken where there are enough."""
 MOVED_WIDTH_SHARE = 0.08
-"""Share of the face's width by which the landmarks' rays may miss each other in a quarter of the frames before the head counts as moved."""
+"""Share of the face's width by which the landmarks' rays may miss each other in a quarter of the frames before the head
+counts as moved."""
 
 
 @dataclass(frozen=True)
 class HeadFrame:
-    """The similarity into the head's world; by how much the landmarks' rays miss each other [px, median over frames and landmarks], and that as a
-    share of the face's width in the quarter of the frames where it is most; the distance of the pupils in the units of the cameras' own world;
-    by how much the template's head misses the rays [m, median]."""
+    """The similarity into the head's world; by how much the landmarks' rays miss each other [px, median over frames and
+    landmarks], and that as a share of the face's width in the quarter of the frames where it is most; the distance of
+    the pupils in the units of the cameras' own world; by how much the template's head misses the rays [m, median]."""
 
     world_from_model: pycolmap.Sim3d
     error_px: float
@@ -56,7 +58,8 @@ def find_head(model: pycolmap.Reconstruction, found: dict[str, faces.Face], inte
     points, angles = intersect_rays(origins, directions)
     focal = np.array([model.cameras[image.camera_id].mean_focal_length() for image, _ in seen])
     width = np.median([face.box[2] - face.box[0] for _, face in seen])
-    errors = np.median(angles * focal[:, None], axis=1)  # per frame, so that a head that sat elsewhere in a quarter of them shows
+    # per frame, so that a head that sat elsewhere in a quarter of them shows
+    errors = np.median(angles * focal[:, None], axis=1)
     good = _together(errors, width)
     if not good.all():
         origins, directions = origins[good], directions[good]
@@ -70,15 +73,18 @@ def find_head(model: pycolmap.Reconstruction, found: dict[str, faces.Face], inte
     head = scale * template_landmarks().shape(coefficients) @ rotation.T + translation
     offset = head[None] - origins[:, None]
     miss = np.linalg.norm(np.cross(offset, directions), axis=-1)[:, template_landmarks().trust > 0.2]
-    return HeadFrame(similarity, float(np.median(errors)), float(np.percentile(errors, 75) / width), apart, float(np.median(miss)) * size)
+    return HeadFrame(similarity, float(np.median(errors)), float(np.percentile(errors, 75) / width), apart,
+                     float(np.median(miss)) * size)
 
 
 def head_of_one(coefficients: np.ndarray, error_px: float, miss: float, interpupillary_m: float) -> HeadFrame:
-    """The head in the one camera that was placed by it, which is in the template's metres: no rays meet, and its landmarks miss by what the fit says."""
+    """The head in the one camera that was placed by it, which is in the template's metres: no rays meet, and its
+    landmarks miss by what the fit says."""
     right, left = pupils(coefficients)
     apart = float(np.linalg.norm(left - right))
     size = interpupillary_m / apart
-    return HeadFrame(pycolmap.Sim3d(size, pycolmap.Rotation3d(np.eye(3)), -size * (left + right) / 2), error_px, miss, apart, 0.0)
+    return HeadFrame(pycolmap.Sim3d(size, pycolmap.Rotation3d(np.eye(3)), -size * (left + right) / 2), error_px, miss,
+                     apart, 0.0)
 
 
 def agreeing_faces(model: pycolmap.Reconstruction, found: dict[str, faces.Face]) -> dict[str, faces.Face]:
@@ -89,7 +95,8 @@ def agreeing_faces(model: pycolmap.Reconstruction, found: dict[str, faces.Face])
     origins, directions = zip(*(rays(image, model.cameras[image.camera_id], face) for image, face in seen), strict=True)
     _, angles = intersect_rays(np.array(origins), np.array(directions))
     focal = np.array([model.cameras[image.camera_id].mean_focal_length() for image, _ in seen])
-    good = _together(np.median(angles * focal[:, None], axis=1), np.median([face.box[2] - face.box[0] for _, face in seen]))
+    good = _together(np.median(angles * focal[:, None], axis=1),
+                     np.median([face.box[2] - face.box[0] for _, face in seen]))
     return {image.name: face for (image, face), kept in zip(seen, good, strict=True) if kept}
 
 
@@ -109,8 +116,8 @@ def rays(image: pycolmap.Image, camera: pycolmap.Camera, face: faces.Face) -> tu
 
 
 def intersect_rays(origins: np.ndarray, directions: np.ndarray, rounds: int = 10) -> tuple[np.ndarray, np.ndarray]:
-    """The points [P, 3] nearest to rays from origins [N, 3] along unit directions [N, P, 3], robustly (L1 by reweighting);
-    and the angles [N, P] in radians by which the rays miss them."""
+    """The points [P, 3] nearest to rays from origins [N, 3] along unit directions [N, P, 3], robustly (L1 by
+    reweighting); and the angles [N, P] in radians by which the rays miss them."""
     across = np.eye(3) - directions[..., :, None] * directions[..., None, :]  # [N, P, 3, 3], projects off the ray
     weights = np.ones(directions.shape[:2])
     for _ in range(rounds):
@@ -126,9 +133,10 @@ def intersect_rays(origins: np.ndarray, directions: np.ndarray, rounds: int = 10
 
 
 def _sure(model: pycolmap.Reconstruction, found: dict[str, faces.Face]) -> list[tuple]:
-    """Registered images with their faces, without those that the net hardly believes itself, where there are others: in a profile it sees a face from in
-    front that is none."""
-    seen = [(image, found[image.name]) for image in sorted(model.images.values(), key=lambda image: image.name) if image.has_pose and image.name in found]
+    """Registered images with their faces, without those that the net hardly believes itself, where there are others: in
+    a profile it sees a face from in front that is none."""
+    seen = [(image, found[image.name]) for image in sorted(model.images.values(), key=lambda image: image.name)
+            if image.has_pose and image.name in found]
     sure = [pair for pair in seen if pair[1].score > SURE_SCORE]
     return sure if len(sure) >= 2 else seen
 

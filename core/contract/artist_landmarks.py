@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Landmarks the artist has put: landmarks_artist.json, {"points": {INDEX: [x, y, z]}} in metres of the capture's world.
 
-An index is one of the 468 of MediaPipe's face mesh, as in landmarks.json. Written only by the add-on and `core landmarks`; the stage
-registration reads it when it is there, and a point in it wins over what was found in the frames. Ground floor: standard library only.
+An index is one of the 468 of MediaPipe's face mesh, as in landmarks.json. Written only by the add-on and `core
+landmarks`; the stage registration reads it when it is there, and a point in it wins over what was found in the frames.
+Ground floor: standard library only.
 """
 
 from __future__ import annotations
@@ -33,12 +34,14 @@ def read(path: Path) -> dict[int, tuple[float, float, float]]:
                       "Correct the file, or delete it to use the landmarks found in the frames.") from error
     points = record.get("points") if isinstance(record, dict) else None
     if not isinstance(points, dict):
-        raise Problem(f"{path} holds no landmarks.", 'Write them as {"points": {"152": [0.0, -0.01, -0.11]}}: index, and position in metres.')
+        raise Problem(f"{path} holds no landmarks.",
+                      'Write them as {"points": {"152": [0.0, -0.01, -0.11]}}: index, and position in metres.')
     return _checked(points, str(path))
 
 
 def put(capture: Capture, points: Mapping) -> dict[int, tuple[float, float, float]]:
-    """Lays points {index: (x, y, z)} over those in the capture's file, an index with None taken out; the file goes with its last point.
+    """Lays points {index: (x, y, z)} over those in the capture's file, an index with None taken out; the file goes with
+    its last point.
 
     Returns all that are now in it. Raises Problem, and changes nothing, for an index or a position that cannot be.
     """
@@ -73,5 +76,6 @@ def _checked(points: Mapping, whose: str) -> dict[int, tuple[float, float, float
 def _index(key, whose: str) -> int:
     text = str(key)
     if not (text.isdecimal() and len(text) <= len(str(COUNT)) and int(text) < COUNT):
-        raise Problem(f"{whose}: there is no landmark {key!r:.60}.", f"Landmarks are counted from 0 to {COUNT - 1}, as in landmarks.json.")
+        raise Problem(f"{whose}: there is no landmark {key!r:.60}.",
+                      f"Landmarks are counted from 0 to {COUNT - 1}, as in landmarks.json.")
     return int(text)

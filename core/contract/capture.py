@@ -25,7 +25,8 @@ from .portable_paths import convert_settings, write_portable
 from .settings import Settings
 
 FORMAT = 2
-"""Version of the capture folder's layout; a capture of a newer format is refused. Format 1 is that of WildCap 0.1.0 (format_1.py)."""
+"""Version of the capture folder's layout; a capture of a newer format is refused. Format 1 is that of WildCap 0.1.0
+(format_1.py)."""
 
 
 class Capture:
@@ -43,7 +44,8 @@ class Capture:
         self.landmarks = self.root / "landmarks.json"
         self.landmarks_artist = self.root / "landmarks_artist.json"
         self.head = self.root / "head.obj"
-        self.head_open = self.root / "head_open.obj"  # the head with its lids as they were filmed; absent where the eyes were closed
+        # the head with its lids as they were filmed; absent where the eyes were closed
+        self.head_open = self.root / "head_open.obj"
         self.eyes = self.root / "eyes.json"  # the eyeballs between them; likewise
         self.own_head = self.root / "own_head.obj"
         self.own_head_skin = self.root / "own_head.json"
@@ -54,12 +56,15 @@ class Capture:
         self.texture_png = self.root / "texture.png"
         self.texture_filmed = self.root / "texture_filmed.png"
         self.texture_confidence = self.root / "texture_confidence.exr"
-        self.texture_detail = self.root / "texture_detail.exr"  # what the frames show beyond the texture's texels; absent where they show no more
-        self.texture_parts = self.root / "texture_parts.png"  # where the frames show brows, beard and head hair; absent where none was there to be asked
+        # what the frames show beyond the texture's texels; absent where they show no more
+        self.texture_detail = self.root / "texture_detail.exr"
+        # where the frames show brows, beard and head hair; absent where none was there to be asked
+        self.texture_parts = self.root / "texture_parts.png"
         self.shadow_mask_auto = self.root / "shadow_mask_auto.png"
         self.shadow_mask = self.root / "shadow_mask.png"
         self.protect_mask = self.root / "protect_mask.png"
-        self.shadow_mask_edges = self.root / "shadow_mask_edges.png"  # the mask snapped to the shadow's edges, until the artist takes it
+        # the mask snapped to the shadow's edges, until the artist takes it
+        self.shadow_mask_edges = self.root / "shadow_mask_edges.png"
         self.mask_history = self.root / "mask_history"
         self.maps = self.root / "maps"
         self.solved = self.maps / "solved.safetensors"  # what a later solve of an edited part goes on from
@@ -88,53 +93,64 @@ class Capture:
         except FileNotFoundError:
             return {"format": FORMAT, "source": "", "stages": {}}
         except (OSError, ValueError) as error:
-            raise Problem(f"{self.json} cannot be read ({error}).",
-                          "Restore it from a backup, or delete it to start this capture anew; pictures and masks stay.") from error
+            raise Problem(
+                f"{self.json} cannot be read ({error}).",
+                "Restore it from a backup, or delete it to start this capture anew; pictures and masks stay.",
+            ) from error
         if isinstance(record, dict) and is_number(record.get("format"), FORMAT + 1):
-            raise Problem("This capture was made by a newer version of WildCap.", "Update the extension to open it; nothing was changed.")
+            raise Problem("This capture was made by a newer version of WildCap.",
+                          "Update the extension to open it; nothing was changed.")
         if fault := capture_record.find_fault(record):
             raise Problem(f"{self.json} is not a capture record: {fault}.",
-                          "Choose a folder that ends in .wildcap, or delete this file to start anew; pictures and masks stay.")
+                          "Choose a folder that ends in .wildcap, or delete this file to start anew; pictures and "
+                          "masks stay.")
         return record
 
     @property
     def source(self) -> Path | None:
-        """The video, or the folder of photographs, that the capture is made from; it may be gone. None where none was chosen."""
+        """The video, or the folder of photographs, that the capture is made from; it may be gone. None where none was
+        chosen."""
         return freshness.source_of(self.root, self.read())
 
     def refuse_inside(self, source: str | Path) -> None:
-        """Raises Problem for a source that is the capture or lies in it: what is written there could replace it, or be read again."""
+        """Raises Problem for a source that is the capture or lies in it: what is written there could replace it, or be
+        read again."""
         place, root = (Path(os.path.realpath(path)) for path in (source, self.root))
         if place == root or place.is_relative_to(root):
-            raise Problem(f"{source} lies in the capture {self.root}, which writes its own files there.", "Keep the video or photographs elsewhere.")
+            raise Problem(f"{source} lies in the capture {self.root}, which writes its own files there.",
+                          "Keep the video or photographs elsewhere.")
 
     def set_source(self, source: str | Path) -> None:
-        """Records where the pictures come from, and what they hold: a video may be put away once its frames are taken."""
+        """Records where the pictures come from, and what they hold: a video may be put away once its frames are
+        taken."""
         if str(source):
             self.refuse_inside(source)
         self.claim()
         record = self.read()
         stamp, path = record.get("source_stamp", []), Path(source) if str(source) else None
-        changed = {**record, **format_1.keep_stamp(stamp), "format": FORMAT, "source": self._portable(path) if path else "",
-                   "source_stamp": hash_source(path) or stamp}
+        changed = {**record, **format_1.keep_stamp(stamp), "format": FORMAT,
+                   "source": self._portable(path) if path else "", "source_stamp": hash_source(path) or stamp}
         if changed != record:
             write_json(self.json, changed)
 
     def made_from(self, source: str | Path) -> bool:
-        """Whether `source` holds what this capture's frames were taken from, or there are none yet, or it is not there to be asked."""
+        """Whether `source` holds what this capture's frames were taken from, or there are none yet, or it is not there
+        to be asked."""
         record = self.read()
         first = next(stage.name for stage in stages.STAGES if not stage.reads)
         present = hash_source(Path(source))
         return first not in record["stages"] or not present or same_source(record.get("source_stamp", []), present)
 
-    def finish(self, stage: stages.Stage, conditions: dict, seconds: float, settings: Settings, figures: dict, version: str,
-               findings: Collection[dict] = ()) -> None:
-        """Records that a stage ended well; `conditions` is what `conditions` gave before it began, `findings` are the Reporter's."""
+    def finish(self, stage: stages.Stage, conditions: dict, seconds: float, settings: Settings, figures: dict,
+               version: str, findings: Collection[dict] = ()) -> None:
+        """Records that a stage ended well; `conditions` is what `conditions` gave before it began, `findings` are the
+        Reporter's."""
         record = self.read()
         chosen = convert_settings({stage.name: asdict(getattr(settings, stage.name))}, self._portable)[stage.name]
         record["format"] = FORMAT
         record["stages"][stage.name] = {
-            **conditions, "seconds": round(seconds, 2), "finished": time.strftime("%Y-%m-%dT%H:%M:%S"), "version": version,
+            **conditions, "seconds": round(seconds, 2), "finished": time.strftime("%Y-%m-%dT%H:%M:%S"),
+            "version": version,
             "settings": chosen, "seed": settings.seed, "device": settings.compute_device, "figures": figures,
             "findings": list(findings),
         }
@@ -146,12 +162,16 @@ class Capture:
     def stop(self, stage: str, problem: Problem, findings: Collection[dict] = ()) -> None:
         """Records why a stage could not end, for the report; gone as soon as that stage is begun again."""
         record = self.read()
-        write_json(self.json, {**record, "stopped": {"stage": stage, "problem": problem.problem, "remedy": problem.remedy, "findings": list(findings)}})
+        write_json(self.json,
+                   {**record,
+                    "stopped": {"stage": stage, "problem": problem.problem, "remedy": problem.remedy,
+                                "findings": list(findings)}})
 
     def forget(self, names: Collection[str]) -> None:
         """Marks stages as not done; their files stay until they are written again."""
         record = self.read()
-        kept = {**record, "stages": {name: finished for name, finished in record["stages"].items() if name not in names}}
+        kept = {**record,
+                "stages": {name: finished for name, finished in record["stages"].items() if name not in names}}
         if kept.get("stopped", {}).get("stage") in names:
             del kept["stopped"]
         if kept != record:
@@ -170,13 +190,17 @@ class Capture:
         return freshness.judge(self.root, self.read(), stage, settings)
 
     def require_source(self) -> Path:
-        """The source. Raises Problem where it is gone or holds something else than it did: what is made of it could not be made again."""
+        """The source. Raises Problem where it is gone or holds something else than it did: what is made of it could not
+        be made again."""
         source = self.source
         if source is None or not source.exists():
-            raise Problem(f"{source or 'The video'} is not there any more, and frames that are slimmed away can be made from it alone.",
-                          f"Connect the disk that it is on, or choose it where it is now (`python -m core run VIDEO {self.root}`).")
+            raise Problem(f"{source or 'The video'} is not there any more, and frames that are slimmed away can be "
+                          "made from it alone.",
+                          f"Connect the disk that it is on, or choose it where it is now (`python -m core run VIDEO "
+                          f"{self.root}`).")
         if not self.made_from(source):
-            raise Problem(f"{source} is not the video that this capture was made from: the same frames could not be taken from it.",
+            raise Problem(f"{source} is not the video that this capture was made from: the same frames could not be "
+                          "taken from it.",
                           f"Choose the right one where it is now (`python -m core run VIDEO {self.root}`).")
         return source
 
@@ -198,7 +222,8 @@ class Capture:
 
     @contextlib.contextmanager
     def workspace(self):
-        """A folder in the capture for what a stage needs for a while; it goes when the stage ends, or, where that was killed, with the next run."""
+        """A folder in the capture for what a stage needs for a while; it goes when the stage ends, or, where that was
+        killed, with the next run."""
         folder = self.root / f".work.{os.getpid()}.{time.monotonic_ns()}.tmp"
         try:
             ownership.note_temporary(self.root, folder)
@@ -222,19 +247,23 @@ class Capture:
     def require(self, name: str) -> None:
         """Raises Problem where an artefact was slimmed away, for what cannot have it made again."""
         if not self.holds(name) and self.has(name):
-            raise Problem(f"{name} was slimmed away from this capture.", f"Have it made again: `python -m core slim --undo {self.root}`.")
+            raise Problem(f"{name} was slimmed away from this capture.",
+                          f"Have it made again: `python -m core slim --undo {self.root}`.")
 
     def claim(self) -> None:
-        """Makes the folder a capture, if it is not one yet. Raises Problem for a folder that holds something else, and where it cannot be written."""
+        """Makes the folder a capture, if it is not one yet. Raises Problem for a folder that holds something else, and
+        where it cannot be written."""
         if not self.json.is_file():
             if not self._was_capture():
                 self.refuse_strangers()
             write_json(self.json, {"format": FORMAT, "source": "", "stages": {}})
 
     def _was_capture(self) -> bool:
-        """Whether a folder without capture.json, which a damaged one may be deleted from to start anew, has been a capture: by our record, or by a job."""
+        """Whether a folder without capture.json, which a damaged one may be deleted from to start anew, has been a
+        capture: by our record, or by a job."""
         with contextlib.suppress(OSError, ValueError, TypeError):
-            return (self.root / ownership.RECORD).is_file() or {"capture", "from", "until", "quality"} <= set(read_json(self.job))
+            return (self.root / ownership.RECORD).is_file() or {"capture", "from", "until",
+                                                                "quality"} <= set(read_json(self.job))
         return False
 
     def refuse_strangers(self) -> None:
@@ -244,7 +273,8 @@ class Capture:
         except OSError as error:
             raise storage_problem(error, self.root) from error
         if strangers:
-            raise Problem(f"{self.root} is no capture: it holds {strangers[0]}.", "Name a new folder, as NAME.wildcap, and it will be made.")
+            raise Problem(f"{self.root} is no capture: it holds {strangers[0]}.",
+                          "Name a new folder, as NAME.wildcap, and it will be made.")
 
     # -- lock
 
@@ -256,8 +286,8 @@ class Capture:
 
     @contextlib.contextmanager
     def locked(self, tell: Callable[[str], None] = lambda text: None):
-        """Keeps every other worker out, and clears away what killed ones left. Raises Problem naming who works here, and for a folder that is no capture;
-        `tell` hears of a longer wait (lease.hold)."""
+        """Keeps every other worker out, and clears away what killed ones left. Raises Problem naming who works here,
+        and for a folder that is no capture; `tell` hears of a longer wait (lease.hold)."""
         self.claim()
         with contextlib.ExitStack() as held:
             try:

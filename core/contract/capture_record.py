@@ -9,20 +9,23 @@ from __future__ import annotations
 
 from .json_files import is_number, plain_name
 
-ENTRY = {"finished": str, "version": str, "settings": dict, "seed": int, "device": str, "figures": dict, "findings": list, "inputs": dict, "code": str}
+ENTRY = {"finished": str, "version": str, "settings": dict, "seed": int, "device": str, "figures": dict,
+         "findings": list, "inputs": dict, "code": str}
 """What is told of a finished stage, beside its seconds."""
 SINCE_2 = {"inputs", "code", "settings", "seed", "device", "finished", "figures"}
 """What is never missing where `inputs` are told, as since format 2: freshness.py and the report count on it."""
 
 
 def find_fault(record) -> str:
-    """What makes it no record of a capture, as "its stages.scan makes no sense"; '' where nothing does. `record` is any JSON value."""
+    """What makes it no record of a capture, as "its stages.scan makes no sense"; '' where nothing does. `record` is any
+    JSON value."""
     if not isinstance(record, dict) or not isinstance(record.get("stages"), dict):
         return "it has no stages"
     source = record.get("source", "")
     right = {"format": type(record.get("format", 0)) is int, "source": isinstance(source, str) and "\0" not in source,
              **{field: _is_stamp(record.get(field, [])) for field in ("source_stamp", "format_1_stamp")},
-             **{f"stages.{name}": _is_entry(entry) for name, entry in record["stages"].items()}, "stopped": _is_stop(record.get("stopped"))}
+             **{f"stages.{name}": _is_entry(entry) for name, entry in record["stages"].items()},
+             "stopped": _is_stop(record.get("stopped"))}
     return next((f"its {field} makes no sense" for field, sound in right.items() if not sound), "")
 
 
@@ -30,26 +33,35 @@ def _is_entry(entry) -> bool:
     if not isinstance(entry, dict) or not is_number(entry.get("seconds"), 0):
         return False
     typed = all(isinstance(entry.get(field, kind()), kind) for field, kind in ENTRY.items())
-    return typed and ("inputs" not in entry or entry.keys() >= SINCE_2) and _are_findings(entry.get("findings", [])) and _are_hashes(entry.get("slimmed", {}))
+    return typed and ("inputs" not in entry
+                      or entry.keys()
+                      >= SINCE_2) and _are_findings(entry.get("findings", [])) and _are_hashes(entry.get("slimmed", {}))
 
 
 def _is_stop(stopped) -> bool:
-    told = isinstance(stopped, dict) and all(isinstance(stopped.get(field), str) for field in ("stage", "problem", "remedy"))
+    told = isinstance(stopped,
+                      dict) and all(isinstance(stopped.get(field), str) for field in ("stage", "problem", "remedy"))
     return stopped is None or told and _are_findings(stopped.get("findings"))
 
 
 def _is_stamp(value) -> bool:
     """Whether it is a source's stamp: [name, size, content hash, or time] of each file."""
-    return isinstance(value, list) and all(isinstance(file, list) and len(file) == 3 and plain_name(file[0]) and is_number(file[1], 0)
-                                           and (isinstance(file[2], str) or is_number(file[2])) for file in value)
+    return isinstance(value,
+                      list) and all(isinstance(file, list) and len(file) == 3 and plain_name(file[0])
+                                    and is_number(file[1], 0)
+                                    and (isinstance(file[2], str) or is_number(file[2])) for file in value)
 
 
 def _are_hashes(value) -> bool:
     """Whether it tells what was slimmed away: name -> content hash, or {file: hash} of a folder."""
-    return isinstance(value, dict) and all(isinstance(tree, str) or isinstance(tree, dict) and all(isinstance(each, str) for each in tree.values())
-                                           for tree in value.values())
+    return isinstance(value,
+                      dict) and all(isinstance(tree, str) or isinstance(tree, dict)
+                                    and all(isinstance(each, str) for each in tree.values())
+                                    for tree in value.values())
 
 
 def _are_findings(value) -> bool:
-    return isinstance(value, list) and all(isinstance(finding, dict) and isinstance(finding.get("problem"), str) and isinstance(finding.get("remedy"), str)
-                                           and isinstance(finding.get("frames"), list) for finding in value)
+    return isinstance(value,
+                      list) and all(isinstance(finding, dict) and isinstance(finding.get("problem"), str)
+                                    and isinstance(finding.get("remedy"), str)
+                                    and isinstance(finding.get("frames"), list) for finding in value)

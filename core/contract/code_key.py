@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which code a stage's result depends on: a hash of everything its module imports, read from the sources without importing any of it.
+"""Which code a stage's result depends on: a hash of everything its module imports, read from the sources without
+importing any of it.
 
-A module counts by its syntax tree, without docstrings, comments and layout, written in a form that no Python version changes (`ast.dump` and `ast.unparse`
-differ between versions). Data files count by content: a module that reads shipped ones names them in its constant DATA_FILES, relative to core/.
-Standard library only.
+A module counts by its syntax tree, without docstrings, comments and layout, written in a form that no Python version
+changes (`ast.dump` and `ast.unparse` differ between versions). Data files count by content: a module that reads shipped
+ones names them in its constant DATA_FILES, relative to core/. Standard library only.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ IGNORED_FIELDS = {"ctx", "kind", "type_comment"}
 
 @dataclass(frozen=True)
 class Module:
-    """One source file: the hash of its syntax tree, the files (relative to core/) of the modules it imports, and the data files it names."""
+    """One source file: the hash of its syntax tree, the files (relative to core/) of the modules it imports, and the
+    data files it names."""
 
     tree: str
     imports: tuple[str, ...]
@@ -50,8 +52,8 @@ def data_files(module: str, core: Path = CORE) -> list[str]:
 
 
 def write_canonically(node, text: list[str]) -> None:
-    """Appends a syntax tree, or a part of one, to `text`: the same pieces under every Python that can parse it. Statements that are only a string are
-    left out, and fields that are empty, for every version brings new ones."""
+    """Appends a syntax tree, or a part of one, to `text`: the same pieces under every Python that can parse it.
+    Statements that are only a string are left out, and fields that are empty, for every version brings new ones."""
     if isinstance(node, ast.AST):
         text.append("(" + type(node).__name__)
         for name in node._fields:
@@ -88,22 +90,26 @@ def _read_module(core: Path, file: str, changed: int) -> Module:
     """One source file as it was at the time `changed`."""
     tree = ast.parse((core / file).read_bytes())
     package = file.split("/")[:-1]
-    imports = [_file_of(core, package[:depth]) for depth in range(1, len(package) + 1)]  # importing a module runs its packages first
+    # importing a module runs its packages first
+    imports = [_file_of(core, package[:depth]) for depth in range(1, len(package) + 1)]
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.level:
             base = package[:len(package) - node.level + 1] + (node.module.split(".") if node.module else [])
             imports += [_file_of(core, [*base, alias.name]) or _file_of(core, base) for alias in node.names]
         elif isinstance(node, ast.JoinedStr):
             imports.append(_run_module(core, package, node))
-    named = [node.value for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == DATA_CONSTANT]
+    named = [node.value for node in tree.body if isinstance(node, ast.Assign)
+             and ast.unparse(node.targets[0]) == DATA_CONSTANT]
     data = ast.literal_eval(named[0]) if named else ()
     text: list[str] = []
     write_canonically(tree, text)
-    return Module(hashlib.blake2b("".join(text).encode(), digest_size=16).hexdigest(), tuple(dict.fromkeys(filter(None, imports))), data)
+    return Module(hashlib.blake2b("".join(text).encode(), digest_size=16).hexdigest(),
+                  tuple(dict.fromkeys(filter(None, imports))), data)
 
 
 def _run_module(core: Path, package: list[str], node: ast.JoinedStr) -> str:
-    """The file of a module that is run as a process of its own, by the name f"{__package__}.NAME"; '' for any other string."""
+    """The file of a module that is run as a process of its own, by the name f"{__package__}.NAME"; '' for any other
+    string."""
     parts = _merge_constants(node.values)
     shape = [type(part) for part in parts]
     if shape != [ast.FormattedValue, ast.Constant] or ast.unparse(parts[0].value) != "__package__":
@@ -112,7 +118,8 @@ def _run_module(core: Path, package: list[str], node: ast.JoinedStr) -> str:
 
 
 def _file_of(core: Path, parts: list[str]) -> str:
-    """The file of the module core.PARTS relative to core/, '' where there is none. core/__init__.py holds the version alone, on which no result depends."""
+    """The file of the module core.PARTS relative to core/, '' where there is none. core/__init__.py holds the version
+    alone, on which no result depends."""
     for name in ("/".join([*parts, "__init__.py"]), "/".join(parts) + ".py"):
         if parts and (core / name).is_file():
             return name

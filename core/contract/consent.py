@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a paid service would get of a capture, and whether the artist agreed to it: consent.json holds for these very pictures, here, and no others.
+"""What a paid service would get of a capture, and whether the artist agreed to it: consent.json holds for these very
+pictures, here, and no others.
 
-Ground floor: standard library only. The record names the capture's place, the receiving machine, the credits and every picture by its content, so that a
-copy in another capture, a moved one or changed frames are not agreed to. Answers that have come lie in switchlight/, named by what was sent.
+Ground floor: standard library only. The record names the capture's place, the receiving machine, the credits and every
+picture by its content, so that a copy in another capture, a moved one or changed frames are not agreed to. Answers that
+have come lie in switchlight/, named by what was sent.
 """
 
 from __future__ import annotations
@@ -25,10 +27,12 @@ from .json_files import read_json
 from .messages import Problem
 
 GIVEN_VARIABLE = "WILDCAP_SWITCHLIGHT_CONSENT"
-"""Environment variable by which the terminal's --send-frames reaches the worker: the place of the one capture that it is for."""
+"""Environment variable by which the terminal's --send-frames reaches the worker: the place of the one capture that it
+is for."""
 TOLD = (
     "{pictures} of this capture leave your machine: they show a person's face. Ask that person first.",
-    "They go to {company}, a company, at {host}, with your key and nothing else. What it does with them is told at {website}.",
+    "They go to {company}, a company, at {host}, with your key and nothing else. What it does with them is told at "
+    "{website}.",
     "{company} charges your account with {credits}.",
     "What comes back may not be used to train a model, as its terms say.",
 )
@@ -38,7 +42,8 @@ TOLD_AGAIN = "{kept} more have their answer already and are not paid again."
 
 @dataclass(frozen=True)
 class Sending:
-    """What a run would send: `frames` are name -> content hash of those without an answer yet, `kept` the number of those with one."""
+    """What a run would send: `frames` are name -> content hash of those without an answer yet, `kept` the number of
+    those with one."""
 
     host: str
     frames: dict[str, str]
@@ -51,7 +56,8 @@ class Sending:
 
 
 def sending(capture: Capture, preview: bool, names: Collection[str] | None = None) -> Sending:
-    """What of the frames `names` (None: the selected ones) has no answer yet. Raises Problem where there are no frames."""
+    """What of the frames `names` (None: the selected ones) has no answer yet. Raises Problem where there are no
+    frames."""
     names = selected(capture) if names is None else names
     hashes = {name: hash_file(capture.frames / name) for name in sorted(names) if (capture.frames / name).is_file()}
     missing = {name: content for name, content in hashes.items() if not answer(capture, content, preview).is_file()}
@@ -65,7 +71,8 @@ def selected(capture: Capture) -> list[str]:
     except Problem:
         names = []
     if not names:
-        raise Problem("This capture has no frames yet that could be agreed to.", "Reconstruct first: it stops before anything is sent.")
+        raise Problem("This capture has no frames yet that could be agreed to.",
+                      "Reconstruct first: it stops before anything is sent.")
     return names
 
 
@@ -77,15 +84,16 @@ def answer(capture: Capture, content: str, preview: bool) -> Path:
 
 def lines(plan: Sending, translated=str) -> list[str]:
     """What the artist is told, whole sentences; `translated` looks a template up."""
-    values = {"pictures": f"{len(plan.frames)} frame{'' if len(plan.frames) == 1 else 's'}", "company": service.COMPANY, "host": plan.host,
-              "website": service.WEBSITE, "credits": service.amount(plan.credits), "kept": plan.kept}
+    values = {"pictures": f"{len(plan.frames)} frame{'' if len(plan.frames) == 1 else 's'}", "company": service.COMPANY,
+              "host": plan.host, "website": service.WEBSITE, "credits": service.amount(plan.credits), "kept": plan.kept}
     return [translated(line).format(**values) for line in (*TOLD, *([TOLD_AGAIN] if plan.kept else []))]
 
 
 def give(capture: Capture, plan: Sending) -> None:
     """Records that the artist agrees to it."""
-    write_json(capture.consent, {"capture": _place(capture), "company": service.COMPANY, "host": plan.host, "credits": plan.credits,
-                                 "preview": plan.preview, "frames": plan.frames, "given": time.strftime("%Y-%m-%dT%H:%M:%S")})
+    write_json(capture.consent,
+               {"capture": _place(capture), "company": service.COMPANY, "host": plan.host, "credits": plan.credits,
+                "preview": plan.preview, "frames": plan.frames, "given": time.strftime("%Y-%m-%dT%H:%M:%S")})
 
 
 def withdraw(capture: Capture) -> None:
@@ -97,10 +105,12 @@ def withdraw(capture: Capture) -> None:
 
 
 def is_given(capture: Capture, plan: Sending) -> bool:
-    """Whether all that would be sent was agreed to: these pictures, from this place, to this machine, for no more credits. Damaged records count as none."""
+    """Whether all that would be sent was agreed to: these pictures, from this place, to this machine, for no more
+    credits. Damaged records count as none."""
     try:
         record = read_json(capture.consent)
-        return (record["capture"] == _place(capture) and record["host"] == plan.host and record["preview"] is plan.preview
+        return (record["capture"] == _place(capture) and record["host"] == plan.host
+                and record["preview"] is plan.preview
                 and plan.credits <= record["credits"] and plan.frames.items() <= record["frames"].items())
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return False
@@ -111,9 +121,11 @@ def require(capture: Capture, plan: Sending) -> None:
     if os.environ.get(GIVEN_VARIABLE) == _place(capture):
         give(capture, plan)
     if not is_given(capture, plan):
-        raise Problem(f"SwitchLight waits for your consent: {len(plan.frames)} frames that show a person's face would go to {service.COMPANY} ({plan.host}) "
+        raise Problem(f"SwitchLight waits for your consent: {len(plan.frames)} frames that show a person's face would "
+                      f"go to {service.COMPANY} ({plan.host}) "
                       f"for {service.amount(plan.credits)}. Nothing was sent.",
-                      "Click Allow Sending beside the delighter, or add --send-frames in the terminal; or choose another delighter, which sends nothing.")
+                      "Click Allow Sending beside the delighter, or add --send-frames in the terminal; or choose "
+                      "another delighter, which sends nothing.")
 
 
 def by_flag(capture: Capture) -> dict[str, str]:

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A face is deleted: first a list of all that would go and all that stays, then exactly that.
 
-What goes is what WildCap wrote and nobody changed (ownership.py), the capture's own books, its logs and what killed stages left. The video and deliveries
-elsewhere are never touched. Standard library only.
+What goes is what WildCap wrote and nobody changed (ownership.py), the capture's own books, its logs and what killed
+stages left. The video and deliveries elsewhere are never touched. Standard library only.
 """
 
 from __future__ import annotations
@@ -21,14 +21,19 @@ from .messages import Problem
 LOGS = frozenset({"logs/worker.log", "logs/contact_sheet.log", f"logs/{unforeseen.LOG}",
                   *(f"logs/{stage.name}.log" for stage in (*stages.STAGES, *stages.TOOLS))})
 GROUPS = {
-    "frames": "Frames", "cameras": "Cameras", "scan.ply": "Scan", "head.obj": "Head", "own_head.obj": "Head", "own_head.json": "Head",
-    "landmarks.json": "Landmarks", "landmarks_artist.json": "Landmarks", "delit": "Delit frames", "switchlight": "SwitchLight's answers",
-    "shadow_mask.png": "Painted masks", "protect_mask.png": "Painted masks", "mask_history": "Painted masks", "maps": "Maps", "maps_4k": "Maps",
-    "renders": "Renders", "delivery": "Exports", "exports": "Exports", "logs": "Logs", "report": "Report", "report.html": "Report",
+    "frames": "Frames", "cameras": "Cameras", "scan.ply": "Scan", "head.obj": "Head", "own_head.obj": "Head",
+    "own_head.json": "Head",
+    "landmarks.json": "Landmarks", "landmarks_artist.json": "Landmarks", "delit": "Delit frames",
+    "switchlight": "SwitchLight's answers",
+    "shadow_mask.png": "Painted masks", "protect_mask.png": "Painted masks", "mask_history": "Painted masks",
+    "maps": "Maps", "maps_4k": "Maps",
+    "renders": "Renders", "delivery": "Exports", "exports": "Exports", "logs": "Logs", "report": "Report",
+    "report.html": "Report",
 }
 """What the first part of a file's path in the capture is called in the list."""
 REST = "Other working files"
-FOLDERS = tuple(f"{name}/-" for name in (*GROUPS, "checkpoints", "comparison", "preview", ownership.KEPT) if "." not in name)
+FOLDERS = tuple(f"{name}/-" for name in (*GROUPS, "checkpoints", "comparison", "preview", ownership.KEPT)
+                if "." not in name)
 """Our own folders, which go where they are empty, as a file in each."""
 
 
@@ -71,24 +76,29 @@ def plan(capture: Capture) -> Deletion:
     kinds: dict[str, list[int]] = {}
     for inside, size in going.items():
         kinds.setdefault(GROUPS.get(inside.partition("/")[0], REST), []).append(size)
-    groups = sorted((FileGroup(label, len(sizes), sum(sizes)) for label, sizes in kinds.items()), key=lambda group: -group.size)
+    groups = sorted((FileGroup(label, len(sizes), sum(sizes)) for label, sizes in kinds.items()),
+                    key=lambda group: -group.size)
     return Deletion(tuple(going), tuple(groups), tuple(staying))
 
 
 def delete(capture: Capture) -> Deletion:
-    """Deletes what is WildCap's, looking at each file once more, and returns what went and what stayed. Killed in the middle, it can be asked for
-    again: the books go last. Raises Problem where a worker is at the capture, or a file cannot be deleted."""
+    """Deletes what is WildCap's, looking at each file once more, and returns what went and what stayed. Killed in the
+    middle, it can be asked for again: the books go last. Raises Problem where a worker is at the capture, or a file
+    cannot be deleted."""
     _require(capture)
     with capture.locked():
         found = plan(capture)
         try:
-            for inside in sorted(found.going, key=lambda inside: PurePosixPath(inside).name == PROVENANCE):  # which says whose the others are
+            # which says whose the others are
+            for inside in sorted(found.going, key=lambda inside: PurePosixPath(inside).name == PROVENANCE):
                 if inside not in ownership.BOOKS:
                     (capture.root / inside).unlink(missing_ok=True)
-            for folder in sorted({folder for inside in (*found.going, *FOLDERS) for folder in _folders(inside)}, reverse=True):
+            for folder in sorted({folder for inside in (*found.going, *FOLDERS) for folder in _folders(inside)},
+                                 reverse=True):
                 with contextlib.suppress(OSError):  # it is not there, or somebody's files are in it
                     (capture.root / folder).rmdir()
-            for name in (capture.job.name, capture.json.name, ownership.RECORD):  # a capture without its record would be taken for one of 0.1.0
+            # a capture without its record would be taken for one of 0.1.0
+            for name in (capture.job.name, capture.json.name, ownership.RECORD):
                 (capture.root / name).unlink(missing_ok=True)
         except OSError as error:
             raise storage_problem(error, capture.root) from error
@@ -114,13 +124,16 @@ def _folders(inside: str) -> list[str]:
 
 def _require(capture: Capture) -> None:
     if not capture.json.is_file() and not (capture.root / ownership.RECORD).is_file():
-        raise Problem(f"There is no capture at {capture.root}.", "Check the name: a capture's folder holds capture.json.")
+        raise Problem(f"There is no capture at {capture.root}.",
+                      "Check the name: a capture's folder holds capture.json.")
 
 
 def lines(found: Deletion, translated=lambda text: text) -> list[str]:
     """The list as sentences; `translated` gives a sentence in the reader's language."""
-    said = [translated("{} files of this face are deleted for good, {} in all:").format(len(found.going), megabytes(found.size))]
-    said += [translated("{}: {} files, {}").format(translated(group.label), group.files, megabytes(group.size)) for group in found.groups]
+    said = [translated("{} files of this face are deleted for good, {} in all:").format(len(found.going),
+                                                                                        megabytes(found.size))]
+    said += [translated("{}: {} files, {}").format(translated(group.label), group.files, megabytes(group.size))
+             for group in found.groups]
     if found.staying:
         more = translated(" and {} more").format(len(found.staying) - SHOWN) if len(found.staying) > SHOWN else ""
         said.append(translated("{} files stay, which WildCap did not write or somebody changed: {}").format(

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The card of each delighter: what it is and whose, where it runs, what leaves the machine and what it costs. Written here and nowhere else.
+"""The card of each delighter: what it is and whose, where it runs, what leaves the machine and what it costs. Written
+here and nowhere else.
 
-Ground floor: standard library only. Shown by the add-on beside the choice, by `python -m core delighters`, and in docs/delighters.md.
+Ground floor: standard library only. Shown by the add-on beside the choice, by `python -m core delighters`, and in
+docs/delighters.md.
 """
 
 from __future__ import annotations
@@ -15,8 +17,8 @@ from .settings import DelightSettings
 
 @dataclass(frozen=True)
 class Card:
-    """Whole sentences for an artist. `settings` are the fields of DelightSettings that are this delighter's own; `needed` says of those that may not
-    stay empty what is missing then."""
+    """Whole sentences for an artist. `settings` are the fields of DelightSettings that are this delighter's own;
+    `needed` says of those that may not stay empty what is missing then."""
 
     title: str
     what: str
@@ -37,8 +39,8 @@ class Card:
 
 
 NOTHING = "Nothing."
-FACTS = (("best_for", "Best for"), ("runs", "Where it runs"), ("leaves", "What leaves your machine"), ("costs", "What it costs"),
-         ("shadows", "Finds shadows"), ("weights", "Weights"), ("licence", "Licence"))
+FACTS = (("best_for", "Best for"), ("runs", "Where it runs"), ("leaves", "What leaves your machine"),
+         ("costs", "What it costs"), ("shadows", "Finds shadows"), ("weights", "Weights"), ("licence", "Licence"))
 """The rows of a card below what the delighter is: field, and how it is called."""
 
 CARDS = {
@@ -49,10 +51,13 @@ CARDS = {
         leaves=NOTHING, costs=NOTHING,
         shadows="Yes: it says of every pixel how much of the main light is blocked there.",
         weights="Come with the extension.",
-        licence="GPL-3.0-or-later, code and weights; trained on synthetic faces of our own, with some painted skins (MIT) and panoramas (CC0).",
+        licence="GPL-3.0-or-later, code and weights; trained on synthetic faces of our own, with some painted skins "
+                "(MIT) and panoramas (CC0).",
     ),
     "shading": Card(
-        "Shading", "Takes the light of the surroundings out of every frame by the head's own shape. No network is involved, so nothing can be invented.",
+        "Shading",
+        "Takes the light of the surroundings out of every frame by the head's own shape. No network is involved, so "
+        "nothing can be invented.",
         best_for="Soft light. Hard shadows are left to the mask and the solver.",
         runs="On your machine, on the processor; seconds per frame.",
         leaves=NOTHING, costs=NOTHING,
@@ -61,11 +66,16 @@ CARDS = {
         licence="GPL-3.0-or-later.",
     ),
     "switchlight": Card(
-        "SwitchLight", f"A paid service of the company {service.COMPANY} that answers each frame with one without light. It is what the paper uses.",
+        "SwitchLight",
+        f"A paid service of the company {service.COMPANY} that answers each frame with one without light. It is what "
+        "the paper uses.",
         best_for="Whoever has an account there, and the leave of the person who was filmed.",
-        runs=f"On the machines of {service.COMPANY}, at {service.BASE.split('/')[2]}; about five seconds per frame, three at a time.",
-        leaves="The chosen frames, which show a person's face, and your key. Only after you agreed to it for this capture.",
-        costs=f"Per frame {service.amount(service.CREDITS_PER_PICTURE)} of your account, or {service.amount(service.CREDITS_PER_PREVIEW)} for a small picture "
+        runs=f"On the machines of {service.COMPANY}, at {service.BASE.split('/')[2]}; about five seconds per frame, "
+             "three at a time.",
+        leaves="The chosen frames, which show a person's face, and your key. Only after you agreed to it for this "
+               "capture.",
+        costs=f"Per frame {service.amount(service.CREDITS_PER_PICTURE)} of your account, or "
+              f"{service.amount(service.CREDITS_PER_PREVIEW)} for a small picture "
               f"of {service.PREVIEW_PX} px at most. An answer that has come is never paid for again.",
         shadows="No.",
         weights="None on your machine.",
@@ -84,7 +94,8 @@ CARDS = {
     ),
     "folder": Card(
         "Folder", "Takes pictures that another program has delit, for instance a relighting network.",
-        best_for="The best model that you have access to. Name the pictures like the frames; neither crop nor turn them.",
+        best_for="The best model that you have access to. Name the pictures like the frames; neither crop nor turn "
+                 "them.",
         runs="Wherever you made the pictures.",
         leaves=NOTHING, costs="Nothing here.",
         shadows="No.",
@@ -94,7 +105,8 @@ CARDS = {
     ),
     "none": Card(
         "None", "Leaves the frames as they were shot.",
-        best_for="A face that was filmed under an overcast sky or in a light tent; and to see what the others are worth.",
+        best_for="A face that was filmed under an overcast sky or in a light tent; and to see what the others are "
+                 "worth.",
         runs="On your machine, at once.",
         leaves=NOTHING, costs=NOTHING,
         shadows="No.",

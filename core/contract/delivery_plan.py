@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What one delivery comes to: the settings with the preset's own choices filled in, its folder, and how that is put in place as a whole.
+"""What one delivery comes to: the settings with the preset's own choices filled in, its folder, and how that is put in
+place as a whole.
 
-Ground floor: standard library only. The worker makes the maps in a folder beside the target, Blender adds the mesh, and then the folder gets its name.
+Ground floor: standard library only. The worker makes the maps in a folder beside the target, Blender adds the mesh, and
+then the folder gets its name.
 """
 
 from __future__ import annotations
@@ -31,8 +33,9 @@ MADE_BY = "WildCap for Blender"
 
 @dataclass(frozen=True)
 class DeliveryPlan:
-    """`name` begins every file's name; `pictures` is 'png8', 'png16' or 'exr'; `colour` 'srgb' or 'linear'; `normals` 'opengl' or 'directx'; `unit` 'm'
-    or 'cm'; `target` is the folder, `staged` what it is until it is whole; `replace`: files of an older delivery that were changed since are given up."""
+    """`name` begins every file's name; `pictures` is 'png8', 'png16' or 'exr'; `colour` 'srgb' or 'linear'; `normals`
+    'opengl' or 'directx'; `unit` 'm' or 'cm'; `target` is the folder, `staged` what it is until it is whole; `replace`:
+    files of an older delivery that were changed since are given up."""
 
     name: str
     what: str
@@ -69,7 +72,8 @@ def plan(capture: Capture, settings: DeliverSettings) -> DeliveryPlan:
     pictures = preset.pictures if settings.pictures == "preset" else settings.pictures
     if pictures not in format.pictures:
         if settings.pictures != "preset":
-            raise Problem(f"{format.title} cannot hold {PICTURES[pictures]} pictures.", "Choose PNG, or another format.")
+            raise Problem(f"{format.title} cannot hold {PICTURES[pictures]} pictures.",
+                          "Choose PNG, or another format.")
         pictures = "png16"
     colour = ("linear" if pictures == "exr" else "srgb") if settings.colour == "preset" else settings.colour
     if colour == "linear" and format.pictures == ("png8", "png16"):
@@ -77,26 +81,31 @@ def plan(capture: Capture, settings: DeliverSettings) -> DeliveryPlan:
     if colour == "srgb" and pictures == "exr":
         raise Problem("EXR pictures hold linear light.", "Choose Linear, or PNG for sRGB.")
     if colour == "linear" and pictures == "png8":
-        raise Problem("8 bits are too few for linear colours: dark skin would show steps.", "Choose PNG with 16 bit, EXR, or sRGB.")
+        raise Problem("8 bits are too few for linear colours: dark skin would show steps.",
+                      "Choose PNG with 16 bit, EXR, or sRGB.")
     name = safe_name(capture.root.stem)
     base = Path(settings.folder).expanduser() if settings.folder else capture.exports
     target = base / f"{name}_{settings.what}_{settings.preset}_{format_name}"
     numbered = preset.numbered if settings.udim == "preset" else settings.udim == "numbered"
-    return DeliveryPlan(name, settings.what, preset, format, pictures, colour, format.normals or preset.normals, format.unit or preset.unit, numbered,
+    return DeliveryPlan(name, settings.what, preset, format, pictures, colour, format.normals or preset.normals,
+                        format.unit or preset.unit, numbered,
                         target, target.with_name(f".{target.name}.staged"), settings.replace)
 
 
 def safe_name(text: str) -> str:
-    """Letters, digits, hyphens and underscores, which every program takes in a file's name; accents are dropped. 'head' where nothing is left."""
+    """Letters, digits, hyphens and underscores, which every program takes in a file's name; accents are dropped. 'head'
+    where nothing is left."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
     return re.sub(r"[^A-Za-z0-9_-]+", "_", plain).strip("_") or "head"
 
 
 def needs(capture: Capture, what: str) -> Path:
     """The mesh that is delivered. Raises Problem where the capture does not have it."""
-    mesh = {"head": capture.head, "own_mesh": capture.delivery / "own_head.obj", "scan": capture.delivery / "scan.obj"}[what]
+    mesh = {"head": capture.head, "own_mesh": capture.delivery / "own_head.obj",
+            "scan": capture.delivery / "scan.obj"}[what]
     if not mesh.is_file():
-        remedy = {"head": "Click Reconstruct first.", "own_mesh": "Choose your mesh under Reconstruction, Head Mesh, and run the stages to the end.",
+        remedy = {"head": "Click Reconstruct first.",
+                  "own_mesh": "Choose your mesh under Reconstruction, Head Mesh, and run the stages to the end.",
                   "scan": "Run the stage Delivery with its scan switched on."}[what]
         words = {"head": "head", "own_mesh": "fitted mesh of yours", "scan": "scan with textures"}[what]
         raise Problem(f"This capture has no {words} to deliver.", remedy)
@@ -104,8 +113,8 @@ def needs(capture: Capture, what: str) -> Path:
 
 
 def put_in_place(plan: DeliveryPlan) -> None:
-    """The staged folder gets its name; an older delivery there goes only then, but for files that others put there: those stay. Raises Problem where that
-    cannot be, and then everything is as it was."""
+    """The staged folder gets its name; an older delivery there goes only then, but for files that others put there:
+    those stay. Raises Problem where that cannot be, and then everything is as it was."""
     old = plan.target.with_name(f".{plan.target.name}.old")
     try:
         _recover(plan.target, old)
@@ -130,26 +139,32 @@ def discard(plan: DeliveryPlan) -> None:
 
 
 def check_target(plan: DeliveryPlan) -> None:
-    """Raises Problem for a folder that no delivery has made, for files of an older delivery that somebody changed since, unless the plan replaces those,
-    and for files of others that are in the way."""
+    """Raises Problem for a folder that no delivery has made, for files of an older delivery that somebody changed
+    since, unless the plan replaces those, and for files of others that are in the way."""
     target = plan.target
     if not target.exists() or target.is_dir() and not any(target.iterdir()):
         return
     delivered = read_delivered(target)
     if delivered is None:
-        raise Problem(f"{target} holds files that no delivery has put there.", "Move them away, or choose another folder to deliver to.")
-    changed = [name for name, digest in delivered.items() if (target / name).is_file() and not is_as_delivered(target / name, digest)]
+        raise Problem(f"{target} holds files that no delivery has put there.",
+                      "Move them away, or choose another folder to deliver to.")
+    changed = [name for name, digest in delivered.items() if (target / name).is_file()
+               and not is_as_delivered(target / name, digest)]
     if changed and not plan.replace:
         raise Problem(f"{_listed(changed)} in {target} changed since the last delivery, which would be replaced.",
-                      "Move what you want to keep to another folder, or deliver again with Replace Changed Files (--replace) to give it up.")
-    new = {path.relative_to(plan.staged).as_posix() for path in plan.staged.rglob("*") if path.is_file()} if plan.staged.is_dir() else set()
+                      "Move what you want to keep to another folder, or deliver again with Replace Changed Files "
+                      "(--replace) to give it up.")
+    new = ({path.relative_to(plan.staged).as_posix() for path in plan.staged.rglob("*") if path.is_file()}
+           if plan.staged.is_dir() else set())
     blocked = sorted(name for name in new - delivered.keys() if (target / name).exists())
     if blocked:
-        raise Problem(f"{_listed(blocked)} in {target} is in the way: no delivery has put it there.", "Move it to another folder, or deliver to another one.")
+        raise Problem(f"{_listed(blocked)} in {target} is in the way: no delivery has put it there.",
+                      "Move it to another folder, or deliver to another one.")
 
 
 def _recover(target: Path, old: Path) -> None:
-    """Ends what was begun when `old`, an older delivery, was put aside: what a delivery wrote goes, what others put there moves back to where it was."""
+    """Ends what was begun when `old`, an older delivery, was put aside: what a delivery wrote goes, what others put
+    there moves back to where it was."""
     if not old.exists():
         return
     if not target.exists():
@@ -164,7 +179,9 @@ def _recover(target: Path, old: Path) -> None:
             file.unlink()
             continue
         place = target / name  # taken where somebody put another of that name into the new one since
-        free = next(free for free in (place, *(place.with_stem(f"{place.stem}_{number}") for number in range(2, 10_000))) if not os.path.lexists(free))
+        free = next(free
+                    for free in (place, *(place.with_stem(f"{place.stem}_{number}") for number in range(2, 10_000)))
+                    if not os.path.lexists(free))
         free.parent.mkdir(parents=True, exist_ok=True)
         os.replace(file, free)
     (old / PROVENANCE).unlink(missing_ok=True)  # last: it says which files are whose

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""eyes.json: the eyeballs of a face that was filmed with open eyes, and maps/irises.json: their colours. Absent where the eyes were closed.
+"""eyes.json: the eyeballs of a face that was filmed with open eyes, and maps/irises.json: their colours. Absent where
+the eyes were closed.
 
 Ground floor: standard library only.
 """
@@ -22,8 +23,9 @@ Colour = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Eyeball:
-    """centre in the world and radius, in metres; gaze: where it looks, a unit vector; openness of its lids, 1 as far as MakeHuman opens them; iris_radius in
-    metres, 0 where no frame showed it; views: how many frames told of it (0: placed by the other eye, or by the head)."""
+    """centre in the world and radius, in metres; gaze: where it looks, a unit vector; openness of its lids, 1 as far as
+    MakeHuman opens them; iris_radius in metres, 0 where no frame showed it; views: how many frames told of it (0:
+    placed by the other eye, or by the head)."""
 
     centre: tuple[float, float, float]
     radius: float
@@ -52,7 +54,8 @@ def write_irises(path: Path, left: Colour, right: Colour) -> None:
 
 
 def read_irises(capture: Capture) -> tuple[Colour, Colour] | None:
-    """Linear albedo of the left and the right iris; None where it was not measured. Raises Problem for a damaged file."""
+    """Linear albedo of the left and the right iris; None where it was not measured. Raises Problem for a damaged
+    file."""
     if not capture.irises.is_file():
         return None
     try:
@@ -66,8 +69,10 @@ def read_irises(capture: Capture) -> tuple[Colour, Colour] | None:
 
 
 def _eyeball(told: dict) -> Eyeball:
-    eye = Eyeball(_vector(told["centre"]), told["radius"], _vector(told["gaze"]), told["openness"], told["iris_radius"], told["views"])
-    if not all(is_number(value, 0) for value in (eye.openness, eye.iris_radius, eye.views)) or not is_number(eye.radius, 1e-4):
+    eye = Eyeball(_vector(told["centre"]), told["radius"], _vector(told["gaze"]), told["openness"], told["iris_radius"],
+                  told["views"])
+    if not all(is_number(value, 0)
+               for value in (eye.openness, eye.iris_radius, eye.views)) or not is_number(eye.radius, 1e-4):
         raise ValueError("an eye has no size")
     if abs(math.hypot(*eye.gaze) - 1) > 1e-3:
         raise ValueError("an eye looks nowhere")

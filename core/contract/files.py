@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that are whole or not there: everything is written under a temporary name, and gets its own when it is complete.
+"""Files that are whole or not there: everything is written under a temporary name, and gets its own when it is
+complete.
 
-In a capture nothing of the user's is deleted or overwritten on the way (ownership.py), and a worker that was replaced writes nothing (lease.py). Standard
-library only.
+In a capture nothing of the user's is deleted or overwritten on the way (ownership.py), and a worker that was replaced
+writes nothing (lease.py). Standard library only.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from .hashes import read_hash
 from .lease import check_lease
 from .messages import Problem
 
-_AWAY_NAMES = ("ESTALE", "ENOTCONN", "ETIMEDOUT", "EHOSTDOWN", "EHOSTUNREACH", "ENETDOWN", "ENETUNREACH", "ENODEV", "ENXIO", "EREMOTEIO")
+_AWAY_NAMES = ("ESTALE", "ENOTCONN", "ETIMEDOUT", "EHOSTDOWN", "EHOSTUNREACH", "ENETDOWN", "ENETUNREACH", "ENODEV",
+               "ENXIO", "EREMOTEIO")
 AWAY = {getattr(errno, name) for name in _AWAY_NAMES if hasattr(errno, name)}
 """Errors of a file server or a disk that has gone."""
 _UMASK = os.umask(0o022)
@@ -34,8 +36,8 @@ MODE = 0o666 & ~_UMASK
 def replacing(path: Path):
     """A temporary path of the same suffix in the same folder; renamed to `path` on success, removed on failure.
 
-    In a capture, a file at `path` that is not as WildCap wrote it is kept aside (ownership.py), and nothing is written by a worker that was replaced
-    (lease.py). Disk-full and read-only errors become a Problem.
+    In a capture, a file at `path` that is not as WildCap wrote it is kept aside (ownership.py), and nothing is written
+    by a worker that was replaced (lease.py). Disk-full and read-only errors become a Problem.
     """
     path = Path(path)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
@@ -57,8 +59,8 @@ def replacing(path: Path):
 
 @contextlib.contextmanager
 def replacing_folder(path: Path):
-    """As `replacing`, for a folder whose files belong together; the old folder goes only when the new one is complete. In a capture, those of the old
-    one's files that others put there stay where they are."""
+    """As `replacing`, for a folder whose files belong together; the old folder goes only when the new one is complete.
+    In a capture, those of the old one's files that others put there stay where they are."""
     path = Path(path)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     root = ownership.root_of(path)
@@ -89,7 +91,8 @@ def place_file(temporary: Path, path: Path) -> None:
 
 
 def place_folder(temporary: Path, path: Path) -> None:
-    """Gives a complete folder its name. In a capture, files that others put into the one before stay, and those of ours that were changed are kept aside."""
+    """Gives a complete folder its name. In a capture, files that others put into the one before stay, and those of ours
+    that were changed are kept aside."""
     root, old = ownership.root_of(path), path.with_name(f".{path.name}.old")
     written = [file for file in temporary.rglob("*") if file.is_file()]
     for file in written:
@@ -101,7 +104,9 @@ def place_folder(temporary: Path, path: Path) -> None:
         if old.exists():  # of a process that was killed between the two renames
             ownership.take_back(root, old)
         ownership.note_temporary(root, old)
-        ownership.note_written(root, {ownership.path_inside(root, path / file.relative_to(temporary)): read_hash(file) for file in written})
+        ownership.note_written(root,
+                               {ownership.path_inside(root, path / file.relative_to(temporary)): read_hash(file)
+                                for file in written})
         check_lease(root)
     if path.exists():
         os.replace(path, old)
@@ -133,11 +138,13 @@ def storage_problem(error: OSError, path: Path) -> Problem:
         return Problem(f"The disk is full: {path} could not be written.",
                        "Free some space (a capture needs about 1 GB) and run again; finished stages are kept.")
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
-        return Problem(f"{path} cannot be written: the folder is read-only.", "Choose a folder you may write to, or change its permissions.")
+        return Problem(f"{path} cannot be written: the folder is read-only.",
+                       "Choose a folder you may write to, or change its permissions.")
     if error.errno in AWAY or error.errno == errno.ENOENT and not Path(path.anchor).exists():
         return Problem(f"The disk or file server that {path} lies on does not answer ({error.strerror or error}).",
                        "See that it is connected, then run again: what was finished is kept.")
-    return Problem(f"{path} could not be written ({error.strerror or error}).", "Check the disk and the folder, then run again.")
+    return Problem(f"{path} could not be written ({error.strerror or error}).",
+                   "Check the disk and the folder, then run again.")
 
 
 def final_name(path: Path) -> Path:

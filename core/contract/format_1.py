@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Captures of WildCap 0.1.0: capture.json of format 1 kept, per finished stage, one hash of its inputs, settings, code and data together.
+"""Captures of WildCap 0.1.0: capture.json of format 1 kept, per finished stage, one hash of its inputs, settings, code
+and data together.
 
-With the code and data of 0.1.0, whose hashes format_1.json holds, that hash can be made again, and so says whether inputs and settings are still the same.
-Standard library only.
+With the code and data of 0.1.0, whose hashes format_1.json holds, that hash can be made again, and so says whether
+inputs and settings are still the same. Standard library only.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from .stages import Stage
 
 INDIFFERENT = ("checkpoint_every", "low_memory")
 """Settings that no result depended on."""
-PATHS = {"delight": "folder", "cameras": "import_from", "registration": "template", "shadow_mask": "softened", "solve": "prior"}
+PATHS = {"delight": "folder", "cameras": "import_from", "registration": "template", "shadow_mask": "softened",
+         "solve": "prior"}
 """Settings that name something outside of the capture, by stage."""
 
 STAMP = "format_1_stamp"
@@ -37,8 +39,10 @@ def matches(root: Path, record: dict, stage: Stage, settings: Settings) -> bool:
     """Whether the inputs and settings of a stage that 0.1.0 finished are what they were then."""
     finished, made = record["stages"][stage.name], _code_and_data()[stage.name]
     chosen = asdict(getattr(settings, stage.name))
-    parts: list = [{name: chosen.get(name, value) for name, value in finished.get("settings", {}).items() if name not in INDIFFERENT},
-                   {name: getattr(settings, "compute_device" if name == "device" else name) for name in made["shared"]}, made["code"]]
+    parts: list = [{name: chosen.get(name, value) for name, value in finished.get("settings", {}).items()
+                    if name not in INDIFFERENT},
+                   {name: getattr(settings, "compute_device" if name == "device" else name) for name in made["shared"]},
+                   made["code"]]
     if stage.name == "frames":
         parts.append(record.get(STAMP, record.get("source_stamp", [])))
     named = chosen[PATHS[stage.name]] if stage.name in PATHS else ""
@@ -48,10 +52,12 @@ def matches(root: Path, record: dict, stage: Stage, settings: Settings) -> bool:
             parts += [[name, hash_tree(root / name)] for name in ("own_head.obj", "own_head.json")]
     parts += [[name, hash_artefact(root, record, name)] for name in made["inputs"]]
     parts += made["data"]
-    return finished.get("key") == hashlib.blake2b(json.dumps(parts, sort_keys=True).encode(), digest_size=16).hexdigest()
+    return finished.get("key") == hashlib.blake2b(json.dumps(parts, sort_keys=True).encode(),
+                                                  digest_size=16).hexdigest()
 
 
 @cache
 def _code_and_data() -> dict:
-    """Stage -> {"code": hash of its room, "shared": shared settings, "inputs": files of the capture, "data": hashes of the shipped files}, all of 0.1.0."""
+    """Stage -> {"code": hash of its room, "shared": shared settings, "inputs": files of the capture, "data": hashes of
+    the shipped files}, all of 0.1.0."""
     return json.loads(Path(__file__).with_suffix(".json").read_text(encoding="utf-8"))

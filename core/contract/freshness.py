@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether a finished stage is still what its inputs, its settings and its code would give.
 
-When a stage begins, `describe_conditions` says what its result will depend on; capture.json keeps that, and `judge` compares it with what is there now.
-What differs is told apart: inputs and settings are the artist's doing, and such a stage is out of date; code that has changed is ours, and a stage that
-older code made stays as it is until the artist has it run again. Standard library only.
+When a stage begins, `describe_conditions` says what its result will depend on; capture.json keeps that, and `judge`
+compares it with what is there now. What differs is told apart: inputs and settings are the artist's doing, and such a
+stage is out of date; code that has changed is ours, and a stage that older code made stays as it is until the artist
+has it run again. Standard library only.
 """
 
 from __future__ import annotations
@@ -25,14 +26,15 @@ from .together import hash_told
 
 TO_DO, DONE, STALE, OLDER = "to do", "done", "stale", "older"
 FINISHED = (DONE, OLDER)
-"""States of a stage whose outputs are what its inputs and settings ask for: painted on, delivered and rendered alike."""
+"""States of a stage whose outputs are what its inputs and settings ask for: painted on, delivered and rendered
+alike."""
 SOURCE = "the video or photographs"
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """`state`: 'to do', 'done', 'stale' (an input or a setting changed) or 'older' (neither did, but the code); `changed` names the inputs and settings that
-    did; `version` is that of the WildCap that made the outputs."""
+    """`state`: 'to do', 'done', 'stale' (an input or a setting changed) or 'older' (neither did, but the code);
+    `changed` names the inputs and settings that did; `version` is that of the WildCap that made the outputs."""
 
     state: str
     changed: tuple[str, ...] = ()
@@ -46,7 +48,8 @@ class Verdict:
 
 
 def describe_conditions(root: Path, record: dict, stage: Stage, settings: Settings) -> dict:
-    """All that the result of a stage in the capture folder `root` depends on beside its settings, as capture.json's entry of the stage keeps it."""
+    """All that the result of a stage in the capture folder `root` depends on beside its settings, as capture.json's
+    entry of the stage keeps it."""
     return {"code": code_key(stage.module), "inputs": _hash_inputs(root, record, stage, settings)}
 
 
@@ -57,19 +60,25 @@ def judge(root: Path, record: dict, stage: Stage, settings: Settings) -> Verdict
         return Verdict(TO_DO)
     version = str(finished.get("version", ""))
     if "inputs" not in finished:  # by WildCap 0.1.0, which kept one hash of everything
-        same = format_1.matches(root, record, stage, settings) and (bool(stage.reads) or not _other_source(record.get("source_stamp", []), root, record))
+        same = format_1.matches(root, record, stage,
+                                settings) and (bool(stage.reads)
+                                               or not _other_source(record.get("source_stamp", []), root, record))
         return Verdict(OLDER, version=version) if same else Verdict(STALE, ("an input or a setting",), version)
-    changed = [*_changed_inputs(finished["inputs"], root, record, stage, settings), *_changed_settings(finished, stage, settings)]
+    changed = [*_changed_inputs(finished["inputs"], root, record, stage, settings),
+               *_changed_settings(finished, stage, settings)]
     if changed:
         return Verdict(STALE, tuple(changed), version)
     return Verdict(DONE if finished["code"] == code_key(stage.module) else OLDER, version=version)
 
 
 def _hash_inputs(root: Path, record: dict, stage: Stage, settings: Settings) -> dict:
-    """Content hash by name: of the capture's files that the stage reads, of what its settings name elsewhere, and of the source for the first stage."""
-    names = (*stage.reads, *stage.optional_reads, *(("own_head.obj", "own_head.json") if stage.name == "solve" and settings.solve.prior else ()))
+    """Content hash by name: of the capture's files that the stage reads, of what its settings name elsewhere, and of
+    the source for the first stage."""
+    names = (*stage.reads, *stage.optional_reads,
+             *(("own_head.obj", "own_head.json") if stage.name == "solve" and settings.solve.prior else ()))
     found = {name: _digest(hash_artefact(root, record, name)) for name in names}
-    found |= {f"{stage.name}.{name}": _digest(_hash_place(name, path)) for name, path in result_paths(getattr(settings, stage.name)).items()}
+    found |= {f"{stage.name}.{name}": _digest(_hash_place(name, path))
+              for name, path in result_paths(getattr(settings, stage.name)).items()}
     if not stage.reads:
         found[SOURCE] = record.get("source_stamp", [])
     return found
@@ -93,8 +102,10 @@ def source_of(root: Path, record: dict) -> Path | None:
 
 def _changed_inputs(recorded: dict, root: Path, record: dict, stage: Stage, settings: Settings) -> list[str]:
     present = _hash_inputs(root, record, stage, settings)
-    named = {name for name in {*present, *recorded} if name.startswith(f"{stage.name}.")}  # by settings, outside of the capture
-    gone = {f"{stage.name}.{name}" for name, path in result_paths(getattr(settings, stage.name)).items() if not Path(path).exists()}
+    # by settings, outside of the capture
+    named = {name for name in {*present, *recorded} if name.startswith(f"{stage.name}.")}
+    gone = {f"{stage.name}.{name}" for name, path in result_paths(getattr(settings, stage.name)).items()
+            if not Path(path).exists()}
     changed = [name for name in present.keys() & recorded.keys() - gone - {SOURCE} if present[name] != recorded[name]]
     changed += [name for name in named if name not in present or name not in recorded]
     if SOURCE in present and _other_source(recorded.get(SOURCE, []), root, record):
@@ -103,14 +114,20 @@ def _changed_inputs(recorded: dict, root: Path, record: dict, stage: Stage, sett
 
 
 def _changed_settings(finished: dict, stage: Stage, settings: Settings) -> list[str]:
-    """A setting that the record does not know had its default; one that names a path is judged by what the path holds."""
-    chosen, then = getattr(settings, stage.name), {**asdict(type(getattr(settings, stage.name))()), **finished["settings"]}
+    """A setting that the record does not know had its default; one that names a path is judged by what the path
+    holds."""
+    chosen, then = getattr(settings, stage.name), {**asdict(type(getattr(settings, stage.name))()),
+                                                   **finished["settings"]}
     paths = {f.name for f in fields(chosen) if "path" in f.metadata}
-    changed = [f"{stage.name}.{name}" for name, value in result_settings(chosen).items() if name not in paths and then[name] != value]
-    any_device = {"device"} if settings.device == "auto" else set()  # what another one has made, here or on another machine, is as good
-    return changed + [name for name in stage.shared if name not in any_device and finished[name] != getattr(settings, name)]
+    changed = [f"{stage.name}.{name}" for name, value in result_settings(chosen).items() if name not in paths
+               and then[name] != value]
+    # what another one has made, here or on another machine, is as good
+    any_device = {"device"} if settings.device == "auto" else set()
+    return changed + [name for name in stage.shared if name not in any_device
+                      and finished[name] != getattr(settings, name)]
 
 
 def _digest(tree: str | dict) -> str:
     """One hash for a folder's many; '' stays what it is: nothing there."""
-    return hashlib.blake2b(json.dumps(tree, sort_keys=True).encode(), digest_size=16).hexdigest() if isinstance(tree, dict) else tree
+    return (hashlib.blake2b(json.dumps(tree, sort_keys=True).encode(), digest_size=16).hexdigest()
+            if isinstance(tree, dict) else tree)

@@ -28,7 +28,8 @@ def hash_file(path: Path) -> str:
 
 
 def read_hash(path: Path) -> str:
-    """As `hash_file`, but always read: where being wrong would cost somebody a file. Two files within one tick of the disk's clock have the same time."""
+    """As `hash_file`, but always read: where being wrong would cost somebody a file. Two files within one tick of the
+    disk's clock have the same time."""
     with open(require_regular(path), "rb") as file:
         return _hash_whole(file, 0)
 
@@ -41,40 +42,48 @@ def hash_bytes(content: bytes) -> str:
 
 
 def sample_file(path: Path) -> str:
-    """As `hash_file`, but a file of more than WHOLE_BYTES is known by its size and BLOCKS blocks of it: a film, or another program's network."""
+    """As `hash_file`, but a file of more than WHOLE_BYTES is known by its size and BLOCKS blocks of it: a film, or
+    another program's network."""
     return _remember(path, _hash_sampled)
 
 
 def hash_tree(path: Path, hash_one: Callable[[Path], str] = hash_file) -> str | dict:
     """The content hash of a file, {relative name: hash} of a folder, or '' for what is not there."""
     if path.is_dir():
-        return {p.relative_to(path).as_posix(): hash_one(p) for p in sorted(path.rglob("*")) if p.is_file() and not p.name.startswith(".")}
+        return {p.relative_to(path).as_posix(): hash_one(p) for p in sorted(path.rglob("*")) if p.is_file()
+                and not p.name.startswith(".")}
     return hash_one(path) if path.is_file() else ""
 
 
 def hash_source(source: Path | None) -> list:
-    """[name, size, content hash by `sample_file`] of each file of a source, which is a video or a folder of photographs; [] where it is gone."""
-    inside = sorted(source.iterdir()) if source is not None and source.is_dir() else [source] if source is not None else []
+    """[name, size, content hash by `sample_file`] of each file of a source, which is a video or a folder of
+    photographs; [] where it is gone."""
+    inside = (sorted(source.iterdir()) if source is not None and source.is_dir() else [source] if source is not None
+              else [])
     files = [p for p in inside if p.is_file() and not p.name.startswith(".")]
     return [[p.name, p.stat().st_size, sample_file(p)] for p in files]
 
 
 def same_source(recorded: list, present: list) -> bool:
-    """Whether two answers of `hash_source` mean the same pictures. A video may be renamed; the names of photographs count, for they tell their order.
+    """Whether two answers of `hash_source` mean the same pictures. A video may be renamed; the names of photographs
+    count, for they tell their order.
 
     Captures of WildCap 0.1.0 recorded a time in place of the hash: of those, size and name must do.
     """
     def told(stamp: list) -> list:
-        return [[name if len(stamp) > 1 or not hashed else "", size, digest if hashed else ""] for name, size, digest in stamp if not name.startswith(".")]
+        return [[name if len(stamp) > 1 or not hashed else "", size, digest if hashed else ""]
+                for name, size, digest in stamp if not name.startswith(".")]
 
     hashed = all(isinstance(digest, str) for _, _, digest in (*recorded, *present))
     return told(recorded) == told(present)
 
 
 def tell_known(root: Path) -> list:
-    """What this process knows of the files below a folder: [[kind, path in the folder, size, time in nanoseconds, hash]], for `take_known` of another one."""
+    """What this process knows of the files below a folder: [[kind, path in the folder, size, time in nanoseconds,
+    hash]], for `take_known` of another one."""
     inside = str(root) + os.sep
-    return [[kind, path.removeprefix(inside), size, when, digest] for (kind, path, size, when), digest in list(_hashes.items()) if path.startswith(inside)]
+    return [[kind, path.removeprefix(inside), size, when, digest]
+            for (kind, path, size, when), digest in list(_hashes.items()) if path.startswith(inside)]
 
 
 def take_known(root: Path, known: list) -> None:

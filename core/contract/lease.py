@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lock of a capture: a lease, which its holder refreshes and which another may take once it has seen no refresh for a whole term.
+"""The lock of a capture: a lease, which its holder refreshes and which another may take once it has seen no refresh for
+a whole term.
 
-The file `lock` is made with O_EXCL, which every file system has; hard links some have not. It names the process that holds it and a token of its own, and
-its time of change is the refresh: who waits only looks whether that changes, by a clock of their own, for clocks of two machines differ. A holder that was
-asleep and has been replaced finds another token in the file, and every write into the capture asks for that first. Standard library only.
+The file `lock` is made with O_EXCL, which every file system has; hard links some have not. It names the process that
+holds it and a token of its own, and its time of change is the refresh: who waits only looks whether that changes, by a
+clock of their own, for clocks of two machines differ. A holder that was asleep and has been replaced finds another
+token in the file, and every write into the capture asks for that first. Standard library only.
 """
 
 from __future__ import annotations
@@ -24,8 +26,9 @@ from .processes import identify_process, is_at_work, is_gone
 from .regular_files import require_regular
 
 TERM_S = 30.0
-"""How long a lease lasts without a refresh. A refresh that is held up for longer costs its holder the lease, and nobody a file; a shorter term would make
-that more frequent, a longer one has an artist wait longer for a machine that has gone."""
+"""How long a lease lasts without a refresh. A refresh that is held up for longer costs its holder the lease, and nobody
+a file; a shorter term would make that more frequent, a longer one has an artist wait longer for a machine that has
+gone."""
 REFRESHES = 5
 """How often it is refreshed in one term."""
 LOOK_S = 0.1
@@ -47,15 +50,18 @@ class Lease:
 
 
 def check_lease(root: Path) -> None:
-    """Raises Problem where this process had the capture and another one took it over while this one was asleep: it may write nothing more."""
+    """Raises Problem where this process had the capture and another one took it over while this one was asleep: it may
+    write nothing more."""
     lease = _held.get(_key(root))
     if lease is not None and not lease.holds():
-        raise Problem("Another worker has taken this capture over while this one was asleep; nothing more was written here.",
+        raise Problem("Another worker has taken this capture over while this one was asleep; nothing more was written "
+                      "here.",
                       "Look at what the other one does, and run again when it has ended: finished stages are kept.")
 
 
 def holder(path: Path) -> dict | None:
-    """Who holds the lease in the file `path`, as far as can be told at once: None where nobody does, or a process that has ended."""
+    """Who holds the lease in the file `path`, as far as can be told at once: None where nobody does, or a process that
+    has ended."""
     _refuse_stranger(path)
     found = _read(path)
     return None if found is None or found and is_gone(found) else found
@@ -64,13 +70,16 @@ def holder(path: Path) -> dict | None:
 def refuse(found: dict, path: Path, what: str = "capture") -> Problem:
     """The Problem of a capture, or a batch, that is worked on."""
     if not found:
-        return Problem(f"Another worker is just beginning to work on this {what}.", f"Wait a moment and try again; if nobody works on it, delete {path}.")
-    return Problem(f"Another worker (process {found['pid']} on {str(found['host']).partition('/')[0]}, since {found['since']}) is working on this {what}.",
+        return Problem(f"Another worker is just beginning to work on this {what}.",
+                       f"Wait a moment and try again; if nobody works on it, delete {path}.")
+    return Problem(f"Another worker (process {found['pid']} on {str(found['host']).partition('/')[0]}, since "
+                   f"{found['since']}) is working on this {what}.",
                    f"Wait for it or cancel it there; if it is gone, delete {path}.")
 
 
 def _refuse_stranger(path: Path) -> None:
-    """Raises Problem for a link, a folder or a pipe under the lock's name, which no worker has put there and none can give back."""
+    """Raises Problem for a link, a folder or a pipe under the lock's name, which no worker has put there and none can
+    give back."""
     if path.is_symlink() or path.exists() and not path.is_file():
         raise Problem(f"{path} is in the way: it is no lock of WildCap's.", "Move it away, or delete it.")
 
@@ -79,8 +88,8 @@ def _refuse_stranger(path: Path) -> None:
 def hold(root: Path, tell: Callable[[str], None] = lambda text: None, what: str = "capture") -> Iterator[Lease]:
     """Holds the lease of a capture's folder, or a batch's, which must be there. Raises Problem naming who works there.
 
-    A process of this machine that is at work is refused at once, and one that has ended is replaced at once. For one that was stopped, or that lives on
-    another machine, a term is waited for a refresh; `tell` hears of that.
+    A process of this machine that is at work is refused at once, and one that has ended is replaced at once. For one
+    that was stopped, or that lives on another machine, a term is waited for a refresh; `tell` hears of that.
     """
     lease = Lease(root / "lock", secrets.token_hex(8))
     while not _make(lease):
@@ -103,7 +112,8 @@ def hold(root: Path, tell: Callable[[str], None] = lambda text: None, what: str 
 
 
 def _make(lease: Lease) -> bool:
-    """Makes the file, in one step with its content but for the moment in between, in which it is empty and counts as being made."""
+    """Makes the file, in one step with its content but for the moment in between, in which it is empty and counts as
+    being made."""
     content = {**identify_process(), "since": time.strftime("%Y-%m-%dT%H:%M:%S"), "token": lease.token}
     try:
         descriptor = os.open(lease.path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
@@ -115,8 +125,8 @@ def _make(lease: Lease) -> bool:
 
 
 def _wait_out(path: Path, tell: Callable[[str], None], what: str) -> tuple[dict, tuple | None] | None:
-    """What the lease says that can be taken over, and its stamp: its holder has ended, or a term went by without a refresh. None where it was given back.
-    Raises Problem when it is held."""
+    """What the lease says that can be taken over, and its stamp: its holder has ended, or a term went by without a
+    refresh. None where it was given back. Raises Problem when it is held."""
     _refuse_stranger(path)
     first, began, told = _stamp(path), time.monotonic(), False
     while True:
@@ -135,7 +145,8 @@ def _wait_out(path: Path, tell: Callable[[str], None], what: str) -> tuple[dict,
 
 
 def _take_over(lease: Lease, expired: dict, stamp: tuple | None) -> None:
-    """Removes the lease that said `expired`, unless somebody was faster. Only one at a time may: the file beside it keeps the others out."""
+    """Removes the lease that said `expired`, unless somebody was faster. Only one at a time may: the file beside it
+    keeps the others out."""
     path = lease.path
     succession = Lease(path.with_name(path.name + SUCCESSION), lease.token)
     if not _make(succession):
@@ -146,7 +157,8 @@ def _take_over(lease: Lease, expired: dict, stamp: tuple | None) -> None:
             aside = path.with_name(f"{path.name}.{lease.token}")
             with contextlib.suppress(FileNotFoundError):
                 os.rename(path, aside)
-                if _read(aside) != expired and not path.exists():  # the old holder awoke, gave it back, and somebody else has it since
+                # the old holder awoke, gave it back, and somebody else has it since
+                if _read(aside) != expired and not path.exists():
                     os.rename(aside, path)
                 aside.unlink(missing_ok=True)
     finally:
@@ -154,7 +166,8 @@ def _take_over(lease: Lease, expired: dict, stamp: tuple | None) -> None:
 
 
 def _clear(succession: Path) -> None:
-    """Waits a moment for whoever is taking the lease over; removes what one that was killed in the middle of it has left."""
+    """Waits a moment for whoever is taking the lease over; removes what one that was killed in the middle of it has
+    left."""
     found, stamp, began = _read(succession), _stamp(succession), time.monotonic()
     while _stamp(succession) == stamp and stamp is not None:
         if found and is_gone(found) or time.monotonic() - began > TERM_S:

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether only the part of the maps that a mask edit touched can be solved again: when all but the masks is as it was at the last solve.
+"""Whether only the part of the maps that a mask edit touched can be solved again: when all but the masks is as it was
+at the last solve.
 
-Ground floor: standard library only. What the last solve found stands in maps/solved.safetensors, with the conditions it was found under.
+Ground floor: standard library only. What the last solve found stands in maps/solved.safetensors, with the conditions it
+was found under.
 """
 
 from __future__ import annotations
@@ -38,9 +40,11 @@ def conditions(capture: Capture, settings: Settings) -> dict[str, str]:
     """All that a solve depends on beside its masks: name -> hash."""
     stage, record = stages.by_name("solve"), capture.read()
     chosen = [result_settings(settings.solve), settings.seed, settings.compute_device, settings.delight.delighter]
-    files = {name: hash_artefact(capture.root, record, name) for name in (*stage.reads, *stage.optional_reads) if "mask" not in name}
+    files = {name: hash_artefact(capture.root, record, name) for name in (*stage.reads, *stage.optional_reads)
+             if "mask" not in name}
     found = {**files, "the solver's settings": chosen, "the solver's code": code_key(stage.module)}
-    return {name: hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=8).hexdigest() for name, value in found.items()}
+    return {name: hashlib.blake2b(json.dumps(value, sort_keys=True).encode(), digest_size=8).hexdigest()
+            for name, value in found.items()}
 
 
 def _stored(path: Path) -> dict | None:

@@ -19,15 +19,16 @@ KEPT = 10
 
 
 def keep(capture: Capture, mask: Path, content: bytes | None = None) -> Path | None:
-    """Copies `mask` (shadow_mask.png or protect_mask.png), or another `content` of that file, to mask_history/NAME_DATE_TIME.png and drops all but the
-    last ten of that name.
+    """Copies `mask` (shadow_mask.png or protect_mask.png), or another `content` of that file, to
+    mask_history/NAME_DATE_TIME.png and drops all but the last ten of that name.
 
     Returns the copy, or None when there is no mask yet. Raises Problem when the folder cannot be written.
     """
     if content is None and not mask.is_file():
         return None
     now = time.time_ns() // 1_000_000
-    while (copy := _place(capture, mask, now)).exists():  # a fast disk takes several within a millisecond, and none may be lost
+    # a fast disk takes several within a millisecond, and none may be lost
+    while (copy := _place(capture, mask, now)).exists():
         now += 1
     with replacing(copy) as temporary:
         shutil.copyfile(mask, temporary) if content is None else temporary.write_bytes(content)
@@ -39,4 +40,7 @@ def keep(capture: Capture, mask: Path, content: bytes | None = None) -> Path | N
 
 def _place(capture: Capture, mask: Path, milliseconds: int) -> Path:
     seconds, rest = divmod(milliseconds, 1000)
-    return capture.mask_history / f"{mask.stem}_{time.strftime('%Y%m%d_%H%M%S', time.localtime(seconds))}_{rest:03d}{mask.suffix}"
+    return (
+        capture.mask_history
+        / f"{mask.stem}_{time.strftime('%Y%m%d_%H%M%S', time.localtime(seconds))}_{rest:03d}{mask.suffix}"
+    )

@@ -11,7 +11,8 @@ import json
 from collections.abc import Callable, Collection
 from dataclasses import asdict, dataclass
 
-NO_MEMORY = ("out of memory", "not enough memory", "can't allocate memory", "cannot allocate memory", "insufficient memory", "bad_alloc", "unable to allocate")
+NO_MEMORY = ("out of memory", "not enough memory", "can't allocate memory", "cannot allocate memory",
+             "insufficient memory", "bad_alloc", "unable to allocate")
 
 
 class Problem(Exception):
@@ -120,8 +121,8 @@ class Reporter:
     (several times a second) can be stopped at any report without code of its own.
     """
 
-    def __init__(self, stage: str, emit: Callable[[Message], None] = lambda message: None, cancelled: Callable[[], bool] = lambda: False,
-                 clock: Callable[[], float] | None = None):
+    def __init__(self, stage: str, emit: Callable[[Message], None] = lambda message: None,
+                 cancelled: Callable[[], bool] = lambda: False, clock: Callable[[], float] | None = None):
         import time
 
         self.stage = stage
@@ -138,8 +139,8 @@ class Reporter:
             raise CancelledError(self.stage)
 
     def progress(self, done: float, of: float, text: str = "") -> None:
-        """`done` of `of` equal units are finished. The ETA is what is left at the pace since the first finished unit was reported: what comes before
-        it (reading, or going on from a checkpoint) says nothing about the pace."""
+        """`done` of `of` equal units are finished. The ETA is what is left at the pace since the first finished unit
+        was reported: what comes before it (reading, or going on from a checkpoint) says nothing about the pace."""
         self.check()
         now = self._clock()
         if self._first is None and done > 0:
@@ -158,11 +159,13 @@ class Reporter:
         self._emit(Preview(self.stage, path))
 
     def figure(self, name: str, value) -> None:
-        """A quality figure (JSON value) for capture.json and the report; a name of lower_case words with its unit last."""
+        """A quality figure (JSON value) for capture.json and the report; a name of lower_case words with its unit
+        last."""
         self.figures[name] = value
 
     def finding(self, problem: str, remedy: str, frames: Collection[str] = ()) -> None:
-        """What is wrong with this capture though it can be used, how to shoot it better (both whole sentences), and the frames it is seen in.
+        """What is wrong with this capture though it can be used, how to shoot it better (both whole sentences), and the
+        frames it is seen in.
 
         Kept in capture.json, listed at the top of the report, and logged.
         """

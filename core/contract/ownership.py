@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whose a file in a capture is. WildCap deletes and replaces what it wrote, as it wrote it, and nothing else.
 
-The capture's written.jsonl says what that is: one line for each file, with its content's hash, added before the file gets its name. So what a killed stage
-left is known to be ours, and a file that somebody put there or changed is known not to be. Standard library only.
+The capture's written.jsonl says what that is: one line for each file, with its content's hash, added before the file
+gets its name. So what a killed stage left is known to be ours, and a file that somebody put there or changed is known
+not to be. Standard library only.
 """
 
 from __future__ import annotations
@@ -33,11 +34,15 @@ LONG_BYTES = 1 << 18
 DIGIT = "[0-9]"
 FIVE = 5 * DIGIT
 FIRST_FORMAT = (
-    "frames/frames.json", f"frames/{FIVE}.jpg", *(f"cameras/{name}.bin" for name in ("cameras", "images", "points3D", "rigs", "frames")), "scan.ply",
-    "head.obj", "own_head.obj", "own_head.json", "landmarks.json", "landmarks_artist.json", f"delit/{FIVE}.png", f"delit/shadow/{FIVE}.png",
-    "texture*.exr", "texture*.png", "shadow_mask*.png", "protect_mask.png", f"mask_history/*_mask_{8 * DIGIT}_{6 * DIGIT}_{3 * DIGIT}.png",
+    "frames/frames.json", f"frames/{FIVE}.jpg",
+    *(f"cameras/{name}.bin" for name in ("cameras", "images", "points3D", "rigs", "frames")), "scan.ply",
+    "head.obj", "own_head.obj", "own_head.json", "landmarks.json", "landmarks_artist.json", f"delit/{FIVE}.png",
+    f"delit/shadow/{FIVE}.png",
+    "texture*.exr", "texture*.png", "shadow_mask*.png", "protect_mask.png",
+    f"mask_history/*_mask_{8 * DIGIT}_{6 * DIGIT}_{3 * DIGIT}.png",
     "maps/*.png", "maps/*.exr", "maps/solved.safetensors", "maps_4k/*.png", "maps_4k/*.exr", "delivery/delivery.json",
-    *(f"delivery/own_{name}*.png" for name in ("diffuse_albedo", "normal", "specular_albedo", "confidence")), "delivery/own_head.obj", "delivery/scan.obj",
+    *(f"delivery/own_{name}*.png" for name in ("diffuse_albedo", "normal", "specular_albedo", "confidence")),
+    "delivery/own_head.obj", "delivery/scan.obj",
     *(f"delivery/scan_{name}.png" for name in ("lit", "albedo", "albedo_known")), "delivery/displacement.exr",
     "comparison/*.png", "comparison/*.jpg", "preview/*.png", "report/*_*.jpg", "report.html", "consent.json",
     "checkpoints/solve.safetensors", "switchlight/*.png",
@@ -48,7 +53,8 @@ LEFT_BEFORE = re.compile(r"\.(?P<stem>.+)\.\d+\.tmp(?P<suffix>\..+)?|\.(?P<old>.
 
 
 def root_of(path: Path) -> Path | None:
-    """The capture that a path lies in, if it lies in one; not what lies in a temporary folder of one, which is ours as a whole."""
+    """The capture that a path lies in, if it lies in one; not what lies in a temporary folder of one, which is ours as
+    a whole."""
     parents = Path(os.path.abspath(path)).parents
     for folder in parents:
         if (folder / "capture.json").is_file():
@@ -80,18 +86,19 @@ def is_ours(root: Path, path: Path) -> bool:
 
 
 def keep_aside(root: Path, path: Path, was: str = "") -> Path:
-    """Moves a file out of the way of one of ours, to kept/ under its own name (or `was`, a path in the capture), or with a number where that is taken.
-    Returns its new place."""
+    """Moves a file out of the way of one of ours, to kept/ under its own name (or `was`, a path in the capture), or
+    with a number where that is taken. Returns its new place."""
     place = root / KEPT / (was or path_inside(root, path))
     place.parent.mkdir(parents=True, exist_ok=True)
-    free = next(free for free in (place, *(place.with_stem(f"{place.stem}_{number}") for number in range(2, 10_000))) if not free.exists())
+    free = next(free for free in (place, *(place.with_stem(f"{place.stem}_{number}") for number in range(2, 10_000)))
+                if not free.exists())
     os.replace(path, free)
     return free
 
 
 def clear_replaced(root: Path, old: Path, path: Path) -> None:
-    """Empties `old`, the folder that was at `path` before a new one took its name. What is ours goes, what somebody changed is kept aside, and a file that
-    others put there moves back to where it was."""
+    """Empties `old`, the folder that was at `path` before a new one took its name. What is ours goes, what somebody
+    changed is kept aside, and a file that others put there moves back to where it was."""
     for file in files_in(old):
         was = path / file.relative_to(old)
         inside = path_inside(root, was)
@@ -107,16 +114,19 @@ def clear_replaced(root: Path, old: Path, path: Path) -> None:
 
 def remove_empty_folders(folder: Path) -> None:
     """A folder and those in it, as far as nothing else is left in them."""
-    for each in (*sorted((path for path in folder.rglob("*") if path.is_dir() and not path.is_symlink()), reverse=True), folder):
+    for each in (*sorted((path for path in folder.rglob("*") if path.is_dir() and not path.is_symlink()), reverse=True),
+                 folder):
         with contextlib.suppress(OSError):  # it is not empty
             each.rmdir()
 
 
 def clear_leftovers(root: Path) -> None:
-    """Removes the temporary files of processes that have ended, and takes back a folder that one of them had just put aside."""
+    """Removes the temporary files of processes that have ended, and takes back a folder that one of them had just put
+    aside."""
     for left, by in read_record(root)[1].items():
         path = root / left
-        if is_gone(by) and path.exists() and path.parent.resolve().is_relative_to(root.resolve()):  # no link leads out of the capture
+        # no link leads out of the capture
+        if is_gone(by) and path.exists() and path.parent.resolve().is_relative_to(root.resolve()):
             if path.suffix == ".old":
                 take_back(root, path)
             elif path.is_dir():
@@ -127,13 +137,15 @@ def clear_leftovers(root: Path) -> None:
 
 
 def _shorten(root: Path) -> None:
-    """Rewrites a record that has grown long without what no file answers to any more. Only under the lease; a line that another process of the user adds in
-    the same moment is lost, and its file then counts as changed, which loses nothing."""
+    """Rewrites a record that has grown long without what no file answers to any more. Only under the lease; a line that
+    another process of the user adds in the same moment is lost, and its file then counts as changed, which loses
+    nothing."""
     record = root / RECORD
     if not record.is_file() or record.stat().st_size < LONG_BYTES:
         return
     written, temporary = read_record(root)
-    lines = [{"path": path, "hash": read_hash(root / path)} for path in written if (root / path).is_file() and is_ours(root, root / path)]
+    lines = [{"path": path, "hash": read_hash(root / path)} for path in written if (root / path).is_file()
+             and is_ours(root, root / path)]
     lines += [{"temporary": path, "by": by} for path, by in temporary.items() if (root / path).exists()]
     short = record.with_name(f".{RECORD}.{os.getpid()}.tmp")
     note_temporary(root, short)
@@ -151,7 +163,8 @@ def take_back(root: Path, old: Path) -> None:
 
 
 def read_record(root: Path) -> tuple[dict[str, set[str]], dict[str, dict]]:
-    """What was written: path -> content hashes; and what was temporary: path -> process. A capture of 0.1.0 gets its record here."""
+    """What was written: path -> content hashes; and what was temporary: path -> process. A capture of 0.1.0 gets its
+    record here."""
     record = root / RECORD
     _begin_record(root)
     try:
@@ -177,26 +190,34 @@ def _parse(record: Path, size: int, changed: int) -> tuple[dict[str, set[str]], 
 
 
 def _is_temporary_name(path: str) -> bool:
-    """Whether it can be a temporary file or folder of ours: in the capture, and hidden. A record may come from a stranger with the capture it lies in."""
+    """Whether it can be a temporary file or folder of ours: in the capture, and hidden. A record may come from a
+    stranger with the capture it lies in."""
     parts = PurePosixPath(path).parts
-    return bool(parts) and not {"..", "/"} & set(parts) and "\\" not in path and ":" not in path and parts[-1].startswith(".")
+    return bool(parts) and not {"..",
+                                "/"} & set(parts) and "\\" not in path and ":" not in path and parts[-1].startswith(".")
 
 
 def adopt_first_format(root: Path) -> None:
     """Makes the record of a capture of 0.1.0: what its finished stages wrote, and what killed ones left."""
-    note_written(root, {path_inside(root, path): read_hash(path) for pattern in FIRST_FORMAT for path in sorted(root.glob(pattern)) if path.is_file()})
+    note_written(root,
+                 {path_inside(root, path): read_hash(path) for pattern in FIRST_FORMAT
+                  for path in sorted(root.glob(pattern)) if path.is_file()})
     gone = {**identify_process(), "pid": -1}
-    _append(root, [{"temporary": inside, "by": gone} for path in root.glob("**/.*") if _was_left_before(inside := path_inside(root, path))])
+    _append(root,
+            [{"temporary": inside, "by": gone} for path in root.glob("**/.*")
+             if _was_left_before(inside := path_inside(root, path))])
 
 
 def _was_left_before(inside: str) -> bool:
-    """Whether a path is a temporary one of 0.1.0's, for a file or a folder that it wrote. Others have files of such names, too."""
+    """Whether a path is a temporary one of 0.1.0's, for a file or a folder that it wrote. Others have files of such
+    names, too."""
     path = PurePosixPath(inside)
     found = LEFT_BEFORE.fullmatch(path.name)
     if not found:
         return False
     final = str(path.with_name(found["old"] or found["stem"] + (found["suffix"] or "")))
-    return any(fnmatch.fnmatchcase(final, each) or PurePosixPath(final) in PurePosixPath(each).parents for each in FIRST_FORMAT)
+    return any(fnmatch.fnmatchcase(final, each) or PurePosixPath(final) in PurePosixPath(each).parents
+               for each in FIRST_FORMAT)
 
 
 def _begin_record(root: Path) -> None:
@@ -207,7 +228,8 @@ def _begin_record(root: Path) -> None:
 
 
 def _is_of_first_format(root: Path) -> bool:
-    """Whether 0.1.0 wrote it, and finished a stage. A newer one whose record was lost gets none: what is in it may be anybody's, and is kept aside."""
+    """Whether 0.1.0 wrote it, and finished a stage. A newer one whose record was lost gets none: what is in it may be
+    anybody's, and is kept aside."""
     with contextlib.suppress(OSError, ValueError, AttributeError, TypeError):
         record = json.loads((root / "capture.json").read_text(encoding="utf-8"))
         return bool(record.get("stages")) and record.get("format", 0) < 2
@@ -234,15 +256,17 @@ def path_inside(root: Path, path: Path) -> str:
 
 
 def _is_as_written(root: Path, file: Path, inside: str) -> bool:
-    """Whether a file, which is or was at `inside`, holds what we wrote there. A link is nobody's but whoever made it."""
+    """Whether a file, which is or was at `inside`, holds what we wrote there. A link is nobody's but whoever made
+    it."""
     return not file.is_symlink() and read_hash(file) in read_record(root)[0].get(inside, ())
 
 
 def is_leftover(root: Path, path: Path) -> bool:
-    """Whether a file is temporary, or lies in a temporary folder, and its process has ended. Not in a folder that was put aside, which may hold files of
-    others."""
+    """Whether a file is temporary, or lies in a temporary folder, and its process has ended. Not in a folder that was
+    put aside, which may hold files of others."""
     inside = PurePosixPath(path_inside(root, path))
-    owners = [by for left, by in read_record(root)[1].items() if inside.is_relative_to(left) and not left.endswith(".old")]
+    owners = [by for left, by in read_record(root)[1].items() if inside.is_relative_to(left)
+              and not left.endswith(".old")]
     return bool(owners) and not path.is_symlink() and all(is_gone(by) for by in owners)
 
 

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which process works somewhere, told so that nothing else is ever taken for it: its host since that was started, its number, and when it began.
+"""Which process works somewhere, told so that nothing else is ever taken for it: its host since that was started, its
+number, and when it began.
 
-Standard library only. A process number alone is given to another process sooner or later, and after a restart of the machine at once.
+Standard library only. A process number alone is given to another process sooner or later, and after a restart of the
+machine at once.
 """
 
 from __future__ import annotations
@@ -17,8 +19,8 @@ from pathlib import Path
 
 @cache
 def name_host() -> str:
-    """NAME/RUN/SPACE: this machine's name and, where it tells them, the identity of its present run and of the space in which processes have numbers
-    (containers of one machine have their own)."""
+    """NAME/RUN/SPACE: this machine's name and, where it tells them, the identity of its present run and of the space in
+    which processes have numbers (containers of one machine have their own)."""
     run = space = ""
     with contextlib.suppress(OSError):
         run = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()[:8]
@@ -33,7 +35,8 @@ def identify_process() -> dict:
 
 
 def is_gone(process: dict) -> bool:
-    """Whether a process is certainly not running any more. One of another machine or container may be: only those beside us can be asked after."""
+    """Whether a process is certainly not running any more. One of another machine or container may be: only those
+    beside us can be asked after."""
     name, run, space = _place(process)
     _, our_run, our_space = _place({"host": name_host()})
     if name != socket.gethostname():
@@ -78,9 +81,11 @@ def _ask_beginning(pid: int) -> str:
     if os.name == "nt":
         return _windows_beginning(pid)
     with contextlib.suppress(OSError, IndexError):
-        return Path(f"/proc/{pid}/stat").read_bytes().rpartition(b") ")[2].split()[19].decode()  # Linux: clock ticks since the machine was started
+        # Linux: clock ticks since the machine was started
+        return Path(f"/proc/{pid}/stat").read_bytes().rpartition(b") ")[2].split()[19].decode()
     with contextlib.suppress(OSError, subprocess.SubprocessError):
-        return subprocess.run(["ps", "-o", "lstart=", "-p", str(pid)], capture_output=True, text=True, timeout=5).stdout.strip()
+        return subprocess.run(["ps", "-o", "lstart=", "-p", str(pid)], capture_output=True, text=True,
+                              timeout=5).stdout.strip()
     return ""
 
 
@@ -107,6 +112,7 @@ def _runs(pid: int) -> bool:
             os.kill(pid, 0)
     except (ProcessLookupError, OverflowError, TypeError, ValueError):
         return False
-    with contextlib.suppress(OSError, IndexError):  # Linux: a process that has ended, but that nobody has asked after, as in a container without an init
+    # Linux: a process that has ended, but that nobody has asked after, as in a container without an init
+    with contextlib.suppress(OSError, IndexError):
         return Path(f"/proc/{pid}/stat").read_bytes().rpartition(b") ")[2][:1] != b"Z"
     return True

@@ -18,8 +18,8 @@ VERTICES = "head_vertices.obj"
 
 
 def copy_to(folder: Path) -> Capture:
-    """A writable copy of the sample head in `folder`; one that is there already is kept with the artist's work in it. Raises Problem where it is missing from
-    the installation, or cannot be written."""
+    """A writable copy of the sample head in `folder`; one that is there already is kept with the artist's work in it.
+    Raises Problem where it is missing from the installation, or cannot be written."""
     if not (SHIPPED / VERTICES).is_file():
         raise Problem("The sample head is missing from this installation.", "Install the extension's zip again.")
     capture = Capture(folder / "sample_head.wildcap")
@@ -30,7 +30,9 @@ def copy_to(folder: Path) -> Capture:
                 shutil.copytree(SHIPPED, temporary, dirs_exist_ok=True, copy_function=shutil.copyfile)
                 moved = (temporary / VERTICES).read_text(encoding="ascii")
                 built_in = (SHIPPED.parent / "head.obj").read_text(encoding="ascii").splitlines(keepends=True)
-                (temporary / capture.head.name).write_text(moved + "".join(line for line in built_in if not line.startswith("v ")), encoding="ascii")
+                (temporary / capture.head.name).write_text(moved
+                                                           + "".join(line for line in built_in
+                                                                     if not line.startswith("v ")), encoding="ascii")
                 (temporary / VERTICES).unlink()
                 write_json(temporary / capture.json.name, capture.read())
                 ownership.claim_all(temporary)

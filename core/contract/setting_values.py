@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a setting is: a field with metadata, by which its value is checked, made from text and said in words.
 
-Ground floor: standard library only. A `name` is how people call a setting: STAGE.NAME, or the name alone for what all stages share.
+Ground floor: standard library only. A `name` is how people call a setting: STAGE.NAME, or the name alone for what all
+stages share.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ PATHS = {"file": "a file", "folder": "a folder", "file_or_folder": "a file or a 
 def setting(default, **metadata):
     """A field whose type is that of its default (bool, int, float or str).
 
-    A number has `min` and `max`, and may have a `unit`. A text has `choices`, or is a `path` ("file", "folder" or "file_or_folder"), or has a `form` (how it
-    is written, in a few words). `label` is its name in Blender where the one made of the field's does not do, `flag` its short option of `core run` (of
-    `core deliver` for what delivers). `per_face` is True for what a quality leaves as it is, as it leaves every path; `affects_result` is False for what
+    A number has `min` and `max`, and may have a `unit`. A text has `choices`, or is a `path` ("file", "folder" or
+    "file_or_folder"), or has a `form` (how it is written, in a few words). `label` is its name in Blender where the one
+    made of the field's does not do, `flag` its short option of `core run` (of `core deliver` for what delivers).
+    `per_face` is True for what a quality leaves as it is, as it leaves every path; `affects_result` is False for what
     no result depends on.
     """
     return dataclasses.field(default=default, metadata=metadata)
@@ -33,12 +35,14 @@ def setting(default, **metadata):
 def check_value(name: str, field: dataclasses.Field, value):
     """The value as the setting keeps it: a whole number becomes a float where one is wanted.
 
-    Raises Problem for a wrong type, for what is none of its choices, and for what lies outside of its range (not-a-number does).
+    Raises Problem for a wrong type, for what is none of its choices, and for what lies outside of its range
+    (not-a-number does).
     """
     expected, limits = type(field.default), field.metadata
     whole_for_float = expected is float and type(value) is int
     if type(value) is not expected and not whole_for_float:
-        raise Problem(f"{name} is {value!r}, which is not a {expected.__name__}.", f"{advise_values(field)} Its default is {field.default!r}.")
+        raise Problem(f"{name} is {value!r}, which is not a {expected.__name__}.",
+                      f"{advise_values(field)} Its default is {field.default!r}.")
     if "choices" in limits and value not in limits["choices"]:
         raise Problem(f"{name} is {value!r}.", advise_values(field))
     if "min" in limits and not limits["min"] <= value <= limits["max"]:
@@ -47,7 +51,8 @@ def check_value(name: str, field: dataclasses.Field, value):
 
 
 def value_from_text(name: str, field: dataclasses.Field, text: str, folder: Path | None = None):
-    """The value that a text means, by the type of the field; a path is made absolute from `folder` (None: the working directory). Raises Problem."""
+    """The value that a text means, by the type of the field; a path is made absolute from `folder` (None: the working
+    directory). Raises Problem."""
     kind = type(field.default)
     if "path" in field.metadata:
         return absolute_path(text, folder)
@@ -59,7 +64,8 @@ def value_from_text(name: str, field: dataclasses.Field, text: str, folder: Path
     try:
         value = kind(text)
     except ValueError:
-        raise Problem(f"{name} is {text!r}, which is no {'whole ' if kind is int else ''}number.", advise_values(field)) from None
+        raise Problem(f"{name} is {text!r}, which is no {'whole ' if kind is int else ''}number.",
+                      advise_values(field)) from None
     return check_value(name, field, value)
 
 
@@ -69,7 +75,8 @@ def absolute_path(text: str, folder: Path | None = None) -> str:
 
 
 def describe_values(field: dataclasses.Field) -> str:
-    """What a setting may be, in a few words: its choices, its range with the unit, what it names, or the form of its text."""
+    """What a setting may be, in a few words: its choices, its range with the unit, what it names, or the form of its
+    text."""
     limits = field.metadata
     unit = f" {limits['unit']}" if "unit" in limits else ""
     if "choices" in limits:

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One frozen dataclass per stage. All that is said of a setting is written here and nowhere else: Blender's panels, the command line, what a
-stage's result depends on and what is read as a path follow from it.
+"""One frozen dataclass per stage. All that is said of a setting is written here and nowhere else: Blender's panels, the
+command line, what a stage's result depends on and what is read as a path follow from it.
 
-Ground floor: standard library only. The docstring under a field is its tooltip in Blender and its line in the command line's help.
+Ground floor: standard library only. The docstring under a field is its tooltip in Blender and its line in the command
+line's help.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ class FramesSettings:
     views: int = setting(16, min=3, max=64)
     """Sharp, evenly spread frames chosen for the texture (V in the paper)"""
     mirrored: bool = setting(False, per_face=True)
-    """The pictures are mirrored, as a front camera may save them: flip them back. A head alone cannot show which way round it was"""
+    """The pictures are mirrored, as a front camera may save them: flip them back. A head alone cannot show which way
+    round it was"""
     no_glasses: bool = setting(False, per_face=True)
     """The person wears no glasses, whatever the frames look like: a capture with glasses is refused"""
 
@@ -41,15 +43,18 @@ class CamerasSettings:
     matching: str = setting("auto", choices=("auto", "sequential", "exhaustive"))
     """Which frames are matched with each other; auto: neighbours in a video, all pairs in a few photographs"""
     features: str = setting("auto", choices=("auto", "plain", "skin", "face"))
-    """What the cameras are found by; skin holds on low-contrast faces and costs ten times as much, face uses its landmarks alone; auto tries plain first"""
+    """What the cameras are found by; skin holds on low-contrast faces and costs ten times as much, face uses its
+    landmarks alone; auto tries plain first"""
     import_from: str = setting("", path="file_or_folder", flag="--cameras")
-    """Cameras of another program: COLMAP's folder, Metashape's .xml, RealityScan's .csv, Blender's .json; empty: solve them here"""
+    """Cameras of another program: COLMAP's folder, Metashape's .xml, RealityScan's .csv, Blender's .json; empty: solve
+    them here"""
 
 
 @dataclass(frozen=True)
 class ScanSettings:
     method: str = setting("auto", choices=("auto", "stereo", "splats"))
-    """stereo runs anywhere; splats are Gaussian surfels and need an NVIDIA GPU with gsplat; auto takes splats where they can run"""
+    """stereo runs anywhere; splats are Gaussian surfels and need an NVIDIA GPU with gsplat; auto takes splats where
+    they can run"""
     pairs: int = setting(24, min=2, max=400)
     """Stereo pairs that are matched and fused"""
     voxel_mm: float = setting(1.0, min=0.3, max=5.0, unit="mm")
@@ -61,21 +66,25 @@ class RegistrationSettings:
     iterations: int = setting(30, min=1, max=200)
     """Steps of the non-rigid fit, stiff to soft"""
     template: str = setting("", path="file_or_folder", flag="--template")
-    """A head mesh of your own, fitted beside the built-in one: an OBJ, or a folder with a neutral OBJ and its shapes (as ICT-FaceKit)"""
+    """A head mesh of your own, fitted beside the built-in one: an OBJ, or a folder with a neutral OBJ and its shapes
+    (as ICT-FaceKit)"""
     new_atlas: bool = setting(False, flag="--new-atlas", per_face=True)
     """Make new UVs for your own head mesh where its own are missing or overlap"""
 
 
 @dataclass(frozen=True)
 class DelightSettings:
-    delighter: str = setting("network", choices=("network", "shading", "switchlight", "opendelight", "folder", "none"), flag="--delighter", per_face=True)
+    delighter: str = setting("network", choices=("network", "shading", "switchlight", "opendelight", "folder", "none"),
+                             flag="--delighter", per_face=True)
     """How the light is taken out of the frames before the texture is built"""
-    switchlight_preview: bool = setting(False, label="Small Pictures at Half the Credits", flag="--preview", per_face=True)
+    switchlight_preview: bool = setting(False, label="Small Pictures at Half the Credits", flag="--preview",
+                                        per_face=True)
     """Have SwitchLight answer with pictures of at most 512 px, at half the credits: to see whether it helps"""
     folder: str = setting("", path="folder", flag="--folder")
     """Folder of delit pictures for the folder delighter, matched by name"""
     checkpoint: str = setting("", path="folder", flag="--checkpoint")
-    """OpenDelight's checkpoint as its authors publish it: the folder with base_delight_network.pth and unet_enhancer.pth"""
+    """OpenDelight's checkpoint as its authors publish it: the folder with base_delight_network.pth and
+    unet_enhancer.pth"""
 
 
 @dataclass(frozen=True)
@@ -85,7 +94,8 @@ class TextureSettings:
     perceptual: int = setting(0, min=0, max=2000, label="Perceptual Steps")
     """Steps that sharpen the texture until the head looks like the frames to a network, as the paper does; 0 is off"""
     perceptual_network: str = setting("", path="file_or_folder")
-    """VGG16 file, or folder with it and LPIPS's weights, for these steps; empty takes the small network of an installed package"""
+    """VGG16 file, or folder with it and LPIPS's weights, for these steps; empty takes the small network of an installed
+    package"""
 
 
 @dataclass(frozen=True)
@@ -93,9 +103,11 @@ class ShadowMaskSettings:
     sensitivity: float = setting(0.5, min=0.0, max=1.0)
     """How readily a dark region is taken for a shadow"""
     dilate_px: int = setting(8, min=0, max=64, unit="px")
-    """How far the proposal is grown, at a 1024 px texture; where the texture shows the shadow's edge it is laid on that"""
+    """How far the proposal is grown, at a 1024 px texture; where the texture shows the shadow's edge it is laid on
+    that"""
     softened: str = setting("", path="folder", label="Frames With Softened Shadows", flag="--softened")
-    """Folder of the frames with their shadows softened by any tool, matched by name: what that lightens is proposed. Empty: the delighter tells"""
+    """Folder of the frames with their shadows softened by any tool, matched by name: what that lightens is proposed.
+    Empty: the delighter tells"""
 
 
 @dataclass(frozen=True)
@@ -103,25 +115,31 @@ class SolveSettings:
     size: int = setting(1024, min=128, max=1024, unit="px")
     """Side of the map that is solved"""
     recipe: str = setting("wildcap", choices=("wildcap", "paper", "released"))
-    """wildcap is the default; paper and released follow the paper and its authors' code to the letter, with their own 600 steps, and are many times slower"""
+    """wildcap is the default; paper and released follow the paper and its authors' code to the letter, with their own
+    600 steps, and are many times slower"""
     steps: int = setting(20, min=4, max=600)
     """Sampling steps"""
     guidance: str = setting("dps", choices=("dps", "proximal"))
-    """dps follows the paper through the network's gradient; proximal is a closed form, twice as fast, with smoother normals and specular"""
+    """dps follows the paper through the network's gradient; proximal is a closed form, twice as fast, with smoother
+    normals and specular"""
     grid_cells: int = setting(96, min=1, max=512)
     """Cells per side of the texel grid of lights over the whole map's face crop (96 cells of 8 texels at 1024)"""
     skin_tone: str = setting("auto", form="R,G,B or auto", flag="--skin-tone", per_face=True)
     """Skin tone as sRGB R,G,B in 0..1 (linear mean over facial skin), or auto"""
     white_point: str = setting("auto", form="R,G,B or auto", flag="--white-point", per_face=True)
-    """What a white surface in the face's light is in the frames, linear R,G,B, from a ColorChecker, a grey card or white paper; auto: from the scene"""
+    """What a white surface in the face's light is in the frames, linear R,G,B, from a ColorChecker, a grey card or
+    white paper; auto: from the scene"""
     prior: str = setting("", path="folder", flag="--prior")
-    """The authors' prior: the folder with its config.json and ckpt.pth. It needs ICT-FaceKit fitted as template, in whose UVs it works; empty: ours"""
+    """The authors' prior: the folder with its config.json and ckpt.pth. It needs ICT-FaceKit fitted as template, in
+    whose UVs it works; empty: ours"""
     together: str = setting("", path="folder", label="Together With", flag="--with")
-    """Another capture of the same person in other light, or a folder of several: what they agree on is skin, what differs is light. Empty: alone"""
+    """Another capture of the same person in other light, or a folder of several: what they agree on is skin, what
+    differs is light. Empty: alone"""
     checkpoint_every: int = setting(5, min=1, max=600, affects_result=False)
     """Steps between two checkpoints"""
     low_memory: bool = setting(False, affects_result=False)
-    """Use a third less memory for the same maps, at two thirds more time. Without it this begins where the memory does not suffice"""
+    """Use a third less memory for the same maps, at two thirds more time. Without it this begins where the memory does
+    not suffice"""
 
 
 @dataclass(frozen=True)
@@ -129,13 +147,16 @@ class UpscaleSettings:
     size: int = setting(4096, min=1024, max=8192, unit="px")
     """Side of the delivered maps"""
     method: str = setting("network", choices=("network", "lanczos"))
-    """How albedo, normals and specular become four times as large: by the network, which sharpens, or by Lanczos resampling, which is quick"""
+    """How albedo, normals and specular become four times as large: by the network, which sharpens, or by Lanczos
+    resampling, which is quick"""
     frames_detail: bool = setting(True)
     """Take pores and the edges of moles from the frames, where those show more than the texture can hold"""
     whole_head: bool = setting(True)
-    """Complete neck, ears, scalp and the back of the head from the solved face where no camera saw them; off: the mean face's plain tone"""
+    """Complete neck, ears, scalp and the back of the head from the solved face where no camera saw them; off: the mean
+    face's plain tone"""
     hair: bool = setting(True)
-    """Find brows, lashes and beard: a mask of each, the albedo of the skin below them, and single hairs for Grow Hair"""
+    """Find brows, lashes and beard: a mask of each, the albedo of the skin below them, and single hairs for Grow
+    Hair"""
 
 
 @dataclass(frozen=True)
@@ -177,7 +198,8 @@ class DeliverSettings:
     roughness: int = setting(45, min=0, max=100, unit="percent")
     """Roughness of the cheeks, in the maps and materials that hold it; Blender puts in what the head's material has"""
     replace: bool = setting(False, label="Replace Changed Files", flag="--replace")
-    """Give up what was changed in the files of an older delivery to the same folder; off: such a delivery is refused. Files of others stay in any case"""
+    """Give up what was changed in the files of an older delivery to the same folder; off: such a delivery is refused.
+    Files of others stay in any case"""
     whole: bool = setting(False)
     """Write the mesh as well, without Blender, as OBJ"""
 
@@ -190,7 +212,8 @@ class Settings:
     """The same seed gives the same maps"""
     device: str = setting("auto", choices=("auto", "cpu", "cuda", "mps"), flag="--device")
     """Where the solver computes; auto: where a pass of its network has been shown to run, and faster than on the CPU"""
-    edited_part: bool = setting(False, flag="--edited-part", affects_result=False)  # how a result was reached is no condition of it
+    # how a result was reached is no condition of it
+    edited_part: bool = setting(False, flag="--edited-part", affects_result=False)
     """Solve only what a mask edit touched since the last solve, where that can be done"""
     frames: FramesSettings = field(default_factory=FramesSettings)
     cameras: CamerasSettings = field(default_factory=CamerasSettings)
@@ -206,7 +229,8 @@ class Settings:
 
     @property
     def compute_device(self) -> str:
-        """The device by name. A worker puts the one that it has proven in the place of auto before a stage runs; without a worker that is the CPU."""
+        """The device by name. A worker puts the one that it has proven in the place of auto before a stage runs;
+        without a worker that is the CPU."""
         return "cpu" if self.device == "auto" else self.device
 
 
@@ -236,24 +260,29 @@ def to_json(settings: Settings) -> dict:
 
 @cache
 def known_settings() -> dict[str, Field]:
-    """Every setting there is: STAGE.NAME, or the name alone for the shared ones -> its field. The shared ones come first."""
+    """Every setting there is: STAGE.NAME, or the name alone for the shared ones -> its field. The shared ones come
+    first."""
     shared = {f.name: f for f in fields(Settings) if f.name not in STAGE_KINDS}
     return {**shared, **{f"{stage}.{f.name}": f for stage, kind in STAGE_KINDS.items() for f in fields(kind)}}
 
 
 def result_settings(stage_settings) -> dict:
     """The settings of one stage that its result depends on: name -> value."""
-    return {f.name: getattr(stage_settings, f.name) for f in fields(stage_settings) if f.metadata.get("affects_result", True)}
+    return {f.name: getattr(stage_settings, f.name) for f in fields(stage_settings)
+            if f.metadata.get("affects_result", True)}
 
 
 def result_paths(stage_settings) -> dict[str, str]:
-    """The files and folders whose content the result of one stage depends on: name -> path with ~ expanded, of the settings that are not empty."""
+    """The files and folders whose content the result of one stage depends on: name -> path with ~ expanded, of the
+    settings that are not empty."""
     paths = [f.name for f in fields(stage_settings) if "path" in f.metadata]
-    return {name: os.path.expanduser(value) for name, value in result_settings(stage_settings).items() if name in paths and value}
+    return {name: os.path.expanduser(value) for name, value in result_settings(stage_settings).items() if name in paths
+            and value}
 
 
 def quality_settings(kind: type) -> list[str]:
-    """The names of the settings of one stage's class that a quality sets; it leaves alone what is about the face, and every path."""
+    """The names of the settings of one stage's class that a quality sets; it leaves alone what is about the face, and
+    every path."""
     return [f.name for f in fields(kind) if not f.metadata.get("per_face") and "path" not in f.metadata]
 
 
@@ -273,7 +302,8 @@ def from_json(values: dict, base: Settings | None = None) -> Settings:
         elif not isinstance(value, dict):
             raise Problem(f"The settings of the stage {name} are no object but {value!r:.60}.", WRITTEN)
         else:
-            value = replace(getattr(settings, name), **{k: check_value(f"{name}.{k}", find_setting(f"{name}.{k}"), v) for k, v in value.items()})
+            value = replace(getattr(settings, name),
+                            **{k: check_value(f"{name}.{k}", find_setting(f"{name}.{k}"), v) for k, v in value.items()})
         settings = replace(settings, **{name: value})
     return settings
 
@@ -283,7 +313,8 @@ def find_setting(name: str) -> Field:
     if name not in known_settings():
         near = difflib.get_close_matches(name, [*known_settings(), *STAGE_KINDS], 1, 0.5)
         raise Problem(f"There is no setting named {name!r}.",
-                      f"{f'Did you mean {near[0]}? ' if near else ''}`python -m core settings` lists all of this version; a newer one may have more.")
+                      f"{f'Did you mean {near[0]}? ' if near else ''}`python -m core settings` lists all of this "
+                      "version; a newer one may have more.")
     return known_settings()[name]
 
 
@@ -293,6 +324,7 @@ def tooltips(kind: type) -> dict[str, str]:
     body = ast.parse(inspect.getsource(kind)).body[0].body
     found = {}
     for node, following in zip(body, body[1:], strict=False):
-        if isinstance(node, ast.AnnAssign) and isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant):
+        if isinstance(node, ast.AnnAssign) and isinstance(following,
+                                                          ast.Expr) and isinstance(following.value, ast.Constant):
             found[node.target.id] = following.value.value
     return found

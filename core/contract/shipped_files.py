@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The files that come with WildCap and are no code, networks above all: each is as it was shipped, or it is named.
 
-shipped.json beside this file holds their SHA-256; `python -m core.training.manifest` writes it anew in a checkout after one of them was made again, and a test
-sees that it was. Standard library only.
+shipped.json beside this file holds their SHA-256; `python -m core.training.manifest` writes it anew in a checkout after
+one of them was made again, and a test sees that it was. Standard library only.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ def find_faults(core: Path = CORE) -> list[str]:
 
 
 def require_whole(path: Path) -> None:
-    """Raises Problem where a shipped file is missing or not as it was shipped; files that did not come with WildCap are none of its business."""
+    """Raises Problem where a shipped file is missing or not as it was shipped; files that did not come with WildCap are
+    none of its business."""
     path = Path(path).resolve()
     digest = read_manifest()["core"].get(path.relative_to(CORE).as_posix()) if path.is_relative_to(CORE) else None
     if digest is not None and not path.is_file():

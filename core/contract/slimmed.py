@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was slimmed away of a capture (slimming.py) counts as if it were there, by the hashes that were taken of it. Standard library only.
+"""What was slimmed away of a capture (slimming.py) counts as if it were there, by the hashes that were taken of it.
+Standard library only.
 
-capture.json keeps them in the entry of the stage that made it: {"slimmed": {"frames/": {"00000.jpg": hash, ...}}}. So they go with that entry, also where an
-older version, which does not know of them, has the stage run again.
+capture.json keeps them in the entry of the stage that made it: {"slimmed": {"frames/": {"00000.jpg": hash, ...}}}. So
+they go with that entry, also where an older version, which does not know of them, has the stage run again.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from .stages import STAGES, Stage
 
 
 def hashes_of(record: dict) -> dict[str, str | dict]:
-    """Name in some stage's `writes` -> what `hash_tree` gave for it before it was slimmed away. `record` is capture.json's content."""
+    """Name in some stage's `writes` -> what `hash_tree` gave for it before it was slimmed away. `record` is
+    capture.json's content."""
     return {name: tree for entry in record["stages"].values() for name, tree in entry.get("slimmed", {}).items()}
 
 
@@ -27,12 +29,14 @@ def hash_artefact(root: Path, record: dict, name: str) -> str | dict:
 
 
 def is_back(root: Path, entry: dict) -> bool:
-    """Whether all that was slimmed away of one stage is there, byte for byte. `entry` is the stage's in capture.json."""
+    """Whether all that was slimmed away of one stage is there, byte for byte. `entry` is the stage's in
+    capture.json."""
     return all(hash_tree(root / name) == tree for name, tree in entry["slimmed"].items())
 
 
 def makers(record: dict, steps: Iterable[Stage]) -> list[Stage]:
-    """The stages that must run before `steps` can, for what these read was slimmed away, in the chain's order. What a step itself writes does not count."""
+    """The stages that must run before `steps` can, for what these read was slimmed away, in the chain's order. What a
+    step itself writes does not count."""
     gone, steps = hashes_of(record), tuple(steps)
     wanted = {name for step in steps for name in (*step.reads, *step.optional_reads)}
     found: list[Stage] = []

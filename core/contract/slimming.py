@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A finished face is slimmed: what its video gives again in a minute goes, and counts as if it were there (slimmed.py). Standard library only.
+"""A finished face is slimmed: what its video gives again in a minute goes, and counts as if it were there (slimmed.py).
+Standard library only.
 
-First a list of all that would go, then exactly that; and of it only what WildCap wrote and nobody changed (ownership.py). When a stage has to run that reads
-what went, the worker has it made again first (worker/runner.py).
+First a list of all that would go, then exactly that; and of it only what WildCap wrote and nobody changed
+(ownership.py). When a stage has to run that reads what went, the worker has it made again first (worker/runner.py).
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from .settings import Settings, result_paths
 
 @dataclass(frozen=True)
 class Slimming:
-    """What slimming a capture does: the files that go (path in the capture -> size), the hashes to keep (stage -> {name: tree}), whole sentences on what
-    stays that could have gone, and on what to know of what goes."""
+    """What slimming a capture does: the files that go (path in the capture -> size), the hashes to keep (stage ->
+    {name: tree}), whole sentences on what stays that could have gone, and on what to know of what goes."""
 
     going: dict[str, int]
     hashes: dict[str, dict]
@@ -37,10 +38,11 @@ class Slimming:
 
 
 def plan(capture: Capture, settings: Settings) -> Slimming:
-    """Looks at a capture; `settings` decide which stages count as finished. Raises Problem where it is none, cannot be read, is not finished to its last
-    stage, or has lost the video that all of it was made from."""
+    """Looks at a capture; `settings` decide which stages count as finished. Raises Problem where it is none, cannot be
+    read, is not finished to its last stage, or has lost the video that all of it was made from."""
     if not capture.json.is_file():
-        raise Problem(f"There is no capture at {capture.root}.", "Check the name: a capture's folder holds capture.json.")
+        raise Problem(f"There is no capture at {capture.root}.",
+                      "Check the name: a capture's folder holds capture.json.")
     verdicts = {stage.name: capture.verdict(stage, settings) for stage in stages.STAGES}
     for stage in stages.STAGES:
         verdict = verdicts[stage.name]
@@ -55,7 +57,8 @@ def plan(capture: Capture, settings: Settings) -> Slimming:
         try:
             files = [path for path in ownership.files_in(capture.root / name) if not path.name.startswith(".")]
             theirs = [path for path in files if not ownership.is_ours(capture.root, path)]
-            sizes = {ownership.path_inside(capture.root, path): path.lstat().st_size for path in files if path not in theirs}
+            sizes = {ownership.path_inside(capture.root, path): path.lstat().st_size for path in files
+                     if path not in theirs}
         except OSError as error:
             raise storage_problem(error, capture.root) from error
         gone = name in slimmed.hashes_of(record)
@@ -67,7 +70,8 @@ def plan(capture: Capture, settings: Settings) -> Slimming:
         going |= sizes
         older += [stage.label] if sizes and verdicts[stage.name].state == OLDER else []
     if older:
-        notes.append(f"Made by older code: {', '.join(older)}. Made again by WildCap {__version__} they may differ, and what was made from them is then out "
+        notes.append(f"Made by older code: {', '.join(older)}. Made again by WildCap {__version__} they may differ, "
+                     "and what was made from them is then out "
                      "of date.")
     return Slimming(going, hashes, tuple(notes))
 
@@ -84,8 +88,9 @@ def _obstacle(capture: Capture, stage: stages.Stage, settings: Settings, theirs:
 
 
 def slim(capture: Capture, settings: Settings) -> Slimming:
-    """Slims a capture and returns what went. Killed in the middle it can be asked for again: what goes is on record before the first file does. Raises
-    Problem as `plan` does, and where a worker is at the capture or a file cannot be deleted."""
+    """Slims a capture and returns what went. Killed in the middle it can be asked for again: what goes is on record
+    before the first file does. Raises Problem as `plan` does, and where a worker is at the capture or a file cannot be
+    deleted."""
     plan(capture, settings)  # before the lock makes a capture of what is none
     with capture.locked():
         found = plan(capture, settings)
@@ -107,9 +112,12 @@ def lines(found: Slimming, capture: Capture) -> list[str]:
     kinds: dict[str, list[int]] = {}
     for inside, size in found.going.items():
         kinds.setdefault(GROUPS[inside.partition("/")[0]], []).append(size)
-    said = [f"{label}: {len(sizes)} files, {megabytes(sum(sizes))}" for label, sizes in kinds.items()] or ["Nothing is left that could go."]
+    said = [f"{label}: {len(sizes)} files, {megabytes(sum(sizes))}"
+            for label, sizes in kinds.items()] or ["Nothing is left that could go."]
     if found.going:
-        left = sum(path.lstat().st_size for path in ownership.files_in(capture.root) if ownership.path_inside(capture.root, path) not in found.going)
-        said.append(f"{megabytes(left)} stay: maps, masks, landmarks, head, renders, deliveries and the report among them. What goes is made again from the "
+        left = sum(path.lstat().st_size for path in ownership.files_in(capture.root)
+                   if ownership.path_inside(capture.root, path) not in found.going)
+        said.append(f"{megabytes(left)} stay: maps, masks, landmarks, head, renders, deliveries and the report among "
+                    "them. What goes is made again from the "
                     "video when a stage needs it; keep the video.")
     return [*said, *found.notes]

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is known of the SwitchLight API of Beeble, all of it here: where it is, how it is spoken to, what it charges.
 
-Ground floor: standard library only. From its public documentation (switchlight-api.beeble.ai/docs: quickstart, material acquisition, FAQ), NOT VERIFIED
-AGAINST THE LIVE SERVICE. Calls to `acquire/albedo` answer with a PNG; that its page says so was not seen, only programs that rely on it.
+Ground floor: standard library only. From its public documentation (switchlight-api.beeble.ai/docs: quickstart, material
+acquisition, FAQ), NOT VERIFIED AGAINST THE LIVE SERVICE. Calls to `acquire/albedo` answer with a PNG; that its page
+says so was not seen, only programs that rely on it.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ MOST_AT_ONCE = 3
 KEY_VARIABLE = "WILDCAP_SWITCHLIGHT_KEY"
 BASE_VARIABLE = "WILDCAP_SWITCHLIGHT_URL"
 OFFLINE_VARIABLE = "WILDCAP_OFFLINE"
-"""Environment variables: the key, another server that speaks the same protocol (for tests), and that nothing may be sent."""
+"""Environment variables: the key, another server that speaks the same protocol (for tests), and that nothing may be
+sent."""
 
 
 _kept = ""
@@ -52,11 +54,13 @@ def amount(credits: float) -> str:
 
 
 def base() -> str:
-    """The address that calls go to. Raises Problem where it would carry the key and the pictures unencrypted over a network."""
+    """The address that calls go to. Raises Problem where it would carry the key and the pictures unencrypted over a
+    network."""
     address = os.environ.get(BASE_VARIABLE, "").rstrip("/") or BASE
     parts = urllib.parse.urlsplit(address)
     if parts.scheme != "https" and not (parts.scheme == "http" and local(address)):
-        raise Problem(f"The address in {BASE_VARIABLE} is not a safe one.", "It begins with https://, or with http:// on this very machine.")
+        raise Problem(f"The address in {BASE_VARIABLE} is not a safe one.",
+                      "It begins with https://, or with http:// on this very machine.")
     return address
 
 
@@ -70,17 +74,21 @@ def local(address: str) -> bool:
 
 
 def keep_key() -> None:
-    """Takes the key out of this process's environment, which all that it starts would inherit, and keeps it for `key`."""
+    """Takes the key out of this process's environment, which all that it starts would inherit, and keeps it for
+    `key`."""
     global _kept
     _kept = os.environ.pop(KEY_VARIABLE, "")
 
 
 def key() -> str:
-    """The artist's key. Raises Problem where there is none, or it cannot be one; its text is never part of a message."""
+    """The artist's key. Raises Problem where there is none, or it cannot be one; its text is never part of a
+    message."""
     found = (os.environ.get(KEY_VARIABLE) or _kept).strip()
     if not found:
         raise Problem("SwitchLight needs a key, and there is none.",
-                      f"Get one at {WEBSITE} and put it into the extension's preferences, or into the environment variable {KEY_VARIABLE}.")
+                      f"Get one at {WEBSITE} and put it into the extension's preferences, or into the environment "
+                      f"variable {KEY_VARIABLE}.")
     if not (found.isascii() and found.isprintable()) or " " in found:
-        raise Problem("The SwitchLight key is not one: it holds blanks or other characters that no key has.", f"Copy it again from {WEBSITE}.")
+        raise Problem("The SwitchLight key is not one: it holds blanks or other characters that no key has.",
+                      f"Copy it again from {WEBSITE}.")
     return found

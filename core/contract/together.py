@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Captures of one person in several lights, which a solve takes together (`core run --with`), and what of them it depends on."""
+"""Captures of one person in several lights, which a solve takes together (`core run --with`), and what of them it
+depends on."""
 
 from __future__ import annotations
 
@@ -16,18 +17,21 @@ TOLD = (*stages.by_name("solve").reads, "shadow_mask.png", "protect_mask.png", s
 
 
 def captures_in(named: str) -> list[Path]:
-    """The captures that a setting names: a capture's folder, or a folder that holds several; none for ''. Raises Problem where there is none."""
+    """The captures that a setting names: a capture's folder, or a folder that holds several; none for ''. Raises
+    Problem where there is none."""
     if not named:
         return []
     folder = Path(named).expanduser()
     found = [folder] if (folder / RECORD).is_file() else sorted(path.parent for path in folder.glob(f"*/{RECORD}"))
     if not found:
-        raise Problem(f"{folder} is no capture, and holds none.", "Name the folder of another capture of the same person, usually NAME.wildcap.")
+        raise Problem(f"{folder} is no capture, and holds none.",
+                      "Name the folder of another capture of the same person, usually NAME.wildcap.")
     return found
 
 
 def hash_told(named: str) -> dict[str, str] | str:
-    """Hash by capture and file of all that a solve reads of the captures that a setting names; of what is no capture, of all there is."""
+    """Hash by capture and file of all that a solve reads of the captures that a setting names; of what is no capture,
+    of all there is."""
     try:
         found = captures_in(named)
     except Problem:

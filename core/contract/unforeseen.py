@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Errors that nobody foresaw: the traceback goes to a log under an id, the user reads what stopped, what is kept and what to do. Standard library only.
+"""Errors that nobody foresaw: the traceback goes to a log under an id, the user reads what stopped, what is kept and
+what to do. Standard library only.
 
 The id is that of the place in the code: the same fault has the same id on every machine.
 """
@@ -20,13 +21,16 @@ recent: deque[str] = deque(maxlen=10)
 """The last such errors of this process, as they went to the log."""
 LOG = "unforeseen.log"
 """In a capture's folder of logs, for those that no stage was stopped by."""
-KEPT = "What was finished is kept. Try again; if it stays, Save Report (in a terminal: core report-problem) makes a file about it that you can send us."
+KEPT = ("What was finished is kept. Try again; if it stays, Save Report (in a terminal: core report-problem) makes a "
+        "file about it that you can send us.")
 
 
 def explain(error: BaseException, stopped: str, log: Path | None = None) -> Problem:
-    """The Problem of an error that stopped something ("the stage solve"), whose traceback is added to `log` where there is one."""
+    """The Problem of an error that stopped something ("the stage solve"), whose traceback is added to `log` where there
+    is one."""
     name = identify(error)
-    text = f"{time.strftime('%Y-%m-%d %H:%M:%S')} {name} stopped {stopped}\n{''.join(traceback.format_exception(error))}"
+    text = (f"{time.strftime('%Y-%m-%d %H:%M:%S')} {name} stopped "
+            f"{stopped}\n{''.join(traceback.format_exception(error))}")
     recent.append(text)
     if log is not None:
         with contextlib.suppress(OSError):  # the disk may be full; that is said elsewhere

@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light knows no hair: below it, and on the eyes, the shading is what the skin around them says, so that none of their colour is taken for light.
+"""Light knows no hair: below it, and on the eyes, the shading is what the skin around them says, so that none of their
+colour is taken for light.
 
-In a single photograph that holds for brows and eyes: what a shadow does that crosses them is lost, and a beard covers too much of a face, so what is light on
-it is left to the network. In a capture the light that was fitted to the bare skin goes on below beard and hair and on the eyes, by the head's own shape; brows,
-which lie where shading changes most, are left to both answers as skin is.
+In a single photograph that holds for brows and eyes: what a shadow does that crosses them is lost, and a beard covers
+too much of a face, so what is light on it is left to the network. In a capture the light that was fitted to the bare
+skin goes on below beard and hair and on the eyes, by the head's own shape; brows, which lie where shading changes most,
+are left to both answers as skin is.
 """
 
 from __future__ import annotations
@@ -24,13 +26,14 @@ REACH = 1  # cells around them: the network's answer is as coarse as that
 
 
 def without_features(shading: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Log-shading [h, h, C] with that of cells whose `share` [h, h] of FEATURES is SURE, and of those around them, carried over from the skin."""
+    """Log-shading [h, h, C] with that of cells whose `share` [h, h] of FEATURES is SURE, and of those around them,
+    carried over from the skin."""
     return completed(shading, _covered(share)).astype(np.float32)
 
 
 def without_hair(look: ShadingEstimate, fitted: np.ndarray, share: np.ndarray) -> ShadingEstimate:
-    """The look with the fitted log-shading [h, h, 3] below hair, whose `share` of the head is [h, h], at the level at which it meets the skin around; and the
-    shadow that is seen there."""
+    """The look with the fitted log-shading [h, h, 3] below hair, whose `share` of the head is [h, h], at the level at
+    which it meets the skin around; and the shadow that is seen there."""
     here = look.face >= 0
     hairy, bare = _covered(share) & here, here & ~_covered(share)
     if not hairy.any() or not bare.any():
@@ -47,7 +50,8 @@ def _covered(share: np.ndarray) -> np.ndarray:
 
 
 def completed(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
-    """Values [H, W, C] with those where `unknown` bool [H, W] replaced by the smoothest surface that meets the others (a harmonic one)."""
+    """Values [H, W, C] with those where `unknown` bool [H, W] replaced by the smoothest surface that meets the others
+    (a harmonic one)."""
     if not unknown.any() or unknown.all():
         return values
     height, width = unknown.shape

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skin does not change its hue where a shadow falls: what is left of the light's colour in the albedo is found by that, and taken out.
+"""Skin does not change its hue where a shadow falls: what is left of the light's colour in the albedo is found by that,
+and taken out.
 
-Sun and sky differ in colour, and a network learns the difference of usual ones. So the hue of the albedo is regressed on the brightness of the shading
-and on the shadow over all skin of the capture; what the regression explains is light and moves to the shading. Luminance is left alone: beards grow in shade.
+Sun and sky differ in colour, and a network learns the difference of usual ones. So the hue of the albedo is regressed
+on the brightness of the shading and on the shadow over all skin of the capture; what the regression explains is light
+and moves to the shading. Luminance is left alone: beards grow in shade.
 """
 
 from __future__ import annotations
@@ -32,9 +34,12 @@ def without_casts(looks: list[ShadingEstimate], skins: list[np.ndarray]) -> list
     for _ in range(4):
         centre, level = np.average(x, axis=0, weights=trust), np.average(y, axis=0, weights=trust)
         weighted = (x - centre) * trust[:, None]
-        slopes = np.linalg.solve(weighted.T @ (x - centre) + RIDGE * len(x) * np.eye(x.shape[1]), weighted.T @ (y - level))  # [4, 3]
+        # [4, 3]
+        slopes = np.linalg.solve(weighted.T @ (x - centre) + RIDGE * len(x) * np.eye(x.shape[1]),
+                                 weighted.T @ (y - level))
         trust = 1 / (1 + ((y - level - (x - centre) @ slopes) ** 2).sum(1) / USUAL**2)
-    return [replace(look, shading=(look.shading + (f - centre) @ slopes).astype(np.float32)) for look, f in zip(looks, features, strict=True)]
+    return [replace(look, shading=(look.shading + (f - centre) @ slopes).astype(np.float32))
+            for look, f in zip(looks, features, strict=True)]
 
 
 def _features(look: ShadingEstimate, middle: float) -> np.ndarray:

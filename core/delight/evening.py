@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One head has one albedo: what the frames say of it is averaged in the head's UV space, and each frame's shading is moved to agree with the mean.
+"""One head has one albedo: what the frames say of it is averaged in the head's UV space, and each frame's shading is
+moved to agree with the mean.
 
 Only coarsely, as registration is a pixel off at times, and the frames' own shadow edges are to stay where they are.
 """
@@ -25,8 +26,9 @@ LEAST = 0.05  # weight from which a texel is known
 
 @dataclass(frozen=True)
 class ShadingEstimate:
-    """What the network says of one picture. box: left, top and side in pixels of the square it saw; shading [h, h, 3] natural log, shadow [h, h] in
-    [0, 1] and log [h, h, 3], the picture's own at that size; face int [h, h] and bary [h, h, 3]: the head there (-1: none), if it is known."""
+    """What the network says of one picture. box: left, top and side in pixels of the square it saw; shading [h, h, 3]
+    natural log, shadow [h, h] in [0, 1] and log [h, h, 3], the picture's own at that size; face int [h, h] and bary [h,
+    h, 3]: the head there (-1: none), if it is known."""
 
     box: tuple[float, float, float]
     shading: np.ndarray
@@ -51,7 +53,8 @@ def even_out(head: LitHead, views: list[View], looks: list[ShadingEstimate]) -> 
     albedo = np.zeros((UV_SIDE**2, 3), np.float32)
     albedo[texel] = mean
     albedo, known = albedo.reshape(UV_SIDE, UV_SIDE, 3), known.reshape(UV_SIDE, UV_SIDE)
-    return [_agreeing(head, replace(look, shading=look.shading + off), albedo, known) for look, off in zip(looks, level, strict=True)]
+    return [_agreeing(head, replace(look, shading=look.shading + off), albedo, known)
+            for look, off in zip(looks, level, strict=True)]
 
 
 def _opinion(surface: Unfolded, view: View, look: ShadingEstimate) -> tuple[np.ndarray, np.ndarray]:
@@ -62,7 +65,8 @@ def _opinion(surface: Unfolded, view: View, look: ShadingEstimate) -> tuple[np.n
     pixels, _ = view.project(points)
     side = len(look.shading)
     at = (pixels - look.box[:2]) * side / look.box[2]
-    inside = ((at > 1) & (at < side - 1)).all(1) & ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)  # nan is not
+    # nan is not
+    inside = ((at > 1) & (at < side - 1)).all(1) & ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1)
     seen = np.flatnonzero((cosine > 0.2) & inside)
     seen = seen[visible_from(surface.caster, points[seen], normals[seen], view.centre)]
     values, weight = np.zeros((len(points), 3), np.float32), np.zeros(len(points), np.float32)

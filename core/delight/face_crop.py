@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face cut out of a frame, upright and at a fixed size, and put back: FFHQ's alignment by eyes and mouth (Karras et al. 2019).
+"""A face cut out of a frame, upright and at a fixed size, and put back: FFHQ's alignment by eyes and mouth (Karras et
+al. 2019).
 
 Maps [2, 3] go from frame to crop in pixels whose centres lie at +0.5.
 """
@@ -14,7 +15,8 @@ from ..face.faces import Face
 from ..imaging import images
 
 EYES = ((33, 160, 158, 133, 153, 144), (362, 385, 387, 263, 373, 380))
-"""Landmarks round the person's right and left eye: the places of 36 to 47 of the 68 points that FFHQ's alignment is written for."""
+"""Landmarks round the person's right and left eye: the places of 36 to 47 of the 68 points that FFHQ's alignment is
+written for."""
 MOUTH = (61, 291)
 BROWS = (105, 334)
 FOREHEAD = 0.3
@@ -55,17 +57,22 @@ def face_mask(face: Face, to_crop: np.ndarray, size: int, growth: float = 1.0) -
     return mask.astype(np.float32)
 
 
-def put_back(frame: np.ndarray, before: np.ndarray, after: np.ndarray, mask: np.ndarray, to_crop: np.ndarray) -> np.ndarray:
-    """The frame sRGB [H, W, 3] with what was made of its crop, `before` -> `after` sRGB, inside of the mask and feathered; elsewhere it stays.
+def put_back(frame: np.ndarray, before: np.ndarray, after: np.ndarray, mask: np.ndarray,
+             to_crop: np.ndarray) -> np.ndarray:
+    """The frame sRGB [H, W, 3] with what was made of its crop, `before` -> `after` sRGB, inside of the mask and
+    feathered; elsewhere it stays.
 
-    What the way through the crop took of the frame's sharpness is given back, so that a crop that was not changed gives the frame itself.
+    What the way through the crop took of the frame's sharpness is given back, so that a crop that was not changed gives
+    the frame itself.
     """
     height, width = frame.shape[:2]
     inverse = cv2.invertAffineTransform(_from_centres(to_crop))
-    inside = cv2.distanceTransform(np.pad(mask[2:-2, 2:-2], 2).astype(np.uint8), cv2.DIST_L2, 5)  # 0 along the crop's border too
+    # 0 along the crop's border too
+    inside = cv2.distanceTransform(np.pad(mask[2:-2, 2:-2], 2).astype(np.uint8), cv2.DIST_L2, 5)
     alpha, through, made = (cv2.warpAffine(picture.astype(np.float32), inverse, (width, height), flags=cv2.INTER_CUBIC)
                             for picture in (np.clip(inside / FEATHER, 0, 1), before, after))
-    through, made, linear = (np.maximum(images.srgb_to_linear(np.clip(picture, 0, 1)), 1e-4) for picture in (through, made, frame))
+    through, made, linear = (np.maximum(images.srgb_to_linear(np.clip(picture, 0, 1)), 1e-4)
+                             for picture in (through, made, frame))
     sharp = images.linear_to_srgb(made * np.clip(linear / through, 1 / MOST_DETAIL, MOST_DETAIL))
     return (frame + np.clip(alpha, 0, 1)[..., None] * (sharp - frame)).astype(np.float32)
 

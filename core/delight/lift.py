@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Log-shading from a network's coarse map to every pixel, along the picture's own edges.
 
-In each small window the shading is taken for an affine function of the picture's log colour (He, Sun and Tang, Guided Image Filtering, 2013; fast form
-2015): at a shadow's edge it follows the picture, on even skin it is a constant. The guide knows no pores, so none can pass into the shading.
+In each small window the shading is taken for an affine function of the picture's log colour (He, Sun and Tang, Guided
+Image Filtering, 2013; fast form 2015): at a shadow's edge it follows the picture, on even skin it is a constant. The
+guide knows no pores, so none can pass into the shading.
 """
 
 from __future__ import annotations
@@ -13,17 +14,20 @@ import numpy as np
 
 WINDOW = 1  # radius, in cells of the coarse map
 STIFF = 0.02  # natural log units: what varies less in a window is skin and not an edge
-PORE_PX, PORE_LOG = 0.006, 0.25  # of the picture's side, and in log units: what is finer and fainter is left out of the guide
+# of the picture's side, and in log units: what is finer and fainter is left out of the guide
+PORE_PX, PORE_LOG = 0.006, 0.25
 
 
 def lift(shading: np.ndarray, log: np.ndarray) -> np.ndarray:
-    """Coarse log-shading [h, w, C] and the log of the linear picture [H, W, C] that it covers -> log-shading [H, W, C]."""
+    """Coarse log-shading [h, w, C] and the log of the linear picture [H, W, C] that it covers -> log-shading [H, W,
+    C]."""
     guide = without_pores(log)
     height, width = shading.shape[:2]
     small = cv2.resize(guide, (width, height), interpolation=cv2.INTER_AREA).reshape(shading.shape)
     slope, offset = _affine(small, shading)
     size = guide.shape[1::-1]
-    slope, offset = (cv2.resize(grid, size, interpolation=cv2.INTER_LINEAR).reshape(guide.shape) for grid in (slope, offset))
+    slope, offset = (cv2.resize(grid, size, interpolation=cv2.INTER_LINEAR).reshape(guide.shape)
+                     for grid in (slope, offset))
     return slope * guide + offset
 
 
@@ -40,7 +44,8 @@ def without_pores(log: np.ndarray) -> np.ndarray:
 
 
 def _affine(guide: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Per channel the slope and offset [h, w, C] that carry guide to values in each window, averaged over the windows a cell is in."""
+    """Per channel the slope and offset [h, w, C] that carry guide to values in each window, averaged over the windows a
+    cell is in."""
     def mean(x: np.ndarray) -> np.ndarray:
         return cv2.blur(np.ascontiguousarray(x, np.float32), (2 * WINDOW + 1,) * 2).reshape(x.shape)
 

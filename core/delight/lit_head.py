@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The registered head of a capture with the light that was fitted to its skin: what a delighter knows before it looks at single frames."""
+"""The registered head of a capture with the light that was fitted to its skin: what a delighter knows before it looks
+at single frames."""
 
 from __future__ import annotations
 
@@ -23,8 +24,9 @@ FIT_POINTS = 6000
 
 @dataclass(frozen=True)
 class LitHead:
-    """The head; its smoothed unit normals [V, 3]; transfer [V, 9] of the sky; skin [V]: 1 on bare facial skin; hair [V]: the share of the views that show
-    hair, eyes or cloth there; brows [V]; the light; and best_lit [3]: the linear colour of the best lit skin, taken for that of the skin itself."""
+    """The head; its smoothed unit normals [V, 3]; transfer [V, 9] of the sky; skin [V]: 1 on bare facial skin; hair
+    [V]: the share of the views that show hair, eyes or cloth there; brows [V]; the light; and best_lit [3]: the linear
+    colour of the best lit skin, taken for that of the skin itself."""
 
     head: Head
     normals: np.ndarray
@@ -44,8 +46,9 @@ class LitHead:
         return self.head.caster
 
     def at(self, face: np.ndarray, bary: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Where a raster (face [h, w], bary [h, w, 3]) shows the head: the linear colour of its skin under the sky [h, w, 3], what an unblocked sun adds
-        [h, w, 3], 1 where the head itself leaves the sun visible [h, w], unit normals [h, w, 3]."""
+        """Where a raster (face [h, w], bary [h, w, 3]) shows the head: the linear colour of its skin under the sky [h,
+        w, 3], what an unblocked sun adds [h, w, 3], 1 where the head itself leaves the sun visible [h, w], unit normals
+        [h, w, 3]."""
         normal = interpolate(self.normals, self.mesh.faces, face, bary)
         normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
         ambient = self.light.ambient(interpolate(self.transfer, self.mesh.faces, face, bary))
@@ -58,18 +61,22 @@ class LitHead:
 
 
 def lit_head(head: Head, views: list[View], report: Reporter) -> LitHead:
-    """Fits the light of these views to the head; half of the stage's progress. Raises Problem where the views hardly see it."""
+    """Fits the light of these views to the head; half of the stage's progress. Raises Problem where the views hardly
+    see it."""
     normals = smooth_normals(head)
     colours, count, hair, seen_brows = vertex_colours(head, normals, views, report)
-    transfer = radiance_transfer(head.caster, head.mesh.vertices, normals, step=lambda done, of: report.progress(of + done, 4 * of, "Casting rays at the sky"))
+    transfer = radiance_transfer(head.caster, head.mesh.vertices, normals, step=lambda done,
+                                 of: report.progress(of + done, 4 * of, "Casting rays at the sky"))
     skin, brows = skin_weights(head.mesh)
     skin, brows = skin * (1 - hair) * (1 - seen_brows), np.maximum(brows, seen_brows)
     light, reached = _fit(head, normals, transfer, colours, skin * (count >= min(2, len(views))), report)
-    return LitHead(head, normals, transfer, skin, hair, brows, light, _best_lit(light, normals, transfer, reached, count))
+    return LitHead(head, normals, transfer, skin, hair, brows, light,
+                   _best_lit(light, normals, transfer, reached, count))
 
 
 def _fit(head, normals, transfer, colours, weights, report) -> tuple[Light, np.ndarray]:
-    """The light from an even draw of skin vertices; the draw's posterior on all vertices [V] (0 where not drawn) and the figures."""
+    """The light from an even draw of skin vertices; the draw's posterior on all vertices [V] (0 where not drawn) and
+    the figures."""
     skin = np.flatnonzero((weights > 0.3) & (colours.min(1) > 1e-3))
     drawn = skin[:: max(1, len(skin) // FIT_POINTS)]
     origins = head.mesh.vertices[drawn] + 1e-3 * normals[drawn]

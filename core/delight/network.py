@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The default delighter: our own network tells the shading and the shadows of a face, from the picture and from what is known of the head.
+"""The default delighter: our own network tells the shading and the shadows of a face, from the picture and from what is
+known of the head.
 
-It sees a square around the face at SIDE pixels and answers at half of that; the answer is lifted to the picture's pixels along its edges (lift.py), and the
-picture is divided by it, so pores are kept and none can be invented. In a capture the frames' answers are evened out over the head (evening.py) and brought
-together with the light that was fitted to all frames (second_opinion.py), which is all that is believed below hair; in a single photograph the skin around
-brows and eyes answers for them (below_hair.py).
-`core train delighter` makes the weights.
+It sees a square around the face at SIDE pixels and answers at half of that; the answer is lifted to the picture's
+pixels along its edges (lift.py), and the picture is divided by it, so pores are kept and none can be invented. In a
+capture the frames' answers are evened out over the head (evening.py) and brought together with the light that was
+fitted to all frames (second_opinion.py), which is all that is believed below hair; in a single photograph the skin
+around brows and eyes answers for them (below_hair.py). `core train delighter` makes the weights.
 """
 
 from __future__ import annotations
@@ -47,7 +48,8 @@ FADE = 0.06  # of the square's side: along its border it gives way to the fitted
 
 
 def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
-    """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see the head."""
+    """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see
+    the head."""
     net, views = load(settings.compute_device), read_views(capture, selected_only=True)
     head = lit_head(read_head(capture), views, report)
     looks, fitted = [], []
@@ -68,10 +70,12 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
 
 
 def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.ndarray, np.ndarray]:
-    """A single photograph [H, W, 3] (sRGB) of a face -> its albedo [H, W, 3] (sRGB) and its shadows [H, W]. Raises Problem where no face is found."""
+    """A single photograph [H, W, 3] (sRGB) of a face -> its albedo [H, W, 3] (sRGB) and its shadows [H, W]. Raises
+    Problem where no face is found."""
     face = faces.detect(srgb)
     if face is None:
-        raise Problem("No face was found in the photograph.", "Choose a photograph that shows the face from the front or half from the side.")
+        raise Problem("No face was found in the photograph.",
+                      "Choose a photograph that shows the face from the front or half from the side.")
     box = face_box(face.landmarks[:, :2])
     look = _look(load("cpu"), box, crop(srgb, box, SIDE))
     share = crop(parser.parse(srgb, face.landmarks).of(*FEATURES), box, len(look.shading))
@@ -83,7 +87,8 @@ def load(device: str) -> DelightNet:
     """The shipped network. Raises Problem where its file or its card is missing."""
     card = WEIGHTS.with_suffix(".json")
     if not (WEIGHTS.is_file() and card.is_file()):
-        raise Problem("The weights of the delighting network are missing.", "Install the add-on again, or choose the delighter 'shading'.")
+        raise Problem("The weights of the delighting network are missing.",
+                      "Install the add-on again, or choose the delighter 'shading'.")
     shipped_files.require_whole(WEIGHTS)
     net = DelightNet(**json.loads(card.read_text(encoding="utf-8"))["model"])
     net.load_state_dict({name: value.float() for name, value in load_file(WEIGHTS).items()})
@@ -107,7 +112,8 @@ def crop(picture: np.ndarray, box: tuple[float, float, float], size: int) -> np.
         fine = crop(picture, box, size * step)
         return cv2.resize(fine, (size, size), interpolation=cv2.INTER_AREA)
     to_crop = np.float32([[scale, 0, -left * scale + 0.5 * (scale - 1)], [0, scale, -top * scale + 0.5 * (scale - 1)]])
-    return cv2.warpAffine(np.ascontiguousarray(picture, np.float32), to_crop, (size, size), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return cv2.warpAffine(np.ascontiguousarray(picture, np.float32), to_crop, (size, size), flags=cv2.INTER_LINEAR,
+                          borderMode=cv2.BORDER_REPLICATE)
 
 
 def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[ShadingEstimate, np.ndarray]:
@@ -122,12 +128,14 @@ def _look_at_view(net: DelightNet, view: View, head: LitHead) -> tuple[ShadingEs
     geometry = (ambient, ambient + free[..., None] * direct, normal @ view.rotation.T, (face >= 0).astype(np.float32))
     picture = crop(images.read_srgb(view.path), box, SIDE)
     look = _look(net, box, picture, geometry)
-    light, _ = light_seen(images.srgb_to_linear(picture), head, face, bary, round(max(view.width, view.height) * SIDE / box[2]))
+    light, _ = light_seen(images.srgb_to_linear(picture), head, face, bary,
+                          round(max(view.width, view.height) * SIDE / box[2]))
     return replace(look, face=face[1::2, 1::2], bary=bary[1::2, 1::2]), coarse(light, SIDE // 2)
 
 
 @torch.inference_mode()
-def _look(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray, geometry: tuple = ()) -> ShadingEstimate:
+def _look(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray,
+          geometry: tuple = ()) -> ShadingEstimate:
     """The mean of what the network says of a square picture and of its mirror image."""
     layers, middle = network_input(picture, *geometry)
     mirrored = layers[:, :, ::-1].copy()
@@ -135,7 +143,8 @@ def _look(net: DelightNet, box: tuple[float, float, float], picture: np.ndarray,
     device = next(net.parameters()).device
     both = torch.from_numpy(np.stack([layers, mirrored])).to(device, memory_format=torch.channels_last)
     shading, shadow = net(both)
-    shading, shadow = ((part[0] + part[1].flip(-1)).cpu().numpy().transpose(1, 2, 0) / 2 for part in (shading, shadow.sigmoid()))
+    shading, shadow = ((part[0] + part[1].flip(-1)).cpu().numpy().transpose(1, 2, 0) / 2
+                       for part in (shading, shadow.sigmoid()))
     small = cv2.resize(images.srgb_to_linear(picture), (SIDE // 2, SIDE // 2), interpolation=cv2.INTER_AREA)
     return ShadingEstimate(box, shading + middle, shadow[..., 0], np.log(np.maximum(small, DARKEST)))
 
@@ -146,16 +155,18 @@ def _seen(head: LitHead, values: np.ndarray, look: ShadingEstimate) -> np.ndarra
 
 
 def _hull(points: np.ndarray, look: ShadingEstimate) -> np.ndarray:
-    """The face within its landmarks [N, 2] (pixels), [h, h] in {0, 1}. Brows, eyes and lips are in it: they are few, and unlike skin."""
+    """The face within its landmarks [N, 2] (pixels), [h, h] in {0, 1}. Brows, eyes and lips are in it: they are few,
+    and unlike skin."""
     side = len(look.shading)
     inside = np.zeros((side, side), np.uint8)
-    cv2.fillConvexPoly(inside, cv2.convexHull(np.round((points - look.box[:2]) * side / look.box[2] - 0.5).astype(np.int32)), 1)
+    cv2.fillConvexPoly(inside,
+                       cv2.convexHull(np.round((points - look.box[:2]) * side / look.box[2] - 0.5).astype(np.int32)), 1)
     return inside.astype(np.float32)
 
 
 def _divided(srgb: np.ndarray, look: ShadingEstimate, fitted: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """A picture without its shading, and its shadows at its own size. Beyond the square `fitted` (of light_in_frame) is taken; without it the shading is
-    that of the square's border, and nothing is said of shadows."""
+    """A picture without its shading, and its shadows at its own size. Beyond the square `fitted` (of light_in_frame) is
+    taken; without it the shading is that of the square's border, and nothing is said of shadows."""
     linear = images.srgb_to_linear(srgb)
     size = round(look.box[2])
     log = np.log(np.maximum(crop(linear, look.box, size), DARKEST))
@@ -170,7 +181,8 @@ def _divided(srgb: np.ndarray, look: ShadingEstimate, fitted: tuple | None = Non
         shading, shadow = beyond(shading, shadow, np.clip(within / (FADE * size), 0, 1).astype(np.float32), *fitted)
     albedo = linear / np.exp(shading)
     bright = float(np.quantile(albedo[inside].max(-1), 0.75)) if inside.any() else 0.0
-    return images.linear_to_srgb(albedo * min(1.0, BRIGHTEST / max(bright, 1e-6))), np.clip(shadow, 0, 1).astype(np.float32)
+    return images.linear_to_srgb(albedo
+                                 * min(1.0, BRIGHTEST / max(bright, 1e-6))), np.clip(shadow, 0, 1).astype(np.float32)
 
 
 def _landmarks(head: LitHead) -> np.ndarray:

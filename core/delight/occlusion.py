@@ -3,7 +3,8 @@
 """Which pixels of a frame the sun reaches: two possible shadings, one picture.
 
 Away from the edges of shadows the share of the sun is 0 or 1 and the skin's detail is untouched; in a band along them
-it is what the pixel's colour asks for, given the albedo on both sides, so that a penumbra or a blurred edge leaves no halo.
+it is what the pixel's colour asks for, given the albedo on both sides, so that a penumbra or a blurred edge leaves no
+halo.
 """
 
 from __future__ import annotations
@@ -20,12 +21,14 @@ ZONE_PX = 0.008  # and of the zone about it that must be no darker or lighter th
 FINE_PX = 0.0025  # skin's detail below this scale is kept even there
 
 
-def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free: np.ndarray, skin: np.ndarray, head: np.ndarray,
-              side: int) -> np.ndarray:
-    """[H, W] in [0, 1]: how much of the sun each pixel gets. `side`: the longer side in pixels of the frame this is a part of.
+def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free: np.ndarray, skin: np.ndarray,
+              head: np.ndarray, side: int) -> np.ndarray:
+    """[H, W] in [0, 1]: how much of the sun each pixel gets. `side`: the longer side in pixels of the frame this is a
+    part of.
 
-    linear, ambient, direct [H, W, 3]: the frame, the skin's colour under the sky, and what the sun would add; free [H, W]: 1 where
-    the head itself leaves the sun visible; skin [H, W]: 0 on brows and hair, whose darkness is their own; head bool [H, W].
+    linear, ambient, direct [H, W, 3]: the frame, the skin's colour under the sky, and what the sun would add; free [H,
+    W]: 1 where the head itself leaves the sun visible; skin [H, W]: 0 on brows and hair, whose darkness is their own;
+    head bool [H, W].
     """
     log = np.log(np.maximum(linear, 1e-3)).astype(np.float32)
     shaded = np.log(np.maximum(ambient, 1e-4)).astype(np.float32)
@@ -34,21 +37,24 @@ def sun_share(linear: np.ndarray, ambient: np.ndarray, direct: np.ndarray, free:
     albedo = np.zeros_like(log)
     share = np.full(head.shape, 0.5, np.float32)
     for _ in range(6):
-        evidence = skin * np.clip(log_likelihood(log - sunlit - albedo) - log_likelihood(log - shaded - albedo), -12, 12) + prior
+        evidence = skin * np.clip(log_likelihood(log - sunlit - albedo) - log_likelihood(log - shaded - albedo), -12,
+                                  12) + prior
         for _ in range(4):
             around = _mean_over(share, head, 0.004 * side)
             share = (1 / (1 + np.exp(-np.clip(evidence + COHERENCE * (2 * around - 1), -30, 30)))).astype(np.float32)
         sharp = (share > 0.5)[..., None]
         deviation = np.clip(log - np.where(sharp, sunlit, shaded), -0.8, 0.8)
         albedo = _mean_over(deviation, head, ALBEDO_PX * side)
-    return _soften((share > 0.5) & head, log, np.where(sharp, sunlit, shaded), ambient, direct, head, max(1.5, BAND_PX * side))
+    return _soften((share > 0.5) & head, log, np.where(sharp, sunlit, shaded), ambient, direct, head,
+                   max(1.5, BAND_PX * side))
 
 
 def seamless(log_albedo: np.ndarray, share: np.ndarray, head: np.ndarray, side: int) -> np.ndarray:
-    """[H, W, 3]: what to take from a log albedo [H, W, 3] along the edges of `share` so that no outline of the shadow stays.
+    """[H, W, 3]: what to take from a log albedo [H, W, 3] along the edges of `share` so that no outline of the shadow
+    stays.
 
-    Bounces, subsurface light and the video's chroma make a penumbra that one share cannot explain. Near an edge the coarse part of the albedo is
-    carried over from both sides; its fine part stays.
+    Bounces, subsurface light and the video's chroma make a penumbra that one share cannot explain. Near an edge the
+    coarse part of the albedo is carried over from both sides; its fine part stays.
     """
     lit = (share > 0.5).astype(np.uint8)
     distance = cv2.distanceTransform(lit, cv2.DIST_L2, 5) + cv2.distanceTransform(1 - lit, cv2.DIST_L2, 5)
@@ -61,7 +67,8 @@ def seamless(log_albedo: np.ndarray, share: np.ndarray, head: np.ndarray, side: 
 
 
 def _soften(lit: np.ndarray, log, log_light, ambient, direct, head, band: float) -> np.ndarray:
-    """The hard decision `lit` with its edges solved for: least squares of colour = albedo * (ambient + share * direct)."""
+    """The hard decision `lit` with its edges solved for: least squares of colour = albedo * (ambient + share *
+    direct)."""
     inner = cv2.distanceTransform(lit.astype(np.uint8), cv2.DIST_L2, 3)
     outer = cv2.distanceTransform((~lit).astype(np.uint8), cv2.DIST_L2, 3)
     edge = (inner + outer <= band + 0.5) & head
@@ -78,12 +85,14 @@ def _mean_over(values: np.ndarray, where: np.ndarray, sigma: float) -> np.ndarra
         height, width = where.shape
         small = (max(width // 4, 1), max(height // 4, 1))
         weight = cv2.resize(where.astype(np.float32), small, interpolation=cv2.INTER_AREA)
-        total = cv2.resize(np.asarray(values * (where if values.ndim == 2 else where[..., None]), np.float32), small, interpolation=cv2.INTER_AREA)
+        total = cv2.resize(np.asarray(values * (where if values.ndim == 2 else where[..., None]), np.float32), small,
+                           interpolation=cv2.INTER_AREA)
         norm = np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma / 4), 1e-4)
         mean = cv2.GaussianBlur(total, (0, 0), sigma / 4) / (norm if values.ndim == 2 else norm[..., None])
         return cv2.resize(mean, (width, height), interpolation=cv2.INTER_LINEAR)
     weight = where.astype(np.float32)
-    total = cv2.GaussianBlur(np.asarray(values * (weight if values.ndim == 2 else weight[..., None]), np.float32), (0, 0), sigma)
+    total = cv2.GaussianBlur(np.asarray(values * (weight if values.ndim == 2 else weight[..., None]), np.float32),
+                             (0, 0), sigma)
     norm = np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-4)
     return total / (norm if values.ndim == 2 else norm[..., None])
 

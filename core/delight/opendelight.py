@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighter that runs the authors' OpenDelight checkpoint, where the user has it: faces are cut out aligned, delit, given their detail and put back.
+"""The delighter that runs the authors' OpenDelight checkpoint, where the user has it: faces are cut out aligned, delit,
+given their detail and put back.
 
 What is off the face stays as it was shot. It does not say where shadows were. Not verified on the authors' weights.
 """
@@ -59,15 +60,18 @@ def delight_photograph(srgb: np.ndarray, settings: DelightSettings) -> tuple[np.
     checkpoint = _kept(settings.checkpoint, path.stat().st_mtime_ns if path.exists() else 0)
     face = detect(srgb)
     if face is None:
-        raise Problem("OpenDelight found no face in the photograph.", "Choose another photograph, or another delighter.")
+        raise Problem("OpenDelight found no face in the photograph.",
+                      "Choose another photograph, or another delighter.")
     return delight_face(srgb, face, checkpoint), None
 
 
-def delight_face(srgb: np.ndarray, face: Face, checkpoint: Checkpoint, device: str = "cpu", step: Callable[[], None] = lambda: None) -> np.ndarray:
+def delight_face(srgb: np.ndarray, face: Face, checkpoint: Checkpoint, device: str = "cpu",
+                 step: Callable[[], None] = lambda: None) -> np.ndarray:
     """A frame sRGB [H, W, 3] with the albedo of one face in it."""
     to_crop = alignment(face, SIZE, MARGIN)
     crop = cut(srgb, to_crop, SIZE)
-    mask = np.maximum(face_mask(face, to_crop, SIZE), face_mask(face, to_crop, SIZE, RIM) * (segment_person(crop) > 0.5))
+    mask = np.maximum(face_mask(face, to_crop, SIZE),
+                      face_mask(face, to_crop, SIZE, RIM) * (segment_person(crop) > 0.5))
     picture = torch.from_numpy((crop * mask[..., None]).transpose(2, 0, 1)[None].astype(np.float32)).to(device)
     albedo = delit(checkpoint.base, checkpoint.enhancer, picture, step)[0].permute(1, 2, 0).cpu().numpy()
     return put_back(srgb, crop, albedo, mask, to_crop)

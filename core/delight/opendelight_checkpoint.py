@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The files of OpenDelight as its authors publish them, read as weights only and checked tensor by tensor: nothing in them is ever run."""
+"""The files of OpenDelight as its authors publish them, read as weights only and checked tensor by tensor: nothing in
+them is ever run."""
 
 from __future__ import annotations
 
@@ -15,12 +16,14 @@ from ..contract.messages import Problem
 from .opendelight_network import HEAD, base_shapes, enhancer_shapes
 
 BASE, ENHANCER = "base_delight_network.pth", "unet_enhancer.pth"
-CHOOSE = f"Choose the folder with {BASE} and {ENHANCER}, as the authors of OpenDelight publish them, or another delighter."
+CHOOSE = (f"Choose the folder with {BASE} and {ENHANCER}, as the authors of OpenDelight publish them, or another "
+          "delighter.")
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """State dicts (name -> float32 tensor) of the network and of the one that gives detail back, None where its file does not lie beside the first."""
+    """State dicts (name -> float32 tensor) of the network and of the one that gives detail back, None where its file
+    does not lie beside the first."""
 
     base: dict[str, Tensor]
     enhancer: dict[str, Tensor] | None
@@ -43,12 +46,15 @@ def _read(path: Path, shapes: Callable, fault: Callable[[dict], str], device: st
     try:
         state = torch.load(path, map_location="cpu", weights_only=True)
     except Exception as error:  # a damaged or hostile file can make the reader fail in any way
-        raise Problem(f"{path} cannot be read as weights: it is damaged, or holds more than weights ({type(error).__name__}). Nothing in it was run.",
+        raise Problem(f"{path} cannot be read as weights: it is damaged, or holds more than weights "
+                      f"({type(error).__name__}). Nothing in it was run.",
                       "Download it again from the page of OpenDelight's authors.") from error
     try:
         wanted = shapes(state)
-        wrong = [f"{name} is missing" for name in wanted if name not in state] + [f"{name} is not part of it" for name in state if name not in wanted]
-        wrong += [f"{name} is {_size(state[name].shape)}, not {_size(shape)}" for name, shape in wanted.items() if name in state and state[name].shape != shape]
+        wrong = [f"{name} is missing" for name in wanted
+                 if name not in state] + [f"{name} is not part of it" for name in state if name not in wanted]
+        wrong += [f"{name} is {_size(state[name].shape)}, not {_size(shape)}" for name, shape in wanted.items()
+                  if name in state and state[name].shape != shape]
         wrong += [found] if (found := fault(state)) else []
     except (KeyError, IndexError, TypeError, AttributeError) as error:
         what = error.args[0] if isinstance(error, KeyError) else "its first tensors"

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighter that needs no network: one light for all frames, fitted to the skin of the registered head and divided out.
+"""The delighter that needs no network: one light for all frames, fitted to the skin of the registered head and divided
+out.
 
 The head's own shadows and the shadows of what stands beside it are told from dark skin by the sun's colour and
 contrast (occlusion.py). What the geometry gets wrong, and the shadows' edges, stay for the mask and the solver.
@@ -43,8 +44,10 @@ def _delight(view: View, head: LitHead) -> Delit:
     return Delit(view, srgb, shadow if head.light.has_sun else None)
 
 
-def light_in_frame(view: View, head: LitHead, srgb: np.ndarray) -> tuple[tuple[slice, slice], np.ndarray, np.ndarray, np.ndarray] | None:
-    """Where a frame [H, W, 3] shows the head, with a margin: that part of it, and there what `light_seen` says and where the head is; None if nowhere."""
+def light_in_frame(view: View, head: LitHead,
+                   srgb: np.ndarray) -> tuple[tuple[slice, slice], np.ndarray, np.ndarray, np.ndarray] | None:
+    """Where a frame [H, W, 3] shows the head, with a margin: that part of it, and there what `light_seen` says and
+    where the head is; None if nowhere."""
     face, bary, _ = render_view(head.caster, view)
     if not (face >= 0).any():
         return None
@@ -53,9 +56,11 @@ def light_in_frame(view: View, head: LitHead, srgb: np.ndarray) -> tuple[tuple[s
     return box, lit, share, face[box] >= 0
 
 
-def light_seen(linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
-    """The skin's expected linear colour [h, w, 3], carried on past the head's edge, and the share of the sun [h, w], where a raster (face [h, w],
-    bary [h, w, 3]) shows the head in a linear picture [h, w, 3]; `side`: the longer side of the frame at the picture's scale."""
+def light_seen(linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.ndarray,
+               side: int) -> tuple[np.ndarray, np.ndarray]:
+    """The skin's expected linear colour [h, w, 3], carried on past the head's edge, and the share of the sun [h, w],
+    where a raster (face [h, w], bary [h, w, 3]) shows the head in a linear picture [h, w, 3]; `side`: the longer side
+    of the frame at the picture's scale."""
     here = face >= 0
     ambient, direct, free, _ = head.at(face, bary)
     share = np.ones(here.shape, np.float32)
@@ -70,4 +75,5 @@ def light_seen(linear: np.ndarray, head: LitHead, face: np.ndarray, bary: np.nda
 
 def _box(where: np.ndarray, margin: int = 8) -> tuple[slice, slice]:
     rows, columns = np.flatnonzero(where.any(1)), np.flatnonzero(where.any(0))
-    return slice(max(rows[0] - margin, 0), rows[-1] + margin + 1), slice(max(columns[0] - margin, 0), columns[-1] + margin + 1)
+    return slice(max(rows[0] - margin, 0),
+                 rows[-1] + margin + 1), slice(max(columns[0] - margin, 0), columns[-1] + margin + 1)

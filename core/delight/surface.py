@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the views say about the head's surface: its smoothed normals, the colour of each vertex's skin over all views, and where hair hides it."""
+"""What the views say about the head's surface: its smoothed normals, the colour of each vertex's skin over all views,
+and where hair hides it."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ from ..imaging import images
 GRAZING = 0.35  # cosine of the view angle under which a vertex's colour is not trusted
 NOT_SKIN = ("lips", "brows", "eyes")
 HAIRY = ("beard", "hair", "eyes", "clothes")
-"""Parts of a picture whose own colour says nothing of the light on the skin. Brows are told apart from them: they are narrow."""
+"""Parts of a picture whose own colour says nothing of the light on the skin. Brows are told apart from them: they are
+narrow."""
 ASKED = (*HAIRY, "brows")
 
 
@@ -36,9 +38,10 @@ def smooth_normals(head: Head, rounds: int = 2) -> np.ndarray:
     return normals
 
 
-def vertex_colours(head: Head, normals: np.ndarray, views: list[View], report: Reporter) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Linear colour [V, 3], the median over the views that show a vertex's skin well (so that highlights, which move, drop out), their number [V], and the
-    shares [V] of HAIRY and of brows over the views that see it at all.
+def vertex_colours(head: Head, normals: np.ndarray, views: list[View],
+                   report: Reporter) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Linear colour [V, 3], the median over the views that show a vertex's skin well (so that highlights, which move,
+    drop out), their number [V], and the shares [V] of HAIRY and of brows over the views that see it at all.
 
     Raises Problem when hardly any vertex is seen.
     """
@@ -62,14 +65,16 @@ def vertex_colours(head: Head, normals: np.ndarray, views: list[View], report: R
     seen_colours[hidden] = np.nan
     count = np.isfinite(seen_colours[..., 0]).sum(0)
     if (count > 0).sum() < 100:
-        raise Problem("The selected frames hardly see the registered head.", "Look at the pictures of the stages cameras and registration in report.html.")
+        raise Problem("The selected frames hardly see the registered head.",
+                      "Look at the pictures of the stages cameras and registration in report.html.")
     colours = np.zeros((len(mesh.vertices), 3))
     colours[count > 0] = np.nanmedian(seen_colours[:, count > 0], 0)
     return colours, count, share[:, :-1].sum(1).clip(0, 1), share[:, -1]
 
 
 def _shares(head: Head, view: View, picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """The shares of ASKED at pixels [N, 2] of a frame, [N, len(ASKED)]; none where nobody can tell: a head of another topology has no landmarks."""
+    """The shares of ASKED at pixels [N, 2] of a frame, [N, len(ASKED)]; none where nobody can tell: a head of another
+    topology has no landmarks."""
     if head.built_in:
         marks, _ = view.project(template.landmark_points(head.mesh))
         if np.isfinite(marks).all():
@@ -79,8 +84,8 @@ def _shares(head: Head, view: View, picture: np.ndarray, pixels: np.ndarray) -> 
 
 
 def _without_doubts(shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shares of ASKED [K, V, len(ASKED)], nan where a view sees nothing -> where a view shows more of them than skin, bool [K, V], and their means over the
-    views [V, len(ASKED)]; of beard and hair where the person has any."""
+    """Shares of ASKED [K, V, len(ASKED)], nan where a view sees nothing -> where a view shows more of them than skin,
+    bool [K, V], and their means over the views [V, len(ASKED)]; of beard and hair where the person has any."""
     seen = np.isfinite(shares[..., :1]).sum(0)
     mean = np.nansum(shares, 0) / np.maximum(seen, 1)
     for name in ("beard", "hair"):

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighter that the paper uses: SwitchLight, a paid service of Beeble (Kim et al., CVPR 2024). The selected frames leave the machine.
+"""The delighter that the paper uses: SwitchLight, a paid service of Beeble (Kim et al., CVPR 2024). The selected frames
+leave the machine.
 
-Nothing is sent without the artist's consent (core/contract/consent.py), nothing twice: answers are kept in the capture by the hash of what was sent. They say
-nothing about shadows. What is known of the service, and how well, is in core/contract/switchlight_api.py.
+Nothing is sent without the artist's consent (core/contract/consent.py), nothing twice: answers are kept in the capture
+by the hash of what was sent. They say nothing about shadows. What is known of the service, and how well, is in
+core/contract/switchlight_api.py.
 """
 
 from __future__ import annotations
@@ -31,7 +33,8 @@ PATIENCE = Patience()
 
 
 def switchlight(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
-    """SwitchLight's albedo of the selected frames, at their size. Raises Problem without consent, key, credits or a service that answers."""
+    """SwitchLight's albedo of the selected frames, at their size. Raises Problem without consent, key, credits or a
+    service that answers."""
     views, preview = read_views(capture, selected_only=True), settings.delight.switchlight_preview
     plan = consent.sending(capture, preview, [view.name for view in views])
     calls = obtain(capture, plan, report) if plan.frames else 0
@@ -45,7 +48,8 @@ def switchlight(capture: Capture, settings: Settings, report: Reporter) -> Itera
 
 
 def obtain(capture: Capture, plan: consent.Sending, report: Reporter) -> int:
-    """Has the frames of a plan answered, after everything that could forbid it was asked; the number of calls. Raises Problem."""
+    """Has the frames of a plan answered, after everything that could forbid it was asked; the number of calls. Raises
+    Problem."""
     if os.environ.get(service.OFFLINE_VARIABLE):
         raise Problem("Blender is set to work offline, and SwitchLight is far away: nothing was sent.",
                       "Allow online access (Preferences, System, Network), or choose another delighter.")
@@ -55,21 +59,26 @@ def obtain(capture: Capture, plan: consent.Sending, report: Reporter) -> int:
         report.log(line)
     left = _listening(report, lambda: balance(account))
     if left is not None and left < plan.credits:
-        raise Problem(f"{service.amount(plan.credits)} are needed, and your SwitchLight account has {service.amount(left)}: nothing was sent.",
+        raise Problem(f"{service.amount(plan.credits)} are needed, and your SwitchLight account has "
+                      f"{service.amount(left)}: nothing was sent.",
                       f"Buy some at {service.WEBSITE}, or have fewer frames chosen, or ask for previews.")
-    report.log("SwitchLight does not say how many credits are left." if left is None else f"Your account has {service.amount(left)}.")
-    return send(account, [parcel(capture, name, content, plan.preview) for name, content in plan.frames.items()], plan.preview, report, PATIENCE)
+    report.log("SwitchLight does not say how many credits are left." if left is None
+               else f"Your account has {service.amount(left)}.")
+    return send(account, [parcel(capture, name, content, plan.preview) for name, content in plan.frames.items()],
+                plan.preview, report, PATIENCE)
 
 
 def parcel(capture: Capture, name: str, content: str, preview: bool) -> Parcel:
-    """A frame as it is sent: its file as it is, and as it was agreed to. Raises Problem where it has changed, and for a kind that the service does not
-    take."""
+    """A frame as it is sent: its file as it is, and as it was agreed to. Raises Problem where it has changed, and for a
+    kind that the service does not take."""
     path = capture.frames / name
     if path.suffix.lower() not in KINDS:
-        raise Problem(f"SwitchLight does not take pictures as {name} is.", "Run the stage frames again, which writes JPEG.")
+        raise Problem(f"SwitchLight does not take pictures as {name} is.",
+                      "Run the stage frames again, which writes JPEG.")
     data = path.read_bytes()
     if hash_bytes(data) != content:
-        raise Problem(f"The frame {name} changed after you agreed to send it: nothing more was sent.", "Look at the frames, and click Allow Sending again.")
+        raise Problem(f"The frame {name} changed after you agreed to send it: nothing more was sent.",
+                      "Look at the frames, and click Allow Sending again.")
     return Parcel(name, data, path.suffix.lower(), consent.answer(capture, content, preview))
 
 
@@ -91,10 +100,11 @@ def _listening(report: Reporter, ask: Callable[[], float | None]) -> float | Non
 
 
 def fitted(answer: np.ndarray, view: View) -> np.ndarray:
-    """An answer [h, w, 1 to 4] as its frame, sRGB [H, W, 3]: where the service cut the background away, the frame's own shows. Raises Problem where it
-    is another section."""
+    """An answer [h, w, 1 to 4] as its frame, sRGB [H, W, 3]: where the service cut the background away, the frame's own
+    shows. Raises Problem where it is another section."""
     if abs(answer.shape[1] / answer.shape[0] - view.width / view.height) > 0.01:
-        raise Problem(f"SwitchLight answered {view.name} with {answer.shape[1]} x {answer.shape[0]} pixels, but the frame is {view.width} x {view.height}.",
+        raise Problem(f"SwitchLight answered {view.name} with {answer.shape[1]} x {answer.shape[0]} pixels, but the "
+                      f"frame is {view.width} x {view.height}.",
                       "The answer is kept in the capture's folder switchlight; choose another delighter.")
     if answer.shape[:2] != (view.height, view.width):
         answer = images.resize(answer, view.width, view.height).reshape(view.height, view.width, -1)

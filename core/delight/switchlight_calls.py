@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One call to the SwitchLight API: a picture goes out as multipart/form-data (RFC 7578), a PNG comes back, and every failure gets its meaning.
+"""One call to the SwitchLight API: a picture goes out as multipart/form-data (RFC 7578), a PNG comes back, and every
+failure gets its meaning.
 
-The key is in one header of the request and in no message. Redirections are not followed: they would carry it to another machine.
+The key is in one header of the request and in no message. Redirections are not followed: they would carry it to another
+machine.
 """
 
 from __future__ import annotations
@@ -29,8 +31,9 @@ BUSY = (408, 425, 429, 500, 502, 503, 504)
 
 
 class AgainError(Exception):
-    """It may work later: `reason` in a few words. `after_s` is how long the service asks to be left alone, None if it does not say; `spoiled` that an
-    answer came which is no use and may have been charged, `reached` that there was a connection at all."""
+    """It may work later: `reason` in a few words. `after_s` is how long the service asks to be left alone, None if it
+    does not say; `spoiled` that an answer came which is no use and may have been charged, `reached` that there was a
+    connection at all."""
 
     def __init__(self, reason: str, after_s: float | None = None, spoiled: bool = False, reached: bool = True):
         super().__init__(reason)
@@ -52,10 +55,12 @@ class Account:
         return f"Account({self.base})"
 
 
-def albedo(account: Account, data: bytes, suffix: str, preview: bool, silence_s: float, call_s: float, stopped: Callable[[], bool]) -> bytes:
+def albedo(account: Account, data: bytes, suffix: str, preview: bool, silence_s: float, call_s: float,
+           stopped: Callable[[], bool]) -> bytes:
     """The whole PNG that answers a picture. Raises AgainError, or Problem for what no repetition mends.
 
-    `silence_s` without a byte, or `call_s` for all of it, are too long. `stopped` is asked between the parts of the answer.
+    `silence_s` without a byte, or `call_s` for all of it, are too long. `stopped` is asked between the parts of the
+    answer.
     """
     boundary = uuid.uuid4().hex
     request = _request(account, service.ALBEDO, _multipart(boundary, data, suffix, service.form(preview)))
@@ -67,15 +72,18 @@ def albedo(account: Account, data: bytes, suffix: str, preview: bool, silence_s:
 
 
 def balance(account: Account, silence_s: float = 10.0) -> float | None:
-    """Credits left on the account, None where the service does not say. Raises Problem where it refuses the key or cannot be reached at all."""
+    """Credits left on the account, None where the service does not say. Raises Problem where it refuses the key or
+    cannot be reached at all."""
     try:
-        found = json.loads(_answer(account, _request(account, service.CREDITS), silence_s, time.monotonic() + silence_s, lambda: False))
+        found = json.loads(_answer(account, _request(account, service.CREDITS), silence_s, time.monotonic() + silence_s,
+                                   lambda: False))
         for name in service.BALANCE:
             found = found[name]
         return float(found)
     except AgainError as error:
         if not error.reached:
-            raise Problem(f"SwitchLight cannot be used now: {error.reason}. Nothing was sent.", "Check the network connection, and run again.") from None
+            raise Problem(f"SwitchLight cannot be used now: {error.reason}. Nothing was sent.",
+                          "Check the network connection, and run again.") from None
     except AccountProblem:
         raise
     except (Problem, ValueError, KeyError, TypeError):
@@ -100,13 +108,16 @@ def is_whole_png(data: bytes) -> bool:
 
 
 def _request(account: Account, path: str, body: bytes | None = None) -> urllib.request.Request:
-    return urllib.request.Request(account.base + path, body, {service.KEY_HEADER: account.key, "User-Agent": f"WildCap-for-Blender/{__version__}"})
+    return urllib.request.Request(account.base + path, body,
+                                  {service.KEY_HEADER: account.key, "User-Agent": f"WildCap-for-Blender/{__version__}"})
 
 
 def _multipart(boundary: str, data: bytes, suffix: str, fields: dict[str, str]) -> bytes:
     """The body; the picture's own name stays here, it may say who that is."""
-    parts = [f'--{boundary}\r\nContent-Disposition: form-data; name="{name}"\r\n\r\n{value}\r\n'.encode() for name, value in fields.items()]
-    head = (f'--{boundary}\r\nContent-Disposition: form-data; name="{service.PICTURE_FIELD}"; filename="frame{suffix}"\r\n'
+    parts = [f'--{boundary}\r\nContent-Disposition: form-data; name="{name}"\r\n\r\n{value}\r\n'.encode()
+             for name, value in fields.items()]
+    head = (f'--{boundary}\r\nContent-Disposition: form-data; name="{service.PICTURE_FIELD}"; '
+            f'filename="frame{suffix}"\r\n'
             f"Content-Type: {KINDS[suffix]}\r\n\r\n").encode()
     return b"".join([*parts, head, data, f"\r\n--{boundary}--\r\n".encode()])
 
@@ -116,10 +127,13 @@ class _Stay(urllib.request.HTTPRedirectHandler):
         return None
 
 
-def _answer(account: Account, request: urllib.request.Request, silence_s: float, end: float, stopped: Callable[[], bool]) -> bytes:
+def _answer(account: Account, request: urllib.request.Request, silence_s: float, end: float,
+            stopped: Callable[[], bool]) -> bytes:
     """The body of an answer with status 200, whole. Raises AgainError or Problem."""
-    # Studios reach the internet by the proxy that their machines are set up with; this very machine is reached directly.
-    opener = urllib.request.build_opener(_Stay, *([urllib.request.ProxyHandler({})] if service.local(account.base) else []))
+    # Studios reach the internet by the proxy that their machines are set up with; this very machine is reached
+    # directly.
+    opener = urllib.request.build_opener(_Stay,
+                                         *([urllib.request.ProxyHandler({})] if service.local(account.base) else []))
     try:
         with opener.open(request, timeout=silence_s) as response:
             return _read(response, end, stopped)
@@ -131,15 +145,19 @@ def _answer(account: Account, request: urllib.request.Request, silence_s: float,
         raise _refusal(account, error.code, body) from None
     except urllib.error.URLError as error:
         if isinstance(error.reason, ssl.SSLCertVerificationError):
-            raise AccountProblem(f"{service.host()} did not prove who it is ({error.reason.verify_message}); nothing was sent.",
-                                 "Check this machine's clock and its certificates, or ask who looks after its network.") from None
+            raise AccountProblem(
+                f"{service.host()} did not prove who it is ({error.reason.verify_message}); nothing was sent.",
+                "Check this machine's clock and its certificates, or ask who looks after its network.",
+            ) from None
         if isinstance(error.reason, TimeoutError):
             raise AgainError("it did not answer in time") from None
-        raise AgainError(f"it cannot be reached ({getattr(error.reason, 'strerror', None) or error.reason})", reached=False) from None
+        raise AgainError(f"it cannot be reached ({getattr(error.reason, 'strerror', None) or error.reason})",
+                         reached=False) from None
     except TimeoutError:
         raise AgainError("it did not answer in time") from None
     except (OSError, http.client.HTTPException) as error:
-        raise AgainError(f"the connection broke ({type(error).__name__})", spoiled=isinstance(error, http.client.IncompleteRead)) from None
+        raise AgainError(f"the connection broke ({type(error).__name__})",
+                         spoiled=isinstance(error, http.client.IncompleteRead)) from None
 
 
 def _read(response, end: float, stopped: Callable[[], bool]) -> bytes:
@@ -165,13 +183,15 @@ def _refusal(account: Account, status: int, body: bytes) -> Problem | None:
     """What a refusal means; None for an answer with status 200 that says nothing."""
     said = _said(body).replace(account.key, "(the key)")
     if status == 402 or "no credit" in said.lower():
-        return AccountProblem("SwitchLight says that your account has no credits left.", f"Buy some at {service.WEBSITE}, then run again: what came is kept.")
+        return AccountProblem("SwitchLight says that your account has no credits left.",
+                              f"Buy some at {service.WEBSITE}, then run again: what came is kept.")
     if status in (401, 403):
         return AccountProblem(f"SwitchLight does not accept the key ({status}{f': {said}' if said else ''}).",
                               f"Compare it with the one on your account's page at {service.WEBSITE}.")
     if status != 200 or said:
         return Problem(f"SwitchLight did not do what its documents say ({status}{f': {said}' if said else ''}).",
-                       "What came is kept. If it stays, the service may have changed: look for a newer version of this extension.")
+                       "What came is kept. If it stays, the service may have changed: look for a newer version of this "
+                       "extension.")
     return None
 
 

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures in line for SwitchLight: three calls at once at most, patience with a busy service, and every answer kept the moment it is whole.
+"""Pictures in line for SwitchLight: three calls at once at most, patience with a busy service, and every answer kept
+the moment it is whole.
 
-A cancel is obeyed at once: calls that are under way are left to their threads, which keep what still comes for as long as the process lives.
+A cancel is obeyed at once: calls that are under way are left to their threads, which keep what still comes for as long
+as the process lives.
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ from .switchlight_calls import Account, AgainError, albedo
 
 @dataclass(frozen=True)
 class Patience:
-    """How often and how long a picture is tried. The wait doubles from `first_s` to `most_s`, at random between half of it and all of it."""
+    """How often and how long a picture is tried. The wait doubles from `first_s` to `most_s`, at random between half of
+    it and all of it."""
 
     tries: int = 6
     spoiled: int = 2  # answers that came broken and may have been charged: more are not risked
@@ -49,7 +52,8 @@ def send(account: Account, parcels: list[Parcel], preview: bool, report: Reporte
     Raises Problem, once the calls that are under way have ended, and CancelledError at once.
     """
     line = _Line(account, parcels, preview, patience)
-    threads = [threading.Thread(target=line.work, name=f"switchlight-{i}", daemon=True) for i in range(min(service.MOST_AT_ONCE, len(parcels)))]
+    threads = [threading.Thread(target=line.work, name=f"switchlight-{i}", daemon=True)
+               for i in range(min(service.MOST_AT_ONCE, len(parcels)))]
     try:
         for thread in threads:
             thread.start()
@@ -109,8 +113,10 @@ class _Line:
             with self._lock:
                 self.calls += 1
             try:
-                self._keep(parcel, albedo(self._account, parcel.data, parcel.suffix, self._preview, self._patience.silence_s, self._patience.call_s,
-                                          lambda: self._cancelled))
+                self._keep(parcel,
+                           albedo(self._account, parcel.data, parcel.suffix, self._preview, self._patience.silence_s,
+                                  self._patience.call_s,
+                                  lambda: self._cancelled))
                 return
             except AgainError as error:
                 spoiled += error.spoiled
@@ -118,11 +124,14 @@ class _Line:
                 if spoiled > self._patience.spoiled:
                     break
                 self._postpone(error, attempt)
-        self._stop(Problem(f"SwitchLight did not serve the frame {parcel.name}: {last.reason}, after {attempt + 1} tries.",
-                           f"Run again later: the {self.done} of {self._of} answers that came are kept and are not paid again."))
+        self._stop(Problem(f"SwitchLight did not serve the frame {parcel.name}: {last.reason}, after {attempt + 1} "
+                           "tries.",
+                           f"Run again later: the {self.done} of {self._of} answers that came are kept and are not "
+                           "paid again."))
 
     def _keep(self, parcel: Parcel, answer: bytes) -> None:
-        """Keeps an answer that can be read as a picture. Raises AgainError for one that cannot, Problem where it cannot be written."""
+        """Keeps an answer that can be read as a picture. Raises AgainError for one that cannot, Problem where it cannot
+        be written."""
         with replacing(parcel.answer) as temporary:
             temporary.write_bytes(answer)
             try:
@@ -136,7 +145,8 @@ class _Line:
         """All threads leave the service alone for a while: what it asks for, and never less than our own wait."""
         wait = min(self._patience.most_s, self._patience.first_s * 2 ** attempt) * random.uniform(0.5, 1.0)
         if error.after_s is not None and error.after_s > self._patience.longest_s:
-            raise Problem(f"SwitchLight asks to be left alone for {error.after_s / 60:.0f} minutes.", "Run again then: the answers that came are kept.")
+            raise Problem(f"SwitchLight asks to be left alone for {error.after_s / 60:.0f} minutes.",
+                          "Run again then: the answers that came are kept.")
         with self._lock:
             self._not_before = max(self._not_before, time.monotonic() + max(wait, error.after_s or 0.0))
             self._reason = error.reason

@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighting network in the head's own UV space: from what all views saw of each texel to its log-shading, and how sure that is.
+"""The delighting network in the head's own UV space: from what all views saw of each texel to its log-shading, and how
+sure that is.
 
-The shading has the form of the light that was fitted to the skin: sky, and as much of the sun as nothing blocks. Which share that is the network tells texel
-by texel, and what the fit gets wrong. A U-Net whose deepest map, 16 texels wide, attends to all of itself: one half of a face tells the light on the other.
-Its finest level, where maps are large, is kept thin.
+The shading has the form of the light that was fitted to the skin: sky, and as much of the sun as nothing blocks. Which
+share that is the network tells texel by texel, and what the fit gets wrong. A U-Net whose deepest map, 16 texels wide,
+attends to all of itself: one half of a face tells the light on the other. Its finest level, where maps are large, is
+kept thin.
 """
 
 from __future__ import annotations
@@ -25,14 +27,15 @@ FINE, FINEST = 24, 12
 
 
 class TexelNet(Trunk):
-    """[N, CHANNELS, S, S] and the fitted light [N, 6, S, S] (texels.network_input) -> log-shading less the face's mean log colour [N, 3, S, S], logits of
-    shadow [N, 1, S, S], and the log of the expected error [N, 3, S / 4, S / 4], one for each of BANDS, in natural log units. S is a multiple of 32 that the
-    widths can halve."""
+    """[N, CHANNELS, S, S] and the fitted light [N, 6, S, S] (texels.network_input) -> log-shading less the face's mean
+    log colour [N, 3, S, S], logits of shadow [N, 1, S, S], and the log of the expected error [N, 3, S / 4, S / 4], one
+    for each of BANDS, in natural log units. S is a multiple of 32 that the widths can halve."""
 
     def __init__(self, widths: list[int], depths: list[int]):
         super().__init__(widths, depths)
         self.begin = nn.Conv2d(CHANNELS, FINEST, 3, padding=1)
-        self.stem, self.enter = nn.Conv2d(CHANNELS, FINE, 4, stride=2, padding=1), nn.Conv2d(FINE, widths[0], 2, stride=2)
+        self.stem, self.enter = nn.Conv2d(CHANNELS, FINE, 4, stride=2,
+                                          padding=1), nn.Conv2d(FINE, widths[0], 2, stride=2)
         self.spread = nn.Conv2d(widths[0], len(BANDS), 1)
         self.leave, self.last = nn.Conv2d(widths[0], 4 * FINE, 1), nn.Conv2d(2 * FINE, 4 * FINEST, 3, padding=1)
         self.finish, self.out = nn.Conv2d(2 * FINEST, 2 * FINEST, 3, padding=1), nn.Conv2d(2 * FINEST, 4, 3, padding=1)

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head in its own UV space as all views saw it, with the light in it: what is known of each texel before a network says what of it is light.
+"""A head in its own UV space as all views saw it, with the light in it: what is known of each texel before a network
+says what of it is light.
 
-One head has one albedo, whatever frame shows it: so the views' colours are brought to one exposure and averaged, robustly, for highlights move and albedo does
-not. Beside them stands what geometry knows: normals, how much of the sky each texel sees, and the light that was fitted to the skin.
+One head has one albedo, whatever frame shows it: so the views' colours are brought to one exposure and averaged,
+robustly, for highlights move and albedo does not. Beside them stands what geometry knows: normals, how much of the sky
+each texel sees, and the light that was fitted to the skin.
 """
 
 from __future__ import annotations
@@ -40,10 +42,11 @@ CHANNELS = 24
 
 @dataclass(frozen=True)
 class Texels:
-    """float32 maps [S, S, ...] in the built-in head's UVs. log [3]: natural log of the linear colour in the views' mean; spread: how far the views' luminance
-    lies from it, in log units; seen in [0, 1]; normal [3]: unit, in the head's axes; open in [0, 1]: the share of an even sky that reaches the surface;
-    ambient [3]: the linear colour of the head's skin under the fitted sky; direct [3]: what the fitted sun adds where nothing blocks it; free in [0, 1]: where
-    the head itself lets the sun through; covered bool: texels of the head."""
+    """float32 maps [S, S, ...] in the built-in head's UVs. log [3]: natural log of the linear colour in the views'
+    mean; spread: how far the views' luminance lies from it, in log units; seen in [0, 1]; normal [3]: unit, in the
+    head's axes; open in [0, 1]: the share of an even sky that reaches the surface; ambient [3]: the linear colour of
+    the head's skin under the fitted sky; direct [3]: what the fitted sun adds where nothing blocks it; free in [0, 1]:
+    where the head itself lets the sun through; covered bool: texels of the head."""
 
     log: np.ndarray
     spread: np.ndarray
@@ -57,7 +60,8 @@ class Texels:
 
 
 def gather(head: LitHead, views: list[View], report: Reporter) -> Texels:
-    """What these views say of the head. The head has the built-in UVs; progress is reported in the third quarter of the stage's."""
+    """What these views say of the head. The head has the built-in UVs; progress is reported in the third quarter of the
+    stage's."""
     surface = head.head.unfold(SIDE)
     colours, weights = (np.zeros((len(views), len(surface.points), n), np.float32) for n in (3, 1))
     for i, view in enumerate(views):
@@ -70,13 +74,16 @@ def gather(head: LitHead, views: list[View], report: Reporter) -> Texels:
     spread = np.sqrt((weights[..., 0] * (colours - mean).mean(-1) ** 2).sum(0) / total)
     ambient, direct, free, normal = head.at(surface.face, surface.bary)
     transfer = raster.interpolate(head.transfer, head.mesh.faces, surface.face, surface.bary)
-    return Texels(surface.spread(mean), surface.spread(spread), surface.spread(weights[..., 0].max(0)), normal.astype(np.float32),
-                  ambient_occlusion(transfer).astype(np.float32), ambient.astype(np.float32), direct.astype(np.float32), free.astype(np.float32),
-                  surface.covered)
+    return Texels(surface.spread(mean), surface.spread(spread), surface.spread(weights[..., 0].max(0)),
+                  normal.astype(np.float32),
+                  ambient_occlusion(transfer).astype(np.float32), ambient.astype(np.float32), direct.astype(np.float32),
+                  free.astype(np.float32), surface.covered)
 
 
-def _colours_seen(points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """Log linear colours [N, 3] of a surface's points in a view, and how far they count [N]: by the cosine of the angle, not at all where burnt out."""
+def _colours_seen(points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster,
+                  view: View) -> tuple[np.ndarray, np.ndarray]:
+    """Log linear colours [N, 3] of a surface's points in a view, and how far they count [N]: by the cosine of the
+    angle, not at all where burnt out."""
     towards = view.centre - points
     cosine = (towards * normals).sum(1) / lengths(towards)
     pixels, _ = view.project(points)
@@ -91,8 +98,8 @@ def _colours_seen(points: np.ndarray, normals: np.ndarray, caster: raster.RayCas
 
 
 def exposures(colours: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """How much higher than the others' each view's log colours [V, N, 3] are as a whole, [V, 3] of mean 0: without it, what one view alone sees would keep
-    that view's exposure. weights [V, N]."""
+    """How much higher than the others' each view's log colours [V, N, 3] are as a whole, [V, 3] of mean 0: without it,
+    what one view alone sees would keep that view's exposure. weights [V, N]."""
     level = np.zeros((len(colours), 3), np.float32)
     shared = (weights > 0) & ((weights > 0).sum(0) > 1)
     for _ in range(20):
@@ -113,34 +120,42 @@ def robust_mean(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 
 def network_input(texels: Texels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """[CHANNELS, S, S] and light [6, S, S] for TexelNet, and the mean log colour [3] of the face that was seen, by which the log-shading that comes out is
-    lower. light: what the fitted sky gives and the fitted sun would add, each channel over the mean of both on the face."""
+    """[CHANNELS, S, S] and light [6, S, S] for TexelNet, and the mean log colour [3] of the face that was seen, by
+    which the log-shading that comes out is lower. light: what the fitted sky gives and the fitted sun would add, each
+    channel over the mean of both on the face."""
     side = len(texels.log)
-    seen, covered = (np.clip(texels.seen, 0, 1) * texels.covered)[..., None], texels.covered[..., None].astype(np.float32)
+    seen, covered = (np.clip(texels.seen, 0, 1)
+                     * texels.covered)[..., None], texels.covered[..., None].astype(np.float32)
     known = np.minimum(seen[..., 0] / 0.2, 1) * template.mask("face", side)
     middle = np.average(texels.log.reshape(-1, 3), axis=0, weights=known.reshape(-1) + 1e-9).astype(np.float32)
     sun = texels.direct.max(-1) * texels.free
     lit = sun / np.maximum(texels.ambient.max(-1) + sun, 1e-6)
     sunlit = texels.ambient + texels.direct * texels.free[..., None]
-    layers = [(texels.log - middle) * (seen > 0), texels.spread[..., None], seen, texels.normal * covered, texels.open[..., None] * covered]
-    layers += [np.clip(texels.log - np.log(np.maximum(light, DARKEST / 4)), -MOST_LOG, MOST_LOG) * (seen > 0) for light in (texels.ambient, sunlit)]
+    layers = [(texels.log - middle) * (seen > 0), texels.spread[..., None], seen, texels.normal * covered,
+              texels.open[..., None] * covered]
+    layers += [np.clip(texels.log - np.log(np.maximum(light, DARKEST / 4)), -MOST_LOG, MOST_LOG) * (seen > 0)
+               for light in (texels.ambient, sunlit)]
     layers += [lit[..., None] * covered, border_distance(lit > 1e-3, texels.covered)[..., None], covered, _place(side)]
     whole = np.average((texels.ambient + texels.direct).reshape(-1, 3), axis=0, weights=known.reshape(-1) + 1e-9)
     light = np.concatenate([texels.ambient / np.maximum(whole, 1e-6), texels.direct / np.maximum(whole, 1e-6)], -1)
-    return np.concatenate(layers, -1).transpose(2, 0, 1).astype(np.float32), light.transpose(2, 0, 1).astype(np.float32), middle
+    return np.concatenate(layers, -1).transpose(2, 0,
+                                                1).astype(np.float32), light.transpose(2, 0,
+                                                                                       1).astype(np.float32), middle
 
 
 def border_distance(lit: np.ndarray, covered: np.ndarray) -> np.ndarray:
-    """Signed distance [S, S] to the border of where the fitted sun falls (bool [S, S]), in [-1, 1]: positive within, 1 from BORDER_TEXELS on, 0 where there is
-    no sun or no head."""
+    """Signed distance [S, S] to the border of where the fitted sun falls (bool [S, S]), in [-1, 1]: positive within, 1
+    from BORDER_TEXELS on, 0 where there is no sun or no head."""
     if not (lit & covered).any() or not (~lit & covered).any():
         return np.zeros(lit.shape, np.float32)
-    within, beyond = (cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5) for part in (lit | ~covered, ~lit | ~covered))
+    within, beyond = (cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5)
+                      for part in (lit | ~covered, ~lit | ~covered))
     return np.tanh(np.where(lit, within, -beyond) * SIDE / len(lit) / BORDER_TEXELS).astype(np.float32) * covered
 
 
 def _place(side: int) -> np.ndarray:
-    """Where on the face a texel lies [S, S, 6]: masks of brows, lips, eyes and nostrils, and u (from the middle, alike on both sides) and v in [-1, 1]."""
+    """Where on the face a texel lies [S, S, 6]: masks of brows, lips, eyes and nostrils, and u (from the middle, alike
+    on both sides) and v in [-1, 1]."""
     v, u = (np.mgrid[0:side, 0:side] + 0.5) * 2 / side - 1
     masks = [template.mask(name, side) for name in ("brows", "lips", "eyes", "nostrils")]
     return np.stack([*masks, np.abs(u), v], -1).astype(np.float32)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The delighting network: a small U-Net from a picture of a face to its log-shading and its shadows, at half the picture's resolution.
+"""The delighting network: a small U-Net from a picture of a face to its log-shading and its shadows, at half the
+picture's resolution.
 
 What goes in is the same in training and in use: `network_input`. All logarithms are natural and of linear light.
 """
@@ -21,12 +22,13 @@ DARKEST = 0.004  # linear; below is noise
 MULTIPLE = 32  # of pixels, to be halved so often
 
 
-def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: np.ndarray | None = None, normal: np.ndarray | None = None,
-                  head: np.ndarray | None = None) -> tuple[np.ndarray, float]:
+def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: np.ndarray | None = None,
+                  normal: np.ndarray | None = None, head: np.ndarray | None = None) -> tuple[np.ndarray, float]:
     """[CHANNELS, S, S] and the middle of the picture's log, by which the log-shading that comes out is lower.
 
-    srgb [S, S, 3]. If the head's geometry is known: ambient and sunlit [S, S, 3], linear colour of its skin under the fitted sky alone and with the fitted
-    sun, normal [S, S, 3] in camera coordinates, head [S, S] where they hold. Without it these channels are 0, and so is the last, which says so.
+    srgb [S, S, 3]. If the head's geometry is known: ambient and sunlit [S, S, 3], linear colour of its skin under the
+    fitted sky alone and with the fitted sun, normal [S, S, 3] in camera coordinates, head [S, S] where they hold.
+    Without it these channels are 0, and so is the last, which says so.
     """
     log = np.log(np.maximum(images.srgb_to_linear(srgb), DARKEST))
     side = len(log)
@@ -37,14 +39,16 @@ def network_input(srgb: np.ndarray, ambient: np.ndarray | None = None, sunlit: n
     layers[3:6] = (log - middle).transpose(2, 0, 1)
     if ambient is not None:
         for first, light in ((6, ambient), (9, sunlit)):
-            layers[first:first + 3] = (np.clip(log - np.log(np.maximum(light, DARKEST / 4)), -2.5, 2.5) * head[..., None]).transpose(2, 0, 1)
+            layers[first:first + 3] = (np.clip(log - np.log(np.maximum(light, DARKEST / 4)), -2.5, 2.5)
+                                       * head[..., None]).transpose(2, 0, 1)
         layers[12:15] = (normal * head[..., None]).transpose(2, 0, 1)
         layers[15] = head
     return layers, middle
 
 
 class Trunk(nn.Module):
-    """A U-Net over levels of these `widths`, each of `depths` blocks and half as fine as the one before; the coarsest attends to all of itself."""
+    """A U-Net over levels of these `widths`, each of `depths` blocks and half as fine as the one before; the coarsest
+    attends to all of itself."""
 
     def __init__(self, widths: list[int], depths: list[int]):
         super().__init__()
@@ -67,17 +71,20 @@ class Trunk(nn.Module):
                 x = self.halve[level](x)
         x = self.attention(x)
         for level in reversed(range(len(self.halve))):
-            x = kept[level] + functional.interpolate(self.narrow[level](x), scale_factor=2, mode="bilinear", align_corners=False)
+            x = kept[level] + functional.interpolate(self.narrow[level](x), scale_factor=2, mode="bilinear",
+                                                     align_corners=False)
             x = self.up[level](x)
         return x
 
 
 class DelightNet(Trunk):
-    """[N, CHANNELS, S, S] -> log-shading less the picture's middle [N, 3, S/2, S/2] and shadow logits [N, 1, S/2, S/2]. S is a multiple of MULTIPLE."""
+    """[N, CHANNELS, S, S] -> log-shading less the picture's middle [N, 3, S/2, S/2] and shadow logits [N, 1, S/2, S/2].
+    S is a multiple of MULTIPLE."""
 
     def __init__(self, widths: list[int], depths: list[int]):
         super().__init__(widths, depths)
-        self.stem, self.enter = nn.Conv2d(CHANNELS, FINE, 4, stride=2, padding=1), nn.Conv2d(FINE, widths[0], 2, stride=2)
+        self.stem, self.enter = nn.Conv2d(CHANNELS, FINE, 4, stride=2,
+                                          padding=1), nn.Conv2d(FINE, widths[0], 2, stride=2)
         self.leave = nn.Conv2d(widths[0], 4 * FINE, 1)  # the finest level, where pictures are large, is kept thin
         self.last, self.out = nn.Conv2d(2 * FINE, 2 * FINE, 3, padding=1), nn.Conv2d(2 * FINE, 4, 3, padding=1)
         nn.init.zeros_(self.out.weight)
@@ -92,7 +99,8 @@ class DelightNet(Trunk):
 
 
 class Block(nn.Module):
-    """x + conv(gelu(conv(norm(x)))), and a gate per channel from the whole map's mean: exposure and light are matters of the whole picture."""
+    """x + conv(gelu(conv(norm(x)))), and a gate per channel from the whole map's mean: exposure and light are matters
+    of the whole picture."""
 
     def __init__(self, width: int):
         super().__init__()

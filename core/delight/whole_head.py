@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture's frames without their light, by one shading of the whole head: a network tells it in the head's own UV space from what all views saw
-(texels.py), and every frame is divided by it where it shows the head. `core train texels` makes the weights."""
+"""A capture's frames without their light, by one shading of the whole head: a network tells it in the head's own UV
+space from what all views saw (texels.py), and every frame is divided by it where it shows the head. `core train texels`
+makes the weights."""
 
 from __future__ import annotations
 
@@ -34,8 +35,9 @@ WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
 
 @dataclass(frozen=True)
 class Shading:
-    """What a network says of a head, in its UVs: log float32 [S, S, 3], natural log of what the albedo is multiplied by; shadow [S, S] in [0, 1]; spread
-    [3, S / 4, S / 4], the expected error of `log` in each of texel_net.BANDS, natural log units."""
+    """What a network says of a head, in its UVs: log float32 [S, S, 3], natural log of what the albedo is multiplied
+    by; shadow [S, S] in [0, 1]; spread [3, S / 4, S / 4], the expected error of `log` in each of texel_net.BANDS,
+    natural log units."""
 
     log: np.ndarray
     shadow: np.ndarray
@@ -43,11 +45,13 @@ class Shading:
 
 
 def whole_head(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
-    """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see the head."""
+    """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see
+    the head."""
     net, views = load(settings.compute_device), read_views(capture, selected_only=True)
     filmed = read_head(capture)
     if not filmed.built_in:
-        raise Problem("Whole Head knows the built-in head's UVs alone, and this capture's head has others.", "Choose Network or Shading to delight with.")
+        raise Problem("Whole Head knows the built-in head's UVs alone, and this capture's head has others.",
+                      "Choose Network or Shading to delight with.")
     head = lit_head(filmed, views, report)
     texels = gather(head, views, report)
     found = tell_shading(net, texels)
@@ -61,7 +65,8 @@ def load(device: str, weights: Path = WEIGHTS) -> TexelNet:
     """The shipped network. Raises Problem where its file or its card is missing."""
     card = weights.with_suffix(".json")
     if not (weights.is_file() and card.is_file()):
-        raise Problem("The weights of the delighting network are missing.", "Install the add-on again, or choose the delighter 'shading'.")
+        raise Problem("The weights of the delighting network are missing.",
+                      "Install the add-on again, or choose the delighter 'shading'.")
     if weights == WEIGHTS:
         shipped_files.require_whole(weights)
     net = TexelNet(**json.loads(card.read_text(encoding="utf-8"))["model"])
@@ -76,9 +81,11 @@ def tell_shading(net: TexelNet, texels: Texels) -> Shading:
     turned = layers[:, :, ::-1].copy()
     turned[5] *= -1
     device = next(net.parameters()).device
-    both = (torch.from_numpy(np.stack(pair)).to(device, memory_format=torch.channels_last) for pair in ((layers, turned), (light, light[:, :, ::-1])))
+    both = (torch.from_numpy(np.stack(pair)).to(device, memory_format=torch.channels_last)
+            for pair in ((layers, turned), (light, light[:, :, ::-1])))
     parts = net(*both)
-    shading, shadow, spread = ((part[0] + part[1].flip(-1)).cpu().numpy() / 2 for part in (parts[0], parts[1].sigmoid(), parts[2]))
+    shading, shadow, spread = ((part[0] + part[1].flip(-1)).cpu().numpy() / 2
+                               for part in (parts[0], parts[1].sigmoid(), parts[2]))
     return Shading(shading.transpose(1, 2, 0) + middle, shadow[0], np.exp(spread))
 
 

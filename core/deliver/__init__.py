@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tool deliver: the maps as a preset wants them, with provenance.json, in a hidden folder beside the target.
 
-Blender adds the mesh there and gives the folder its name; with `whole` the mesh is written here, as OBJ, and the folder is in place at the end.
+Blender adds the mesh there and gives the folder its name; with `whole` the mesh is written here, as OBJ, and the folder
+is in place at the end.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ METRES = {"m": 1.0, "cm": 0.01}
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """The map set, packing.json that tells Blender what it is, and provenance.json -> the plan's staged folder, whole or not at all.
+    """The map set, packing.json that tells Blender what it is, and provenance.json -> the plan's staged folder, whole
+    or not at all.
 
     Raises Problem, and delivers nothing, where a stage is out of date, or one of its files is damaged."""
     plan = delivery_plan.plan(capture, settings.deliver)
@@ -36,7 +38,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     mesh = delivery_plan.needs(capture, plan.what)
     checks.check_stages(capture, plan.what, settings, report)
     if settings.deliver.whole and plan.format.suffix != ".obj":
-        raise Problem(f"{plan.format.title} is written by Blender.", "Choose OBJ here, or deliver from the add-on's panel.")
+        raise Problem(f"{plan.format.title} is written by Blender.",
+                      "Choose OBJ here, or deliver from the add-on's panel.")
     tiles = _tiles(capture, plan, settings)
     several = len(tiles) > 1
     built_in = read_head(capture).built_in
@@ -49,7 +52,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         (folder / TEXTURES).mkdir()
         made, size = [], 0
         for i, (tile, paths) in enumerate(tiles.items()):
-            sources = maps.Sources(paths, int(settings.deliver.size), settings.deliver.roughness / 100, mean, METRES[plan.unit], regions)
+            sources = maps.Sources(paths, int(settings.deliver.size), settings.deliver.roughness / 100, mean,
+                                   METRES[plan.unit], regions)
             wanted = [picture for picture in pictures if sources.has(picture)]
             for j, picture in enumerate(wanted):
                 number = f".{tile}" if plan.numbered or several else ""
@@ -64,7 +68,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             wavefront.write(mesh, folder / plan.mesh, plan, made, settings.deliver.roughness / 100)
             provenance.finish(folder)
         else:
-            packing = {"name": plan.name, "mesh": plan.mesh, "several": several, "maps": made, "roughness": settings.deliver.roughness / 100}
+            packing = {"name": plan.name, "mesh": plan.mesh, "several": several, "maps": made,
+                       "roughness": settings.deliver.roughness / 100}
             (folder / PACKING).write_text(json.dumps(packing, indent=1), encoding="utf-8")
     if settings.deliver.whole:
         delivery_plan.put_in_place(plan)
@@ -79,42 +84,51 @@ def _pictures(plan: DeliveryPlan, settings: Settings) -> list[MapPicture]:
         return list(SCAN_MAPS)
     base = [picture for picture in plan.preset.maps if picture.channels != ("displacement",) or plan.pictures == "exr"]
     if plan.what == "head" and settings.deliver.clean:
-        base = [MapPicture(p.name, tuple(c.replace("albedo.", "clean.") for c in p.channels), p.kind, p.slot) for p in base]
+        base = [MapPicture(p.name, tuple(c.replace("albedo.", "clean.") for c in p.channels), p.kind, p.slot)
+                for p in base]
     return base + (list(HAIR) if plan.what == "head" and settings.deliver.hair else [])
 
 
 def _tiles(capture: Capture, plan: DeliveryPlan, settings: Settings) -> dict[int, dict[str, Path]]:
-    """UV tile -> its maps by the names of maps.Sources, those that are there. Raises Problem where there is no albedo."""
+    """UV tile -> its maps by the names of maps.Sources, those that are there. Raises Problem where there is no
+    albedo."""
     delivery = capture.delivery
     if plan.what == "scan":
         found = {HEAD_TILE: {"albedo": delivery / "scan_albedo.png", "lit": delivery / "scan_lit.png"}}
     elif plan.what == "own_mesh":
         numbers = [int(path.suffixes[-2][1:]) for path in sorted(delivery.glob("own_diffuse_albedo.????.png"))]
-        found = {number or HEAD_TILE: {name: delivery / f"own_{file}{f'.{number}' if number else ''}.png" for name, file in
-                                       (("albedo", "diffuse_albedo"), ("normal", "normal"), ("specular", "specular_albedo"))} for number in numbers or [0]}
+        found = {number
+                 or HEAD_TILE: {name: delivery / f"own_{file}{f'.{number}' if number else ''}.png" for name, file in
+                                (("albedo", "diffuse_albedo"), ("normal", "normal"), ("specular", "specular_albedo"))}
+                 for number in numbers or [0]}
     else:
         folder = _newest(capture)
-        found = {HEAD_TILE: {"albedo": folder / "diffuse_albedo.png", "normal": folder / "normal.png", "specular": folder / "specular_albedo.png",
-                             "displacement": delivery / "displacement.exr",
-                             **{name: folder / f"{name}.png" for name in ("brows", "lashes", "beard")}, "clean": folder / "clean_albedo.png"}}
+        found = {HEAD_TILE: {"albedo": folder / "diffuse_albedo.png", "normal": folder / "normal.png",
+                             "specular": folder / "specular_albedo.png", "displacement": delivery / "displacement.exr",
+                             **{name: folder / f"{name}.png" for name in ("brows", "lashes", "beard")},
+                             "clean": folder / "clean_albedo.png"}}
     found = {tile: {name: path for name, path in paths.items() if path.is_file()} for tile, paths in found.items()}
     if not all("albedo" in paths for paths in found.values()):
         raise Problem("This capture has no albedo for that mesh.", "Run the stage Delivery again.")
     if plan.what == "head" and settings.deliver.clean and "clean" not in found[HEAD_TILE]:
-        raise Problem("This capture has no albedo without hair.", "Run the stage 4K Maps again, or deliver the albedo as it is.")
+        raise Problem("This capture has no albedo without hair.",
+                      "Run the stage 4K Maps again, or deliver the albedo as it is.")
     return found
 
 
 def _newest(capture: Capture) -> Path:
     """The 4K maps where they are complete and not older than the solved ones, else those."""
-    solved, enlarged = ([folder / name for name in stages.MAPS if name.endswith(".png")] for folder in (capture.maps, capture.maps_4k))
-    fresh = all(path.is_file() for path in enlarged) and min(path.stat().st_mtime for path in enlarged) >= max(path.stat().st_mtime for path in solved)
+    solved, enlarged = ([folder / name for name in stages.MAPS if name.endswith(".png")]
+                        for folder in (capture.maps, capture.maps_4k))
+    fresh = all(path.is_file() for path in enlarged) and min(path.stat().st_mtime
+                                                             for path in enlarged) >= max(path.stat().st_mtime
+                                                                                          for path in solved)
     return capture.maps_4k if fresh else capture.maps
 
 
 def _mean_specular(capture: Capture, built_in: bool) -> float:
-    """The specular map's mean on cheeks and forehead, by which its values are told against skin's reflectance: as the stage upscale found it, else the mean
-    over the face, or, without our UVs, where the maps are sure."""
+    """The specular map's mean on cheeks and forehead, by which its values are told against skin's reflectance: as the
+    stage upscale found it, else the mean over the face, or, without our UVs, where the maps are sure."""
     told = capture.read()["stages"].get("upscale", {}).get("figures", {}).get("specular_mean")
     if told:
         return float(told)

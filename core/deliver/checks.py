@@ -12,12 +12,13 @@ from ..contract.messages import Problem, Reporter
 from ..contract.settings import Settings
 
 LAST = {"head": "upscale", "own_mesh": "transfer", "scan": "transfer"}
-"""What is delivered -> the last stage that it comes from. A head's displacement, which the stage after it makes, is left out where there is none."""
+"""What is delivered -> the last stage that it comes from. A head's displacement, which the stage after it makes, is
+left out where there is none."""
 
 
 def check_stages(capture: Capture, what: str, settings: Settings, report: Reporter) -> None:
-    """Raises Problem naming a stage, of those that `what` comes from, whose inputs or settings have changed since. What older code made is delivered, and
-    named in the log."""
+    """Raises Problem naming a stage, of those that `what` comes from, whose inputs or settings have changed since. What
+    older code made is delivered, and named in the log."""
     older = []
     last = stages.NAMES.index(LAST[what])
     if what == "head" and (capture.delivery / "displacement.exr").is_file():
@@ -29,4 +30,5 @@ def check_stages(capture: Capture, what: str, settings: Settings, report: Report
                           f"Click Reconstruct, or run the stage {stage.name} and those after it again, then deliver.")
         older += [stage.label] if verdict.state == OLDER else []
     if older:
-        report.log(f"Made by older code and delivered as it is: {', '.join(older)}. Run a stage again to have it made by WildCap {__version__}.")
+        report.log(f"Made by older code and delivered as it is: {', '.join(older)}. Run a stage again to have it made "
+                   f"by WildCap {__version__}.")

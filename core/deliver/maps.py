@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The map set of a delivery: channels packed, normals flipped, sizes, bit depth and colour space as the target wants them.
+"""The map set of a delivery: channels packed, normals flipped, sizes, bit depth and colour space as the target wants
+them.
 
 A map that the capture lacks is left out.
 """
@@ -21,7 +22,8 @@ from ..face import template
 from ..imaging import images
 
 F0 = 0.0278
-"""What skin of an IOR of 1.4 reflects at normal incidence, ((1.4 - 1) / (1.4 + 1))^2, where the specular map is at its mean of facial skin."""
+"""What skin of an IOR of 1.4 reflects at normal incidence, ((1.4 - 1) / (1.4 + 1))^2, where the specular map is at its
+mean of facial skin."""
 UNREAL_F0 = 0.08
 """What Unreal's Specular of 1 reflects at normal incidence."""
 STRIP = 256
@@ -29,11 +31,12 @@ STRIP = 256
 
 
 class Sources:
-    """The maps of one UV tile, read when they are asked for, at one size. `paths`: albedo, normal, specular, clean, lit ... -> file;
-    `mean` is the specular map's mean on facial skin, `roughness` that of the cheeks, `regions` whether the UVs are those of the built-in head, whose other
-    regions are known; `unit` the metres that 1 is."""
+    """The maps of one UV tile, read when they are asked for, at one size. `paths`: albedo, normal, specular, clean, lit
+    ... -> file; `mean` is the specular map's mean on facial skin, `roughness` that of the cheeks, `regions` whether the
+    UVs are those of the built-in head, whose other regions are known; `unit` the metres that 1 is."""
 
-    def __init__(self, paths: dict[str, Path], size: int, roughness: float, mean: float, unit: float = 1.0, regions: bool = False):
+    def __init__(self, paths: dict[str, Path], size: int, roughness: float, mean: float, unit: float = 1.0,
+                 regions: bool = False):
         self.paths, self.roughness, self.mean, self.unit, self.regions = paths, roughness, mean, unit, regions
         stored = [images.size(path)[0] for name, path in paths.items() if name in ("albedo", "normal")]
         self.size = min([size, *stored])
@@ -44,7 +47,8 @@ class Sources:
         return {_file_of(term) for term in picture.channels} - {"roughness", ""} <= set(self.paths)
 
     def channel(self, term: str) -> np.ndarray:
-        """One channel float32 [S, S]: linear light of albedo, clean and lit, x, y, z of the normal in [-1, 1], stored values of the rest."""
+        """One channel float32 [S, S]: linear light of albedo, clean and lit, x, y, z of the normal in [-1, 1], stored
+        values of the rest."""
         name, _, part = term.partition(".")
         if part:
             return self._file(name)[..., "rgbxyz".index(part) % 3]
@@ -52,11 +56,15 @@ class Sources:
             return np.full((self.size, self.size), float(term), np.float32)
         if term in ("roughness", "smoothness"):
             rough = np.full((self.size, self.size), self.roughness, np.float32)
-            rough = np.clip(rough * (1 + _shares(self.size)), 0, 1) if self.regions else rough  # as the node group WildCap Skin has it
+            # as the node group WildCap Skin has it
+            rough = np.clip(rough * (1 + _shares(self.size)), 0, 1) if self.regions else rough
             return rough if term == "roughness" else 1 - rough
         if term in ("level", "weight", "f0", "unreal_specular"):
-            level = np.clip(0.5 * self._file("specular") / max(self.mean, 1e-6), 0, 1)  # as the node group WildCap Skin has it
-            return (level * {"level": 1.0, "weight": 2.0, "f0": 2 * F0, "unreal_specular": 2 * F0 / UNREAL_F0}[term]).astype(np.float32)
+            # as the node group WildCap Skin has it
+            level = np.clip(0.5 * self._file("specular") / max(self.mean, 1e-6), 0, 1)
+            return (level
+                    * {"level": 1.0, "weight": 2.0, "f0": 2 * F0,
+                       "unreal_specular": 2 * F0 / UNREAL_F0}[term]).astype(np.float32)
         values = self._file(term)
         return values / self.unit if term == "displacement" else values
 
@@ -66,7 +74,8 @@ class Sources:
 
     def _file(self, name: str) -> np.ndarray:
         if name not in self._read:
-            read = images.read_linear if name in ("albedo", "clean", "lit") else images.read_normals if name == "normal" else images.read_mask
+            read = (images.read_linear if name in ("albedo", "clean", "lit") else images.read_normals
+                    if name == "normal" else images.read_mask)
             self._read[name] = _sized(_square(self.paths[name], read(self.paths[name])), self.size, name == "normal")
         return self._read[name]
 
@@ -74,7 +83,8 @@ class Sources:
 def write(picture: MapPicture, sources: Sources, path: Path, plan: DeliveryPlan) -> None:
     """One file of the set, atomically. The picture's files must be there (Sources.has)."""
     bits = {"png8": 8, "png16": 16, "exr": 16}[plan.pictures]
-    as_it_is = picture.channels[0].endswith((".r", ".x")) and len(picture.channels) == 3 and _file_of(picture.channels[0])
+    as_it_is = picture.channels[0].endswith((".r",
+                                             ".x")) and len(picture.channels) == 3 and _file_of(picture.channels[0])
     if as_it_is and _stored_alike(picture, sources, plan, as_it_is):
         sources.check(as_it_is)
         shutil.copyfile(sources.paths[as_it_is], path)  # byte for byte what the worker's stage wrote
@@ -112,21 +122,29 @@ def _file_of(term: str) -> str:
     if term in ("0", "1"):
         return ""
     name = term.partition(".")[0]
-    return {"level": "specular", "weight": "specular", "f0": "specular", "unreal_specular": "specular", "smoothness": "roughness"}.get(name, name)
+    return {"level": "specular", "weight": "specular", "f0": "specular", "unreal_specular": "specular",
+            "smoothness": "roughness"}.get(name, name)
 
 
 def _stored_alike(picture: MapPicture, sources: Sources, plan: DeliveryPlan, name: str) -> bool:
     """Whether the capture's own file is the one that is wanted: 16 bit PNG of that size, sRGB or OpenGL."""
     source = sources.paths[name]
     right = plan.colour == "srgb" if picture.kind == COLOUR else plan.normals == "opengl"
-    return right and plan.pictures == "png16" and source.suffix == ".png" and images.bits(source) == 16 and images.size(source) == (sources.size, sources.size)
+    return (
+        right
+        and plan.pictures == "png16"
+        and source.suffix == ".png"
+        and images.bits(source) == 16
+        and images.size(source) == (sources.size, sources.size)
+    )
 
 
 def _square(path: Path, pixels: np.ndarray) -> np.ndarray:
     """The pixels [S, S(, C)] themselves. Raises Problem for a map of another shape."""
     height, width = pixels.shape[:2]
     if width != height:
-        raise Problem(f"{path} is {width} x {height}, and a map is square.", advise_remaking(path, "Run the stage that makes it again."))
+        raise Problem(f"{path} is {width} x {height}, and a map is square.",
+                      advise_remaking(path, "Run the stage that makes it again."))
     return pixels
 
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture's OBJ with the delivery's unit, Y up, and an MTL that names its maps: what can be delivered without Blender.
+"""A capture's OBJ with the delivery's unit, Y up, and an MTL that names its maps: what can be delivered without
+Blender.
 
 Lines are passed on one by one: polygons, UVs and the order of vertices stay as they are.
 """
@@ -18,7 +19,8 @@ LINKS = {"base_color": "map_Kd", "normal": "norm", "roughness": "map_Pr", "specu
 
 
 def write(source: Path, path: Path, plan: DeliveryPlan, maps: list[dict], roughness: float) -> None:
-    """`path` and its .mtl from the capture's `source` (metres, Z up, face towards -Y); `maps` are the files that were made."""
+    """`path` and its .mtl from the capture's `source` (metres, Z up, face towards -Y); `maps` are the files that were
+    made."""
     factor = {"m": 1.0, "cm": 100.0}[plan.unit]
     tiles = sorted({entry["tile"] for entry in maps})
     uvs, lines, now = [], [f"mtllib {path.stem}.mtl", f"o {plan.name}"], None
@@ -42,11 +44,13 @@ def write(source: Path, path: Path, plan: DeliveryPlan, maps: list[dict], roughn
         elif key in ("g", "s"):
             lines.append(line)
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    path.with_suffix(".mtl").write_text("\n".join(_material(plan, tile, maps, roughness, len(tiles) > 1) for tile in tiles), encoding="utf-8")
+    path.with_suffix(".mtl").write_text("\n".join(_material(plan, tile, maps, roughness, len(tiles) > 1)
+                                                  for tile in tiles), encoding="utf-8")
 
 
 def _tile(corners: list[str], uvs: list[tuple[float, float]], tiles: list[int]) -> int:
-    """The UV tile that a face's middle lies in; faces in tiles without maps (teeth, eyes) get the first one's material."""
+    """The UV tile that a face's middle lies in; faces in tiles without maps (teeth, eyes) get the first one's
+    material."""
     indices = [int(parts[1]) for parts in (corner.split("/") for corner in corners) if len(parts) > 1 and parts[1]]
     if not indices:
         return tiles[0]

@@ -16,10 +16,12 @@ from ..geometry import raster
 from ..imaging import images
 from . import template
 
-PLACES = (((132, 58, 172, 136, 150, 149, 176, 148, 152, 377, 400, 378, 379, 365, 397, 288, 361), 16.0), ((92, 165, 167, 164, 393, 391, 322), 6.5),
+PLACES = (((132, 58, 172, 136, 150, 149, 176, 148, 152, 377, 400, 378, 379, 365, 397, 288, 361), 16.0),
+          ((92, 165, 167, 164, 393, 391, 322), 6.5),
           ((18, 200, 199, 201, 421, 204, 424, 202, 422, 212, 432, 57, 287), 9.0), ((127, 234, 93, 356, 454, 323), 8.0),
           ((214, 434, 192, 416, 213, 433, 147, 376, 135, 364, 169, 394, 210, 430, 138, 367), 10.0))
-"""MediaPipe landmarks about which a beard grows, and how far in mm: jaw, upper lip, chin, before the ears, lower cheeks."""
+"""MediaPipe landmarks about which a beard grows, and how far in mm: jaw, upper lip, chin, before the ears, lower
+cheeks."""
 BELOW_JAW = (0.0, 14.0, -22.0), 18.0
 """mm from the jaw to where the beard goes on below it, and how far it reaches there."""
 STEP = 4
@@ -29,7 +31,8 @@ OUTSTANDING = 2.5
 AROUND = 0.5
 """mm about a stroke that count as stroked: many hairs tell a beard, not one long edge of a shadow."""
 STROKED = 0.10, 0.25
-"""Share of the skin that is stroked, beyond the bare skin's own, at which a beard begins, and from which on there is one."""
+"""Share of the skin that is stroked, beyond the bare skin's own, at which a beard begins, and from which on there is
+one."""
 LEAST = 0.10
 """Share of where a beard may grow that must have one: less is freckles, scars or the edges of shadows."""
 SIZE = 1024
@@ -39,13 +42,16 @@ SIZE = 1024
 def seen_in(texture: np.ndarray, confidence: np.ndarray) -> np.ndarray:
     """How sure it is that a beard grows here, float32 [SIZE, SIZE] in [0, 1], from a texture of the built-in head.
 
-    texture linear [S, S, 3]; confidence [S, S]: how well each texel was seen. Zero everywhere where the texture is too small to show strokes.
+    texture linear [S, S, 3]; confidence [S, S]: how well each texel was seen. Zero everywhere where the texture is too
+    small to show strokes.
     """
     if len(texture) < SIZE:
         return np.zeros((SIZE, SIZE), np.float32)
     light = np.log(np.maximum(images.resize(texture, SIZE, SIZE), 1e-3)).mean(-1).astype(np.float32)
     grows, texel = _on_template()
-    bare = (template.mask("skin", SIZE) > 0.99) & (grows < 0.05) & (template.mask("brows", SIZE) < 0.01) & (images.resize(confidence, SIZE, SIZE) > 0.5)
+    bare = (template.mask("skin", SIZE) > 0.99) & (grows
+                                                   < 0.05) & (template.mask("brows", SIZE)
+                                                              < 0.01) & (images.resize(confidence, SIZE, SIZE) > 0.5)
     small = fine(light, float(np.median(texel)))
     return presence(small, deviation(small[bare]), bare, grows, texel)
 
@@ -58,7 +64,9 @@ def zone(landmarks: np.ndarray, position: np.ndarray) -> np.ndarray:
     out, size = np.zeros(coarse.shape[:2], np.float32), len(position)
     for centres, radius in near:
         for centre in centres:
-            np.maximum(out, np.clip(1.8 - ((coarse - centre.astype(np.float32)) ** 2).sum(-1) / np.float32(radius**2), 0, 1), out=out)
+            np.maximum(out,
+                       np.clip(1.8 - ((coarse - centre.astype(np.float32)) ** 2).sum(-1) / np.float32(radius**2), 0, 1),
+                       out=out)
     bar = np.maximum.reduce([template.mask(name, size) for name in ("lips", "ears", "scalp", "nostrils", "nose")])
     return cv2.resize(out, (size, size), interpolation=cv2.INTER_LINEAR) * (1 - bar)
 
@@ -66,7 +74,8 @@ def zone(landmarks: np.ndarray, position: np.ndarray) -> np.ndarray:
 def presence(small: np.ndarray, usual: float, bare: np.ndarray, grows: np.ndarray, texel: np.ndarray) -> np.ndarray:
     """How sure it is that a beard grows here, [S, S] in [0, 1]: from the share of dark strokes around.
 
-    small: `fine` of the log albedo, usual its `deviation` on skin that is `bare` (bool); grows: `zone`; texel: width of each texel in mm; all [S, S].
+    small: `fine` of the log albedo, usual its `deviation` on skin that is `bare` (bool); grows: `zone`; texel: width of
+    each texel in mm; all [S, S].
     """
     width = float(np.median(texel))
     stroked = cv2.dilate((small < -OUTSTANDING * usual).astype(np.float32), disc(AROUND / width))
@@ -94,10 +103,12 @@ def disc(radius: float) -> np.ndarray:
 
 @cache
 def _on_template() -> tuple[np.ndarray, np.ndarray]:
-    """`zone` and the width of each texel in mm [SIZE, SIZE] on the built-in head before it is fitted: near enough for what is soft by millimetres."""
+    """`zone` and the width of each texel in mm [SIZE, SIZE] on the built-in head before it is fitted: near enough for
+    what is soft by millimetres."""
     mesh, (face, bary) = template.load(), raster.rasterize_uv(template.load(), SIZE)
     at, weight = template.landmarks()
     landmarks = 1000 * (mesh.vertices[mesh.faces[at]] * weight[..., None]).sum(1)
-    position = raster.bleed(raster.interpolate(1000 * mesh.vertices, mesh.faces, face, bary).astype(np.float32), face >= 0)
+    position = raster.bleed(raster.interpolate(1000 * mesh.vertices, mesh.faces, face, bary).astype(np.float32),
+                            face >= 0)
     width = np.sqrt(np.linalg.norm(np.cross(*(np.gradient(position, axis=axis) for axis in (0, 1))), axis=-1))
     return zone(landmarks, position), np.minimum(width, 3 * np.median(width))

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces and people in pictures: MediaPipe's detector, 468 face-mesh landmarks, eyelids and person segmentation, run by OpenCV.
+"""Faces and people in pictures: MediaPipe's detector, 468 face-mesh landmarks, eyelids and person segmentation, run by
+OpenCV.
 
 The networks lie in core/weights/face_nets, with their notice (Apache-2.0).
 Bazarevsky et al., BlazeFace (2019); Kartynnik et al., Real-time Facial Surface Geometry (2019).
@@ -19,12 +20,14 @@ from ..contract import shipped_files
 from ..contract.messages import Problem
 
 RIGHT_EYE, LEFT_EYE = (33, 133), (362, 263)
-"""Landmarks at the outer and inner corner of the person's right eye, and at the inner and outer of the left: they stay put when the lids close."""
+"""Landmarks at the outer and inner corner of the person's right eye, and at the inner and outer of the left: they stay
+put when the lids close."""
 BROW, CHIN, NOSE = 9, 152, 1
 EYE_CROP = 2.3
 """Side of the square that the eye network is shown, in distances between the eye's corners."""
 NEAR_DEG, FAR_DEG = 50.0, 25.0
-"""How far the head may be turned for the marks of the eye on the near side of the nose to hold, and of the one beyond it."""
+"""How far the head may be turned for the marks of the eye on the near side of the nose to hold, and of the one beyond
+it."""
 AS_OPEN = 0.3
 """Share by which an eye's opening may differ from its usual one: a blink, or a look down, beyond."""
 DATA_FILES = ("weights/face_nets/face_detection_short_range.tflite", "weights/face_nets/face_landmark.tflite",
@@ -48,15 +51,16 @@ class Face:
 
     @property
     def yaw_deg(self) -> float:
-        """How far the head is turned, in degrees: 0 faces the camera, positive where it turns to the picture's right."""
+        """How far the head is turned, in degrees: 0 faces the camera, positive where it turns to the picture's
+        right."""
         across = self.landmarks[list(LEFT_EYE)].mean(0) - self.landmarks[list(RIGHT_EYE)].mean(0)
         return float(np.degrees(np.arctan2(across[2], np.linalg.norm(across[:2]))))
 
 
 @dataclass(frozen=True)
 class Eye:
-    """An eye in a picture, in pixels (centres at +0.5): upper and lower edge of its lids [9, 2], both from the outer corner to the inner one; centre [2]
-    and radius of the iris."""
+    """An eye in a picture, in pixels (centres at +0.5): upper and lower edge of its lids [9, 2], both from the outer
+    corner to the inner one; centre [2] and radius of the iris."""
 
     upper: np.ndarray
     lower: np.ndarray
@@ -81,8 +85,8 @@ class Eye:
 def detect(srgb: np.ndarray, last: Face | None = None) -> Face | None:
     """The most prominent face (large, and near the middle) of an sRGB picture [H, W, 3] in [0, 1], or None.
 
-    `last`, the face of the frame before, is followed first: turned heads stay found where the detector alone loses them.
-    Raises Problem where the networks are not installed.
+    `last`, the face of the frame before, is followed first: turned heads stay found where the detector alone loses
+    them. Raises Problem where the networks are not installed.
     """
     image = np.clip(np.asarray(srgb, np.float32), 0, 1)
     if last is not None:
@@ -105,7 +109,8 @@ def detect_others(srgb: np.ndarray, face: Face) -> list[Face]:
     for region in _detect_regions(image, 0.0):
         if np.hypot(region[0] - x, region[1] - y) > 0.5 * max(face.width, region[2] / 1.5):
             other = _landmarks(image, region)
-            if other is not None and other.score > 0.8 and np.hypot(*np.subtract(_middle(other), (x, y))) > 0.5 * face.width:
+            if other is not None and other.score > 0.8 and np.hypot(*np.subtract(_middle(other),
+                                                                                 (x, y))) > 0.5 * face.width:
                 found.append(other)
     return found
 
@@ -116,8 +121,8 @@ def prominence(face: Face, width: int, height: int) -> float:
 
 
 def eye_openness(srgb: np.ndarray, face: Face) -> tuple[float, float]:
-    """Height over width of the opening between the lids of the person's right and left eye: 0.25 to 0.5 open, about 0.1 closed, where seen from
-    in front. From the eye network: the face mesh calls closed lids half open."""
+    """Height over width of the opening between the lids of the person's right and left eye: 0.25 to 0.5 open, about 0.1
+    closed, where seen from in front. From the eye network: the face mesh calls closed lids half open."""
     right, left = find_eyes(srgb, face)
     return right.opening, left.opening
 
@@ -129,7 +134,8 @@ def shows_eye(yaw_deg: float, side: int) -> bool:
 
 
 def find_eyes(srgb: np.ndarray, face: Face) -> tuple[Eye, Eye]:
-    """The person's right and left eye in an sRGB picture [H, W, 3], by the eye network (Ablavatski et al., Real-time Pupil Tracking, 2020)."""
+    """The person's right and left eye in an sRGB picture [H, W, 3], by the eye network (Ablavatski et al., Real-time
+    Pupil Tracking, 2020)."""
     image = np.clip(np.asarray(srgb, np.float32), 0, 1)
     return _find_eye(image, face, RIGHT_EYE, False), _find_eye(image, face, LEFT_EYE[::-1], True)
 
@@ -140,13 +146,15 @@ def _find_eye(image: np.ndarray, face: Face, corners: tuple[int, int], mirrored:
     from_, to = ends[::-1] if mirrored else ends
     side = EYE_CROP * max(float(np.linalg.norm(to - from_)), 1.0)
     crop, to_crop = _crop(image, (*((from_ + to) / 2), side, np.arctan2(*(to - from_)[::-1])), 64)
-    outputs = {points.size: points.reshape(-1, 3)[:, :2] for points in _run(_EYE, crop[:, ::-1] if mirrored else crop)}  # it knows right eyes
+    # it knows right eyes
+    outputs = {points.size: points.reshape(-1, 3)[:, :2] for points in _run(_EYE, crop[:, ::-1] if mirrored else crop)}
     marks = np.concatenate([outputs[213][:16], outputs[15]])
     if mirrored:
         marks[:, 0] = 64 - marks[:, 0]
     marks = (marks - to_crop[:, 2]) @ np.linalg.inv(to_crop[:, :2]).T
     contour = marks[:16]  # 9 below from the outer corner to the inner one, 7 above
-    return Eye(contour[[0, *range(9, 16), 8]], contour[:9], marks[16], float(np.linalg.norm(marks[17:] - marks[16], axis=1).mean()))
+    return Eye(contour[[0, *range(9, 16), 8]], contour[:9], marks[16],
+               float(np.linalg.norm(marks[17:] - marks[16], axis=1).mean()))
 
 
 def segment_person(srgb: np.ndarray) -> np.ndarray:
@@ -158,30 +166,35 @@ def segment_person(srgb: np.ndarray) -> np.ndarray:
 
 
 def _detect_regions(image: np.ndarray, margin: float) -> list[tuple]:
-    """The detections as square regions (centre x, y, side [px], angle [rad]), the most prominent first. `margin` pads the picture by that share
-    of its long side."""
+    """The detections as square regions (centre x, y, side [px], angle [rad]), the most prominent first. `margin` pads
+    the picture by that share of its long side."""
     height, width = image.shape[:2]
     side = max(height, width) * (1 + 2 * margin)
     scale = 128 / side
     move = np.array([[scale, 0, 64 - scale * width / 2], [0, scale, 64 - scale * height / 2]], np.float32)
-    shrunk = cv2.resize(image, (max(1, round(width * scale)), max(1, round(height * scale))), interpolation=cv2.INTER_AREA)
+    shrunk = cv2.resize(image, (max(1, round(width * scale)), max(1, round(height * scale))),
+                        interpolation=cv2.INTER_AREA)
     square = np.zeros((128, 128, 3), np.float32)
     top, left = (128 - shrunk.shape[0]) // 2, (128 - shrunk.shape[1]) // 2
     square[top:top + shrunk.shape[0], left:left + shrunk.shape[1]] = shrunk
     scores, boxes = _run(_SHORT_RANGE, square * 2 - 1)
     scores, boxes = scores.reshape(-1), boxes.reshape(-1, 16)
     sure = scores > 0  # logit of 0.5
-    boxes = boxes[sure] + np.tile(_anchors()[sure], 8) * (np.arange(16) // 2 != 1)  # every pair but width and height is relative to the anchor
+    # every pair but width and height is relative to the anchor
+    boxes = boxes[sure] + np.tile(_anchors()[sure], 8) * (np.arange(16) // 2 != 1)
     weight = 1 / (1 + np.exp(-np.clip(scores[sure], -100, 100)))
     regions = []
     while len(boxes):
-        best = np.argmax(weight * np.sqrt(np.abs(boxes[:, 2] * boxes[:, 3])))  # the most prominent, not merely the surest
+        # the most prominent, not merely the surest
+        best = np.argmax(weight * np.sqrt(np.abs(boxes[:, 2] * boxes[:, 3])))
         distance = np.linalg.norm(boxes[:, :2] - boxes[best, :2], axis=1) / boxes[best, 2]
-        box = np.average(boxes[distance < 0.4], axis=0, weights=weight[distance < 0.4])  # blended, as MediaPipe's weighted suppression
+        # blended, as MediaPipe's weighted suppression
+        box = np.average(boxes[distance < 0.4], axis=0, weights=weight[distance < 0.4])
         right_eye, left_eye = box[4:6], box[6:8]
         angle = np.arctan2(*(left_eye - right_eye)[::-1])
         x, y = (box[:2] - move[:, 2]) / scale
-        regions.append((weight[best] * box[2] * _centrality(x, y, width, height), (x, y, 1.5 * max(box[2], box[3]) / scale, angle)))
+        regions.append((weight[best] * box[2] * _centrality(x, y, width, height),
+                        (x, y, 1.5 * max(box[2], box[3]) / scale, angle)))
         boxes, weight = boxes[distance >= 0.7], weight[distance >= 0.7]
     return [region for _, region in sorted(regions, key=lambda scored: -scored[0])]
 
@@ -224,7 +237,8 @@ def _landmarks(image: np.ndarray, region: tuple) -> Face | None:
 
 
 def _crop(image: np.ndarray, region: tuple, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """A square region of the picture at `size` x `size`, eyes level, and the map [2, 3] to it in pixel-edge coordinates."""
+    """A square region of the picture at `size` x `size`, eyes level, and the map [2, 3] to it in pixel-edge
+    coordinates."""
     x, y, side, angle = region
     scale = size / side
     c, s = np.cos(angle) * scale, np.sin(angle) * scale
@@ -241,7 +255,8 @@ def _crop(image: np.ndarray, region: tuple, size: int) -> tuple[np.ndarray, np.n
 @cache
 def _anchors() -> np.ndarray:
     """Centres of the 896 anchors [896, 2] in pixels of 128 x 128: two per cell of 16 x 16, six per cell of 8 x 8."""
-    return np.concatenate([np.stack(np.meshgrid(*[(np.arange(n) + 0.5) * 128 / n] * 2), -1).reshape(-1, 2).repeat(count, 0) for n, count in ((16, 2), (8, 6))])
+    return np.concatenate([np.stack(np.meshgrid(*[(np.arange(n) + 0.5) * 128 / n] * 2),
+                                    -1).reshape(-1, 2).repeat(count, 0) for n, count in ((16, 2), (8, 6))])
 
 
 def _run(network: Path, image: np.ndarray, outputs: tuple | None = None) -> list[np.ndarray]:
@@ -255,6 +270,8 @@ def _run(network: Path, image: np.ndarray, outputs: tuple | None = None) -> list
 def _net(path: Path):
     shipped_files.require_whole(path)
     try:
-        return cv2.dnn.readNetFromTFLite(np.fromfile(path, np.uint8))  # by content: OpenCV may not open a path with accents
+        # by content: OpenCV may not open a path with accents
+        return cv2.dnn.readNetFromTFLite(np.fromfile(path, np.uint8))
     except cv2.error as error:
-        raise Problem(f"OpenCV {cv2.__version__} cannot read the network {path.name}.", "Press Install Solver again: it brings the OpenCV that can.") from error
+        raise Problem(f"OpenCV {cv2.__version__} cannot read the network {path.name}.",
+                      "Press Install Solver again: it brings the OpenCV that can.") from error

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a face wears glasses: how strong thin lines are around both eyes, by direction and place, and one plane through that.
+"""Whether a face wears glasses: how strong thin lines are around both eyes, by direction and place, and one plane
+through that.
 
-Rims, bridge and temples are thin lines where a bare face has none, bright or dark; hard shadows are steps, creases are faint. `python -m core train glasses`
-finds the plane, on synthetic people only.
+Rims, bridge and temples are thin lines where a bare face has none, bright or dark; hard shadows are steps, creases are
+faint. `python -m core train glasses` finds the plane, on synthetic people only.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ WIDTH, HEIGHT, CELL = 128, 64, 8
 THIN_PX, DIRECTIONS = 1.1, 6
 """Scale of the lines, 1.2 mm to a pixel, and how many directions are told apart."""
 GAMMA, DARK, FLAT = 2.2, 0.02, 0.15
-"""Of the logarithm of light that lines are looked for in: what an sRGB value is raised to, what is added so that black is no line, and to its deviation so that
-an even picture is none either."""
+"""Of the logarithm of light that lines are looked for in: what an sRGB value is raised to, what is added so that black
+is no line, and to its deviation so that an even picture is none either."""
 SPAN = 1.75
 """Width of the band in distances between the outer corners of the eyes: from ear to ear, nearly."""
 BELOW = 0.08
@@ -38,7 +39,8 @@ MOST_YAW_DEG = 50.0
 
 
 def band(srgb: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
-    """The upright band around the eyes, linear in the picture's values, float32 [HEIGHT, WIDTH], of landmarks [468, 3] as faces.Face has them."""
+    """The upright band around the eyes, linear in the picture's values, float32 [HEIGHT, WIDTH], of landmarks [468, 3]
+    as faces.Face has them."""
     right, left = landmarks[list(OUTER)].astype(np.float64)
     across = left[:2] - right[:2]
     across /= max(np.linalg.norm(across), 1e-6)
@@ -49,11 +51,13 @@ def band(srgb: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
     grey = np.ascontiguousarray(srgb @ np.float32([0.299, 0.587, 0.114]), np.float32)
     if scale < 0.8:  # what the warp would alias
         grey = cv2.GaussianBlur(grey, (0, 0), 0.4 * float(np.sqrt(1 / scale**2 - 1)))
-    return cv2.warpAffine(grey, from_centres(move), (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return cv2.warpAffine(grey, from_centres(move), (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR,
+                          borderMode=cv2.BORDER_REPLICATE)
 
 
 def describe(strip: np.ndarray) -> np.ndarray:
-    """How strong thin bright and thin dark lines of each direction are in each cell of a band, as one vector, float32."""
+    """How strong thin bright and thin dark lines of each direction are in each cell of a band, as one vector,
+    float32."""
     shade = np.log(np.clip(strip, 0, 1).astype(np.float64) ** GAMMA + DARK)
     shade = (shade - shade.mean()) / (shade.std() + FLAT)
     down, across, askew = (gaussian_filter(shade, THIN_PX, order=order) for order in ((2, 0), (0, 2), (1, 1)))
@@ -61,7 +65,8 @@ def describe(strip: np.ndarray) -> np.ndarray:
     turn = (np.arctan2(2 * askew, across - down) / 2 % np.pi) * DIRECTIONS / np.pi
     layers = []
     for sign, quarter in ((1, 0), (-1, DIRECTIONS / 2)):
-        line = np.maximum(sign * middle + apart - np.abs(sign * middle - apart), 0)  # curved one way alone, as no step and no spot is
+        # curved one way alone, as no step and no spot is
+        line = np.maximum(sign * middle + apart - np.abs(sign * middle - apart), 0)
         for k in range(DIRECTIONS):
             off = np.abs((turn + quarter - k + DIRECTIONS / 2) % DIRECTIONS - DIRECTIONS / 2)
             layers.append(line * np.clip(1 - off, 0, 1))
@@ -70,7 +75,8 @@ def describe(strip: np.ndarray) -> np.ndarray:
 
 
 def sureness(srgb: np.ndarray, face: faces.Face) -> float:
-    """The logarithm of the odds that the face in an sRGB picture [H, W, 3] wears glasses, nan where it is turned too far to tell."""
+    """The logarithm of the odds that the face in an sRGB picture [H, W, 3] wears glasses, nan where it is turned too
+    far to tell."""
     if abs(face.yaw_deg) > MOST_YAW_DEG:
         return float("nan")
     plane, offset = _plane()

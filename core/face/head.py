@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The registered head of a capture, read once per stage and passed on: its mesh, and what is worked out from it when first asked for.
+"""The registered head of a capture, read once per stage and passed on: its mesh, and what is worked out from it when
+first asked for.
 
 All arrays are shared between those who hold the head, and cannot be written to: copy before writing.
 """
@@ -29,7 +30,8 @@ class Head:
     """Whether the lids are open as they were filmed: then the vertices are those of lids.OpenHead."""
 
     def __init__(self, mesh: Mesh, before: Mesh | None = None):
-        """before: all that light and views meet on their way to the mesh, itself included, where that is more: sockets and eyeballs."""
+        """before: all that light and views meet on their way to the mesh, itself included, where that is more: sockets
+        and eyeballs."""
         self.mesh = mesh
         self._before = before or mesh
         self._rasters: dict[int, tuple[np.ndarray, np.ndarray]] = {}
@@ -63,15 +65,16 @@ class Head:
     def unfold(self, size: int) -> Unfolded:
         face, bary = self.raster(size)
         inside = face >= 0
-        points, normals = (raster.interpolate(values, self.mesh.faces, face[inside], bary[inside]) for values in (self.mesh.vertices, self.normals))
+        points, normals = (raster.interpolate(values, self.mesh.faces, face[inside], bary[inside])
+                           for values in (self.mesh.vertices, self.normals))
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), SHORTEST)
         return Unfolded(self, face, bary, _shared(points), _shared(normals))
 
 
 @dataclass(frozen=True)
 class Unfolded:
-    """A head in its UVs: face int32 [S, S] (-1: none) and bary float32 [S, S, 3] of the raster; points (metres) and unit normals [N, 3] of its N covered
-    texels, row by row."""
+    """A head in its UVs: face int32 [S, S] (-1: none) and bary float32 [S, S, 3] of the raster; points (metres) and
+    unit normals [N, 3] of its N covered texels, row by row."""
 
     head: Head
     face: np.ndarray
@@ -113,15 +116,17 @@ def read_head(capture: Capture) -> Head:
 
 
 def read_filmed_head(capture: Capture) -> Head:
-    """The head as it was filmed, with the UVs and triangles of `read_head`'s: where its eyes were open, its lids are, and eyeballs lie between them, so that
-    no iris is seen on a lid. Raises Problem as `read_head` does, and where head_open.obj or eyes.json is damaged."""
+    """The head as it was filmed, with the UVs and triangles of `read_head`'s: where its eyes were open, its lids are,
+    and eyeballs lie between them, so that no iris is seen on a lid. Raises Problem as `read_head` does, and where
+    head_open.obj or eyes.json is damaged."""
     head = read_head(capture)
     if not (head.built_in and capture.head_open.is_file() and capture.eyes.is_file()):
         return head
     opened = meshes.read_obj(capture.head_open)
     if not lids.belongs_to(opened, head.mesh):  # another head.obj was put beside it
         return head
-    balls = [lids.place_ball(side, np.array(eye.centre), eye.radius, np.array(eye.gaze)).mesh for side, eye in enumerate(read_eyes(capture))]
+    balls = [lids.place_ball(side, np.array(eye.centre), eye.radius, np.array(eye.gaze)).mesh
+             for side, eye in enumerate(read_eyes(capture))]
     whole = meshes.joined([opened, *balls])
     count = len(head.mesh.faces)
     mesh = replace(head.mesh, vertices=_shared(opened.vertices), faces=_shared(opened.faces[:count]))

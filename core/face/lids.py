@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built-in head cut open at the lids, with sockets and eyeballs behind them, from assets/face_units.npz (see NOTICE.md there).
+"""The built-in head cut open at the lids, with sockets and eyeballs behind them, from assets/face_units.npz (see
+NOTICE.md there).
 
 The lips stay closed. The head's triangles keep their numbers, so what is painted in its UVs stays where it was.
 """
@@ -29,8 +30,8 @@ REST_M = -0.003, 0.010  # how far an eyeball may lie behind the place that its s
 
 @dataclass(frozen=True)
 class PosedEyeball:
-    """centre [3] metres; radius in metres; gaze [3] unit; mesh: its vertices, with UVs whose distance from the middle (0.5, 0.5) grows with the angle from
-    the pupil: 0.5 (angle / pi)^0.6."""
+    """centre [3] metres; radius in metres; gaze [3] unit; mesh: its vertices, with UVs whose distance from the middle
+    (0.5, 0.5) grows with the angle from the pupil: 0.5 (angle / pi)^0.6."""
 
     centre: np.ndarray
     radius: float
@@ -40,8 +41,9 @@ class PosedEyeball:
 
 @dataclass(frozen=True)
 class OpenHead:
-    """skin: the head and its sockets in the template's UVs, the template's triangles first; balls: the left and the right eye; rims: upper and lower edge of
-    the left and the right lids as vertex numbers [N], from the inner corner outwards."""
+    """skin: the head and its sockets in the template's UVs, the template's triangles first; balls: the left and the
+    right eye; rims: upper and lower edge of the left and the right lids as vertex numbers [N], from the inner corner
+    outwards."""
 
     skin: Mesh
     balls: tuple[PosedEyeball, PosedEyeball]
@@ -49,15 +51,17 @@ class OpenHead:
 
 
 def open_lids(head: Mesh, openness: float, gaze: np.ndarray) -> OpenHead:
-    """head: a closed head in the template's topology; openness in [0, 1]: 0 shut, 1 as far as MakeHuman opens them; gaze [2]: degrees that both eyes turn to
-    the person's left and up."""
+    """head: a closed head in the template's topology; openness in [0, 1]: 0 shut, 1 as far as MakeHuman opens them;
+    gaze [2]: degrees that both eyes turn to the person's left and up."""
     turn = _turned(np.radians(gaze))
-    return open_around(head, tuple(place_ball(side, *carry_ball(head, side), turn @ FORWARD) for side in (0, 1)), (openness, openness))
+    return open_around(head, tuple(place_ball(side, *carry_ball(head, side), turn @ FORWARD) for side in (0, 1)),
+                       (openness, openness))
 
 
-def open_around(head: Mesh, balls: tuple[PosedEyeball, PosedEyeball], openness: tuple[float, float], shift: np.ndarray | float = 0.0) -> OpenHead:
-    """The closed head with its lids open around given eyeballs; openness: of the left and of the right eye; shift [V + C + P, 3] metres: what all vertices are
-    moved by besides, before the lids are pushed out of the balls."""
+def open_around(head: Mesh, balls: tuple[PosedEyeball, PosedEyeball], openness: tuple[float, float],
+                shift: np.ndarray | float = 0.0) -> OpenHead:
+    """The closed head with its lids open around given eyeballs; openness: of the left and of the right eye; shift [V +
+    C + P, 3] metres: what all vertices are moved by besides, before the lids are pushed out of the balls."""
     unit = _asset()
     rest = np.concatenate([head.vertices, head.vertices[unit.copies], _carried(unit, head)]) + shift
     scale = _scale(unit, head)
@@ -70,7 +74,8 @@ def open_around(head: Mesh, balls: tuple[PosedEyeball, PosedEyeball], openness: 
 
 
 def carry_ball(head: Mesh, side: int) -> tuple[np.ndarray, float]:
-    """Centre [3] and radius of an eyeball (0: the left one): moved from the template as the lids before it are, then back until the closed lids clear it."""
+    """Centre [3] and radius of an eyeball (0: the left one): moved from the template as the lids before it are, then
+    back until the closed lids clear it."""
     unit, rest = _asset(), template.load().vertices
     centre, radius = unit.balls[side, :3], unit.balls[side, 3]
     arm = rest - centre
@@ -95,16 +100,19 @@ def place_ball(side: int, centre: np.ndarray, radius: float, gaze: np.ndarray) -
     unit = _asset()
     mesh, (x, y, z, size) = unit.ball_meshes[side], unit.balls[side]
     vertices = centre + (mesh.vertices - [x, y, z]) @ _towards(gaze).T * (radius / size)
-    return PosedEyeball(np.asarray(centre, np.float64), float(radius), np.asarray(gaze, np.float64), mesh.moved(vertices))
+    return PosedEyeball(np.asarray(centre, np.float64), float(radius), np.asarray(gaze, np.float64),
+                        mesh.moved(vertices))
 
 
 @cache
 def corners() -> tuple[tuple[int, int], tuple[int, int]]:
-    """The vertices at the outer and the inner corner of the left and of the right eye: those that both lids' last edges share."""
+    """The vertices at the outer and the inner corner of the left and of the right eye: those that both lids' last edges
+    share."""
     unit, head = _asset(), template.load()
     faces = head.faces.copy()
     faces[unit.corners[:, 0], unit.corners[:, 1]] = unit.corners[:, 2]
-    return tuple(tuple(_shared_neighbour(faces, upper[end], lower[end]) for end in (-1, 0)) for upper, lower in unit.rims)
+    return tuple(tuple(_shared_neighbour(faces, upper[end], lower[end]) for end in (-1, 0))
+                 for upper, lower in unit.rims)
 
 
 def _shared_neighbour(faces: np.ndarray, upper: int, lower: int) -> int:
@@ -114,13 +122,14 @@ def _shared_neighbour(faces: np.ndarray, upper: int, lower: int) -> int:
 
 
 def edges(vertices: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
-    """The upper and the lower edge of the left (0) or the right lids of an open head's vertices, from the outer corner to the inner one [N, 3]."""
+    """The upper and the lower edge of the left (0) or the right lids of an open head's vertices, from the outer corner
+    to the inner one [N, 3]."""
     return _edge(vertices, side, 0), _edge(vertices, side, 1)
 
 
 def closed_edge(vertices: np.ndarray, side: int, lid: int, off: float) -> np.ndarray:
-    """Where the closed lids of the left (0) or the right eye of a head's vertices meet, from the outer corner to the inner one [N, 3], moved onto the upper
-    (0) or the lower (1) lid by `off` metres."""
+    """Where the closed lids of the left (0) or the right eye of a head's vertices meet, from the outer corner to the
+    inner one [N, 3], moved onto the upper (0) or the lower (1) lid by `off` metres."""
     edge = _edge(vertices, side, 0)  # its vertices are the head's own; the lower lid's are doubles of them
     rows = rows_of_lid(side, lid)
     skin = vertices[rows[(rows < len(vertices)) & ~np.isin(rows, _asset().rims[side][0])]]
@@ -134,18 +143,21 @@ def _edge(vertices: np.ndarray, side: int, lid: int) -> np.ndarray:
 
 
 def rows_of_lid(side: int, lid: int) -> np.ndarray:
-    """The vertices of an open head [N] that move with the upper (0) or the lower (1) lid of the left (0) or the right eye."""
+    """The vertices of an open head [N] that move with the upper (0) or the lower (1) lid of the left (0) or the right
+    eye."""
     unit, head = _asset(), template.load()
     rows, upper = unit.opens[side][0], unit.rims[side][0]
     order = upper[np.argsort(head.vertices[upper, 0])]
     x, _, z = head.vertices[np.minimum(rows, len(head.vertices) - 1)].T
-    above = z > np.interp(x, head.vertices[order, 0], head.vertices[order, 2]) - 1e-7  # of the skin: above where the lids meet
+    # of the skin: above where the lids meet
+    above = z > np.interp(x, head.vertices[order, 0], head.vertices[order, 2]) - 1e-7
     above[np.isin(rows, unit.rims[side][1])] = False
     count = len(head.vertices) + len(unit.copies)
     height = np.zeros(len(head.vertices))
     height[head.faces] = head.uvs[head.face_uvs][..., 1]
     inside = rows >= count  # a socket's UVs go on from those of its lid, up or down
-    above[inside] = unit.uvs[rows[inside] - count, 1] > (unit.weights * height[unit.anchors])[rows[inside] - count].sum(1)
+    above[inside] = unit.uvs[rows[inside] - count,
+                             1] > (unit.weights * height[unit.anchors])[rows[inside] - count].sum(1)
     return rows[above == (lid == 0)]
 
 
@@ -171,8 +183,9 @@ def push_out(points: np.ndarray, ball: PosedEyeball) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Asset:
-    """Of the eyes only: copies [C] the vertex that each doubles; corners [n, 3] triangle, corner, copy; faces [G, 3] and uvs [P, 2] of the sockets; parts
-    [P, 3]; anchors, weights [P, 6]; opens: rows and moves for the left and the right lids; soft_of: the rows of each socket; balls [2, 4]; ball meshes."""
+    """Of the eyes only: copies [C] the vertex that each doubles; corners [n, 3] triangle, corner, copy; faces [G, 3]
+    and uvs [P, 2] of the sockets; parts [P, 3]; anchors, weights [P, 6]; opens: rows and moves for the left and the
+    right lids; soft_of: the rows of each socket; balls [2, 4]; ball meshes."""
 
     copies: np.ndarray
     corners: np.ndarray
@@ -214,13 +227,17 @@ def _asset() -> _Asset:
     corners = z["corners"][number[z["corners"][:, 2]] >= count].copy()
     corners[:, 2] = number[corners[:, 2]]
     soft = count + lids.sum() + np.arange(len(socket))
-    return _Asset(copies[lids], corners, number[triangles[inside]], z["uvs"][socket].astype(np.float64), parts[socket], z["anchors"][socket].astype(int),
-                  weights / weights.sum(1, keepdims=True), tuple(opens), (soft[parts[socket, 0] > 0], soft[parts[socket, 0] <= 0]),
-                  z["balls"].astype(np.float64), tuple(_ball_mesh(z, first, parts, kind) for kind in (1, 2)), _rims(z, copies[lids], count))
+    return _Asset(copies[lids], corners, number[triangles[inside]], z["uvs"][socket].astype(np.float64), parts[socket],
+                  z["anchors"][socket].astype(int),
+                  weights / weights.sum(1, keepdims=True), tuple(opens),
+                  (soft[parts[socket, 0] > 0], soft[parts[socket, 0] <= 0]),
+                  z["balls"].astype(np.float64), tuple(_ball_mesh(z, first, parts, kind) for kind in (1, 2)),
+                  _rims(z, copies[lids], count))
 
 
 def _ball_mesh(z: dict, first: int, parts: np.ndarray, kind: int) -> Mesh:
-    """One eyeball as the asset has it, turned about its centre so that it looks straight ahead; the asset's look down by two degrees."""
+    """One eyeball as the asset has it, turned about its centre so that it looks straight ahead; the asset's look down
+    by two degrees."""
     rows = np.flatnonzero(z["kind"] == kind)
     number = np.full(len(z["kind"]), -1)
     number[rows] = np.arange(len(rows))
@@ -281,5 +298,6 @@ def _turned(radians: np.ndarray) -> np.ndarray:
 
 
 def _towards(gaze: np.ndarray) -> np.ndarray:
-    """The rotation [3, 3] that turns an eye from straight ahead to the unit vector gaze [3]: left or right first, then up or down, without roll."""
+    """The rotation [3, 3] that turns an eye from straight ahead to the unit vector gaze [3]: left or right first, then
+    up or down, without roll."""
     return _turned(np.array([np.arctan2(gaze[0], -gaze[1]), np.arcsin(np.clip(gaze[2], -1, 1))]))

@@ -1,11 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The face parser: which part of a person each pixel of a picture shows, by our own small network on the upright crop of a face.
+"""The face parser: which part of a person each pixel of a picture shows, by our own small network on the upright crop
+of a face.
 
     parts = parse(srgb, face.landmarks)
     hairy = parts.of("hair", "beard")          float32 [H, W]
 
-`core train parser` makes the weights, on synthetic people only. PyTorch is loaded when the first picture is parsed: who only asks where faces are does without.
+`core train parser` makes the weights, on synthetic people only. PyTorch is loaded when the first picture is parsed: who
+only asks where faces are does without.
 """
 
 from __future__ import annotations
@@ -32,8 +34,8 @@ BACKGROUND = PARTS.index("background")
 
 @dataclass(frozen=True)
 class Parts:
-    """crop float32 [SIDE, SIDE, len(PARTS)] in [0, 1], of sum one: the shares of the parts in the square around the face; move [2, 3]: from picture to crop;
-    size: the picture's height and width. Beyond the crop all is background."""
+    """crop float32 [SIDE, SIDE, len(PARTS)] in [0, 1], of sum one: the shares of the parts in the square around the
+    face; move [2, 3]: from picture to crop; size: the picture's height and width. Beyond the crop all is background."""
 
     crop: np.ndarray
     move: np.ndarray
@@ -54,10 +56,12 @@ class Parts:
 
 
 def parse(srgb: np.ndarray, landmarks: np.ndarray, network: ParseNet | None = None) -> Parts:
-    """The parts of the person whose face's landmarks [468, 2 or 3] lie there in an sRGB picture [H, W, 3], in pixels: as they were found, or where a head that
-    is known projects them, hidden ones included; `network` in place of the shipped one.
+    """The parts of the person whose face's landmarks [468, 2 or 3] lie there in an sRGB picture [H, W, 3], in pixels:
+    as they were found, or where a head that is known projects them, hidden ones included; `network` in place of the
+    shipped one.
 
-    The mean of what the network says of the crop and of its mirror image. Raises Problem where the weights are missing or damaged.
+    The mean of what the network says of the crop and of its mirror image. Raises Problem where the weights are missing
+    or damaged.
     """
     import torch
 
@@ -75,7 +79,8 @@ def parse(srgb: np.ndarray, landmarks: np.ndarray, network: ParseNet | None = No
 
 @cache
 def load(path: Path = WEIGHTS) -> ParseNet:
-    """The shipped network, or that of another file. Raises Problem where the file or its card is missing, or the shipped one damaged."""
+    """The shipped network, or that of another file. Raises Problem where the file or its card is missing, or the
+    shipped one damaged."""
     from safetensors.torch import load_file
 
     from .parser_network import ParseNet

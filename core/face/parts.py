@@ -11,16 +11,16 @@ import cv2
 import numpy as np
 
 PARTS = ("skin", "lips", "brows", "beard", "hair", "eyes", "clothes", "background")
-"""What is told apart. Where hair grows, the skin between its roots counts as hair of that kind; lashes belong to the eyes, teeth to the lips, hands to the
-background."""
+"""What is told apart. Where hair grows, the skin between its roots counts as hair of that kind; lashes belong to the
+eyes, teeth to the lips, hands to the background."""
 GROWTHS = ("brows", "beard", "hair")
 """The parts that are hair; "hair" is the head's."""
 SIDE = 192  # of the crop
 MARGIN = 1.9  # side of the square in heights of the face's landmarks: hair and neck are in it
 BRIDGE, CHIN = 9, 152
 PRESENT = 0.8
-"""Mean share of a part, where it has more than half, from which the person has it: over hard shadows on a bare jaw the parser is 0.62 sure of a beard (the
-sample), where a full beard is 0.92."""
+"""Mean share of a part, where it has more than half, from which the person has it: over hard shadows on a bare jaw the
+parser is 0.62 sure of a beard (the sample), where a full beard is 0.92."""
 
 
 def keep_present(share: np.ndarray) -> np.ndarray:
@@ -30,9 +30,11 @@ def keep_present(share: np.ndarray) -> np.ndarray:
 
 
 def to_crop(landmarks: np.ndarray, side: int = SIDE, margin: float = MARGIN) -> np.ndarray:
-    """The map [2, 3] of a similarity that puts a face of landmarks [468, 2 or 3] in pixels upright into the middle of a square.
+    """The map [2, 3] of a similarity that puts a face of landmarks [468, 2 or 3] in pixels upright into the middle of a
+    square.
 
-    Upright by the line from the chin to the bridge of the nose, which no turn of the head tilts as one tilts the line between the eyes.
+    Upright by the line from the chin to the bridge of the nose, which no turn of the head tilts as one tilts the line
+    between the eyes.
     """
     points = landmarks[:, :2].astype(np.float64)
     down = points[CHIN] - points[BRIDGE]
@@ -62,8 +64,10 @@ def inside(shape: tuple[int, ...], move: np.ndarray, side: int = SIDE) -> np.nda
 
 
 def put_back(values: np.ndarray, move: np.ndarray, shape: tuple[int, ...], beyond: float) -> np.ndarray:
-    """Values [side, side] of a crop at the pixels of the picture of shape (H, W, ...), float32 [H, W]; `beyond` outside the crop."""
-    return cv2.warpAffine(np.ascontiguousarray(values, np.float32), from_centres(move), (shape[1], shape[0]), borderMode=cv2.BORDER_CONSTANT,
+    """Values [side, side] of a crop at the pixels of the picture of shape (H, W, ...), float32 [H, W]; `beyond` outside
+    the crop."""
+    return cv2.warpAffine(np.ascontiguousarray(values, np.float32), from_centres(move), (shape[1], shape[0]),
+                          borderMode=cv2.BORDER_CONSTANT,
                           flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderValue=beyond)
 
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the face parser saw in the frames, in the head's UVs: texture_parts.png, which the stage texture writes where the frames are at hand."""
+"""What the face parser saw in the frames, in the head's UVs: texture_parts.png, which the stage texture writes where
+the frames are at hand."""
 
 from __future__ import annotations
 
@@ -13,18 +14,21 @@ from .parts import GROWTHS, keep_present
 
 
 def read_parts(capture: Capture, size: int) -> np.ndarray | None:
-    """What the face parser saw in the frames, float32 [size, size, len(GROWTHS)]; None where they were not asked. Raises Problem for another picture."""
+    """What the face parser saw in the frames, float32 [size, size, len(GROWTHS)]; None where they were not asked.
+    Raises Problem for another picture."""
     if not capture.texture_parts.is_file():
         return None
     parts = images.read_data(capture.texture_parts)
     if parts.shape[2] != len(GROWTHS):
-        raise Problem(f"{capture.texture_parts} has {parts.shape[2]} channels, and the parts of a face that grow hair are {len(GROWTHS)}.",
+        raise Problem(f"{capture.texture_parts} has {parts.shape[2]} channels, and the parts of a face that grow hair "
+                      f"are {len(GROWTHS)}.",
                       "Run the stage texture again.")
     return images.resize(parts, size, size).clip(0, 1)
 
 
 def read_hidden_skin(capture: Capture, size: int) -> np.ndarray:
-    """The share of beard and of the head's hair at each texel, float32 [size, size]: what is dark there is no shadow. 0 where the frames were not asked."""
+    """The share of beard and of the head's hair at each texel, float32 [size, size]: what is dark there is no shadow. 0
+    where the frames were not asked."""
     parts = read_parts(capture, size)
     if parts is None:
         return np.zeros((size, size), np.float32)

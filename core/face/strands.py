@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hairs as polylines: where they root, how they grow along and off the skin, how they clump; Cycles draws them as curves, the CPU as slim prisms."""
+"""Hairs as polylines: where they root, how they grow along and off the skin, how they clump; Cycles draws them as
+curves, the CPU as slim prisms."""
 
 from __future__ import annotations
 
@@ -15,8 +16,8 @@ from ..geometry.noise import noise
 
 @dataclass(frozen=True)
 class Strands:
-    """One growth of hair. points float32 [M, K, 3] in metres from the root to the tip; radius float32 [M] in metres at the root, a third of it at the tip;
-    colour float32 [M, 3] linear albedo; part: its name among parts.PARTS."""
+    """One growth of hair. points float32 [M, K, 3] in metres from the root to the tip; radius float32 [M] in metres at
+    the root, a third of it at the tip; colour float32 [M, 3] linear albedo; part: its name among parts.PARTS."""
 
     points: np.ndarray
     radius: np.ndarray
@@ -30,7 +31,8 @@ class Strands:
 
 @dataclass(frozen=True)
 class Roots:
-    """Where hairs begin: position [M, 3] in metres, normal and direction [M, 3] unit, at [M, 3] the same places on the template in millimetres."""
+    """Where hairs begin: position [M, 3] in metres, normal and direction [M, 3] unit, at [M, 3] the same places on the
+    template in millimetres."""
 
     position: np.ndarray
     normal: np.ndarray
@@ -59,9 +61,11 @@ class SkinSurface:
         return ((points - foot) * normal).sum(1), normal
 
 
-def grow(roots: Roots, length: np.ndarray, lift: np.ndarray, skin: SkinSurface, pull: np.ndarray, clearance: np.ndarray, steps: int) -> np.ndarray:
-    """Points float32 [M, steps, 3]: each hair of `length` [M] metres leaves the skin at angle `lift` [M] radians along its root's direction, is bent by `pull`
-    [M, 3] or [3] (per length of the hair), and stays `clearance` [M] metres above the skin, less near its root."""
+def grow(roots: Roots, length: np.ndarray, lift: np.ndarray, skin: SkinSurface, pull: np.ndarray, clearance: np.ndarray,
+         steps: int) -> np.ndarray:
+    """Points float32 [M, steps, 3]: each hair of `length` [M] metres leaves the skin at angle `lift` [M] radians along
+    its root's direction, is bent by `pull` [M, 3] or [3] (per length of the hair), and stays `clearance` [M] metres
+    above the skin, less near its root."""
     lift = lift[:, None]
     way = np.cos(lift) * roots.direction + np.sin(lift) * roots.normal
     step = length[:, None] / (steps - 1)
@@ -90,15 +94,19 @@ def clumped(points: np.ndarray, each: int, strength: float, rng: np.random.Gener
     return points * (1 - share) + points[leader] * share
 
 
-def waved(points: np.ndarray, at: np.ndarray, amplitude: float, wavelength_mm: float, rng: np.random.Generator, alone: float = 0.35) -> np.ndarray:
-    """Hairs [M, K, 3] rooted `at` [M, 3] mm that bend aside by `amplitude` metres at their tips: neighbours alike, each `alone` of it in its own way."""
+def waved(points: np.ndarray, at: np.ndarray, amplitude: float, wavelength_mm: float, rng: np.random.Generator,
+          alone: float = 0.35) -> np.ndarray:
+    """Hairs [M, K, 3] rooted `at` [M, 3] mm that bend aside by `amplitude` metres at their tips: neighbours alike, each
+    `alone` of it in its own way."""
     along = np.linspace(0, 1, points.shape[1], dtype=np.float32)[None, :, None]
     length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(1)[:, None, None]
     out = points
     for turn, share in ((1.0, 1.0), (2.3, 0.45)):
         phase = 2 * noise(at, wavelength_mm, rng)[:, None, None] + alone * rng.normal(size=(len(points), 1, 1))
-        aside = np.stack([noise(at, 1.5 * wavelength_mm, rng) for _ in range(3)], 1) + alone * rng.normal(size=(len(points), 3))
-        out = out + share * amplitude * along * np.sin(2 * np.pi * turn * along * np.clip(length / 0.05, 0.4, 3) + phase) * aside[:, None]
+        aside = np.stack([noise(at, 1.5 * wavelength_mm, rng) for _ in range(3)],
+                         1) + alone * rng.normal(size=(len(points), 3))
+        out = out + share * amplitude * along * np.sin(2 * np.pi * turn * along * np.clip(length / 0.05, 0.4, 3)
+                                                       + phase) * aside[:, None]
     return out.astype(np.float32)
 
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built-in head: mesh with its frozen UVs, identity space, landmarks and UV masks. core/assets/build.py made the files."""
+"""The built-in head: mesh with its frozen UVs, identity space, landmarks and UV masks. core/assets/build.py made the
+files."""
 
 from __future__ import annotations
 
@@ -23,13 +24,15 @@ MASKS = ("face", "skin", "lips", "brows", "eyes", "nose", "nostrils", "ears", "n
 
 @cache
 def load() -> Mesh:
-    """The neutral head: metres, pupils 63 mm apart, +Z up, face towards -Y, u = 0.5 in the middle, the person's left at u > 0.5."""
+    """The neutral head: metres, pupils 63 mm apart, +Z up, face towards -Y, u = 0.5 in the middle, the person's left at
+    u > 0.5."""
     return meshes.read_obj(_shipped("head.obj"))
 
 
 @cache
 def identity() -> np.ndarray:
-    """Displacements float32 [K, V, 3] in metres per unit coefficient; coefficients are independent and N(0, 1) over MakeHuman's heads."""
+    """Displacements float32 [K, V, 3] in metres per unit coefficient; coefficients are independent and N(0, 1) over
+    MakeHuman's heads."""
     with np.load(_shipped("identity.npz"), allow_pickle=False) as stored:
         return stored["components"].astype(np.float32)
 
@@ -55,7 +58,8 @@ def landmark_weights() -> np.ndarray:
 
 @cache
 def mask(name: str, size: int) -> np.ndarray:
-    """A soft UV mask float32 [size, size] in [0, 1]; `name` is one of MASKS. The array is shared: copy before writing."""
+    """A soft UV mask float32 [size, size] in [0, 1]; `name` is one of MASKS. The array is shared: copy before
+    writing."""
     assert name in MASKS, name
     return images.resize(images.read_mask(_shipped(f"masks/{name}.png")), size, size).clip(0, 1)
 

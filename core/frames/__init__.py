@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stage frames: a video or a folder of photographs becomes frames/: sharp ones, in one exposure, with the turn of the head in each.
+"""Stage frames: a video or a folder of photographs becomes frames/: sharp ones, in one exposure, with the turn of the
+head in each.
 
-frames.json (contract/frame_records.py) tells of the written frames, to which the gains have been applied already: every stage, and any tool that is given
-the folder, sees one exposure. The mask of the person is not stored: faces.segment_person gives it in the time a file is read in.
+frames.json (contract/frame_records.py) tells of the written frames, to which the gains have been applied already: every
+stage, and any tool that is given the folder, sees one exposure. The mask of the person is not stored:
+faces.segment_person gives it in the time a file is read in.
 """
 
 from __future__ import annotations
@@ -33,7 +35,8 @@ from .video import read_video
 FEWEST = 3
 """Of a video, frames that a head can be built from; of photographs one will do, for a draft."""
 STILL = 0.004
-"""Mean difference of two small frames, in [0, 1], below which the camera has not moved: above compression noise, far below a step aside."""
+"""Mean difference of two small frames, in [0, 1], below which the camera has not moved: above compression noise, far
+below a step aside."""
 RIVAL = 1.5
 """A face this much more prominent than the one that was followed takes its place."""
 READING = 0.9
@@ -41,11 +44,12 @@ READING = 0.9
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Writes capture.frames. Raises Problem where a video has fewer than three readable frames, where there is no face, or no motion."""
+    """Writes capture.frames. Raises Problem where a video has fewer than three readable frames, where there is no face,
+    or no motion."""
     path = capture.source
     if path is None or not (path.is_dir() or path.is_file()):
-        raise Problem(f"There is no video or folder of photographs at {str(path)!r}." if path else "No video was chosen.",
-                      "Choose a video of the face, or a folder of photographs.")
+        raise Problem(f"There is no video or folder of photographs at {str(path)!r}." if path
+                      else "No video was chosen.", "Choose a video of the face, or a folder of photographs.")
     photographs = path.is_dir()
     read = read_photographs if photographs else read_video
     pictures = read(path, settings.frames.max_frames, settings.frames.long_side, report)
@@ -67,7 +71,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
 
 def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[FrameRecord], np.ndarray, list, list[float]]:
-    """Consumes the pictures; their records, thumbnails [N, 32, 32], what the exposure is compared by, and how surely the face wears glasses."""
+    """Consumes the pictures; their records, thumbnails [N, 32, 32], what the exposure is compared by, and how surely
+    the face wears glasses."""
     records, thumbnails, contents, glasses, last = [], [], [], [], None
     for picture in pictures:
         name = f"{picture.index:05d}.jpg"
@@ -80,7 +85,8 @@ def _write_frames(pictures, folder: Path, report: Reporter) -> tuple[list[FrameR
         thumbnails.append(images.resize(picture.srgb.mean(-1), 32, 32))
         contents.append(content_of(picture.srgb))
         glasses.append(sureness(picture.srgb, face) if face else float("nan"))
-        report.progress(READING * picture.done, picture.of, f"frame {len(records)}, {'face found' if face else 'no face'}")
+        report.progress(READING * picture.done, picture.of,
+                        f"frame {len(records)}, {'face found' if face else 'no face'}")
     return records, np.array(thumbnails), contents, glasses
 
 
@@ -89,39 +95,49 @@ def _flipped(picture: np.ndarray | None) -> np.ndarray | None:
 
 
 def _subject(srgb: np.ndarray, last: faces.Face | None) -> tuple[faces.Face | None, float]:
-    """The face of the subject, the one followed so far unless another is far more prominent, and how prominent the next is beside it."""
+    """The face of the subject, the one followed so far unless another is far more prominent, and how prominent the next
+    is beside it."""
     face = faces.detect(srgb, last)
     if face is None:
         return None, 0.0
     weighed = [(faces.prominence(each, srgb.shape[1], srgb.shape[0]), each) for each in faces.detect_others(srgb, face)]
     if not weighed:
         return face, 0.0
-    weight, (second, rival) = faces.prominence(face, srgb.shape[1], srgb.shape[0]), max(weighed, key=lambda pair: pair[0])
+    weight, (second, rival) = faces.prominence(face, srgb.shape[1],
+                                               srgb.shape[0]), max(weighed, key=lambda pair: pair[0])
     return (rival, weight / second) if second > RIVAL * weight else (face, second / weight)
 
 
 def _record(picture: Picture, name: str, face: faces.Face | None, last: faces.Face | None, rival: float) -> FrameRecord:
     """`last` tells where the head is, more or less, where no face is found."""
     return FrameRecord(
-        name=name, video_frame=picture.index, time_s=None if picture.time_s is None else round(picture.time_s, 4), source=picture.source,
-        size=(picture.srgb.shape[1], picture.srgb.shape[0]), sharpness=round(sharpness(picture.srgb, face.box if face else None), 5), selected=False,
-        face_box=tuple(round(x, 1) for x in face.box) if face else None, face_score=round(face.score, 4) if face else 0.0,
-        yaw_deg=round(face.yaw_deg, 1) if face else None, focal_px=picture.focal_px, **examine(picture.srgb, last.box if last else None),
-        eyes_open=tuple(round(x, 3) for x in faces.eye_openness(picture.srgb, face)) if face else None, other_face=round(rival, 3))
+        name=name, video_frame=picture.index, time_s=None if picture.time_s is None else round(picture.time_s, 4),
+        source=picture.source,
+        size=(picture.srgb.shape[1], picture.srgb.shape[0]),
+        sharpness=round(sharpness(picture.srgb, face.box if face else None), 5), selected=False,
+        face_box=tuple(round(x, 1) for x in face.box) if face else None,
+        face_score=round(face.score, 4) if face else 0.0,
+        yaw_deg=round(face.yaw_deg, 1) if face else None, focal_px=picture.focal_px,
+        **examine(picture.srgb, last.box if last else None),
+        eyes_open=tuple(round(x, 3) for x in faces.eye_openness(picture.srgb, face)) if face else None,
+        other_face=round(rival, 3))
 
 
-def _drop_blurred(records: list[FrameRecord], contents: list, folder: Path) -> tuple[list[FrameRecord], list, list[str]]:
+def _drop_blurred(records: list[FrameRecord], contents: list,
+                  folder: Path) -> tuple[list[FrameRecord], list, list[str]]:
     """Without the frames that are blurred by comparison, whose files go too; and their names."""
     bad = blurred(records)
     dropped = [r.name for r, out in zip(records, bad, strict=True) if out]
     for name in dropped:
         (folder / name).unlink()
         (folder / FULL / name).unlink(missing_ok=True)
-    return [r for r, out in zip(records, bad, strict=True) if not out], [c for c, out in zip(contents, bad, strict=True) if not out], dropped
+    return [r for r, out in zip(records, bad, strict=True)
+            if not out], [c for c, out in zip(contents, bad, strict=True) if not out], dropped
 
 
 def _even_out(records: list[FrameRecord], contents: list, folder: Path, report: Reporter) -> list[FrameRecord]:
-    """Brings all frames to the exposure and white balance of the median frame; those that have it stay byte for byte. The records with their gains."""
+    """Brings all frames to the exposure and white balance of the median frame; those that have it stay byte for byte.
+    The records with their gains."""
     gains, evened = gains_of(contents, report.check), []
     for done, (record, gain) in enumerate(zip(records, gains, strict=True)):
         if np.abs(np.log(gain)).max() < 0.005:
@@ -135,7 +151,8 @@ def _even_out(records: list[FrameRecord], contents: list, folder: Path, report: 
 
 
 def _select(records: list[FrameRecord], count: int) -> list[FrameRecord]:
-    """The same records with the V views marked. A blink is none of them as long as there are other frames to choose from."""
+    """The same records with the V views marked. A blink is none of them as long as there are other frames to choose
+    from."""
     turn = turns(records)
     open_ = np.array([not r.blink for r in records])
     if (np.isfinite(turn) & open_).sum() >= min(count, FEWEST):
@@ -148,11 +165,14 @@ def _check(path: Path, records: list[FrameRecord], thumbnails: np.ndarray, photo
     if not records:
         raise Problem(f"None of the photographs in {path.name} could be read.", "Save them again as JPEG, PNG or TIFF.")
     if len(records) < FEWEST and not photographs:
-        raise Problem(f"Only {len(records)} frames of {path.name} could be read; three are the least a head can be built from.",
-                      "Film the face for 5 to 30 seconds while you walk half around it; a damaged file may be whole once copied again.")
+        raise Problem(f"Only {len(records)} frames of {path.name} could be read; three are the least a head can be "
+                      "built from.",
+                      "Film the face for 5 to 30 seconds while you walk half around it; a damaged file may be whole "
+                      "once copied again.")
     if not any(r.face_box for r in records):
         raise Problem("No face was found in any frame.",
-                      "Film one face, upright, filling a third of the picture or more, and lit well enough to see the eyes.")
+                      "Film one face, upright, filling a third of the picture or more, and lit well enough to see the "
+                      "eyes.")
     if len(records) > 1 and np.abs(thumbnails - thumbnails[0]).mean((1, 2)).max() < STILL:
         raise Problem("All frames show the same picture: the camera did not move.",
                       "Let the person sit still and move the camera from one ear around the face to the other.")

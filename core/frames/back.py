@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tool that brings back what was slimmed away: that is all it reads, so the worker has made it again before it begins."""
+"""The tool that brings back what was slimmed away: that is all it reads, so the worker has made it again before it
+begins."""
 
 from __future__ import annotations
 

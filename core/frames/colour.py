@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A video's signal to the sRGB a phone would show: HLG and PQ (ITU-R BT.2100) on a display of 1000 nits, wide gamuts brought in.
+"""A video's signal to the sRGB a phone would show: HLG and PQ (ITU-R BT.2100) on a display of 1000 nits, wide gamuts
+brought in.
 
-Dolby Vision 8.4, as iPhones record it, is HLG with metadata beside it; it is read as its HLG. Reference white, 203 nits (BT.2408), is
-1.0 of linear light before the tone curve, so an HDR video of a face gives the skin the tone an SDR one would.
+Dolby Vision 8.4, as iPhones record it, is HLG with metadata beside it; it is read as its HLG. Reference white, 203 nits
+(BT.2408), is 1.0 of linear light before the tone curve, so an HDR video of a face gives the skin the tone an SDR one
+would.
 """
 
 from __future__ import annotations
@@ -22,18 +24,22 @@ KNEE = 0.8
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 LUMINANCE_2020 = np.array([0.2627, 0.6780, 0.0593], np.float32)
 TO_REC709 = {
-    REC2020: np.array([[1.660491, -0.587641, -0.072850], [-0.124550, 1.132900, -0.008349], [-0.018151, -0.100579, 1.118730]], np.float32),
-    P3: np.array([[1.224940, -0.224940, 0.0], [-0.042057, 1.042057, 0.0], [-0.019638, -0.078636, 1.098274]], np.float32),
+    REC2020: np.array([[1.660491, -0.587641, -0.072850], [-0.124550, 1.132900, -0.008349],
+                       [-0.018151, -0.100579, 1.118730]], np.float32),
+    P3: np.array([[1.224940, -0.224940, 0.0], [-0.042057, 1.042057, 0.0], [-0.019638, -0.078636, 1.098274]],
+                 np.float32),
 }
 
 
 def to_srgb(signal: np.ndarray, transfer: int, primaries: int) -> np.ndarray:
-    """A full-range R'G'B' signal float32 [..., 3] in [0, 1] -> sRGB float32 in [0, 1]. Numbers of `transfer` and `primaries` are H.273's.
+    """A full-range R'G'B' signal float32 [..., 3] in [0, 1] -> sRGB float32 in [0, 1]. Numbers of `transfer` and
+    `primaries` are H.273's.
 
     HDR whose primaries are not told is Rec. 2020, as BT.2100 has it.
     """
     if transfer not in (HLG, PQ):
-        return signal if primaries not in TO_REC709 else images.linear_to_srgb(into_gamut(images.srgb_to_linear(signal) @ TO_REC709[primaries].T))
+        return (signal if primaries not in TO_REC709
+                else images.linear_to_srgb(into_gamut(images.srgb_to_linear(signal) @ TO_REC709[primaries].T)))
     light = hlg_light(signal) if transfer == HLG else pq_light(signal)
     if primaries != REC709:
         light = light @ TO_REC709.get(primaries, TO_REC709[REC2020]).T
@@ -41,7 +47,8 @@ def to_srgb(signal: np.ndarray, transfer: int, primaries: int) -> np.ndarray:
 
 
 def hlg_light(signal: np.ndarray) -> np.ndarray:
-    """HLG signal -> display light, 1.0 at reference white: the inverse OETF, then the OOTF of gamma 1.2 on luminance (BT.2100, table 5)."""
+    """HLG signal -> display light, 1.0 at reference white: the inverse OETF, then the OOTF of gamma 1.2 on luminance
+    (BT.2100, table 5)."""
     a, b, c = 0.17883277, 0.28466892, 0.55991073
     scene = np.where(signal <= 0.5, signal**2 / 3, (np.exp((np.maximum(signal, 0.5) - c) / a) + b) / 12)
     luminance = np.maximum(scene @ LUMINANCE_2020, 0)[..., None]
@@ -51,11 +58,13 @@ def hlg_light(signal: np.ndarray) -> np.ndarray:
 def pq_light(signal: np.ndarray) -> np.ndarray:
     """PQ signal -> display light, 1.0 at reference white: the EOTF (BT.2100, table 4; SMPTE ST 2084)."""
     root = np.maximum(signal, 0) ** (1 / 78.84375)
-    return (np.maximum(root - 0.8359375, 0) / (18.8515625 - 18.6875 * root)) ** (1 / 0.1593017578125) * (10000 / WHITE_NITS)
+    return (np.maximum(root - 0.8359375, 0)
+            / (18.8515625 - 18.6875 * root)) ** (1 / 0.1593017578125) * (10000 / WHITE_NITS)
 
 
 def into_gamut(light: np.ndarray) -> np.ndarray:
-    """Linear Rec. 709 light with negative parts -> none: such a colour is mixed with the grey of its own luminance just so far, others stay exactly."""
+    """Linear Rec. 709 light with negative parts -> none: such a colour is mixed with the grey of its own luminance just
+    so far, others stay exactly."""
     luminance = np.maximum(light @ LUMINANCE, 0)[..., None]
     least = light.min(-1, keepdims=True)
     keep = np.where(least < 0, luminance / np.maximum(luminance - least, 1e-9), 1)
@@ -63,9 +72,11 @@ def into_gamut(light: np.ndarray) -> np.ndarray:
 
 
 def tone_curve(light: np.ndarray) -> np.ndarray:
-    """Display light [..., 3] from 0 up -> [0, 1): the identity up to KNEE, then a hyperbola of the same slope towards 1.
+    """Display light [..., 3] from 0 up -> [0, 1): the identity up to KNEE, then a hyperbola of the same slope towards
+    1.
 
-    It works on the largest channel and scales the others with it, so hues stay. Reference white becomes 0.9, 1000 nits 0.99.
+    It works on the largest channel and scales the others with it, so hues stay. Reference white becomes 0.9, 1000 nits
+    0.99.
     """
     peak = light.max(-1, keepdims=True)
     over = np.maximum(peak - KNEE, 0) / (1 - KNEE)

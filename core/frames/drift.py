@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exposure and white balance that a phone changed while it filmed: one gain per frame and channel, from what the frames have in common.
+"""Exposure and white balance that a phone changed while it filmed: one gain per frame and channel, from what the frames
+have in common.
 
-The same spots are found in neighbouring frames (SIFT; Lowe 2004) and their colours compared, on the person and behind it. A gain is
-believed only where it explains most of the picture: a head that turns into the shade changes more on one side, and what is behind it not at all.
+The same spots are found in neighbouring frames (SIFT; Lowe 2004) and their colours compared, on the person and behind
+it. A gain is believed only where it explains most of the picture: a head that turns into the shade changes more on one
+side, and what is behind it not at all.
 """
 
 from __future__ import annotations
@@ -29,8 +31,8 @@ TOLERANCE = 0.08
 DOUBT = 0.2
 """Weight of a comparison that may be shading: it stands for no change, unless another one knows better."""
 STEADY = 0.08
-"""Whole range of the gains, in natural logarithms, up to which the light counts as constant and no picture is touched: what a steady video of
-100 frames, blurred ones too, is measured to have. The texture evens out what is smaller."""
+"""Whole range of the gains, in natural logarithms, up to which the light counts as constant and no picture is touched:
+what a steady video of 100 frames, blurred ones too, is measured to have. The texture evens out what is smaller."""
 
 
 @dataclass(frozen=True)
@@ -51,20 +53,22 @@ def content_of(srgb: np.ndarray) -> Content:
     grey = np.clip(small @ np.array([0.299, 0.587, 0.114], np.float32) * 255, 0, 255).astype(np.uint8)
     points, descriptors = _sift().detectAndCompute(grey, None)
     if not points:
-        return Content(np.zeros((0, 128), np.uint8), np.zeros((0, 3), np.float32), np.zeros((0, 2), np.float32), np.zeros(0, bool))
+        return Content(np.zeros((0, 128), np.uint8), np.zeros((0, 3), np.float32), np.zeros((0, 2), np.float32),
+                       np.zeros(0, bool))
     x, y = np.array([p.pt for p in points]).round().astype(int).T
     x, y = np.clip(x, 0, small.shape[1] - 1), np.clip(y, 0, small.shape[0] - 1)
     mean = cv2.blur(images.srgb_to_linear(small), (SPOT, SPOT))[y, x]
     whole = np.ones((SPOT, SPOT), np.uint8)
     fair = (cv2.dilate(small.max(-1), whole)[y, x] < 0.97) & (mean.min(-1) > 0.004)
     person = faces.segment_person(small)[y, x] > 0.5
-    return Content(descriptors.astype(np.uint8)[fair], np.log(np.maximum(mean, 1e-5))[fair], np.stack([x, y], 1)[fair].astype(np.float32), person[fair])
+    return Content(descriptors.astype(np.uint8)[fair], np.log(np.maximum(mean, 1e-5))[fair],
+                   np.stack([x, y], 1)[fair].astype(np.float32), person[fair])
 
 
 @dataclass(frozen=True)
 class Link:
-    """What two frames say of each other: gain [3] (log of the second's light over the first's), weight (how many saw it),
-    and whether the change is shading of the person rather than exposure, where nothing else could be compared."""
+    """What two frames say of each other: gain [3] (log of the second's light over the first's), weight (how many saw
+    it), and whether the change is shading of the person rather than exposure, where nothing else could be compared."""
 
     gain: np.ndarray
     weight: float
@@ -73,14 +77,16 @@ class Link:
 
 
 def gains_of(contents: list[Content], check=lambda: None) -> np.ndarray:
-    """Factors [N, 3] in linear light that even the frames out, 1 for the median frame; exactly 1 throughout where the light is steady.
+    """Factors [N, 3] in linear light that even the frames out, 1 for the median frame; exactly 1 throughout where the
+    light is steady.
 
     `check` is called between comparisons.
     """
     count = len(contents)
     turning = np.zeros(count, bool)
     pairs, links = [], []
-    for step in sorted(STEPS, reverse=True):  # far ones first: what is shading shows over a wide turn, from one frame to the next it does not
+    # far ones first: what is shading shows over a wide turn, from one frame to the next it does not
+    for step in sorted(STEPS, reverse=True):
         for i in range(count - step):
             check()
             link = compare(contents[i], contents[i + step])
@@ -93,7 +99,8 @@ def gains_of(contents: list[Content], check=lambda: None) -> np.ndarray:
             links.append(link)
     if not links:
         return np.ones((count, 3))
-    levels = _levels(count, np.array(pairs), np.array([link.gain for link in links]), np.array([link.weight for link in links]))
+    levels = _levels(count, np.array(pairs), np.array([link.gain for link in links]),
+                     np.array([link.weight for link in links]))
     levels -= np.median(levels, axis=0)
     return np.exp(-levels) if np.ptp(levels, axis=0).max() > STEADY else np.ones((count, 3))
 
@@ -113,13 +120,15 @@ def compare(a: Content, b: Content) -> Link | None:
         return Link(*common[:2])
     common = _common(ratio[person], place[person])
     if common is None:
-        return Link(np.zeros(3), float(person.sum()), True, True) if _slanted(ratio[person].mean(1), place[person]) else None
+        return (Link(np.zeros(3), float(person.sum()), True, True) if _slanted(ratio[person].mean(1), place[person])
+                else None)
     return Link(*common[:2], True, common[2])
 
 
 def _matches(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Indices into descriptors [n, 128] and [m, 128] of those that are each other's nearest, and near."""
-    unit = [d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1) for d in (a.astype(np.float32), b.astype(np.float32))]
+    unit = [d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1)
+            for d in (a.astype(np.float32), b.astype(np.float32))]
     likeness = unit[0] @ unit[1].T
     there, back = likeness.argmax(1), likeness.argmax(0)
     first = np.flatnonzero((back[there] == np.arange(len(a))) & (likeness.max(1) > 0.9))
@@ -127,8 +136,8 @@ def _matches(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _common(ratio: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, float, bool] | None:
-    """The log gain [3] that most spots [n, 3] share, every square of the picture having one voice; its weight; and whether it differs
-    between the ends of the area [n, 2], as shading does and exposure does not. Or None."""
+    """The log gain [3] that most spots [n, 3] share, every square of the picture having one voice; its weight; and
+    whether it differs between the ends of the area [n, 2], as shading does and exposure does not. Or None."""
     if len(ratio) < LEAST_SPOTS:
         return None
     cell = (place // 60).astype(int) @ [1, 64]
@@ -146,7 +155,8 @@ def _common(ratio: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, float, bo
 
 
 def _slanted(ratio: np.ndarray, place: np.ndarray) -> bool:
-    """Whether log ratios [n] that have no value in common lie on a slope across the picture [n, 2]: shading, not wrong matches."""
+    """Whether log ratios [n] that have no value in common lie on a slope across the picture [n, 2]: shading, not wrong
+    matches."""
     if len(ratio) < LEAST_SPOTS:
         return False
     ones = np.concatenate([(place - place.mean(0)) / np.maximum(place.std(0), 1), np.ones((len(place), 1))], 1)
@@ -165,14 +175,17 @@ def _weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
 
 
 def _levels(count: int, pairs: np.ndarray, ratios: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Log light of every frame [N, 3] from the links' differences by least squares, links that contradict the rest losing their say."""
+    """Log light of every frame [N, 3] from the links' differences by least squares, links that contradict the rest
+    losing their say."""
     from scipy.sparse import coo_matrix, diags
     from scipy.sparse.linalg import spsolve
 
     links = len(pairs)
-    draw = coo_matrix((np.repeat([-1.0, 1.0], links), (np.tile(np.arange(links), 2), pairs.T.ravel())), shape=(links, count)).tocsr()
+    draw = coo_matrix((np.repeat([-1.0, 1.0], links), (np.tile(np.arange(links), 2), pairs.T.ravel())),
+                      shape=(links, count)).tocsr()
     chain = diags([-np.ones(count - 1), np.ones(count - 1)], [0, 1], shape=(count - 1, count))
-    hold = 1e-3 * (chain.T @ chain) + 1e-9 * diags([np.ones(count)], [0])  # frames without links follow their neighbours
+    # frames without links follow their neighbours
+    hold = 1e-3 * (chain.T @ chain) + 1e-9 * diags([np.ones(count)], [0])
     trust = np.ones(links)
     for _ in range(8):
         normal = draw.T @ diags([weights * trust], [0]) @ draw + hold

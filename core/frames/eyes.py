@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which frames catch a blink: told by the subject's own eyes in the frames around, so lids that stay closed are no blink."""
+"""Which frames catch a blink: told by the subject's own eyes in the frames around, so lids that stay closed are no
+blink."""
 
 from __future__ import annotations
 
@@ -24,6 +25,7 @@ def blinks(openings: list[tuple[float, float] | None], times: list[float | None]
     time = np.zeros(len(opening)) if any(t is None for t in times) else np.array(times, float)
     found = np.zeros(len(opening), bool)
     for i in np.flatnonzero(seen):
-        usual = np.percentile(opening[seen & (np.abs(time - time[i]) <= AROUND_S)], 70, axis=0)  # above the middle: a blink may take a third of them
+        # above the middle: a blink may take a third of them
+        usual = np.percentile(opening[seen & (np.abs(time - time[i]) <= AROUND_S)], 70, axis=0)
         found[i] = (usual > OPEN).all() and (opening[i] < SHUT * usual).all()
     return found

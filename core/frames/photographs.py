@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folders of photographs, in the order of their names, upright by their EXIF orientation, Display P3 brought to sRGB."""
+"""Folders of photographs, in the order of their names, upright by their EXIF orientation, Display P3 brought to
+sRGB."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from .source import Picture, evenly, fit
 SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".exr", ".heic", ".heif", ".avif")
 RAW = (".dng",)
 FEATURES_PX = 2000
-"""Longer side of the pictures that cameras are found by: photographs lie far apart, and what still matches between them is fine."""
+"""Longer side of the pictures that cameras are found by: photographs lie far apart, and what still matches between them
+is fine."""
 AS_JPEG = "Export them as JPEG or PNG."
 
 
@@ -26,10 +28,12 @@ def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) 
     if not pictures:
         if any(p.suffix.lower() in RAW for p in files):
             raise Problem(f"The photographs in {folder.name} are raw files, which cannot be read.", AS_JPEG)
-        raise Problem(f"There are no photographs in {folder}.", "Choose a folder with JPEG, HEIC, PNG, TIFF or WebP pictures of the face, or a video.")
+        raise Problem(f"There are no photographs in {folder}.",
+                      "Choose a folder with JPEG, HEIC, PNG, TIFF or WebP pictures of the face, or a video.")
     unread = [p for p in files if p.suffix.lower() in RAW]
     if unread:
-        report.finding(f"{len(unread)} raw files were left out beside {len(pictures)} photographs that can be read.", AS_JPEG)
+        report.finding(f"{len(unread)} raw files were left out beside {len(pictures)} photographs that can be read.",
+                       AS_JPEG)
     chosen = evenly(len(pictures), most)
     for done, index in enumerate(chosen, 1):
         path = pictures[index]
@@ -44,4 +48,5 @@ def read_photographs(folder: Path, most: int, long_side: int, report: Reporter) 
             full = to_srgb(full, SDR, P3)
         srgb = fit(full, long_side)
         focal_px = None if focal is None else round(focal / 36 * max(srgb.shape[:2]), 2)  # a full frame is 36 mm wide
-        yield Picture(srgb, int(index), None, path.name, focal_px, done, len(chosen), full if full.shape != srgb.shape else None)
+        yield Picture(srgb, int(index), None, path.name, focal_px, done, len(chosen),
+                      full if full.shape != srgb.shape else None)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How sharp a frame is, from where it sees the head, and which frames make the texture: the sharpest, evenly spread around the head."""
+"""How sharp a frame is, from where it sees the head, and which frames make the texture: the sharpest, evenly spread
+around the head."""
 
 from __future__ import annotations
 
@@ -10,11 +11,13 @@ import numpy as np
 from ..contract.frame_records import FrameRecord
 
 REACH = 0.1
-"""A frame without a face may be chosen if one with a face is nearer than this share of the sequence: a profile, where detectors fail."""
+"""A frame without a face may be chosen if one with a face is nearer than this share of the sequence: a profile, where
+detectors fail."""
 
 
 def sharpness(srgb: np.ndarray, box: tuple | None) -> float:
-    """Tenengrad of the face (of the middle of the picture where there is none), relative to its brightness; higher is sharper.
+    """Tenengrad of the face (of the middle of the picture where there is none), relative to its brightness; higher is
+    sharper.
 
     Mean squared Sobel gradient of luma over squared mean luma: exposure cancels, motion blur and defocus do not.
     """
@@ -23,13 +26,15 @@ def sharpness(srgb: np.ndarray, box: tuple | None) -> float:
     crop = srgb[max(0, int(y0)):max(1, int(y1)), max(0, int(x0)):max(1, int(x1))]
     if crop.shape[0] < 8 or crop.shape[1] < 8:
         crop = srgb
-    luma = cv2.GaussianBlur(crop @ np.array([0.299, 0.587, 0.114], np.float32), (0, 0), 0.8)  # below the noise, above the pores
+    # below the noise, above the pores
+    luma = cv2.GaussianBlur(crop @ np.array([0.299, 0.587, 0.114], np.float32), (0, 0), 0.8)
     gradient = cv2.Sobel(luma, cv2.CV_32F, 1, 0) ** 2 + cv2.Sobel(luma, cv2.CV_32F, 0, 1) ** 2
     return float(np.sqrt(gradient.mean()) / max(luma.mean(), 0.02))
 
 
 def turns(records: list[FrameRecord]) -> np.ndarray:
-    """From where each frame sees the head [N]: its yaw in degrees, carried on along the sequence where no face is found; nan too far from any face."""
+    """From where each frame sees the head [N]: its yaw in degrees, carried on along the sequence where no face is
+    found; nan too far from any face."""
     order = np.arange(len(records))
     known = np.array([r.yaw_deg is not None for r in records])
     yaw = np.array([r.yaw_deg or 0.0 for r in records])
@@ -60,6 +65,7 @@ def select_views(sharp: np.ndarray, turn: np.ndarray, count: int) -> list[int]:
     while len(chosen) < count:
         rest = np.setdiff1d(candidates, chosen)
         rest = rest[sharp[rest] >= np.median(sharp[rest])]
-        gap = np.abs(turn[rest][:, None] - turn[chosen][None]).min(1) + 0.01 * np.abs(rest[:, None] - np.array(chosen)[None]).min(1)
+        gap = np.abs(turn[rest][:, None]
+                     - turn[chosen][None]).min(1) + 0.01 * np.abs(rest[:, None] - np.array(chosen)[None]).min(1)
         chosen.append(int(rest[np.argmax(gap)]))
     return sorted(chosen)

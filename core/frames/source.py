@@ -13,9 +13,10 @@ from ..imaging import images
 
 @dataclass(frozen=True)
 class Picture:
-    """One sampled picture: srgb [H, W, 3] upright and at its final size, index in the source (decoded frame or sorted file),
-    time_s (None for a photograph), source (file name of a photograph), focal_px at this size where the file says it,
-    how far the reading is: `done` of `of`; and full [h, w, 3], the same picture larger, for the features that cameras are found by, where there is one."""
+    """One sampled picture: srgb [H, W, 3] upright and at its final size, index in the source (decoded frame or sorted
+    file), time_s (None for a photograph), source (file name of a photograph), focal_px at this size where the file says
+    it, how far the reading is: `done` of `of`; and full [h, w, 3], the same picture larger, for the features that
+    cameras are found by, where there is one."""
 
     srgb: np.ndarray
     index: int
@@ -33,7 +34,8 @@ def evenly(count: int, most: int) -> np.ndarray:
 
 
 def evenly_in_time(times: np.ndarray, most: int) -> np.ndarray:
-    """At most `most` indices of ascending time stamps [N], nearest to equal intervals of time, first and last among them.
+    """At most `most` indices of ascending time stamps [N], nearest to equal intervals of time, first and last among
+    them.
 
     A pause in the recording counts as no more than thirty frames.
     """

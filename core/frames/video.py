@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Videos: any that FFmpeg reads through PyAV, at equal intervals of time, upright and never mirrored, HDR brought to sRGB.
+"""Videos: any that FFmpeg reads through PyAV, at equal intervals of time, upright and never mirrored, HDR brought to
+sRGB.
 
-A damaged or cut-off file gives what can be decoded of it. One frame at a time is in memory, shrunk as it leaves the decoder, and stretches
-between two wanted frames are jumped over where the file allows it, so an hour of 8K is read as well as four seconds.
+A damaged or cut-off file gives what can be decoded of it. One frame at a time is in memory, shrunk as it leaves the
+decoder, and stretches between two wanted frames are jumped over where the file allows it, so an hour of 8K is read as
+well as four seconds.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ LARGE = 2560 * 1440
 
 
 def read_video(path: Path, most: int, long_side: int, report: Reporter) -> Iterator[Picture]:
-    """At most `most` frames of a video, evenly spread in time. Raises Problem for what is not a video that can be read."""
+    """At most `most` frames of a video, evenly spread in time. Raises Problem for what is not a video that can be
+    read."""
     index = _index(path, report)
     wanted = evenly_in_time(index.times, most)
     given, corrupt = 0, 0
@@ -37,39 +40,46 @@ def read_video(path: Path, most: int, long_side: int, report: Reporter) -> Itera
             if frame.is_corrupt:
                 corrupt += 1
                 continue
-            transfer, primaries = stream.codec_context.color_trc, stream.codec_context.color_primaries  # known for sure once a frame is decoded
+            # known for sure once a frame is decoded
+            transfer, primaries = stream.codec_context.color_trc, stream.codec_context.color_primaries
             if not given and transfer in (HLG, PQ):
                 report.log("The video is HDR; its highlights are compressed into sRGB.")
             turns, mirrored = orientation(frame)
             if not given and mirrored:
-                report.finding("The video is marked to be shown as in a mirror, as selfie cameras do; it was turned back, so that left is left.",
-                               "If moles end up on the wrong side, switch off the mirroring of the front camera, or film with the back camera.")
+                report.finding("The video is marked to be shown as in a mirror, as selfie cameras do; it was turned "
+                               "back, so that left is left.",
+                               "If moles end up on the wrong side, switch off the mirroring of the front camera, or "
+                               "film with the back camera.")
             size = fitted(frame.width * (stream.sample_aspect_ratio or 1), frame.height, long_side)
             given += 1
-            yield Picture(np.ascontiguousarray(np.rot90(_srgb(frame, size, transfer, primaries), turns)), number, frame.time, "", None, number + 1,
-                          len(index.times))
+            yield Picture(np.ascontiguousarray(np.rot90(_srgb(frame, size, transfer, primaries), turns)), number,
+                          frame.time, "", None, number + 1, len(index.times))
     if given < 0.9 * len(wanted):
-        report.finding(f"Only {given} of {len(wanted)} frames could be read; the file seems damaged or cut off.", "Copy the video again from the phone.")
+        report.finding(f"Only {given} of {len(wanted)} frames could be read; the file seems damaged or cut off.",
+                       "Copy the video again from the phone.")
 
 
 @dataclass(frozen=True)
 class _Index:
-    """What a video's packets tell: time stamps in order of showing [N] in units of the stream (consecutive numbers where there are none),
-    and those of frames that decoding can begin with (none: from the start only)."""
+    """What a video's packets tell: time stamps in order of showing [N] in units of the stream (consecutive numbers
+    where there are none), and those of frames that decoding can begin with (none: from the start only)."""
 
     times: np.ndarray
     keys: np.ndarray
 
 
 def orientation(frame: av.VideoFrame) -> tuple[int, bool]:
-    """How a frame is shown as its display matrix says: quarter turns counter-clockwise, and whether mirrored after that.
+    """How a frame is shown as its display matrix says: quarter turns counter-clockwise, and whether mirrored after
+    that.
 
-    Only the turns are to be followed: a phone's front camera stores what it saw and marks it to be shown as in a mirror.
+    Only the turns are to be followed: a phone's front camera stores what it saw and marks it to be shown as in a
+    mirror.
     """
     data = frame.side_data.get("DISPLAYMATRIX")
     if data is None:
         return 0, False
-    a, b, _, c, d = np.frombuffer(bytes(data), np.int32)[:5].astype(float)  # (x, y) is shown at (ax + cy, bx + dy), y down
+    # (x, y) is shown at (ax + cy, bx + dy), y down
+    a, b, _, c, d = np.frombuffer(bytes(data), np.int32)[:5].astype(float)
     mirrored = a * d - b * c < 0
     if mirrored:
         a = -a  # shown from behind once more
@@ -81,9 +91,13 @@ def _open(path: Path):
         container = av.open(str(path))
     except (av.FFmpegError, OSError, ValueError) as error:
         if path.stat().st_size == 0:
-            raise Problem(f"{path.name} is empty.", "Copy the video again from the phone, or choose another one.") from error
-        raise Problem(f"{path.name} cannot be read as a video: it is damaged, cut off before its end, or no video at all.",
-                      "Copy it again from the phone, or choose an MP4 or MOV file that a video player opens.") from error
+            raise Problem(
+                f"{path.name} is empty.", "Copy the video again from the phone, or choose another one."
+            ) from error
+        raise Problem(
+            f"{path.name} cannot be read as a video: it is damaged, cut off before its end, or no video at all.",
+            "Copy it again from the phone, or choose an MP4 or MOV file that a video player opens.",
+        ) from error
     if not container.streams.video:
         container.close()
         raise Problem(f"{path.name} holds no pictures, only sound or data.", "Choose a video of the face.")
@@ -113,14 +127,16 @@ def _index(path: Path, report: Reporter) -> _Index:
     return _Index(np.array(sorted(times)), np.array(sorted(keys), int))
 
 
-def _frames(container, stream, index: _Index, wanted: np.ndarray, report: Reporter) -> Iterator[tuple[int, av.VideoFrame]]:
+def _frames(container, stream, index: _Index, wanted: np.ndarray,
+            report: Reporter) -> Iterator[tuple[int, av.VideoFrame]]:
     """The frames of these numbers, or where one is lost the next that can be decoded, with their numbers."""
     for first, numbers in _stretches(index, wanted):
         if first is not None:
             container.seek(int(first), stream=stream)
         targets = list(numbers)
         for count, frame in enumerate(_decode(container, stream, report)):
-            number = int(np.searchsorted(index.times, frame.pts)) if len(index.keys) and frame.pts is not None else count
+            number = (int(np.searchsorted(index.times, frame.pts)) if len(index.keys) and frame.pts is not None
+                      else count)
             if number < targets[0]:
                 report.check()
                 continue
@@ -132,7 +148,8 @@ def _frames(container, stream, index: _Index, wanted: np.ndarray, report: Report
 
 
 def _stretches(index: _Index, wanted: np.ndarray) -> list[tuple[int | None, list[int]]]:
-    """Wanted numbers in stretches that are decoded in one go, each with the time stamp to jump to (None: read on from the start)."""
+    """Wanted numbers in stretches that are decoded in one go, each with the time stamp to jump to (None: read on from
+    the start)."""
     begin = np.searchsorted(index.keys, index.times[wanted], side="right") - 1  # the key frame each needs
     stretches: list[tuple[int | None, list[int]]] = []
     for i, number in enumerate(wanted.tolist()):
@@ -160,7 +177,8 @@ def _decode(container, stream, report: Reporter) -> Iterator[av.VideoFrame]:
 def _srgb(frame: av.VideoFrame, size: tuple[int, int], transfer: int, primaries: int) -> np.ndarray:
     """A decoded frame as sRGB float32 [H, W, 3] of that width and height, not yet turned."""
     how = {"width": size[0], "height": size[1], "interpolation": "AREA"} if size != (frame.width, frame.height) else {}
-    # Unless told, swscale takes Rec. 601 for every matrix, and a phone's Rec. 709 skin turns greenish; and full-range values for the narrow range
+    # Unless told, swscale takes Rec. 601 for every matrix, and a phone's Rec. 709 skin turns greenish; and full-range
+    # values for the narrow range
     if frame.colorspace != UNSPECIFIED:
         how |= {"src_colorspace": frame.colorspace, "dst_colorspace": "DEFAULT"}
     if frame.color_range == FULL_RANGE:

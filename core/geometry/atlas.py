@@ -17,33 +17,40 @@ from .meshes import Mesh
 CHECK_SIDE_TEXELS = 512
 """Of the map on which overlaps and packing are counted: shares of a quarter of a million texels."""
 FILLED_SHARE = 0.6
-"""Share of the square that charts of a face with their margins are taken to fill: decides the scale at which they are packed."""
+"""Share of the square that charts of a face with their margins are taken to fill: decides the scale at which they are
+packed."""
 MOST_OVERLAP_SHARE = 0.01
 """Share of the covered texels that may lie under two triangles: charts touch, and fans of tiny triangles fold."""
 
 
 def unwrap(mesh: Mesh, size: int, gap_px: int = 2) -> Mesh:
-    """The same vertices and triangles with new UVs in one square, charts about 2 `gap_px` texels apart in a map of that size.
+    """The same vertices and triangles with new UVs in one square, charts about 2 `gap_px` texels apart in a map of that
+    size.
 
     The same mesh gives the same UVs. Triangles without area end up in a corner.
     """
     import xatlas  # here, because only jobs that unwrap need it
 
     atlas, charts, packing = xatlas.Atlas(), xatlas.ChartOptions(), xatlas.PackOptions()
-    charts.fix_winding, packing.rotate_charts = True, False  # it turns a chart by swapping u and v, which makes a mirror image of it
+    # it turns a chart by swapping u and v, which makes a mirror image of it
+    charts.fix_winding, packing.rotate_charts = True, False
     packing.padding, packing.bilinear = gap_px, True
-    packing.texels_per_unit = size * np.sqrt(FILLED_SHARE / _areas(mesh).sum())  # a fixed resolution would leave room for a third of the texels
-    atlas.add_mesh(np.ascontiguousarray(mesh.vertices - mesh.vertices.mean(0), np.float32), np.ascontiguousarray(mesh.faces, np.uint32))
+    # a fixed resolution would leave room for a third of the texels
+    packing.texels_per_unit = size * np.sqrt(FILLED_SHARE / _areas(mesh).sum())
+    atlas.add_mesh(np.ascontiguousarray(mesh.vertices - mesh.vertices.mean(0), np.float32),
+                   np.ascontiguousarray(mesh.faces, np.uint32))
     atlas.generate(charts, packing)
     _, faces, uvs = atlas[0]
     side = max(atlas.width, atlas.height)  # the packed area is no square, texels are
-    mapped = replace(mesh, uvs=np.asarray(uvs, np.float64) * [atlas.width / side, atlas.height / side], face_uvs=np.asarray(faces, np.int64))
+    mapped = replace(mesh, uvs=np.asarray(uvs, np.float64) * [atlas.width / side, atlas.height / side],
+                     face_uvs=np.asarray(faces, np.int64))
     mirrored = _double_areas(mapped.uvs[mapped.face_uvs]).sum() < 0
     return replace(mapped, uvs=np.abs([0, float(mirrored)] - mapped.uvs))
 
 
 def tiles(mesh: Mesh) -> np.ndarray:
-    """The tile each triangle lies in, whole numbers [F, 2]: that of its middle, for a chart may end on its tile's edge."""
+    """The tile each triangle lies in, whole numbers [F, 2]: that of its middle, for a chart may end on its tile's
+    edge."""
     return np.floor(mesh.uvs[mesh.face_uvs].mean(1)).astype(np.int64)
 
 
@@ -97,14 +104,16 @@ def packing(mesh: Mesh, size: int = CHECK_SIDE_TEXELS) -> float:
 
 
 def stretch(mesh: Mesh) -> np.ndarray:
-    """Per triangle the larger of its stretches [F]: 1 for one that keeps its shape and the mean scale of the map, 2 for one drawn out to twice
-    in some direction or shrunk to half in one (the singular values of Sander et al. 2001, over the mean scale)."""
+    """Per triangle the larger of its stretches [F]: 1 for one that keeps its shape and the mean scale of the map, 2 for
+    one drawn out to twice in some direction or shrunk to half in one (the singular values of Sander et al. 2001, over
+    the mean scale)."""
     corners, uvs = mesh.vertices[mesh.faces], mesh.uvs[mesh.face_uvs]
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     length = np.maximum(np.linalg.norm(e1, axis=1), 1e-12)
     x, y = (e2 * e1).sum(1) / length, np.linalg.norm(np.cross(e1, e2), axis=1) / length
     area = length * y / 2
-    flat = np.stack([np.stack([length, np.zeros_like(length)], -1), np.stack([x, np.maximum(y, 1e-12)], -1)], 1)  # rows: edges in the plane
+    # rows: edges in the plane
+    flat = np.stack([np.stack([length, np.zeros_like(length)], -1), np.stack([x, np.maximum(y, 1e-12)], -1)], 1)
     mapped = np.linalg.solve(flat, np.stack([uvs[:, 1] - uvs[:, 0], uvs[:, 2] - uvs[:, 0]], 1))
     singular = np.linalg.svd(mapped, compute_uv=False)
     scale = np.sqrt((np.abs(_double_areas(uvs)) / 2).sum() / area.sum())

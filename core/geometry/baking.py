@@ -28,8 +28,9 @@ BLEED_PX = 16
 class TexelPartners:
     """For each texel [S, S] of a tile where its partner lies in the source's maps.
 
-    uv float32 [S, S, 2] (nan: no partner), turn float32 [S, S]: the angle in radians that takes directions of the source's tangent plane to the
-    target's, mirrored bool [S, S]: whether one of the two is a mirror image, covered bool [S, S]: texels inside a triangle.
+    uv float32 [S, S, 2] (nan: no partner), turn float32 [S, S]: the angle in radians that takes directions of the
+    source's tangent plane to the target's, mirrored bool [S, S]: whether one of the two is a mirror image, covered bool
+    [S, S]: texels inside a triangle.
     """
 
     uv: np.ndarray
@@ -51,7 +52,8 @@ class Source:
         self.tangent, self.hand = surfaces.tangents(self.mesh)
 
 
-def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick: Callable[[float], None], painted: np.ndarray | None = None) -> TexelPartners:
+def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick: Callable[[float], None],
+           painted: np.ndarray | None = None) -> TexelPartners:
     """Partners, up to `farthest` metres away, of the texels of a tile (u, v) of the target's UVs, in a map of `size`.
 
     painted bool [F]: the triangles that count (all by default). `tick` is called with the share done, per strip.
@@ -63,7 +65,8 @@ def places(target: Mesh, tile, source: Source, size: int, farthest: float, tick:
     part = atlas.in_tile(whole, tile, where)
     low, high = _rows(part, size)
     uv = np.full((size, size, 2), np.nan, np.float32)
-    turn, mirrored, covered = np.zeros((size, size), np.float32), np.zeros((size, size), bool), np.zeros((size, size), bool)
+    turn, mirrored, covered = np.zeros((size, size),
+                                       np.float32), np.zeros((size, size), bool), np.zeros((size, size), bool)
     for row in range(0, size, STRIP_ROWS):
         tick(row / size)
         end = min(row + STRIP_ROWS, size)
@@ -99,14 +102,18 @@ def bake(image: np.ndarray, at: TexelPartners) -> np.ndarray:
     for row in range(0, len(out), STRIP_ROWS):
         uv = np.nan_to_num(at.uv[row:row + STRIP_ROWS])
         x, y = uv[..., 0] * width - 0.5, (1 - uv[..., 1]) * height - 0.5
-        out[row:row + STRIP_ROWS] = np.clip(cv2.remap(image, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE), low, high)  # cubic overshoots at edges
+        # cubic overshoots at edges
+        out[row:row + STRIP_ROWS] = np.clip(cv2.remap(image, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE),
+                                            low, high)
     return bled(out, at)
 
 
 def bake_normals(packed: np.ndarray, at: TexelPartners) -> np.ndarray:
-    """A tangent space normal map [H, W, 3] packed into [0, 1], OpenGL Y+, turned from the source's tangent frames into the target's.
+    """A tangent space normal map [H, W, 3] packed into [0, 1], OpenGL Y+, turned from the source's tangent frames into
+    the target's.
 
-    What it tells is how the skin leaves its own smooth surface; that is kept, for the target brings a smooth surface of its own.
+    What it tells is how the skin leaves its own smooth surface; that is kept, for the target brings a smooth surface of
+    its own.
     """
     out = bake(packed, at)
     for row in range(0, len(out), STRIP_ROWS):
@@ -122,7 +129,8 @@ def bake_normals(packed: np.ndarray, at: TexelPartners) -> np.ndarray:
 
 
 def bled(image: np.ndarray, at: TexelPartners) -> np.ndarray:
-    """The map with a margin around what is known that repeats its nearest texel, and a smooth continuation of it beyond, over the rest of the tile."""
+    """The map with a margin around what is known that repeats its nearest texel, and a smooth continuation of it
+    beyond, over the rest of the tile."""
     known = at.known
     if known.all() or not known.any():
         return image
@@ -130,21 +138,26 @@ def bled(image: np.ndarray, at: TexelPartners) -> np.ndarray:
     near = cv2.distanceTransform((~known).astype(np.uint8), cv2.DIST_L2, 5) <= margin + 1
     small = min(512, len(image))
     weight = images.resize(known.astype(np.float32), small, small)
-    mean = images.resize(np.where(known[..., None], image.reshape(*known.shape, -1), 0).astype(np.float32), small, small).reshape(small, small, -1)
-    smooth = cv2.resize(_continued(mean, weight), known.shape[::-1], interpolation=cv2.INTER_LINEAR).reshape(image.shape)
+    mean = images.resize(np.where(known[..., None], image.reshape(*known.shape, -1), 0).astype(np.float32), small,
+                         small).reshape(small, small, -1)
+    smooth = cv2.resize(_continued(mean, weight), known.shape[::-1],
+                        interpolation=cv2.INTER_LINEAR).reshape(image.shape)
     nearest = raster.bleed(image, known)
     return np.where(near.reshape(near.shape + (1,) * (image.ndim - 2)), nearest, smooth)
 
 
 def _continued(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Values times weights [h, w, C] and weights [h, w] in [0, 1] -> values everywhere, from ever coarser means where the weight is low
-    (pull-push, Gortler et al. 1996)."""
+    """Values times weights [h, w, C] and weights [h, w] in [0, 1] -> values everywhere, from ever coarser means where
+    the weight is low (pull-push, Gortler et al. 1996)."""
     if min(weight.shape) <= 2:
         return np.broadcast_to(weighted.sum((0, 1)) / max(weight.sum(), 1e-6), weighted.shape).astype(np.float32)
     half = (weight.shape[1] + 1) // 2, (weight.shape[0] + 1) // 2
-    down = cv2.resize(weighted, half, interpolation=cv2.INTER_AREA).reshape(*half[::-1], -1), cv2.resize(weight, half, interpolation=cv2.INTER_AREA)
+    down = cv2.resize(weighted, half,
+                      interpolation=cv2.INTER_AREA).reshape(*half[::-1],
+                                                            -1), cv2.resize(weight, half, interpolation=cv2.INTER_AREA)
     gain = np.minimum(4 * down[1], 1) / np.maximum(down[1], 1e-6)  # one known texel of four is enough
-    coarse = cv2.resize(_continued(down[0] * gain[..., None], down[1] * gain), weight.shape[::-1], interpolation=cv2.INTER_LINEAR)
+    coarse = cv2.resize(_continued(down[0] * gain[..., None], down[1] * gain), weight.shape[::-1],
+                        interpolation=cv2.INTER_LINEAR)
     return (weighted + coarse.reshape(weighted.shape) * (1 - weight[..., None])).astype(np.float32)
 
 
@@ -161,10 +174,12 @@ def _rows(mesh: Mesh, size: int) -> tuple[np.ndarray, np.ndarray]:
     return np.floor(v.min(1)) - 1, np.ceil(v.max(1)) + 1
 
 
-def _turn(source: Source, face: np.ndarray, bary: np.ndarray, t: np.ndarray, b: np.ndarray, n: np.ndarray) -> np.ndarray:
-    """Angles [N] from the target's tangent t to the source's at face, bary, towards b; the source's normal is first taken to the target's n [N, 3]
-    by the smallest rotation."""
-    tangent, _, normal = surfaces.frames(source.surface.normals, source.mesh.faces, source.tangent, source.hand, face, bary)
+def _turn(source: Source, face: np.ndarray, bary: np.ndarray, t: np.ndarray, b: np.ndarray,
+          n: np.ndarray) -> np.ndarray:
+    """Angles [N] from the target's tangent t to the source's at face, bary, towards b; the source's normal is first
+    taken to the target's n [N, 3] by the smallest rotation."""
+    tangent, _, normal = surfaces.frames(source.surface.normals, source.mesh.faces, source.tangent, source.hand, face,
+                                         bary)
     lean = (tangent * n).sum(1, keepdims=True) / np.maximum(1 + (normal * n).sum(1, keepdims=True), 1e-6)
     tangent = tangent - lean * (normal + n)
     return np.arctan2((tangent * b).sum(1), (tangent * t).sum(1))

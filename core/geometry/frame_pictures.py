@@ -21,7 +21,8 @@ from .views import View, read_views
 KINDS = (".png", ".jpg", ".jpeg", ".exr", ".tif", ".tiff", ".webp")
 
 MOST_REDUCTION = 8
-"""How many times smaller than its frame a picture may be: of a face 600 pixels wide it has 75 left, too few for a texture, enough for its tones."""
+"""How many times smaller than its frame a picture may be: of a face 600 pixels wide it has 75 left, too few for a
+texture, enough for its tones."""
 
 
 def pictures_of(capture: Capture, folder: str, what: str) -> list[tuple[View, Path]]:
@@ -29,7 +30,8 @@ def pictures_of(capture: Capture, folder: str, what: str) -> list[tuple[View, Pa
 
     Raises Problem where none belongs to a registered frame.
     """
-    return match(read_views(capture), {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()}, Path(folder), what, bool(folder))
+    return match(read_views(capture), {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()},
+                 Path(folder), what, bool(folder))
 
 
 def read_picture(path: Path, view: View, what: str) -> np.ndarray:
@@ -44,22 +46,28 @@ def check_shape(path: Path, image: np.ndarray, view: View, what: str) -> None:
     height, width = image.shape[:2]
     if abs(width / height - view.width / view.height) > 0.01 or width * MOST_REDUCTION < view.width:
         raise Problem(f"{path} is {width} x {height}, but its frame is {view.width} x {view.height}.",
-                      f"{what.title()} pictures are made from the frames in the capture's frames folder, without cropping or turning them.")
+                      f"{what.title()} pictures are made from the frames in the capture's frames folder, without "
+                      "cropping or turning them.")
 
 
 def match(views: list[View], video_frames: dict[str, int], path: Path, what: str = "delit",
           given: bool = True) -> list[tuple[View, Path]]:
-    """Each registered view with its picture in the folder `path`, in frame order; `video_frames`: frame name -> number in the video."""
+    """Each registered view with its picture in the folder `path`, in frame order; `video_frames`: frame name -> number
+    in the video."""
     if not given or not path.is_dir():
-        raise Problem(f"There is no folder {str(path)!r} with {what} pictures." if given else f"No folder of {what} pictures was chosen.",
+        raise Problem(f"There is no folder {str(path)!r} with {what} pictures." if given
+                      else f"No folder of {what} pictures was chosen.",
                       "Choose the folder that holds them, named like the frames of the capture.")
     pictures = sorted(p for p in path.iterdir() if p.suffix.lower() in KINDS and not p.name.startswith("."))
     by_stem = {p.stem: p for p in pictures}
     by_number = {int(p.stem): p for p in pictures if p.stem.isascii() and p.stem.isdigit()}
     named = [(view, by_stem[Path(view.name).stem]) for view in views if Path(view.name).stem in by_stem]
-    numbered = [(view, by_number[video_frames[view.name]]) for view in views if video_frames.get(view.name) in by_number]
-    pairs = max(named, numbered, key=len)  # not mixed: 00009.jpg may be frame 9 of the capture or of the video, but not both
+    numbered = [(view, by_number[video_frames[view.name]]) for view in views
+                if video_frames.get(view.name) in by_number]
+    # not mixed: 00009.jpg may be frame 9 of the capture or of the video, but not both
+    pairs = max(named, numbered, key=len)
     if not pairs:
         raise Problem(f"None of the {len(pictures)} pictures in {path} belongs to a registered frame.",
-                      f"Name them like the frames (for example {Path(views[0].name).stem}.png)." if views else "Run the stage cameras again.")
+                      f"Name them like the frames (for example {Path(views[0].name).stem}.png)." if views
+                      else "Run the stage cameras again.")
     return pairs

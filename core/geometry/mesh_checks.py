@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every mesh passes when it is read and before it is written: numbers that are finite, indices in range; and what a PLY's header promises, held
-against the file's size before memory is taken."""
+"""What every mesh passes when it is read and before it is written: numbers that are finite, indices in range; and what
+a PLY's header promises, held against the file's size before memory is taken."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from ..contract.regular_files import require_regular
 from ..contract.stages import advise_remaking
 
 MOST_OBJ_BYTES = 512 << 20
-"""As lists of words, an OBJ takes about ten times its size while it is read: 5 GB of memory. It holds five million triangles."""
+"""As lists of words, an OBJ takes about ten times its size while it is read: 5 GB of memory. It holds five million
+triangles."""
 MOST_PLY_BYTES = 2 << 30
 """A scan of 50 million triangles; as arrays of doubles and of long integers it takes about three times its size."""
 FARTHEST_UNITS = 1e9
 """In whatever units; a head in micrometres has 3e5. What lies farther off is damage, and its volume would overflow."""
-SIZES = {"char": 1, "uchar": 1, "int8": 1, "uint8": 1, "short": 2, "ushort": 2, "int16": 2, "uint16": 2, "int": 4, "uint": 4, "int32": 4, "uint32": 4,
-         "float": 4, "float32": 4, "double": 8, "float64": 8}
+SIZES = {"char": 1, "uchar": 1, "int8": 1, "uint8": 1, "short": 2, "ushort": 2, "int16": 2, "uint16": 2, "int": 4,
+         "uint": 4, "int32": 4, "uint32": 4, "float": 4, "float32": 4, "double": 8, "float64": 8}
 """Bytes of PLY's types."""
 MOST_HEADER_BYTES = 1 << 16
 """A PLY's header is a line per property; one that has not ended by then is none."""
@@ -49,7 +50,9 @@ def find_fault(vertices: np.ndarray, faces: np.ndarray, uvs: np.ndarray | None, 
     for values, width, what in ((vertices, 3, "vertex"), (uvs, 2, "UV")):
         if values is not None and (values.ndim != 2 or values.shape[1] != width):
             return f"not every {what} has {width} numbers"
-        if values is not None and values.size and not (values.min() >= -FARTHEST_UNITS and values.max() <= FARTHEST_UNITS):  # false for NaN, too
+        # false for NaN, too
+        if values is not None and values.size and not (values.min() >= -FARTHEST_UNITS
+                                                       and values.max() <= FARTHEST_UNITS):
             return f"it has a {what} of values that are no numbers (NaN), infinite or beyond {FARTHEST_UNITS:g}"
     for indices, count, what in ((faces, len(vertices), "vertex"), (face_uvs, 0 if uvs is None else len(uvs), "UV")):
         if indices is not None and indices.size and not (indices.min() >= 0 and indices.max() < count):

@@ -40,7 +40,8 @@ class Mesh:
 def joined(meshes: list[Mesh]) -> Mesh:
     """Several meshes as one, without UVs; the triangles of the first come first."""
     first = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
-    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate([mesh.faces + k for mesh, k in zip(meshes, first, strict=True)]))
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]),
+                np.concatenate([mesh.faces + k for mesh, k in zip(meshes, first, strict=True)]))
 
 
 def face_normals(mesh: Mesh) -> np.ndarray:
@@ -60,10 +61,11 @@ def vertex_normals(mesh: Mesh) -> np.ndarray:
 
 
 def read_obj(path: Path) -> Mesh:
-    """Triangles and triangulated polygons with their UVs. Raises Problem for a file without faces, and for one that is damaged: a line without its
-    numbers, positions that are no numbers, faces with vertices that are not there."""
+    """Triangles and triangulated polygons with their UVs. Raises Problem for a file without faces, and for one that is
+    damaged: a line without its numbers, positions that are no numbers, faces with vertices that are not there."""
     vertices, uvs, faces, face_uvs, polygons = [], [], [], [], []
-    text = open_mesh(Path(path), MOST_OBJ_BYTES).decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
+    text = open_mesh(Path(path), MOST_OBJ_BYTES).decode("utf-8-sig",
+                                                        "replace").replace("\r\n", "\n").replace("\r", "\n")
     for number, line in enumerate(text.replace("\\\n", " ").split("\n"), 1):
         key, *words = line.split() or [""]
         try:
@@ -99,7 +101,8 @@ def read_obj_vertices(path: Path) -> np.ndarray:
     path = Path(path)
     text = open_mesh(path, MOST_OBJ_BYTES).decode("utf-8-sig", "replace")
     try:
-        vertices = np.array([line.split()[1:4] for line in text.splitlines() if line.startswith("v ")], np.float64).reshape(-1, 3)
+        vertices = np.array([line.split()[1:4] for line in text.splitlines() if line.startswith("v ")],
+                            np.float64).reshape(-1, 3)
     except ValueError as error:
         raise damaged(path, str(error)) from error
     if fault := find_fault(vertices, np.zeros((0, 3), np.int64), None, None):
@@ -108,13 +111,14 @@ def read_obj_vertices(path: Path) -> np.ndarray:
 
 
 def write_obj(path: Path, mesh: Mesh) -> None:
-    """Positions to a micrometre, UVs to 1e-6, atomically. Raises Problem, and writes nothing, for a mesh without faces or with values that are no
-    numbers."""
+    """Positions to a micrometre, UVs to 1e-6, atomically. Raises Problem, and writes nothing, for a mesh without faces
+    or with values that are no numbers."""
     _check_written(path, mesh)
     lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in mesh.vertices]
     if mesh.uvs is not None:
         lines += [f"vt {u:.6f} {v:.6f}" for u, v in mesh.uvs]
-        lines += [f"f {a}/{i} {b}/{j} {c}/{k}" for (a, b, c), (i, j, k) in zip(mesh.faces + 1, mesh.face_uvs + 1, strict=True)]
+        lines += [f"f {a}/{i} {b}/{j} {c}/{k}"
+                  for (a, b, c), (i, j, k) in zip(mesh.faces + 1, mesh.face_uvs + 1, strict=True)]
     else:
         lines += [f"f {a} {b} {c}" for a, b, c in mesh.faces + 1]
     with replacing(path) as temporary:
@@ -122,7 +126,8 @@ def write_obj(path: Path, mesh: Mesh) -> None:
 
 
 def read_ply(path: Path, or_points: bool = False) -> Mesh:
-    """The triangles of a PLY file, ASCII or binary of either byte order; polygons are cut into triangles. Raises Problem for a damaged one.
+    """The triangles of a PLY file, ASCII or binary of either byte order; polygons are cut into triangles. Raises
+    Problem for a damaged one.
 
     `or_points`: one that holds points alone gives a mesh without faces, and is no damage.
     """
@@ -131,9 +136,11 @@ def read_ply(path: Path, or_points: bool = False) -> Mesh:
     check_ply(path, content)
     try:
         loaded = trimesh.load(io.BytesIO(content), file_type="ply", process=False, force=None if or_points else "mesh")
-        points, faces = (getattr(loaded, name, np.zeros((0, 3))) for name in ("vertices", "faces"))  # what is empty has neither
+        # what is empty has neither
+        points, faces = (getattr(loaded, name, np.zeros((0, 3))) for name in ("vertices", "faces"))
         mesh = Mesh(np.asarray(points, np.float64).reshape(-1, 3), np.asarray(faces, np.int64))
-    except (ValueError, LookupError, TypeError, AttributeError, OverflowError, struct.error, NotImplementedError) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, OverflowError, struct.error,
+            NotImplementedError) as error:
         raise damaged(path, str(error).splitlines()[0][:100] if str(error) else type(error).__name__) from error
     if not len(mesh.faces) and not or_points:
         raise damaged(path, "it holds no faces")
@@ -141,17 +148,21 @@ def read_ply(path: Path, or_points: bool = False) -> Mesh:
 
 
 def write_ply(path: Path, mesh: Mesh) -> None:
-    """Binary PLY, atomically. Raises Problem, and writes nothing, for a mesh without faces or with values that are no numbers."""
+    """Binary PLY, atomically. Raises Problem, and writes nothing, for a mesh without faces or with values that are no
+    numbers."""
     _check_written(path, mesh)
     with replacing(path) as temporary:
-        temporary.write_bytes(trimesh.exchange.ply.export_ply(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)))
+        temporary.write_bytes(trimesh.exchange.ply.export_ply(trimesh.Trimesh(mesh.vertices, mesh.faces,
+                                                                              process=False)))
 
 
 def write_points(path: Path, points: np.ndarray) -> None:
     """Points [N, 3] without faces as a binary PLY, atomically."""
-    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\nproperty float x\nproperty float y\nproperty float z\n"
+    header = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\nproperty float x\nproperty float "
+              "y\nproperty float z\n")
     with replacing(path) as temporary:
-        temporary.write_bytes(f"{header}element face 0\nproperty list uchar int vertex_indices\nend_header\n".encode() + points.astype("<f4").tobytes())
+        temporary.write_bytes(f"{header}element face 0\nproperty list uchar int vertex_indices\nend_header\n".encode()
+                              + points.astype("<f4").tobytes())
 
 
 def _sound(path: Path, mesh: Mesh) -> Mesh:
@@ -162,23 +173,29 @@ def _sound(path: Path, mesh: Mesh) -> Mesh:
 
 
 def _check_written(path: Path, mesh: Mesh) -> None:
-    if fault := find_fault(mesh.vertices, mesh.faces, mesh.uvs, mesh.face_uvs) or ("" if len(mesh.faces) else "it has no faces"):
+    if fault := find_fault(mesh.vertices, mesh.faces, mesh.uvs,
+                           mesh.face_uvs) or ("" if len(mesh.faces) else "it has no faces"):
         raise Problem(f"{path} was not written: {fault}.",
-                      advise_remaking(Path(path), "Run again, and if it stays, report it with the logs of this capture. Finished stages are kept."))
+                      advise_remaking(Path(path),
+                                      "Run again, and if it stays, report it with the logs of this capture. Finished "
+                                      "stages are kept."))
 
 
 def _corner(word: str, vertices: int, uvs: int) -> tuple[int, int]:
-    """A corner of an OBJ's face, "3/7/1" or "-1//-1", as indices from zero of its vertex and UV (-1: it has none); `vertices` and `uvs` have been read so
-    far, from which negative numbers count back. Raises ValueError for what is none."""
+    """A corner of an OBJ's face, "3/7/1" or "-1//-1", as indices from zero of its vertex and UV (-1: it has none);
+    `vertices` and `uvs` have been read so far, from which negative numbers count back. Raises ValueError for what is
+    none."""
     vertex, uv = (word.split("/") + [""])[:2]
-    found = [int(text) - 1 if not text.startswith("-") else int(text) + count for text, count in ((vertex, vertices), (uv or "0", uvs))]
+    found = [int(text) - 1 if not text.startswith("-") else int(text) + count
+             for text, count in ((vertex, vertices), (uv or "0", uvs))]
     if found[0] < 0 or uv and found[1] < 0:
         raise ValueError(word)
     return found[0], found[1]
 
 
 def _unfolded(mesh: Mesh, counts: np.ndarray) -> Mesh:
-    """The mesh with the fans of hollow polygons begun at a corner from which none of their triangles lies outside, where there is one.
+    """The mesh with the fans of hollow polygons begun at a corner from which none of their triangles lies outside,
+    where there is one.
 
     counts [P]: triangles of each polygon, which lie one after the other.
     """
@@ -198,10 +215,12 @@ def _unfolded(mesh: Mesh, counts: np.ndarray) -> Mesh:
             corners = np.append(mesh.faces[own, 1], mesh.faces[start + count - 1, 2])
             corners = np.concatenate([mesh.faces[start, :1], corners])[fan]
             p = mesh.vertices[corners]
-            if ((np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) * whole[np.searchsorted(starts, start)]).sum(1) > 0).all():
+            if ((np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) * whole[np.searchsorted(starts, start)]).sum(1)
+                > 0).all():
                 faces[own] = corners
                 if face_uvs is not None:
-                    face_uvs[own] = np.concatenate([mesh.face_uvs[start, :1], mesh.face_uvs[own, 1], mesh.face_uvs[start + count - 1, 2:]])[fan]
+                    face_uvs[own] = np.concatenate([mesh.face_uvs[start, :1], mesh.face_uvs[own, 1],
+                                                    mesh.face_uvs[start + count - 1, 2:]])[fan]
                 break
     return replace(mesh, faces=faces, face_uvs=face_uvs)
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""COLMAP models: the one door to their files. Binary ones are walked through record by record before pycolmap reads them, for it believes every count.
+"""COLMAP models: the one door to their files. Binary ones are walked through record by record before pycolmap reads
+them, for it believes every count.
 
 Formats: COLMAP's documentation, "Output format". Numbers are little-endian.
 """
@@ -91,8 +92,9 @@ RECORDS = {"cameras": _camera, "images": _image, "points3D": _point, "rigs": _ri
 
 
 def read_model(folder: Path) -> pycolmap.Reconstruction:
-    """The model in a folder, binary or text. Raises OSError where it cannot be opened, ValueError where it is damaged: what its records say does not fit
-    the files' sizes, cameras or poses that are no finite numbers, a lens without a focal length."""
+    """The model in a folder, binary or text. Raises OSError where it cannot be opened, ValueError where it is damaged:
+    what its records say does not fit the files' sizes, cameras or poses that are no finite numbers, a lens without a
+    focal length."""
     ending = "bin" if (folder / "cameras.bin").is_file() and (folder / "images.bin").is_file() else "txt"
     for name, record in RECORDS.items():
         file = folder / f"{name}.{ending}"
@@ -110,17 +112,20 @@ def read_model(folder: Path) -> pycolmap.Reconstruction:
         pose = pose_of(image) if image.has_pose else None
         if image.camera_id not in model.cameras:
             raise ValueError(f"the camera of {image.name} is missing")
-        if pose is not None and not (np.isfinite(pose.rotation.quat).all() and np.isfinite(pose.translation).all() and np.any(pose.rotation.quat)):
+        if pose is not None and not (np.isfinite(pose.rotation.quat).all() and np.isfinite(pose.translation).all()
+                                     and np.any(pose.rotation.quat)):
             raise ValueError(f"the pose of {image.name} is no place")
     for number, camera in model.cameras.items():
         lengths = [camera.params[i] for i in camera.focal_length_idxs()]
-        if not (0 < camera.width <= LONGEST_SIDE_PX and 0 < camera.height <= LONGEST_SIDE_PX and np.isfinite(camera.params).all() and min(lengths) > 0):
+        if not (0 < camera.width <= LONGEST_SIDE_PX and 0 < camera.height <= LONGEST_SIDE_PX
+                and np.isfinite(camera.params).all() and min(lengths) > 0):
             raise ValueError(f"the lens of camera {number} makes no sense")
     return model
 
 
 def write_model(folder: Path, model: pycolmap.Reconstruction) -> None:
-    """Writes a model's binary files. Raises OSError where they are not whole afterwards: pycolmap says nothing of a disk that is full."""
+    """Writes a model's binary files. Raises OSError where they are not whole afterwards: pycolmap says nothing of a
+    disk that is full."""
     model.write_binary(str(folder))
     try:
         for name, record in RECORDS.items():

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Noise in the space of the head, so that it knows no UV seam: random lattices in 3D, read at the surface's points in mm."""
+"""Noise in the space of the head, so that it knows no UV seam: random lattices in 3D, read at the surface's points in
+mm."""
 
 from __future__ import annotations
 
@@ -14,13 +15,16 @@ LATTICE_NODES = 48  # nodes per side; the noise repeats after so many wavelength
 def noise(points: np.ndarray, wavelength: float, rng: np.random.Generator, smooth: bool = False) -> np.ndarray:
     """float32 [N] of mean 0 and deviation 1 at points [N, 3] in mm; features are about `wavelength` mm large.
 
-    `smooth` takes cubic B-splines (for few points or large features), otherwise faded linear interpolation (eight times faster).
+    `smooth` takes cubic B-splines (for few points or large features), otherwise faded linear interpolation (eight times
+    faster).
     """
     lattice = rng.standard_normal((LATTICE_NODES,) * 3).astype(np.float32)
     turn = Rotation.random(random_state=rng).as_matrix().astype(np.float32)  # hides the lattice's axes
-    at = (points.astype(np.float32) @ (turn / np.float32(wavelength))).T + rng.uniform(0, LATTICE_NODES, (3, 1)).astype(np.float32)
+    at = (points.astype(np.float32)
+          @ (turn / np.float32(wavelength))).T + rng.uniform(0, LATTICE_NODES, (3, 1)).astype(np.float32)
     if smooth:
-        return map_coordinates(lattice, at, np.float32, order=3, mode="grid-wrap", prefilter=False) * np.float32(3.03)  # 1 / mean deviation
+        # 1 / mean deviation
+        return map_coordinates(lattice, at, np.float32, order=3, mode="grid-wrap", prefilter=False) * np.float32(3.03)
     node = np.floor(at)
     part = at - node
     at = node + part * part * (3 - 2 * part)
@@ -29,4 +33,5 @@ def noise(points: np.ndarray, wavelength: float, rng: np.random.Generator, smoot
 
 def octaves(points: np.ndarray, wavelengths: list[float], rng: np.random.Generator, smooth: bool = False) -> np.ndarray:
     """The sum of `noise` over wavelengths, again of deviation 1."""
-    return sum(noise(points, wavelength, rng, smooth) for wavelength in wavelengths) / np.float32(np.sqrt(len(wavelengths)))
+    return sum(noise(points, wavelength, rng, smooth)
+               for wavelength in wavelengths) / np.float32(np.sqrt(len(wavelengths)))

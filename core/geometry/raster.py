@@ -21,12 +21,14 @@ BENT_SIDE_SHARE = 0.01
 
 
 def rasterize_uv(mesh: Mesh, size: int, rows: tuple[int, int] | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Which triangle covers each texel's centre: face index int32 [S, S] (-1: none) and barycentric coordinates float32 [S, S, 3].
+    """Which triangle covers each texel's centre: face index int32 [S, S] (-1: none) and barycentric coordinates float32
+    [S, S, 3].
 
     `rows` (first, end): that strip of the map only, [end - first, S].
     """
     first, end = rows or (0, size)
-    corners = mesh.uvs[mesh.face_uvs] * [size, -size] + [-0.5, size - 0.5 - first]  # [F, 3, 2] in texels: x = column, y = row
+    # [F, 3, 2] in texels: x = column, y = row
+    corners = mesh.uvs[mesh.face_uvs] * [size, -size] + [-0.5, size - 0.5 - first]
     face = np.full((end - first, size), -1, np.int32)
     bary = np.zeros((end - first, size, 3), np.float32)
     low = np.maximum(np.ceil(corners.min(1)), 0).astype(int)
@@ -45,17 +47,21 @@ def rasterize_uv(mesh: Mesh, size: int, rows: tuple[int, int] | None = None) -> 
 
 
 def interpolate(values: np.ndarray, corners: np.ndarray, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
-    """Per-vertex values [V, C] at raster samples: corners [F, 3] index them, face [...] and bary [..., 3] say where. Zero where face < 0."""
+    """Per-vertex values [V, C] at raster samples: corners [F, 3] index them, face [...] and bary [..., 3] say where.
+    Zero where face < 0."""
     of = corners[np.maximum(face, 0)]
-    first, second, third = (values[of[..., k]] * bary[..., k, None] for k in range(3))  # a sum over an axis of three takes several times as long
+    # a sum over an axis of three takes several times as long
+    first, second, third = (values[of[..., k]] * bary[..., k, None] for k in range(3))
     return (first + second + third) * (face >= 0)[..., None]
 
 
 def bleed(image: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """[H, W(, C)] with every unknown texel given its nearest known one's value, so that filtering meets no black seam."""
+    """[H, W(, C)] with every unknown texel given its nearest known one's value, so that filtering meets no black
+    seam."""
     if known.all() or not known.any():
         return image
-    _, labels = cv2.distanceTransformWithLabels((~known).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    _, labels = cv2.distanceTransformWithLabels((~known).astype(np.uint8), cv2.DIST_L2, 5,
+                                                labelType=cv2.DIST_LABEL_PIXEL)
     nearest = np.zeros(labels.max() + 1, np.int64)
     nearest[labels[known]] = np.flatnonzero(known)
     return image.reshape(-1, *image.shape[2:])[nearest[labels]]
@@ -69,11 +75,13 @@ class RayCaster:
         self._intersector = RayMeshIntersector(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False))
 
     def first_hits(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """origins and unit directions [N, 3] -> face int64 [N] (-1: miss), barycentric [N, 3], distance [N] in metres (inf: miss)."""
+        """origins and unit directions [N, 3] -> face int64 [N] (-1: miss), barycentric [N, 3], distance [N] in metres
+        (inf: miss)."""
         count = len(directions)
         face, bary, distance = np.full(count, -1), np.zeros((count, 3)), np.full(count, np.inf)
         if count:
-            triangle, ray, location = self._intersector.intersects_id(origins, directions, multiple_hits=False, return_locations=True)
+            triangle, ray, location = self._intersector.intersects_id(origins, directions, multiple_hits=False,
+                                                                      return_locations=True)
             face[ray] = triangle
             bary[ray] = trimesh.triangles.points_to_barycentric(self.mesh.vertices[self.mesh.faces[triangle]], location)
             distance[ray] = np.linalg.norm(location - origins[ray], axis=1)
@@ -84,8 +92,10 @@ class RayCaster:
         return self._intersector.intersects_any(origins, directions) if len(directions) else np.zeros(0, bool)
 
 
-def visible_from(caster: RayCaster, points: np.ndarray, normals: np.ndarray, centre: np.ndarray, offset: float = 5e-4) -> np.ndarray:
-    """bool [N]: whether surface points [N, 3] with unit normals face `centre` [3] and nothing lies between. `offset` in metres lifts them off."""
+def visible_from(caster: RayCaster, points: np.ndarray, normals: np.ndarray, centre: np.ndarray,
+                 offset: float = 5e-4) -> np.ndarray:
+    """bool [N]: whether surface points [N, 3] with unit normals face `centre` [3] and nothing lies between. `offset` in
+    metres lifts them off."""
     towards = centre - points
     directions = towards / np.linalg.norm(towards, axis=1, keepdims=True)
     facing = (directions * normals).sum(1) > 0
@@ -95,7 +105,8 @@ def visible_from(caster: RayCaster, points: np.ndarray, normals: np.ndarray, cen
 
 
 def render_view(caster: RayCaster, view: View, scale: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The mesh through a view's camera at `scale` times its size: face int64 [h, w] (-1: background), bary [h, w, 3], distance [h, w] in metres."""
+    """The mesh through a view's camera at `scale` times its size: face int64 [h, w] (-1: background), bary [h, w, 3],
+    distance [h, w] in metres."""
     width, height = round(view.width * scale), round(view.height * scale)
     face, bary, distance = np.full((height, width), -1), np.zeros((height, width, 3)), np.full((height, width), np.inf)
     box = _box(caster.mesh, view, width, height)
@@ -109,18 +120,23 @@ def render_view(caster: RayCaster, view: View, scale: float = 1.0) -> tuple[np.n
 
 
 def _box(mesh: Mesh, view: View, width: int, height: int) -> tuple[slice, slice]:
-    """The rows and columns of a picture of that size within which a view shows the mesh; all where a part of it lies behind the camera."""
+    """The rows and columns of a picture of that size within which a view shows the mesh; all where a part of it lies
+    behind the camera."""
     pixels, _ = view.project(mesh.vertices)
     if not np.isfinite(pixels).all():
         return slice(0, height), slice(0, width)
     low, high = (edge * [width / view.width, height / view.height] for edge in (pixels.min(0), pixels.max(0)))
-    (left, top), (right, bottom) = np.floor(low - BENT_SIDE_SHARE * (width + height)), np.ceil(high + BENT_SIDE_SHARE * (width + height))
-    return tuple(slice(int(np.clip(first, 0, size)), int(np.clip(end, 0, size))) for first, end, size in ((top, bottom, height), (left, right, width)))
+    (left, top), (right,
+                  bottom) = np.floor(low - BENT_SIDE_SHARE
+                                     * (width + height)), np.ceil(high + BENT_SIDE_SHARE * (width + height))
+    return tuple(slice(int(np.clip(first, 0, size)), int(np.clip(end, 0, size)))
+                 for first, end, size in ((top, bottom, height), (left, right, width)))
 
 
 def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """Bilinear values of [H, W(, C)] at pixels [N, 2] (pixel centres at +0.5; clamped at the border)."""
     xy = (np.asarray(pixels, np.float32) - 0.5).reshape(-1, 1, 2)
-    out = [cv2.remap(np.ascontiguousarray(image, np.float32), xy[i:i + 32000, :, 0], xy[i:i + 32000, :, 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    out = [cv2.remap(np.ascontiguousarray(image, np.float32), xy[i:i + 32000, :, 0], xy[i:i + 32000, :, 1],
+                     cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
            for i in range(0, len(xy), 32000)]  # cv2.remap takes fewer than 32767 rows
     return np.concatenate(out)[:, 0] if out else np.zeros((0, *image.shape[2:]), np.float32)

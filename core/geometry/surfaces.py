@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From one surface to another that lies on it: partners of points, and the tangent frames in which normal maps are written.
+"""From one surface to another that lies on it: partners of points, and the tangent frames in which normal maps are
+written.
 
 A partner is where the ray along a point's normal meets the other surface, or else the nearest point of it, and only
 where the two surfaces face the same way: the inside of a lip is no partner of the other lip.
@@ -22,20 +23,25 @@ from .raster import RayCaster, interpolate
 CANDIDATES = (8, 64)
 """How many samples near a point are looked at: at first, and where none of these will do."""
 NEAR_SHARE = 0.25
-"""The first rays start this share of `farthest` off the surface: most partners lie within, and farther ones cost a search."""
+"""The first rays start this share of `farthest` off the surface: most partners lie within, and farther ones cost a
+search."""
 
 
 class Surface:
-    """A mesh on which partners are looked for. `spacing` in metres: how densely it is sampled for the search of nearest points."""
+    """A mesh on which partners are looked for. `spacing` in metres: how densely it is sampled for the search of nearest
+    points."""
 
     def __init__(self, mesh: Mesh, spacing: float = 0.002):
         self.mesh, self.normals = mesh, vertex_normals(mesh)
-        dense, faces, self._parent = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, spacing, max_iter=12, return_index=True)
+        dense, faces, self._parent = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, spacing, max_iter=12,
+                                                                      return_index=True)
         self._tree = cKDTree(dense[faces].mean(1))
         self._caster = RayCaster(mesh)
 
-    def partners(self, points: np.ndarray, normals: np.ndarray, farthest: float, cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray]:
-        """points [N, 3] with unit normals [N, 3] -> triangle int64 [N] (-1: no partner within `farthest` metres) and barycentric [N, 3]."""
+    def partners(self, points: np.ndarray, normals: np.ndarray, farthest: float,
+                 cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray]:
+        """points [N, 3] with unit normals [N, 3] -> triangle int64 [N] (-1: no partner within `farthest` metres) and
+        barycentric [N, 3]."""
         lift = NEAR_SHARE * farthest
         face, bary, distance = self.along(points + lift * normals, -normals, normals, cosine)
         face = np.where(distance < 2 * lift, face, -1)
@@ -43,12 +49,15 @@ class Surface:
         face[missed], bary[missed] = self.nearest(points[missed], normals[missed], farthest, cosine)
         return face, bary
 
-    def along(self, origins: np.ndarray, directions: np.ndarray, normals: np.ndarray, cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """First hits of rays [N, 3] as RayCaster.first_hits gives them, those left out (-1) where the surface does not face the way of `normals`."""
+    def along(self, origins: np.ndarray, directions: np.ndarray, normals: np.ndarray,
+              cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """First hits of rays [N, 3] as RayCaster.first_hits gives them, those left out (-1) where the surface does not
+        face the way of `normals`."""
         face, bary, distance = self._caster.first_hits(origins, directions)
         return np.where(self._agree(face, bary, normals, cosine), face, -1), bary, distance
 
-    def nearest(self, points: np.ndarray, normals: np.ndarray, farthest: float, cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray]:
+    def nearest(self, points: np.ndarray, normals: np.ndarray, farthest: float,
+                cosine: float = 0.3) -> tuple[np.ndarray, np.ndarray]:
         """As `partners`, by distance alone."""
         face, bary = self._nearest_of(CANDIDATES[0], points, normals, farthest, cosine)
         missed = np.flatnonzero(face < 0)  # another sheet lies before the one that faces the same way
@@ -67,7 +76,13 @@ class Surface:
             closest = trimesh.triangles.closest_point(corners, points[there])
             distance = np.linalg.norm(closest - points[there], axis=1)
             near = distance < best[there]
-            there, face, closest, distance, corners = there[near], face[near], closest[near], distance[near], corners[near]
+            there, face, closest, distance, corners = (
+                there[near],
+                face[near],
+                closest[near],
+                distance[near],
+                corners[near],
+            )
             bary = np.clip(trimesh.triangles.points_to_barycentric(corners, closest), 0, 1)
             fits = self._agree(face, bary, normals[there], cosine)
             best[there[fits]], best_face[there[fits]], best_bary[there[fits]] = distance[fits], face[fits], bary[fits]
@@ -79,18 +94,19 @@ class Surface:
 
 
 def welded(mesh: Mesh, tolerance: float = 1e-6) -> tuple[Mesh, np.ndarray]:
-    """The mesh with its open edges sewn where two of them, and no third, lie at one place (within `tolerance` of its size), and for each of the old
-    vertices the new one's index.
+    """The mesh with its open edges sewn where two of them, and no third, lie at one place (within `tolerance` of its
+    size), and for each of the old vertices the new one's index.
 
-    Files often split a mesh along its UV seams; its halves would come apart, and be shaded apart. What merely touches, as a film of
-    tears touches a lid, stays what it is.
+    Files often split a mesh along its UV seams; its halves would come apart, and be shaded apart. What merely touches,
+    as a film of tears touches a lid, stays what it is.
     """
     size = np.ptp(mesh.vertices, axis=0).max()
     _, place = np.unique(np.round(mesh.vertices / (tolerance * size)).astype(np.int64), axis=0, return_inverse=True)
     place = place.ravel()
     edges = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     swap = place[edges[:, 0]] > place[edges[:, 1]]
-    edges = np.where(swap[:, None], edges[:, ::-1], edges)  # both ends sorted by place, so that partners' ends stand in one order
+    # both ends sorted by place, so that partners' ends stand in one order
+    edges = np.where(swap[:, None], edges[:, ::-1], edges)
     _, group, uses = np.unique(place[edges], axis=0, return_inverse=True, return_counts=True)
     group = group.ravel()
     order = np.argsort(group, kind="stable")
@@ -103,7 +119,8 @@ def welded(mesh: Mesh, tolerance: float = 1e-6) -> tuple[Mesh, np.ndarray]:
 
 
 def tangents(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """Unit tangents [F, 3, 3] per triangle and corner, along growing u and across the vertex normal, and handedness [F] (-1: mirrored in UV space).
+    """Unit tangents [F, 3, 3] per triangle and corner, along growing u and across the vertex normal, and handedness [F]
+    (-1: mirrored in UV space).
 
     Averaged over the triangles that share a corner's vertex and UV, as MikkTSpace does (Mikkelsen 2008).
     """
@@ -117,16 +134,19 @@ def tangents(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     _, group = np.unique(key, axis=0, return_inverse=True)
     group = group.ravel()
     total = np.zeros((group.max() + 1, 3))
-    np.add.at(total, group, np.repeat(along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-20), 3, 0) * _angles(corners).reshape(-1, 1))
+    np.add.at(total, group,
+              np.repeat(along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-20), 3, 0)
+              * _angles(corners).reshape(-1, 1))
     normal = vertex_normals(mesh)[mesh.faces.ravel()]
     tangent = total[group]
     tangent -= (tangent * normal).sum(1, keepdims=True) * normal
     return (tangent / np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-20)).reshape(-1, 3, 3), hand
 
 
-def frames(normals: np.ndarray, faces: np.ndarray, tangent: np.ndarray, hand: np.ndarray, face: np.ndarray, bary: np.ndarray):
-    """Tangent, bitangent and normal, unit and square to each other, [N, 3] each, at samples face [N] (all >= 0), bary [N, 3];
-    normals [V, 3] and faces [F, 3] of the mesh, tangent and hand from `tangents`."""
+def frames(normals: np.ndarray, faces: np.ndarray, tangent: np.ndarray, hand: np.ndarray, face: np.ndarray,
+           bary: np.ndarray):
+    """Tangent, bitangent and normal, unit and square to each other, [N, 3] each, at samples face [N] (all >= 0), bary
+    [N, 3]; normals [V, 3] and faces [F, 3] of the mesh, tangent and hand from `tangents`."""
     n = _unit((normals[faces[face]] * bary[..., None]).sum(1))
     t = (tangent[face] * bary[..., None]).sum(1)
     t = _unit(t - (t * n).sum(1, keepdims=True) * n)

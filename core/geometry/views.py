@@ -50,7 +50,8 @@ class View:
         return self.rotation[2]
 
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """World points [N, 3] -> pixels [N, 2] (lens distortion applied; nan behind the camera) and depths [N] in metres."""
+        """World points [N, 3] -> pixels [N, 2] (lens distortion applied; nan behind the camera) and depths [N] in
+        metres."""
         local = np.asarray(points, np.float64) @ self.rotation.T + self.translation
         depth = local[:, 2]
         pixels = np.full((len(local), 2), np.nan)
@@ -67,18 +68,22 @@ class View:
 
 
 def lengths(vectors: np.ndarray) -> np.ndarray:
-    """[..., 2 or 3] -> [...]. np.linalg.norm to the last bit, in a third of its time: its sum over so short an axis is slow."""
+    """[..., 2 or 3] -> [...]. np.linalg.norm to the last bit, in a third of its time: its sum over so short an axis is
+    slow."""
     return np.sqrt(sum((vectors[..., k] ** 2 for k in range(1, vectors.shape[-1])), vectors[..., 0] ** 2))
 
 
 def read_points(capture: Capture) -> tuple[np.ndarray, np.ndarray]:
-    """The points [N, 3] in metres that were matched between the frames, and unit mean directions [N, 3] to the cameras that saw them. Raises Problem."""
+    """The points [N, 3] in metres that were matched between the frames, and unit mean directions [N, 3] to the cameras
+    that saw them. Raises Problem."""
     model = _read_model(capture)
-    centres = {number: np.asarray(image.projection_center()) for number, image in model.images.items() if image.has_pose}
+    centres = {number: np.asarray(image.projection_center()) for number, image in model.images.items()
+               if image.has_pose}
     places = np.array([point.xyz for point in model.points3D.values()]).reshape(-1, 3)
     towards = np.zeros_like(places)
     for i, point in enumerate(model.points3D.values()):
-        seen = np.array([centres[element.image_id] for element in point.track.elements if element.image_id in centres]).reshape(-1, 3) - places[i]
+        seen = np.array([centres[element.image_id] for element in point.track.elements
+                         if element.image_id in centres]).reshape(-1, 3) - places[i]
         towards[i] = (seen / np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-9)).sum(0)
     return places, towards / np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
 
@@ -107,5 +112,6 @@ def _read_model(capture: Capture) -> pycolmap.Reconstruction:
         if strange:
             raise ValueError(f"{strange[0]!r} is no name of a frame")
     except (OSError, ValueError) as error:
-        raise Problem(f"The cameras of this capture cannot be read ({error}).", "Run the stages frames and cameras again.") from error
+        raise Problem(f"The cameras of this capture cannot be read ({error}).",
+                      "Run the stages frames and cameras again.") from error
     return model

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""HEIC, HEIF and AVIF, as telephones write them, by libheif (package pillow-heif), which OpenImageIO's wheel lacks. libheif turns pictures upright itself,
-so their EXIF orientation is told already.
+"""HEIC, HEIF and AVIF, as telephones write them, by libheif (package pillow-heif), which OpenImageIO's wheel lacks.
+libheif turns pictures upright itself, so their EXIF orientation is told already.
 
 The package brings Pillow along; nothing here uses it.
 """
@@ -17,7 +17,15 @@ from ..contract.messages import Problem
 
 SUFFIXES = (".heic", ".heif", ".avif")
 EXPORT = "Export it as JPEG or PNG (on an iPhone: Settings, Camera, Formats, Most Compatible)."
-EXIF_FOLDER, FOCAL_LENGTH, FOCAL_35MM, PLANE_RESOLUTION, PLANE_UNIT, WIDTH, HEIGHT = 0x8769, 0x920A, 0xA405, 0xA20E, 0xA210, 0xA002, 0xA003
+EXIF_FOLDER, FOCAL_LENGTH, FOCAL_35MM, PLANE_RESOLUTION, PLANE_UNIT, WIDTH, HEIGHT = (
+    0x8769,
+    0x920A,
+    0xA405,
+    0xA20E,
+    0xA210,
+    0xA002,
+    0xA003,
+)
 """EXIF 2.3's numbers of its tags."""
 
 
@@ -26,11 +34,13 @@ def is_heif(path: Path) -> bool:
 
 
 def read_pixels(path: Path, most_bytes: int) -> np.ndarray:
-    """The upright picture as stored, float32 [H, W, 3] in [0, 1]. Raises Problem for what is no such picture or would take more than `most_bytes`."""
+    """The upright picture as stored, float32 [H, W, 3] in [0, 1]. Raises Problem for what is no such picture or would
+    take more than `most_bytes`."""
     picture = _opened(path)
     width, height = picture.size
     if 12 * width * height > most_bytes:
-        raise Problem(f"{path} has {width} x {height} pixels, which would take more than {most_bytes >> 30} GB of memory.", "Make it smaller.")
+        raise Problem(f"{path} has {width} x {height} pixels, which would take more than {most_bytes >> 30} GB of "
+                      "memory.", "Make it smaller.")
     try:
         pixels = np.asarray(picture)
     except (ValueError, EOFError, SyntaxError, RuntimeError, OSError) as error:
@@ -48,7 +58,9 @@ def read_profile(path: Path) -> str:
     """ "Display P3" where the picture's colours are in it, else ""."""
     info = _opened(path).info
     icc, nclx = info.get("icc_profile") or b"", info.get("nclx_profile") or {}
-    wide = b"Display P3" in icc or "Display P3".encode("utf-16-be") in icc or not icc and nclx.get("color_primaries") == 12
+    wide = (
+        b"Display P3" in icc or "Display P3".encode("utf-16-be") in icc or not icc and nclx.get("color_primaries") == 12
+    )
     return "Display P3" if wide else ""
 
 
@@ -82,7 +94,8 @@ def parse_exif(block: bytes) -> dict[int, float]:
 
 
 def focal_35mm(tags: dict[int, float], width: int, height: int) -> float | None:
-    """Millimetres of 35 mm film: as told, or from the lens and the sensor's resolution; None where neither is. width, height: the picture's."""
+    """Millimetres of 35 mm film: as told, or from the lens and the sensor's resolution; None where neither is. width,
+    height: the picture's."""
     if tags.get(FOCAL_35MM, 0) > 0:
         return tags[FOCAL_35MM]
     unit = {2: 25.4, 3: 10.0, 4: 1.0}.get(int(tags.get(PLANE_UNIT, 2)))
@@ -96,7 +109,8 @@ def _opened(path: Path):
     try:
         import pillow_heif
     except ImportError as error:
-        raise Problem(f"{Path(path).name} is a HEIC picture, and the package pillow-heif that reads them is not installed.",
+        raise Problem(f"{Path(path).name} is a HEIC picture, and the package pillow-heif that reads them is not "
+                      "installed.",
                       "Press Install Solver in the add-on's preferences, or export the pictures as JPEG.") from error
     try:
         return pillow_heif.open_heif(path, convert_hdr_to_8bit=False)
@@ -105,4 +119,5 @@ def _opened(path: Path):
 
 
 def _unreadable(path: Path, error: Exception) -> Problem:
-    return Problem(f"{path} is not a picture that can be read ({str(error).rstrip('.') or type(error).__name__}).", EXPORT)
+    return Problem(f"{path} is not a picture that can be read ({str(error).rstrip('.') or type(error).__name__}).",
+                   EXPORT)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Picture files and colour spaces: the one door. OpenImageIO reads and writes every file but telephones' HEIC, which heif.py reads.
+"""Picture files and colour spaces: the one door. OpenImageIO reads and writes every file but telephones' HEIC, which
+heif.py reads.
 
 Arrays are float32, rows from the top, [H, W, C]. *sRGB* means encoded with the IEC 61966-2-1 curve in [0, 1];
 *linear* means scene or reflectance values with the same primaries; *data* is neither (masks, normals, specular).
@@ -24,24 +25,29 @@ from ..contract.stages import advise_remaking
 from . import heif
 from .checks import MOST_PICTURE_BYTES, SAVE_ANEW, check_written, open_picture, read_pixels
 
-EXIF = {heif.FOCAL_LENGTH: "FocalLength", heif.FOCAL_35MM: "FocalLengthIn35mmFilm", heif.PLANE_RESOLUTION: "FocalPlaneXResolution",
+EXIF = {heif.FOCAL_LENGTH: "FocalLength", heif.FOCAL_35MM: "FocalLengthIn35mmFilm",
+        heif.PLANE_RESOLUTION: "FocalPlaneXResolution",
         heif.PLANE_UNIT: "FocalPlaneResolutionUnit", heif.WIDTH: "PixelXDimension", heif.HEIGHT: "PixelYDimension"}
 """EXIF's tags -> what OpenImageIO calls them."""
-TURNS = {1: (False, 1, 1), 2: (False, 1, -1), 3: (False, -1, -1), 4: (False, -1, 1), 5: (True, 1, 1), 6: (True, 1, -1), 7: (True, -1, -1), 8: (True, -1, 1)}
-"""EXIF orientation -> how it comes upright: whether rows become columns, then the order of rows and of columns. (OpenImageIO's reorient mistakes 5 for 7.)"""
+TURNS = {1: (False, 1, 1), 2: (False, 1, -1), 3: (False, -1, -1), 4: (False, -1, 1), 5: (True, 1, 1), 6: (True, 1, -1),
+         7: (True, -1, -1), 8: (True, -1, 1)}
+"""EXIF orientation -> how it comes upright: whether rows become columns, then the order of rows and of columns.
+(OpenImageIO's reorient mistakes 5 for 7.)"""
 
 QUICK = {"level": 1, "filter": 0x20}
-"""zlib's level and libpng's filter (each row less the one above it) of pictures that are not shipped: of what was tried on the solved maps
-(`python -m benchmarks.png_levels`) the quickest that is hardly larger than libpng's own choice of filters."""
+"""zlib's level and libpng's filter (each row less the one above it) of pictures that are not shipped: of what was tried
+on the solved maps (`python -m benchmarks.png_levels`) the quickest that is hardly larger than libpng's own choice of
+filters."""
 
 ROWS_BETWEEN_CHECKS = 256
-"""Rows that are encoded between two looks at a cancel: 0.3 s of a map of 4096; a multiple of what EXR packs together (16)."""
+"""Rows that are encoded between two looks at a cancel: 0.3 s of a map of 4096; a multiple of what EXR packs together
+(16)."""
 
 
 @dataclass(frozen=True)
 class _Encoding:
-    """How pixels are stored. kind: uint8, uint16 or half; colour_space: OpenImageIO's name of it; quality: of a JPEG, in percent; straight: the fourth channel
-    multiplies no colour; small: packed as tightly as it goes."""
+    """How pixels are stored. kind: uint8, uint16 or half; colour_space: OpenImageIO's name of it; quality: of a JPEG,
+    in percent; straight: the fourth channel multiplies no colour; small: packed as tightly as it goes."""
 
     kind: str
     colour_space: str
@@ -84,7 +90,8 @@ def read_data(path: Path) -> np.ndarray:
 
 
 def read_normals(path: Path) -> np.ndarray:
-    """The vectors [H, W, 3] of a normal map, which stores [-1, 1] as [0, 1]; not brought to length 1. Raises Problem for a grey picture."""
+    """The vectors [H, W, 3] of a normal map, which stores [-1, 1] as [0, 1]; not brought to length 1. Raises Problem
+    for a grey picture."""
     pixels = _read(path)
     if pixels.shape[2] < 3:
         raise Problem(f"{path} is grey, and a normal map has three channels.", advise_remaking(Path(path), SAVE_ANEW))
@@ -114,7 +121,8 @@ def bits(path: Path) -> int:
 
 
 def read_focal_35mm(path: Path) -> float | None:
-    """The focal length in millimetres of 35 mm film that a photograph's EXIF tells, of itself or by the lens and the sensor's resolution, or None."""
+    """The focal length in millimetres of 35 mm film that a photograph's EXIF tells, of itself or by the lens and the
+    sensor's resolution, or None."""
     if heif.is_heif(path):
         return heif.focal_35mm(heif.read_exif(path), *heif.size(path))
     image = oiio.ImageInput.open(str(path))
@@ -123,7 +131,8 @@ def read_focal_35mm(path: Path) -> float | None:
     spec = image.spec()
     told = {tag: spec.getattribute(f"Exif:{name}") for tag, name in EXIF.items()}
     image.close()
-    return heif.focal_35mm({tag: float(value) for tag, value in told.items() if isinstance(value, int | float)}, spec.width, spec.height)
+    return heif.focal_35mm({tag: float(value) for tag, value in told.items() if isinstance(value, int | float)},
+                           spec.width, spec.height)
 
 
 def read_profile(path: Path) -> str:
@@ -139,16 +148,19 @@ def read_profile(path: Path) -> str:
 
 
 def write_packed(path: Path, channels: np.ndarray, bits: int = 8, srgb: bool = False) -> None:
-    """Four channels [H, W, 4] in [0, 1] that have nothing to do with each other, to PNG or EXR, atomically: no colour is multiplied or divided by the
-    fourth, as happens to what is written as a picture with alpha. `srgb`: the first three are colours encoded so."""
-    _write(path, channels, _Encoding("half" if _is_linear(path) else f"uint{bits}", "sRGB" if srgb else "raw", straight=True))
+    """Four channels [H, W, 4] in [0, 1] that have nothing to do with each other, to PNG or EXR, atomically: no colour
+    is multiplied or divided by the fourth, as happens to what is written as a picture with alpha. `srgb`: the first
+    three are colours encoded so."""
+    _write(path, channels,
+           _Encoding("half" if _is_linear(path) else f"uint{bits}", "sRGB" if srgb else "raw", straight=True))
 
 
-def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8, quality: int = 92, small: bool = False, check: Callable[[], None] = _never) -> None:
+def write_srgb(path: Path, srgb: np.ndarray, bits: int = 8, quality: int = 92, small: bool = False,
+               check: Callable[[], None] = _never) -> None:
     """sRGB [H, W, 3 or 4] (alpha stays as it is) to PNG (8 or 16 bit) or JPEG (8 bit, of that quality), atomically.
 
-    `small`, here and below: what is shipped is packed as tightly as it goes, at ten times the time; an EXR loses what the eye does not see (DWAA).
-    `check` may raise to cancel, every few rows; then nothing is written.
+    `small`, here and below: what is shipped is packed as tightly as it goes, at ten times the time; an EXR loses what
+    the eye does not see (DWAA). `check` may raise to cancel, every few rows; then nothing is written.
     """
     check_written(Path(path), np.asarray(srgb), half=False)  # clipped, infinity would be white
     _write(path, np.clip(srgb, 0, 1), _Encoding(f"uint{bits}", "sRGB", quality, small=small), check)
@@ -159,7 +171,8 @@ def write_linear(path: Path, linear: np.ndarray, small: bool = False, check: Cal
     _write(path, linear, _Encoding("half" if _is_linear(path) else "uint16", "lin_srgb", small=small), check)
 
 
-def write_data(path: Path, data: np.ndarray, bits: int = 8, small: bool = False, check: Callable[[], None] = _never) -> None:
+def write_data(path: Path, data: np.ndarray, bits: int = 8, small: bool = False,
+               check: Callable[[], None] = _never) -> None:
     """Data [H, W] or [H, W, C] in [0, 1] to PNG (8 or 16 bit), or to a half-float EXR, atomically; no colour space."""
     _write(path, data, _Encoding("half" if _is_linear(path) else f"uint{bits}", "raw", small=small), check)
 
@@ -195,7 +208,8 @@ def _write(path: Path, pixels: np.ndarray, encoding: _Encoding, check: Callable[
     spec.attribute("oiio:ColorSpace", encoding.colour_space)
     if encoding.straight:
         spec.attribute("oiio:UnassociatedAlpha", 1)
-    spec.attribute("DateTime", "2000:01:01 00:00:00")  # an EXR would carry the hour, and the same pixels would not be the same file
+    # an EXR would carry the hour, and the same pixels would not be the same file
+    spec.attribute("DateTime", "2000:01:01 00:00:00")
     if _is_linear(path):
         spec.attribute("compression", "dwaa:45" if encoding.small else "zip")
     elif path.suffix.lower() in (".jpg", ".jpeg"):
@@ -207,7 +221,8 @@ def _write(path: Path, pixels: np.ndarray, encoding: _Encoding, check: Callable[
     with replacing(path) as temporary:
         _need_space(temporary.parent, pixels.size * (1 if encoding.kind == "uint8" else 2))
         output = oiio.ImageOutput.create(str(temporary))
-        if output is None or not output.open(str(temporary), spec) or not _write_rows(output, pixels, check) or not output.close():
+        if output is None or not output.open(str(temporary),
+                                             spec) or not _write_rows(output, pixels, check) or not output.close():
             error = (output.geterror() if output else oiio.geterror()) or "unknown error"
             # OpenImageIO gives text only: touching the folder ourselves turns a full or read-only disk into its OSError
             with open(temporary, "ab") as file:
@@ -222,7 +237,8 @@ def _write_rows(output: oiio.ImageOutput, pixels: np.ndarray, check: Callable[[]
     """Whether all rows could be written. A map of 4096 takes seconds, so `check` is asked in between."""
     for row in range(0, len(pixels), ROWS_BETWEEN_CHECKS):
         check()
-        if not output.write_scanlines(row, min(row + ROWS_BETWEEN_CHECKS, len(pixels)), 0, pixels[row:row + ROWS_BETWEEN_CHECKS]):
+        if not output.write_scanlines(row, min(row + ROWS_BETWEEN_CHECKS, len(pixels)), 0,
+                                      pixels[row:row + ROWS_BETWEEN_CHECKS]):
             return False
     return True
 

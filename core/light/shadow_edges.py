@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the shadow truly ends: from a rough mask and the texture to a soft alpha that lies on the penumbra.
 
-The local light is continuous inside M, so a sharp edge of the shadow can live in M alone (the paper's failure case, section 4.4). Near the painted
-contour the texture over the reference face is parted into a lit and a dark side (a local two-phase segmentation after Li et al. 2008, "Minimization
-of region-scalable fitting energy"), and about that edge a penumbra of some place and width is fitted in windows, so that pores and moles average out.
-Where there is no step, or one of another colour than the shadow's (a brow, a lip), the painted mask stays as it is. Lengths are texels of a 1024 map.
+The local light is continuous inside M, so a sharp edge of the shadow can live in M alone (the paper's failure case,
+section 4.4). Near the painted contour the texture over the reference face is parted into a lit and a dark side (a local
+two-phase segmentation after Li et al. 2008, "Minimization of region-scalable fitting energy"), and about that edge a
+penumbra of some place and width is fitted in windows, so that pores and moles average out. Where there is no step, or
+one of another colour than the shadow's (a brow, a lip), the painted mask stays as it is. Lengths are texels of a 1024
+map.
 """
 
 from __future__ import annotations
@@ -22,14 +24,15 @@ ALONG = 6.0  # deviation over which place and width of the penumbra vary along t
 PLACES = (-6.0, -4.0, -2.5, -1.25, 0.0, 1.25, 2.5, 4.0, 6.0)
 WIDTHS = (0.0, 2.0, 4.0, 7.0, 10.0, 14.0, 19.0, 25.0)
 STEP = 0.06, 0.16  # shares of the light: a smaller step is no edge, a larger one is for certain
-COLOUR = 0.12, 0.30  # distance of a step's colour (its three shares over their mean) from the shadow's: below it is shadow, above it is not
+# distance of a step's colour (its three shares over their mean) from the shadow's: below it is shadow, above it is not
+COLOUR = 0.12, 0.30
 ROUNDS = 8  # of the segmentation
 
 
 @dataclass(frozen=True)
 class Edge:
-    """alpha [S, S] in [0, 1]: M; found [S, S] in [0, 1]: how far it lies on an edge seen in the texture, along a band of BAND about it;
-    colour [3]: what the shadow takes of the light, over its mean (zeros where no edge was found)."""
+    """alpha [S, S] in [0, 1]: M; found [S, S] in [0, 1]: how far it lies on an edge seen in the texture, along a band
+    of BAND about it; colour [3]: what the shadow takes of the light, over its mean (zeros where no edge was found)."""
 
     alpha: np.ndarray
     found: np.ndarray
@@ -39,9 +42,10 @@ class Edge:
 def place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: float) -> Edge:
     """The edge of the shadow under a rough mask.
 
-    light [S, S, 3]: texture over (reference albedo x global shading), linear, about 1 where lit; painted [S, S]: the mask in [0, 1], as soft as it
-    shall stay where no edge is found; weight [S, S] in [0, 1]: how far a texel tells of light (0: unseen, or a brow); `texel` is the side of one in
-    texels of a 1024 map. Deeper than INWARD inside the mask alpha is never lowered.
+    light [S, S, 3]: texture over (reference albedo x global shading), linear, about 1 where lit; painted [S, S]: the
+    mask in [0, 1], as soft as it shall stay where no edge is found; weight [S, S] in [0, 1]: how far a texel tells of
+    light (0: unseen, or a brow); `texel` is the side of one in texels of a 1024 map. Deeper than INWARD inside the mask
+    alpha is never lowered.
     """
     nothing = Edge(painted, np.zeros_like(painted), np.zeros(3))
     inside = painted > 0.5
@@ -57,7 +61,8 @@ def place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: flo
     return whole
 
 
-def _place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: float) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+def _place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray,
+           texel: float) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     depth = signed_distance(painted > 0.5) * texel  # negative inside
     dark = _segmented(light.mean(-1), painted > 0.5, depth, weight, texel)
     if not dark.any() or dark.all():
@@ -68,20 +73,25 @@ def _place(light: np.ndarray, painted: np.ndarray, weight: np.ndarray, texel: fl
     sure, colour = _sureness(step, near * (np.abs(distance) < BAND))
     if sure is None:
         return None
-    sure = sure * np.clip((INWARD + BAND - np.abs(depth + INWARD / 2)) / BAND, 0, 1)  # what is far from the contour is not ours to move
+    # what is far from the contour is not ours to move
+    sure = sure * np.clip((INWARD + BAND - np.abs(depth + INWARD / 2)) / BAND, 0, 1)
     fitted = penumbra(distance - shift, np.maximum(width, 0.7 * texel))
     alpha = painted + sure * (fitted - painted)
-    return np.where(depth < -INWARD - BAND, painted, alpha).astype(np.float32), (sure * (np.abs(distance) < BAND)).astype(np.float32), colour
+    return np.where(depth < -INWARD - BAND, painted,
+                    alpha).astype(np.float32), (sure * (np.abs(distance) < BAND)).astype(np.float32), colour
 
 
 def penumbra(distance: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """The share of a light that is blocked, over the signed distance to the edge's middle (positive on the lit side) and the penumbra's width."""
+    """The share of a light that is blocked, over the signed distance to the edge's middle (positive on the lit side)
+    and the penumbra's width."""
     t = np.clip(0.5 - distance / np.maximum(width, 1e-3), 0, 1)
     return t * t * (3 - 2 * t)
 
 
-def _segmented(value: np.ndarray, inside: np.ndarray, depth: np.ndarray, weight: np.ndarray, texel: float) -> np.ndarray:
-    """bool [h, w]: the dark side. Both sides' local means and the sides themselves follow each other; deep inside the mask all is dark."""
+def _segmented(value: np.ndarray, inside: np.ndarray, depth: np.ndarray, weight: np.ndarray,
+               texel: float) -> np.ndarray:
+    """bool [h, w]: the dark side. Both sides' local means and the sides themselves follow each other; deep inside the
+    mask all is dark."""
     sigma, smooth = WINDOW / texel, max(2.0 / texel, 0.6)
     free = (depth > -INWARD) & (depth < OUTWARD)
     dark = inside.astype(np.float32)
@@ -92,16 +102,21 @@ def _segmented(value: np.ndarray, inside: np.ndarray, depth: np.ndarray, weight:
             means.append(_blur(value * share, sigma) / np.maximum(_blur(share, sigma), 1e-4))
         lit, shaded = means
         gap = lit - shaded
-        odds = np.where(gap > 0.02, ((lit + shaded) / 2 - value) / np.maximum(gap, 0.05), np.where(dark > 0.5, 0.5, -0.5))
-        odds = _blur(np.clip(odds, -0.5, 0.5) * np.maximum(weight, 0.02), smooth) / np.maximum(_blur(np.maximum(weight, 0.02), smooth), 1e-4)
+        odds = np.where(gap > 0.02, ((lit + shaded) / 2 - value) / np.maximum(gap, 0.05),
+                        np.where(dark > 0.5, 0.5, -0.5))
+        odds = _blur(np.clip(odds, -0.5, 0.5) * np.maximum(weight, 0.02),
+                     smooth) / np.maximum(_blur(np.maximum(weight, 0.02), smooth), 1e-4)
         dark = np.where(free, odds > 0, inside).astype(np.float32)
     return dark > 0.5
 
 
-def _profile(light: np.ndarray, distance: np.ndarray, weight: np.ndarray, texel: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Place [h, w] and width [h, w] of the penumbra along the edge, in the window about each texel, and the step's height [h, w, 3] there.
+def _profile(light: np.ndarray, distance: np.ndarray, weight: np.ndarray,
+             texel: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Place [h, w] and width [h, w] of the penumbra along the edge, in the window about each texel, and the step's
+    height [h, w, 3] there.
 
-    In a window light = lit - step * penumbra(distance - place, width): linear in lit and step, so each candidate's residual is closed form.
+    In a window light = lit - step * penumbra(distance - place, width): linear in lit and step, so each candidate's
+    residual is closed form.
     """
     sigma = WINDOW / texel
     value = light.mean(-1)
@@ -124,12 +139,14 @@ def _profile(light: np.ndarray, distance: np.ndarray, weight: np.ndarray, texel:
     shape = penumbra(distance - shift, np.maximum(width, 0.7 * texel)).astype(np.float32)
     m = _blur(weight * shape, sigma) / total
     spread = np.maximum(_blur(weight * shape**2, sigma) / total - m**2, 1e-3)
-    steps = [(_blur(weight * shape * c, sigma) / total - m * (_blur(weight * c, sigma) / total)) / spread for c in np.moveaxis(light, -1, 0)]
+    steps = [(_blur(weight * shape * c, sigma) / total - m * (_blur(weight * c, sigma) / total)) / spread
+             for c in np.moveaxis(light, -1, 0)]
     return shift, width, -np.stack(steps, -1)
 
 
 def _sureness(step: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
-    """How far [h, w] the step [h, w, 3] is one, and of the colour that most of the edge has; that colour [3]. None where nothing is."""
+    """How far [h, w] the step [h, w, 3] is one, and of the colour that most of the edge has; that colour [3]. None
+    where nothing is."""
     height = step.mean(-1)
     good = (weight > 0.5) & (height > STEP[1])
     if good.sum() < 8:
@@ -147,7 +164,8 @@ def _ramp(values: np.ndarray, low: float, high: float) -> np.ndarray:
 def signed_distance(inside: np.ndarray) -> np.ndarray:
     """Texels to the border of a region, negative inside it; the border runs between texels."""
     outside = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, 5)
-    return np.where(inside, 0.5 - cv2.distanceTransform(inside.astype(np.uint8), cv2.DIST_L2, 5), outside - 0.5).astype(np.float32)
+    return np.where(inside, 0.5 - cv2.distanceTransform(inside.astype(np.uint8), cv2.DIST_L2, 5),
+                    outside - 0.5).astype(np.float32)
 
 
 def _blur(image: np.ndarray, sigma: float) -> np.ndarray:

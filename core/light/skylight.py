@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of the sky each point of a head sees past the head itself: precomputed radiance transfer (Sloan, Kautz and Snyder 2002) in
-second-order spherical harmonics, and ambient occlusion, which is its part under an even sky.
+"""How much of the sky each point of a head sees past the head itself: precomputed radiance transfer (Sloan, Kautz and
+Snyder 2002) in second-order spherical harmonics, and ambient occlusion, which is its part under an even sky.
 """
 
 from __future__ import annotations
@@ -15,13 +15,15 @@ from .spherical_harmonics import UNIFORM, sh_basis
 
 
 def ambient_occlusion(transfer: np.ndarray) -> np.ndarray:
-    """radiance_transfer [..., 9] -> [...] in [0, 1]: the share of an even sky's light that reaches the surface; 1 where nothing is in the way."""
+    """radiance_transfer [..., 9] -> [...] in [0, 1]: the share of an even sky's light that reaches the surface; 1 where
+    nothing is in the way."""
     return np.clip(UNIFORM * transfer[..., 0], 0, 1)
 
 
 def radiance_transfer(caster: RayCaster, points: np.ndarray, normals: np.ndarray, rays: int = 128,
                       step: Callable[[int, int], None] = lambda done, of: None) -> np.ndarray:
-    """[N, 9]: irradiance / pi at surface points from the radiance of each orthonormal harmonic (spherical_harmonics.py), occluded by the mesh."""
+    """[N, 9]: irradiance / pi at surface points from the radiance of each orthonormal harmonic
+    (spherical_harmonics.py), occluded by the mesh."""
     transfer = np.zeros((len(points), 9))
     directions = fibonacci_sphere(rays)
     basis = sh_basis(directions)
@@ -30,7 +32,8 @@ def radiance_transfer(caster: RayCaster, points: np.ndarray, normals: np.ndarray
             step(i, rays)
         cosine = normals @ direction
         facing = np.flatnonzero(cosine > 0)
-        free = facing[~caster.blocked(points[facing] + 1e-3 * normals[facing], np.repeat(direction[None], len(facing), 0))]
+        free = facing[~caster.blocked(points[facing] + 1e-3 * normals[facing],
+                                      np.repeat(direction[None], len(facing), 0))]
         transfer[free] += cosine[free, None] * basis[i] * (4 / rays)
     return transfer
 

@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Real spherical harmonics to the second order: the one place where their polynomials are written, for numpy arrays and torch tensors.
+"""Real spherical harmonics to the second order: the one place where their polynomials are written, for numpy arrays and
+torch tensors.
 
-Order (l, m): (0, 0), (1, -1), (1, 0), (1, 1), (2, -2), (2, -1), (2, 0), (2, 1), (2, 2), that is 1, y, z, x, xy, yz, 3 z^2 - 1, xz, x^2 - y^2. Signs with
-the Condon-Shortley phase: the functions of odd m are negative where their polynomial is positive, as in the code of the method's authors. A function is
-its band's factor times a polynomial whose norm is the band's own; `bands` chooses the factors, of which the orthonormal ones are exact.
+Order (l, m): (0, 0), (1, -1), (1, 0), (1, 1), (2, -2), (2, -1), (2, 0), (2, 1), (2, 2), that is 1, y, z, x, xy, yz, 3
+z^2 - 1, xz, x^2 - y^2. Signs with the Condon-Shortley phase: the functions of odd m are negative where their polynomial
+is positive, as in the code of the method's authors. A function is its band's factor times a polynomial whose norm is
+the band's own; `bands` chooses the factors, of which the orthonormal ones are exact.
 """
 
 from __future__ import annotations
@@ -20,16 +22,19 @@ Bands = tuple[float, float, float]
 ORTHONORMAL: Bands = (sqrt(1 / (4 * pi)), sqrt(3 / (4 * pi)), sqrt(15 / (4 * pi)))
 """Factors of the bands 0, 1 and 2 under which the integral over the sphere of a product of two functions is 1 or 0."""
 LAMBERT: Bands = (1.0, 2 / 3, 1 / 4)
-"""What a Lambertian surface makes of each band of the radiance around it: irradiance over pi (Ramamoorthi and Hanrahan 2001, where it is A_l over pi)."""
-GAMMA_BANDS: Bands = tuple(y * pi * lambert * scale for y, lambert, scale in zip(ORTHONORMAL, LAMBERT, (1.0, sqrt(3), 2 * sqrt(2)), strict=True))
-"""The parameterisation of gamma in the authors' code: the irradiance pi, 2 pi / 3, pi / 4 of orthonormal radiance, and its bands once more times 1,
-sqrt 3 and 2 sqrt 2. Together pi, 2 pi / sqrt 3 and pi / sqrt 2."""
+"""What a Lambertian surface makes of each band of the radiance around it: irradiance over pi (Ramamoorthi and Hanrahan
+2001, where it is A_l over pi)."""
+GAMMA_BANDS: Bands = tuple(y * pi * lambert * scale
+                           for y, lambert, scale in zip(ORTHONORMAL, LAMBERT, (1.0, sqrt(3), 2 * sqrt(2)), strict=True))
+"""The parameterisation of gamma in the authors' code: the irradiance pi, 2 pi / 3, pi / 4 of orthonormal radiance, and
+its bands once more times 1, sqrt 3 and 2 sqrt 2. Together pi, 2 pi / sqrt 3 and pi / sqrt 2."""
 UNIFORM = 1 / ORTHONORMAL[0]
 """The orthonormal coefficient of radiance 1 from everywhere."""
 
 
 def sh_basis(directions: Array, bands: Bands = ORTHONORMAL, axis: int = -1) -> Array:
-    """The nine functions in unit directions whose x, y and z lie along `axis`, where the result has the functions: [..., 3] -> [..., 9], say.
+    """The nine functions in unit directions whose x, y and z lie along `axis`, where the result has the functions:
+    [..., 3] -> [..., 9], say.
 
     Lengths other than one enter the polynomials as they are. The kind of array and its precision stay.
     """
@@ -44,7 +49,8 @@ def sh_basis(directions: Array, bands: Bands = ORTHONORMAL, axis: int = -1) -> A
 
 
 def sh_polynomials(directions: Array, axis: int = -1) -> list[Array]:
-    """What the nine functions are multiples of, each without the dimension `axis`: 1, -y, z, -x, xy, -yz, 3 z^2 - 1, -xz, x^2 - y^2."""
+    """What the nine functions are multiples of, each without the dimension `axis`: 1, -y, z, -x, xy, -yz, 3 z^2 - 1,
+    -xz, x^2 - y^2."""
     x, y, z = np.moveaxis(directions, axis, 0) if isinstance(directions, np.ndarray) else directions.movedim(axis, 0)
     return [x**0, -y, z, -x, x * y, -y * z, 3 * z * z - 1, -x * z, x * x - y * y]
 

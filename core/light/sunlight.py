@@ -22,18 +22,22 @@ SIGMA_CHROMA = 0.08  # ... and of the differences between channels
 OUTLIER = 0.05  # share of points that are neither (hair, highlights, misregistration)
 BOX = 3.0  # log units over which an outlier may lie, per channel
 TABLED = np.array([0.282095, *[0.488603] * 3, 1.092548, 1.092548, 2 * 3**0.5 * 0.315392, 1.092548, 2 * 0.546274])
-# The harmonics' band factors with the six digits that tables print: RIDGE was chosen for coefficients of these, and a delit frame shows any other ridge
+# The harmonics' band factors with the six digits that tables print: RIDGE was chosen for coefficients of these, and a
+# delit frame shows any other ridge
 RIDGE = np.array([0, *[0.5] * 3, *[2.0] * 5]) * (per_function(ORTHONORMAL) / TABLED) ** 2
-# Skin varies in patches: a few dozen independent samples, against environments whose bands are a few tenths of their mean
+# Skin varies in patches: a few dozen independent samples, against environments whose bands are a few tenths of their
+# mean
 SUN_GAIN = 0.15  # log likelihood per point that a sun must be worth, or uneven skin passes for a shadow
 FLOOR = 0.15  # the environment's shading never falls below this share of its median
 
 
 @dataclass(frozen=True)
 class Light:
-    """environment float64 [9, 3]: coefficients (orthonormal) of radiance times skin tone; sun unit direction [3] towards it, its colour [3] (zeros: no sun).
+    """environment float64 [9, 3]: coefficients (orthonormal) of radiance times skin tone; sun unit direction [3]
+    towards it, its colour [3] (zeros: no sun).
 
-    floor float64 [3] is the least environment shading. The tone is part of both: shading 1 would be a surface of the skin's own colour under unit light.
+    floor float64 [3] is the least environment shading. The tone is part of both: shading 1 would be a surface of the
+    skin's own colour under unit light.
     """
 
     environment: np.ndarray
@@ -64,12 +68,16 @@ class _SkinPoints:
     weights: np.ndarray
 
 
-def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray, reaches: Callable[[np.ndarray], np.ndarray],
-              weights: np.ndarray, step: Callable[[int, int], None] = lambda done, of: None) -> tuple[Light, np.ndarray, np.ndarray]:
-    """The light that explains linear skin colours [N, 3] at points with unit normals [N, 3], transfer [N, 9] and weights [N].
+def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray,
+              reaches: Callable[[np.ndarray], np.ndarray],
+              weights: np.ndarray, step: Callable[[int, int], None] = lambda done,
+              of: None) -> tuple[Light, np.ndarray, np.ndarray]:
+    """The light that explains linear skin colours [N, 3] at points with unit normals [N, 3], transfer [N, 9] and
+    weights [N].
 
-    `reaches(direction)` -> [N] in [0, 1]: whether the head itself lets light from there through. `step` hears of progress.
-    Returns the light, the posterior [N] that the sun reaches a point, and that a point is explained at all (an inlier) [N].
+    `reaches(direction)` -> [N] in [0, 1]: whether the head itself lets light from there through. `step` hears of
+    progress. Returns the light, the posterior [N] that the sun reaches a point, and that a point is explained at all
+    (an inlier) [N].
     """
     skin = _SkinPoints(colours, np.log(np.maximum(colours, 1e-4)), transfer, weights)
     best = _expectation_maximisation(skin, np.zeros(len(colours)), np.zeros(len(colours)))
@@ -88,7 +96,8 @@ def fit_light(colours: np.ndarray, normals: np.ndarray, transfer: np.ndarray, re
                 best, best_direction = found, direction
     if best[0] - none[0] <= SUN_GAIN * weights.sum():
         best, best_direction = none, np.array([0.0, 0.0, 1.0])
-    cosine, visible = (np.maximum(normals @ best_direction, 0), reaches(best_direction)) if best is not none else (np.zeros(len(colours)),) * 2
+    cosine, visible = ((np.maximum(normals @ best_direction, 0), reaches(best_direction)) if best is not none
+                       else (np.zeros(len(colours)),) * 2)
     _, environment, sun, reached, inlier, _ = _expectation_maximisation(skin, cosine, visible, best[5], iterations=30)
     ambient = transfer @ environment
     return Light(environment, best_direction, sun, FLOOR * np.median(ambient, 0)), reached, inlier
@@ -109,17 +118,22 @@ def _around(direction: np.ndarray, spread: float) -> np.ndarray:
     side /= np.linalg.norm(side)
     up = np.cross(direction, side)
     angles = np.arange(6) * np.pi / 3
-    rings = [direction + np.tan(spread * r) * (np.cos(a) * side + np.sin(a) * up) for r in (0.5, 1.0) for a in angles + r]
+    rings = [direction + np.tan(spread * r) * (np.cos(a) * side + np.sin(a) * up) for r in (0.5, 1.0)
+             for a in angles + r]
     return np.array([d / np.linalg.norm(d) for d in rings])
 
 
-def _expectation_maximisation(skin: _SkinPoints, cosine: np.ndarray, visible: np.ndarray, start=None, iterations: int = 12):
-    """-> (log likelihood, environment [9, 3], sun colour [3], reached [N], inlier [N], responsibilities to start another fit from)."""
+def _expectation_maximisation(skin: _SkinPoints, cosine: np.ndarray, visible: np.ndarray, start=None,
+                              iterations: int = 12):
+    """-> (log likelihood, environment [9, 3], sun colour [3], reached [N], inlier [N], responsibilities to start
+    another fit from)."""
     log, colours, transfer, weights = skin.log, skin.colours, skin.transfer, skin.weights
     count = len(colours)
     prior = 0.03 + 0.67 * visible * (cosine > 0)  # that the sun reaches a point
     # a first guess of the two states: the sky gives the darker skin its colour, sky and sun the brightest
-    bright = (log.mean(1) - np.quantile(log.mean(1), 0.3)) / max(np.quantile(log.mean(1), 0.97) - np.quantile(log.mean(1), 0.3), 1e-3)
+    bright = (log.mean(1)
+              - np.quantile(log.mean(1), 0.3)) / max(np.quantile(log.mean(1), 0.97) - np.quantile(log.mean(1), 0.3),
+                                                     1e-3)
     lit = visible * (bright > 0.5) if start is None else start[0]
     inlier = np.ones(count) if start is None else start[1]
     scale = np.average(colours, axis=0, weights=weights)
@@ -128,7 +142,8 @@ def _expectation_maximisation(skin: _SkinPoints, cosine: np.ndarray, visible: np
     for _ in range(iterations):
         environment, sun = np.zeros((9, 3)), np.zeros(3)
         for k in range(3):
-            environment[:, k], sun[k] = _weighted_fit(transfer, cosine, colours[:, k] / scale[k], lit, inlier * weights, has_sun, spread)
+            environment[:, k], sun[k] = _weighted_fit(transfer, cosine, colours[:, k] / scale[k], lit, inlier * weights,
+                                                      has_sun, spread)
         environment, sun = environment * scale, sun * scale
         ambient = transfer @ environment
         ambient = np.maximum(ambient, FLOOR * np.median(ambient, 0))
@@ -141,15 +156,17 @@ def _expectation_maximisation(skin: _SkinPoints, cosine: np.ndarray, visible: np
         shares = np.exp(terms - peak)
         total = shares.sum(0)
         lit, inlier = shares[0] / np.maximum(shares[0] + shares[1], 1e-30), 1 - shares[2] / total
-        spread = np.average(lit * (in_sun**2).mean(1) + (1 - lit) * (in_shade**2).mean(1), weights=inlier * weights + 1e-9)
+        spread = np.average(lit * (in_sun**2).mean(1) + (1 - lit) * (in_shade**2).mean(1),
+                            weights=inlier * weights + 1e-9)
     return float(((peak + np.log(total)) * weights).sum()), environment, sun, lit, inlier, (lit, inlier, spread)
 
 
 def _weighted_fit(transfer, cosine, values, lit, weights, has_sun, spread) -> tuple[np.ndarray, float]:
-    """Relative least squares of values [N] ~ transfer @ e + lit * cosine * sun, each point once as sunlit and once as shaded.
+    """Relative least squares of values [N] ~ transfer @ e + lit * cosine * sun, each point once as sunlit and once as
+    shaded.
 
-    The higher bands have a prior (a ridge) whose weight grows with the `spread` of the skin about its tone, a variance in log units: freckled,
-    flushed or bearded skin must not be told as light.
+    The higher bands have a prior (a ridge) whose weight grows with the `spread` of the skin about its tone, a variance
+    in log units: freckled, flushed or bearded skin must not be told as light.
     """
     relative = 1 / np.maximum(values, 0.1)
     a_lit = np.concatenate([transfer, cosine[:, None]], 1) * relative[:, None]

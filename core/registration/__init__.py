@@ -3,7 +3,8 @@
 """Registration: the built-in head with its fixed topology and UVs takes the shape of the scan.
 
 Landmarks lifted from several frames place it, identity shapes bring it near, and a regularised non-rigid fit lays it on
-the scan; it stays watertight where the scan has holes. Where there is no scan it is fitted to what the views themselves show.
+the scan; it stays watertight where the scan has holes. Where there is no scan it is fitted to what the views themselves
+show.
 """
 
 from __future__ import annotations
@@ -23,22 +24,38 @@ from ..face import template
 from ..geometry import meshes, raster
 from ..geometry.views import View, read_points, read_views
 from ..imaging import images
-from . import alignment, bust, drawing, eyeballs, eyes, hair, intersections, landmarks, nonrigid, own_template, quality, unscanned
+from . import (
+    alignment,
+    bust,
+    drawing,
+    eyeballs,
+    eyes,
+    hair,
+    intersections,
+    landmarks,
+    nonrigid,
+    own_template,
+    quality,
+    unscanned,
+)
 from .correspondence import Scan
 
 STEPS = 100.0
 FOLLOWED = "face"
-"""UV mask of the template whose region is drawn to the scan; ears, scalp and neck come by identity and stiffness alone."""
+"""UV mask of the template whose region is drawn to the scan; ears, scalp and neck come by identity and stiffness
+alone."""
 SHAPED = {"face": 1.0, "neck": 0.3, "scalp": 0.15}
 """UV masks of what says which identity it is, and how loudly: hair and collars speak there, too."""
 SEEN = {"ears": 0.5, "neck": 0.3}
-"""Further UV masks that matched points and outlines speak of where there is no scan, and how loudly: collars and hair are there, too."""
+"""Further UV masks that matched points and outlines speak of where there is no scan, and how loudly: collars and hair
+are there, too."""
 HELD = ("lips", "eyes", "brows")
 """UV masks whose landmarks keep their say to the end: the scan alone would let them slide."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """frames/, cameras/, scan.ply -> head.obj with closed lids, landmarks.json, and where the eyes were open head_open.obj and eyes.json.
+    """frames/, cameras/, scan.ply -> head.obj with closed lids, landmarks.json, and where the eyes were open
+    head_open.obj and eyes.json.
 
     Raises Problem where no face is found or the fit does not hold.
     """
@@ -53,7 +70,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     subject = _subject(landmarks.with_artists(landmarks.onto_surface(found, views, surface), given), report)
     photographs = read_frames(capture).kind == PHOTOGRAPHS
     try:
-        head = _by_scan(capture, settings, views, surface, subject, quality.LEAST_SHARE_OF_PHOTOGRAPHS if photographs else quality.LEAST_FOLLOWED_SHARE, report)
+        head = _by_scan(capture, settings, views, surface, subject,
+                        quality.LEAST_SHARE_OF_PHOTOGRAPHS if photographs else quality.LEAST_FOLLOWED_SHARE, report)
         if photographs:
             quality.tell_draft(report, views, head)
     except quality.Unlike as problem:
@@ -65,8 +83,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
 @dataclass(frozen=True)
 class Subject:
-    """What is known of a person before the fit: landmarks, with the artist's; the model that trusts those; weights of the vertices and landmarks as
-    `weights_of` gives them, without the lids where the eyes are open; trust [468]."""
+    """What is known of a person before the fit: landmarks, with the artist's; the model that trusts those; weights of
+    the vertices and landmarks as `weights_of` gives them, without the lids where the eyes are open; trust [468]."""
 
     found: landmarks.Landmarks
     model: alignment.HeadModel
@@ -90,14 +108,19 @@ def _subject(found: landmarks.Landmarks, report: Reporter) -> Subject:
 
 def _by_views(capture: Capture, settings: Settings, views: list[View], subject: Subject, report: Reporter) -> None:
     model, found = subject.model, subject.found
-    seen = np.max([subject.follow, *(strength * _per_vertex(model.mesh, template.mask(name, 512)) for name, strength in SEEN.items())], axis=0)
+    seen = np.max([subject.follow,
+                   *(strength * _per_vertex(model.mesh, template.mask(name, 512)) for name, strength in SEEN.items())],
+                  axis=0)
     points = _on_skin(unscanned.Points(*read_points(capture)), views, subject, report)
-    fitted = unscanned.fit(model, unscanned.ShownByViews(views, found, subject.trust, points, seen), report, 10, 0.9 * STEPS)
+    fitted = unscanned.fit(model, unscanned.ShownByViews(views, found, subject.trust, points, seen), report, 10,
+                           0.9 * STEPS)
     placed = model.mesh.moved(fitted.pose.apply(model.mesh.vertices))
-    vertices = intersections.mended(placed, fitted.vertices, lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
+    vertices = intersections.mended(placed, fitted.vertices,
+                                    lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
     vertices = bust.level_edge(model.mesh, vertices)
     head, aligned = model.mesh.moved(vertices), model.mesh.moved(fitted.pose.apply(model.shape(fitted.coefficients)))
-    quality.figures(report, model, quality.HeadFit(head, aligned, fitted.coefficients, np.zeros(0)), found, subject.follow)
+    quality.figures(report, model, quality.HeadFit(head, aligned, fitted.coefficients, np.zeros(0)), found,
+                    subject.follow)
     quality.figures_of_views(report, fitted, views, head)
     quality.judge_views(report, views, head, fitted)
     quality.tell_draft(report, views, head)
@@ -114,8 +137,8 @@ def _on_skin(points: unscanned.Points, views: list[View], subject: Subject, repo
     return unscanned.Points(points.places[share <= hair.HAIR_SHARE], points.towards[share <= hair.HAIR_SHARE])
 
 
-def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: meshes.Mesh, subject: Subject, least_share: float,
-             report: Reporter) -> meshes.Mesh:
+def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: meshes.Mesh, subject: Subject,
+             least_share: float, report: Reporter) -> meshes.Mesh:
     found, model = subject.found, subject.model
     follow, shaped, trust = subject.follow, subject.shaped, subject.trust
     report.progress(10, STEPS, "placing the head")
@@ -127,7 +150,8 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
     start = pose.apply(model.shape(coefficients))
     targets = nonrigid.LandmarkTargets(found.points, trust, subject.hold, found.put)
     vertices = nonrigid.fit(model, start, scan, follow, targets, settings.registration.iterations,
-                            lambda share: report.progress(20 + (0.9 * STEPS - 20) * share, 0.9 * STEPS, "fitting the head to the scan"))
+                            lambda share: report.progress(20 + (0.9 * STEPS - 20) * share, 0.9 * STEPS,
+                                                          "fitting the head to the scan"))
     placed = model.mesh.moved(pose.apply(model.mesh.vertices))
     vertices = intersections.mended(placed, vertices, lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
     vertices = bust.level_edge(model.mesh, vertices)  # last: where folds are smoothed at the edge, it would bend again
@@ -140,7 +164,8 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
     return head
 
 
-def _finish(capture: Capture, settings: Settings, views: list[View], head: meshes.Mesh, subject: Subject, report: Reporter) -> None:
+def _finish(capture: Capture, settings: Settings, views: list[View], head: meshes.Mesh, subject: Subject,
+            report: Reporter) -> None:
     found = subject.found
     remove_file(capture.head_open)
     remove_file(capture.eyes)
@@ -153,8 +178,10 @@ def _finish(capture: Capture, settings: Settings, views: list[View], head: meshe
         images.write_srgb(capture.picture("registration", "eyes"), drawing.eyes_overlay(views, found, seen.opened))
     meshes.write_obj(capture.head, head)
     write_json(capture.landmarks, landmarks.to_json(found))
-    own_template.run(capture, settings, head, own_template.BuiltIn(subject.model, subject.follow, subject.shaped, subject.hold), report)
-    images.write_srgb(capture.picture("registration", "wireframe"), drawing.overlay(drawing.three_views(views, found), head, found))
+    own_template.run(capture, settings, head,
+                     own_template.BuiltIn(subject.model, subject.follow, subject.shaped, subject.hold), report)
+    images.write_srgb(capture.picture("registration", "wireframe"),
+                      drawing.overlay(drawing.three_views(views, found), head, found))
 
 
 def load_model() -> alignment.HeadModel:
@@ -169,10 +196,11 @@ def trusting(model: alignment.HeadModel, put: np.ndarray) -> alignment.HeadModel
 
 
 def weights_of(model: alignment.HeadModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """follow [V] and shaped [V] in [0, 1]: how far the scan is believed at a vertex, by the last fit and by the identity's;
-    hold [468]: how much longer a landmark counts than the others."""
+    """follow [V] and shaped [V] in [0, 1]: how far the scan is believed at a vertex, by the last fit and by the
+    identity's; hold [468]: how much longer a landmark counts than the others."""
     follow = _per_vertex(model.mesh, template.mask(FOLLOWED, 512))
-    shaped = np.max([strength * _per_vertex(model.mesh, template.mask(name, 512)) for name, strength in SHAPED.items()], axis=0)
+    shaped = np.max([strength * _per_vertex(model.mesh, template.mask(name, 512)) for name, strength in SHAPED.items()],
+                    axis=0)
     held = np.max([_per_vertex(model.mesh, template.mask(name, 512)) for name in HELD], axis=0)
     return follow, shaped, 1 + 9 * (model.at_landmarks(held[:, None])[:, 0] > 0.3)
 

@@ -36,7 +36,8 @@ class Similarity:
 
 @dataclass(frozen=True)
 class HeadModel:
-    """The template's part of a fit: mesh, identity [K, V, 3], landmark anchors (face [468], bary [468, 3]) and their weights [468]."""
+    """The template's part of a fit: mesh, identity [K, V, 3], landmark anchors (face [468], bary [468, 3]) and their
+    weights [468]."""
 
     mesh: Mesh
     identity: np.ndarray
@@ -64,7 +65,8 @@ def similarity(source: np.ndarray, target: np.ndarray, weights: np.ndarray) -> S
     return Similarity(float(scale), rotation, b - scale * rotation @ a)
 
 
-def fit_landmarks(model: HeadModel, points: np.ndarray, trust: np.ndarray, rounds: int = 12) -> tuple[Similarity, np.ndarray]:
+def fit_landmarks(model: HeadModel, points: np.ndarray, trust: np.ndarray,
+                  rounds: int = 12) -> tuple[Similarity, np.ndarray]:
     """Similarity and coefficients [K] that lay the model's landmarks over points [468, 3] (nan: unknown)."""
     known, weights = _usable(model, points, trust)
     coefficients = np.zeros(len(model.identity))
@@ -86,11 +88,13 @@ def fit_scan(model: HeadModel, pose: Similarity, coefficients: np.ndarray, point
     for step in range(SCAN_ROUNDS):
         vertices = pose.apply(model.shape(coefficients))
         normals = vertex_normals(model.mesh.moved(vertices))[index]
-        reach = np.interp(step, [0, SCAN_ROUNDS - 1], [0.030, 0.010])  # the identity space is no closer to a person than this
+        # the identity space is no closer to a person than this
+        reach = np.interp(step, [0, SCAN_ROUNDS - 1], [0.030, 0.010])
         signed, scan_normals = scan.match(vertices[index], normals, 1.5 * reach)
         weight = trimmed(signed, reach) * shaped[index]
         weight *= min(1.0, INDEPENDENT["scan"] / max(weight.sum(), 1)) / SCAN_SIGMA_M ** 2
-        pose, coefficients = _step(model, pose, coefficients, points, trust, (index, np.nan_to_num(signed), scan_normals, weight))
+        pose, coefficients = _step(model, pose, coefficients, points, trust,
+                                   (index, np.nan_to_num(signed), scan_normals, weight))
     return pose, coefficients
 
 
@@ -121,8 +125,9 @@ def _step(model, pose, coefficients, points, trust, planes=None) -> tuple[Simila
 
 
 def stepped(pose: Similarity, coefficients: np.ndarray, constraints: list[tuple]) -> tuple[Similarity, np.ndarray]:
-    """One such step for points that should move along directions. Of each kind of them: where they are [M, 3], their identity basis [K, M, 3] in the
-    model's own frame, unit directions [M, 3], distances [M] in metres and weights [M] in 1 / m^2."""
+    """One such step for points that should move along directions. Of each kind of them: where they are [M, 3], their
+    identity basis [K, M, 3] in the model's own frame, unit directions [M, 3], distances [M] in metres and weights [M]
+    in 1 / m^2."""
     rows = []
     for at, basis, direction, distance, weight in constraints:
         full = _jacobian(at, pose.translation, basis @ (pose.scale * pose.rotation.T))

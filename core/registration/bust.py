@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The neck ends in a plane, as a bust does: a fit leaves the template's open edge wavy, for no scan tells where a neck ends."""
+"""The neck ends in a plane, as a bust does: a fit leaves the template's open edge wavy, for no scan tells where a neck
+ends."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ NEIGHBOURS = 6
 
 
 def level_edge(mesh: Mesh, vertices: np.ndarray) -> np.ndarray:
-    """Vertices [V, 3] with the mesh's open edge in the plane that lies nearest to it; the skin above gives way less and less, the rest stays."""
+    """Vertices [V, 3] with the mesh's open edge in the plane that lies nearest to it; the skin above gives way less and
+    less, the rest stays."""
     edge = open_edge(mesh)
     if not len(edge):
         return vertices

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Eyes, teeth, sockets, lashes: parts of the artist's mesh with no counterpart on the scan go where the skin around them goes.
+"""Eyes, teeth, sockets, lashes: parts of the artist's mesh with no counterpart on the scan go where the skin around
+them goes.
 
 The displacement of the skin is interpolated by a biharmonic radial basis function, which is linear far away and exact
 at its centres (Carr et al. 2001); a ball stays a ball, so that an eye still turns in its socket.
@@ -21,9 +22,10 @@ ROUND_RADIUS_SHARE = 0.06
 """Deviation from a sphere, as a share of its radius, below which a part is a ball."""
 
 
-def along(start: np.ndarray, faces: np.ndarray, label: np.ndarray, skin: np.ndarray, fitted: np.ndarray, report: Reporter) -> np.ndarray:
-    """Final vertices [V, 3]. start [V, 3]: all as placed by the similarity; label [V]: connected part of each; skin [S]: indices of the fitted ones,
-    fitted [S, 3]: where they went."""
+def along(start: np.ndarray, faces: np.ndarray, label: np.ndarray, skin: np.ndarray, fitted: np.ndarray,
+          report: Reporter) -> np.ndarray:
+    """Final vertices [V, 3]. start [V, 3]: all as placed by the similarity; label [V]: connected part of each; skin
+    [S]: indices of the fitted ones, fitted [S, 3]: where they went."""
     final = start.copy()
     final[skin] = fitted
     others = np.setdiff1d(np.arange(len(start)), skin)
@@ -42,9 +44,11 @@ def along(start: np.ndarray, faces: np.ndarray, label: np.ndarray, skin: np.ndar
 
 
 def field(places: np.ndarray, shift: np.ndarray, at: np.ndarray, report: Reporter) -> np.ndarray:
-    """A displacement known at places [N, 3] (shift [N, 3]), smoothly continued to `at` [M, 3]; of many places an even choice counts."""
+    """A displacement known at places [N, 3] (shift [N, 3]), smoothly continued to `at` [M, 3]; of many places an even
+    choice counts."""
     chosen = np.linspace(0, len(places) - 1, min(len(places), MOST_CENTRES)).astype(int)
-    _, first = np.unique(np.round(places[chosen] * 1e5), axis=0, return_index=True)  # two centres at one place have no solution
+    # two centres at one place have no solution
+    _, first = np.unique(np.round(places[chosen] * 1e5), axis=0, return_index=True)
     chosen = chosen[np.sort(first)]
     continued = RBFInterpolator(places[chosen], shift[chosen], kernel="linear", smoothing=1e-6)
     out = np.empty_like(at)

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a few views tell of a head without a scan, as one kind of constraint: a point of the surface should move so far along a direction.
+"""What a few views tell of a head without a scan, as one kind of constraint: a point of the surface should move so far
+along a direction.
 
-A landmark in a picture constrains the two directions across its ray, a matched point the surface's normal, a silhouette the normal in the picture.
+A landmark in a picture constrains the two directions across its ray, a matched point the surface's normal, a silhouette
+the normal in the picture.
 """
 
 from __future__ import annotations
@@ -18,18 +20,20 @@ from .alignment import HeadModel
 from .landmarks import Landmarks
 
 LEAST_COSINE, FULL_COSINE = 0.15, 0.45
-"""Cosines between a landmark's normal and its view: below the first it has slid onto the outline and says nothing, from the second on it counts fully."""
+"""Cosines between a landmark's normal and its view: below the first it has slid onto the outline and says nothing, from
+the second on it counts fully."""
 DEPTH_SHARE = 0.06
-"""What a depth taken from the mean head counts for beside a landmark's place in the picture: people differ from it by a centimetre, and a net's mark errs by
-2.5 mm."""
+"""What a depth taken from the mean head counts for beside a landmark's place in the picture: people differ from it by a
+centimetre, and a net's mark errs by 2.5 mm."""
 MOST_ANGLE_DEG = 60.0
-"""Between a matched point's mean viewing direction and the surface's normal: beyond, the point lies on something behind."""
+"""Between a matched point's mean viewing direction and the surface's normal: beyond, the point lies on something
+behind."""
 
 
 @dataclass(frozen=True)
 class Constraints:
-    """M points of a mesh, at corners int64 [M, 3] with bary [M, 3], that should move by distance [M] (metres) along unit direction [M, 3] in the world;
-    weight [M] in [0, 1]: how far each is believed beside its like."""
+    """M points of a mesh, at corners int64 [M, 3] with bary [M, 3], that should move by distance [M] (metres) along
+    unit direction [M, 3] in the world; weight [M] in [0, 1]: how far each is believed beside its like."""
 
     corners: np.ndarray
     bary: np.ndarray
@@ -49,9 +53,11 @@ def joined(parts: list[Constraints]) -> Constraints:
     return Constraints(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Constraints)))
 
 
-def from_landmarks(model: HeadModel, vertices: np.ndarray, views: list[View], found: Landmarks, trust: np.ndarray, reach: float) -> Constraints:
-    """Two constraints per view and landmark that is seen squarely enough; trust [468]. What misses by much more than `reach` metres counts for little.
-    A single view does not tell depths, so there each landmark is also held, loosely, to the depth that it was lifted to."""
+def from_landmarks(model: HeadModel, vertices: np.ndarray, views: list[View], found: Landmarks, trust: np.ndarray,
+                   reach: float) -> Constraints:
+    """Two constraints per view and landmark that is seen squarely enough; trust [468]. What misses by much more than
+    `reach` metres counts for little. A single view does not tell depths, so there each landmark is also held, loosely,
+    to the depth that it was lifted to."""
     at = model.at_landmarks(vertices)
     normals = model.at_landmarks(vertex_normals(model.mesh.moved(vertices)))
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
@@ -73,16 +79,19 @@ def from_landmarks(model: HeadModel, vertices: np.ndarray, views: list[View], fo
         side /= np.linalg.norm(side, axis=1, keepdims=True)
         robust = weight[index] / (1 + (miss**2).sum(1) / reach**2) ** 2
         for direction in (side, np.cross(rays[index], side)):
-            parts.append(Constraints(corners[index], model.landmark_bary[index], direction, (miss * direction).sum(1), robust))
+            parts.append(Constraints(corners[index], model.landmark_bary[index], direction, (miss * direction).sum(1),
+                                     robust))
         if len(found.images) == 1:
             deeper = ((found.points[index] - at[index]) * rays[index]).sum(1)
-            parts.append(Constraints(corners[index], model.landmark_bary[index], rays[index], deeper, DEPTH_SHARE * robust))
+            parts.append(Constraints(corners[index], model.landmark_bary[index], rays[index], deeper,
+                                     DEPTH_SHARE * robust))
     return joined(parts)
 
 
 def from_points(mesh: Mesh, follow: np.ndarray, points: np.ndarray, towards: np.ndarray, reach: float) -> Constraints:
-    """One constraint per matched point [N, 3] that lies within `reach` metres of the part of the mesh that follows (follow [V] > 0.5), on the side that
-    the views it was seen in look at; towards [N, 3]: unit mean direction to those."""
+    """One constraint per matched point [N, 3] that lies within `reach` metres of the part of the mesh that follows
+    (follow [V] > 0.5), on the side that the views it was seen in look at; towards [N, 3]: unit mean direction to
+    those."""
     if not len(points):
         return none()
     normals, index = vertex_normals(mesh), np.flatnonzero(follow > 0.02)
@@ -93,7 +102,9 @@ def from_points(mesh: Mesh, follow: np.ndarray, points: np.ndarray, towards: np.
     distance = ((points[found] - mesh.vertices[vertex]) * direction).sum(1)
     aside = np.linalg.norm(points[found] - mesh.vertices[vertex] - distance[:, None] * direction, axis=1)
     spacing = np.median(np.linalg.norm(mesh.vertices[mesh.faces[:, 0]] - mesh.vertices[mesh.faces[:, 1]], axis=1))
-    good = (np.abs(distance) < reach) & (aside < 3 * spacing) & ((towards[found] * direction).sum(1) > np.cos(np.radians(MOST_ANGLE_DEG)))
+    good = (np.abs(distance) < reach) & (aside < 3
+                                         * spacing) & ((towards[found] * direction).sum(1)
+                                                       > np.cos(np.radians(MOST_ANGLE_DEG)))
     weight = np.clip(1 - (distance / reach) ** 2, 0, 1) ** 2 * follow[vertex]
     corners = np.repeat(vertex[:, None], 3, 1)
     bary = np.tile([1.0, 0.0, 0.0], (len(vertex), 1))

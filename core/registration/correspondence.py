@@ -25,7 +25,8 @@ class Scan:
         self.spacing = float(np.median(spacing))
 
     def match(self, points: np.ndarray, normals: np.ndarray, farthest: float) -> tuple[np.ndarray, np.ndarray]:
-        """Signed distances [N] along the scan's local normals, and those normals [N, 3]; nan where nothing compatible lies within `farthest` metres.
+        """Signed distances [N] along the scan's local normals, and those normals [N, 3]; nan where nothing compatible
+        lies within `farthest` metres.
 
         A local patch (the mean of the nearest scan points, nearer ones counting more) takes out the scan's noise.
         """
@@ -50,7 +51,8 @@ class Scan:
 
 
 def trimmed(signed: np.ndarray, least: float) -> np.ndarray:
-    """Weights [N] in [0, 1] of signed distances with nan: zero beyond three robust deviations (at least `least` metres), Tukey's biweight within."""
+    """Weights [N] in [0, 1] of signed distances with nan: zero beyond three robust deviations (at least `least`
+    metres), Tukey's biweight within."""
     known = np.isfinite(signed)
     if not known.any():
         return np.zeros(len(signed))

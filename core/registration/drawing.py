@@ -15,7 +15,8 @@ from ..imaging import images
 from .landmarks import Landmarks
 
 RIM_UV = (0.4 / np.pi) ** 0.6
-"""Distance from the middle of an eyeball's UVs of the ring at 0.4 radians, near the iris' edge, over the half of their width."""
+"""Distance from the middle of an eyeball's UVs of the ring at 0.4 radians, near the iris' edge, over the half of their
+width."""
 
 
 def overlay(views: list[View], mesh: Mesh, found: Landmarks, height: int = 640) -> np.ndarray:
@@ -26,9 +27,10 @@ def overlay(views: list[View], mesh: Mesh, found: Landmarks, height: int = 640) 
 
 
 def eyes_overlay(views: list[View], found: Landmarks, opened: OpenHead, side: int = 300) -> np.ndarray:
-    """sRGB [3 side, 2 side, 3]: the right and the left eye in three frames, with the edges of the head's lids (green), a ring near the iris' edge
-    (blue) and the network's marks (red)."""
-    return np.vstack([np.hstack([_eye(view, found, opened, which, side) for which in (1, 0)]) for view in three_views(views, found)])
+    """sRGB [3 side, 2 side, 3]: the right and the left eye in three frames, with the edges of the head's lids (green),
+    a ring near the iris' edge (blue) and the network's marks (red)."""
+    return np.vstack([np.hstack([_eye(view, found, opened, which, side) for which in (1, 0)])
+                      for view in three_views(views, found)])
 
 
 def _eye(view: View, found: Landmarks, opened: OpenHead, which: int, side: int) -> np.ndarray:
@@ -38,7 +40,8 @@ def _eye(view: View, found: Landmarks, opened: OpenHead, which: int, side: int) 
     srgb = images.read_srgb(view.path)
     scale = side / (2 * reach)
     full = np.array([srgb.shape[1] / view.width, srgb.shape[0] / view.height])
-    move = np.column_stack([np.diag(scale / full), side / 2 - scale * middle + 0.5 * scale / full - 0.5])  # cv2 counts from pixel centres
+    # cv2 counts from pixel centres
+    move = np.column_stack([np.diag(scale / full), side / 2 - scale * middle + 0.5 * scale / full - 0.5])
     canvas = cv2.warpAffine(srgb.astype(np.float32), move, (side, side), flags=cv2.INTER_LINEAR)
 
     def drawn(points, colour, closed=False):

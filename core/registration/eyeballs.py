@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Eyes that were open while filming: eyeballs placed and sized by the edges of the lids and by the iris, and the head's lids opened to meet those edges.
+"""Eyes that were open while filming: eyeballs placed and sized by the edges of the lids and by the iris, and the head's
+lids opened to meet those edges.
 
 The closed head stays the head; open, its triangles and UVs are the same but parted between the lids.
 """
@@ -25,18 +26,21 @@ RIM_SIGMA_M, IRIS_SIGMA_M = 0.0006, 0.0010
 GAZE_SIGMA = 0.17
 """Radians by which eyes usually turn in the head: they look ahead, and some ten degrees around."""
 CENTRE_SIGMA_M, RADIUS_SIGMA = 0.0025, 0.06
-"""How well the head around tells where an eyeball lies, and (as a share) how large it is: MakeHuman's eyes over its own heads."""
+"""How well the head around tells where an eyeball lies, and (as a share) how large it is: MakeHuman's eyes over its own
+heads."""
 ROUNDS = 12
 CORNER_REACH_M, RIM_REACH_M = 0.008, 0.006
-"""How far around the eye's corners the face follows them, and around a lid's edge the lid: some centimetre, and half of one."""
+"""How far around the eye's corners the face follows them, and around a lid's edge the lid: some centimetre, and half of
+one."""
 USUAL, OPENEST = 0.8, 1.4
 """Of MakeHuman's own opening."""
 
 
 @dataclass(frozen=True)
 class OpenEyes:
-    """head: the closed head, its lids before the balls; opened: the same as filmed; openness: of the left and of the right eye, 1 being MakeHuman's;
-    iris_radius [2] in metres, nan where unseen; measured: how many views told of the left and the right eye (0: by the other one, or by the head)."""
+    """head: the closed head, its lids before the balls; opened: the same as filmed; openness: of the left and of the
+    right eye, 1 being MakeHuman's; iris_radius [2] in metres, nan where unseen; measured: how many views told of the
+    left and the right eye (0: by the other one, or by the head)."""
 
     head: Mesh
     opened: lids.OpenHead
@@ -48,8 +52,10 @@ class OpenEyes:
         """The left and the right eye as eyes.json keeps them."""
         def rounded(vector):
             return tuple(round(float(x), 6) for x in vector)
-        return tuple(Eyeball(rounded(ball.centre), round(ball.radius, 6), rounded(ball.gaze), round(openness, 3), round(float(np.nan_to_num(iris)), 6), views)
-                     for ball, openness, iris, views in zip(self.opened.balls, self.openness, self.iris_radius, self.measured, strict=True))
+        return tuple(Eyeball(rounded(ball.centre), round(ball.radius, 6), rounded(ball.gaze), round(openness, 3),
+                             round(float(np.nan_to_num(iris)), 6), views)
+                     for ball, openness, iris, views in zip(self.opened.balls, self.openness, self.iris_radius,
+                                                            self.measured, strict=True))
 
 
 def lift_rims(views: list[View], found: Landmarks) -> tuple[LidMarks | None, LidMarks | None]:
@@ -57,14 +63,16 @@ def lift_rims(views: list[View], found: Landmarks) -> tuple[LidMarks | None, Lid
     seen = [view for view in views if view.name in found.eyes]
     rims = []
     for side in (0, 1):
-        sights = [(found.eyes[view.name][0], found.eyes[view.name][2 - side]) for view in seen]  # the right eye stands first there
+        # the right eye stands first there
+        sights = [(found.eyes[view.name][0], found.eyes[view.name][2 - side]) for view in seen]
         use = usable(sights, side)
         rims.append(lift([seen[i] for i in use], [sights[i][1] for i in use]))
     return tuple(rims)
 
 
 def figures(report: Reporter, eyes: OpenEyes) -> None:
-    for name, ball, radius, views, openness in zip(SIDES, eyes.opened.balls, eyes.iris_radius, eyes.measured, eyes.openness, strict=True):
+    for name, ball, radius, views, openness in zip(SIDES, eyes.opened.balls, eyes.iris_radius, eyes.measured,
+                                                   eyes.openness, strict=True):
         report.figure(f"{name}_eye_views", views)
         report.figure(f"{name}_eye_openness", round(openness, 2))
         report.figure(f"{name}_eyeball_radius_mm", round(1e3 * ball.radius, 2))
@@ -72,8 +80,8 @@ def figures(report: Reporter, eyes: OpenEyes) -> None:
 
 
 def fit(head: Mesh, rims: tuple[LidMarks | None, LidMarks | None], opening: float) -> OpenEyes:
-    """head: closed, in the template's topology; rims of the left and the right eye, where they could be lifted; opening: height over width of the eyes, for one
-    that could not."""
+    """head: closed, in the template's topology; rims of the left and the right eye, where they could be lifted;
+    opening: height over width of the eyes, for one that could not."""
     head = _with_corners(head, rims)
     balls = tuple(_place(head, side, rims[side]) for side in (0, 1))
     clear = head.vertices
@@ -88,7 +96,8 @@ def fit(head: Mesh, rims: tuple[LidMarks | None, LidMarks | None], opening: floa
         if found is not None:
             shift += _towards_rims(opened, side, found)
     radius = np.array([found.iris_radius if found is not None else np.nan for found in rims])
-    return OpenEyes(head, lids.open_around(head, balls, openness, shift), openness, radius, tuple(found.views if found is not None else 0 for found in rims))
+    return OpenEyes(head, lids.open_around(head, balls, openness, shift), openness, radius,
+                    tuple(found.views if found is not None else 0 for found in rims))
 
 
 def _with_corners(head: Mesh, rims: tuple) -> Mesh:
@@ -97,13 +106,15 @@ def _with_corners(head: Mesh, rims: tuple) -> Mesh:
     for found, (outer, inner) in zip(rims, lids.corners(), strict=True):
         if found is not None:
             for corner, aim in ((outer, found.upper[0]), (inner, found.upper[-1])):
-                near = np.exp(-0.5 * (np.linalg.norm(head.vertices - head.vertices[corner], axis=1) / CORNER_REACH_M) ** 2)
+                near = np.exp(-0.5
+                              * (np.linalg.norm(head.vertices - head.vertices[corner], axis=1) / CORNER_REACH_M) ** 2)
                 vertices += near[:, None] * (aim - head.vertices[corner])
     return replace(head, vertices=vertices)
 
 
 def _place(head: Mesh, side: int, found: LidMarks | None) -> lids.PosedEyeball:
-    """The eyeball whose surface the edges of the lids lie on, and on whose front the iris does; by least squares, under what the head around tells."""
+    """The eyeball whose surface the edges of the lids lie on, and on whose front the iris does; by least squares, under
+    what the head around tells."""
     centre, radius = lids.carry_ball(head, side)
     if found is None:
         return lids.place_ball(side, centre, radius, lids.FORWARD)
@@ -122,7 +133,8 @@ def _place(head: Mesh, side: int, found: LidMarks | None) -> lids.PosedEyeball:
             np.array([[0, 0, 0, 1 / (RADIUS_SIGMA * size)]]),
         ])
         left = np.concatenate([(radius + off - far) / RIM_SIGMA_M, [(front * radius - front_far) / IRIS_SIGMA_M],
-                               -ahead[[0, 2]] / front_far / GAZE_SIGMA, (start - centre) / CENTRE_SIGMA_M, [(size - radius) / (RADIUS_SIGMA * size)]])
+                               -ahead[[0, 2]] / front_far / GAZE_SIGMA, (start - centre) / CENTRE_SIGMA_M,
+                               [(size - radius) / (RADIUS_SIGMA * size)]])
         step = np.linalg.lstsq(rows, left, rcond=None)[0]
         centre, radius = centre + step[:3], radius + step[3]
     ahead = found.iris - centre
@@ -130,7 +142,8 @@ def _place(head: Mesh, side: int, found: LidMarks | None) -> lids.PosedEyeball:
 
 
 def _clearance(head: Mesh, side: int, ball: lids.PosedEyeball, found: LidMarks) -> np.ndarray:
-    """How far the lids' edges lie before the eyeball of this head, metres, where the marks of `found` are, but for two at either end."""
+    """How far the lids' edges lie before the eyeball of this head, metres, where the marks of `found` are, but for two
+    at either end."""
     opened = lids.open_around(head, (ball, ball), (USUAL, USUAL))  # the other side's lids are not looked at
     outer, inner = (opened.skin.vertices[corner] for corner in lids.corners()[side])
     off = []
@@ -147,8 +160,8 @@ def _along(points: np.ndarray, outer: np.ndarray, inner: np.ndarray) -> np.ndarr
 
 
 def _openness(head: Mesh, balls: tuple, side: int, found: LidMarks | None, opening: float) -> float:
-    """How far an eye is open, of MakeHuman's opening: that which brings the upper lid's edge nearest to the one seen, or the height between the lids to
-    `opening` times the width."""
+    """How far an eye is open, of MakeHuman's opening: that which brings the upper lid's edge nearest to the one seen,
+    or the height between the lids to `opening` times the width."""
     steps = np.linspace(0.0, OPENEST, 29)
     miss = []
     for step in steps:
@@ -164,7 +177,8 @@ def _openness(head: Mesh, balls: tuple, side: int, found: LidMarks | None, openi
 
 
 def _aims(opened: lids.OpenHead, side: int, lid: int, found: LidMarks) -> np.ndarray:
-    """Where the vertices of an edge belong [N, 3]: on the curve through its marks, as far between the corners as they are on the head."""
+    """Where the vertices of an edge belong [N, 3]: on the curve through its marks, as far between the corners as they
+    are on the head."""
     outer, inner = (opened.skin.vertices[corner] for corner in lids.corners()[side])
     share = np.clip(_along(opened.skin.vertices[opened.rims[side][lid]], outer, inner), 0, 1)
     marks = (found.upper, found.lower)[lid]
@@ -173,7 +187,8 @@ def _aims(opened: lids.OpenHead, side: int, lid: int, found: LidMarks) -> np.nda
 
 
 def _towards_rims(opened: lids.OpenHead, side: int, found: LidMarks) -> np.ndarray:
-    """What is left to the edges seen, on the edges and, fading, on the lids beside them [V + C + P, 3]; each lid follows its own edge."""
+    """What is left to the edges seen, on the edges and, fading, on the lids beside them [V + C + P, 3]; each lid
+    follows its own edge."""
     vertices = opened.skin.vertices
     shift = np.zeros_like(vertices)
     for lid, rim in enumerate(opened.rims[side]):

@@ -25,7 +25,8 @@ LEAST_LEFT_SHARE = 0.2
 
 
 def without_hair(scan: Mesh, views: list[View], head: Mesh, report: Reporter) -> Mesh:
-    """The scan without the triangles of hair and cloth; head: the template, placed roughly, by which the pictures are cut."""
+    """The scan without the triangles of hair and cloth; head: the template, placed roughly, by which the pictures are
+    cut."""
     normals, caster = vertex_normals(scan), raster.RayCaster(scan)
     share = hidden_share(scan.vertices, normals, views, head, report,
                          lambda view: raster.visible_from(caster, scan.vertices, normals, view.centre, offset=0.002))
@@ -35,8 +36,10 @@ def without_hair(scan: Mesh, views: list[View], head: Mesh, report: Reporter) ->
     return Mesh(scan.vertices, scan.faces[kept]) if LEAST_LEFT_SHARE < kept.mean() < 1 else scan
 
 
-def hidden_share(points: np.ndarray, normals: np.ndarray, views: list[View], head: Mesh, report: Reporter, visible=None) -> np.ndarray:
-    """Of points [N, 3] with unit normals: the mean share of hair and cloth over the views that face them and, by visible(view) [N], see them; nan else."""
+def hidden_share(points: np.ndarray, normals: np.ndarray, views: list[View], head: Mesh, report: Reporter,
+                 visible=None) -> np.ndarray:
+    """Of points [N, 3] with unit normals: the mean share of hair and cloth over the views that face them and, by
+    visible(view) [N], see them; nan else."""
     marks = template.landmark_points(head)
     total, votes = np.zeros(len(points)), np.zeros(len(points))
     for view in spread(views, MOST_VIEWS):

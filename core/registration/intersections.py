@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a fitted head cuts or folds through itself, and the mending of it: the spot's displacement from the clean template is smoothed.
+"""Where a fitted head cuts or folds through itself, and the mending of it: the spot's displacement from the clean
+template is smoothed.
 
-Two triangles cut where an edge of one pierces the other (Moeller and Trumbore 1997); neighbours along an edge are left out.
+Two triangles cut where an edge of one pierces the other (Moeller and Trumbore 1997); neighbours along an edge are left
+out.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ def mended(placed: Mesh, vertices: np.ndarray, tick=lambda done: None) -> np.nda
             break
         moved = vertices - placed.vertices
         part, rest = np.flatnonzero(free), np.flatnonzero(~free)
-        moved[part] = spsolve(laplacian[part][:, part].tocsc(), -(laplacian[part][:, rest] @ moved[rest])).reshape(-1, 3)
+        moved[part] = spsolve(laplacian[part][:, part].tocsc(),
+                              -(laplacian[part][:, rest] @ moved[rest])).reshape(-1, 3)
         vertices[part] = placed.vertices[part] + moved[part]
     return vertices
 
@@ -99,4 +102,5 @@ def _graph(mesh: Mesh) -> sparse.csr_matrix:
     """[V, V] with 1 along edges."""
     a, b = mesh.faces[:, [0, 1, 2]].ravel(), mesh.faces[:, [1, 2, 0]].ravel()
     count = len(mesh.vertices)
-    return (sparse.coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), (count, count)).tocsr() > 0).astype(np.float64)
+    return (sparse.coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), (count, count)).tocsr()
+            > 0).astype(np.float64)

@@ -28,8 +28,9 @@ BEHIND_FACE_M = 0.06
 @dataclass(frozen=True)
 class Landmarks:
     """points [468, 3] in metres (nan: not lifted), trust [468] in [0, 1], error_px the median reprojection error;
-    images maps a frame's name to what was found in it: pixels [468, 2], and used bool [468]; opening of the eyes, height over width;
-    put bool [468]: which points the artist has given; eyes: by a frame's name the yaw of the head in degrees and the right and the left eye, in its pixels."""
+    images maps a frame's name to what was found in it: pixels [468, 2], and used bool [468]; opening of the eyes,
+    height over width; put bool [468]: which points the artist has given; eyes: by a frame's name the yaw of the head in
+    degrees and the right and the left eye, in its pixels."""
 
     points: np.ndarray
     trust: np.ndarray
@@ -41,7 +42,8 @@ class Landmarks:
 
 
 def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
-    """Landmarks of the face all views look at. Raises Problem when fewer than three frames show one, or of a few views two; a single view will do.
+    """Landmarks of the face all views look at. Raises Problem when fewer than three frames show one, or of a few views
+    two; a single view will do.
 
     `steps` is the stage's total for the progress bar, of which detection is the first tenth.
     """
@@ -60,11 +62,14 @@ def find(views: list[View], report: Reporter, steps: float) -> Landmarks:
     lifted = triangulate([view for view, _ in found], np.stack([pixels for _, pixels in found]))
     if not np.isfinite(lifted.points).any():  # a single view, or several from one side
         lifted = lift_alone(*min(found, key=lambda pair: abs(seen[pair[0].name][0])))
-    return replace(lifted, opening=eyes.opening([(yaw, (right.opening, left.opening)) for yaw, right, left in seen.values()]), eyes=seen)
+    return replace(lifted,
+                   opening=eyes.opening([(yaw, (right.opening, left.opening)) for yaw, right, left in seen.values()]),
+                   eyes=seen)
 
 
 def spread(views: list[View], count: int) -> list[View]:
-    """At most `count` views, evenly spread over the angle around the vertical through the point that they all look at."""
+    """At most `count` views, evenly spread over the angle around the vertical through the point that they all look
+    at."""
     if len(views) <= count:
         return views
     centres, axes = np.stack([v.centre for v in views]), np.stack([v.axis for v in views])
@@ -78,7 +83,8 @@ def spread(views: list[View], count: int) -> list[View]:
 
 
 def triangulate(views: list[View], pixels: np.ndarray, rounds: int = 12) -> Landmarks:
-    """Lifts pixels [V, 468, 2] to points: iteratively reweighted (Geman-McClure) rays, the far side of the face left out."""
+    """Lifts pixels [V, 468, 2] to points: iteratively reweighted (Geman-McClure) rays, the far side of the face left
+    out."""
     count, landmarks = pixels.shape[:2]
     origins = np.stack([np.repeat(v.centre[None], landmarks, 0) for v in views], 1)  # [468, V, 3]
     rays = np.stack([v.rays(p) for v, p in zip(views, pixels, strict=True)], 1)
@@ -88,9 +94,11 @@ def triangulate(views: list[View], pixels: np.ndarray, rounds: int = 12) -> Land
         errors = _errors(views, points, pixels)
         facing = _facing(points, origins)
         width = max(3 * np.median(errors[facing > 0]), 1.0) if (facing > 0).any() else 5.0
-        robust = 1 / np.maximum(errors, 0.5) if step < 3 else (width ** 2 / (width ** 2 + errors ** 2)) ** 2  # the first rounds: least absolute
+        # the first rounds: least absolute
+        robust = 1 / np.maximum(errors, 0.5) if step < 3 else (width ** 2 / (width ** 2 + errors ** 2)) ** 2
         distance = np.linalg.norm(origins - points[:, None], axis=-1)
-        weights = np.where(np.isfinite(errors), robust, 0) * np.maximum(facing, 1e-4) * _view_trust(errors, facing) / distance ** 2
+        weights = np.where(np.isfinite(errors), robust,
+                           0) * np.maximum(facing, 1e-4) * _view_trust(errors, facing) / distance ** 2
         points = _nearest_to_rays(origins, rays, weights)
     errors = _errors(views, points, pixels)
     facing = _facing(points, origins)
@@ -100,12 +108,14 @@ def triangulate(views: list[View], pixels: np.ndarray, rounds: int = 12) -> Land
     trust = np.where(lifted, np.minimum(used.sum(1) / 4, 1) / (1 + (typical / width) ** 2), 0)
     points[~lifted] = np.nan
     median = float(np.median(errors[used])) if used.any() else float("nan")
-    return Landmarks(points, trust, median, {v.name: (p, used[:, i]) for i, (v, p) in enumerate(zip(views, pixels, strict=True))})
+    return Landmarks(points, trust, median,
+                     {v.name: (p, used[:, i]) for i, (v, p) in enumerate(zip(views, pixels, strict=True))})
 
 
 def lift_alone(view: View, pixels: np.ndarray) -> Landmarks:
-    """Lifts the pixels [468, 2] of a single view to where their rays pass nearest to the mean head's landmarks: across the view they are the person's, along it
-    the mean's. The mean head stands as the world has it, its pupils about the origin."""
+    """Lifts the pixels [468, 2] of a single view to where their rays pass nearest to the mean head's landmarks: across
+    the view they are the person's, along it the mean's. The mean head stands as the world has it, its pupils about the
+    origin."""
     mean = template.landmark_points(template.load())
     rays = view.rays(pixels)
     points = view.centre + rays * ((mean - view.centre) * rays).sum(1, keepdims=True)
@@ -116,8 +126,9 @@ def lift_alone(view: View, pixels: np.ndarray) -> Landmarks:
 def onto_surface(found: Landmarks, views: list[View], mesh: Mesh, farthest: float = 0.02) -> Landmarks:
     """The same landmarks where their rays meet the scan, averaged over the views that see that side squarely.
 
-    The net moves its marks over the skin as a head turns, so rays cross behind the skin; the template's marks were found
-    on its surface in this way, too. A landmark whose rays miss the scan, or meet it `farthest` metres away, stays where it was.
+    The net moves its marks over the skin as a head turns, so rays cross behind the skin; the template's marks were
+    found on its surface in this way, too. A landmark whose rays miss the scan, or meet it `farthest` metres away, stays
+    where it was.
     """
     caster, seen = RayCaster(mesh), [view for view in views if view.name in found.images]
     hits, weights = [], []
@@ -132,7 +143,8 @@ def onto_surface(found: Landmarks, views: list[View], mesh: Mesh, farthest: floa
         weights.append(used * near * _facing(found.points, origins[:, None])[:, 0] ** 2)
     hits, weights = np.stack(hits, 1), np.stack(weights, 1)  # [468, V, 3], [468, V]
     total = weights.sum(1)
-    points = np.where((total > 0)[:, None], (hits * weights[..., None]).sum(1) / np.maximum(total, 1e-9)[:, None], found.points)
+    points = np.where((total > 0)[:, None], (hits * weights[..., None]).sum(1) / np.maximum(total, 1e-9)[:, None],
+                      found.points)
     for _ in range(8):  # towards the geometric median: one view's slip does not count
         robust = weights / np.maximum(np.linalg.norm(hits - points[:, None], axis=-1), 5e-4)
         mean = (hits * robust[..., None]).sum(1) / np.maximum(robust.sum(1), 1e-9)[:, None]
@@ -151,7 +163,8 @@ def with_artists(found: Landmarks, given: Mapping[int, tuple]) -> Landmarks:
 def to_json(found: Landmarks) -> dict:
     """What landmarks.json holds: points by index in metres, and by frame the pixels they were lifted from."""
     points = {str(i): [round(float(x), 6) for x in p] for i, p in enumerate(found.points) if np.isfinite(p).all()}
-    seen = {name: {str(i): [round(float(x), 2) for x in pixels[i]] for i in np.flatnonzero(used)} for name, (pixels, used) in found.images.items()}
+    seen = {name: {str(i): [round(float(x), 2) for x in pixels[i]] for i in np.flatnonzero(used)}
+            for name, (pixels, used) in found.images.items()}
     return {"points": points, "images": seen}
 
 
@@ -169,13 +182,15 @@ def _errors(views, points, pixels) -> np.ndarray:
 
 
 def _view_trust(errors: np.ndarray, facing: np.ndarray) -> np.ndarray:
-    """[V] in [0, 1]: the net fails as a whole where a head is turned far, so a view's typical error is held against the better views'."""
+    """[V] in [0, 1]: the net fails as a whole where a head is turned far, so a view's typical error is held against the
+    better views'."""
     typical = np.nanmedian(np.where((facing > 0) | ~(facing > 0).any(0), errors, np.nan), axis=0)
     return 1 / (1 + (typical / (1.5 * np.percentile(typical, 30) + 1e-9)) ** 4)
 
 
 def _facing(points: np.ndarray, origins: np.ndarray) -> np.ndarray:
-    """[468, V] in [0, 1]: how squarely a view sees the side of the head that a landmark lies on (0: beyond 70 degrees)."""
+    """[468, V] in [0, 1]: how squarely a view sees the side of the head that a landmark lies on (0: beyond 70
+    degrees)."""
     face = np.nanmedian(points, axis=0)
     backwards = face - origins.mean((0, 1))
     backwards[2] = 0

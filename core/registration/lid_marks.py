@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the edges of open lids and the irises lie in the world: the eye network's marks in the frames that see an eye well, lifted to points."""
+"""Where the edges of open lids and the irises lie in the world: the eye network's marks in the frames that see an eye
+well, lifted to points."""
 
 from __future__ import annotations
 
@@ -20,8 +21,8 @@ ROBUST_PX = 1.0
 
 @dataclass(frozen=True)
 class LidMarks:
-    """Of one eye, metres: upper and lower edge of the lids [9, 3], from the outer corner to the inner one, the ends shared; centre of the iris [3] and its
-    radius; views: how many it was lifted from."""
+    """Of one eye, metres: upper and lower edge of the lids [9, 3], from the outer corner to the inner one, the ends
+    shared; centre of the iris [3] and its radius; views: how many it was lifted from."""
 
     upper: np.ndarray
     lower: np.ndarray
@@ -36,7 +37,8 @@ class LidMarks:
 
 
 def usable(seen: list[tuple[float, Eye]], side: int) -> list[int]:
-    """Which sights (yaw of the head in degrees, eye) of the left (0) or right (1) eye hold: it is not beyond the nose, and as open as it usually is."""
+    """Which sights (yaw of the head in degrees, eye) of the left (0) or right (1) eye hold: it is not beyond the nose,
+    and as open as it usually is."""
     there = [i for i, (yaw, _) in enumerate(seen) if shows_eye(yaw, side)]
     usual = float(np.median([seen[i][1].opening for i in there])) if there else 0.0
     return [i for i in there if seen[i][1].is_open_as(usual)]
@@ -65,5 +67,6 @@ def lift(views: list[View], eyes: list[Eye]) -> LidMarks | None:
         width = max(ROBUST_PX, float(np.median(errors)))
         weights = (width**2 / (width**2 + errors**2)) / depth**2
     upper, lower = points[:9], points[[0, *range(9, 16), 8]]
-    radii = [eye.iris_radius * z / view.camera.mean_focal_length() for view, eye, z in zip(views, eyes, depth[16], strict=True)]
+    radii = [eye.iris_radius * z / view.camera.mean_focal_length()
+             for view, eye, z in zip(views, eyes, depth[16], strict=True)]
     return LidMarks(upper, lower, points[16], float(np.median(radii)), len(views))

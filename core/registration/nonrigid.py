@@ -28,7 +28,8 @@ BLIND_M = 0.020
 FAR_M, NEAR_M = 0.030, 0.002
 """Distance beyond which a scan patch is no partner: at the first and the last step."""
 PULL, BLIND_PULL = 1e-3, 2e-2
-"""Weight of staying where the identity fit is, against data of weight one; and where the scan is not followed, lest the crown overshoot."""
+"""Weight of staying where the identity fit is, against data of weight one; and where the scan is not followed, lest the
+crown overshoot."""
 LANDMARK_AREA_M2 = (3e-4, 3e-6)
 """Surface area that one landmark counts for, at the first and the last step."""
 
@@ -38,8 +39,9 @@ PUT_AREA_M2 = 1e-3
 
 @dataclass(frozen=True)
 class LandmarkTargets:
-    """Where landmarks should come to lie: points [468, 3] and trust [468] as in Landmarks; hold [468]: how much longer one counts than the others (lips and
-    lids); put bool [468]: those that are where they are said to be, whatever the scan says (None: none)."""
+    """Where landmarks should come to lie: points [468, 3] and trust [468] as in Landmarks; hold [468]: how much longer
+    one counts than the others (lips and lids); put bool [468]: those that are where they are said to be, whatever the
+    scan says (None: none)."""
 
     points: np.ndarray
     trust: np.ndarray
@@ -99,7 +101,8 @@ def fit(model: HeadModel, start: np.ndarray, scan: Scan, follow: np.ndarray, tar
                   + laplacian.T @ sparse.diags(bending / area) @ laplacian)
         right = (area * data)[:, None] * (aim - start) + marks.T @ (pin[:, None] * (at + miss - marks @ start))
         # positive definite, so no pivoting: with it the factors fill up and take fifty times as long
-        vertices = start + splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve(right)
+        vertices = start + splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                                options={"SymmetricMode": True}).solve(right)
     return vertices
 
 
@@ -109,7 +112,8 @@ def flipped_triangles(before: Mesh, after: Mesh) -> int:
 
 
 def operators(mesh: Mesh) -> tuple[np.ndarray, sparse.csr_matrix]:
-    """Area of each vertex [V] in square metres, and the cotangent Laplacian [V, V] (integrated: divide by the area for a mean)."""
+    """Area of each vertex [V] in square metres, and the cotangent Laplacian [V, V] (integrated: divide by the area for
+    a mean)."""
     count = len(mesh.vertices)
     area, rows, columns, values = np.zeros(count), [], [], []
     for i in range(3):
@@ -119,7 +123,8 @@ def operators(mesh: Mesh) -> tuple[np.ndarray, sparse.csr_matrix]:
         np.add.at(area, a, double / 6)
         rows.append(b)
         columns.append(c)
-        values.append(np.clip((u * v).sum(1) / double, 0.02, 5) / 2)  # thin triangles must not turn stiffness into tearing
+        # thin triangles must not turn stiffness into tearing
+        values.append(np.clip((u * v).sum(1) / double, 0.02, 5) / 2)
     rows, columns, values = (np.concatenate(x) for x in (rows, columns, values))
     half = sparse.coo_matrix((values, (rows, columns)), (count, count)).tocsr()
     weights = half + half.T
@@ -131,4 +136,5 @@ def anchors(model: HeadModel) -> sparse.csr_matrix:
     """[468, V]: takes vertices to landmarks."""
     corners = model.mesh.faces[model.landmark_face]
     rows = np.repeat(np.arange(len(corners)), 3)
-    return sparse.coo_matrix((model.landmark_bary.ravel(), (rows, corners.ravel())), (len(corners), len(model.mesh.vertices))).tocsr()
+    return sparse.coo_matrix((model.landmark_bary.ravel(), (rows, corners.ravel())),
+                             (len(corners), len(model.mesh.vertices))).tocsr()

@@ -27,8 +27,8 @@ EXPRESSION_SIGMA = 0.4
 
 @dataclass(frozen=True)
 class OwnMesh:
-    """mesh: the file's vertices, in its order, units and axes, its polygons cut into triangles; shapes float32 [K, V, 3] displacements per standard
-    deviation of their coefficients, in the same units; path of the OBJ."""
+    """mesh: the file's vertices, in its order, units and axes, its polygons cut into triangles; shapes float32 [K, V,
+    3] displacements per standard deviation of their coefficients, in the same units; path of the OBJ."""
 
     mesh: Mesh
     shapes: np.ndarray
@@ -39,7 +39,8 @@ def read(chosen: str, report: Reporter) -> OwnMesh:
     """Reads an OBJ or a folder. Raises Problem for what is no head mesh."""
     path = Path(chosen)
     if not path.exists():
-        raise Problem(f"There is no template at {path}.", "Choose an OBJ file or a folder of shapes, or leave the template empty.")
+        raise Problem(f"There is no template at {path}.",
+                      "Choose an OBJ file or a folder of shapes, or leave the template empty.")
     neutral, others = _folder(path) if path.is_dir() else (path, [])
     mesh = meshes.read_obj(neutral)
     _check(mesh, neutral)
@@ -48,32 +49,38 @@ def read(chosen: str, report: Reporter) -> OwnMesh:
         report.progress(i, len(others), f"reading the shape {other.stem}")
         positions = _positions(other)
         if positions.shape != mesh.vertices.shape:
-            raise Problem(f"The shape {other.name} has {len(positions)} vertices, the neutral mesh {neutral.name} has {len(mesh.vertices)}.",
+            raise Problem(f"The shape {other.name} has {len(positions)} vertices, the neutral mesh {neutral.name} has "
+                          f"{len(mesh.vertices)}.",
                           "Leave in the folder only shapes of the same mesh, in the same vertex order.")
-        shapes.append(((positions - mesh.vertices) * (1.0 if _is_identity(other) else EXPRESSION_SIGMA)).astype(np.float32))
+        shapes.append(((positions - mesh.vertices)
+                       * (1.0 if _is_identity(other) else EXPRESSION_SIGMA)).astype(np.float32))
     return OwnMesh(mesh, np.array(shapes, np.float32).reshape(-1, *mesh.vertices.shape), neutral)
 
 
 def with_usable_uvs(own: OwnMesh, skin: np.ndarray, allowed: bool, size: int) -> tuple[OwnMesh, str]:
-    """The mesh with UVs that a map can be painted in, and what was done to it. skin bool [F]: the triangles that will be painted.
+    """The mesh with UVs that a map can be painted in, and what was done to it. skin bool [F]: the triangles that will
+    be painted.
 
     Raises Problem, saying what is wrong with its UVs, unless a new atlas is `allowed`.
     """
-    part = replace(own.mesh, faces=own.mesh.faces[skin], face_uvs=None if own.mesh.face_uvs is None else own.mesh.face_uvs[skin])
+    part = replace(own.mesh, faces=own.mesh.faces[skin],
+                   face_uvs=None if own.mesh.face_uvs is None else own.mesh.face_uvs[skin])
     wrong = atlas.faults(part)
     if not wrong:
         return own, "the artist's"
     if not allowed:
         raise Problem(f"Maps cannot be baked into the UVs of {own.path.name}. {' '.join(wrong)}",
-                      "Unwrap the mesh in your modelling program, or allow a new atlas in the settings of the stage Head (--new-atlas).")
+                      "Unwrap the mesh in your modelling program, or allow a new atlas in the settings of the stage "
+                      "Head (--new-atlas).")
     return replace(own, mesh=atlas.unwrap(own.mesh, size)), "a new atlas"
 
 
 def write(path: Path, own: OwnMesh, vertices: np.ndarray) -> None:
-    """The artist's file with vertices [V, 3] in metres in place of its own: same order, polygons, groups and UVs; a UV line is copied, not rewritten.
+    """The artist's file with vertices [V, 3] in metres in place of its own: same order, polygons, groups and UVs; a UV
+    line is copied, not rewritten.
 
-    With a new atlas (OwnMesh.mesh has other UVs than the file), polygons that a seam crosses are cut into triangles. Normals and the material
-    library are left out: the first no longer hold, the second lies elsewhere.
+    With a new atlas (OwnMesh.mesh has other UVs than the file), polygons that a seam crosses are cut into triangles.
+    Normals and the material library are left out: the first no longer hold, the second lies elsewhere.
     """
     text = own.path.read_text(encoding="utf-8", errors="replace").replace("\\\n", " ")
     kept = _same_uvs(own.mesh, meshes.read_obj(own.path))
@@ -91,7 +98,8 @@ def write(path: Path, own: OwnMesh, vertices: np.ndarray) -> None:
             if uv_lines:
                 lines, uv_lines = [*lines, *uv_lines], []
             count = len(words) - 3
-            lines += _polygons(own.mesh.faces[triangle:triangle + count] + 1, own.mesh.face_uvs[triangle:triangle + count] + 1)
+            lines += _polygons(own.mesh.faces[triangle:triangle + count] + 1,
+                               own.mesh.face_uvs[triangle:triangle + count] + 1)
             triangle += count
         elif key not in ("vn", "mtllib") and (kept or key != "vt"):
             lines.append(line)
@@ -137,7 +145,8 @@ def _positions(path: Path) -> np.ndarray:
     try:
         return meshes.read_obj_vertices(path)
     except Problem as problem:
-        raise Problem(f"The shape {path.name} cannot be read: {problem.problem}", "Export it again, or take it out of the folder.") from problem
+        raise Problem(f"The shape {path.name} cannot be read: {problem.problem}",
+                      "Export it again, or take it out of the folder.") from problem
 
 
 def _check(mesh: Mesh, path: Path) -> None:
@@ -147,8 +156,10 @@ def _check(mesh: Mesh, path: Path) -> None:
         raise Problem(f"{path.name} is flat.", "Export it again as OBJ.")
     if not LEAST_VERTICES <= count <= MOST_VERTICES:
         raise Problem(f"{path.name} has {count} vertices.",
-                      f"Choose a head of {LEAST_VERTICES} to {MOST_VERTICES} vertices: no primitive, and no sculpt at its finest.")
+                      f"Choose a head of {LEAST_VERTICES} to {MOST_VERTICES} vertices: no primitive, and no sculpt at "
+                      "its finest.")
 
 
 def _same_uvs(a: Mesh, b: Mesh) -> bool:
-    return a.uvs is not None and b.uvs is not None and np.array_equal(a.uvs, b.uvs) and np.array_equal(a.face_uvs, b.face_uvs)
+    return a.uvs is not None and b.uvs is not None and np.array_equal(a.uvs, b.uvs) and np.array_equal(a.face_uvs,
+                                                                                                       b.face_uvs)

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The artist's own head mesh, fitted to the registered built-in head: own_head.obj.
 
-The registered head is clean and complete where a scan is neither, so it is what the artist's mesh is drawn to. Nothing here
-knows a topology: landmarks are found by rendering, what is skin by following the surface from them.
+The registered head is clean and complete where a scan is neither, so it is what the artist's mesh is drawn to. Nothing
+here knows a topology: landmarks are found by rendering, what is skin by following the surface from them.
 """
 
 from __future__ import annotations
@@ -30,13 +30,17 @@ ITERATIONS, COVER_ITERATIONS = 14, 8
 """Steps of the fit to the head, and of laying the built-in head over the artist's mesh."""
 SOURCE_SPACING_M = 0.0012
 OPEN_SKY_SHARES = (0.25, 0.5)
-"""Share of free sky over a vertex below which it lies inside the mouth, a nostril or a socket, and above which it is certainly outside."""
+"""Share of free sky over a vertex below which it lies inside the mouth, a nostril or a socket, and above which it is
+certainly outside."""
 REACH_M = (0.006, 0.015)
-"""Distance of an aligned vertex to the head up to which it belongs to it, and from which it is another thing: shoulders, clothes."""
+"""Distance of an aligned vertex to the head up to which it belongs to it, and from which it is another thing:
+shoulders, clothes."""
 SLIGHT_TRUST_SHARE = 0.05
-"""Share of their say that landmarks keep once two clean surfaces lie on each other: a net's marks are a millimetre or two off."""
+"""Share of their say that landmarks keep once two clean surfaces lie on each other: a net's marks are a millimetre or
+two off."""
 RIM_M = (0.005, 0.045)
-"""Distance to the edge where the built-in head ends at which it begins to draw, and from which it draws fully: a neck must not show a step."""
+"""Distance to the edge where the built-in head ends at which it begins to draw, and from which it draws fully: a neck
+must not show a step."""
 PAINTED_M = 0.010
 """Distance of the fitted skin to the head up to which the head's maps hold for it."""
 LOOSE_EARS_SHARE = 0.15
@@ -47,8 +51,9 @@ SHUT_WIDTH_SHARE = 0.12
 
 @dataclass(frozen=True)
 class FittedTemplate:
-    """vertices [V, 3] metres, of all of the artist's mesh; skin bool [F]: triangles with a counterpart on the head; distances [M] in metres from the
-    skin that was drawn to the head; flipped triangles; pictures (sRGB) in which the face was found."""
+    """vertices [V, 3] metres, of all of the artist's mesh; skin bool [F]: triangles with a counterpart on the head;
+    distances [M] in metres from the skin that was drawn to the head; flipped triangles; pictures (sRGB) in which the
+    face was found."""
 
     vertices: np.ndarray
     skin: np.ndarray
@@ -59,7 +64,8 @@ class FittedTemplate:
 
 @dataclass(frozen=True)
 class BuiltIn:
-    """The built-in head: its model, and per vertex and landmark the weights that registration uses (registration.weights_of)."""
+    """The built-in head: its model, and per vertex and landmark the weights that registration uses
+    (registration.weights_of)."""
 
     model: alignment.HeadModel
     follow: np.ndarray
@@ -78,14 +84,16 @@ def run(capture: Capture, settings: Settings, head: Mesh, ours: BuiltIn, report:
     own, uvs = own_mesh.with_usable_uvs(own, fitted.skin, settings.registration.new_atlas, settings.transfer.size)
     own_mesh.write(capture.own_head, own, fitted.vertices)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], fitted.skin, [0]])))
-    write_json(capture.own_head_skin, {"template": own.path.name, "uvs": uvs, "skin_triangles": edges.reshape(-1, 2).tolist()})
+    write_json(capture.own_head_skin,
+               {"template": own.path.name, "uvs": uvs, "skin_triangles": edges.reshape(-1, 2).tolist()})
     report.figure("own_template", Path(settings.registration.template).stem)
     report.figure("own_shapes", len(own.shapes))
     report.figure("own_uvs", uvs)
     report.figure("own_to_head_median_mm", round(1e3 * float(np.median(fitted.distances)), 3))
     report.figure("own_to_head_p95_mm", round(1e3 * float(np.percentile(fitted.distances, 95)), 3))
     report.figure("own_flipped_triangles", fitted.flipped)
-    images.write_srgb(capture.picture("registration", "own_template"), _drawn(head, own.mesh.moved(fitted.vertices), fitted.pictures[0]))
+    images.write_srgb(capture.picture("registration", "own_template"),
+                      _drawn(head, own.mesh.moved(fitted.vertices), fitted.pictures[0]))
 
 
 def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> FittedTemplate:
@@ -98,7 +106,8 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     shapes = (own.shapes[:, first] @ pose.turn.T.astype(np.float32)) * np.float32(render_landmarks.FACE_M / pose.width)
 
     known = np.flatnonzero(np.isfinite(found.points).all(1))
-    at, bary = surfaces.Surface(whole, 0.004).nearest(found.points[known], _facing_camera(whole, found.points[known]), 0.02, -1.0)
+    at, bary = surfaces.Surface(whole, 0.004).nearest(found.points[known], _facing_camera(whole, found.points[known]),
+                                                      0.02, -1.0)
     label = _components(whole)
     main = np.bincount(label[whole.faces[at[at >= 0], 0]]).argmax()
     used = np.flatnonzero(label == main)
@@ -107,8 +116,13 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     skin = Mesh(whole.vertices[used], np.searchsorted(used, whole.faces[label[whole.faces[:, 0]] == main]))
     good = (at >= 0) & (label[whole.faces[np.maximum(at, 0), 0]] == main)
     of_skin = np.cumsum(label[whole.faces[:, 0]] == main) - 1  # triangle of the whole -> of the skin
-    weight, marks_at, marks_bary = np.zeros(len(found.points)), np.zeros(len(found.points), int), np.full((len(found.points), 3), 1 / 3)
-    weight[known[good]], marks_at[known[good]], marks_bary[known[good]] = found.trust[known[good]], of_skin[at[good]], bary[good]
+    weight, marks_at, marks_bary = np.zeros(len(found.points)), np.zeros(len(found.points),
+                                                                         int), np.full((len(found.points), 3), 1 / 3)
+    weight[known[good]], marks_at[known[good]], marks_bary[known[good]] = (
+        found.trust[known[good]],
+        of_skin[at[good]],
+        bary[good],
+    )
     model = alignment.HeadModel(skin, shapes[:, used], marks_at, marks_bary, weight)
 
     target = _at_landmarks(head)
@@ -128,7 +142,8 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
         trust[_lid_marks()] = 0
     start = placed.apply(model.shape(coefficients))
     start = _matched(model, start, follow, head, ours, report)
-    vertices = nonrigid.fit(model, start, dense, follow, nonrigid.LandmarkTargets(target, SLIGHT_TRUST_SHARE * trust, ours.hold), ITERATIONS,
+    vertices = nonrigid.fit(model, start, dense, follow,
+                            nonrigid.LandmarkTargets(target, SLIGHT_TRUST_SHARE * trust, ours.hold), ITERATIONS,
                             lambda share: report.progress(0.5 + 0.5 * share, 1, "fitting the head to the scan"))
 
     final = skin.moved(vertices)
@@ -136,20 +151,24 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     distances = dense.distances(vertices[drawn], vertex_normals(final)[drawn], 0.01)
     if len(distances) < 0.5 * drawn.sum() or not len(distances) or np.median(distances) > 0.002:
         raise Problem(f"{own.path.name} could not be laid over the head.",
-                      "Choose a head in a neutral pose with its mouth closed, or leave the template empty; the built-in head is not affected.")
+                      "Choose a head in a neutral pose with its mouth closed, or leave the template empty; the "
+                      "built-in head is not affected.")
     everything = placed.apply(whole.vertices + np.tensordot(coefficients, shapes, 1))
     everything = carried.along(everything, whole.faces, label, used, vertices, report)
     counterpart = np.zeros(len(whole.vertices), bool)
     normals = vertex_normals(final)
-    counterpart[used] = (surface.nearest(vertices, normals, PAINTED_M)[0] >= 0) & (_free_sky(final, normals) > OPEN_SKY_SHARES[0])
-    return FittedTemplate(everything[index], counterpart[whole.faces].any(1), distances, nonrigid.flipped_triangles(skin.moved(start), final), pictures)
+    counterpart[used] = (surface.nearest(vertices, normals, PAINTED_M)[0]
+                         >= 0) & (_free_sky(final, normals) > OPEN_SKY_SHARES[0])
+    return FittedTemplate(everything[index], counterpart[whole.faces].any(1), distances,
+                          nonrigid.flipped_triangles(skin.moved(start), final), pictures)
 
 
-def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, head: Mesh, ours: BuiltIn, report: Reporter) -> np.ndarray:
+def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, head: Mesh, ours: BuiltIn,
+             report: Reporter) -> np.ndarray:
     """The placed skin [V, 3], each vertex taken to the place on the head that it has on the built-in head laid over it.
 
-    Between landmarks two faces say little about which point is which; the built-in head's identity space says it: it is laid over the
-    artist's mesh, as over a scan, and what lies together there belongs together.
+    Between landmarks two faces say little about which point is which; the built-in head's identity space says it: it is
+    laid over the artist's mesh, as over a scan, and what lies together there belongs together.
     """
     skin = model.mesh.moved(start)
     outside = skin.faces[(follow[skin.faces] > 0.1).all(1)]
@@ -157,25 +176,31 @@ def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, 
     cover, points = Scan(Mesh(fine, faces)), model.at_landmarks(start)
     pose, coefficients = alignment.fit_landmarks(ours.model, points, model.landmark_weight)
     trust = SLIGHT_TRUST_SHARE * model.landmark_weight
-    pose, coefficients = alignment.fit_scan(ours.model, pose, coefficients, points, trust, cover, np.maximum(ours.shaped, 0.7))
+    pose, coefficients = alignment.fit_scan(ours.model, pose, coefficients, points, trust, cover,
+                                            np.maximum(ours.shaped, 0.7))
     targets = nonrigid.LandmarkTargets(points, trust, ours.hold)
-    over = nonrigid.fit(ours.model, pose.apply(ours.model.shape(coefficients)), cover, np.maximum(ours.follow, 0.5 * ours.shaped), targets,
-                        COVER_ITERATIONS, lambda share: report.progress(0.5 * share, 0.5, "fitting the head to the scan"))
+    over = nonrigid.fit(ours.model, pose.apply(ours.model.shape(coefficients)), cover,
+                        np.maximum(ours.follow, 0.5 * ours.shaped), targets,
+                        COVER_ITERATIONS,
+                        lambda share: report.progress(0.5 * share, 0.5, "fitting the head to the scan"))
     known = np.flatnonzero(follow > 0.1)
-    face, bary = surfaces.Surface(ours.model.mesh.moved(over), SOURCE_SPACING_M).nearest(start[known], vertex_normals(skin)[known], REACH_M[1])
+    face, bary = surfaces.Surface(ours.model.mesh.moved(over),
+                                  SOURCE_SPACING_M).nearest(start[known], vertex_normals(skin)[known], REACH_M[1])
     known, face, bary = known[face >= 0], face[face >= 0], bary[face >= 0]
     shift = ((head.vertices - over)[head.faces[face]] * bary[..., None]).sum(1)
     return start + carried.field(start[known], shift, start, report)
 
 
-def _follow(model: alignment.HeadModel, placed: alignment.Similarity, coefficients: np.ndarray, surface: surfaces.Surface, eyes: bool) -> np.ndarray:
+def _follow(model: alignment.HeadModel, placed: alignment.Similarity, coefficients: np.ndarray,
+            surface: surfaces.Surface, eyes: bool) -> np.ndarray:
     """How far each vertex of the placed skin is drawn to the head [V] in [0, 1]."""
     at = model.mesh.moved(placed.apply(model.shape(coefficients)))
     normals = vertex_normals(at)
     face, bary = surface.nearest(at.vertices, normals, REACH_M[1])
     there = face >= 0
     distance = np.full(len(face), np.inf)
-    distance[there] = np.linalg.norm(raster.interpolate(surface.mesh.vertices, surface.mesh.faces, face[there], bary[there]) - at.vertices[there], axis=1)
+    distance[there] = np.linalg.norm(raster.interpolate(surface.mesh.vertices, surface.mesh.faces, face[there],
+                                                        bary[there]) - at.vertices[there], axis=1)
     follow = np.interp(distance, REACH_M, (1, 0)) * np.interp(_free_sky(at, normals), OPEN_SKY_SHARES, (0, 1))
     follow *= np.interp(cKDTree(_rim(surface.mesh)).query(at.vertices)[0], RIM_M, (0, 1))
     uv = np.zeros((len(face), 2))
@@ -188,7 +213,8 @@ def _follow(model: alignment.HeadModel, placed: alignment.Similarity, coefficien
 
 def _rim(mesh: Mesh) -> np.ndarray:
     """The vertices [N, 3] on open edges."""
-    edges, count = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
+    edges, count = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0,
+                             return_counts=True)
     return mesh.vertices[np.unique(edges[count == 1])]
 
 
@@ -249,12 +275,14 @@ def _dense(head: Mesh) -> Mesh:
 
 
 def _drawn(head: Mesh, own: Mesh, picture: np.ndarray, size: int = 480) -> np.ndarray:
-    """The picture the face was found in, then the built-in head and the artist's from the front, and the artist's from the side."""
+    """The picture the face was found in, then the built-in head and the artist's from the front, and the artist's from
+    the side."""
     shots = [images.resize(picture, size, size)]
     middle = np.nanmean(_at_landmarks(head), axis=0)
     for mesh, yaw in ((head, 0), (own, 0), (own, 50)):
         moved = mesh.moved(mesh.vertices - middle)
         view = render_landmarks.view_from(yaw, 5, size, 0.30)
-        shots.append(render_landmarks.shaded(raster.RayCaster(moved), vertex_normals(surfaces.welded(moved)[0])[surfaces.welded(moved)[1]],
+        shots.append(render_landmarks.shaded(raster.RayCaster(moved),
+                                             vertex_normals(surfaces.welded(moved)[0])[surfaces.welded(moved)[1]],
                                              np.tile(render_landmarks.SKIN, (len(mesh.vertices), 1)), view))
     return np.hstack(shots)

@@ -18,7 +18,8 @@ from .intersections import flipped, intersecting
 from .landmarks import Landmarks
 
 LEAST_FOLLOWED_SHARE, FARTHEST_M = 0.3, 0.004
-"""A fit holds when this share of the followed vertices finds a partner on the scan, at this distance or nearer in the median."""
+"""A fit holds when this share of the followed vertices finds a partner on the scan, at this distance or nearer in the
+median."""
 MOST_MISS_WIDTH_SHARE = 0.05
 """Share of the face's width by which landmarks may miss a head that is fitted without a scan."""
 APART_DEG, WANTED_VIEWS = 25.0, 3
@@ -35,8 +36,8 @@ class Unlike(Problem):
 
 @dataclass(frozen=True)
 class HeadFit:
-    """What a fit came to: head; aligned, the same before the non-rigid fit; coefficients [K] of the identity; distances [M] in metres of the vertices that
-    are followed to the scan, none where there is no scan."""
+    """What a fit came to: head; aligned, the same before the non-rigid fit; coefficients [K] of the identity; distances
+    [M] in metres of the vertices that are followed to the scan, none where there is no scan."""
 
     head: Mesh
     aligned: Mesh
@@ -60,27 +61,34 @@ def figures(report: Reporter, model: HeadModel, fit: HeadFit, found: Landmarks, 
     report.figure("eye_opening", round(found.opening, 2) if np.isfinite(found.opening) else None)
     report.figure("identity_norm", round(float(np.linalg.norm(fit.coefficients)), 2))
     report.figure("head_to_scan_median_mm", round(1e3 * float(np.median(distances)), 3) if len(distances) else None)
-    report.figure("head_to_scan_p90_mm", round(1e3 * float(np.percentile(distances, 90)), 3) if len(distances) else None)
+    report.figure("head_to_scan_p90_mm",
+                  round(1e3 * float(np.percentile(distances, 90)), 3) if len(distances) else None)
     report.figure("face_with_scan_percent", round(100 * len(distances) / max(int((follow > 0.5).sum()), 1), 1))
     report.figure("flipped_triangles", int(flipped(fit.aligned, head.vertices).sum()))
     report.figure("intersecting_triangles", len(intersecting(head.vertices, head.faces)))
     report.figure("uv_stretch_p95", round(float(np.percentile(stretched, 95)), 2))
 
 
-def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follow: np.ndarray, least_share: float = LEAST_FOLLOWED_SHARE) -> None:
+def judge(report: Reporter, head: Mesh, scan: Scan, distances: np.ndarray, follow: np.ndarray,
+          least_share: float = LEAST_FOLLOWED_SHARE) -> None:
     """Raises Problem where the fit does not hold; tells which side of the face the scan does not show."""
     wanted = follow > 0.5
     if len(distances) < least_share * wanted.sum():
-        raise Unlike(f"The head could not be laid over the scan of the face: only {100 * len(distances) / wanted.sum():.0f} % of the face is in the scan.",
-                      "Look at the scan's picture in the report; film again slower, in an arc from ear to ear, with the whole face in view.")
+        raise Unlike(f"The head could not be laid over the scan of the face: only "
+                     f"{100 * len(distances) / wanted.sum():.0f} % of the face is in the scan.",
+                      "Look at the scan's picture in the report; film again slower, in an arc from ear to ear, with "
+                      "the whole face in view.")
     if np.median(distances) > FARTHEST_M:
-        raise Unlike(f"The head could not be laid over the scan of the face: it stays {1e3 * np.median(distances):.0f} mm away from it.",
-                      "Look at the scan's picture in the report: where it is no face, film again with the head kept still and hair and hands off the face.")
+        raise Unlike(f"The head could not be laid over the scan of the face: it stays {1e3 * np.median(distances):.0f} "
+                     "mm away from it.",
+                      "Look at the scan's picture in the report: where it is no face, film again with the head kept "
+                      "still and hair and hands off the face.")
     signed, _ = scan.match(head.vertices, vertex_normals(head), 0.01)
     for name, where in _sides(head, wanted).items():
         shown = float(np.isfinite(signed[where]).mean())
         if shown < LEAST_SHOWN_SHARE:
-            report.finding(f"The scan shows only {100 * shown:.0f} % of {name}; the rest was guessed from the shape of heads.",
+            report.finding(f"The scan shows only {100 * shown:.0f} % of {name}; the rest was guessed from the shape of "
+                           "heads.",
                            f"Film once more and bring {name} well into view, in sharp frames.")
 
 
@@ -96,8 +104,10 @@ def judge_views(report: Reporter, views: list[View], head: Mesh, fitted) -> None
     """Raises Problem where a head does not fit what the views show."""
     x = head.vertices[:, 0]
     if not fitted.miss_m["landmarks"] < MOST_MISS_WIDTH_SHARE * np.ptp(x):
-        raise Problem(f"The head could not be laid over the face in these pictures: its features miss by {1e3 * fitted.miss_m['landmarks']:.0f} mm.",
-                      "Use pictures of one still face, neither cropped nor mirrored; or give the cameras of a program that can solve them.")
+        raise Problem(f"The head could not be laid over the face in these pictures: its features miss by "
+                      f"{1e3 * fitted.miss_m['landmarks']:.0f} mm.",
+                      "Use pictures of one still face, neither cropped nor mirrored; or give the cameras of a program "
+                      "that can solve them.")
 
 
 def tell_draft(report: Reporter, views: list[View], head: Mesh) -> None:
@@ -105,8 +115,10 @@ def tell_draft(report: Reporter, views: list[View], head: Mesh) -> None:
     apart = views_apart(views, head)
     if apart < WANTED_VIEWS:
         sides = "one side" if apart < 2 else f"{apart} sides that are at least {APART_DEG:.0f} degrees apart"
-        report.finding(f"This head is a draft: the photographs show the face from {sides} only, and its depth is mostly guessed.",
-                       "Add photographs: one from the front and one from each side, about 40 degrees around, are the least for a likeness.")
+        report.finding(f"This head is a draft: the photographs show the face from {sides} only, and its depth is "
+                       "mostly guessed.",
+                       "Add photographs: one from the front and one from each side, about 40 degrees around, are the "
+                       "least for a likeness.")
 
 
 def views_apart(views: list[View], head: Mesh) -> int:
@@ -130,5 +142,6 @@ def _sides(head: Mesh, wanted: np.ndarray) -> dict[str, np.ndarray]:
     """Parts of the face as the person has them: bool [V] each."""
     x, _, z = head.vertices.T
     middle, low, high = np.median(x[wanted]), *np.percentile(z[wanted], [15, 85])
-    return {"the right side of the face": wanted & (x < middle - 0.02), "the left side of the face": wanted & (x > middle + 0.02),
+    return {"the right side of the face": wanted & (x < middle - 0.02),
+            "the left side of the face": wanted & (x > middle + 0.02),
             "the chin": wanted & (z < low), "the forehead": wanted & (z > high)}

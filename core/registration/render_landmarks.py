@@ -46,8 +46,8 @@ FACE_M = 0.11
 
 @dataclass(frozen=True)
 class Pose:
-    """turn [3, 3] takes the mesh's axes to ours (+Z up, face towards -Y); face [3] is the middle of the face in the mesh's own
-    coordinates; width is that of the face, in the mesh's units."""
+    """turn [3, 3] takes the mesh's axes to ours (+Z up, face towards -Y); face [3] is the middle of the face in the
+    mesh's own coordinates; width is that of the face, in the mesh's units."""
 
     turn: np.ndarray
     face: np.ndarray
@@ -55,8 +55,8 @@ class Pose:
 
 
 def find(mesh: Mesh, report: Reporter | None = None) -> tuple[Pose, Landmarks, list[np.ndarray]]:
-    """The pose of the face, its landmarks in metres and our axes around the middle of the face (`to_ours`), and the pictures they were found in,
-    sRGB. Raises Problem where no face is found."""
+    """The pose of the face, its landmarks in metres and our axes around the middle of the face (`to_ours`), and the
+    pictures they were found in, sRGB. Raises Problem where no face is found."""
     pose = _find_pose(mesh, report)
     posed = mesh.moved(to_ours(mesh.vertices, pose))
     colours, found, pictures = np.tile(SKIN, (len(mesh.vertices), 1)), None, []
@@ -121,15 +121,16 @@ def _find_pose(mesh: Mesh, report: Reporter | None) -> Pose:
 
 
 def _windows(sides: np.ndarray) -> list[tuple[float, float]]:
-    """Heights over the middle, and sides, of the squares in which a face may lie: all of the mesh, its upper half, or, in a figure with a body
-    or arms, what is round the top of its middle. sides [3]: the mesh's extents in our axes."""
+    """Heights over the middle, and sides, of the squares in which a face may lie: all of the mesh, its upper half, or,
+    in a figure with a body or arms, what is round the top of its middle. sides [3]: the mesh's extents in our axes."""
     whole = 1.05 * max(sides[0], sides[2])
     windows = [(0.0, whole), (0.2 * sides[2], 0.75 * whole)]
     smaller = [side for side in (1.2 * sides[2], 0.35 * sides[2], 0.2 * sides[2]) if side < 0.7 * whole]
     return windows + [(max(0.5 * sides[2] - 0.42 * side, 0.0), side) for side in smaller]
 
 
-def _look(caster: raster.RayCaster, normals: np.ndarray, turn: np.ndarray, centre: np.ndarray, extent: float) -> tuple[float, Pose] | None:
+def _look(caster: raster.RayCaster, normals: np.ndarray, turn: np.ndarray, centre: np.ndarray,
+          extent: float) -> tuple[float, Pose] | None:
     """How sure an upright face is seen in a square of side `extent` around `centre` [3], and where it is."""
     front = view_from(0, 0, FIRST_SIDE_PX, extent)
     rotation = front.rotation @ turn
@@ -149,7 +150,8 @@ def _look(caster: raster.RayCaster, normals: np.ndarray, turn: np.ndarray, centr
     points = view.centre + rays * np.where(hit >= 0, distance, np.nan)[:, None]
     posed = points @ turn.T
     width = np.nanmax(posed[:, 0]) - np.nanmin(posed[:, 0])
-    # a face is about as deep as it is wide: the back of a head, where nets see faces too, has no nose in front of its sides
+    # a face is about as deep as it is wide: the back of a head, where nets see faces too, has no nose in front of its
+    # sides
     bulge = np.nanmedian(posed[list(TEMPLES), 1]) - posed[faces.NOSE, 1]
     if not 0.2 < bulge / width < 1.4:
         return None
@@ -180,7 +182,8 @@ def view_from(yaw: float, pitch: float, size: int, extent: float) -> View:
     towards = np.array([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)])
     right = np.array([np.cos(yaw), np.sin(yaw), 0])
     rotation = np.stack([right, np.cross(-towards, right), -towards])
-    camera = pycolmap.Camera(model="SIMPLE_PINHOLE", width=size, height=size, params=[FOCAL_SIDES * size, size / 2, size / 2])
+    camera = pycolmap.Camera(model="SIMPLE_PINHOLE", width=size, height=size,
+                             params=[FOCAL_SIDES * size, size / 2, size / 2])
     return View("render", Path(), camera, rotation, -rotation @ (towards * extent * FOCAL_SIDES), False)
 
 
@@ -191,7 +194,8 @@ def shaded(caster: raster.RayCaster, normals: np.ndarray, colours: np.ndarray, v
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
     normal *= np.where((normal @ view.axis) > 0, -1, 1)[..., None]
     key = -0.75 * view.axis - 0.55 * view.rotation[1] + 0.35 * view.rotation[0]
-    light = 0.75 * np.clip(normal @ (key / np.linalg.norm(key)), 0, 1) + 0.2 + 0.15 * np.clip(-(normal @ view.axis), 0, 1)
+    light = 0.75 * np.clip(normal @ (key / np.linalg.norm(key)), 0,
+                           1) + 0.2 + 0.15 * np.clip(-(normal @ view.axis), 0, 1)
     colour = raster.interpolate(colours, caster.mesh.faces, face, bary)
     return images.linear_to_srgb(np.where((face >= 0)[..., None], colour * light[..., None], 0.2))
 
@@ -205,12 +209,15 @@ def _painted(mesh: Mesh, points: np.ndarray) -> np.ndarray:
     for outline, colour in ((LIP_LINE, LIPS), *((line, BROWS) for line in BROW_LINES)):
         polygon = points[list(outline)][:, [0, 2]].astype(np.float32)
         if np.isfinite(polygon).all():
-            near = np.flatnonzero(front & (mesh.vertices[:, [0, 2]] >= polygon.min(0)).all(1) & (mesh.vertices[:, [0, 2]] <= polygon.max(0)).all(1))
-            inside = [cv2.pointPolygonTest(polygon, (float(mesh.vertices[v, 0]), float(mesh.vertices[v, 2])), False) >= 0 for v in near]
+            near = np.flatnonzero(front & (mesh.vertices[:, [0, 2]] >= polygon.min(0)).all(1)
+                                  & (mesh.vertices[:, [0, 2]] <= polygon.max(0)).all(1))
+            inside = [cv2.pointPolygonTest(polygon, (float(mesh.vertices[v, 0]), float(mesh.vertices[v, 2])), False)
+                      >= 0 for v in near]
             colours[near[np.array(inside, bool)]] = colour
     return colours
 
 
 def _no_face() -> Problem:
     return Problem("No face was found on the template mesh, seen from any side.",
-                   "Choose an OBJ of a head in a neutral pose, without hair or glasses over the face, or leave the template empty.")
+                   "Choose an OBJ of a head in a neutral pose, without hair or glasses over the face, or leave the "
+                   "template empty.")

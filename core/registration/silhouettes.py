@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where skin meets the background: the outline of the face in each picture, against that of a mesh.
 
-Only what borders on the background counts: hair over a cheek, or a jaw before a neck, is no outline of the face. Where the border lies is read from
-colours, for the person's mask is too coarse: each picture's own skin against its own background.
+Only what borders on the background counts: hair over a cheek, or a jaw before a neck, is no outline of the face. Where
+the border lies is read from colours, for the person's mask is too coarse: each picture's own skin against its own
+background.
 """
 
 from __future__ import annotations
@@ -24,14 +25,16 @@ HISTOGRAM_BINS = 12
 LEAST_CERTAINTY_STEP = 0.5
 """How much surer of skin the inside must be than the outside, in shares of certainty."""
 COARSE_PX = 5.0
-"""The person's mask is this uncertain in a picture of 960 pixels: a border of colours further from it is another one."""
+"""The person's mask is this uncertain in a picture of 960 pixels: a border of colours further from it is another
+one."""
 RIM_PX = 3.0
 """How far inside of the mesh's outline a vertex on it may come to lie, in pixels: triangles are that coarse."""
 
 
 @dataclass(frozen=True)
 class Outline:
-    """A picture made ready: skin [H, W] and person [H, W], certainties in [0, 1], of the picture at `scale` times its size."""
+    """A picture made ready: skin [H, W] and person [H, W], certainties in [0, 1], of the picture at `scale` times its
+    size."""
 
     view: View
     skin: np.ndarray
@@ -40,7 +43,8 @@ class Outline:
 
 
 def prepare(view: View, mesh: Mesh, follow: np.ndarray, scale: float = 1.0) -> Outline:
-    """Skin and person in a view's picture; skin is what looks like the pixels that the followed part of the mesh [V] covers."""
+    """Skin and person in a view's picture; skin is what looks like the pixels that the followed part of the mesh [V]
+    covers."""
     picture = images.read_srgb(view.path)
     height, width = round(view.height * scale), round(view.width * scale)
     picture = images.resize(picture, width, height) if (height, width) != picture.shape[:2] else picture
@@ -59,8 +63,8 @@ def prepare(view: View, mesh: Mesh, follow: np.ndarray, scale: float = 1.0) -> O
 
 
 def compare(outline: Outline, mesh: Mesh, edges: np.ndarray, follow: np.ndarray, reach_m: float) -> Constraints:
-    """One constraint per vertex of the mesh's outline in this view that lies on the followed part (follow [V]), where skin meets background within
-    `reach_m` metres; edges: `edges_of` the mesh."""
+    """One constraint per vertex of the mesh's outline in this view that lies on the followed part (follow [V]), where
+    skin meets background within `reach_m` metres; edges: `edges_of` the mesh."""
     view, scale = outline.view, outline.scale
     pixels, depth = view.project(mesh.vertices)
     normals = vertex_normals(mesh)
@@ -79,7 +83,8 @@ def compare(outline: Outline, mesh: Mesh, edges: np.ndarray, follow: np.ndarray,
     away, step = _borders(outline, pixels[vertices] * scale, outward / np.maximum(length, 1e-9), reach)
     good = np.isfinite(away) & (np.abs(away) * per_px < reach_m)
     corners = np.repeat(vertices[good, None], 3, 1)
-    return Constraints(corners, np.tile([1.0, 0.0, 0.0], (good.sum(), 1)), direction[good], (away * per_px)[good], (follow[vertices] * step)[good])
+    return Constraints(corners, np.tile([1.0, 0.0, 0.0], (good.sum(), 1)), direction[good], (away * per_px)[good],
+                       (follow[vertices] * step)[good])
 
 
 def edges_of(mesh: Mesh) -> np.ndarray:
@@ -93,9 +98,11 @@ def edges_of(mesh: Mesh) -> np.ndarray:
 
 
 def _on_outline(outline: Outline, mesh: Mesh, edges: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """Vertices [N] between triangles that are seen and others that are not, where no other part of the mesh lies behind; pixels [V, 2]."""
+    """Vertices [N] between triangles that are seen and others that are not, where no other part of the mesh lies
+    behind; pixels [V, 2]."""
     a, b, c = (pixels[mesh.faces[:, i]] for i in range(3))
-    front = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]) < 0  # counter-clockwise, and rows go down
+    # counter-clockwise, and rows go down
+    front = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]) < 0
     there = np.zeros(outline.skin.shape, np.uint8)
     for triangle in np.round(np.stack([a, b, c], 1)[front] * 16 - 8).astype(np.int32):
         cv2.fillConvexPoly(there, triangle, 1, cv2.LINE_8, 4)
@@ -106,11 +113,13 @@ def _on_outline(outline: Outline, mesh: Mesh, edges: np.ndarray, pixels: np.ndar
 
 
 def _borders(outline: Outline, at: np.ndarray, outward: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """How far along `outward` [N, 2] from pixels `at` [N, 2] skin gives way to background, nan where it does not, and how clearly [N] in [0, 1]."""
+    """How far along `outward` [N, 2] from pixels `at` [N, 2] skin gives way to background, nan where it does not, and
+    how clearly [N] in [0, 1]."""
     width = 4
     steps = np.arange(-np.ceil(reach) - width, np.ceil(reach) + width + 1)
     where = at[:, None] - 0.5 + outward[:, None] * steps[:, None]
-    skin, person = (cv2.remap(image, where[..., 0].astype(np.float32), where[..., 1].astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    skin, person = (cv2.remap(image, where[..., 0].astype(np.float32), where[..., 1].astype(np.float32),
+                              cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
                     for image in (outline.skin, outline.person))
     total = np.cumsum(np.pad(skin, ((0, 0), (1, 0))), 1)
     inside = (total[:, width:-width] - total[:, :-2 * width]) / width
@@ -130,7 +139,9 @@ def _borders(outline: Outline, at: np.ndarray, outward: np.ndarray, reach: float
 
 def _histogram(code: np.ndarray) -> np.ndarray:
     """Smoothed shares [HISTOGRAM_BINS**3] of the colours with these codes."""
-    counts = np.bincount(code, minlength=HISTOGRAM_BINS**3).astype(np.float64).reshape(HISTOGRAM_BINS, HISTOGRAM_BINS, HISTOGRAM_BINS)
+    counts = np.bincount(code,
+                         minlength=HISTOGRAM_BINS**3).astype(np.float64).reshape(HISTOGRAM_BINS, HISTOGRAM_BINS,
+                                                                                 HISTOGRAM_BINS)
     for axis in range(3):
         counts = counts + 0.5 * (np.roll(counts, 1, axis) + np.roll(counts, -1, axis))
     return (counts / max(counts.sum(), 1.0)).ravel()

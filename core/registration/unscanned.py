@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head without a scan: the identity space's nearest head under the given cameras, by landmarks, matched points and outlines, then relaxed towards
-what the views agree on as far as that is told.
+"""A head without a scan: the identity space's nearest head under the given cameras, by landmarks, matched points and
+outlines, then relaxed towards what the views agree on as far as that is told.
 
 Gauss-Newton on a similarity and coefficients with prior N(0, 1), then thin-plate displacements as in nonrigid.py.
 """
@@ -23,7 +23,8 @@ from .constraints import Constraints, from_landmarks, from_points, joined
 from .landmarks import Landmarks
 
 SIGMA_M = {"landmarks": 0.0025, "points": 0.0015, "outlines": 0.0015}
-"""How far each kind lies from the nearest head of the identity space, roughly: a net's marks err by themselves, the others by what that space lacks."""
+"""How far each kind lies from the nearest head of the identity space, roughly: a net's marks err by themselves, the
+others by what that space lacks."""
 INDEPENDENT = {"landmarks": 120, "points": 200, "outlines": 100}
 """How many of each kind count as independent; neighbours err together."""
 ROUNDS = 10
@@ -32,9 +33,11 @@ OUTLINE_PX = 960
 REACH_M = (0.012, 0.004)
 """How far a point or outline may lie off at the first and the last round."""
 STIFF_M, SOFT_M = 0.030, 0.009
-"""Length over which the displacement is held together, at the first and the last step: what is told lies centimetres apart."""
+"""Length over which the displacement is held together, at the first and the last step: what is told lies centimetres
+apart."""
 AREA_M2 = {"landmarks": 0.006, "points": 0.020, "outlines": 0.006}
-"""Surface area that all constraints of a kind count for in the relaxation, where there are many: a face has about 0.03 square metres."""
+"""Surface area that all constraints of a kind count for in the relaxation, where there are many: a face has about 0.03
+square metres."""
 MOST_AREA_M2 = 4e-5
 """That a single one counts for."""
 PULL = 0.02
@@ -44,7 +47,8 @@ STEPS = 8
 
 @dataclass(frozen=True)
 class Points:
-    """Matched points of the cameras' model [N, 3] in metres, and the unit mean directions [N, 3] to the views that saw them."""
+    """Matched points of the cameras' model [N, 3] in metres, and the unit mean directions [N, 3] to the views that saw
+    them."""
 
     places: np.ndarray
     towards: np.ndarray
@@ -52,8 +56,8 @@ class Points:
 
 @dataclass(frozen=True)
 class FittedHead:
-    """The pose and coefficients [K] of the identity fit; vertices [V, 3] after the relaxation; how many constraints of each kind it had, and by how much
-    they miss in the median [m]."""
+    """The pose and coefficients [K] of the identity fit; vertices [V, 3] after the relaxation; how many constraints of
+    each kind it had, and by how much they miss in the median [m]."""
 
     pose: Similarity
     coefficients: np.ndarray
@@ -64,8 +68,8 @@ class FittedHead:
 
 @dataclass(frozen=True)
 class ShownByViews:
-    """What views show of a head: the landmarks found in them with their trust [468], matched points, and follow [V] in [0, 1]: which part of the head they are
-    believed about."""
+    """What views show of a head: the landmarks found in them with their trust [468], matched points, and follow [V] in
+    [0, 1]: which part of the head they are believed about."""
 
     views: list[View]
     landmarks: Landmarks
@@ -86,9 +90,11 @@ class _ViewConstraints:
     def of(self, mesh: Mesh, reach: float) -> dict[str, Constraints]:
         """By kind, for a head as it lies now. reach: metres by which a point or outline may lie off."""
         shown = self.shown
-        return {"landmarks": from_landmarks(self.model, mesh.vertices, shown.views, shown.landmarks, shown.trust, max(reach, 0.006)),
+        return {"landmarks": from_landmarks(self.model, mesh.vertices, shown.views, shown.landmarks, shown.trust,
+                                            max(reach, 0.006)),
                 "points": from_points(mesh, shown.follow, shown.points.places, shown.points.towards, reach),
-                "outlines": joined([silhouettes.compare(outline, mesh, self.edges, shown.follow, reach) for outline in self.outlines])}
+                "outlines": joined([silhouettes.compare(outline, mesh, self.edges, shown.follow, reach)
+                                    for outline in self.outlines])}
 
 
 def fit(model: HeadModel, shown: ShownByViews, report: Reporter, first: float, steps: float) -> FittedHead:
@@ -110,7 +116,8 @@ def fit(model: HeadModel, shown: ShownByViews, report: Reporter, first: float, s
     start = model.mesh.moved(pose.apply(model.shape(coefficients)))
     outlines = []
     for i, view in enumerate(views):
-        report.progress(first + 0.4 * (steps - first) * i / len(views), steps, f"looking for the outline of the face in {view.name}")
+        report.progress(first + 0.4 * (steps - first) * i / len(views), steps,
+                        f"looking for the outline of the face in {view.name}")
         outlines.append(silhouettes.prepare(view, start, follow, min(1.0, OUTLINE_PX / max(view.width, view.height))))
     constraints = _ViewConstraints(model, shown, outlines, silhouettes.edges_of(model.mesh))
     parts: dict[str, Constraints] = {}
@@ -126,10 +133,13 @@ def fit(model: HeadModel, shown: ShownByViews, report: Reporter, first: float, s
         pose, coefficients = stepped(pose, coefficients, rows)
     vertices = pose.apply(model.shape(coefficients))
     vertices = _relaxed(model, vertices, lambda mesh: constraints.of(mesh, REACH_M[1]),
-                        found, lambda step: report.progress(first + (steps - first) * (0.7 + 0.3 * step / STEPS), steps, "fitting the head to the views"))
+                        found,
+                        lambda step: report.progress(first + (steps - first) * (0.7 + 0.3 * step / STEPS), steps,
+                                                     "fitting the head to the views"))
     parts = constraints.of(model.mesh.moved(vertices), REACH_M[1])
     return FittedHead(pose, coefficients, vertices, {name: len(part) for name, part in parts.items()},
-                      {name: float(np.median(np.abs(part.distance))) if len(part) else float("nan") for name, part in parts.items()})
+                      {name: float(np.median(np.abs(part.distance))) if len(part) else float("nan")
+                       for name, part in parts.items()})
 
 
 def _relaxed(model: HeadModel, start: np.ndarray, constraints, found: Landmarks, tick) -> np.ndarray:
@@ -146,7 +156,8 @@ def _relaxed(model: HeadModel, start: np.ndarray, constraints, found: Landmarks,
             if not len(part):
                 continue
             weight = part.weight * min(MOST_AREA_M2, AREA_M2[name] / max(part.weight.sum(), 1e-9))
-            picked = sparse.coo_matrix((part.bary.ravel(), (np.repeat(np.arange(len(part)), 3), part.corners.ravel())), (len(part), len(start))).tocsr()
+            picked = sparse.coo_matrix((part.bary.ravel(), (np.repeat(np.arange(len(part)), 3), part.corners.ravel())),
+                                       (len(part), len(start))).tocsr()
             matrix = matrix + picked.T @ sparse.diags(weight) @ picked
             aim = picked @ (vertices - start) + part.direction * part.distance[:, None]
             right += picked.T @ (weight[:, None] * aim)
@@ -154,6 +165,7 @@ def _relaxed(model: HeadModel, start: np.ndarray, constraints, found: Landmarks,
             held = sparse.diags(np.where(found.put, nonrigid.PUT_AREA_M2, 0.0))
             matrix = matrix + anchors.T @ held @ anchors
             right += anchors.T @ (held @ (np.nan_to_num(found.points) - anchors @ start))
-        solver = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        solver = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                      options={"SymmetricMode": True})
         vertices = start + solver.solve(right)
     return vertices

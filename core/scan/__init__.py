@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stage scan: frames and cameras become scan.ply, the dense surface of the head as far as it was seen.
 
-Pairs of frames are matched by semi-global stereo, coarse to fine, and their depth maps fused in a truncated signed distance field;
-where there is an NVIDIA GPU and gsplat, Gaussian surfels trained on the frames refine that surface, and their depth is fused the same way.
+Pairs of frames are matched by semi-global stereo, coarse to fine, and their depth maps fused in a truncated signed
+distance field; where there is an NVIDIA GPU and gsplat, Gaussian surfels trained on the frames refine that surface, and
+their depth is fused the same way.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ MOST_DISAGREEING = 0.03
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Writes capture.scan: a surface, or, where no pair of frames gives one, the points that match between the frames."""
+    """Writes capture.scan: a surface, or, where no pair of frames gives one, the points that match between the
+    frames."""
     started = time.monotonic()
     views = read_views(capture)
     frames = read_frames(capture).by_name
@@ -37,7 +39,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     by_splats = splats.use_splats(settings.scan.method, settings.compute_device)
     fused, maps = rounds.measure(views, sharpness, settings.scan.pairs, settings.scan.voxel_mm / 1000, HEAD_BOX, report)
     if fused is not None and by_splats:
-        fused, maps = splats.measure(fused.mesh, views, settings.scan.voxel_mm / 1000, HEAD_BOX, settings.compute_device, report)
+        fused, maps = splats.measure(fused.mesh, views, settings.scan.voxel_mm / 1000, HEAD_BOX,
+                                     settings.compute_device, report)
     if fused is None or len(fused.mesh.faces) < 1000:
         _without_surface(capture, report)
         report.figure("seconds", round(time.monotonic() - started, 1))
@@ -54,7 +57,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         report.figure("left_right_disagreement_px", round(float(np.nanmedian([seen.disagreement for seen in maps])), 3))
     report.figure("seconds", round(time.monotonic() - started, 1))
     if fused.disagreeing > MOST_DISAGREEING:
-        report.finding(f"The frames disagree about {100 * fused.disagreeing:.0f} % of the surface; it was left out of the scan.",
+        report.finding(f"The frames disagree about {100 * fused.disagreeing:.0f} % of the surface; it was left out of "
+                       "the scan.",
                        "Film again with the head kept still, the hair tied back and nothing shiny on the skin.")
     images.write_srgb(capture.picture("scan", "surface"), _draw(mesh, views))
 
@@ -66,8 +70,10 @@ def _without_surface(capture: Capture, report: Reporter) -> None:
     remove_file(capture.picture("scan", "surface"))
     report.figure("method", "none")
     report.figure("points", len(points))
-    report.finding("No surface of the head could be measured from these frames. The head is fitted to the face's features, outlines and what matches alone.",
-                   "For a closer likeness take sharper pictures that lie closer together, every ten degrees around the face, in good light.")
+    report.finding("No surface of the head could be measured from these frames. The head is fitted to the face's "
+                   "features, outlines and what matches alone.",
+                   "For a closer likeness take sharper pictures that lie closer together, every ten degrees around the "
+                   "face, in good light.")
 
 
 def _draw(mesh: meshes.Mesh, views: list[View], height: int = 480) -> np.ndarray:

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Depth maps to one surface: a truncated signed distance field in blocks around what was seen, and its zero by marching cubes.
+"""Depth maps to one surface: a truncated signed distance field in blocks around what was seen, and its zero by marching
+cubes.
 
 Curless and Levoy, A Volumetric Method for Building Complex Models from Range Images (1996).
 """
@@ -25,14 +26,17 @@ SIDE = 8
 TRUNCATION = 5
 """Reach of the distance field on either side of the surface, in voxels."""
 LEAST_WEIGHT, LEAST_SHARE = 2.0, 0.15
-"""Maps that must agree for a voxel to count (a head-on view weighs 1), fewer where a handful of photographs makes few maps."""
+"""Maps that must agree for a voxel to count (a head-on view weighs 1), fewer where a handful of photographs makes few
+maps."""
 MOST_SPREAD = 0.6
-"""Deviation of the maps' distances, in truncations, beyond which they do not speak of one surface: hair, a hand that moved, a highlight that wandered."""
+"""Deviation of the maps' distances, in truncations, beyond which they do not speak of one surface: hair, a hand that
+moved, a highlight that wandered."""
 
 VOXELS = 1 << 18
 """Voxels to which a map is added at once: what is worked out on the way stays in the processor's caches."""
 LEAST_PIECE = 0.05
-"""Pieces of fewer triangles, as a share of the largest one's, float: background seen through hair, a flap of a collar."""
+"""Pieces of fewer triangles, as a share of the largest one's, float: background seen through hair, a flap of a
+collar."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,8 @@ class Fused:
     floating: float
 
 
-def fuse(maps: list[DepthMap], box: np.ndarray, voxel: float, tick: Callable[[int], None] = lambda done: None) -> Fused | None:
+def fuse(maps: list[DepthMap], box: np.ndarray, voxel: float,
+         tick: Callable[[int], None] = lambda done: None) -> Fused | None:
     """The surface of depth maps within the box [2, 3], with voxels of `voxel` metres; None where there is none.
 
     A map counts with the square of its baseline: so much finer does it measure depth.
@@ -73,10 +78,12 @@ def fuse(maps: list[DepthMap], box: np.ndarray, voxel: float, tick: Callable[[in
     known = np.zeros(shape * SIDE, bool)
     index = tuple(voxels.T)
     field[index], known[index] = np.where(enough & agreeing, mean, 1), enough & agreeing
-    for axis in range(3):  # a cube counts when all its corners are known: at an unknown one there is no crossing, but a curtain
+    # a cube counts when all its corners are known: at an unknown one there is no crossing, but a curtain
+    for axis in range(3):
         known &= np.roll(known, -1, axis)
     found = _surface(field, known, low, voxel)
-    return None if found is None else Fused(found[0], float((at_surface & ~agreeing).sum() / max(at_surface.sum(), 1)), found[1])
+    return (None if found is None
+            else Fused(found[0], float((at_surface & ~agreeing).sum() / max(at_surface.sum(), 1)), found[1]))
 
 
 def _blocks_seen(maps: list[DepthMap], low: np.ndarray, shape: np.ndarray, voxel: float) -> np.ndarray:
@@ -85,7 +92,8 @@ def _blocks_seen(maps: list[DepthMap], low: np.ndarray, shape: np.ndarray, voxel
     for seen in maps:
         y, x = np.nonzero(np.isfinite(seen.depth[::2, ::2]))
         z = seen.depth[::2, ::2][y, x]
-        local = np.stack([(2 * x + 0.5 + seen.origin[0]) * z / seen.focal, (2 * y + 0.5 + seen.origin[1]) * z / seen.focal, z], -1)
+        local = np.stack([(2 * x + 0.5 + seen.origin[0]) * z / seen.focal,
+                          (2 * y + 0.5 + seen.origin[1]) * z / seen.focal, z], -1)
         cell = np.floor((local @ seen.rotation + seen.centre - low) / (voxel * SIDE)).astype(int)
         cell = cell[((cell >= 0) & (cell < shape)).all(1)]
         found[tuple(cell.T)] = True
@@ -93,14 +101,16 @@ def _blocks_seen(maps: list[DepthMap], low: np.ndarray, shape: np.ndarray, voxel
 
 
 def _integrate(seen: DepthMap, points: np.ndarray, voxel: float, precision: float, sums: np.ndarray) -> None:
-    """Adds one map's signed distances (in truncations, positive in front of the surface) to sums [4, N] where it sees the voxels [3, N] or just behind."""
+    """Adds one map's signed distances (in truncations, positive in front of the surface) to sums [4, N] where it sees
+    the voxels [3, N] or just behind."""
     cosine = _cosine(seen)
     for first in range(0, points.shape[1], VOXELS):
         part = np.s_[:, first:first + VOXELS]
         _integrate_part(seen, cosine, points[part], voxel, precision, sums[part])
 
 
-def _integrate_part(seen: DepthMap, cosine: np.ndarray, points: np.ndarray, voxel: float, precision: float, sums: np.ndarray) -> None:
+def _integrate_part(seen: DepthMap, cosine: np.ndarray, points: np.ndarray, voxel: float, precision: float,
+                    sums: np.ndarray) -> None:
     local = seen.rotation.astype(np.float32) @ (points - seen.centre.astype(np.float32)[:, None])
     u = np.floor(seen.focal * local[0] / local[2] - seen.origin[0]).astype(np.int32)
     v = np.floor(seen.focal * local[1] / local[2] - seen.origin[1]).astype(np.int32)
@@ -112,7 +122,8 @@ def _integrate_part(seen: DepthMap, cosine: np.ndarray, points: np.ndarray, voxe
     near = np.isfinite(gap) & (gap > -reach) & (facing > 0.2)
     index, value = inside[near], np.minimum(gap[near] / reach, 1)
     share = facing[near] ** 2
-    for row, term in zip(sums, (share, precision * share, precision * share * value, precision * share * value**2), strict=True):
+    for row, term in zip(sums, (share, precision * share, precision * share * value, precision * share * value**2),
+                         strict=True):
         row[index] += term
 
 
@@ -120,7 +131,8 @@ def _cosine(seen: DepthMap) -> np.ndarray:
     """How squarely the map's surface faces its rays, [H, W] in [0, 1]; 0 at steps and where unknown."""
     height, width = seen.depth.shape
     y, x = np.mgrid[0:height, 0:width].astype(np.float32)
-    rays = np.stack([(x + 0.5 + seen.origin[0]) / seen.focal, (y + 0.5 + seen.origin[1]) / seen.focal, np.ones_like(x)], -1)
+    rays = np.stack([(x + 0.5 + seen.origin[0]) / seen.focal, (y + 0.5 + seen.origin[1]) / seen.focal, np.ones_like(x)],
+                    -1)
     known = np.isfinite(seen.depth)
     filled = np.where(known, seen.depth, 0).astype(np.float32)
     share = cv2.blur(known.astype(np.float32), (5, 5))
@@ -131,7 +143,8 @@ def _cosine(seen: DepthMap) -> np.ndarray:
     across[:, 1:-1], down[1:-1] = points[:, 2:] - points[:, :-2], points[2:] - points[:-2]
     normal = np.cross(across, down)
     with np.errstate(invalid="ignore", divide="ignore"):
-        cosine = np.abs(normal[..., 0] * rays[..., 0] + normal[..., 1] * rays[..., 1] + normal[..., 2] * rays[..., 2]) / (lengths(normal) * lengths(rays))
+        cosine = np.abs(normal[..., 0] * rays[..., 0] + normal[..., 1] * rays[..., 1] + normal[..., 2]
+                        * rays[..., 2]) / (lengths(normal) * lengths(rays))
     return np.nan_to_num(cosine, nan=0.0)
 
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which frames are matched with each other: near enough to look alike, far enough to measure depth, from all around the head."""
+"""Which frames are matched with each other: near enough to look alike, far enough to measure depth, from all around the
+head."""
 
 from __future__ import annotations
 
@@ -10,9 +11,11 @@ BASELINES_DEG = ((4.0, 9.0), (2.5, 14.0), (1.5, 30.0))
 """Angles between two cameras as seen from the head, from the best range to what a handful of photographs leaves."""
 
 
-def choose_pairs(centres: np.ndarray, sharpness: np.ndarray, count: int, baselines: tuple = BASELINES_DEG) -> list[tuple[int, int]]:
-    """At most `count` pairs of cameras at centres [N, 3] (the head at the origin), spread over the directions they look from,
-    the sharper [N] preferred. Wider or narrower baselines are taken only where the best range leaves a direction without a pair."""
+def choose_pairs(centres: np.ndarray, sharpness: np.ndarray, count: int,
+                 baselines: tuple = BASELINES_DEG) -> list[tuple[int, int]]:
+    """At most `count` pairs of cameras at centres [N, 3] (the head at the origin), spread over the directions they look
+    from, the sharper [N] preferred. Wider or narrower baselines are taken only where the best range leaves a direction
+    without a pair."""
     directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
     first, second = np.triu_indices(len(centres), 1)
     angle = np.degrees(np.arccos(np.clip((directions[first] * directions[second]).sum(1), -1, 1)))

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stereo from coarse to fine: what one round fuses guides the next, whose pairs may then lie further apart and measure depth more finely.
+"""Stereo from coarse to fine: what one round fuses guides the next, whose pairs may then lie further apart and measure
+depth more finely.
 
-Without a guide, wide pairs look too different to be matched, and near ones measure depth to a millimetre at best, always on the flat side.
+Without a guide, wide pairs look too different to be matched, and near ones measure depth to a millimetre at best,
+always on the flat side.
 """
 
 from __future__ import annotations
@@ -29,7 +31,8 @@ MARGIN_M = 0.005
 
 @dataclass(frozen=True)
 class Round:
-    """share of the pairs (near and wide ones, by their ranges of angles in degrees, best first), scale of the pictures, voxels in the finest one's."""
+    """share of the pairs (near and wide ones, by their ranges of angles in degrees, best first), scale of the pictures,
+    voxels in the finest one's."""
 
     sorts: tuple[tuple[float, tuple], ...]
     scale: float
@@ -37,13 +40,17 @@ class Round:
 
 
 NEAR, WIDE = ((6.0, 12.0), (2.5, 14.0), (1.5, 30.0)), ((13.0, 24.0), (9.0, 30.0))
-ROUNDS = (Round(((0.6, BASELINES_DEG),), 0.5, 2.0), Round(((0.6, NEAR),), 0.7, 1.4), Round(((0.4, NEAR), (0.6, WIDE)), 1.0, 1.0))
+ROUNDS = (Round(((0.6, BASELINES_DEG),), 0.5, 2.0), Round(((0.6, NEAR),), 0.7, 1.4),
+          Round(((0.4, NEAR), (0.6, WIDE)), 1.0, 1.0))
 
 
-def measure(views: list[View], sharpness: np.ndarray, pairs: int, voxel: float, box: np.ndarray, report: Reporter) -> tuple[Fused | None, list[DepthMap]]:
-    """The surface within the box [2, 3] from at most `pairs` pairs a round, and the last round's depth maps; sharpness [V]; voxel in metres."""
+def measure(views: list[View], sharpness: np.ndarray, pairs: int, voxel: float, box: np.ndarray,
+            report: Reporter) -> tuple[Fused | None, list[DepthMap]]:
+    """The surface within the box [2, 3] from at most `pairs` pairs a round, and the last round's depth maps; sharpness
+    [V]; voxel in metres."""
     centres = np.array([view.centre for view in views])
-    plans = [[pair for share, baselines in now.sorts for pair in choose_pairs(centres, sharpness, max(2, round(share * pairs)), baselines)] for now in ROUNDS]
+    plans = [[pair for share, baselines in now.sorts
+              for pair in choose_pairs(centres, sharpness, max(2, round(share * pairs)), baselines)] for now in ROUNDS]
     steps = sum(2 * len(plan) * now.scale**2 for plan, now in zip(plans, ROUNDS, strict=True))
     done, guide, fused, maps = 0.0, None, None, []
     mask = _remembering()
@@ -54,16 +61,19 @@ def measure(views: list[View], sharpness: np.ndarray, pairs: int, voxel: float, 
         seen = _match(views, plan, now.scale, box, guide, mask, tick)
         if guide:  # the nearer pairs of the round before fill what the wide ones cannot match; they weigh little
             seen = maps + seen
-        result = fuse(seen, box, voxel * now.voxels, lambda k, plan=plan, tick=tick: tick(len(plan) + min(k, len(plan)), "fusing depth")) if seen else None
+        result = (fuse(seen, box, voxel * now.voxels, lambda k, plan=plan,
+                       tick=tick: tick(len(plan) + min(k, len(plan)), "fusing depth")) if seen else None)
         done += 2 * len(plan) * now.scale**2
         if result is None:
             break
         fused, maps, guide = result, seen if guide else [], raster.RayCaster(result.mesh)
-        box = np.stack([np.maximum(box[0], result.mesh.vertices.min(0) - MARGIN_M), np.minimum(box[1], result.mesh.vertices.max(0) + MARGIN_M)])
+        box = np.stack([np.maximum(box[0], result.mesh.vertices.min(0) - MARGIN_M),
+                        np.minimum(box[1], result.mesh.vertices.max(0) + MARGIN_M)])
     return fused, maps
 
 
-def _match(views: list[View], plan: list, scale: float, box: np.ndarray, guide: raster.RayCaster | None, mask: Callable, tick: Callable) -> list[DepthMap]:
+def _match(views: list[View], plan: list, scale: float, box: np.ndarray, guide: raster.RayCaster | None, mask: Callable,
+           tick: Callable) -> list[DepthMap]:
     pictures, maps = {}, []
     for done, pair in enumerate(sorted(plan)):
         tick(done, f"matching pair {done + 1} of {len(plan)}")
@@ -74,7 +84,8 @@ def _match(views: list[View], plan: list, scale: float, box: np.ndarray, guide: 
                 picture = images.read_srgb(views[i].path)
                 pictures[i] = picture, mask(i, picture)
         a, b = pair
-        seen = match_pair(views[a], views[b], (pictures[a][0], pictures[b][0]), (pictures[a][1], pictures[b][1]), box, scale * _scale(views[a]), guide)
+        seen = match_pair(views[a], views[b], (pictures[a][0], pictures[b][0]), (pictures[a][1], pictures[b][1]), box,
+                          scale * _scale(views[a]), guide)
         if seen is not None:
             maps.append(seen)
     return maps
@@ -86,7 +97,8 @@ def _scale(view: View) -> float:
 
 
 def _remembering() -> Callable[[int, np.ndarray], np.ndarray]:
-    """Where view i's picture [H, W, 3] shows a person, grown by a few pixels: bool [H, W], asked of the network once and kept as bits."""
+    """Where view i's picture [H, W, 3] shows a person, grown by a few pixels: bool [H, W], asked of the network once
+    and kept as bits."""
     kept: dict[int, np.ndarray] = {}
 
     def mask(i: int, picture: np.ndarray) -> np.ndarray:

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A first proposal of the shadow mask M, in UV: what single frames show to be in shadow, what is still dark in I_UV, and occlusion baked into it.
+"""A first proposal of the shadow mask M, in UV: what single frames show to be in shadow, what is still dark in I_UV,
+and occlusion baked into it.
 
 Writes shadow_mask_auto.png only (8 bit grey, soft edges); shadow_mask.png is the artist's and is never touched.
 """
@@ -36,9 +37,9 @@ UNLIKE_SKIN = ("lips", "brows", "eyes", "nostrils", "scalp")  # their darkness i
 
 @dataclass(frozen=True)
 class ShadowEvidence:
-    """At the working size: texture (I_UV) and filmed (with its light) linear [S, S, 3]; normals [S, S, 3]; visible [S, S]: the sky's share that
-    reaches the surface; judged bool [S, S]: texels of the face that somebody saw, and no beard or hair; skin, brows [S, S] in [0, 1]: plain skin, and
-    brows."""
+    """At the working size: texture (I_UV) and filmed (with its light) linear [S, S, 3]; normals [S, S, 3]; visible [S,
+    S]: the sky's share that reaches the surface; judged bool [S, S]: texels of the face that somebody saw, and no beard
+    or hair; skin, brows [S, S] in [0, 1]: plain skin, and brows."""
 
     texture: np.ndarray
     filmed: np.ndarray
@@ -50,8 +51,9 @@ class ShadowEvidence:
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """texture.exr, texture_confidence.exr, head.obj, and where they are there texture_filmed.png and the frames' shadows -> shadow_mask_auto.png at the
-    texture's size. Raises Problem where the folder of softened pictures holds none of a registered frame."""
+    """texture.exr, texture_confidence.exr, head.obj, and where they are there texture_filmed.png and the frames'
+    shadows -> shadow_mask_auto.png at the texture's size. Raises Problem where the folder of softened pictures holds
+    none of a registered frame."""
     report.progress(0, 8, "Unfolding the head")
     whole = read_filmed_head(capture)
     width = images.size(capture.texture)[0]
@@ -62,9 +64,11 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     source = source_of(capture, settings)
     seen = np.zeros_like(evidence.judged)
     if source == "texture":
-        seen = out_of_sun(evidence.filmed, transfer, head, evidence.judged, evidence.skin > 0.5, settings.shadow_mask.sensitivity, report)
+        seen = out_of_sun(evidence.filmed, transfer, head, evidence.judged, evidence.skin > 0.5,
+                          settings.shadow_mask.sensitivity, report)
     elif source:
-        seen = over_brows(lift_shadows(head, *shadow_frames(capture, settings, source), report), evidence.judged, evidence.brows) > 0.5
+        seen = over_brows(lift_shadows(head, *shadow_frames(capture, settings, source), report), evidence.judged,
+                          evidence.brows) > 0.5
     report.progress(7, 8, "Looking for shadows in the texture")
     found = propose(evidence, seen, settings.shadow_mask.sensitivity, settings.shadow_mask.dilate_px)
     images.write_data(capture.shadow_mask_auto, np.clip(images.resize(found.mask, width, width), 0, 1))
@@ -73,7 +77,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
 @dataclass(frozen=True)
 class Proposal:
-    """mask [S, S] in [0, 1], and what it came from: frames and texture bool [S, S], occlusion [S, S] in [0, 1], edges [S, S]: where it was laid on one."""
+    """mask [S, S] in [0, 1], and what it came from: frames and texture bool [S, S], occlusion [S, S] in [0, 1], edges
+    [S, S]: where it was laid on one."""
 
     mask: np.ndarray
     frames: np.ndarray
@@ -83,40 +88,50 @@ class Proposal:
 
 
 def propose(evidence: ShadowEvidence, seen: np.ndarray, sensitivity: float, dilate_px: float) -> Proposal:
-    """The proposal from the evidence and where the frames or the filmed texture show a shadow, bool [S, S]. dilate_px: at 1024 texels."""
+    """The proposal from the evidence and where the frames or the filmed texture show a shadow, bool [S, S]. dilate_px:
+    at 1024 texels."""
     judged, skin = evidence.judged, evidence.skin
     texture = still_dark(evidence.texture, evidence.normals, judged, skin > 0.5, sensitivity)
     mask = tidy((seen & judged) | texture, judged, dilate_px * len(judged) / 1024)
-    mask, edges = snapped(mask, evidence.filmed, evidence.normals, np.where(judged, 0.2 + 0.8 * skin, 0).astype(np.float32))
+    mask, edges = snapped(mask, evidence.filmed, evidence.normals,
+                          np.where(judged, 0.2 + 0.8 * skin, 0).astype(np.float32))
     luminance = np.log(np.maximum(evidence.texture.mean(-1), 2e-3))
     occlusion = baked_occlusion(luminance, evidence.visible, np.where(judged, skin, 0) * (1 - mask))
     return Proposal((np.maximum(mask, occlusion) * judged).astype(np.float32), seen & judged, texture, occlusion, edges)
 
 
-def still_dark(texture: np.ndarray, normals: np.ndarray, judged: np.ndarray, skin: np.ndarray, sensitivity: float) -> np.ndarray:
-    """bool [S, S]: shadow in a linear texture [S, S, 3] with unit normals [S, S, 3]; judged, skin bool [S, S]: what is looked at, and plain skin."""
+def still_dark(texture: np.ndarray, normals: np.ndarray, judged: np.ndarray, skin: np.ndarray,
+               sensitivity: float) -> np.ndarray:
+    """bool [S, S]: shadow in a linear texture [S, S, 3] with unit normals [S, S, 3]; judged, skin bool [S, S]: what is
+    looked at, and plain skin."""
     odds = np.full(judged.shape, -12.0)
     found, _, step = find_shadow(texture[judged], normals[judged], skin[judged])
     if not step.any():
         return np.zeros_like(judged)
     odds[judged] = found
-    return cohere(np.where(skin, np.clip(odds + 6 * (sensitivity - 0.5), -12, 12), 0), judged)  # what is not skin follows its neighbours
+    # what is not skin follows its neighbours
+    return cohere(np.where(skin, np.clip(odds + 6 * (sensitivity - 0.5), -12, 12), 0), judged)
 
 
 def _evidence(capture: Capture, head: Unfolded, visible: np.ndarray) -> ShadowEvidence:
     """visible [V]: the sky's share that reaches the head's vertices."""
     size = len(head.face)
     texture = images.resize(images.read_linear(capture.texture), size, size)
-    filmed = images.resize(images.read_linear(capture.texture_filmed), size, size) if capture.texture_filmed.is_file() else texture
+    filmed = (images.resize(images.read_linear(capture.texture_filmed), size, size) if capture.texture_filmed.is_file()
+              else texture)
     confidence = images.resize(images.read_data(capture.texture_confidence)[..., 0], size, size)
-    built_in = head.mesh.faces.shape == template.load().faces.shape  # on a head of another topology everything is face and skin
-    face, skin = (template.mask(name, size) if built_in else np.ones((size, size), np.float32) for name in ("face", "skin"))
+    # on a head of another topology everything is face and skin
+    built_in = head.mesh.faces.shape == template.load().faces.shape
+    face, skin = (template.mask(name, size) if built_in else np.ones((size, size), np.float32)
+                  for name in ("face", "skin"))
     brows = template.mask("brows", size) if built_in else np.zeros_like(skin)
     for name in UNLIKE_SKIN if built_in else ():
         skin = skin * (1 - template.mask(name, size))
     visible = interpolate(visible[:, None], head.mesh.faces, head.face, head.bary)[..., 0]
-    return ShadowEvidence(texture, filmed, bleed(head.spread(head.normals), head.covered), bleed(visible, head.covered).astype(np.float32),
-                          head.covered & (confidence > SEEN) & (face > 0.5) & (read_hidden_skin(capture, size) < 0.5), skin, brows)
+    return ShadowEvidence(texture, filmed, bleed(head.spread(head.normals), head.covered),
+                          bleed(visible, head.covered).astype(np.float32),
+                          head.covered & (confidence > SEEN) & (face > 0.5) & (read_hidden_skin(capture, size) < 0.5),
+                          skin, brows)
 
 
 def _leave_figures(capture: Capture, report: Reporter, source: str, evidence: ShadowEvidence, found: Proposal) -> None:
@@ -130,7 +145,9 @@ def _leave_figures(capture: Capture, report: Reporter, source: str, evidence: Sh
     report.figure("occlusion_percent", percent(found.occlusion > 0.1))
     report.figure("laid_on_edges_percent", round(100 * float(found.edges.sum() / max(_border(found.mask).sum(), 1)), 1))
     filmed = images.linear_to_srgb(evidence.filmed)
-    shown = np.stack([found.frames, found.texture, found.occlusion / max(float(found.occlusion.max()), 0.25)], -1).astype(np.float32)  # red, green, blue
+    # red, green, blue
+    shown = np.stack([found.frames, found.texture, found.occlusion / max(float(found.occlusion.max()), 0.25)],
+                     -1).astype(np.float32)
     tinted = 0.55 * filmed + 0.45 * shown
     images.write_srgb(capture.picture("shadow_mask", "filmed__red_in_frames_green_in_texture_blue_occlusion__proposal"),
                       np.hstack([filmed, tinted, np.repeat(found.mask[..., None], 3, -1)]))

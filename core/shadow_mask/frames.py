@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where single frames are in shadow: the delighter's own word, or the difference between the frames and pictures whose shadows any tool has softened.
+"""Where single frames are in shadow: the delighter's own word, or the difference between the frames and pictures whose
+shadows any tool has softened.
 
-The latter is the paper's way (appendix "Shadow Detection"; it softens by DiFaReli). Each frame's mask is thresholded, median filtered
-and freed of small regions before it is lifted.
+The latter is the paper's way (appendix "Shadow Detection"; it softens by DiFaReli). Each frame's mask is thresholded,
+median filtered and freed of small regions before it is lifted.
 """
 
 from __future__ import annotations
@@ -23,34 +24,42 @@ from .tidy import without_small
 
 THRESHOLDS = {"shading": 0.5, "network": 0.5, "softened": 0.5}
 """Shadow alpha from which a pixel is in shadow at a sensitivity of 0.5, by who said so."""
-LEAST_STEP, SURE_STEP = 0.10, 0.40  # natural log units by which softening lightens: less is no shadow, more is one for certain
-UNTOUCHED = 0.25  # share of the pixels that softening has lightened least: they are lit, and tell the two pictures' gain
-BLUR = 0.003  # deviation over which a difference is averaged, of the frame's longer side: a tool's pictures may lack the pores
+# natural log units by which softening lightens: less is no shadow, more is one for certain
+LEAST_STEP, SURE_STEP = 0.10, 0.40
+# share of the pixels that softening has lightened least: they are lit, and tell the two pictures' gain
+UNTOUCHED = 0.25
+# deviation over which a difference is averaged, of the frame's longer side: a tool's pictures may lack the pores
+BLUR = 0.003
 MEDIAN = 0.008  # window of the median filter, of the longer side
 SMALLEST = 2e-4  # share of the frame below which a region is dropped
 
 
 def source_of(capture: Capture, settings: Settings) -> str:
-    """Who tells where shadows are: "softened" pictures, a delighter by its name, the "texture" as it was filmed, or "": a delighter that looked for a sun
-    in the same way and found none."""
+    """Who tells where shadows are: "softened" pictures, a delighter by its name, the "texture" as it was filmed, or "":
+    a delighter that looked for a sun in the same way and found none."""
     if settings.shadow_mask.softened:
         return "softened"
-    delighter = str(capture.read()["stages"].get("delight", {}).get("figures", {}).get("delighter", settings.delight.delighter))
+    delighter = str(capture.read()["stages"].get("delight",
+                                                 {}).get("figures", {}).get("delighter", settings.delight.delighter))
     if any((capture.delit / "shadow").glob("*.png")):
         return delighter
     return "" if delighter == "shading" else "texture"
 
 
 def shadow_frames(capture: Capture, settings: Settings, source: str) -> tuple[int, Iterator[tuple[View, np.ndarray]]]:
-    """How many frames there are, and each view with its shadow mask float32 [H, W] in [0, 1]: 1 is shadow, fractions only along borders.
+    """How many frames there are, and each view with its shadow mask float32 [H, W] in [0, 1]: 1 is shadow, fractions
+    only along borders.
 
     Raises Problem where the folder of softened pictures holds none of a registered frame.
     """
     threshold = THRESHOLDS.get(source, 0.5) + 0.5 * (0.5 - settings.shadow_mask.sensitivity)
     if source == "softened":
         pairs = pictures_of(capture, settings.shadow_mask.softened, source)
-        return len(pairs), ((view, filtered(softening(images.read_srgb(view.path), read_picture(path, view, source)), threshold)) for view, path in pairs)
-    views = [(view, path) for view in read_views(capture) if (path := shadow_path(capture.delit / "shadow", view)).is_file()]
+        return len(pairs), ((view,
+                             filtered(softening(images.read_srgb(view.path), read_picture(path, view, source)),
+                                      threshold)) for view, path in pairs)
+    views = [(view, path) for view in read_views(capture)
+             if (path := shadow_path(capture.delit / "shadow", view)).is_file()]
     return len(views), ((view, filtered(images.read_mask(path), threshold)) for view, path in views)
 
 
@@ -59,7 +68,8 @@ def shadow_path(folder: Path, view: View) -> Path:
 
 
 def softening(raw: np.ndarray, soft: np.ndarray) -> np.ndarray:
-    """Shadow alpha [H, W] in [0, 1] of a frame from the same frame with softened shadows, both sRGB [H, W, 3]: how much that has lightened it."""
+    """Shadow alpha [H, W] in [0, 1] of a frame from the same frame with softened shadows, both sRGB [H, W, 3]: how much
+    that has lightened it."""
     lighter = np.log((images.srgb_to_linear(soft).mean(-1) + 0.01) / (images.srgb_to_linear(raw).mean(-1) + 0.01))
     lighter = cv2.GaussianBlur(lighter.astype(np.float32), (0, 0), max(BLUR * max(lighter.shape), 0.8))
     seen = raw.max(-1) < 0.99  # what is burnt out has lost its light

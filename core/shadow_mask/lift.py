@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shadows seen in the frames, carried to the texture (paper, appendix "Shadow Detection"): each texel is judged by the views that see it well."""
+"""Shadows seen in the frames, carried to the texture (paper, appendix "Shadow Detection"): each texel is judged by the
+views that see it well."""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ def lift_shadows(head: Unfolded, count: int, masks: Iterable[tuple[View, np.ndar
         pixels, _ = view.project(head.points)
         seen = np.flatnonzero((cosine > GRAZING) & ((pixels > 1) & (pixels < [view.width - 1, view.height - 1])).all(1))
         seen = seen[visible_from(head.caster, head.points[seen], head.normals[seen], view.centre)]
-        inner = np.clip(sample(_silhouette_distance(head.caster, view), pixels[seen]) / (EDGE_PX * max(view.width, view.height)), 0.02, 1)
+        inner = np.clip(sample(_silhouette_distance(head.caster, view), pixels[seen])
+                        / (EDGE_PX * max(view.width, view.height)), 0.02, 1)
         trust = cosine[seen] ** 2 * inner
         total[seen] += trust * sample(mask, pixels[seen])
         weight[seen] += trust

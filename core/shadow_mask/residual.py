@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shadows that are still in the texture: skin that is darker than lit skin should be, by the one colour that a shadow has.
+"""Shadows that are still in the texture: skin that is darker than lit skin should be, by the one colour that a shadow
+has.
 
 log I_UV = smooth light over the normals + shadow colour * hidden 0 or 1 + skin's own variation. Fitted by expectation
 maximisation; a shadow colour must be darker in every channel and must explain the texture clearly better than none.
@@ -22,11 +23,12 @@ STARTS = (-0.4, -0.8, -1.3)
 LIKELIEST_SHARE = 0.35
 
 
-def find_shadow(colours: np.ndarray, normals: np.ndarray, skin: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def find_shadow(colours: np.ndarray, normals: np.ndarray,
+                skin: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Linear texture colours [N, 3], unit normals [N, 3], bool [N]: plain skin to fit on.
 
-    Returns the log odds [N] that a texel is in shadow (-12 everywhere if there is none), its residual [N, 3] against lit skin in
-    log units, and the shadow's colour [3] in log units (zeros: none).
+    Returns the log odds [N] that a texel is in shadow (-12 everywhere if there is none), its residual [N, 3] against
+    lit skin in log units, and the shadow's colour [3] in log units (zeros: none).
     """
     log = np.log(np.maximum(colours, 1e-4))
     basis = smooth_basis(normals)
@@ -46,19 +48,23 @@ def find_shadow(colours: np.ndarray, normals: np.ndarray, skin: np.ndarray) -> t
 
 
 def _expectation_maximisation(log, basis, step, iterations, fixed=False):
-    """-> (log likelihood, smooth [9, 3], step [3]) from a first guess of the step; `fixed` leaves it there with no texel in shadow."""
+    """-> (log likelihood, smooth [9, 3], step [3]) from a first guess of the step; `fixed` leaves it there with no
+    texel in shadow."""
     count = len(log)
     dark = np.zeros(count) if fixed else (log.mean(1) < np.quantile(log.mean(1), 0.9) + 0.6 * step.mean()).astype(float)
     inlier, share = np.ones(count), 1e-6 if fixed else LIKELIEST_SHARE
     ridge = np.diag([0.0, *[2e-3] * 3, *[2e-2] * 5]) * count
     for _ in range(iterations):
         weighted = basis * inlier[:, None]
-        smooth = np.linalg.solve(weighted.T @ basis + ridge + 1e-9 * np.eye(9), weighted.T @ (log - dark[:, None] * step))
+        smooth = np.linalg.solve(weighted.T @ basis + ridge + 1e-9 * np.eye(9),
+                                 weighted.T @ (log - dark[:, None] * step))
         residual = log - basis @ smooth
         if not fixed:
             step = (residual * (dark * inlier)[:, None]).sum(0) / max((dark * inlier).sum(), 1e-6)
         terms = np.stack([np.log(share) + np.log1p(-OUTLIER) + _log_likelihood(residual - step),
-                          np.log1p(-share) + np.log1p(-OUTLIER) + _log_likelihood(residual), np.full(count, np.log(OUTLIER) - 3 * np.log(BOX))])  # [3, N]
+                          # [3, N]
+                          np.log1p(-share) + np.log1p(-OUTLIER) + _log_likelihood(residual),
+                          np.full(count, np.log(OUTLIER) - 3 * np.log(BOX))])
         peak = terms.max(0)
         shares = np.exp(terms - peak)
         dark = np.zeros(count) if fixed else shares[0] / np.maximum(shares[0] + shares[1], 1e-30)
@@ -70,10 +76,12 @@ def _expectation_maximisation(log, basis, step, iterations, fixed=False):
 def _log_likelihood(residual: np.ndarray) -> np.ndarray:
     common = residual.mean(-1)
     chroma = residual - common[..., None]
-    return -0.5 * (3 * common**2 / SIGMA_LUMINANCE**2 + (chroma**2).sum(-1) / SIGMA_CHROMA**2) - np.log(SIGMA_LUMINANCE * SIGMA_CHROMA**2 * (2 * np.pi) ** 1.5)
+    return -0.5 * (3 * common**2 / SIGMA_LUMINANCE**2 + (chroma**2).sum(-1)
+                   / SIGMA_CHROMA**2) - np.log(SIGMA_LUMINANCE * SIGMA_CHROMA**2 * (2 * np.pi) ** 1.5)
 
 
 def smooth_basis(normals: np.ndarray) -> np.ndarray:
-    """The polynomials of the second-order spherical harmonics in unit normals [N, 3], centred: [N, 9], the first column 1."""
+    """The polynomials of the second-order spherical harmonics in unit normals [N, 3], centred: [N, 9], the first column
+    1."""
     columns = np.stack(sh_polynomials(normals)[1:], 1)
     return np.concatenate([np.ones((len(columns), 1)), columns - columns.mean(0)], 1)

@@ -10,7 +10,8 @@ from ..light.shadow_edges import place
 from .residual import smooth_basis
 
 
-def snapped(mask: np.ndarray, filmed: np.ndarray, normals: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def snapped(mask: np.ndarray, filmed: np.ndarray, normals: np.ndarray,
+            weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A mask [S, S] in [0, 1] laid on the shadow's edges, and how far [S, S] each texel lies at one that was found.
 
     filmed [S, S, 3] linear; normals [S, S, 3]; weight [S, S] in [0, 1]: how far a texel tells of light.
@@ -20,7 +21,8 @@ def snapped(mask: np.ndarray, filmed: np.ndarray, normals: np.ndarray, weight: n
 
 
 def flattened(filmed: np.ndarray, normals: np.ndarray, mask: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """[S, S, 3]: the texture over its smooth light, about 1 where it is lit; what the shadow under the mask takes is not told as smooth."""
+    """[S, S, 3]: the texture over its smooth light, about 1 where it is lit; what the shadow under the mask takes is
+    not told as smooth."""
     log = np.log(np.maximum(filmed, 2e-3))
     known = np.flatnonzero(weight.ravel() > 0.5)
     known = known[:: max(1, len(known) // 20000)]

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the sun does not reach, told by the texture as it was filmed: for delighters that do not say where they saw a shadow.
+"""Where the sun does not reach, told by the texture as it was filmed: for delighters that do not say where they saw a
+shadow.
 
-The light of core/light/sunlight.py, a sky and a sun, is fitted to the skin; each texel is then lit by both or by the sky alone.
+The light of core/light/sunlight.py, a sky and a sun, is fitted to the skin; each texel is then lit by both or by the
+sky alone.
 """
 
 from __future__ import annotations
@@ -21,17 +23,18 @@ OFF_M = 1e-3  # how far rays start off the surface
 OFTEN = 0.05, 0.65  # how often a texel is sunlit that the head itself hides from the sun, and that it does not
 
 
-def out_of_sun(filmed: np.ndarray, transfer: np.ndarray, head: Unfolded, judged: np.ndarray, skin: np.ndarray, sensitivity: float,
-               report: Reporter) -> np.ndarray:
-    """bool [S, S]: in shadow; nowhere where no sun shows. filmed [S, S, 3] linear; transfer [V, 9] of the head's vertices; judged, skin bool [S, S]:
-    what is looked at, and plain skin."""
+def out_of_sun(filmed: np.ndarray, transfer: np.ndarray, head: Unfolded, judged: np.ndarray, skin: np.ndarray,
+               sensitivity: float, report: Reporter) -> np.ndarray:
+    """bool [S, S]: in shadow; nowhere where no sun shows. filmed [S, S, 3] linear; transfer [V, 9] of the head's
+    vertices; judged, skin bool [S, S]: what is looked at, and plain skin."""
     colours = filmed[head.covered].astype(float)
     at = interpolate(transfer, head.mesh.faces, head.face[head.covered], head.bary[head.covered])
     drawn = np.flatnonzero((judged & skin)[head.covered] & (colours.min(1) > 1e-3))
     if len(drawn) < FEWEST:
         return np.zeros_like(judged)
     drawn = drawn[:: max(1, len(drawn) // FIT_TEXELS)]
-    light, _, _ = fit_light(colours[drawn], head.normals[drawn], at[drawn], lambda sun: _sees(head, drawn, sun), np.ones(len(drawn)),
+    light, _, _ = fit_light(colours[drawn], head.normals[drawn], at[drawn], lambda sun: _sees(head, drawn, sun),
+                            np.ones(len(drawn)),
                             lambda done, of: report.progress(2 * of + 3 * done, 8 * of, "Fitting the light"))
     if not light.has_sun:
         return np.zeros_like(judged)
@@ -46,5 +49,6 @@ def _sees(head: Unfolded, texels: np.ndarray, sun: np.ndarray) -> np.ndarray:
     """[N] 0 or 1: whether the head leaves the sun visible from these of its covered texels."""
     facing = texels[head.normals[texels] @ sun > 0]
     free = np.zeros(len(head.points))
-    free[facing] = ~head.caster.blocked(head.points[facing] + OFF_M * head.normals[facing], np.repeat(sun[None], len(facing), 0))
+    free[facing] = ~head.caster.blocked(head.points[facing] + OFF_M * head.normals[facing],
+                                        np.repeat(sun[None], len(facing), 0))
     return free[texels]

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From doubtful texels to a mask one can paint on: coherent, without specks, a little larger than the shadow, soft at its edge."""
+"""From doubtful texels to a mask one can paint on: coherent, without specks, a little larger than the shadow, soft at
+its edge."""
 
 from __future__ import annotations
 
@@ -13,18 +14,21 @@ SMALLEST = 0.0003  # share of the map below which a region is a speck
 
 
 def cohere(odds: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """bool [S, S]: log odds [S, S] made coherent by mean-field steps of a smoothness prior; nothing outside `inside` [S, S]."""
+    """bool [S, S]: log odds [S, S] made coherent by mean-field steps of a smoothness prior; nothing outside `inside`
+    [S, S]."""
     size = len(odds)
     known = inside.astype(np.float32)
     share = 1 / (1 + np.exp(-odds))
     for _ in range(10):
-        around = cv2.GaussianBlur((share * known).astype(np.float32), (0, 0), 0.005 * size) / np.maximum(cv2.GaussianBlur(known, (0, 0), 0.005 * size), 1e-3)
+        around = cv2.GaussianBlur((share * known).astype(np.float32), (0, 0),
+                                  0.005 * size) / np.maximum(cv2.GaussianBlur(known, (0, 0), 0.005 * size), 1e-3)
         share = 1 / (1 + np.exp(-np.clip(odds + COHERENCE * (2 * around - 1), -30, 30)))
     return (share > 0.5) & inside
 
 
 def over_brows(share: np.ndarray, inside: np.ndarray, brows: np.ndarray) -> np.ndarray:
-    """A share of shadow [S, S] with that of the skin around carried over the brows [S, S] in [0, 1], whose darkness passes for shadow in many a frame."""
+    """A share of shadow [S, S] with that of the skin around carried over the brows [S, S] in [0, 1], whose darkness
+    passes for shadow in many a frame."""
     known = (inside & (brows < 0.1)).astype(np.float32)
     sigma = ACROSS * len(share)
     around = cv2.GaussianBlur(share * known, (0, 0), sigma) / np.maximum(cv2.GaussianBlur(known, (0, 0), sigma), 1e-4)
@@ -32,7 +36,8 @@ def over_brows(share: np.ndarray, inside: np.ndarray, brows: np.ndarray) -> np.n
 
 
 def tidy(mask: np.ndarray, inside: np.ndarray, dilate_px: float) -> np.ndarray:
-    """Soft mask [S, S] in [0, 1] from a hard one: median filter, specks and pinholes gone, grown by `dilate_px` texels."""
+    """Soft mask [S, S] in [0, 1] from a hard one: median filter, specks and pinholes gone, grown by `dilate_px`
+    texels."""
     size = len(mask)
     mask = cv2.medianBlur(mask.astype(np.uint8), max(3, round(0.006 * size) | 1))
     mask = without_small(mask, SMALLEST * size * size)

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""I_UV and shadow mask -> reflectance maps: a clean albedo under a global light, and local dark ones where the mask is (paper, section 3).
+"""I_UV and shadow mask -> reflectance maps: a clean albedo under a global light, and local dark ones where the mask is
+(paper, section 3).
 
-The stage reads the evidence, starts from a reference face of the subject's tone, samples reflectance and light jointly, and writes the maps.
+The stage reads the evidence, starts from a reference face of the subject's tone, samples reflectance and light jointly,
+and writes the maps.
 """
 
 from __future__ import annotations
@@ -40,14 +42,17 @@ from .window import coarse
 from .witnesses import confirmed
 
 FAINT = 2.0
-"""After any delighter little of a shadow is left, and what M takes along of dark skin and beards is not to be explained by local light (Recipe.faint)."""
+"""After any delighter little of a shadow is left, and what M takes along of dark skin and beards is not to be explained
+by local light (Recipe.faint)."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """texture, confidence, head and masks -> maps/ (see maps.py for their colour spaces), comparison/, preview/, and two pictures for the report.
+    """texture, confidence, head and masks -> maps/ (see maps.py for their colour spaces), comparison/, preview/, and
+    two pictures for the report.
 
-    The artist's mask wins over the proposal. Continues from its own checkpoint. With settings.edited_part only what a mask edit touched is solved again,
-    where that can be done (edited.py). Raises Problem for unusable inputs and for divergence.
+    The artist's mask wins over the proposal. Continues from its own checkpoint. With settings.edited_part only what a
+    mask edit touched is solved again, where that can be done (edited.py). Raises Problem for unusable inputs and for
+    divergence.
     """
     options = settings.solve
     prior = load(Path(options.prior).expanduser() if options.prior else WEIGHTS, settings.compute_device)
@@ -55,15 +60,18 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
         spare_memory(prior)
     recipe = recipe_of(settings, prior)
     report.progress(0, recipe.steps, "reading the texture, the head and the masks")
-    size = layout.whole_size(options.size, prior.multiple) if options.prior else max(options.size // 32, 4) * 32  # the network halves the map several times
+    # the network halves the map several times
+    size = layout.whole_size(options.size, prior.multiple) if options.prior else max(options.size // 32, 4) * 32
     head = read_filmed_head(capture)
     known = evidence = read_evidence(capture, head, size)
     elsewhere = None
     if options.prior:  # the authors' prior speaks of maps in other UVs
         elsewhere, prior = layout.fitted(capture, head, known, prior, report)
-        evidence, recipe = elsewhere.evidence(known, recipe.released_boxes), free(recipe)  # the split knows its places on the built-in head
+        # the split knows its places on the built-in head
+        evidence, recipe = elsewhere.evidence(known, recipe.released_boxes), free(recipe)
     _check_often(prior, report)
-    part = solve_edited(capture, head, settings, recipe, prior, evidence, report) if settings.edited_part and elsewhere is None else None
+    part = (solve_edited(capture, head, settings, recipe, prior, evidence, report) if settings.edited_part
+            and elsewhere is None else None)
     if part is not None:
         iris.measure(capture, head, part[0].diffuse, report)
         _leave_figures(capture, evidence, *part, report)
@@ -74,14 +82,17 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     others = read_others(capture, settings, report)
     start = initial.start(prior, evidence, tone, evidence.cell_side(options.grid_cells), recipe, witness, others)
     if others and not start.recipe.linear:
-        report.log("The other captures were not used: they help where a delighter has left a faint light, on the built-in head, by the default recipe.")
+        report.log("The other captures were not used: they help where a delighter has left a faint light, on the "
+                   "built-in head, by the default recipe.")
     denoiser = prior.of_tone(start.tone)
     report.figure("marks_kept_from_light", len(start.marks))
-    images.write_srgb(capture.picture("solve", "edges_and_marks"), drawing.edges_and_marks(evidence, start.alpha, start.marks))
+    images.write_srgb(capture.picture("solve", "edges_and_marks"),
+                      drawing.edges_and_marks(evidence, start.alpha, start.marks))
     stored = capture.checkpoints / "solve.safetensors"
     state = _sampled(capture, settings, start, denoiser, stored, _key(evidence, settings, start), report)
     result, found = _finished(denoiser, state, evidence, start, settings.seed, report)
-    delivered = result if elsewhere is None else elsewhere.returned(result, known, state.lights, start.exposure, start.tone)
+    delivered = (result if elsewhere is None
+                 else elsewhere.returned(result, known, state.lights, start.exposure, start.tone))
     maps.write(capture, delivered, found, conditions)
     iris.measure(capture, head, delivered.diffuse, report)
     comparison.write(capture, known, delivered.diffuse)
@@ -90,8 +101,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     stored.unlink(missing_ok=True)
 
 
-def _sampled(capture: Capture, settings: Settings, start: initial.Start, denoiser: ConditionedPrior, stored: Path, key: str, report: Reporter) -> State:
-    """The last state of the walk, on the processor; goes on from the checkpoint `stored` where that is of this run, which `key` stands for."""
+def _sampled(capture: Capture, settings: Settings, start: initial.Start, denoiser: ConditionedPrior, stored: Path,
+             key: str, report: Reporter) -> State:
+    """The last state of the walk, on the processor; goes on from the checkpoint `stored` where that is of this run,
+    which `key` stands for."""
     state, seen = start.state, {factor: o.to(denoiser.device) for factor, o in start.observations.items()}
     stopped = checkpoint.read(stored, key)
     if stopped is not None:
@@ -118,15 +131,16 @@ def _finished(prior: ConditionedPrior, state: State, evidence: Evidence, start: 
               report: Reporter) -> tuple[maps.Maps, Solution]:
     """The maps with their confidence, and what a later solve of a part needs."""
     factor = max(start.observations)
-    varied = spread(prior, start.observations[factor], coarse(start.reference, factor), state.lights, start.recipe, seed, report.check)
+    varied = spread(prior, start.observations[factor], coarse(start.reference, factor), state.lights, start.recipe,
+                    seed, report.check)
     result = maps.finished(state, evidence, start, varied)
-    return result, Solution(state.denoised, state.lights, evidence.alpha, start.alpha, varied, start.tone, result.gain, start.exposure, start.local,
-                            start.recipe.linear > 0)
+    return result, Solution(state.denoised, state.lights, evidence.alpha, start.alpha, varied, start.tone, result.gain,
+                            start.exposure, start.local, start.recipe.linear > 0)
 
 
 def recipe_of(settings: Settings, prior: Prior) -> Recipe:
-    """The chosen recipe on the noise levels that the prior knows. Ours takes the number of steps and the guidance from the settings; the others come with
-    their own."""
+    """The chosen recipe on the noise levels that the prior knows. Ours takes the number of steps and the guidance from
+    the settings; the others come with their own."""
     recipe = RECIPES[settings.solve.recipe]
     if prior.one_scale:
         recipe = replace(recipe, coarse=())
@@ -139,7 +153,8 @@ def recipe_of(settings: Settings, prior: Prior) -> Recipe:
 
 
 def _check_often(prior: Prior, report: Reporter) -> None:
-    """Lets a cancel stop the run between two blocks of the network, forward and backward: one step on a large map takes seconds."""
+    """Lets a cancel stop the run between two blocks of the network, forward and backward: one step on a large map takes
+    seconds."""
     def after(module, inputs, output):
         report.check()
         if output.requires_grad:
@@ -153,11 +168,13 @@ def _check_often(prior: Prior, report: Reporter) -> None:
 def _key(evidence: Evidence, settings: Settings, start: initial.Start) -> str:
     """Stands for everything a run's bytes depend on."""
     digest = hashlib.blake2b(digest_size=16)
-    for tensor in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, start.tone.tensor, start.state.lights.glob, start.local):
+    for tensor in (evidence.texture, evidence.weight, evidence.alpha, evidence.normal, start.tone.tensor,
+                   start.state.lights.glob, start.local):
         digest.update(tensor.numpy().tobytes())
     digest.update(json.dumps([result_settings(settings.solve), settings.seed, settings.compute_device]).encode())
     digest.update(code_key(__package__).encode())  # with the prior's weights
-    digest.update(json.dumps(hash_tree(Path(settings.solve.prior).expanduser()) if settings.solve.prior else "").encode())
+    digest.update(json.dumps(hash_tree(Path(settings.solve.prior).expanduser()) if settings.solve.prior
+                             else "").encode())
     return digest.hexdigest()
 
 
@@ -167,7 +184,8 @@ def _leave_figures(capture: Capture, evidence: Evidence, result: maps.Maps, tone
     error = images.linear_to_srgb(explained) - images.linear_to_srgb(texture)
     mean_square = float((error**2 * weight).sum() / max(3 * weight.sum(), 1e-6))
     report.figure("residual_psnr_db", round(-10 * np.log10(max(mean_square, 1e-10)), 1))
-    report.figure("mask_share_of_face_percent", round(100 * float((evidence.alpha * evidence.skin).sum() / evidence.skin.sum()), 1))
+    report.figure("mask_share_of_face_percent",
+                  round(100 * float((evidence.alpha * evidence.skin).sum() / evidence.skin.sum()), 1))
     report.figure("skin_tone_srgb", [round(float(v), 3) for v in tone.srgb])
     side = min(evidence.size, REFERENCE // 2)
     small = [images.resize(image, side, side) for image in (texture.transpose(1, 2, 0), result.diffuse, result.shading)]
@@ -175,4 +193,5 @@ def _leave_figures(capture: Capture, evidence: Evidence, result: maps.Maps, tone
     small[2] = small[2] * (0.6 / max(np.percentile(small[2], 95), 1e-6))
     images.write_srgb(capture.picture("solve", "texture_albedo_shading"), images.linear_to_srgb(np.hstack(small)))
     aux = [result.normal, np.repeat(result.specular[..., None], 3, 2), np.repeat(result.confidence[..., None], 3, 2)]
-    images.write_srgb(capture.picture("solve", "normal_specular_confidence"), np.hstack([images.resize(image, side, side) for image in aux]))
+    images.write_srgb(capture.picture("solve", "normal_specular_confidence"),
+                      np.hstack([images.resize(image, side, side) for image in aux]))

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much light is missing inside of M, as its border tells: a shadow's edge crosses the skin at random, so what differs on its two sides is light.
+"""How much light is missing inside of M, as its border tells: a shadow's edge crosses the skin at random, so what
+differs on its two sides is light.
 
-Inside a shadow a darker skin and a lesser light look the same; at its edge they do not. What the steps along the border say holds for some way inwards,
-less the farther in and the shorter the border is that says it.
+Inside a shadow a darker skin and a lesser light look the same; at its edge they do not. What the steps along the border
+say holds for some way inwards, less the farther in and the shorter the border is that says it.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ import torch
 from ..light.shadow_edges import signed_distance
 
 # in texels of a 1024 map
-AWAY, BAND = 9.0, 8.0  # the two sides are compared over bands about this distance from the border: a penumbra lies between; half width of a band
+# the two sides are compared over bands about this distance from the border: a penumbra lies between; half width of a
+# band
+AWAY, BAND = 9.0, 8.0
 REACH = 14.0  # how far from the border a step is read
 WINDOW = 8.0  # deviation of the windows over which a side is averaged
 INWARDS = 40.0  # deviation over which a step holds for what is around it
@@ -24,10 +27,12 @@ DARKEST = 0.9  # more of the light than this never goes
 
 
 def missing(light: torch.Tensor, alpha: torch.Tensor, weight: torch.Tensor, texel: float) -> torch.Tensor:
-    """The share [S, S] in [0, DARKEST] of the light that is missing under M = 1, by the steps along M's border; 0 where no border is near.
+    """The share [S, S] in [0, DARKEST] of the light that is missing under M = 1, by the steps along M's border; 0 where
+    no border is near.
 
-    light [3, S, S]: texture over (reference albedo x global shading), linear, about 1 where lit; alpha [S, S]: M; weight [S, S]: how far a texel tells of
-    light, 0 off the facial skin, so that the outline of the face is no border; `texel` is the side of one in texels of a 1024 map.
+    light [3, S, S]: texture over (reference albedo x global shading), linear, about 1 where lit; alpha [S, S]: M;
+    weight [S, S]: how far a texel tells of light, 0 off the facial skin, so that the outline of the face is no border;
+    `texel` is the side of one in texels of a 1024 map.
     """
     inside = alpha.numpy() > 0.5
     if not inside.any() or inside.all():

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the solver keeps on disk: its state on the way, taken up only by a run on the same inputs, and what it found in the end, for a later solve of a part.
+"""What the solver keeps on disk: its state on the way, taken up only by a run on the same inputs, and what it found in
+the end, for a later solve of a part.
 
-Numbers are stored as tensors: safetensors writes several metadata fields in random order, and the same solve is to give the same bytes.
+Numbers are stored as tensors: safetensors writes several metadata fields in random order, and the same solve is to give
+the same bytes.
 """
 
 from __future__ import annotations
@@ -26,9 +28,10 @@ from .skin_tone import EARLIER, SkinTone
 
 @dataclass(frozen=True)
 class Solution:
-    """What a solve ended with, all of the whole map: denoised x_0 [1, 7, S, S] before the maps' own gain, lights, the mask as `painted` [S, S] and as it was
-    used (`alpha`), the spread [H, W] of a coarser map that the confidence took; the skin tone, gain [3] of the albedo, exposure of the texture;
-    local [3, C, C]: initial.Start's; settled: whether the split told the global light."""
+    """What a solve ended with, all of the whole map: denoised x_0 [1, 7, S, S] before the maps' own gain, lights, the
+    mask as `painted` [S, S] and as it was used (`alpha`), the spread [H, W] of a coarser map that the confidence took;
+    the skin tone, gain [3] of the albedo, exposure of the texture; local [3, C, C]: initial.Start's; settled: whether
+    the split told the global light."""
 
     denoised: torch.Tensor
     lights: Lights
@@ -45,7 +48,8 @@ class Solution:
 def write_solution(path: Path, found: Solution, conditions: dict[str, str]) -> None:
     """`conditions` are mask_edit's: under others this state is of no use."""
     lights = {"glob": found.lights.glob, "grid": found.lights.grid, "chroma": found.lights.chroma}
-    tensors = {name: getattr(found, name) for name in ("denoised", "painted", "alpha", "spread", "gain", "local")} | lights
+    tensors = {name: getattr(found, name)
+               for name in ("denoised", "painted", "alpha", "spread", "gain", "local")} | lights
     tensors["tone"] = found.tone.tensor
     tensors["settled"] = torch.tensor(found.settled)
     tensors["exposure"] = torch.tensor(found.exposure, dtype=torch.float64)
@@ -63,14 +67,16 @@ def read_solution(path: Path, conditions: dict[str, str]) -> Solution | None:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
         lights = Lights(*(tensors.pop(name) for name in ("glob", "grid", "chroma")))
         tone = SkinTone.from_linear(tensors.pop("tone"), EARLIER)
-        return Solution(lights=lights, tone=tone, exposure=tensors.pop("exposure").item(), settled=bool(tensors.pop("settled")), **tensors)
+        return Solution(lights=lights, tone=tone, exposure=tensors.pop("exposure").item(),
+                        settled=bool(tensors.pop("settled")), **tensors)
     except (OSError, SafetensorError, KeyError, TypeError, ValueError):
         return None
 
 
 def write(path: Path, state: State, key: str) -> None:
     """Stores a state; `key` stands for everything its future depends on."""
-    tensors = {"denoised": state.denoised, "glob": state.lights.glob, "grid": state.lights.grid, "chroma": state.lights.chroma}
+    tensors = {"denoised": state.denoised, "glob": state.lights.glob, "grid": state.lights.grid,
+               "chroma": state.lights.chroma}
     if state.x is not None:
         tensors["x"] = state.x
     tensors["step"] = torch.tensor(state.step)
@@ -86,7 +92,9 @@ def read(path: Path, key: str) -> State | None:
             metadata = file.metadata() or {}
             if metadata.get("key") != key:
                 return None
-            tensors: dict[str, torch.Tensor] = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
+            tensors: dict[str,
+                          torch.Tensor] = {name: file.get_tensor(name)
+                                           for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
         moments = [tensors[f"moment{k}"] for k in range(sum(name.startswith("moment") for name in tensors))]
         lights = Lights(tensors["glob"], tensors["grid"], tensors["chroma"])
         return State(int(tensors["step"]), tensors.get("x"), tensors["denoised"], lights, moments)
@@ -99,7 +107,9 @@ def _save(path: Path, tensors: dict[str, torch.Tensor], metadata: dict[str, str]
     with replacing(path) as temporary:
         try:
             save_file(tensors, temporary, metadata=metadata)
-        except SafetensorError as error:  # which tells the system's error in words alone: "No space left on device (os error 28)"
+        except SafetensorError as error:
+            # which tells the system's error in words alone: "No space left on device (os error 28)"
             found = re.search(r"os error (\d+)", str(error))
             number = int(found[1]) if found else 0
-            raise (OSError(0, str(error), str(path), number) if os.name == "nt" else OSError(number, str(error), str(path))) from error
+            raise (OSError(0, str(error), str(path), number) if os.name == "nt"
+                   else OSError(number, str(error), str(path))) from error

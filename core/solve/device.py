@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which device the networks run on: proven by a pass of the shipped one, not taken for granted because PyTorch names it.
+"""Which device the networks run on: proven by a pass of the shipped one, not taken for granted because PyTorch names
+it.
 
-A graphics card may be too old for PyTorch's kernels, out of memory, or slower than the processor: each is found out here, once, and said.
+A graphics card may be too old for PyTorch's kernels, out of memory, or slower than the processor: each is found out
+here, once, and said.
 """
 
 from __future__ import annotations
@@ -17,9 +19,11 @@ from .prior import WEIGHTS, coordinates, load
 from .skin_tone import GIVEN, SkinTone
 
 SIZE = 128
-"""Side of the map that is tried, in texels: small enough for any card, and large enough that a card shows what it can do."""
+"""Side of the map that is tried, in texels: small enough for any card, and large enough that a card shows what it can
+do."""
 ALIKE = 0.05
-"""The largest difference between two devices' results, in units of the map's range; bfloat16 differs from float32 by 0.01."""
+"""The largest difference between two devices' results, in units of the map's range; bfloat16 differs from float32 by
+0.01."""
 
 
 @dataclass(frozen=True)
@@ -42,12 +46,14 @@ def prove() -> Proof:
         try:
             result, seconds = run_pass(device)
         except Exception as error:  # whatever a driver says: the CPU is there
-            reasons.append(f"{device} does not run the network ({type(error).__name__}: {str(error).partition(chr(10))[0][:120].rstrip('.')}).")
+            reasons.append(f"{device} does not run the network ({type(error).__name__}: "
+                           f"{str(error).partition(chr(10))[0][:120].rstrip('.')}).")
             continue
         if not torch.isfinite(result).all() or (result - expected).abs().max() > ALIKE:
             reasons.append(f"{device} computes something else than the CPU.")
         elif seconds >= cpu_s:
-            reasons.append(f"{device} is slower than the CPU: {seconds:.2f} s against {cpu_s:.2f} s for one pass of the network.")
+            reasons.append(f"{device} is slower than the CPU: {seconds:.2f} s against {cpu_s:.2f} s for one pass of "
+                           "the network.")
         else:
             return Proof(device, f"{device} takes {seconds:.2f} s for one pass of the network, the CPU {cpu_s:.2f} s.")
     return Proof("cpu", " ".join(reasons))
@@ -55,11 +61,13 @@ def prove() -> Proof:
 
 def candidates() -> list[str]:
     """The devices that PyTorch names, beside the CPU."""
-    return [name for name, there in (("cuda", torch.cuda.is_available()), ("mps", torch.backends.mps.is_available())) if there]
+    return [name for name, there in (("cuda", torch.cuda.is_available()), ("mps", torch.backends.mps.is_available()))
+            if there]
 
 
 def run_pass(device: str) -> tuple[torch.Tensor, float]:
-    """A pass of the shipped prior over a fixed map [1, 7, SIZE, SIZE] and back to its input, twice: the gradient, on the CPU, and the second one's seconds."""
+    """A pass of the shipped prior over a fixed map [1, 7, SIZE, SIZE] and back to its input, twice: the gradient, on
+    the CPU, and the second one's seconds."""
     generator = torch.Generator().manual_seed(0)
     prior = load(WEIGHTS, device).of_tone(SkinTone((0.45, 0.3, 0.22), GIVEN))
     noisy, weights = (torch.randn(1, 7, SIZE, SIZE, generator=generator).to(device) for _ in range(2))

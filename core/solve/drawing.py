@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solver's own pictures: how its loss falls; for the report, where the mask was painted, where its border was laid, and which marks are kept from light."""
+"""The solver's own pictures: how its loss falls; for the report, where the mask was painted, where its border was laid,
+and which marks are kept from light."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ PAINTED, LAID, MARK = (1.0, 1.0, 1.0), (1.0, 0.45, 0.0), (0.1, 0.9, 0.2)
 
 
 def edges_and_marks(evidence: Evidence, alpha: torch.Tensor, marks: tuple[Mark, ...]) -> np.ndarray:
-    """sRGB [H, 2 H, 3]: the texture with the painted contour in white, M's border as it is used in orange, the marks ringed in green; M itself beside it."""
+    """sRGB [H, 2 H, 3]: the texture with the painted contour in white, M's border as it is used in orange, the marks
+    ringed in green; M itself beside it."""
     side = min(evidence.size, REFERENCE // 2)
     texture = images.resize(np.ascontiguousarray(evidence.texture.permute(1, 2, 0).numpy()), side, side)
     seen = texture[images.resize(evidence.weight.numpy(), side, side) > 0.5]
@@ -28,12 +30,14 @@ def edges_and_marks(evidence: Evidence, alpha: torch.Tensor, marks: tuple[Mark, 
         cv2.drawContours(shown, contours, -1, colour, 1)
     scale = side / evidence.size
     for mark in marks:
-        cv2.circle(shown, (round(mark.column * scale), round(mark.row * scale)), max(4, round(2.2 * mark.radius * scale)), MARK, 1)
+        cv2.circle(shown, (round(mark.column * scale), round(mark.row * scale)),
+                   max(4, round(2.2 * mark.radius * scale)), MARK, 1)
     return np.hstack([shown, np.repeat(np.clip(small, 0, 1)[..., None], 3, 2)])
 
 
 def loss_curve(losses: list[tuple[int, float]], steps: int) -> np.ndarray:
-    """sRGB [h, w, 3] of (step, loss) over all steps of the run, on a logarithmic scale from the largest to the smallest so far; a line at every tenfold."""
+    """sRGB [h, w, 3] of (step, loss) over all steps of the run, on a logarithmic scale from the largest to the smallest
+    so far; a line at every tenfold."""
     height, width = CURVE
     picture = np.full((height, width, 3), 0.12, np.float32)
     values = np.log10(np.maximum([loss for _, loss in losses], 1e-6))

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""M laid on the shadow's edges before the first step (core/light/shadow_edges.py says how): a sharp edge of the shadow can live in M alone."""
+"""M laid on the shadow's edges before the first step (core/light/shadow_edges.py says how): a sharp edge of the shadow
+can live in M alone."""
 
 from __future__ import annotations
 
@@ -13,7 +14,9 @@ from .evidence import Evidence
 
 
 def with_edges(evidence: Evidence, light: torch.Tensor, weight: torch.Tensor) -> Evidence:
-    """The evidence with `place`'s alpha for its own; light [3, S, S] and weight [S, S] as there. What is protected stays out of M."""
-    edge = place(light.permute(1, 2, 0).numpy(), evidence.alpha.numpy(), (weight * evidence.covered).numpy(), evidence.texel)
+    """The evidence with `place`'s alpha for its own; light [3, S, S] and weight [S, S] as there. What is protected
+    stays out of M."""
+    edge = place(light.permute(1, 2, 0).numpy(), evidence.alpha.numpy(), (weight * evidence.covered).numpy(),
+                 evidence.texel)
     alpha = torch.from_numpy(edge.alpha) * (1 - evidence.protected) * evidence.covered
     return replace(evidence, alpha=alpha, edge=torch.from_numpy(edge.found), taken=tuple(edge.colour.tolist()))

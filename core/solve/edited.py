@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""After a mask edit: the touched part of the maps solved again and put into the maps of the last solve; everything else of them stays, bit by bit."""
+"""After a mask edit: the touched part of the maps solved again and put into the maps of the last solve; everything else
+of them stays, bit by bit."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ from .witnesses import confirmed
 
 def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recipe, prior: Prior, evidence: Evidence,
                  report: Reporter) -> tuple[maps.Maps, SkinTone] | None:
-    """The maps with the edited part new, as they are now in maps/, and the skin tone; None, and the reason in the log, where the whole map is to be solved.
+    """The maps with the edited part new, as they are now in maps/, and the skin tone; None, and the reason in the log,
+    where the whole map is to be solved.
 
     Without an edit the maps stay as they are.
     """
@@ -46,8 +48,10 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
     near = torch.zeros_like(evidence.alpha)
     if part is not None:
         near[part.inside] = 1
-    start = initial.again(prior, evidence, earlier, cell, recipe, near, lambda marks: confirmed(capture, head, marks, evidence.size))
-    found = earlier if part is None else _sampled(settings, prior.of_tone(earlier.tone), evidence, earlier, start, part, report)
+    start = initial.again(prior, evidence, earlier, cell, recipe, near,
+                          lambda marks: confirmed(capture, head, marks, evidence.size))
+    found = (earlier if part is None
+             else _sampled(settings, prior.of_tone(earlier.tone), evidence, earlier, start, part, report))
     state = State(0, None, found.denoised, found.lights)
     result = maps.finished(state, evidence, start, found.spread, found.gain)
     if part is None:
@@ -60,14 +64,18 @@ def solve_edited(capture: Capture, head: Head, settings: Settings, recipe: Recip
     return result, earlier.tone
 
 
-def _sampled(settings: Settings, prior: ConditionedPrior, evidence: Evidence, earlier: Solution, start: initial.Start, part: Window,
-             report: Reporter) -> Solution:
+def _sampled(settings: Settings, prior: ConditionedPrior, evidence: Evidence, earlier: Solution, start: initial.Start,
+             part: Window, report: Reporter) -> Solution:
     denoised, lights = solve_inside(prior, start.observations, earlier, part, start.recipe, settings.seed, report)
     factor = max(start.observations)
     here = Lights(lights.glob, lights.grid[(..., *part.cells)], lights.chroma)
     reference = coarse(start.reference[(..., *part.seen)], factor)
-    patch = spread(prior, cropped(start.observations[factor], part, factor), reference, here, start.recipe, settings.seed, report.check)
+    patch = spread(prior, cropped(start.observations[factor], part, factor), reference, here, start.recipe,
+                   settings.seed, report.check)
     rows, columns = (slice(a.start // factor, a.stop // factor) for a in part.inside)
     whole = earlier.spread.clone()
-    whole[rows, columns] = patch[tuple(slice((a.start - b.start) // factor, (a.stop - b.start) // factor) for a, b in zip(part.inside, part.seen, strict=True))]
-    return Solution(denoised, lights, evidence.alpha, start.alpha, whole, earlier.tone, earlier.gain, earlier.exposure, earlier.local, earlier.settled)
+    whole[rows,
+          columns] = patch[tuple(slice((a.start - b.start) // factor, (a.stop - b.start) // factor)
+                                 for a, b in zip(part.inside, part.seen, strict=True))]
+    return Solution(denoised, lights, evidence.alpha, start.alpha, whole, earlier.tone, earlier.gain, earlier.exposure,
+                    earlier.local, earlier.settled)

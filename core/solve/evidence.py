@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the solver knows of a capture: texture, confidence, normals and masks at the size it solves, and the same again for its coarser maps."""
+"""What the solver knows of a capture: texture, confidence, normals and masks at the size it solves, and the same again
+for its coarser maps."""
 
 from __future__ import annotations
 
@@ -24,16 +25,19 @@ from .recipes import Recipe
 
 REFERENCE = 1024  # lengths in texels are given for maps of this size
 TRUSTED = 0.2  # confidence from which a texel counts in full: below, it was seen at a glancing angle only
-FEATURE_TRUST = 0.2  # of brows, lips, lids and hair: they vary between people more than skin does, and light must not explain them away
+# of brows, lips, lids and hair: they vary between people more than skin does, and light must not explain them away
+FEATURE_TRUST = 0.2
 BEARD_TRUST = 0.1  # of skin under a beard: the shade of a shaven one is as soft as a light's
 MASK_FADE = 2.0  # deviation in texels over which a hard mask's border fades
-FACE_CROP = 768  # texels of REFERENCE over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels
+# texels of REFERENCE over which settings.solve.grid_cells are counted, as in the paper: 96 cells are of 8 texels
+FACE_CROP = 768
 
 
 @dataclass(frozen=True)
 class Extent:
-    """Which part of the UV square the maps cover, in texels of REFERENCE: `side` rows from `top` on and as many columns from `left` on. The prior is told
-    the coordinates of texel centres, or of their upper left corners (not `centred`), and knows maps that are coarser by `factors`."""
+    """Which part of the UV square the maps cover, in texels of REFERENCE: `side` rows from `top` on and as many columns
+    from `left` on. The prior is told the coordinates of texel centres, or of their upper left corners (not `centred`),
+    and knows maps that are coarser by `factors`."""
 
     top: int = 0
     left: int = 0
@@ -44,12 +48,13 @@ class Extent:
 
 @dataclass(frozen=True)
 class Evidence:
-    """texture [3, S, S] linear; weight [S, S]: how far it counts, 0 where nobody looked; alpha [S, S]: the soft shadow mask M; normal [3, S, S], unit, world
-    space, N_c; covered bool [S, S]: texels of the head; skin [S, S]: facial skin without lips, brows, eyes and hair; trust [S, S]: 1, less where a texel's
-    colour says little of the light; protected [S, S]: what the artist keeps out of M; edge [S, S]: how far M's border lies on a shadow's edge that is
-    seen; taken [3]: the colour of what shadows take of the light, over its mean, zeros where that is not known; asked [S, S]: how far the
-    artist added to the proposal for M, None where the maps are in other UVs; missing [S, S]: the share of the light that M's border says is missing, None
-    where nobody asked it."""
+    """texture [3, S, S] linear; weight [S, S]: how far it counts, 0 where nobody looked; alpha [S, S]: the soft shadow
+    mask M; normal [3, S, S], unit, world space, N_c; covered bool [S, S]: texels of the head; skin [S, S]: facial skin
+    without lips, brows, eyes and hair; trust [S, S]: 1, less where a texel's colour says little of the light; protected
+    [S, S]: what the artist keeps out of M; edge [S, S]: how far M's border lies on a shadow's edge that is seen; taken
+    [3]: the colour of what shadows take of the light, over its mean, zeros where that is not known; asked [S, S]: how
+    far the artist added to the proposal for M, None where the maps are in other UVs; missing [S, S]: the share of the
+    light that M's border says is missing, None where nobody asked it."""
 
     texture: torch.Tensor
     weight: torch.Tensor
@@ -75,23 +80,28 @@ class Evidence:
         return self.extent.side / self.size
 
     def cell_side(self, grid_cells: int) -> float:
-        """The side of a cell of V, in texels where the whole map has REFERENCE, when settings.solve.grid_cells of them are asked for."""
+        """The side of a cell of V, in texels where the whole map has REFERENCE, when settings.solve.grid_cells of them
+        are asked for."""
         return FACE_CROP / grid_cells * REFERENCE / self.extent.side
 
 
 def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
-    """The capture's texture, confidence, head and masks at size x size. Raises Problem for what is missing, empty or of another shape."""
+    """The capture's texture, confidence, head and masks at size x size. Raises Problem for what is missing, empty or of
+    another shape."""
     texture = images.read_linear(capture.texture)
     confidence = images.read_data(capture.texture_confidence)[..., 0]
     if texture.shape[:2] != confidence.shape or texture.shape[0] != texture.shape[1]:
-        raise Problem(f"{capture.texture} is {texture.shape[1]} x {texture.shape[0]} pixels and {capture.texture_confidence.name} {confidence.shape[1]} x "
+        raise Problem(f"{capture.texture} is {texture.shape[1]} x {texture.shape[0]} pixels and "
+                      f"{capture.texture_confidence.name} {confidence.shape[1]} x "
                       f"{confidence.shape[0]}: they have to be alike and square.", "Run the texture stage again.")
     confidence, texture = np.clip(confidence, 0, 1), np.clip(texture, 0, None)
     if confidence.max() < 1e-3:
-        raise Problem("No texel of the texture was seen by any frame.", "Run the chain again from the cameras, and look at its report.")
+        raise Problem("No texel of the texture was seen by any frame.",
+                      "Run the chain again from the cameras, and look at its report.")
     hidden = read_hidden_skin(capture, size)
     seen, bearded = _sized(confidence, size), np.maximum(_sized(beard.seen_in(texture, confidence), size), hidden)
-    texture = _sized(texture * confidence[..., None], size) / np.maximum(seen, 1e-4)[..., None]  # what nobody saw must not darken its neighbours
+    # what nobody saw must not darken its neighbours
+    texture = _sized(texture * confidence[..., None], size) / np.maximum(seen, 1e-4)[..., None]
     if head.mesh.uvs is None:
         raise Problem("The head has no UV coordinates.", "Run the registration stage again.")
     covered = head.raster(size)[0] >= 0
@@ -100,21 +110,25 @@ def read_evidence(capture: Capture, head: Head, size: int) -> Evidence:
     normal = raster.bleed(head.interpolate(head.normals, size), covered)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
     mask, asked = _shadow_mask(capture, size)
-    protected = _sized(images.read_mask(capture.protect_mask), size) if capture.protect_mask.is_file() else np.zeros_like(mask)
+    protected = (_sized(images.read_mask(capture.protect_mask), size) if capture.protect_mask.is_file()
+                 else np.zeros_like(mask))
     alpha = softened(mask) * (1 - protected)
     skin = template.mask("skin", size) * template.mask("face", size)
     skin = skin * (1 - template.mask("eyes", size)) * (1 - hidden)
     weight = np.where(covered, np.clip(seen / TRUSTED, 0, 1), 0)
-    tensors = [np.ascontiguousarray(a, np.float32) for a in (texture.transpose(2, 0, 1), weight, np.where(covered, alpha, 0), normal.transpose(2, 0, 1))]
-    unlike_skin = np.maximum.reduce([template.mask(name, size) for name in ("brows", "lips", "eyes", "nostrils", "scalp")])
+    tensors = [np.ascontiguousarray(a, np.float32)
+               for a in (texture.transpose(2, 0, 1), weight, np.where(covered, alpha, 0), normal.transpose(2, 0, 1))]
+    unlike_skin = np.maximum.reduce([template.mask(name, size)
+                                     for name in ("brows", "lips", "eyes", "nostrils", "scalp")])
     trust = np.minimum(1 - (1 - FEATURE_TRUST) * unlike_skin, 1 - (1 - BEARD_TRUST) * bearded)
-    parts = [torch.from_numpy(np.ascontiguousarray(a, np.float32)) for a in (skin, trust, protected, np.zeros_like(alpha))]
+    parts = [torch.from_numpy(np.ascontiguousarray(a, np.float32))
+             for a in (skin, trust, protected, np.zeros_like(alpha))]
     return Evidence(*map(torch.from_numpy, tensors), torch.from_numpy(covered), *parts, asked=torch.from_numpy(asked))
 
 
 def _shadow_mask(capture: Capture, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """M [S, S] in [0, 1], the artist's before the proposal; and where the artist added to the proposal. That says more than a proposal, which takes dark
-    skin and beards along: there the light need not be held back."""
+    """M [S, S] in [0, 1], the artist's before the proposal; and where the artist added to the proposal. That says more
+    than a proposal, which takes dark skin and beards along: there the light need not be held back."""
     painted, proposed = capture.shadow_mask.is_file(), capture.shadow_mask_auto.is_file()
     mask = _sized(images.read_mask(capture.shadow_mask if painted else capture.shadow_mask_auto), size)
     proposal = _sized(images.read_mask(capture.shadow_mask_auto), size) if painted and proposed else mask
@@ -122,14 +136,16 @@ def _shadow_mask(capture: Capture, size: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def softened(mask: np.ndarray) -> np.ndarray:
-    """A mask [S, S] in [0, 1] whose hard borders fade over a few texels, as the light's do; faint remains become zero."""
+    """A mask [S, S] in [0, 1] whose hard borders fade over a few texels, as the light's do; faint remains become
+    zero."""
     faded = cv2.GaussianBlur(mask, (0, 0), max(MASK_FADE * len(mask) / REFERENCE, 0.3))
     return np.clip((faded - 0.02) / 0.96, 0, 1)
 
 
-def observations(evidence: Evidence, exposure: float, cell: float, multiple: int, recipe: Recipe) -> dict[int, Observation]:
-    """The evidence as the sampler takes it, per coarsening factor. The texture is multiplied by `exposure`; `cell` is a grid cell where the map has REFERENCE
-    texels.
+def observations(evidence: Evidence, exposure: float, cell: float, multiple: int,
+                 recipe: Recipe) -> dict[int, Observation]:
+    """The evidence as the sampler takes it, per coarsening factor. The texture is multiplied by `exposure`; `cell` is a
+    grid cell where the map has REFERENCE texels.
 
     Maps coarser than a quarter of REFERENCE are left out: the prior has not seen them.
     """
@@ -140,7 +156,8 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
         if factor > 1 and (size < REFERENCE // 4 or size % multiple or evidence.size % factor):
             continue
         weight, alpha, trust, edge, protected = (torch.from_numpy(_sized(a.numpy(), size))
-                                                 for a in (evidence.weight, evidence.alpha, evidence.trust, evidence.edge, evidence.protected))
+                                                 for a in (evidence.weight, evidence.alpha, evidence.trust,
+                                                           evidence.edge, evidence.protected))
         texture = _shrunk(evidence.texture * evidence.weight, size) / weight.clamp_min(1e-4) * exposure
         texture = blurred(texture) if recipe.blur else texture
         normal = torch.nn.functional.normalize(_shrunk(evidence.normal, size), dim=0)
@@ -148,14 +165,16 @@ def observations(evidence: Evidence, exposure: float, cell: float, multiple: int
         support = cv2.dilate(inside, np.ones((5, 5)))  # M and two texels around it
         ring = (support > 0) & ((inside == 0) if recipe.hard_mask else (alpha.numpy() < 0.5))
         ring &= edge.numpy() < 0.5  # a border that lies on a shadow's edge shall not be seamless
-        modulation = torch.from_numpy(support.astype(np.float32)) if recipe.hard_mask else alpha + recipe.open * (1 - alpha) * (1 - protected)
+        modulation = (torch.from_numpy(support.astype(np.float32)) if recipe.hard_mask
+                      else alpha + recipe.open * (1 - alpha) * (1 - protected))
         whole = size * REFERENCE // extent.side
         top, left = (start * whole // REFERENCE for start in (extent.top, extent.left))
         coords = coordinates(whole, slice(top, top + size), slice(left, left + size), extent.centred)
         shader = Shader(normal, modulation, cells, recipe.bilinear)
         held = 1.0 if evidence.asked is None else 1 - torch.from_numpy(_sized(evidence.asked.numpy(), size))
         missing = 0.0 if evidence.missing is None else torch.from_numpy(_sized(evidence.missing.numpy(), size))
-        found[factor] = Observation(texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size, held, missing)
+        found[factor] = Observation(texture, weight, trust, coords, shader, torch.from_numpy(ring), extent.side / size,
+                                    held, missing)
     return found
 
 
@@ -175,4 +194,5 @@ def _sized(image: np.ndarray, size: int) -> np.ndarray:
     if image.shape[:2] == (size, size):
         return image
     shrinks = size < image.shape[0]
-    return cv2.resize(np.ascontiguousarray(image), (size, size), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
+    return cv2.resize(np.ascontiguousarray(image), (size, size),
+                      interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the sampling starts from: a reference face of the skin tone (x_0^ref), and a global light that fits it (paper, "Initialization")."""
+"""What the sampling starts from: a reference face of the skin tone (x_0^ref), and a global light that fits it (paper,
+"Initialization")."""
 
 from __future__ import annotations
 
@@ -26,9 +27,10 @@ from .split import Shapes, enlarged, split
 
 @dataclass(frozen=True)
 class Start:
-    """tone: the skin's; recipe: the one that was asked for, as this capture's light lets it be used; reference x_0^ref [1, 7, S, S]; exposure: what the texture
-    is multiplied by in `observations` (by coarsening factor), so that its shading is about one; alpha [S, S]: M as it is used; state: before the first step;
-    marks: what of the skin's own is kept from the light; local [3, C, C], natural log: what other captures of the person tell of the light beside theta,
+    """tone: the skin's; recipe: the one that was asked for, as this capture's light lets it be used; reference x_0^ref
+    [1, 7, S, S]; exposure: what the texture is multiplied by in `observations` (by coarsening factor), so that its
+    shading is about one; alpha [S, S]: M as it is used; state: before the first step; marks: what of the skin's own is
+    kept from the light; local [3, C, C], natural log: what other captures of the person tell of the light beside theta,
     zeros without any."""
 
     tone: SkinTone
@@ -44,8 +46,8 @@ class Start:
 
 def start(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, recipe: Recipe,
           witness: Callable[[list[Mark]], list[Mark]] = list, others: Sequence[Evidence] = ()) -> Start:
-    """All that a run begins with. `cell` is a cell of V in texels of a 1024 map; `witness` leaves those marks that the views confirm; `others` are what is
-    known of other captures of the same person.
+    """All that a run begins with. `cell` is a cell of V in texels of a 1024 map; `witness` leaves those marks that the
+    views confirm; `others` are what is known of other captures of the same person.
 
     Raises Problem where no facial skin was seen.
     """
@@ -54,14 +56,17 @@ def start(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, recipe:
     exposure = exposure_to(albedo_of(x_ref), evidence.texture, lit)
     trusted = evidence.weight * (1 if recipe.trusting else evidence.trust)
     weight = trusted * (1 - evidence.alpha) if recipe.fitted else lit  # one even light is best told by skin
-    lights = first_lights(evidence.texture * exposure, albedo_of(x_ref), evidence.normal, weight if weight.sum() >= 1 else trusted, grid_cells(cell), recipe)
+    lights = first_lights(evidence.texture * exposure, albedo_of(x_ref), evidence.normal,
+                          weight if weight.sum() >= 1 else trusted, grid_cells(cell), recipe)
     local = torch.zeros(3, 1, 1)
     if recipe.linear:
-        told = split([shapes_of(each, albedo_of(reference(prior, tone, each, recipe.reference))) for each in (evidence, *others)])
+        told = split([shapes_of(each, albedo_of(reference(prior, tone, each, recipe.reference)))
+                      for each in (evidence, *others)])
         light = told.light(evidence.normal)
         if deviation(light.log(), lit) < recipe.linear:
             recipe = settled(recipe)
-            lights.glob = fit_around_constant(light, torch.ones_like(light), shading_basis(evidence.normal), evidence.skin * evidence.weight, 1e-3)
+            lights.glob = fit_around_constant(light, torch.ones_like(light), shading_basis(evidence.normal),
+                                              evidence.skin * evidence.weight, 1e-3)
             if others:  # one capture alone cannot tell a light of this form from a trait
                 local = torch.from_numpy(told.local)
         else:
@@ -72,37 +77,47 @@ def start(prior: Prior, evidence: Evidence, tone: SkinTone, cell: float, recipe:
 
 def again(prior: Prior, evidence: Evidence, earlier: Solution, cell: float, recipe: Recipe, near: torch.Tensor,
           witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
-    """What a part of an earlier solve goes on from: that solve's tone, exposure and light, and where `near` [S, S] is 0 its mask too."""
+    """What a part of an earlier solve goes on from: that solve's tone, exposure and light, and where `near` [S, S] is 0
+    its mask too."""
     x_ref = reference(prior, earlier.tone, evidence, recipe.reference)
     recipe = settled(recipe) if earlier.settled else free(recipe)
-    begun = Start(earlier.tone, recipe, x_ref, earlier.exposure, evidence.alpha, {}, State(0, None, earlier.denoised, earlier.lights), local=earlier.local)
+    begun = Start(earlier.tone, recipe, x_ref, earlier.exposure, evidence.alpha, {},
+                  State(0, None, earlier.denoised, earlier.lights), local=earlier.local)
     return _laid_out(prior, evidence, begun, cell, lambda alpha: torch.lerp(earlier.alpha, alpha, near), witness)
 
 
 def _laid_out(prior: Prior, evidence: Evidence, begun: Start, cell: float,
-              mask: Callable[[torch.Tensor], torch.Tensor] = lambda alpha: alpha, witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
+              mask: Callable[[torch.Tensor], torch.Tensor] = lambda alpha: alpha,
+              witness: Callable[[list[Mark]], list[Mark]] = list) -> Start:
     """`begun` with M as it is used, the marks that light must not explain, and the observations under both."""
-    evidence, recipe = replace(evidence, texture=evidence.texture / enlarged(begun.local, evidence.size).exp()), begun.recipe
-    lit = torch.einsum("ck,khw->chw", begun.state.lights.glob, shading_basis(evidence.normal)) * albedo_of(begun.reference).clamp_min(1e-3)
+    evidence, recipe = replace(evidence,
+                               texture=evidence.texture / enlarged(begun.local, evidence.size).exp()), begun.recipe
+    lit = torch.einsum("ck,khw->chw", begun.state.lights.glob,
+                       shading_basis(evidence.normal)) * albedo_of(begun.reference).clamp_min(1e-3)
     light = evidence.texture * begun.exposure / lit.clamp_min(1e-3)
     if recipe.sharp_edges:
         evidence = with_edges(evidence, light, evidence.weight * (1 if recipe.trusting else evidence.trust))
     evidence = replace(evidence, alpha=mask(evidence.alpha))
     if recipe.faint:
-        evidence = replace(evidence, missing=missing(light, evidence.alpha, evidence.weight * evidence.trust * evidence.skin, evidence.texel))
+        evidence = replace(evidence,
+                           missing=missing(light, evidence.alpha, evidence.weight * evidence.trust * evidence.skin,
+                                           evidence.texel))
     marks: list[Mark] = []
     if recipe.protect_marks:
         evidence, marks = with_marks(evidence, witness)
-    return replace(begun, alpha=evidence.alpha, marks=tuple(marks), observations=observations(evidence, begun.exposure, cell, prior.multiple, recipe))
+    return replace(begun, alpha=evidence.alpha, marks=tuple(marks),
+                   observations=observations(evidence, begun.exposure, cell, prior.multiple, recipe))
 
 
 def lit_skin(evidence: Evidence) -> torch.Tensor:
-    """[S, S]: how far a texel tells of the skin in the light, 0 in shadows. Raises Problem where no facial skin was seen."""
+    """[S, S]: how far a texel tells of the skin in the light, 0 in shadows. Raises Problem where no facial skin was
+    seen."""
     lit = evidence.skin * evidence.weight * (1 - evidence.alpha)
     if lit.sum() < 1:  # everything on the face is masked: the least evil is to trust it all
         lit = evidence.skin * evidence.weight
     if lit.sum() < 1:
-        raise Problem("No facial skin was seen in the texture.", "Look at the texture in the report; film the face from the front and from both sides.")
+        raise Problem("No facial skin was seen in the texture.",
+                      "Look at the texture in the report; film the face from the front and from both sides.")
     return lit
 
 
@@ -118,7 +133,8 @@ def exposure_to(albedo: torch.Tensor, texture: torch.Tensor, weight: torch.Tenso
 
 
 def shapes_of(evidence: Evidence, albedo: torch.Tensor) -> Shapes:
-    """What `split` takes of a capture: facial skin outside of M, and brows, lips and beards as little as light may explain them."""
+    """What `split` takes of a capture: facial skin outside of M, and brows, lips and beards as little as light may
+    explain them."""
     told = lit_skin(evidence) * evidence.trust
     return Shapes(evidence.texture * exposure_to(albedo, evidence.texture, told), albedo, evidence.normal, told)
 
@@ -129,8 +145,8 @@ def mean_tone(albedo: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
 
 
 def reference(prior: Prior, tone: SkinTone, evidence: Evidence, kind: str) -> torch.Tensor:
-    """x_0^ref [1, 7, S, S] of the tone: the prior's mean face; the one of its reference skins that explains the texture best ("nearest"); or the tone
-    everywhere ("uniform", and where the prior has neither)."""
+    """x_0^ref [1, 7, S, S] of the tone: the prior's mean face; the one of its reference skins that explains the texture
+    best ("nearest"); or the tone everywhere ("uniform", and where the prior has neither)."""
     if prior.mean_face is None or kind == "uniform":
         return uniform_skin(tone.tensor, evidence.size)
     if kind == "mean" or prior.references is None:
@@ -139,13 +155,15 @@ def reference(prior: Prior, tone: SkinTone, evidence: Evidence, kind: str) -> to
 
     def unexplained(face: torch.Tensor) -> float:
         light = first_lights(evidence.texture, albedo_of(face), evidence.normal, weight, (1, 1), OURS).glob
-        return float((((evidence.texture - albedo_of(face) * torch.einsum("ck,khw->chw", light, basis)) * weight) ** 2).sum())
+        return float((((evidence.texture - albedo_of(face) * torch.einsum("ck,khw->chw", light, basis))
+                       * weight) ** 2).sum())
 
     return min((face_of_tone(skin, tone.tensor, evidence.skin) for skin in prior.references), key=unexplained)
 
 
 def face_of_tone(face: torch.Tensor, tone: torch.Tensor, skin: torch.Tensor) -> torch.Tensor:
-    """A face [7, R, R] in the form of the prior's mean face as x [1, 7, S, S], the mean of its skin [S, S] brought to the tone, linear [3]."""
+    """A face [7, R, R] in the form of the prior's mean face as x [1, 7, S, S], the mean of its skin [S, S] brought to
+    the tone, linear [3]."""
     size = skin.shape[0]
     out = mean_at(face.to(tone.device), coordinates(size, slice(0, size), slice(0, size)), tone[None])
     albedo = albedo_of(out)
@@ -160,11 +178,13 @@ def uniform_skin(tone: torch.Tensor, size: int) -> torch.Tensor:
     return out
 
 
-def first_lights(texture: torch.Tensor, albedo: torch.Tensor, normal: torch.Tensor, weight: torch.Tensor, cells: tuple[int, int],
-                 recipe: Recipe) -> Lights:
-    """theta to start with: gamma^g fitted to the reference outside the shadow (closed form, around the constant light) or the constant light, V zero.
+def first_lights(texture: torch.Tensor, albedo: torch.Tensor, normal: torch.Tensor, weight: torch.Tensor,
+                 cells: tuple[int, int], recipe: Recipe) -> Lights:
+    """theta to start with: gamma^g fitted to the reference outside the shadow (closed form, around the constant light)
+    or the constant light, V zero.
 
-    texture, albedo, normal [3, H, W]; weight [H, W], zero inside M. One chroma for all local light is the global light's at first.
+    texture, albedo, normal [3, H, W]; weight [H, W], zero inside M. One chroma for all local light is the global
+    light's at first.
     """
     shade = mean_tone(texture, weight) / mean_tone(albedo, weight).clamp_min(1e-4)
     glob = constant_light(shade)

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The colour of eyes that were open: what a frame shows of an iris, over what it shows of the skin around that eye, whose albedo the solve has found.
+"""The colour of eyes that were open: what a frame shows of an iris, over what it shows of the skin around that eye,
+whose albedo the solve has found.
 
-So the white point, the exposure and most of the light divide out, frame by frame. Where the iris lies in a frame the eye network says. What is a highlight, a
-lash's shadow or a blink in some frames, or in a part of the iris, the median leaves out.
+So the white point, the exposure and most of the light divide out, frame by frame. Where the iris lies in a frame the
+eye network says. What is a highlight, a lash's shadow or a blink in some frames, or in a part of the iris, the median
+leaves out.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ from .witnesses import visible
 RING = 0.55, 0.85
 """Shares of the iris' radius between which it is iris: a pupil is seldom wider than half, and the rim is darker."""
 FACING = 0.75
-"""Least cosine between the gaze and the way to the camera: beyond 40 degrees the cornea's edge bends what is behind it."""
+"""Least cosine between the gaze and the way to the camera: beyond 40 degrees the cornea's edge bends what is behind
+it."""
 REACH = 2.6
 """Radii of the eyeball within which skin is lit as the eye is."""
 TURNED = 0.5
@@ -36,7 +39,8 @@ MOST_VIEWS = 10
 
 
 def measure(capture: Capture, head: Head, albedo: np.ndarray, report: Reporter) -> None:
-    """maps/irises.json from the frames and a linear albedo [S, S, 3] of the head's UVs; none where the eyes were closed or no frame shows them well.
+    """maps/irises.json from the frames and a linear albedo [S, S, 3] of the head's UVs; none where the eyes were closed
+    or no frame shows them well.
 
     Raises Problem for damaged records.
     """
@@ -55,8 +59,10 @@ def measure(capture: Capture, head: Head, albedo: np.ndarray, report: Reporter) 
         report.figure(f"{side}_iris_srgb", [round(float(v), 3) for v in images.linear_to_srgb(np.array(colour))])
 
 
-def iris_colour(views: list[View], head: Head, side: int, eye: Eyeball, albedo: np.ndarray, report: Reporter) -> Colour | None:
-    """Linear albedo of the left (0) or the right iris, by the median over it and the frames that face it most; None where none shows it."""
+def iris_colour(views: list[View], head: Head, side: int, eye: Eyeball, albedo: np.ndarray,
+                report: Reporter) -> Colour | None:
+    """Linear albedo of the left (0) or the right iris, by the median over it and the frames that face it most; None
+    where none shows it."""
     skin, known = _skin_around(head, eye, albedo)
     if len(skin) < FEWEST:
         return None

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The UVs that a released prior was trained in: the evidence is taken there from the built-in head's maps, and the solved maps back.
+"""The UVs that a released prior was trained in: the evidence is taken there from the built-in head's maps, and the
+solved maps back.
 
-The artist's own fitted mesh brings these UVs; nothing here knows which mesh it is. The released code works on a window of the map, and the bounds of
-its masks lie in it (their soft shapes are not at hand).
+The artist's own fitted mesh brings these UVs; nothing here knows which mesh it is. The released code works on a window
+of the map, and the bounds of its masks lie in it (their soft shapes are not at hand).
 """
 
 from __future__ import annotations
@@ -30,20 +31,21 @@ from .skin_tone import SkinTone
 WINDOW = Extent(64, 128, 768, centred=False, factors=(1,))
 Box = tuple[int, int, int, int]
 TONE, FACE, SHADOW = (289, 399, 470, 554), (131, 764, 177, 842), (225, 594, 248, 778)
-"""First and last row, first and last column at 1024, ends excluded: where the released code takes the skin tone, where its face mask and the mask that
-bounds shadows have their support."""
+"""First and last row, first and last column at 1024, ends excluded: where the released code takes the skin tone, where
+its face mask and the mask that bounds shadows have their support."""
 FAR_M = 0.012
 """Farthest that the two fitted heads may lie apart."""
 FADE = 24.0
 """Texels of a 1024 map over which the solved maps end where the window does."""
-REMEDY = ("Choose ICT-FaceKit's folder with the neutral mesh as template (under Reconstruction, Head; or --template) and run the stage registration again, "
+REMEDY = ("Choose ICT-FaceKit's folder with the neutral mesh as template (under Reconstruction, Head; or --template) "
+          "and run the stage registration again, "
           "or leave the prior empty to use ours.")
 
 
 @dataclass(frozen=True)
 class Layout:
-    """there [C, C]: where the window's texels lie in the built-in head's maps; back [S, S]: where that head's texels lie in the window's maps;
-    face: the mean face of our prior, in the built-in UVs."""
+    """there [C, C]: where the window's texels lie in the built-in head's maps; back [S, S]: where that head's texels
+    lie in the window's maps; face: the mean face of our prior, in the built-in UVs."""
 
     there: baking.TexelPartners
     back: baking.TexelPartners
@@ -53,26 +55,33 @@ class Layout:
         """Our prior's mean face in the window [7, C, C]."""
         face = _picture(self.face)
         normal = 2 * baking.bake_normals(face[..., 3:6] / 2 + 0.5, self.there) - 1
-        return _planes(np.dstack([baking.bake(face[..., :3], self.there), normal, baking.bake(face[..., 6], self.there)]))
+        return _planes(np.dstack([baking.bake(face[..., :3], self.there), normal,
+                                  baking.bake(face[..., 6], self.there)]))
 
     def evidence(self, e: Evidence, boxes: bool) -> Evidence:
-        """The evidence in the window; with `boxes` the tone, the texture and M count within the released masks' bounds alone."""
+        """The evidence in the window; with `boxes` the tone, the texture and M count within the released masks' bounds
+        alone."""
         weight = self._there(e.weight) * torch.from_numpy(self.there.known)
-        found = {f.name: self._there(getattr(e, f.name)) for f in fields(e) if isinstance(getattr(e, f.name), torch.Tensor)}
-        found |= {"texture": self._there(e.texture * e.weight) / self._there(e.weight).clamp_min(1e-4), "weight": weight, "extent": WINDOW,
-                  "normal": torch.nn.functional.normalize(found["normal"], dim=0), "covered": torch.from_numpy(self.there.known)}
+        found = {f.name: self._there(getattr(e, f.name)) for f in fields(e)
+                 if isinstance(getattr(e, f.name), torch.Tensor)}
+        found |= {"texture": self._there(e.texture * e.weight) / self._there(e.weight).clamp_min(1e-4),
+                  "weight": weight, "extent": WINDOW,
+                  "normal": torch.nn.functional.normalize(found["normal"], dim=0),
+                  "covered": torch.from_numpy(self.there.known)}
         if boxes:
             tone, face, shadow = (_box(box, len(weight)) for box in (TONE, FACE, SHADOW))
             found |= {"skin": tone, "weight": weight * face, "alpha": found["alpha"] * shadow}
         return replace(e, **found)
 
     def returned(self, solved: Maps, e: Evidence, lights: Lights, exposure: float, tone: SkinTone) -> Maps:
-        """The window's maps in the built-in UVs. Beyond the window the albedo is the texture under the solved global light, or our mean face of that tone
-        where nobody looked, without confidence. e: the evidence in the built-in UVs."""
+        """The window's maps in the built-in UVs. Beyond the window the albedo is the texture under the solved global
+        light, or our mean face of that tone where nobody looked, without confidence. e: the evidence in the built-in
+        UVs."""
         inside = self._inside()
         side = 2 * (torch.arange(e.size) + 0.5) / e.size - 1
         mean = mean_at(self.face, torch.stack(torch.meshgrid(side, side, indexing="xy"))[None], tone.tensor[None])[0]
-        light = torch.einsum("ck,khw->chw", lights.glob, shading_basis(e.normal)).clamp_min(1e-2) / exposure / solved.gain[:, None, None]
+        light = torch.einsum("ck,khw->chw", lights.glob,
+                             shading_basis(e.normal)).clamp_min(1e-2) / exposure / solved.gain[:, None, None]
         seen = torch.lerp((mean[:3] + 1) / 2, e.texture / light, e.weight.sqrt()).clamp(DARKEST, 1)
 
         def joined(baked: np.ndarray, beyond: np.ndarray) -> np.ndarray:
@@ -81,27 +90,32 @@ class Layout:
 
         normal = joined(baking.bake_normals(solved.normal, self.back), _picture(mean[3:6]) / 2 + 0.5) * 2 - 1
         normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-        return replace(solved, diffuse=joined(baking.bake(solved.diffuse, self.back), _picture(seen)), normal=(normal / 2 + 0.5).astype(np.float32),
+        return replace(solved, diffuse=joined(baking.bake(solved.diffuse, self.back), _picture(seen)),
+                       normal=(normal / 2 + 0.5).astype(np.float32),
                        specular=joined(baking.bake(solved.specular, self.back), ((mean[6] + 1) / 2).numpy()),
                        shading=joined(baking.bake(solved.shading, self.back), _picture(light)),
-                       confidence=np.where(self.back.known, inside * baking.bake(solved.confidence, self.back), 0).astype(np.float32))
+                       confidence=np.where(self.back.known, inside * baking.bake(solved.confidence, self.back),
+                                           0).astype(np.float32))
 
     def _inside(self) -> np.ndarray:
-        """[S, S]: 1 within the window's reach, falling to 0 at its border. Small holes, as in the folds of lids and lips, are no border: they are bled over."""
+        """[S, S]: 1 within the window's reach, falling to 0 at its border. Small holes, as in the folds of lids and
+        lips, are no border: they are bled over."""
         texel = len(self.back.known) / REFERENCE
         missing = (self.back.covered & ~self.back.known).astype(np.uint8)
-        missing = cv2.morphologyEx(missing, cv2.MORPH_OPEN, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * round(FADE / 2 * texel) + 1,) * 2))
+        missing = cv2.morphologyEx(missing, cv2.MORPH_OPEN,
+                                   cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * round(FADE / 2 * texel) + 1,) * 2))
         return np.clip(cv2.distanceTransform(1 - missing, cv2.DIST_L2, 5) / (FADE * texel), 0, 1)
 
     def fits(self, facial: np.ndarray) -> bool:
-        """Whether this is how the prior's UVs show a face: upright, not mirrored, all but the rim of it in the window, and skin in the box of the tone.
-        facial [S, S]: the built-in head's facial skin without lips, brows and eyes."""
+        """Whether this is how the prior's UVs show a face: upright, not mirrored, all but the rim of it in the window,
+        and skin in the box of the tone. facial [S, S]: the built-in head's facial skin without lips, brows and eyes."""
         known = self.there.known
         row, column = np.indices(known.shape)
         u, v = self.there.uv[known].T
         upright = len(u) > 2 and np.corrcoef(u, column[known])[0, 1] > 0.7 and np.corrcoef(v, -row[known])[0, 1] > 0.7
         box = _box(TONE, len(known)).numpy() > 0
-        return bool(upright and self.back.known[facial > 0.5].mean() > 0.8 and baking.bake(facial, self.there)[box].mean() > 0.5)
+        return bool(upright and self.back.known[facial > 0.5].mean() > 0.8
+                    and baking.bake(facial, self.there)[box].mean() > 0.5)
 
     def _there(self, maps: torch.Tensor) -> torch.Tensor:
         """A map [S, S] or [C, S, S] of the built-in UVs in the window."""
@@ -111,14 +125,16 @@ class Layout:
 
 
 def whole_size(asked: int, multiple: int) -> int:
-    """The largest size up to `asked` (but one step at least) of which the window is a whole number of the network's `multiple` of texels."""
+    """The largest size up to `asked` (but one step at least) of which the window is a whole number of the network's
+    `multiple` of texels."""
     step = 16 * multiple // math.gcd(12, multiple)
     return max(asked // step, 1) * step
 
 
 def fitted(capture: Capture, head: Head, e: Evidence, prior: Prior, report: Reporter) -> tuple[Layout, Prior]:
-    """The layout of the own head that lies in the capture, at the evidence's size, and a released prior with what it lacks to start from: the mean face
-    of ours, and the tones of skins. Raises Problem where there is no own head, or its UVs are not the prior's."""
+    """The layout of the own head that lies in the capture, at the evidence's size, and a released prior with what it
+    lacks to start from: the mean face of ours, and the tones of skins. Raises Problem where there is no own head, or
+    its UVs are not the prior's."""
     if not (capture.own_head.is_file() and capture.own_head_skin.is_file()):
         raise Problem("The authors' prior works in the UVs of another head, and none was fitted to this face.", REMEDY)
     own = meshes.read_obj(capture.own_head)
@@ -126,18 +142,22 @@ def fitted(capture: Capture, head: Head, e: Evidence, prior: Prior, report: Repo
     for first, end in runs:
         skin[first:end] = True
     skin &= (atlas.tiles(own) == 0).all(1)
-    strange = Problem(f"The UVs of the fitted template {template} are not those the authors' prior was trained in.", REMEDY)
+    strange = Problem(f"The UVs of the fitted template {template} are not those the authors' prior was trained in.",
+                      REMEDY)
     if not skin.any():
         raise strange
     ours = load()
-    layout = between(head.mesh, own, skin, e.size, ours.mean_face, lambda done: report.progress(done, 100, "laying the prior's UVs over the head"))
+    layout = between(head.mesh, own, skin, e.size, ours.mean_face,
+                     lambda done: report.progress(done, 100, "laying the prior's UVs over the head"))
     if not layout.fits(e.skin.numpy()):
         raise strange
     return layout, prior.with_face(layout.mean_face(), ours.tones)
 
 
-def between(head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int, face: torch.Tensor, tick: Callable[[float], None]) -> Layout:
-    """The layout of `own`, which lies on `head`, for maps of size x size. skin bool [F]: its triangles that count; face: Layout's."""
+def between(head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int, face: torch.Tensor,
+            tick: Callable[[float], None]) -> Layout:
+    """The layout of `own`, which lies on `head`, for maps of size x size. skin bool [F]: its triangles that count;
+    face: Layout's."""
     there = baking.places(own, (0, 0), baking.Source(head), size, FAR_M, tick, skin)
     top, left, side = (v * size // REFERENCE for v in (WINDOW.top, WINDOW.left, WINDOW.side))
     part = np.s_[top:top + side, left:left + side]
@@ -151,7 +171,8 @@ def between(head: meshes.Mesh, own: meshes.Mesh, skin: np.ndarray, size: int, fa
 
 def _box(box: Box, side: int) -> torch.Tensor:
     """[side, side]: 1 in a box of the 1024 map, seen in the window."""
-    top, bottom, left, right = (round((v - start) * side / WINDOW.side) for v, start in zip(box, (WINDOW.top,) * 2 + (WINDOW.left,) * 2, strict=True))
+    top, bottom, left, right = (round((v - start) * side / WINDOW.side)
+                                for v, start in zip(box, (WINDOW.top,) * 2 + (WINDOW.left,) * 2, strict=True))
     inside = torch.zeros(side, side)
     inside[top:bottom, left:right] = 1
     return inside

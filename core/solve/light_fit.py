@@ -17,9 +17,10 @@ MOVING = {"both": (0, 1, 2), "main": (0,), "grid": (1, 2), "cells": (1,)}
 """Which of Lights.parameters() a phase moves."""
 
 
-def update_lights(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe, step: int, steps: int, loss: Callable | None = None) -> None:
-    """The light updates that belong to one sampling step, in place: none, one or several of the phase that this step is in; by `loss` instead of
-    `light_loss` where given.
+def update_lights(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe, step: int, steps: int,
+                  loss: Callable | None = None) -> None:
+    """The light updates that belong to one sampling step, in place: none, one or several of the phase that this step is
+    in; by `loss` instead of `light_loss` where given.
 
     How many there were before follows from the step's number, so a stored state continues exactly.
     """
@@ -34,8 +35,8 @@ def update_lights(state: State, denoised: torch.Tensor, o: Observation, recipe: 
 
 
 def _refit(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe) -> None:
-    """gamma^g in closed form from what is seen outside of M under \\hat x_t. While there is much noise that map is what the prior expects, and no light but
-    the true one makes it fit; later it would agree with whatever light there is."""
+    """gamma^g in closed form from what is seen outside of M under \\hat x_t. While there is much noise that map is what
+    the prior expects, and no light but the true one makes it fit; later it would agree with whatever light there is."""
     weight = o.weight * (1 - o.shader.alpha) * (1.0 if recipe.trusting else o.trust)
     fitted = fit_around_constant(o.texture, albedo(denoised), o.shader.basis, weight, 0.01)
     state.lights.glob = torch.where(weight.sum() >= 1, fitted, state.lights.glob)
@@ -56,10 +57,12 @@ def light_loss(lights: Lights, denoised: torch.Tensor, o: Observation, recipe: R
     elif recipe.tv:
         loss = loss + recipe.tv * variation(shading[(slice(None), *o.shader.box)], o.ring[o.shader.box])
     if recipe.faint:
-        held, missing = (value[o.shader.box] if isinstance(value, torch.Tensor) else value for value in (o.held, o.missing))
+        held, missing = (value[o.shader.box] if isinstance(value, torch.Tensor) else value
+                         for value in (o.held, o.missing))
         loss = loss + recipe.faint * brightness * (held * (local + missing * o.shader.box_alpha) ** 2).sum()
     if recipe.smooth:
-        free = o.shader.unmodulated(lights) if recipe.sharp_edges else local  # a shadow's own edge is in M and costs nothing
+        # a shadow's own edge is in M and costs nothing
+        free = o.shader.unmodulated(lights) if recipe.sharp_edges else local
         loss = loss + recipe.smooth * brightness / o.texel * variation(free, o.shader.box_alpha)
     return loss
 
@@ -69,11 +72,14 @@ def variation(image: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
     return (image.diff(dim=1).abs() * weight[1:]).sum() + (image.diff(dim=2).abs() * weight[:, 1:]).sum()
 
 
-def _adam(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe, moving: tuple[int, ...], before: int, loss: Callable) -> None:
-    """One step of Adam on the parameters `moving`, the `before`+1st of its phase, with an exponentially decaying rate."""
+def _adam(state: State, denoised: torch.Tensor, o: Observation, recipe: Recipe, moving: tuple[int, ...], before: int,
+          loss: Callable) -> None:
+    """One step of Adam on the parameters `moving`, the `before`+1st of its phase, with an exponentially decaying
+    rate."""
     lights = state.lights.requires_grad_(True)
     parameters = lights.parameters()
-    gradients = torch.autograd.grad(loss(lights, denoised, o, recipe), [parameters[k] for k in moving], allow_unused=True)
+    gradients = torch.autograd.grad(loss(lights, denoised, o, recipe), [parameters[k] for k in moving],
+                                    allow_unused=True)
     lights.requires_grad_(False)
     if not state.moments:
         state.moments = [torch.zeros_like(p) for p in parameters for _ in range(2)]

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The light: second-order spherical harmonics for the whole face, and a texel grid of local ones inside the shadow mask (paper, section 3.3).
+"""The light: second-order spherical harmonics for the whole face, and a texel grid of local ones inside the shadow mask
+(paper, section 3.3).
 
-Shading is linear and multiplies the albedo. Coefficients are those of the authors' code, `spherical_harmonics.GAMMA_BANDS`.
+Shading is linear and multiplies the albedo. Coefficients are those of the authors' code,
+`spherical_harmonics.GAMMA_BANDS`.
 """
 
 from __future__ import annotations
@@ -17,7 +19,8 @@ from ..light.spherical_harmonics import GAMMA_BANDS, sh_basis
 
 
 def shading_basis(normal: torch.Tensor) -> torch.Tensor:
-    """Shading of each unit coefficient of gamma for normals [3, ...] -> [9, ...]; lengths other than one enter the polynomials as they are."""
+    """Shading of each unit coefficient of gamma for normals [3, ...] -> [9, ...]; lengths other than one enter the
+    polynomials as they are."""
     return sh_basis(normal, GAMMA_BANDS, axis=0)
 
 
@@ -25,8 +28,8 @@ def shading_basis(normal: torch.Tensor) -> torch.Tensor:
 class Lights:
     """theta: the parameters of Gamma, all float32.
 
-    glob: gamma^g [3, 9]. grid: V [G, 9, h, w] with G = 3 colours, or G = 1 where one learned `chroma` [3] colours all local light:
-    where the sun is blocked, light of one chromaticity is missing.
+    glob: gamma^g [3, 9]. grid: V [G, 9, h, w] with G = 3 colours, or G = 1 where one learned `chroma` [3] colours all
+    local light: where the sun is blocked, light of one chromaticity is missing.
     """
 
     glob: torch.Tensor
@@ -49,8 +52,8 @@ class Lights:
 class Shader:
     """Gamma_theta for one map: the fixed parts of the shading of every texel, prepared once.
 
-    normal [3, H, W], alpha [H, W] the soft shadow mask M, cells (h, w) of the grid. The grid covers the map edge to edge and is read by a
-    cubic kernel, or a bilinear one.
+    normal [3, H, W], alpha [H, W] the soft shadow mask M, cells (h, w) of the grid. The grid covers the map edge to
+    edge and is read by a cubic kernel, or a bilinear one.
     """
 
     def __init__(self, normal: torch.Tensor, alpha: torch.Tensor, cells: tuple[int, int], bilinear: bool = False):
@@ -59,7 +62,8 @@ class Shader:
         height, width = alpha.shape
         rows, columns = (torch.nonzero(alpha.sum(1 - axis) > 0)[:, 0] for axis in (0, 1))
         self.empty = len(rows) == 0
-        # local light exists only where M does: everything about it is computed on M's bounding box, one texel wider for the ring's differences
+        # local light exists only where M does: everything about it is computed on M's bounding box, one texel wider for
+        # the ring's differences
         self.box = (slice(0, 1), slice(0, 1)) if self.empty else tuple(
             slice(max(int(i[0]) - 3, 0), min(int(i[-1]) + 4, size)) for i, size in ((rows, height), (columns, width)))
         self.up_rows = interpolation(cells[0], height, bilinear).to(normal)[self.box[0]]  # [h', h]
@@ -70,7 +74,8 @@ class Shader:
     def to(self, device: torch.device | str) -> Shader:
         """The same shader on another device."""
         moved = copy.copy(self)
-        moved.__dict__.update({name: value.to(device) for name, value in vars(self).items() if isinstance(value, torch.Tensor)})
+        moved.__dict__.update({name: value.to(device) for name, value in vars(self).items()
+                               if isinstance(value, torch.Tensor)})
         return moved
 
     def part(self, rows: slice, columns: slice, cells: tuple[slice, slice]) -> Shader:
@@ -104,7 +109,8 @@ class Shader:
 
 
 def interpolation(cells: int, texels: int, bilinear: bool = False) -> torch.Tensor:
-    """The matrix [texels, cells] that resamples a line by the cubic kernel (a = -0.5) or the linear one, half-pixel centres, borders repeated.
+    """The matrix [texels, cells] that resamples a line by the cubic kernel (a = -0.5) or the linear one, half-pixel
+    centres, borders repeated.
 
     To shrink, the kernel widens with the step (antialiasing).
     """
@@ -122,10 +128,12 @@ def interpolation(cells: int, texels: int, bilinear: bool = False) -> torch.Tens
     return torch.from_numpy(matrix).float()
 
 
-def fit_global(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor, weight: torch.Tensor, ridge: float = 1e-3) -> torch.Tensor:
+def fit_global(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor, weight: torch.Tensor,
+               ridge: float = 1e-3) -> torch.Tensor:
     """gamma^g [3, 9] that minimises sum weight^2 (texture - albedo * shading)^2 in closed form.
 
-    texture, albedo linear [3, H, W]; basis [9, H, W]; weight [H, W]. `ridge` times the mean diagonal keeps coefficients that no normal sees at zero.
+    texture, albedo linear [3, H, W]; basis [9, H, W]; weight [H, W]. `ridge` times the mean diagonal keeps coefficients
+    that no normal sees at zero.
     """
     exact = torch.float32 if basis.device.type == "mps" else torch.float64  # Apple's GPUs have no float64
     columns = basis.reshape(9, -1).to(exact)
@@ -133,13 +141,17 @@ def fit_global(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor,
     out = []
     for t, a in zip(texture.reshape(3, -1).to(exact), albedo.reshape(3, -1).to(exact), strict=True):
         normal_matrix = (columns * (w2 * a * a)) @ columns.T
-        damping = ridge * normal_matrix.diagonal().mean().clamp_min(1e-12) * torch.eye(9, dtype=exact, device=basis.device)
-        out.append(torch.linalg.solve_ex(normal_matrix + damping, (columns * (w2 * a)) @ t)[0])  # `solve` asks the device whether it went well
+        damping = ridge * normal_matrix.diagonal().mean().clamp_min(1e-12) * torch.eye(9, dtype=exact,
+                                                                                       device=basis.device)
+        # `solve` asks the device whether it went well
+        out.append(torch.linalg.solve_ex(normal_matrix + damping, (columns * (w2 * a)) @ t)[0])
     return torch.stack(out).float()
 
 
-def fit_around_constant(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor, weight: torch.Tensor, ridge: float) -> torch.Tensor:
-    """`fit_global`, but what no normal sees, and what `ridge` holds back, is drawn to the even light that gives the texture's mean colour."""
+def fit_around_constant(texture: torch.Tensor, albedo: torch.Tensor, basis: torch.Tensor, weight: torch.Tensor,
+                        ridge: float) -> torch.Tensor:
+    """`fit_global`, but what no normal sees, and what `ridge` holds back, is drawn to the even light that gives the
+    texture's mean colour."""
     total = weight.sum().clamp_min(1e-6)
     even = constant_light((texture * weight).sum((1, 2)) / (albedo * weight).sum((1, 2)).clamp_min(1e-4 * total))
     return even + fit_global(texture - albedo * torch.einsum("ck,khw->chw", even, basis), albedo, basis, weight, ridge)

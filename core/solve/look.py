@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a camera shows of a person's skin, in three colours: the best lit skin, the skin that faces as the face does, and all that is not the person.
+"""What a camera shows of a person's skin, in three colours: the best lit skin, the skin that faces as the face does,
+and all that is not the person.
 
-Over a capture's views each point of the head has one colour, a low quantile of what the views show: highlights move with the camera, the skin's own
-colour does not. Lips, brows, beard, shadow and what is burnt out do not count.
+Over a capture's views each point of the head has one colour, a low quantile of what the views show: highlights move
+with the camera, the skin's own colour does not. Lips, brows, beard, shadow and what is burnt out do not count.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from .witnesses import visible
 
 FRONT = np.array([0.0, -1.0, 0.0])
 QUANTILE = 0.3  # over the views: below the median, as every highlight brightens and nothing but shadow darkens
-BEST_LIT = 0.75, 0.95  # quantiles of luminance between which skin is best lit; what is above is highlights that stood still
+# quantiles of luminance between which skin is best lit; what is above is highlights that stood still
+BEST_LIT = 0.75, 0.95
 BURNT = 0.98  # sRGB from which a channel has lost its value
 FEWEST = 60  # points of skin
 PERSON = 0.2  # sureness from which a pixel may be the person
@@ -34,14 +36,15 @@ SMOOTHED = 0.003  # of the frame's longer side: what noise and a head that is of
 LIKE = 0.75, 1.35  # brightness over that of evenly lit skin outside of which a point is shadow, mark or highlight
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 RIDGE = np.array([1e-6, *[0.03] * 3, 1.5, 1.5, 1.125, 1.5, 0.375]) / (4 * np.pi)
-# Per point, on the harmonics' coefficients: 1e-6, 0.01 and 0.1 on those of 1, of x, y, z and of xy, yz, z^2 - 1/3, xz, x^2 - y^2
+# Per point, on the harmonics' coefficients: 1e-6, 0.01 and 0.1 on those of 1, of x, y, z and of xy, yz, z^2 - 1/3, xz,
+# x^2 - y^2
 BEARD = 0.42  # v of the texture below which a beard may grow, whose colour is not the skin's
 
 
 @dataclass(frozen=True)
 class Look:
-    """Linear colours [3] as the camera shows them. best: skin in the best light; front: skin whose normal is -Y, the way the face looks; surroundings:
-    the mean of what is not the person, None where little of it is in view."""
+    """Linear colours [3] as the camera shows them. best: skin in the best light; front: skin whose normal is -Y, the
+    way the face looks; surroundings: the mean of what is not the person, None where little of it is in view."""
 
     best: np.ndarray
     front: np.ndarray
@@ -49,17 +52,19 @@ class Look:
 
 
 def look(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray, surroundings: np.ndarray | None = None) -> Look:
-    """From linear colours [N, 3] of facial skin with unit normals [N, 3] and weights [N] in [0, 1], 0 for what is shadowed or no skin."""
+    """From linear colours [N, 3] of facial skin with unit normals [N, 3] and weights [N] in [0, 1], 0 for what is
+    shadowed or no skin."""
     brightness = colours @ LUMINANCE
     order = np.argsort(brightness)
     rank = np.cumsum(weight[order]) / weight.sum()
     best = order[(rank >= BEST_LIT[0]) & (rank <= BEST_LIT[1])]
-    return Look(np.average(colours[best], axis=0, weights=weight[best] + 1e-9), _facing_front(colours, normals, weight), surroundings)
+    return Look(np.average(colours[best], axis=0, weights=weight[best] + 1e-9), _facing_front(colours, normals, weight),
+                surroundings)
 
 
 def capture_look(capture: Capture, head: Head, shadow: np.ndarray, report: Reporter) -> Look | None:
-    """From the selected frames as they were filmed. `shadow` [S, S]: the soft mask in UV. None where the frames or cameras are gone, or hardly any
-    skin is seen."""
+    """From the selected frames as they were filmed. `shadow` [S, S]: the soft mask in UV. None where the frames or
+    cameras are gone, or hardly any skin is seen."""
     if not capture.frames_json.is_file() or not capture.cameras.is_dir():
         return None
     views = [view for view in read_views(capture, selected_only=True) if view.path.is_file()]
@@ -86,7 +91,8 @@ def capture_look(capture: Capture, head: Head, shadow: np.ndarray, report: Repor
 
 
 def skin_weight(size: int, shadow: np.ndarray) -> np.ndarray:
-    """[size, size] in [0, 1]: facial skin that is out of the `shadow` [S, S], without lips, brows, eyes, nostrils and where a beard may grow."""
+    """[size, size] in [0, 1]: facial skin that is out of the `shadow` [S, S], without lips, brows, eyes, nostrils and
+    where a beard may grow."""
     skin = template.mask("skin", size) * template.mask("face", size)
     for name in ("lips", "brows", "eyes", "nostrils"):
         skin = skin * (1 - template.mask(name, size))
@@ -96,7 +102,8 @@ def skin_weight(size: int, shadow: np.ndarray) -> np.ndarray:
 
 
 def _facing_front(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """The colour [3] of skin whose normal is FRONT, by a light of second-order spherical harmonics fitted to the skin that turns that way."""
+    """The colour [3] of skin whose normal is FRONT, by a light of second-order spherical harmonics fitted to the skin
+    that turns that way."""
     weight = weight * np.clip(normals @ FRONT, 0, None)
     basis, there = sh_basis(normals), sh_basis(FRONT)
     kept = np.ones(len(colours))
@@ -111,7 +118,8 @@ def _facing_front(colours: np.ndarray, normals: np.ndarray, weight: np.ndarray) 
     return np.maximum(there @ light, 1e-4)
 
 
-def _seen(view: View, frame: np.ndarray, caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def _seen(view: View, frame: np.ndarray, caster: raster.RayCaster, points: np.ndarray,
+          normals: np.ndarray) -> np.ndarray:
     """Linear colours [N, 3] of surface points in an sRGB frame, nan where it does not see them or is burnt out."""
     found = np.full((len(points), 3), np.nan)
     facing = np.flatnonzero(visible(view, caster, points, normals))
@@ -124,7 +132,8 @@ def _seen(view: View, frame: np.ndarray, caster: raster.RayCaster, points: np.nd
 
 
 def _surroundings(frame: np.ndarray) -> np.ndarray | None:
-    """Mean linear colour [3] of what is not the person in an sRGB frame; None where that is little, or cannot be told."""
+    """Mean linear colour [3] of what is not the person in an sRGB frame; None where that is little, or cannot be
+    told."""
     side = max(frame.shape[:2])
     small = images.resize(frame, round(256 * frame.shape[1] / side), round(256 * frame.shape[0] / side))
     try:

@@ -27,8 +27,9 @@ DARKEST = 0.004  # linear albedo below which no skin or hair lies
 
 @dataclass(frozen=True)
 class Maps:
-    """[S, S(, 3)] float32. diffuse and shading linear, diffuse * shading = I_UV; normal packed into [0, 1], tangent space, OpenGL Y+;
-    specular and confidence in [0, 1]; gain [3]: what the albedo was multiplied by to be of the skin tone."""
+    """[S, S(, 3)] float32. diffuse and shading linear, diffuse * shading = I_UV; normal packed into [0, 1], tangent
+    space, OpenGL Y+; specular and confidence in [0, 1]; gain [3]: what the albedo was multiplied by to be of the skin
+    tone."""
 
     diffuse: np.ndarray
     specular: np.ndarray
@@ -38,11 +39,14 @@ class Maps:
     gain: torch.Tensor
 
 
-def finished(state: State, evidence: Evidence, start: Start, spread: torch.Tensor | None = None, gain: torch.Tensor | None = None) -> Maps:
-    """Reads the maps out of \\hat x_0. The albedo is rescaled once so that the mean of the confident facial skin is the skin tone (or by a `gain`
-    [3] that was found before); the shading takes the inverse, so that their product stays. What nobody saw is the mean face of that tone: a drawn
-    sample would be as likely, but would look like something that was measured. So is the specular albedo: no term of the likelihood knows it, and a draw
-    has twice the squared error of what is expected (docs/results/confidence.md). `spread` [H, W], of any size, is confidence.py's; none by default."""
+def finished(state: State, evidence: Evidence, start: Start, spread: torch.Tensor | None = None,
+             gain: torch.Tensor | None = None) -> Maps:
+    """Reads the maps out of \\hat x_0. The albedo is rescaled once so that the mean of the confident facial skin is the
+    skin tone (or by a `gain` [3] that was found before); the shading takes the inverse, so that their product stays.
+    What nobody saw is the mean face of that tone: a drawn sample would be as likely, but would look like something that
+    was measured. So is the specular albedo: no term of the likelihood knows it, and a draw has twice the squared error
+    of what is expected (docs/results/confidence.md). `spread` [H, W], of any size, is confidence.py's; none by
+    default."""
     shader = start.observations[1].shader
     x = torch.lerp(start.reference, state.denoised, evidence.weight.sqrt())[0]
     with torch.no_grad():
@@ -61,20 +65,23 @@ def finished(state: State, evidence: Evidence, start: Start, spread: torch.Tenso
     explained = (1 - (shading / main).mean(0)).clamp(0, 1)  # the share of the darkness that was called shadow
     each = gain[:, None, None]
     trusted = confidence(evidence.weight, explained, diffuse * each, albedo(start.reference), spread)
-    return Maps(_picture((diffuse * each).clamp(DARKEST, 1)), specular, _picture(normal), _picture(shading / each), trusted.numpy(), gain)
+    return Maps(_picture((diffuse * each).clamp(DARKEST, 1)), specular, _picture(normal), _picture(shading / each),
+                trusted.numpy(), gain)
 
 
 def _gain(diffuse: torch.Tensor, weight: torch.Tensor, tone: torch.Tensor, rescale: str) -> torch.Tensor:
-    """Linear factors [3] that bring the mean under `weight` to `tone` [3]: the mean of linear values, or ("srgb") of values to the power 1 / 2.2."""
+    """Linear factors [3] that bring the mean under `weight` to `tone` [3]: the mean of linear values, or ("srgb") of
+    values to the power 1 / 2.2."""
     if rescale == "none":
         return torch.ones(3)
     gamma = 1.0 if rescale == "linear" else 2.2
     return (tone ** (1 / gamma) / mean_tone(diffuse ** (1 / gamma), weight)).pow(gamma).clamp(0.2, 5.0)
 
 
-def write(capture: Capture, maps: Maps, found: Solution, conditions: dict[str, str], only: tuple[slice, slice] | None = None) -> None:
-    """The folder maps/, whole or not at all, with what a later solve of a part goes on from. `only` those rows and columns are new where given:
-    the others keep the values that their files have."""
+def write(capture: Capture, maps: Maps, found: Solution, conditions: dict[str, str],
+          only: tuple[slice, slice] | None = None) -> None:
+    """The folder maps/, whole or not at all, with what a later solve of a part goes on from. `only` those rows and
+    columns are new where given: the others keep the values that their files have."""
     def put(write: Callable, name: str, values: np.ndarray, **options) -> None:
         if only is not None:
             before = images.read_data(capture.maps / name)

@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Moles and round scars in the texture, which a grid of small lights would take for shadow (paper, supplement, "nevus ... close to the grid size").
+"""Moles and round scars in the texture, which a grid of small lights would take for shadow (paper, supplement, "nevus
+... close to the grid size").
 
-Blobs of the Laplacian's scale space (Lindeberg 1998) that are compact, darker than everything around them, alone, and of another colour than the
-shadow: melanin and blood take blue and green, a shadow takes what the sun gave. Longer scars are not found. Lengths are texels of a 1024 map.
+Blobs of the Laplacian's scale space (Lindeberg 1998) that are compact, darker than everything around them, alone, and
+of another colour than the shadow: melanin and blood take blue and green, a shadow takes what the sun gave. Longer scars
+are not found. Lengths are texels of a 1024 map.
 """
 
 from __future__ import annotations
@@ -21,10 +23,12 @@ from .evidence import Evidence
 RADII = tuple(np.geomspace(2.0, 8.0, 6))
 DISC = 2 / np.e  # of a disc's contrast the normalised Laplacian shows at its middle, at the deviation radius / sqrt 2
 LEAST = 0.3  # contrast, natural log units: a fainter one is a freckle, or nothing
-STANDING_OUT = 4.5, 32.0  # of the usual response of such a blob within that distance: in stubble and on rough skin more is asked for
+# of the usual response of such a blob within that distance: in stubble and on rough skin more is asked for
+STANDING_OUT = 4.5, 32.0
 COMPACT = 0.45  # least ratio of the two curvatures: an edge has 0, a disc 1
 SURROUNDED = 0.45  # of the contrast that every direction must show
-NEIGHBOURS, REACH, LIKE = 2, 64.0, 0.4  # more others of that share of its contrast, within that distance, make it one of a crowd of freckles
+# more others of that share of its contrast, within that distance, make it one of a crowd of freckles
+NEIGHBOURS, REACH, LIKE = 2, 64.0, 0.4
 UNLIKE = 0.16  # distance of a mark's colour from the shadow's, in shares of its contrast
 SECTORS = 8
 MARGIN = 12.0  # distance to brows, lips, lids, nostrils and scalp
@@ -32,7 +36,8 @@ MARGIN = 12.0  # distance to brows, lips, lids, nostrils and scalp
 
 @dataclass(frozen=True)
 class Mark:
-    """row, column and radius in texels of the map; change [3]: of the logarithm of R, G, B against what is around it."""
+    """row, column and radius in texels of the map; change [3]: of the logarithm of R, G, B against what is around
+    it."""
 
     row: float
     column: float
@@ -56,7 +61,8 @@ class _Blob:
 
 
 def with_marks(evidence: Evidence, witness: Callable[[list[Mark]], list[Mark]] = list) -> tuple[Evidence, list[Mark]]:
-    """The evidence with no trust in what the marks inside M say of light, and those marks; `witness` leaves the ones that the views confirm."""
+    """The evidence with no trust in what the marks inside M say of light, and those marks; `witness` leaves the ones
+    that the views confirm."""
     if not (evidence.alpha > 0).any():
         return evidence, []
     feature = cv2.blur(1 - evidence.trust.numpy(), (2 * round(MARGIN / evidence.texel) + 1,) * 2)
@@ -65,17 +71,20 @@ def with_marks(evidence: Evidence, witness: Callable[[list[Mark]], list[Mark]] =
     marks = [mark for mark in find(evidence.texture.permute(1, 2, 0).numpy(), where, evidence.texel)
              if alpha[round(mark.row), round(mark.column)] > 0.05 and unlike_shadow(mark, taken)]
     marks = witness(marks)
-    return replace(evidence, trust=evidence.trust * (1 - torch.from_numpy(cover(marks, evidence.size, evidence.texel)))), marks
+    return replace(evidence,
+                   trust=evidence.trust * (1 - torch.from_numpy(cover(marks, evidence.size, evidence.texel)))), marks
 
 
 def find(texture: np.ndarray, where: np.ndarray, texel: float) -> list[Mark]:
-    """The marks of a linear texture [S, S, 3] on the texels `where` bool [S, S]: seen skin without lips, brows and lids. Darkest first."""
+    """The marks of a linear texture [S, S, 3] on the texels `where` bool [S, S]: seen skin without lips, brows and
+    lids. Darkest first."""
     if not where.any():
         return []
     log = np.log(np.maximum(texture, 1e-3)).astype(np.float32)
     log = raster.bleed(log, where)  # so that the border of what is not skin is no blob
     candidates = _blobs(log.mean(-1), where, texel)
-    measured = [mark for blob in candidates if blob.stands_out and (mark := _measured(log, blob.row, blob.column, blob.radius)) is not None]
+    measured = [mark for blob in candidates if blob.stands_out
+                and (mark := _measured(log, blob.row, blob.column, blob.radius)) is not None]
     measured.sort(key=lambda mark: -mark.contrast)
     kept: list[Mark] = []
     for mark in measured:
@@ -85,7 +94,8 @@ def find(texture: np.ndarray, where: np.ndarray, texel: float) -> list[Mark]:
 
 
 def unlike_shadow(mark: Mark, taken: np.ndarray) -> bool:
-    """Whether a mark has another colour than a shadow that dark; taken [3]: the light's share that shadows take, over its mean (zeros: not known, grey)."""
+    """Whether a mark has another colour than a shadow that dark; taken [3]: the light's share that shadows take, over
+    its mean (zeros: not known, grey)."""
     taken = taken if np.any(taken) else np.ones(3)
     change = np.array(mark.change)
     share = 1 - np.exp(change.mean())
@@ -126,7 +136,8 @@ def _blobs(value: np.ndarray, where: np.ndarray, texel: float) -> list[_Blob]:
     around[:-1] = np.maximum(around[:-1], highest[1:])
     stands_out = (stack > 0.7 * LEAST) & (stack > STANDING_OUT[0] * np.stack(usual))
     found = np.nonzero((stack >= around) & (stack > LIKE * LEAST) & (np.stack(compact) > COMPACT) & where[None])
-    return [_Blob(r, c, radii[k], float(stack[k, r, c]), bool(stands_out[k, r, c])) for k, r, c in zip(*(i.tolist() for i in found), strict=True)]
+    return [_Blob(r, c, radii[k], float(stack[k, r, c]), bool(stands_out[k, r, c]))
+            for k, r, c in zip(*(i.tolist() for i in found), strict=True)]
 
 
 def _usual(values: np.ndarray, reach: float) -> np.ndarray:
@@ -135,7 +146,8 @@ def _usual(values: np.ndarray, reach: float) -> np.ndarray:
 
 
 _CURVATURES = tuple(np.array(k, np.float32) for k in (
-    [[0, 0, 0], [1, -2, 1], [0, 0, 0]], [[0, 1, 0], [0, -2, 0], [0, 1, 0]], [[0.25, 0, -0.25], [0, 0, 0], [-0.25, 0, 0.25]]))
+    [[0, 0, 0], [1, -2, 1], [0, 0, 0]], [[0, 1, 0], [0, -2, 0], [0, 1, 0]],
+    [[0.25, 0, -0.25], [0, 0, 0], [-0.25, 0, 0.25]]))
 
 
 def _measured(log: np.ndarray, row: int, column: int, radius: float) -> Mark | None:
@@ -148,7 +160,8 @@ def _measured(log: np.ndarray, row: int, column: int, radius: float) -> Mark | N
     distance, sector = np.hypot(x, y), np.floor((np.arctan2(y, x) / (2 * np.pi) % 1) * SECTORS).astype(int)
     disc = np.median(patch[distance <= max(0.6 * radius, 0.5)], 0)
     ring = (distance > 1.5 * radius + 0.5) & (distance <= max(2.5 * radius, 1.5 * radius + 2))
-    sides = np.stack([np.median(patch[ring & (sector == k)], 0) for k in range(SECTORS) if (ring & (sector == k)).any()])
+    sides = np.stack([np.median(patch[ring & (sector == k)], 0) for k in range(SECTORS)
+                      if (ring & (sector == k)).any()])
     change = disc - np.median(sides, 0)
     contrast = -change.mean()
     if contrast < LEAST or (sides.mean(-1) - disc.mean()).min() < SURROUNDED * contrast:
@@ -162,4 +175,5 @@ def _apart(a: Mark, b: Mark | _Blob) -> float:
 
 def _alone(mark: Mark, blobs: list[_Blob], reach: float) -> bool:
     """Not one of a crowd."""
-    return sum(2 * mark.radius < _apart(mark, other) < reach and other.strength > LIKE * mark.contrast for other in blobs) <= NEIGHBOURS
+    return sum(2 * mark.radius < _apart(mark, other) < reach and other.strength > LIKE * mark.contrast
+               for other in blobs) <= NEIGHBOURS

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sampling where memory is short: the step that did not fit, and all after it, again in the network's low-memory mode.
 
-That mode keeps only the inputs of the network's layers for the gradient and computes what is inside them a second time: the result is the same.
+That mode keeps only the inputs of the network's layers for the gradient and computes what is inside them a second time:
+the result is the same.
 """
 
 from __future__ import annotations
@@ -21,12 +22,15 @@ from .prior import ConditionedPrior, Prior
 from .problem import Observation, State
 from .sampler import Sampler
 
-MMAP_THRESHOLD, LARGE = -3, 8 << 20  # glibc's name for it, and the bytes from which on memory is asked of the system and given back to it
-SAYS = "There was not enough memory for step {} of {}: it is done again in the low-memory mode, which is slower and gives the same maps."
+# glibc's name for it, and the bytes from which on memory is asked of the system and given back to it
+MMAP_THRESHOLD, LARGE = -3, 8 << 20
+SAYS = ("There was not enough memory for step {} of {}: it is done again in the low-memory mode, which is slower and "
+        "gives the same maps.")
 
 
 def sample_within_memory(sampler: Sampler, observations: dict[int, Observation], state: State,
-                         on_step: Callable[[State, int], None] = lambda state, steps: None, log: Callable[[str], None] = lambda text: None) -> State:
+                         on_step: Callable[[State, int], None] = lambda state, steps: None,
+                         log: Callable[[str], None] = lambda text: None) -> State:
     """`Sampler.sample`, of a prior, to the same bytes whether it had to fall back or not.
 
     Parameters
@@ -52,9 +56,13 @@ def sample_within_memory(sampler: Sampler, observations: dict[int, Observation],
         if not out_of_memory(error):
             raise
         if sampler.denoiser.network.low_memory:
-            raise Problem(f"There was not enough memory for step {begun.step + 1} of {sampler.recipe.steps}, even in the low-memory mode.",
-                          "Close other programs, choose a smaller map size for the solve, or the quality draft.") from error
-    log(SAYS.format(begun.step + 1, sampler.recipe.steps))  # past the except block, which holds on to all that the step had computed
+            raise Problem(
+                f"There was not enough memory for step {begun.step + 1} of {sampler.recipe.steps}, even in "
+                "the low-memory mode.",
+                "Close other programs, choose a smaller map size for the solve, or the quality draft.",
+            ) from error
+    # past the except block, which holds on to all that the step had computed
+    log(SAYS.format(begun.step + 1, sampler.recipe.steps))
     spare_memory(sampler.denoiser)
     return sample_within_memory(sampler, observations, begun, on_step, log)
 
@@ -65,11 +73,13 @@ def spare_memory(prior: Prior | ConditionedPrior) -> None:
     gc.collect()
     if torch.cuda.is_available():
         torch.cuda.empty_cache()
-    with contextlib.suppress(OSError, AttributeError, TypeError):  # glibc keeps freed maps for later, in pieces that others do not fit into; others do not
+    # glibc keeps freed maps for later, in pieces that others do not fit into; others do not
+    with contextlib.suppress(OSError, AttributeError, TypeError):
         ctypes.CDLL(None).mallopt(MMAP_THRESHOLD, LARGE)
 
 
 def _copied(state: State) -> State:
-    """A state that the rest of a step cannot touch: the lights and their moments are moved in place, the maps are replaced."""
+    """A state that the rest of a step cannot touch: the lights and their moments are moved in place, the maps are
+    replaced."""
     lights = Lights(*(parameter.detach().clone() for parameter in state.lights.parameters()))
     return replace(state, lights=lights, moments=[moment.clone() for moment in state.moments])

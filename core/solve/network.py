@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The prior's network: a U-Net of modulated residual blocks, and EDM's preconditioning around it (Karras et al. 2022).
 
-Parameter names and arithmetic are those of the `image_v1` models the method's authors trained, so their state dict loads as it is.
-One choice is ours: `norm: pixel` normalises each texel over its channels, so that a patch and a whole map are treated alike.
+Parameter names and arithmetic are those of the `image_v1` models the method's authors trained, so their state dict
+loads as it is. One choice is ours: `norm: pixel` normalises each texel over its channels, so that a patch and a whole
+map are treated alike.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from torch.nn import functional
 from torch.utils.checkpoint import checkpoint
 
 LAYOUT = torch.channels_last
-"""Of all maps inside the network: channels first takes longer, in convolutions and in this normalisation (benchmarks/solver_speed.py)."""
+"""Of all maps inside the network: channels first takes longer, in convolutions and in this normalisation
+(benchmarks/solver_speed.py)."""
 
 STRIP = 64
 """Rows of a map inside the network that are shaped at once where that can be done in pieces."""
@@ -25,10 +27,12 @@ STRIP = 64
 
 @dataclass(frozen=True)
 class Condition:
-    """What the network is told of maps [N, C, H, W]: of each texel `texels` [N, K, H, W], of each whole map `mapping` [N, D], where it takes that.
+    """What the network is told of maps [N, C, H, W]: of each texel `texels` [N, K, H, W], of each whole map `mapping`
+    [N, D], where it takes that.
 
-    The released priors take data of mean 0 and deviation sigma_data, and scale `texels`, which are not noised, by c_in like the data. With `mean`
-    [N, C, H, W] and `spread` [N, C, 1, 1] the network sees what differs from the mean in units of its spread, and the texels' condition as it is.
+    The released priors take data of mean 0 and deviation sigma_data, and scale `texels`, which are not noised, by c_in
+    like the data. With `mean` [N, C, H, W] and `spread` [N, C, 1, 1] the network sees what differs from the mean in
+    units of its spread, and the texels' condition as it is.
     """
 
     texels: torch.Tensor
@@ -37,7 +41,8 @@ class Condition:
     spread: torch.Tensor | None = None
 
 
-def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: Condition, levels: torch.Tensor | None = None) -> torch.Tensor:
+def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: Condition,
+            levels: torch.Tensor | None = None) -> torch.Tensor:
     """D(x; sigma): the preconditioned denoiser. Only the network itself runs in low precision.
 
     Parameters
@@ -45,8 +50,8 @@ def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: Cond
     network : F
     x : float32 [N, C, H, W], noised maps
     sigma : [N], the noise level that the network is told
-    condition : with a mean and a spread D is the best estimate of a Gaussian of these where the network has nothing to say
-    levels : [N, C, 1, 1], the noise levels of the channels where they differ
+    condition : with a mean and a spread D is the best estimate of a Gaussian of these where the network has nothing to
+    say levels : [N, C, 1, 1], the noise levels of the channels where they differ
 
     Returns
     -------
@@ -65,10 +70,12 @@ def denoise(network: UNet, x: torch.Tensor, sigma: torch.Tensor, condition: Cond
 
 @dataclass(frozen=True)
 class UNetLayout:
-    """Depths and channels per level, finest first; which levels have attention, None: no one. Input [N, data + condition, H, W], output [N, data, H, W].
+    """Depths and channels per level, finest first; which levels have attention, None: no one. Input [N, data +
+    condition, H, W], output [N, data, H, W].
 
-    With `patch_size` p the network works on p x p blocks of texels. The first `skip_stages` levels exist but are left out, and the next one takes the map
-    as it is (progressive growing). With `has_variance` the last channel estimates the loss, which sampling does not need.
+    With `patch_size` p the network works on p x p blocks of texels. The first `skip_stages` levels exist but are left
+    out, and the next one takes the map as it is (progressive growing). With `has_variance` the last channel estimates
+    the loss, which sampling does not need.
     """
 
     data_channels: int
@@ -92,12 +99,19 @@ class UNet(nn.Module):
         super().__init__()
         patch_size, skip_stages, mapping_out = layout.patch_size, layout.skip_stages, layout.mapping_out
         depths, channels, attention = layout.depths, layout.channels, layout.attention or [False] * len(layout.depths)
-        self.patch_size, self.sigma_data, self.skip_stages, self.has_variance = patch_size, layout.sigma_data, skip_stages, layout.has_variance
+        self.patch_size, self.sigma_data, self.skip_stages, self.has_variance = (
+            patch_size,
+            layout.sigma_data,
+            skip_stages,
+            layout.has_variance,
+        )
         self.low_memory = False  # keeps a fifth of what the gradient needs, and computes the rest again
         self.multiple = patch_size * 2 ** (len(depths) - 1 - skip_stages)
         self.timestep_embed = _Fourier(mapping_out)
-        self.mapping_cond = nn.Linear(layout.mapping_cond_dim, mapping_out, bias=False) if layout.mapping_cond_dim else None
-        self.mapping = nn.Sequential(nn.Linear(mapping_out, mapping_out), nn.GELU(), nn.Linear(mapping_out, mapping_out), nn.GELU())
+        self.mapping_cond = (nn.Linear(layout.mapping_cond_dim, mapping_out, bias=False) if layout.mapping_cond_dim
+                             else None)
+        self.mapping = nn.Sequential(nn.Linear(mapping_out, mapping_out), nn.GELU(),
+                                     nn.Linear(mapping_out, mapping_out), nn.GELU())
         outer = channels[max(0, skip_stages - 1)]
         self.proj_in = nn.Conv2d((layout.data_channels + layout.condition_channels) * patch_size**2, outer, 1)
         self.proj_out = nn.Conv2d(outer, layout.data_channels * patch_size**2 + layout.has_variance, 1)
@@ -107,9 +121,10 @@ class UNet(nn.Module):
         for level, (depth, width) in enumerate(zip(depths, channels, strict=True)):
             above = channels[max(0, level - 1)]
             deepest, halved = level == len(depths) - 1, level > skip_stages
-            down.append(_block(layout, [above] + [width] * (depth - 1), width, width, attention[level], first=_Down() if halved else nn.Identity()))
-            up.append(_block(layout, [width if deepest else 2 * width] + [width] * (depth - 1), width, above, attention[level],
-                             last=_Up() if halved else nn.Identity()))
+            down.append(_block(layout, [above] + [width] * (depth - 1), width, width, attention[level],
+                               first=_Down() if halved else nn.Identity()))
+            up.append(_block(layout, [width if deepest else 2 * width] + [width] * (depth - 1), width, above,
+                             attention[level], last=_Up() if halved else nn.Identity()))
         self.u_net = nn.ModuleDict({"d_blocks": nn.ModuleList(down), "u_blocks": nn.ModuleList(up[::-1])})
 
     def lower(self, dtype: torch.dtype) -> UNet:
@@ -118,10 +133,12 @@ class UNet(nn.Module):
             part.to(dtype=dtype, memory_format=LAYOUT)
         return self
 
-    def forward(self, x: torch.Tensor, sigma: torch.Tensor, mapping_condition: torch.Tensor | None = None) -> torch.Tensor:
+    def forward(self, x: torch.Tensor, sigma: torch.Tensor,
+                mapping_condition: torch.Tensor | None = None) -> torch.Tensor:
         height, width = x.shape[-2:]
         if height % self.multiple or width % self.multiple:
-            raise ValueError(f"The network takes maps whose sides are multiples of {self.multiple}, not {width} x {height}.")
+            raise ValueError(f"The network takes maps whose sides are multiples of {self.multiple}, not {width} x "
+                             f"{height}.")
         mapped = self.timestep_embed(sigma.log() / 4)
         if mapping_condition is not None:
             mapped = mapped + self.mapping_cond(mapping_condition)
@@ -143,7 +160,8 @@ class UNet(nn.Module):
 
 def _block(layout: UNetLayout, inputs: list[int], width: int, out: int, attention: bool,
            first: nn.Module | None = None, last: nn.Module | None = None) -> nn.ModuleList:
-    """Residual blocks (inputs[i] -> width, the last one -> out), each followed by attention if asked for; resampling first or last."""
+    """Residual blocks (inputs[i] -> width, the last one -> out), each followed by attention if asked for; resampling
+    first or last."""
     mapping, norm = layout.mapping_out, layout.norm
     layers = [] if first is None else [first]
     for i, c_in in enumerate(inputs):
@@ -155,7 +173,8 @@ def _block(layout: UNetLayout, inputs: list[int], width: int, out: int, attentio
 
 
 def _run(blocks: nn.ModuleList, x: torch.Tensor, mapped: torch.Tensor, low_memory: bool) -> torch.Tensor:
-    """The layers one after the other. In low memory only their inputs are kept for the gradient, and what is inside them is computed a second time."""
+    """The layers one after the other. In low memory only their inputs are kept for the gradient, and what is inside
+    them is computed a second time."""
     for layer in blocks:
         given = (x, mapped) if isinstance(layer, _Residual | _Attention) else (x,)
         x = checkpoint(layer, *given, use_reentrant=False) if low_memory and x.requires_grad else layer(*given)
@@ -167,8 +186,10 @@ class _Residual(nn.Module):
 
     def __init__(self, mapping: int, c_in: int, width: int, c_out: int, norm: str):
         super().__init__()
-        self.main = nn.ModuleDict({"0": _Norm(mapping, c_in, max(1, c_in // 32), norm), "2": nn.Conv2d(c_in, width, 3, padding=1),
-                                   "4": _Norm(mapping, width, max(1, width // 32), norm), "6": nn.Conv2d(width, c_out, 3, padding=1)})
+        self.main = nn.ModuleDict({"0": _Norm(mapping, c_in, max(1, c_in // 32), norm),
+                                   "2": nn.Conv2d(c_in, width, 3, padding=1),
+                                   "4": _Norm(mapping, width, max(1, width // 32), norm),
+                                   "6": nn.Conv2d(width, c_out, 3, padding=1)})
         self.skip = nn.Conv2d(c_in, c_out, 1, bias=False) if c_in != c_out else nn.Identity()
         nn.init.zeros_(self.main["6"].weight)
         nn.init.zeros_(self.main["6"].bias)
@@ -179,13 +200,14 @@ class _Residual(nn.Module):
 
 
 class _Shaped(torch.autograd.Function):
-    """convolution(gelu(norm(x))) of a network that does not learn: of all that is worked out only x is kept for the gradient, for the convolution's own input
-    is not needed and the rest, which is cheap, is worked out a second time, in strips where texels do not depend on each other. The same numbers in less
-    than half the memory."""
+    """convolution(gelu(norm(x))) of a network that does not learn: of all that is worked out only x is kept for the
+    gradient, for the convolution's own input is not needed and the rest, which is cheap, is worked out a second time,
+    in strips where texels do not depend on each other. The same numbers in less than half the memory."""
 
     @staticmethod
     def of(norm: _Norm, convolution: nn.Conv2d, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
-        if mapped.requires_grad or convolution.weight.requires_grad or not x.requires_grad:  # it learns, or nobody asks for a gradient
+        # it learns, or nobody asks for a gradient
+        if mapped.requires_grad or convolution.weight.requires_grad or not x.requires_grad:
             return convolution(functional.gelu(norm(x, mapped)))
         return _Shaped.apply(x, mapped, norm, convolution)
 
@@ -201,8 +223,10 @@ class _Shaped(torch.autograd.Function):
     @staticmethod
     def backward(ctx, gradient: torch.Tensor) -> tuple:
         (x, mapped), (norm, convolution) = ctx.saved_tensors, ctx.layers
-        found = torch.ops.aten.convolution_backward(gradient, x, convolution.weight, None, convolution.stride, convolution.padding, convolution.dilation,
-                                                    False, [0, 0], 1, [True, False, False])[0]  # of its input only the shape counts, which is x's
+        found = torch.ops.aten.convolution_backward(gradient, x, convolution.weight, None, convolution.stride,
+                                                    convolution.padding, convolution.dilation,
+                                                    # of its input only the shape counts, which is x's
+                                                    False, [0, 0], 1, [True, False, False])[0]
         for rows in norm.strips(x):
             with torch.enable_grad():
                 part = x[:, :, rows].detach().requires_grad_()
@@ -224,7 +248,8 @@ class _Norm(nn.Module):
     def forward(self, x: torch.Tensor, mapped: torch.Tensor) -> torch.Tensor:
         weight, bias = self.mapper(mapped)[:, :, None, None].to(x.dtype).chunk(2, 1)
         if self.kind == "pixel":
-            x = functional.layer_norm(x.permute(0, 2, 3, 1), x.shape[1:2], eps=1e-5).permute(0, 3, 1, 2)  # free of copies in channels-last
+            # free of copies in channels-last
+            x = functional.layer_norm(x.permute(0, 2, 3, 1), x.shape[1:2], eps=1e-5).permute(0, 3, 1, 2)
         else:
             x = functional.group_norm(x, self.groups, eps=1e-5)
         return torch.addcmul(bias, x, 1 + weight)
@@ -270,7 +295,8 @@ class _Down(nn.Module):
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         x = functional.pad(x, (1, 1, 1, 1), mode="reflect").contiguous(memory_format=LAYOUT)
         kernel = (2 - (torch.arange(4, device=x.device) - 1.5).abs()).to(x.dtype) / 4
-        return functional.conv2d(x, torch.outer(kernel, kernel).expand(x.shape[1], 1, 4, 4), stride=2, groups=x.shape[1])
+        return functional.conv2d(x, torch.outer(kernel, kernel).expand(x.shape[1], 1, 4, 4), stride=2,
+                                 groups=x.shape[1])
 
 
 class _Up(nn.Module):
@@ -282,7 +308,8 @@ class _Up(nn.Module):
 
 
 def from_state(state: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
-    """A released state dict's weights under our names: no wrappers' prefixes, however many, and no constant resampling kernels."""
+    """A released state dict's weights under our names: no wrappers' prefixes, however many, and no constant resampling
+    kernels."""
     while state and all(name.startswith("inner_model.") for name in state):
         state = {name.removeprefix("inner_model."): value for name, value in state.items()}
     return {name: value for name, value in state.items() if not name.endswith(".kernel")}

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The skin tone that a camera's picture of skin stands for, over the tones of all people evenly, and how sure that is.
 
-A picture's colour of skin is the tone times exposure and light. Its brightness tells of the tone only as far as a camera's meter lets it, its colour
-only as far as the white point is known: both are a Gaussian around what simulated phones make of simulated people (`core train tones`), or around
-what a measured white surface says. The posterior over the tones gives the estimate. It is then stretched by what a Gaussian prior had drawn it to the
-middle: without that, dark skin would come out too light and light skin too dark, the more so the less is known.
+A picture's colour of skin is the tone times exposure and light. Its brightness tells of the tone only as far as a
+camera's meter lets it, its colour only as far as the white point is known: both are a Gaussian around what simulated
+phones make of simulated people (`core train tones`), or around what a measured white surface says. The posterior over
+the tones gives the estimate. It is then stretched by what a Gaussian prior had drawn it to the middle: without that,
+dark skin would come out too light and light skin too dark, the more so the less is known.
 """
 
 from __future__ import annotations
@@ -24,20 +25,25 @@ from .skin_tone import DECIMALS, SCENE, WHITE_POINT, SkinTone
 
 DATA_FILES = ("weights/tones.json",)
 FILE = Path(__file__).parents[1] / DATA_FILES[0]
-SHEEN = 0.015  # of a white surface's brightness: what skin of any tone reflects without taking colour, and no view is free of
+# of a white surface's brightness: what skin of any tone reflects without taking colour, and no view is free of
+SHEEN = 0.015
 SHINE = 0.5  # deviation of the sheen in log units: oily and dry skin
 STRETCH = 2.0  # at most
-MEASURED = 0.10, 0.025  # deviations in log units of a measured white: of its level (the face may be lit otherwise), and of its colour
-LEAST = 1.5  # deviation of L* that is always stated: faces differ from their tone's mean in more ways than the model has
+# deviations in log units of a measured white: of its level (the face may be lit otherwise), and of its colour
+MEASURED = 0.10, 0.025
+# deviation of L* that is always stated: faces differ from their tone's mean in more ways than the model has
+LEAST = 1.5
 BETWEEN = 0.02  # log units between the population's tones: they stand for what lies between them, too
 GROUPS = ((55, "very light"), (41, "light"), (28, "intermediate"), (10, "tan"), (-30, "brown"), (-91, "dark"))
-"""Individual typology angle in degrees above which a tone is of a group (Chardon et al. 1991; Del Bino and Bernerd 2013)."""
+"""Individual typology angle in degrees above which a tone is of a group (Chardon et al. 1991; Del Bino and Bernerd
+2013)."""
 
 
 @dataclass(frozen=True)
 class Population:
-    """tones [N, 3] linear, of all groups alike; what a phone shows of one is slope [9, 3] times the `coordinates` of the tone with its sheen plus offset
-    [9], with this covariance [9, 9]: the coordinates of the best lit skin, of the surroundings, and of skin facing the front over a white surface there."""
+    """tones [N, 3] linear, of all groups alike; what a phone shows of one is slope [9, 3] times the `coordinates` of
+    the tone with its sheen plus offset [9], with this covariance [9, 9]: the coordinates of the best lit skin, of the
+    surroundings, and of skin facing the front over a white surface there."""
 
     tones: np.ndarray
     slope: np.ndarray
@@ -49,13 +55,16 @@ BEST, SURROUNDINGS, OVER_WHITE = [0, 1, 2], [3, 4, 5], [6, 7, 8]  # rows of the 
 
 
 def estimate_skin_tone(look: Look, white: np.ndarray | None = None) -> SkinTone:
-    """The tone behind a look, with its deviation, error and group; `white` [3] is the measured linear colour of a white surface that faces as the face does,
-    or None. Its sRGB is rounded to DECIMALS, as a tone that is typed has no more."""
+    """The tone behind a look, with its deviation, error and group; `white` [3] is the measured linear colour of a white
+    surface that faces as the face does, or None. Its sRGB is rounded to DECIMALS, as a tone that is typed has no
+    more."""
     if white is not None:
-        return _posterior(OVER_WHITE, coordinates(look.front) - coordinates(white), np.square([MEASURED[0], MEASURED[1], MEASURED[1]]), WHITE_POINT)
+        return _posterior(OVER_WHITE, coordinates(look.front) - coordinates(white),
+                          np.square([MEASURED[0], MEASURED[1], MEASURED[1]]), WHITE_POINT)
     if look.surroundings is None:
         return _posterior(BEST, coordinates(look.best), np.zeros(3), SCENE)
-    return _posterior(BEST + SURROUNDINGS, np.concatenate([coordinates(look.best), coordinates(look.surroundings)]), np.zeros(6), SCENE)
+    return _posterior(BEST + SURROUNDINGS, np.concatenate([coordinates(look.best), coordinates(look.surroundings)]),
+                      np.zeros(6), SCENE)
 
 
 def _posterior(rows: list[int], shown: np.ndarray, variance: np.ndarray, source: str) -> SkinTone:
@@ -63,9 +72,16 @@ def _posterior(rows: list[int], shown: np.ndarray, variance: np.ndarray, source:
     known = population()
     of_tones = coordinates(known.tones + SHEEN)
     away = shown - of_tones @ known.slope[rows].T - known.offset[rows]
-    shiny = (coordinates(known.tones + SHEEN * np.exp(SHINE)) - of_tones) @ known.slope[rows].T  # [N, R]: on dark skin sheen is much of what is seen
-    covariance = known.covariance[np.ix_(rows, rows)] + np.diag(variance) + BETWEEN**2 * np.eye(len(rows)) + shiny[:, :, None] * shiny[:, None, :]
-    likelihood = -0.5 * (np.einsum("ni,nij,nj->n", away, np.linalg.inv(covariance), away) + np.linalg.slogdet(covariance)[1])
+    # [N, R]: on dark skin sheen is much of what is seen
+    shiny = (coordinates(known.tones + SHEEN * np.exp(SHINE)) - of_tones) @ known.slope[rows].T
+    covariance = (
+        known.covariance[np.ix_(rows, rows)]
+        + np.diag(variance)
+        + BETWEEN**2 * np.eye(len(rows))
+        + shiny[:, :, None] * shiny[:, None, :]
+    )
+    likelihood = -0.5 * (np.einsum("ni,nij,nj->n", away, np.linalg.inv(covariance), away)
+                         + np.linalg.slogdet(covariance)[1])
     weight = np.exp(likelihood - likelihood.max())
     return _stretched(known.tones, weight / weight.sum(), source)
 
@@ -73,7 +89,8 @@ def _posterior(rows: list[int], shown: np.ndarray, variance: np.ndarray, source:
 def coordinates(linear: np.ndarray) -> np.ndarray:
     """Linear colours [..., 3] -> ln luminance, ln R/G, ln B/G [..., 3]."""
     log = np.log(np.maximum(linear, 1e-4))
-    return np.stack([np.log(np.maximum(linear @ LUMINANCE, 1e-4)), log[..., 0] - log[..., 1], log[..., 2] - log[..., 1]], -1)
+    return np.stack([np.log(np.maximum(linear @ LUMINANCE, 1e-4)), log[..., 0] - log[..., 1],
+                     log[..., 2] - log[..., 1]], -1)
 
 
 def lab(linear: np.ndarray) -> np.ndarray:
@@ -100,9 +117,9 @@ def population() -> Population:
 
 
 def _stretched(tones: np.ndarray, weight: np.ndarray, source: str) -> SkinTone:
-    """The posterior over the tones [N, 3] as an estimate without the prior's pull: for Gaussians of prior variance P and posterior variance V the
-    likelihood's own centre is P / (P - V) times as far from the prior's mean, with variance P V / (P - V). Along L*; a* and b* follow as they go
-    with it under the posterior."""
+    """The posterior over the tones [N, 3] as an estimate without the prior's pull: for Gaussians of prior variance P
+    and posterior variance V the likelihood's own centre is P / (P - V) times as far from the prior's mean, with
+    variance P V / (P - V). Along L*; a* and b* follow as they go with it under the posterior."""
     values = lab(tones)
     prior, mean = values.mean(0), weight @ values
     covariance = (values - mean).T @ ((values - mean) * weight[:, None])

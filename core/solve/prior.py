@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The slot for a diffusion prior of facial reflectance: `denoised = prior.of_tone(tone)(x, sigma, coords)`.
 
-x is [N, 7, H, W]: 2 * diffuse_linear - 1 (3), tangent-space normal xyz (3), 2 * specular - 1 (1), plus noise of standard deviation sigma.
-Two priors fit: ours (NAME.safetensors with its card NAME.json) and a folder with the authors' config.json and ckpt.pth.
+x is [N, 7, H, W]: 2 * diffuse_linear - 1 (3), tangent-space normal xyz (3), 2 * specular - 1 (1), plus noise of
+standard deviation sigma. Two priors fit: ours (NAME.safetensors with its card NAME.json) and a folder with the authors'
+config.json and ckpt.pth.
 """
 
 from __future__ import annotations
@@ -31,19 +32,26 @@ WEIGHTS = Path(__file__).parent.parent / DATA_FILES[0]
 class Prior:
     """A trained denoiser with what it knows of all faces; `of_tone` makes it one of a person's.
 
-    Ours models what differs from the mean face of the subject's skin tone: a dark patch alone cannot say whether its skin or its light is dark.
-    mean_face [7, S, S] covers the UV square: albedo over skin tone, normal, 2 * specular - 1; spread [7]: deviation of skins from it, of the albedo in
-    units of the tone; tones: those of the skins it was trained on, N times linear RGB [3]; references [N, 7, R, R] are single skins in the mean face's
-    form. The released priors have none of these and take no tone; their coordinates are not those of texel centres (`centred`), they bring the noise
-    levels they were trained on (`sigmas`, least and largest), and know maps of one size only (`one_scale`).
+    Ours models what differs from the mean face of the subject's skin tone: a dark patch alone cannot say whether its
+    skin or its light is dark. mean_face [7, S, S] covers the UV square: albedo over skin tone, normal, 2 * specular -
+    1; spread [7]: deviation of skins from it, of the albedo in units of the tone; tones: those of the skins it was
+    trained on, N times linear RGB [3]; references [N, 7, R, R] are single skins in the mean face's form. The released
+    priors have none of these and take no tone; their coordinates are not those of texel centres (`centred`), they bring
+    the noise levels they were trained on (`sigmas`, least and largest), and know maps of one size only (`one_scale`).
     """
 
     centred, sigmas, one_scale = True, None, False
 
-    def __init__(self, network: UNet, octaves: int = 0, mean_face: torch.Tensor | None = None, spread: torch.Tensor | None = None, tones: list | None = None,
-                 references: torch.Tensor | None = None):
+    def __init__(self, network: UNet, octaves: int = 0, mean_face: torch.Tensor | None = None,
+                 spread: torch.Tensor | None = None, tones: list | None = None, references: torch.Tensor | None = None):
         self.network = network.eval().requires_grad_(False)
-        self.octaves, self.mean_face, self.spread, self.tones, self.references = octaves, mean_face, spread, tones or [], references
+        self.octaves, self.mean_face, self.spread, self.tones, self.references = (
+            octaves,
+            mean_face,
+            spread,
+            tones or [],
+            references,
+        )
         self.multiple = network.multiple
 
     @property
@@ -54,7 +62,8 @@ class Prior:
     def to(self, device: torch.device | str) -> Prior:
         """Moves the network, in place, and all that `condition_at` reads."""
         self.network.to(device)
-        self.mean_face, self.spread = (None if part is None else part.to(device) for part in (self.mean_face, self.spread))
+        self.mean_face, self.spread = (None if part is None else part.to(device)
+                                       for part in (self.mean_face, self.spread))
         return self
 
     def of_tone(self, tone: SkinTone) -> ConditionedPrior:
@@ -72,9 +81,11 @@ class Prior:
         blind = torch.zeros(1, device=self.device) if self.network.mapping_cond.in_features == 5 else None
         return condition(coords, self.octaves, self.mean_face, self.spread, tone, blind)
 
-    def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor, tone: torch.Tensor | None) -> torch.Tensor:
+    def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor,
+                tone: torch.Tensor | None) -> torch.Tensor:
         """`ConditionedPrior.respond` for a skin of tone [1, 3]."""
-        known = condition(coords, self.octaves, self.mean_face, self.spread, tone, blind=torch.ones(1, device=self.device))
+        known = condition(coords, self.octaves, self.mean_face, self.spread, tone,
+                          blind=torch.ones(1, device=self.device))
         levels = torch.tensor([CLEAR] * 3 + [BLIND] * 4, device=self.device)[None, :, None, None]
         x = torch.where(levels < BLIND, maps, known.mean) + levels * noise
         out = denoise(self.network, x, torch.full((1,), CLEAR, device=self.device), known, levels)
@@ -82,15 +93,18 @@ class Prior:
 
 
 class ConditionedPrior:
-    """What the sampler denoises with: a prior, which stays as it is, and the tone [1, 3], linear RGB, of the skin it is to expect (None: it takes none)."""
+    """What the sampler denoises with: a prior, which stays as it is, and the tone [1, 3], linear RGB, of the skin it is
+    to expect (None: it takes none)."""
 
     def __init__(self, prior: Prior, tone: torch.Tensor | None):
         self.prior, self.tone, self.network, self.device = prior, tone, prior.network, prior.device
-        self._coords: torch.Tensor | None = None  # of the last map, and its condition: it is the same at every noise level
+        # of the last map, and its condition: it is the same at every noise level
+        self._coords: torch.Tensor | None = None
         self._condition: Condition | None = None
 
     def __call__(self, x: torch.Tensor, sigma: float, coords: torch.Tensor) -> torch.Tensor:
-        """The expected clean map given x at noise level sigma. coords [N, 2, H, W] from `coordinates`, one texel apart in the map's own scale."""
+        """The expected clean map given x at noise level sigma. coords [N, 2, H, W] from `coordinates`, one texel apart
+        in the map's own scale."""
         if self._coords is not coords:
             known = self.prior.condition_at(coords, self.tone)
             if known.mean is not None:  # it goes in as it is: kept as the network takes it, at half the memory
@@ -100,7 +114,8 @@ class ConditionedPrior:
         return denoise(self.network, x, sigmas, self._condition)
 
     def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor) -> torch.Tensor:
-        """Maps [1, 7, H, W] with the normals and specular that are expected of their diffuse albedo; noise [1, 7, H, W] is standard normal.
+        """Maps [1, 7, H, W] with the normals and specular that are expected of their diffuse albedo; noise [1, 7, H, W]
+        is standard normal.
 
         A sample's are one possibility; these are the mean of all, in one evaluation of the network.
         """
@@ -108,12 +123,13 @@ class ConditionedPrior:
 
 
 class ReleasedPrior(Prior):
-    """One of the authors' own, in the UV layout it was trained in (layout.py). `kind` is what it is conditioned on: coord, posenc or noise; the fixed
-    random map `noise` [1, 3, S, S] of the last is not in their checkpoint."""
+    """One of the authors' own, in the UV layout it was trained in (layout.py). `kind` is what it is conditioned on:
+    coord, posenc or noise; the fixed random map `noise` [1, 3, S, S] of the last is not in their checkpoint."""
 
     centred, one_scale = False, True
 
-    def __init__(self, network: UNet, kind: str, octaves: int, sigmas: tuple[float, float] | None, noise: torch.Tensor | None):
+    def __init__(self, network: UNet, kind: str, octaves: int, sigmas: tuple[float, float] | None,
+                 noise: torch.Tensor | None):
         super().__init__(network, octaves)
         self.kind, self.sigmas, self.noise = kind, sigmas, noise
 
@@ -127,13 +143,15 @@ class ReleasedPrior(Prior):
         """Raises Problem where it loads but cannot sample."""
         if self.kind == "noise" and self.noise is None:
             raise Problem("This prior is conditioned on a fixed random map, which is not in its folder.",
-                          f"Save the map it was trained with beside ckpt.pth as {released.NOISE_FILE}, float32 of shape 3, S, S.")
+                          f"Save the map it was trained with beside ckpt.pth as {released.NOISE_FILE}, float32 of "
+                          "shape 3, S, S.")
 
     def of_tone(self, tone: SkinTone | None = None) -> ConditionedPrior:
         """It takes no tone: the same for everybody."""
         return ConditionedPrior(self, None)
 
-    def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor, tone: torch.Tensor | None) -> torch.Tensor:
+    def respond(self, maps: torch.Tensor, coords: torch.Tensor, noise: torch.Tensor,
+                tone: torch.Tensor | None) -> torch.Tensor:
         """The maps as they are: a released prior was not taught to answer in one evaluation."""
         return maps
 
@@ -142,12 +160,14 @@ class ReleasedPrior(Prior):
         self.check()
         if self.kind != "noise":
             return Condition(positional_encoding(coords, self.octaves))
-        columns, rows = ((coords + 1) / 2 * self.noise.shape[-1]).round().long().clamp(0, self.noise.shape[-1] - 1).unbind(1)
+        columns, rows = ((coords + 1) / 2
+                         * self.noise.shape[-1]).round().long().clamp(0, self.noise.shape[-1] - 1).unbind(1)
         return Condition(self.noise[0][:, rows, columns].transpose(0, 1))
 
 
 def packed(maps: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """Maps [N, C, R, R] in 256 levels of each channel's range: uint8 [N, C, R, R] and that range, lowest and highest, [C, 2]. A quarter of float32's size."""
+    """Maps [N, C, R, R] in 256 levels of each channel's range: uint8 [N, C, R, R] and that range, lowest and highest,
+    [C, 2]. A quarter of float32's size."""
     limits = torch.stack([maps.amin((0, 2, 3)), maps.amax((0, 2, 3))], 1)
     low, high = limits[:, 0, None, None], limits[:, 1, None, None]
     return ((maps - low) / (high - low).clamp_min(1e-6) * 255).round().to(torch.uint8), limits
@@ -167,20 +187,23 @@ def condition(coords: torch.Tensor, octaves: int, mean_face: torch.Tensor, sprea
     mapping = torch.cat([texel.log2()[:, None], tone.clamp_min(1e-3).log() / 2 + 0.6], 1)  # logarithms of about -1 to 1
     if blind is not None:
         mapping = torch.cat([mapping, blind.to(mapping)[:, None]], 1)
-    return Condition(positional_encoding(coords, octaves), mapping, mean_at(mean_face, coords, tone), scale[:, :, None, None])
+    return Condition(positional_encoding(coords, octaves), mapping, mean_at(mean_face, coords, tone),
+                     scale[:, :, None, None])
 
 
 def mean_at(mean_face: torch.Tensor, coords: torch.Tensor, tone: torch.Tensor) -> torch.Tensor:
     """The mean face of skins of tone [N, 3] at coords [N, 2, H, W]: x's seven channels [N, 7, H, W]."""
     grid = coords.permute(0, 2, 3, 1)
-    mean = torch.nn.functional.grid_sample(mean_face.expand(len(coords), -1, -1, -1), grid, align_corners=False, padding_mode="border")
+    mean = torch.nn.functional.grid_sample(mean_face.expand(len(coords), -1, -1, -1), grid, align_corners=False,
+                                           padding_mode="border")
     return torch.cat([2 * mean[:, :3] * tone[:, :, None, None] - 1, mean[:, 3:]], 1)
 
 
 def load(path: Path = WEIGHTS, device: str = "cpu", dtype: torch.dtype | None = None) -> Prior:
     """Our prior, or the authors' when `path` is a folder with config.json and ckpt.pth.
 
-    Map-sized work runs in `dtype`, by default bfloat16 where the processor has it. Raises Problem for files that are missing or of another kind.
+    Map-sized work runs in `dtype`, by default bfloat16 where the processor has it. Raises Problem for files that are
+    missing or of another kind.
     """
     path = Path(path)
     if path.suffix != WEIGHTS.suffix:
@@ -189,7 +212,8 @@ def load(path: Path = WEIGHTS, device: str = "cpu", dtype: torch.dtype | None = 
         try:
             prior = _load_ours(path)
         except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
-            raise Problem(f"The prior {path} cannot be loaded ({type(error).__name__}: {error}).", "Reinstall the extension.") from error
+            raise Problem(f"The prior {path} cannot be loaded ({type(error).__name__}: {error}).",
+                          "Reinstall the extension.") from error
     prior.network.lower(dtype or fast_dtype(device))
     return prior.to(device)
 
@@ -206,15 +230,19 @@ def build(config: dict) -> UNet:
     model, cond = config["model"], config.get("cond", {})
     channels = {"coord": 2, "posenc": 2 + 4 * int(cond.get("pos_enc_freq", 0)), "noise": 3}[cond.get("type", "coord")]
     augmented = 9 if model.get("augment_wrapper", True) else 0
-    return UNet(UNetLayout(model["input_channels"], channels, model["mapping_out"], model["depths"], model["channels"], model.get("self_attn_depths"),
-                           model.get("patch_size", 1), augmented + model.get("mapping_cond_dim", 0), model.get("sigma_data", 1.0),
+    return UNet(UNetLayout(model["input_channels"], channels, model["mapping_out"], model["depths"], model["channels"],
+                           model.get("self_attn_depths"),
+                           model.get("patch_size", 1), augmented + model.get("mapping_cond_dim", 0),
+                           model.get("sigma_data", 1.0),
                            model.get("norm", "group"), model.get("skip_stages", 0), model.get("has_variance", False)))
 
 
 def coordinates(size: int, rows: slice, columns: slice, centred: bool = True) -> torch.Tensor:
-    """UV coordinates [1, 2, h, w] in [-1, 1] of a window of a size x size map: channel 0 grows with the column, 1 with the row.
+    """UV coordinates [1, 2, h, w] in [-1, 1] of a window of a size x size map: channel 0 grows with the column, 1 with
+    the row.
 
-    Ours are those of texel centres, so that they agree between scales; the released code's (`centred=False`) those of the upper left corners.
+    Ours are those of texel centres, so that they agree between scales; the released code's (`centred=False`) those of
+    the upper left corners.
     """
     line = 2 * (torch.arange(size) + (0.5 if centred else 0.0)) / size - 1
     return torch.stack(torch.meshgrid(line[columns], line[rows], indexing="xy"))[None]
@@ -230,8 +258,13 @@ def _load_ours(path: Path) -> Prior:
     shipped_files.require_whole(path)
     card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     with safe_open(path, "pt") as file:
-        tensors = {name: file.get_tensor(name).float() for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
-    mean_face, spread, references = tensors.pop("mean_face"), tensors.pop("spread"), unpacked(tensors.pop("references"), tensors.pop("references_range"))
+        tensors = {name: file.get_tensor(name).float()
+                   for name in file.keys()}  # noqa: SIM118 - safe_open is no mapping
+    mean_face, spread, references = (
+        tensors.pop("mean_face"),
+        tensors.pop("spread"),
+        unpacked(tensors.pop("references"), tensors.pop("references_range")),
+    )
     network = build(card)
     network.load_state_dict(tensors)
     return Prior(network, card["cond"]["pos_enc_freq"], mean_face, spread, card["tones"], references)
@@ -244,7 +277,10 @@ def _load_released(folder: Path) -> ReleasedPrior:
         network.load_state_dict(state)
     except RuntimeError as error:
         first = str(error).strip().splitlines()[1:2] or [str(error)]
-        raise Problem(f"{folder / 'ckpt.pth'} does not fit the config.json beside it ({first[0].strip()}).", released.CHOOSE) from error
+        raise Problem(f"{folder / 'ckpt.pth'} does not fit the config.json beside it ({first[0].strip()}).",
+                      released.CHOOSE) from error
     model, cond = config["model"], config["cond"]
-    sigmas = (float(model["sigma_min"]), float(model["sigma_max"])) if {"sigma_min", "sigma_max"} <= set(model) else None
-    return ReleasedPrior(network, cond["type"], cond.get("pos_enc_freq", 0) if cond["type"] == "posenc" else 0, sigmas, released.read_noise(folder))
+    sigmas = ((float(model["sigma_min"]), float(model["sigma_max"])) if {"sigma_min", "sigma_max"} <= set(model)
+              else None)
+    return ReleasedPrior(network, cond["type"], cond.get("pos_enc_freq", 0) if cond["type"] == "posenc" else 0, sigmas,
+                         released.read_noise(folder))

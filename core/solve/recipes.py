@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The constants of the method, and the named sets of them: ours, the paper's and the authors' released code's.
 
-All three run through one implementation; what a name changes stands in RECIPES at the end of this file, side by side, and nowhere else.
+All three run through one implementation; what a name changes stands in RECIPES at the end of this file, side by side,
+and nowhere else.
 """
 
 from __future__ import annotations
@@ -19,68 +20,89 @@ class Recipe:
     start: float = 0.6  # T_init / T: the share of the noise schedule that is walked
     sigma_min: float = 0.01
     sigma_max: float = 80.0
-    coarse: tuple[tuple[int, float], ...] = ((4, 1.0), (2, 0.3))  # (factor, sigma): above this noise the map is sampled at 1 / factor of its size
-    reference: str = "mean"  # x_0^ref, of the skin tone: the prior's mean face; "nearest" of its reference skins; or "uniform", the tone everywhere
+    # (factor, sigma): above this noise the map is sampled at 1 / factor of its size
+    coarse: tuple[tuple[int, float], ...] = ((4, 1.0), (2, 0.3))
+    # x_0^ref, of the skin tone: the prior's mean face; "nearest" of its reference skins; or "uniform", the tone
+    # everywhere
+    reference: str = "mean"
 
     # guidance by the texture
     guidance: str = "dps"  # or "proximal": closed form on the denoised map, without the network's gradient
     zeta: float = 1.0  # step size of equation 8
-    preserving: bool = False  # equation 8 in the paper's variance-preserving coordinates: there the same zeta is (1 + sigma^2) times larger
-    clip: str = "texel"  # each texel's guidance is limited alone; "decade": all of it is divided by ten until the largest fits; "none"
+    # equation 8 in the paper's variance-preserving coordinates: there the same zeta is (1 + sigma^2) times larger
+    preserving: bool = False
+    # each texel's guidance is limited alone; "decade": all of it is divided by ten until the largest fits; "none"
+    clip: str = "texel"
     limit: float = 0.1  # largest guidance of one texel
     blur: bool = False  # rendering and texture are compared through a 3 x 3 Gaussian
     candidates: int = 1  # of so many draws of a step's noise the one nearest to the texture is taken
     residual: float = 0.02  # proximal: the photometric error that is taken for noise
 
     # the lights
-    hard_mask: bool = False  # M is 0 or 1 and lights also the ring around it; else a soft alpha that fades over a few texels
-    open: float = 0.0  # how far the texel grid reaches outside of M; above 0 it takes away shadows that nobody masked, and more
+    # M is 0 or 1 and lights also the ring around it; else a soft alpha that fades over a few texels
+    hard_mask: bool = False
+    # how far the texel grid reaches outside of M; above 0 it takes away shadows that nobody masked, and more
+    open: float = 0.0
     one_chroma: bool = True  # all local light has one learned colour; False: 27 free numbers per cell
     bilinear: bool = False  # how a texel reads V; else cubic
-    linear: float = 0.25  # gamma^g is what the split of skin and light says (split.py), and stays, where that light's logarithm deviates by less: to there
-    # exp(x) is 1 + x within 3 %. A stronger light, as of frames that no delighter saw, is free, and all light is with 0
-    fitted: bool = True  # gamma^g starts from a least-squares fit to x_0^ref; else from the even light that gives the texture's mean
-    sharp_edges: bool = True  # M's border is laid on the shadow's edge where the texture shows one, and there light may step
+    # gamma^g is what the split of skin and light says (split.py), and stays, where that light's logarithm deviates by
+    # less: to there exp(x) is 1 + x within 3 %. A stronger light, as of frames that no delighter saw, is free, and all
+    # light is with 0
+    linear: float = 0.25
+    # gamma^g starts from a least-squares fit to x_0^ref; else from the even light that gives the texture's mean
+    fitted: bool = True
+    # M's border is laid on the shadow's edge where the texture shows one, and there light may step
+    sharp_edges: bool = True
     protect_marks: bool = True  # moles and round scars inside M tell nothing of the light
     trusting: bool = False  # light may explain brows, lips and hair as freely as skin
-    phases: tuple[tuple[str, float, float], ...] = (("both", 0.0, 0.5),)  # (which lights, from, to): shares of the steps; frozen outside of them
+    # (which lights, from, to): shares of the steps; frozen outside of them
+    phases: tuple[tuple[str, float, float], ...] = (("both", 0.0, 0.5),)
     refit: float = 0.0  # share of the steps at which gamma^g is fitted outside of M in closed form
     updates: int = 300  # of each phase, spread over its steps; one a step is the least
     rate: float = 0.01  # of Adam ...
     decay: float = 0.995  # ... and its factor per update of a phase
     tv: float = 0.1
-    tv_of_gamma: bool = False  # L_TV is the squared variation of the SH coefficients; else the L1 variation of the shading on M's ring
+    # L_TV is the squared variation of the SH coefficients; else the L1 variation of the shading on M's ring
+    tv_of_gamma: bool = False
     neg: float = 1.0
-    smooth: float = 1.4  # L1 variation of s^V inside M, per texel of a 1024 map and mean squared albedo: a brow is not worth its outline, a shadow is
-    faint: float = 0.0  # pull of s^V towards what M's border says is missing, per texel and mean squared albedo; not where the artist added to the
-    # proposal for M
+    # L1 variation of s^V inside M, per texel of a 1024 map and mean squared albedo: a brow is not worth its outline, a
+    # shadow is
+    smooth: float = 1.4
+    # pull of s^V towards what M's border says is missing, per texel and mean squared albedo; not where the artist added
+    # to the proposal for M
+    faint: float = 0.0
 
     # the end
-    released_boxes: bool = False  # with the authors' prior the tone is that of their box, and texture and M count within the bounds of their masks alone
-    rescale: str = "linear"  # the mean of the facial skin is brought to the skin tone, in linear light; "srgb": in sRGB values; "none"
+    # with the authors' prior the tone is that of their box, and texture and M count within the bounds of their masks
+    # alone
+    released_boxes: bool = False
+    # the mean of the facial skin is brought to the skin tone, in linear light; "srgb": in sRGB values; "none"
+    rescale: str = "linear"
 
 
 OURS = Recipe()
 
 # What neither the paper nor the released code has is off in both.
-_PLAIN = replace(OURS, coarse=(), hard_mask=True, one_chroma=False, sharp_edges=False, protect_marks=False, trusting=True, smooth=0.0,
-                 linear=0.0)
+_PLAIN = replace(OURS, coarse=(), hard_mask=True, one_chroma=False, sharp_edges=False, protect_marks=False,
+                 trusting=True, smooth=0.0, linear=0.0)
 
 RECIPES = {
     "wildcap": OURS,
-    #                                the paper                                     the released code
-    # walk                           T_init = 600 of T = 1000                      the last 599 of 1000 Karras levels
-    # x_0^ref                        nearest scan, colour-matched                  the tone everywhere
-    # equation 8                     zeta = 1, variance preserving, no limit       zeta = 1, variance exploding, decade clip, best of 20 draws
-    # rendering compared             as it is                                      through a 3 x 3 Gaussian
-    # lights                         both at every step, gamma^g fitted first      gamma^g for 101 steps, then V for 200, then none
-    # L_TV                           squared, of gamma                             L1, of the shading on the ring
-    # V read                         bilinear                                      cubic
-    # skin tone                      by x_0^ref alone                              rescaled in sRGB at the end
-    "paper": replace(_PLAIN, steps=600, reference="nearest", preserving=True, clip="none", phases=(("both", 0.0, 1.0),), updates=600, tv_of_gamma=True,
-                     bilinear=True, rescale="none"),
-    "released": replace(_PLAIN, steps=599, start=0.599, reference="uniform", clip="decade", candidates=20, blur=True, fitted=False,
-                        phases=(("main", 0.0, 101 / 599), ("grid", 101 / 599, 301 / 599)), updates=1, rescale="srgb", released_boxes=True),
+    #                     the paper                                    the released code
+    # walk                T_init = 600 of T = 1000                     the last 599 of 1000 Karras levels
+    # x_0^ref             nearest scan, colour-matched                 the tone everywhere
+    # equation 8          zeta = 1, variance preserving, no limit      zeta = 1, exploding, decade clip, best of 20
+    # rendering compared  as it is                                     through a 3 x 3 Gaussian
+    # lights              both at every step, gamma^g fitted first     gamma^g for 101 steps, then V for 200, then none
+    # L_TV                squared, of gamma                            L1, of the shading on the ring
+    # V read              bilinear                                     cubic
+    # skin tone           by x_0^ref alone                             rescaled in sRGB at the end
+    "paper": replace(_PLAIN, steps=600, reference="nearest", preserving=True, clip="none", phases=(("both", 0.0, 1.0),),
+                     updates=600, tv_of_gamma=True, bilinear=True, rescale="none"),
+    "released": replace(_PLAIN, steps=599, start=0.599, reference="uniform", clip="decade", candidates=20, blur=True,
+                        fitted=False,
+                        phases=(("main", 0.0, 101 / 599), ("grid", 101 / 599, 301 / 599)), updates=1, rescale="srgb",
+                        released_boxes=True),
 }
 
 

@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Joint sampling of reflectance and light (paper, section 3.4, "Jointly Sample A and Update Gamma").
 
-The paper writes DDPM; here the same process stands in the variance-exploding form of EDM: x = x_0 + sigma z, one ancestral step of which is the DDPM
-posterior step (equation 5), and the denoiser's output is \\hat x_t (equation 6). Everything is float32 and linear light; x is [1, 7, H, W].
+The paper writes DDPM; here the same process stands in the variance-exploding form of EDM: x = x_0 + sigma z, one
+ancestral step of which is the DDPM posterior step (equation 5), and the denoiser's output is \\hat x_t (equation 6).
+Everything is float32 and linear light; x is [1, 7, H, W].
 
-A step stays on the device that the state, the observations and the prior lie on: it neither asks that device for a number nor sends it one.
+A step stays on the device that the state, the observations and the prior lie on: it neither asks that device for a
+number nor sends it one.
 """
 
 from __future__ import annotations
@@ -23,8 +25,8 @@ from .recipes import Recipe
 
 
 def seeded(seed: int, device: torch.device | str = "cpu") -> Callable[[int], Callable]:
-    """The noise of a run: step -> draw(*shape), standard normal, drawn on the device. It depends on (seed, step, device) alone, so a run continued from a
-    stored state gives the same bytes."""
+    """The noise of a run: step -> draw(*shape), standard normal, drawn on the device. It depends on (seed, step,
+    device) alone, so a run continued from a stored state gives the same bytes."""
     def of_step(step: int) -> Callable:
         generator = torch.Generator(device).manual_seed(1_000_003 * seed + step)
         return lambda *shape: torch.randn(shape, generator=generator, device=device)
@@ -35,8 +37,9 @@ def seeded(seed: int, device: torch.device | str = "cpu") -> Callable[[int], Cal
 class Sampler:
     """How a map is sampled, whatever is observed of it.
 
-    denoiser(x, sigma, coords) is the prior; noise is `seeded`'s, of the observations' device; known(x, sigma, draw) puts what is known of the map for sure
-    into x_t (window.py); fit moves theta after each step (light_fit.update_lights, or another light model's).
+    denoiser(x, sigma, coords) is the prior; noise is `seeded`'s, of the observations' device; known(x, sigma, draw)
+    puts what is known of the map for sure into x_t (window.py); fit moves theta after each step
+    (light_fit.update_lights, or another light model's).
     """
 
     denoiser: Callable
@@ -45,10 +48,12 @@ class Sampler:
     known: Callable[[torch.Tensor, float, Callable], torch.Tensor] = lambda x, sigma, draw: x
     fit: Callable[..., None] = update_lights
 
-    def sample(self, observations: dict[int, Observation], state: State, on_step: Callable[[State, int], None] = lambda state, steps: None) -> State:
+    def sample(self, observations: dict[int, Observation], state: State,
+               on_step: Callable[[State, int], None] = lambda state, steps: None) -> State:
         """Samples from `state` to the end and returns the final state; `denoised` is the solved map, `lights` theta.
 
-        `observations` maps a coarsening factor to what is known at that size. Raises Problem when the numbers leave all bounds.
+        `observations` maps a coarsening factor to what is known at that size. Raises Problem when the numbers leave all
+        bounds.
         """
         sigmas = schedule(self.recipe)
         steps = len(sigmas) - 1
@@ -62,12 +67,14 @@ class Sampler:
             self.step(o, state, (s, sigmas[i + 1]), steps, draw)
             if not state.x.abs().max() <= 1e3 * (1 + s):  # nor where it is no number
                 raise Problem(f"The solver diverged at step {i + 1} of {steps}.",
-                              "Check that the texture and the mask are those of this head, or choose the proximal guidance.")
+                              "Check that the texture and the mask are those of this head, or choose the proximal "
+                              "guidance.")
             on_step(state, steps)
         return state
 
     def step(self, o: Observation, state: State, levels: tuple[float, float], steps: int, draw: Callable) -> None:
-        """One step of `sample`, in place, between two noise levels: x_t becomes x_{t-1}, theta follows, all on their device.
+        """One step of `sample`, in place, between two noise levels: x_t becomes x_{t-1}, theta follows, all on their
+        device.
 
         Parameters
         ----------
@@ -99,9 +106,11 @@ class Sampler:
             state.x = x_prime if s_up == 0 else self._noised(x_prime, x, (s_up, s_down / s), o, state.lights, draw)
         state.denoised, state.step = guided, state.step + 1
 
-    def _noised(self, mean: torch.Tensor, x: torch.Tensor, shares: tuple[float, float], o: Observation, lights: Lights, draw: Callable) -> torch.Tensor:
-        """x_{t-1}: the mean with fresh noise; of several draws the one whose rendering is nearest to where x_t's should go (diffusion proximal posterior
-        sampling, as in the released code). shares: the level of the fresh noise, and the share of x_t's noise that the step keeps."""
+    def _noised(self, mean: torch.Tensor, x: torch.Tensor, shares: tuple[float, float], o: Observation, lights: Lights,
+                draw: Callable) -> torch.Tensor:
+        """x_{t-1}: the mean with fresh noise; of several draws the one whose rendering is nearest to where x_t's should
+        go (diffusion proximal posterior sampling, as in the released code). shares: the level of the fresh noise, and
+        the share of x_t's noise that the step keeps."""
         s_up, kept = shares
         if self.recipe.candidates == 1:
             return mean + s_up * draw(*mean.shape)
@@ -116,7 +125,8 @@ class Sampler:
 
 
 def schedule(recipe: Recipe) -> list[float]:
-    """Noise levels: the last `steps` of Karras' sequence (rho 7) whose length makes them the share `start` of it, then 0."""
+    """Noise levels: the last `steps` of Karras' sequence (rho 7) whose length makes them the share `start` of it, then
+    0."""
     count = max(recipe.steps, round(recipe.steps / recipe.start))
     return karras(count, recipe.sigma_min, recipe.sigma_max)[-recipe.steps - 1:]
 
@@ -129,13 +139,15 @@ def karras(count: int, sigma_min: float, sigma_max: float) -> list[float]:
 
 
 def ancestral(s: float, s_next: float) -> tuple[float, float]:
-    """(s_down, s_up) of a step that keeps the process's variance: down to s_down without noise, then s_up of fresh noise."""
+    """(s_down, s_up) of a step that keeps the process's variance: down to s_down without noise, then s_up of fresh
+    noise."""
     s_up = min(s_next, (s_next**2 * (s**2 - s_next**2) / s**2) ** 0.5)
     return (s_next**2 - s_up**2) ** 0.5, s_up
 
 
 def clipped(gradient: torch.Tensor, recipe: Recipe) -> torch.Tensor:
-    """The guidance [1, 7, H, W] within the recipe's limit: texel by texel, so that one bad texel does not hold up the others, or all of it at once."""
+    """The guidance [1, 7, H, W] within the recipe's limit: texel by texel, so that one bad texel does not hold up the
+    others, or all of it at once."""
     if recipe.clip == "texel":
         return gradient * (recipe.limit / gradient.abs().amax(1, keepdim=True).clamp_min(recipe.limit))
     if recipe.clip == "decade":
@@ -145,7 +157,8 @@ def clipped(gradient: torch.Tensor, recipe: Recipe) -> torch.Tensor:
 
 
 def proximal(denoised: torch.Tensor, shading: torch.Tensor, o: Observation, s: float, residual: float) -> torch.Tensor:
-    """The map nearest to `denoised` (spread s) that explains the texture (spread `residual`): per texel, in closed form (Zhu et al. 2023)."""
+    """The map nearest to `denoised` (spread s) that explains the texture (spread `residual`): per texel, in closed form
+    (Zhu et al. 2023)."""
     half = shading / 2 * o.weight
     ratio = (residual / s) ** 2
     wanted = o.texture * o.weight - half
@@ -161,5 +174,6 @@ def _factor(s: float, recipe: Recipe, observations: dict[int, Observation]) -> i
 def _resized(maps: torch.Tensor, height: int, width: int) -> torch.Tensor:
     if maps.shape[-2:] == (height, width):
         return maps
-    rows, columns = (interpolation(old, new).to(maps) for old, new in zip(maps.shape[-2:], (height, width), strict=True))
+    rows, columns = (interpolation(old, new).to(maps)
+                     for old, new in zip(maps.shape[-2:], (height, width), strict=True))
     return rows @ maps @ columns.T

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The skin tone as a value: read once from the settings or estimated once, and from there on handed from function to function."""
+"""The skin tone as a value: read once from the settings or estimated once, and from there on handed from function to
+function."""
 
 from __future__ import annotations
 
@@ -13,17 +14,20 @@ from ..contract.messages import Problem
 from ..imaging import images
 
 GIVEN, SCENE, WHITE_POINT, TEXTURE, EARLIER = "given", "scene", "white point", "texture", "earlier solve"
-"""Where a tone comes from: the settings; an estimate from the frames as they were filmed, or with a measured white; one from the texture; the solve before."""
+"""Where a tone comes from: the settings; an estimate from the frames as they were filmed, or with a measured white; one
+from the texture; the solve before."""
 DECIMALS = 5
-"""Of sRGB, in a setting and in an estimate from the frames: who types the tone that was estimated gets the same maps."""
+"""Of sRGB, in a setting and in an estimate from the frames: who types the tone that was estimated gets the same
+maps."""
 
 
 @dataclass(frozen=True)
 class SkinTone:
     """The mean albedo of a person's facial skin.
 
-    linear: linear sRGB [3] in (0, 1], numbers of float32. source: where it comes from. Of an estimate from the frames, else None: deviation, one standard
-    deviation of the lightness L*; error, the expected colour difference, delta E 2000; group, what such a tone is called (population.GROUPS).
+    linear: linear sRGB [3] in (0, 1], numbers of float32. source: where it comes from. Of an estimate from the frames,
+    else None: deviation, one standard deviation of the lightness L*; error, the expected colour difference, delta E
+    2000; group, what such a tone is called (population.GROUPS).
     """
 
     linear: tuple[float, float, float]
@@ -62,7 +66,8 @@ def parse_skin_tone(setting: str) -> SkinTone | None:
     except ValueError:
         values = []
     if len(values) != 3 or not all(0 < v <= 1 for v in values):
-        raise Problem(f"The skin tone {setting!r} is not a colour.", "Give three numbers between 0 and 1 as sRGB, such as 0.69,0.54,0.45, or auto.")
+        raise Problem(f"The skin tone {setting!r} is not a colour.",
+                      "Give three numbers between 0 and 1 as sRGB, such as 0.69,0.54,0.45, or auto.")
     return SkinTone.from_srgb(values, GIVEN)
 
 

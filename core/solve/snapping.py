@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tool behind Snap to Edges: the shadow mask laid on the penumbra that the texture shows, as a solve lays it before its first step."""
+"""The tool behind Snap to Edges: the shadow mask laid on the penumbra that the texture shows, as a solve lays it before
+its first step."""
 
 from __future__ import annotations
 
@@ -33,9 +34,11 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     evidence = read_evidence(capture, read_filmed_head(capture), max(min(height, 1024) // 32, 4) * 32)
     report.progress(1, 2, "looking for the shadow's edges")
     recipe = replace(RECIPES["wildcap"], sharp_edges=True, protect_marks=False)
-    tone = parse_skin_tone(settings.solve.skin_tone) or estimate_from_texture(evidence.texture, initial.lit_skin(evidence), prior.tones)
+    tone = parse_skin_tone(settings.solve.skin_tone) or estimate_from_texture(evidence.texture,
+                                                                              initial.lit_skin(evidence), prior.tones)
     found = initial.start(prior, evidence, tone, CELL, recipe)
     snapped = np.clip(images.resize(found.alpha.numpy(), width, height), 0, 1)
     images.write_data(capture.shadow_mask_edges, snapped)
     painted = images.resize(evidence.alpha.numpy(), width, height)
-    report.figure("moved_percent_of_mask", round(100 * float(np.abs(snapped - painted).sum() / max(float(painted.sum()), 1e-6)), 1))
+    report.figure("moved_percent_of_mask",
+                  round(100 * float(np.abs(snapped - painted).sum() / max(float(painted.sum()), 1e-6)), 1))

@@ -2,17 +2,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Skin or light: the large shapes of a texture, split into what is this person's and what light is left.
 
-In the logarithm a texture is the mean face of the tone, plus this person's traits, plus light, plus noise, and each of these is taken for a Gaussian:
+In the logarithm a texture is the mean face of the tone, plus this person's traits, plus light, plus noise, and each of
+these is taken for a Gaussian:
 
     traits         broad (REACH_M) and mostly alike on the face's two sides (ALIKE), whichever way the skin faces
     global light   second-order spherical harmonics of the normal, their level free
-    local light    what a light leaves that the normal does not tell (a soft shadow, a delighter's mistake): nearly as broad as traits, but of one side
-    noise          narrow: fine detail, and what the frames' registration leaves of it
+    local light    what a light leaves that the normal does not tell (a soft shadow, a delighter's mistake): nearly as
+    broad as traits, but of one side noise          narrow: fine detail, and what the frames' registration leaves of it
 
-So the split is linear algebra (Gaussian process regression; Rasmussen and Williams 2006, chapter 2). How large each of the four is on this face is not known:
-the most probable scales are taken, by the evidence of the texture itself (ibid., section 5.4) and by what they usually are (TYPICAL). No delighter is asked for
-by name: where one leaves much light, much of its texture is explained by light. Of several captures of a person the traits are the same and the lights are
-not, which tells them apart far better, local light included. benchmarks/split.py measures the constants and the outcome.
+So the split is linear algebra (Gaussian process regression; Rasmussen and Williams 2006, chapter 2). How large each of
+the four is on this face is not known: the most probable scales are taken, by the evidence of the texture itself (ibid.,
+section 5.4) and by what they usually are (TYPICAL). No delighter is asked for by name: where one leaves much light,
+much of its texture is explained by light. Of several captures of a person the traits are the same and the lights are
+not, which tells them apart far better, local light included. benchmarks/split.py measures the constants and the
+outcome.
 """
 
 from __future__ import annotations
@@ -30,18 +33,22 @@ from ..geometry import raster
 from ..light.spherical_harmonics import sh_basis
 
 CELLS, FIRST_CELLS = 48, 24
-"""Cells along the map's side by which a capture is split, and by which the scales are found: some 4 and 8 mm of the face each."""
+"""Cells along the map's side by which a capture is split, and by which the scales are found: some 4 and 8 mm of the
+face each."""
 CELL_TEXELS = 8
 """Fewest texels along a cell's side: a small map has fewer cells."""
 REACH_M, ALIKE = 0.022, 0.8
-"""Distance over which the traits' correlation falls to 1 / e, and the correlation of a place with its mirror image: of painted skins (benchmarks/split.py)."""
+"""Distance over which the traits' correlation falls to 1 / e, and the correlation of a place with its mirror image: of
+painted skins (benchmarks/split.py)."""
 LOCAL_REACH_M, NOISE_REACH_M = 0.020, 0.005
 AXES = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6]])
-"""Axes of a log colour along which the parts are taken for independent: brightness, red against blue, green against both."""
+"""Axes of a log colour along which the parts are taken for independent: brightness, red against blue, green against
+both."""
 OF_AXES = np.array([1.0, 0.3, 0.1])
 """Deviations along these axes over that of brightness, of skins and of light alike."""
 OF_ORDERS = np.array([0.0, 1, 1, 1, 0.6, 0.6, 0.6, 0.6, 0.6])
-"""Deviations of the global light's coefficients over that of a first-order one; the level's own is LEVEL: exposure is free."""
+"""Deviations of the global light's coefficients over that of a first-order one; the level's own is LEVEL: exposure is
+free."""
 LEVEL = 0.5
 VISIBLE = np.sqrt(4 * np.pi)
 """The functions of the normal are scaled to a mean square of one over the sphere."""
@@ -52,8 +59,8 @@ FULL = 0.5
 
 @dataclass(frozen=True)
 class Scales:
-    """Deviations in natural log along the axis of brightness, 1 / sqrt(3) of which each channel has: of the traits, of a first-order coefficient of the global
-    light, of local light, of noise."""
+    """Deviations in natural log along the axis of brightness, 1 / sqrt(3) of which each channel has: of the traits, of
+    a first-order coefficient of the global light, of local light, of noise."""
 
     traits: float
     light: float
@@ -70,8 +77,8 @@ TYPICAL, VARIED = Scales(0.20, 0.08, 0.08, 0.07), 0.6
 
 @dataclass(frozen=True)
 class Shapes:
-    """What is split of a capture. texture and reference albedo [3, S, S] linear, in the built-in head's UVs; normal [3, S, S], unit, in any axes; weight [S, S]
-    in [0, 1]: how far a texel tells of skin, 0 in M."""
+    """What is split of a capture. texture and reference albedo [3, S, S] linear, in the built-in head's UVs; normal [3,
+    S, S], unit, in any axes; weight [S, S] in [0, 1]: how far a texel tells of skin, 0 in M."""
 
     texture: torch.Tensor
     reference: torch.Tensor
@@ -81,8 +88,8 @@ class Shapes:
 
 @dataclass(frozen=True)
 class Split:
-    """Of the capture that is asked about. coefficients [3, 9]: the global light's logarithm, on orthonormal functions of the normal; traits and local
-    [3, C, C]: natural log, over the whole head; scales as they were found."""
+    """Of the capture that is asked about. coefficients [3, 9]: the global light's logarithm, on orthonormal functions
+    of the normal; traits and local [3, C, C]: natural log, over the whole head; scales as they were found."""
 
     coefficients: np.ndarray
     traits: np.ndarray
@@ -91,13 +98,14 @@ class Split:
 
     def light(self, normal: torch.Tensor) -> torch.Tensor:
         """The global light [3, S, S] at normals [3, S, S], linear: a factor of the albedo."""
-        return torch.from_numpy(np.exp(np.tensordot(self.coefficients, sh_basis(normal.numpy().astype(np.float64), axis=0), 1))).float()
+        return torch.from_numpy(np.exp(np.tensordot(self.coefficients,
+                                                    sh_basis(normal.numpy().astype(np.float64), axis=0), 1))).float()
 
 
 @dataclass(frozen=True)
 class Cells:
-    """places [N, 3] in metres on the built-in head and normal [N, 3] of all cells of a head; seen [K]: which of them tell of the skin; values [K, 3] there:
-    log(texture / reference) along AXES; covered [C, C]: where the N lie."""
+    """places [N, 3] in metres on the built-in head and normal [N, 3] of all cells of a head; seen [K]: which of them
+    tell of the skin; values [K, 3] there: log(texture / reference) along AXES; covered [C, C]: where the N lie."""
 
     places: np.ndarray
     normal: np.ndarray
@@ -128,12 +136,14 @@ class Covariances:
     def covariance(self, scales: Scales, axis: int) -> np.ndarray:
         """Of all parts together, along an axis."""
         sizes = np.square(OF_AXES[axis] * np.array(tuple(scales)))
-        parts = sum(size * part for size, part in zip(sizes, (self.traits, self.light, self.local, self.noise), strict=True))
+        parts = sum(size * part
+                    for size, part in zip(sizes, (self.traits, self.light, self.local, self.noise), strict=True))
         return parts + LEVEL**2 * self.level + 1e-6 * np.eye(*self.level.shape)
 
 
 def split(captures: list[Shapes], typical: Scales = TYPICAL) -> Split:
-    """Splits the first capture, beside others of the same person where there are any; `typical`: the middle of the scales' prior."""
+    """Splits the first capture, beside others of the same person where there are any; `typical`: the middle of the
+    scales' prior."""
     fewer = len(captures) ** -0.5
     most = captures[0].weight.shape[0] // CELL_TEXELS
     seen, values = seen_together([cells_of(shapes, round(min(FIRST_CELLS, most) * fewer)) for shapes in captures])
@@ -165,7 +175,8 @@ def places_of(count: int) -> tuple[np.ndarray, np.ndarray]:
 def seen_together(captures: list[Cells]) -> tuple[Places, np.ndarray]:
     """All cells that were seen, and their values [K, 3]."""
     own = np.repeat(np.arange(len(captures)), [len(cells.seen) for cells in captures])
-    return Places(*(np.concatenate([getattr(cells, name)[cells.seen] for cells in captures]) for name in ("places", "normal")), own), \
+    return Places(*(np.concatenate([getattr(cells, name)[cells.seen] for cells in captures])
+                    for name in ("places", "normal")), own), \
         np.concatenate([cells.values for cells in captures])
 
 
@@ -174,10 +185,12 @@ def model(these: Places, others: Places) -> Covariances:
     same = (these.own[:, None] == others.own[None]).astype(np.float64)
     apart = np.linalg.norm(these.at[:, None] - others.at[None], axis=-1)
     mirrored = np.linalg.norm(these.at[:, None] * [-1, 1, 1] - others.at[None], axis=-1)
-    variances = [1 + ALIKE * np.exp(-2 * np.abs(places.at[:, 0]) / REACH_M) for places in (these, others)]  # higher where a place is its own mirror image
+    # higher where a place is its own mirror image
+    variances = [1 + ALIKE * np.exp(-2 * np.abs(places.at[:, 0]) / REACH_M) for places in (these, others)]
     traits = (np.exp(-apart / REACH_M) + ALIKE * np.exp(-mirrored / REACH_M)) / np.sqrt(np.multiply.outer(*variances))
     light = (VISIBLE**2 * sh_basis(these.normal) * OF_ORDERS**2) @ sh_basis(others.normal).T
-    return Covariances(traits, light * same, np.exp(-apart / LOCAL_REACH_M) * same, np.exp(-apart / NOISE_REACH_M) * same, same)
+    return Covariances(traits, light * same, np.exp(-apart / LOCAL_REACH_M) * same,
+                       np.exp(-apart / NOISE_REACH_M) * same, same)
 
 
 def find_scales(together: Covariances, values: np.ndarray, typical: Scales = TYPICAL) -> Scales:
@@ -201,7 +214,8 @@ def log_probability(together: Covariances, values: np.ndarray, scales: Scales, t
     total = -0.5 * sum((np.log(found / usual) / VARIED) ** 2 for found, usual in zip(scales, typical, strict=True))
     for axis in range(3):
         lower, column = cholesky(together.covariance(scales, axis), lower=True), values[:, axis]
-        total -= 0.5 * float(np.square(solve_triangular(lower, column, lower=True)).sum()) + float(np.log(np.diag(lower)).sum())
+        total -= 0.5 * float(np.square(solve_triangular(lower, column,
+                                                        lower=True)).sum()) + float(np.log(np.diag(lower)).sum())
     return total
 
 
@@ -214,7 +228,9 @@ def infer(captures: list[Cells], scales: Scales) -> Split:
     traits, local, coefficients = np.zeros((3, len(first.places))), np.zeros((3, len(first.places))), np.zeros((3, 9))
     for axis, size in enumerate(OF_AXES):
         told = cho_solve(cho_factor(among.covariance(scales, axis)), values[:, axis])
-        traits[axis], local[axis] = (scales.traits * size) ** 2 * beyond.traits @ told, (scales.local * size) ** 2 * beyond.local @ told
+        traits[axis], local[axis] = (scales.traits
+                                     * size) ** 2 * beyond.traits @ told, (scales.local
+                                                                           * size) ** 2 * beyond.local @ told
         prior = (scales.light * size * OF_ORDERS) ** 2 + LEVEL**2 * (OF_ORDERS == 0)
         coefficients[axis] = VISIBLE * prior * (basis.T @ told[seen.own == 0])
     return Split(AXES.T @ coefficients, *(_spread(AXES.T @ part, first.covered) for part in (traits, local)), scales)

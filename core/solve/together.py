@@ -18,20 +18,24 @@ SIZE = 512
 def read_others(capture: Capture, settings: Settings, report: Reporter) -> list[Evidence]:
     """What is known of the captures that settings.solve.together names; none without it.
 
-    A folder of several may hold this capture, too. Raises Problem where there is no other, for one that has no texture yet, and for a head in other UVs.
+    A folder of several may hold this capture, too. Raises Problem where there is no other, for one that has no texture
+    yet, and for a head in other UVs.
     """
     named = captures_in(settings.solve.together)
     roots = [root for root in named if root.resolve() != capture.root.resolve()]
     if named and not roots:
-        raise Problem(f"{settings.solve.together} is this capture itself.", "Name captures of the same person in other light.")
+        raise Problem(f"{settings.solve.together} is this capture itself.",
+                      "Name captures of the same person in other light.")
     others = []
     for k, root in enumerate(roots):
         report.progress(k, len(roots), f"reading {root.name}")
         other = Capture(root)
         if not other.texture.is_file() or not other.shadow_mask_auto.is_file():
-            raise Problem(f"{root.name} has no texture and shadow mask yet.", "Reconstruct it up to the shadow mask first, or leave it out.")
+            raise Problem(f"{root.name} has no texture and shadow mask yet.",
+                          "Reconstruct it up to the shadow mask first, or leave it out.")
         head = read_filmed_head(other)
         if not head.built_in:
-            raise Problem(f"{root.name} has a head in other UVs.", "Solve together only captures whose head is the built-in one.")
+            raise Problem(f"{root.name} has a head in other UVs.",
+                          "Solve together only captures whose head is the built-in one.")
         others.append(read_evidence(other, head, SIZE))
     return others

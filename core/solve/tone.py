@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The skin tone that a solve takes, given or estimated; and the tool behind Estimate, which tells it.
 
-An estimate is made from the frames as they were filmed, where they and their cameras are there; else from the texture, whose light the delighter took out.
+An estimate is made from the frames as they were filmed, where they and their cameras are there; else from the texture,
+whose light the delighter took out.
 """
 
 from __future__ import annotations
@@ -39,16 +40,19 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     evidence = read_evidence(capture, head, SIZE)
     tone = estimate_from_frames(capture, head, settings, evidence, report)
     if tone is None:
-        prior = load(Path(settings.solve.prior).expanduser() if settings.solve.prior else WEIGHTS, settings.compute_device)
+        prior = load(Path(settings.solve.prior).expanduser() if settings.solve.prior else WEIGHTS,
+                     settings.compute_device)
         tone = estimate_from_texture(evidence.texture, lit_skin(evidence), prior.tones)
     tell_skin_tone(tone, report)
 
 
-def resolve_skin_tone(capture: Capture, head: Head, settings: Settings, built_in: Evidence, evidence: Evidence, tones: list, report: Reporter) -> SkinTone:
+def resolve_skin_tone(capture: Capture, head: Head, settings: Settings, built_in: Evidence, evidence: Evidence,
+                      tones: list, report: Reporter) -> SkinTone:
     """The tone of a solve: the artist's, or the frames', or where these are gone the texture's.
 
-    built_in: the evidence in the built-in UVs; evidence: in the prior's; tones [N, 3]: those that the prior was trained on, linear. The frames' leaves its
-    figures. Raises Problem for a setting that is no colour, and where no facial skin was seen.
+    built_in: the evidence in the built-in UVs; evidence: in the prior's; tones [N, 3]: those that the prior was trained
+    on, linear. The frames' leaves its figures. Raises Problem for a setting that is no colour, and where no facial skin
+    was seen.
     """
     given = parse_skin_tone(settings.solve.skin_tone)
     if given is not None:
@@ -60,19 +64,22 @@ def resolve_skin_tone(capture: Capture, head: Head, settings: Settings, built_in
     return tone
 
 
-def estimate_from_frames(capture: Capture, head: Head, settings: Settings, evidence: Evidence, report: Reporter) -> SkinTone | None:
-    """The tone that the frames tell under the measured white point, or the scene's; None where frames or cameras are gone. `evidence` in the built-in UVs."""
+def estimate_from_frames(capture: Capture, head: Head, settings: Settings, evidence: Evidence,
+                         report: Reporter) -> SkinTone | None:
+    """The tone that the frames tell under the measured white point, or the scene's; None where frames or cameras are
+    gone. `evidence` in the built-in UVs."""
     white = given_white(settings.solve.white_point)
     seen = capture_look(capture, head, evidence.alpha.numpy(), report)
     return None if seen is None else estimate_skin_tone(seen, white)
 
 
 def estimate_from_texture(texture: torch.Tensor, weight: torch.Tensor, tones: list) -> SkinTone:
-    """The tone of a texture [3, H, W], linear, under `weight` [H, W] (unshadowed skin): the mean of the brighter half, because shadows the mask missed only
-    darken.
+    """The tone of a texture [3, H, W], linear, under `weight` [H, W] (unshadowed skin): the mean of the brighter half,
+    because shadows the mask missed only darken.
 
-    Its colour is drawn halfway to that of the training tones [N, 3] nearest to it (the delit texture keeps some of the light's colour) and its lightness
-    kept within the human range. Light and lightness cannot be told apart, so a given tone is always better.
+    Its colour is drawn halfway to that of the training tones [N, 3] nearest to it (the delit texture keeps some of the
+    light's colour) and its lightness kept within the human range. Light and lightness cannot be told apart, so a given
+    tone is always better.
     """
     values = texture[:, weight > 0.5 * weight.max().clamp_min(1e-6)]  # [3, N]
     if values.shape[1] == 0:
@@ -82,7 +89,8 @@ def estimate_from_texture(texture: torch.Tensor, weight: torch.Tensor, tones: li
     tone = tone.clamp_min(1e-3)
     if tones:
         known = torch.tensor(tones).clamp_min(1e-3).log()
-        order = torch.tensor([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0], [0.0, 0.3, 0.0]])  # two chromaticities, and lightness with less weight
+        # two chromaticities, and lightness with less weight
+        order = torch.tensor([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0], [0.0, 0.3, 0.0]])
         distance = ((known - tone.log()) @ order.T).norm(dim=1)
         nearest = known[distance.argsort()[:5]].mean(0)
         chroma = ((tone / tone[1]).log() + (nearest - nearest[1])) / 2
@@ -91,8 +99,8 @@ def estimate_from_texture(texture: torch.Tensor, weight: torch.Tensor, tones: li
 
 
 def tell_skin_tone(tone: SkinTone, report: Reporter) -> None:
-    """Leaves the figures skin_tone_srgb (R, G, B in 0..1), skin_tone_source and, where they are known, skin_tone_group, skin_tone_deviation_l (of L*)
-    and skin_tone_error_de (expected delta E 2000)."""
+    """Leaves the figures skin_tone_srgb (R, G, B in 0..1), skin_tone_source and, where they are known, skin_tone_group,
+    skin_tone_deviation_l (of L*) and skin_tone_error_de (expected delta E 2000)."""
     report.figure("skin_tone_srgb", [round(float(v), 4) for v in tone.srgb])
     if tone.group is not None:
         report.figure("skin_tone_group", tone.group)

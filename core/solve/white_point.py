@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The white point, measured: the linear colour that a white surface in the face's light has in the frames. A ColorChecker is found by itself
-(opencv-contrib's mcc), a grey card or white paper is pointed at.
+"""The white point, measured: the linear colour that a white surface in the face's light has in the frames. A
+ColorChecker is found by itself (opencv-contrib's mcc), a grey card or white paper is pointed at.
 
-`run` is the tool behind the button Find ColorChecker. All frames of a capture are in one exposure (frames/drift.py), so any frame says it for all.
+`run` is the tool behind the button Find ColorChecker. All frames of a capture are in one exposure (frames/drift.py), so
+any frame says it for all.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from ..contract.settings import CARDS, Settings
 from ..imaging import images
 
 GREYS = np.array([0.914, 0.589, 0.363, 0.191, 0.088])
-"""Reflectance of a ColorChecker's neutral patches, white to neutral 3.5 (L* 96.5, 81.3, 66.8, 50.9, 35.7: the mean of measured charts)."""
+"""Reflectance of a ColorChecker's neutral patches, white to neutral 3.5 (L* 96.5, 81.3, 66.8, 50.9, 35.7: the mean of
+measured charts)."""
 COST = 0.04  # above it mcc's chart is a guess
 UNEVEN = 0.25  # deviation in log units of the greys about one white above which they are no chart's
 USABLE = 0.03, 0.96  # sRGB between which a patch has kept its value
@@ -27,7 +29,8 @@ STRAY = 0.15  # deviation in log units within a card
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
-    """Leaves the figures white_point (linear R, G, B) and white_point_frame. Raises Problem where no frame shows a ColorChecker."""
+    """Leaves the figures white_point (linear R, G, B) and white_point_frame. Raises Problem where no frame shows a
+    ColorChecker."""
     frames = sorted(capture.frames.glob("*.jpg"))
     frames = frames[:: max(1, len(frames) // LOOKED_AT)]
     found = {}
@@ -40,13 +43,15 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
             break
     if not found:
         raise Problem("No ColorChecker was found in the frames.",
-                      "Film it flat, in focus, at least a fifth of the picture wide, or point at a grey card or white paper instead.")
+                      "Film it flat, in focus, at least a fifth of the picture wide, or point at a grey card or white "
+                      "paper instead.")
     report.figure("white_point", [round(float(v), 4) for v in np.median(list(found.values()), 0)])
     report.figure("white_point_frame", next(iter(found)))
 
 
 def chart_white(srgb: np.ndarray) -> np.ndarray | None:
-    """The linear white [3] that a ColorChecker Classic's greys in an sRGB frame [H, W, 3] agree on; None where none is seen."""
+    """The linear white [3] that a ColorChecker Classic's greys in an sRGB frame [H, W, 3] agree on; None where none is
+    seen."""
     detector = cv2.mcc.CCheckerDetector_create()
     pixels = np.ascontiguousarray(np.round(255 * np.clip(srgb[..., ::-1], 0, 1)).astype(np.uint8))
     if not detector.process(pixels, cv2.mcc.MCC24, 1):
@@ -63,19 +68,22 @@ def chart_white(srgb: np.ndarray) -> np.ndarray | None:
 
 
 def card_white(srgb: np.ndarray, column: float, row: float, card: str) -> np.ndarray:
-    """The linear white [3] that a card says at a pixel of an sRGB frame [H, W, 3]; `card` is one of settings.CARDS. Raises Problem where the place is
-    outside, burnt out or uneven."""
+    """The linear white [3] that a card says at a pixel of an sRGB frame [H, W, 3]; `card` is one of settings.CARDS.
+    Raises Problem where the place is outside, burnt out or uneven."""
     height, width = srgb.shape[:2]
     if not (0 <= column < width and 0 <= row < height):
         raise Problem(f"The place {column:g}, {row:g} is outside of the frame, which is {width} x {height}.",
                       "Give the pixel's column and row from the upper left.")
     reach = max(2, round(PATCH * max(width, height)))
-    patch = srgb[max(0, int(row) - reach):int(row) + reach + 1, max(0, int(column) - reach):int(column) + reach + 1].reshape(-1, 3)
+    patch = srgb[max(0, int(row) - reach):int(row) + reach + 1,
+                 max(0, int(column) - reach):int(column) + reach + 1].reshape(-1, 3)
     if np.median(patch, 0).max() >= 0.98 or np.median(patch, 0).min() < 0.03:
-        raise Problem("The card is burnt out or black there.", "Choose another frame or place, or a grey card instead of white paper.")
+        raise Problem("The card is burnt out or black there.",
+                      "Choose another frame or place, or a grey card instead of white paper.")
     linear = images.srgb_to_linear(patch)
     if np.log(np.maximum(linear, 1e-3)).std(0).max() > STRAY:
-        raise Problem("That place is not of one colour.", "Point at the middle of the card, away from its border and from writing.")
+        raise Problem("That place is not of one colour.",
+                      "Point at the middle of the card, away from its border and from writing.")
     return linear.mean(0) / CARDS[card]
 
 
@@ -88,5 +96,6 @@ def given_white(setting: str) -> np.ndarray | None:
     except ValueError:
         values = np.zeros(0)
     if values.shape != (3,) or not ((values > 1e-3) & (values < 100)).all():
-        raise Problem(f"The white point {setting!r} is not a colour.", "Give three numbers above 0 as linear light, as `core white` prints them, or auto.")
+        raise Problem(f"The white point {setting!r} is not a colour.",
+                      "Give three numbers above 0 as linear light, as `core white` prints them, or auto.")
     return values

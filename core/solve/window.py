@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A part of the map sampled again after a mask edit, inside what an earlier solve found (inpainting by known region; Lugmayr et al. 2022, Meng et al. 2022).
+"""A part of the map sampled again after a mask edit, inside what an earlier solve found (inpainting by known region;
+Lugmayr et al. 2022, Meng et al. 2022).
 
-Around the window x_t is the earlier result with the noise of level t, at every level, so what is drawn inside goes on from it. The light outside stays: the
-global one is frozen, and of V move only the cells that no texel outside reads.
+Around the window x_t is the earlier result with the noise of level t, at every level, so what is drawn inside goes on
+from it. The light outside stays: the global one is frozen, and of V move only the cells that no texel outside reads.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ LARGEST = 0.5
 
 @dataclass(frozen=True)
 class Window:
-    """Rows and columns of the whole map: `inside` is sampled again, `seen` is what the network sees; `cells` of V belong to `seen`, and of these cells
-    `moving` [h, w] may change."""
+    """Rows and columns of the whole map: `inside` is sampled again, `seen` is what the network sees; `cells` of V
+    belong to `seen`, and of these cells `moving` [h, w] may change."""
 
     inside: tuple[slice, slice]
     seen: tuple[slice, slice]
@@ -46,11 +47,12 @@ class Window:
     moving: torch.Tensor
 
 
-def window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int], multiple: int, reference: int) -> Window | None:
+def window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int], multiple: int,
+           reference: int) -> Window | None:
     """What an edit from the mask `before` to `now` [S, S] touches; None where they are the same.
 
-    `cells` (rows, columns) of V cover the map, the network takes sides that are multiples of `multiple`, `reference` is the size that MARGIN counts texels of.
-    Raises ValueError, with a sentence, where the whole map is to be solved.
+    `cells` (rows, columns) of V cover the map, the network takes sides that are multiples of `multiple`, `reference` is
+    the size that MARGIN counts texels of. Raises ValueError, with a sentence, where the whole map is to be solved.
     """
     size = now.shape[0]
     touched = (now - before).abs() > 1e-3
@@ -78,8 +80,8 @@ def window(before: torch.Tensor, now: torch.Tensor, cells: tuple[int, int], mult
     return Window(tuple(inside), tuple(seen), tuple(cells_seen), moving[0][:, None] & moving[1][None])
 
 
-def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], earlier: Solution, part: Window, recipe: Recipe, seed: int,
-                 report: Reporter) -> tuple[torch.Tensor, Lights]:
+def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], earlier: Solution, part: Window,
+                 recipe: Recipe, seed: int, report: Reporter) -> tuple[torch.Tensor, Lights]:
     """The map and the lights of an earlier solve with a window of it sampled anew.
 
     Parameters
@@ -100,7 +102,8 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
     here = {factor: cropped(o, part, factor).to(device) for factor, o in observations.items()}
     known = denoised[(..., *part.seen)].to(device)
     grid = lights.grid[(..., *part.cells)].to(device)
-    state = State(0, None, known.clone(), Lights(lights.glob.clone().to(device), grid.clone(), lights.chroma.clone().to(device)))
+    state = State(0, None, known.clone(),
+                  Lights(lights.glob.clone().to(device), grid.clone(), lights.chroma.clone().to(device)))
     moving, inside = part.moving.to(device), torch.zeros(known.shape[-2:], device=device)
     inside[tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(part.inside, part.seen, strict=True))] = 1
 
@@ -115,7 +118,8 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
 
     last = max(end for _, _, end in recipe.phases)
     local = replace(recipe, steps=min(recipe.steps, STEPS), phases=(("cells", 0.0, last),), refit=0.0)
-    state = sample_within_memory(Sampler(prior, local, seeded(seed, device), with_known), here, state, keep_frozen, report.log)
+    state = sample_within_memory(Sampler(prior, local, seeded(seed, device), with_known), here, state, keep_frozen,
+                                 report.log)
     found = restored(prior, state.denoised, observations[1].coords.to(device), recipe, seed, part.seen)
     solved, moved = denoised.clone(), lights.grid.clone()
     moved[(..., *part.cells)] = state.lights.grid.cpu()
@@ -126,7 +130,8 @@ def solve_inside(prior: ConditionedPrior, observations: dict[int, Observation], 
 def cropped(o: Observation, part: Window, factor: int) -> Observation:
     """What is known of the window and its surroundings, of a map coarser by `factor`; coordinates keep their place."""
     rows, columns = (slice(s.start // factor, s.stop // factor) for s in part.seen)
-    tensors = {f.name: getattr(o, f.name)[..., rows, columns] for f in fields(o) if isinstance(getattr(o, f.name), torch.Tensor)}
+    tensors = {f.name: getattr(o, f.name)[..., rows, columns] for f in fields(o)
+               if isinstance(getattr(o, f.name), torch.Tensor)}
     return replace(o, **tensors, shader=o.shader.part(rows, columns, part.cells))
 
 

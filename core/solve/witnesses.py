@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the pictures that the texture was made of show a mark, each by itself: what one view alone saw (a highlight's gap, an eyelash)
-is none of the skin's."""
+"""Whether the pictures that the texture was made of show a mark, each by itself: what one view alone saw (a highlight's
+gap, an eyelash) is none of the skin's."""
 
 from __future__ import annotations
 
@@ -22,10 +22,12 @@ FEWEST = 2  # views; where fewer saw it the texture alone decides
 
 
 def confirmed(capture: Capture, head: Head, marks: list[Mark], size: int) -> list[Mark]:
-    """The marks, in texels of a size x size map, that the delit views agree on; all of them where this capture has no cameras or no delit views."""
+    """The marks, in texels of a size x size map, that the delit views agree on; all of them where this capture has no
+    cameras or no delit views."""
     if not marks or not capture.frames_json.is_file() or not capture.cameras.is_dir():
         return marks
-    pictures = [(view, path) for view in read_views(capture) if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
+    pictures = [(view, path) for view in read_views(capture)
+                if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
     covered = head.raster(size)[0] >= 0
     points, normals = (head.interpolate(values, size) for values in (head.mesh.vertices, head.normals))
     at = tuple(np.round([[mark.row, mark.column] for mark in marks]).astype(int).clip(0, size - 1).T)
@@ -53,8 +55,8 @@ def visible(view: View, caster: raster.RayCaster, points: np.ndarray, normals: n
 
 
 def _contrast(view: View, picture: np.ndarray, points: np.ndarray, covered: np.ndarray, mark: Mark) -> float | None:
-    """How much darker than what is around it a view's picture (log [H, W]) is at the mark or within a radius of it, as views and head may be
-    off by that much; None where the view's frame ends there."""
+    """How much darker than what is around it a view's picture (log [H, W]) is at the mark or within a radius of it, as
+    views and head may be off by that much; None where the view's frame ends there."""
     reach = int(np.ceil(3.5 * mark.radius + 1))
     row, column = round(mark.row), round(mark.column)
     window = slice(max(row - reach, 0), row + reach + 1), slice(max(column - reach, 0), column + reach + 1)

@@ -12,12 +12,15 @@ from .canvas import Canvas
 from .regions import lid_lines, regions
 from .spots import splat, strew
 
-LIPSTICKS = np.array([[0.30, 0.02, 0.03], [0.45, 0.10, 0.12], [0.20, 0.01, 0.04], [0.50, 0.16, 0.10], [0.12, 0.02, 0.03]])  # albedo, linear sRGB
+# albedo, linear sRGB
+LIPSTICKS = np.array([[0.30, 0.02, 0.03], [0.45, 0.10, 0.12], [0.20, 0.01, 0.04], [0.50, 0.16, 0.10],
+                      [0.12, 0.02, 0.03]])
 SHADOWS = np.array([[0.10, 0.06, 0.05], [0.05, 0.04, 0.06], [0.20, 0.11, 0.08], [0.06, 0.07, 0.12], [0.14, 0.08, 0.11]])
 
 
 class Scars(NamedTuple):
-    """What scars add, float32 [N] each: to the logarithms of melanin (stain) and of blood (flush), and to the height in mm (ridge)."""
+    """What scars add, float32 [N] each: to the logarithms of melanin (stain) and of blood (flush), and to the height in
+    mm (ridge)."""
 
     stain: np.ndarray
     flush: np.ndarray
@@ -25,7 +28,8 @@ class Scars(NamedTuple):
 
 
 def scars(on: Canvas, ground: Canvas, expected: float, rng: np.random.Generator) -> Scars:
-    """Thin lines of 4 to 20 mm, old ones pale, young ones red, sunken or raised; `expected` of them on the bare skin of face and neck."""
+    """Thin lines of 4 to 20 mm, old ones pale, young ones red, sunken or raised; `expected` of them on the bare skin of
+    face and neck."""
     nothing = np.zeros(len(on.position), np.float32)
     if expected <= 0:
         return Scars(nothing, nothing, nothing)
@@ -55,13 +59,18 @@ def lid_distance(on: Canvas) -> np.ndarray:
     return on.cache["lid line"]
 
 
-def made_up(diffuse: np.ndarray, area: dict[str, np.ndarray], lids: np.ndarray, amount: float, rng: np.random.Generator) -> np.ndarray:
-    """The albedo [N, 3] under make-up: each of lipstick, eye shadow, liner and blusher is worn or not, up to `amount` in [0, 1]."""
+def made_up(diffuse: np.ndarray, area: dict[str, np.ndarray], lids: np.ndarray, amount: float,
+            rng: np.random.Generator) -> np.ndarray:
+    """The albedo [N, 3] under make-up: each of lipstick, eye shadow, liner and blusher is worn or not, up to `amount`
+    in [0, 1]."""
     if amount <= 0:
         return diffuse
     worn = amount * (rng.random(4) < [0.8, 0.5, 0.5, 0.6]) * rng.uniform(0.4, 1.0, 4)
     light = diffuse.mean() / 0.25  # the colours are for middling skin
-    lipstick, shadow = LIPSTICKS[rng.integers(len(LIPSTICKS))] * light**0.3, SHADOWS[rng.integers(len(SHADOWS))] * light**0.6
+    lipstick, shadow = (
+        LIPSTICKS[rng.integers(len(LIPSTICKS))] * light**0.3,
+        SHADOWS[rng.integers(len(SHADOWS))] * light**0.6,
+    )
     out = _coat(diffuse, lipstick, 0.9 * worn[0] * np.clip(area["lips"] * 1.3, 0, 1))
     out = _coat(out, shadow, 0.6 * worn[1] * np.clip(area["eyelids"] + 0.5 * area["sockets"], 0, 1))
     out = _coat(out, np.array([0.015, 0.012, 0.012]), 0.9 * worn[2] * lids)
@@ -70,5 +79,6 @@ def made_up(diffuse: np.ndarray, area: dict[str, np.ndarray], lids: np.ndarray, 
 
 def _coat(below: np.ndarray, colour: np.ndarray, cover: np.ndarray) -> np.ndarray:
     """A thin coat of `colour` [3] over `below` [N, 3]: what lies below shines through, so pores and creases stay."""
-    relief = np.clip(below.mean(-1, keepdims=True) / max(float(np.average(below.mean(-1), weights=cover + 1e-6)), 1e-4), 0.5, 1.5)
+    relief = np.clip(below.mean(-1, keepdims=True) / max(float(np.average(below.mean(-1), weights=cover + 1e-6)), 1e-4),
+                     0.5, 1.5)
     return (below * (1 - cover[:, None]) + colour * relief * cover[:, None]).astype(np.float32)

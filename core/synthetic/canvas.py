@@ -26,9 +26,10 @@ MASK_SIZE = 1024  # of the template's masks; they are soft, so a window takes it
 
 @dataclass(frozen=True)
 class Canvas:
-    """size S; covered bool [S, S], N of them true; position float32 [N, 3] in mm; normal float32 [N, 3] unit; masks name -> float32 [N] in [0, 1];
-    landmarks float64 [468, 3] in mm. metric float32 [N, 3] in mm per texel: with T the unit tangent along +u and B the unit bitangent
-    (orthogonal to T, towards +v) the surface's derivatives are dP/du = a T and dP/dv = b T + c B, stored as (a, b, c)."""
+    """size S; covered bool [S, S], N of them true; position float32 [N, 3] in mm; normal float32 [N, 3] unit; masks
+    name -> float32 [N] in [0, 1]; landmarks float64 [468, 3] in mm. metric float32 [N, 3] in mm per texel: with T the
+    unit tangent along +u and B the unit bitangent (orthogonal to T, towards +v) the surface's derivatives are dP/du = a
+    T and dP/dv = b T + c B, stored as (a, b, c)."""
 
     size: int
     covered: np.ndarray
@@ -69,7 +70,8 @@ class Canvas:
         return values[self._nearest]
 
     def soft(self, values_of: Callable[[np.ndarray], np.ndarray], step: int = 4) -> np.ndarray:
-        """A function of points [M, 3] in mm that varies slowly (over 5 mm or more), computed at every `step`-th texel and enlarged: [N]."""
+        """A function of points [M, 3] in mm that varies slowly (over 5 mm or more), computed at every `step`-th texel
+        and enlarged: [N]."""
         shrunk = cv2.resize(self.bled_position, (self.size // step,) * 2, interpolation=cv2.INTER_AREA)
         small = np.asarray(values_of(shrunk.reshape(-1, 3)), np.float32).reshape(self.size // step, -1)
         return cv2.resize(small, (self.size,) * 2, interpolation=cv2.INTER_LINEAR)[self.covered]
@@ -93,19 +95,22 @@ def canvas(size: int) -> Canvas:
 
 
 def make_canvas(mesh: Mesh, size: int, landmarks: np.ndarray, mask: Callable[[str], np.ndarray]) -> Canvas:
-    """Of any head in metres (face towards -Y) with UVs, its MediaPipe landmarks [468, 3] in metres and masks [S, S] by name."""
+    """Of any head in metres (face towards -Y) with UVs, its MediaPipe landmarks [468, 3] in metres and masks [S, S] by
+    name."""
     return _canvas(mesh, size, *raster.rasterize_uv(mesh, size), landmarks, mask)
 
 
 def window_canvas(size: int, row: int, column: int, side: int) -> Canvas:
-    """A square window, `side` texels wide, of the built-in template's canvas of `size`: what is painted on it is what the whole would show there, but for
-    what is laid onto the nearest texel from outside (hairs and scars that begin beyond its border)."""
+    """A square window, `side` texels wide, of the built-in template's canvas of `size`: what is painted on it is what
+    the whole would show there, but for what is laid onto the nearest texel from outside (hairs and scars that begin
+    beyond its border)."""
     mesh = template.load()
     face, bary = raster.rasterize_uv(mesh, size, (row, row + side))
     columns, factor = slice(column, column + side), size // MASK_SIZE
 
     def mask(name: str) -> np.ndarray:
-        whole = template.mask(name, MASK_SIZE)[row // factor:-(-(row + side) // factor), column // factor:-(-(column + side) // factor)]
+        whole = template.mask(name, MASK_SIZE)[row // factor:-(-(row + side) // factor),
+                                               column // factor:-(-(column + side) // factor)]
         return images.resize(whole, side, side)
 
     return _canvas(mesh, size, face[:, columns], bary[:, columns], _landmarks(mesh), mask)
@@ -117,13 +122,15 @@ def _landmarks(mesh: Mesh) -> np.ndarray:
     return (mesh.vertices[mesh.faces[face]] * bary[..., None]).sum(1)
 
 
-def _canvas(mesh: Mesh, size: int, face: np.ndarray, bary: np.ndarray, landmarks: np.ndarray, mask: Callable[[str], np.ndarray]) -> Canvas:
+def _canvas(mesh: Mesh, size: int, face: np.ndarray, bary: np.ndarray, landmarks: np.ndarray,
+            mask: Callable[[str], np.ndarray]) -> Canvas:
     """The canvas of rastered texels [S, S]; `size`: of the map that they are of."""
     covered = face >= 0
     position = raster.interpolate(mesh.vertices * 1000, mesh.faces, face[covered], bary[covered]).astype(np.float32)
     normal = raster.interpolate(vertex_normals(mesh), mesh.faces, face[covered], bary[covered]).astype(np.float32)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-6)
-    masks = {name: np.asarray(mask(name), np.float32)[covered] for name in ("skin", "lips", "brows", "eyes", "ears", "neck", "scalp", "nose")}
+    masks = {name: np.asarray(mask(name), np.float32)[covered]
+             for name in ("skin", "lips", "brows", "eyes", "ears", "neck", "scalp", "nose")}
     return Canvas(len(face), covered, position, normal, _metric(mesh, size)[face[covered]], masks, landmarks * 1000)
 
 

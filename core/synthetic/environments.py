@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Environments around a portrait: panoramas (HDRI), or made ones of sky, ground, walls, windows and lamps, as radiance from olat.DIRECTIONS.
+"""Environments around a portrait: panoramas (HDRI), or made ones of sky, ground, walls, windows and lamps, as radiance
+from olat.DIRECTIONS.
 
-A panorama's sun is taken out of it and handed on by itself, as the lights of the stage are too few to make its shadow's edge.
+A panorama's sun is taken out of it and handed on by itself, as the lights of the stage are too few to make its shadow's
+edge.
 """
 
 from __future__ import annotations
@@ -23,8 +25,9 @@ SUN_OVER_MEAN = 25.0  # radiance, in means of the panorama, over which a texel i
 
 @dataclass(frozen=True)
 class Environment:
-    """radiance float32 [LIGHTS, 3], linear, of mean luminance 1; lamp unit [3] towards what shines hardest and its colour [3] as irradiance over pi
-    (zeros: none); panorama float32 [WIDTH / 2, WIDTH, 3]: what the background shows."""
+    """radiance float32 [LIGHTS, 3], linear, of mean luminance 1; lamp unit [3] towards what shines hardest and its
+    colour [3] as irradiance over pi (zeros: none); panorama float32 [WIDTH / 2, WIDTH, 3]: what the background
+    shows."""
 
     radiance: np.ndarray
     lamp: np.ndarray
@@ -33,13 +36,15 @@ class Environment:
 
 
 def read_panoramas(folder: Path | None) -> list[np.ndarray]:
-    """The equirectangular panoramas (.hdr, .exr) of a folder, linear [128, 256, 3], in order of their names; none without a folder."""
+    """The equirectangular panoramas (.hdr, .exr) of a folder, linear [128, 256, 3], in order of their names; none
+    without a folder."""
     paths = sorted(p for p in Path(folder).iterdir() if p.suffix.lower() in (".hdr", ".exr")) if folder else []
     return [np.maximum(images.resize(images.read_linear(path), 256, 128), 0) for path in paths]
 
 
 def panorama_environment(panorama: np.ndarray, rng: np.random.Generator) -> Environment:
-    """A panorama turned about the vertical, at random. Its middle column is straight ahead of the face (-Y), +Z is up."""
+    """A panorama turned about the vertical, at random. Its middle column is straight ahead of the face (-Y), +Z is
+    up."""
     turned = np.roll(panorama, rng.integers(panorama.shape[1]), 1)
     if rng.random() < 0.5:
         turned = turned[:, ::-1]
@@ -49,11 +54,13 @@ def panorama_environment(panorama: np.ndarray, rng: np.random.Generator) -> Envi
     hard = luminance > SUN_OVER_MEAN * mean
     colour, lamp = np.zeros(3), np.array([0.0, -0.6, 0.8])
     if hard.any():
-        excess = np.where(hard[..., None], turned - SUN_OVER_MEAN * mean * turned / np.maximum(luminance, 1e-6)[..., None], 0)
+        excess = np.where(hard[..., None],
+                          turned - SUN_OVER_MEAN * mean * turned / np.maximum(luminance, 1e-6)[..., None], 0)
         colour = (excess * solid[..., None]).sum((0, 1)) / np.pi
         lamp = (directions * (excess.mean(-1) * solid)[..., None]).sum((0, 1))
         lamp, turned = lamp / np.linalg.norm(lamp), turned - excess
-    return _normalised(_gathered(turned), lamp, colour, cv2.resize(turned, (WIDTH, WIDTH // 2), interpolation=cv2.INTER_AREA))
+    return _normalised(_gathered(turned), lamp, colour,
+                       cv2.resize(turned, (WIDTH, WIDTH // 2), interpolation=cv2.INTER_AREA))
 
 
 def made_environment(rng: np.random.Generator) -> Environment:
@@ -78,30 +85,34 @@ def background_radiance(environment: Environment, directions: np.ndarray) -> np.
     height, width = environment.panorama.shape[:2]
     column = (0.5 + np.arctan2(directions[..., 0], -directions[..., 1]) / (2 * np.pi)) * width
     row = np.arccos(np.clip(directions[..., 2], -1, 1)) / np.pi * height
-    return cv2.remap(environment.panorama.astype(np.float32), (column - 0.5).astype(np.float32), (row - 0.5).astype(np.float32),
-                     cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return cv2.remap(environment.panorama.astype(np.float32), (column - 0.5).astype(np.float32),
+                     (row - 0.5).astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
 def _normalised(radiance: np.ndarray, lamp: np.ndarray, colour: np.ndarray, panorama: np.ndarray) -> Environment:
     mean = max(float(radiance.mean()), 1e-6)
-    return Environment((radiance / mean).astype(np.float32), lamp, (colour / mean).astype(np.float32), (panorama / mean).astype(np.float32))
+    return Environment((radiance / mean).astype(np.float32), lamp, (colour / mean).astype(np.float32),
+                       (panorama / mean).astype(np.float32))
 
 
 def _gathered(panorama: np.ndarray) -> np.ndarray:
     """Mean radiance [LIGHTS, 3] of the part of a panorama that is nearest to each light."""
     height, width = panorama.shape[:2]
     if height > WIDTH // 2:
-        panorama, height, width = cv2.resize(panorama, (WIDTH, WIDTH // 2), interpolation=cv2.INTER_AREA), WIDTH // 2, WIDTH
+        panorama, height, width = cv2.resize(panorama, (WIDTH, WIDTH // 2),
+                                             interpolation=cv2.INTER_AREA), WIDTH // 2, WIDTH
     solid = _solid_angles(height, width).ravel()
     weight = np.bincount(_NEAREST, solid, len(DIRECTIONS))
-    return np.stack([np.bincount(_NEAREST, solid * panorama[..., k].ravel(), len(DIRECTIONS)) for k in range(3)], -1) / weight[:, None]
+    return np.stack([np.bincount(_NEAREST, solid * panorama[..., k].ravel(), len(DIRECTIONS)) for k in range(3)],
+                    -1) / weight[:, None]
 
 
 def _directions(height: int, width: int) -> np.ndarray:
     """Unit directions [H, W, 3] of an equirectangular panorama's texels."""
     polar = (np.arange(height) + 0.5)[:, None] / height * np.pi
     azimuth = ((np.arange(width) + 0.5)[None] / width - 0.5) * 2 * np.pi
-    return np.stack([np.sin(polar) * np.sin(azimuth), -np.sin(polar) * np.cos(azimuth), np.cos(polar) * np.ones_like(azimuth)], -1)
+    return np.stack([np.sin(polar) * np.sin(azimuth), -np.sin(polar) * np.cos(azimuth),
+                     np.cos(polar) * np.ones_like(azimuth)], -1)
 
 
 def _solid_angles(height: int, width: int) -> np.ndarray:

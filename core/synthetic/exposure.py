@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a phone would show a lit face: what stands around it, the exposure that the camera's meter chooses, and the cast that its white balance leaves.
+"""How a phone would show a lit face: what stands around it, the exposure that the camera's meter chooses, and the cast
+that its white balance leaves.
 
-The meter weighs the face and the surroundings against each other, as phones do that find faces, and holds the brightest skin below white; so the
-brightness of skin in a picture says little of the skin. The light is a black body's; automatic white balance takes most of its colour out and errs
-by a few degrees besides (recovery errors: Gijsenij, Gevers and van de Weijer, "Computational color constancy", 2011).
+The meter weighs the face and the surroundings against each other, as phones do that find faces, and holds the brightest
+skin below white; so the brightness of skin in a picture says little of the skin. The light is a black body's; automatic
+white balance takes most of its colour out and errs by a few degrees besides (recovery errors: Gijsenij, Gevers and van
+de Weijer, "Computational color constancy", 2011).
 """
 
 from __future__ import annotations
@@ -21,18 +23,21 @@ MIDDLE_GREY = 0.18
 
 @dataclass(frozen=True)
 class Exposure:
-    """gain [3]: what scene light is multiplied by in the picture (exposure and the cast that is left, linear); surroundings [3]: the mean linear
-    colour in the picture of all that is not the person."""
+    """gain [3]: what scene light is multiplied by in the picture (exposure and the cast that is left, linear);
+    surroundings [3]: the mean linear colour in the picture of all that is not the person."""
 
     gain: np.ndarray
     surroundings: np.ndarray
 
 
 def phone_exposure(rng: np.random.Generator, skin: np.ndarray, light: np.ndarray) -> Exposure:
-    """The picture that a phone takes of linear skin colours [N, 3] in light whose mean colour on a white surface is `light` [3]."""
+    """The picture that a phone takes of linear skin colours [N, 3] in light whose mean colour on a white surface is
+    `light` [3]."""
     cast = _cast(rng)
-    reflectance = np.clip(np.exp(rng.normal(np.log(0.2), 0.8, (SURFACES, 1)) + rng.normal(0, 0.25, (SURFACES, 3))), 0.02, 0.9)
-    elsewhere = np.exp(rng.normal(0, 0.45)) * np.exp(rng.normal(0, 0.4, (SURFACES, 1)))  # it is rarely as light behind a person as on the face
+    reflectance = np.clip(np.exp(rng.normal(np.log(0.2), 0.8, (SURFACES, 1)) + rng.normal(0, 0.25, (SURFACES, 3))),
+                          0.02, 0.9)
+    # it is rarely as light behind a person as on the face
+    elsewhere = np.exp(rng.normal(0, 0.45)) * np.exp(rng.normal(0, 0.4, (SURFACES, 1)))
     behind = reflectance * elsewhere * light * np.exp(rng.normal(0, 0.06, 3))
     share = rng.dirichlet(np.ones(SURFACES))[:, None]
     face = rng.uniform(0.25, 0.85)  # weight of the face in the meter

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair as the texture shows it: brows of single strokes, the stubble of a beard and its blue shadow, a cropped scalp."""
+"""Hair as the texture shows it: brows of single strokes, the stubble of a beard and its blue shadow, a cropped
+scalp."""
 
 from __future__ import annotations
 
@@ -12,17 +13,22 @@ from .spots import strew
 
 
 def brows(on: Canvas, ground: Canvas, region: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
-    """How much of each texel brow hair covers, [N] in [0, 1]; `region` on the ground is where it grows, `density` 1 is a usual brow."""
-    roots, texel = strew(ground, 1.2 * density * np.clip(region * 2.2 - 1.3 + 0.8 * min(density, 1.2), 0, 1), rng)  # a sparse brow is a narrow one
+    """How much of each texel brow hair covers, [N] in [0, 1]; `region` on the ground is where it grows, `density` 1 is
+    a usual brow."""
+    # a sparse brow is a narrow one
+    roots, texel = strew(ground, 1.2 * density * np.clip(region * 2.2 - 1.3 + 0.8 * min(density, 1.2), 0, 1), rng)
     outer = np.abs(roots[:, 0:1]) / np.abs(ground.landmarks[[70, 300], 0]).mean()  # 0 at the nose ... 1 at the tail
     # near the nose hairs stand up, then lie along the brow, and at the tail point down
     rise = np.clip(1.6 - 2.3 * outer, -0.3, 1.3) + rng.normal(0, 0.2, outer.shape)
-    direction = np.sign(roots[:, 0:1]) * _along(ground.normal[texel], [1.0, 0, 0]) + rise * _along(ground.normal[texel], [0, 0, 1.0])
+    direction = np.sign(roots[:, 0:1]) * _along(ground.normal[texel],
+                                                [1.0, 0, 0]) + rise * _along(ground.normal[texel], [0, 0, 1.0])
     return _strokes(on, roots, direction, rng.uniform(4.5, 8, len(roots)), 0.11, np.full(len(roots), -0.25), rng)
 
 
-def stubble(on: Canvas, ground: Canvas, region: np.ndarray, density: float, length: float, rng: np.random.Generator) -> np.ndarray:
-    """Cover [N] of beard hair of `length` mm (0.3: shaven yesterday) at `density` hairs per mm^2 in the full of `region` [N] on the ground."""
+def stubble(on: Canvas, ground: Canvas, region: np.ndarray, density: float, length: float,
+            rng: np.random.Generator) -> np.ndarray:
+    """Cover [N] of beard hair of `length` mm (0.3: shaven yesterday) at `density` hairs per mm^2 in the full of
+    `region` [N] on the ground."""
     roots, texel = strew(ground, density * np.clip(region * 1.3 - 0.15, 0, 1) ** 1.5, rng)
     aside = np.sign(roots[:, 0:1]) * 0.25 + rng.normal(0, 0.35, (len(roots), 1))
     down = aside * _along(ground.normal[texel], [1.0, 0, 0]) - _along(ground.normal[texel], [0, 0, 1.0])
@@ -30,7 +36,8 @@ def stubble(on: Canvas, ground: Canvas, region: np.ndarray, density: float, leng
 
 
 def beard_shadow(albedo: np.ndarray, amount: np.ndarray) -> np.ndarray:
-    """albedo [N, 3] over hair below the surface, amount [N] in [0, 1]: red light reaches deeper and loses more, so the shade is bluish grey."""
+    """albedo [N, 3] over hair below the surface, amount [N] in [0, 1]: red light reaches deeper and loses more, so the
+    shade is bluish grey."""
     return albedo * (1 - amount[:, None] * np.array([0.42, 0.30, 0.22], np.float32))
 
 
@@ -49,8 +56,10 @@ def _along(normal: np.ndarray, way: list[float]) -> np.ndarray:
     return flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-3)
 
 
-def _strokes(on: Canvas, roots: np.ndarray, direction: np.ndarray, length: np.ndarray, width: float, bend: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Cover [N] of hairs `width` mm thick and `length` [M] mm long from roots [M, 3] along direction [M, 3], sinking by `bend` (a share of the length)."""
+def _strokes(on: Canvas, roots: np.ndarray, direction: np.ndarray, length: np.ndarray, width: float, bend: np.ndarray,
+             rng: np.random.Generator) -> np.ndarray:
+    """Cover [N] of hairs `width` mm thick and `length` [M] mm long from roots [M, 3] along direction [M, 3], sinking by
+    `bend` (a share of the length)."""
     cover = np.zeros(len(on.position), np.float32)
     if not len(roots):
         return cover

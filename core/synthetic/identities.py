@@ -18,7 +18,8 @@ STRENGTH = 0.75  # of N(0, 1): the tails of MakeHuman's combinations are caricat
 
 def subject_mesh(seed: int) -> Mesh:
     """The head of a subject in the template's topology and pose: metres, +Z up, face towards -Y."""
-    return template.load().moved(template.load().vertices + np.tensordot(identity_coefficients(seed), template.identity(), 1))
+    return template.load().moved(template.load().vertices
+                                 + np.tensordot(identity_coefficients(seed), template.identity(), 1))
 
 
 def identity_coefficients(seed: int) -> np.ndarray:
@@ -29,6 +30,7 @@ def identity_coefficients(seed: int) -> np.ndarray:
 
 @cache
 def reserved_seeds() -> frozenset[int]:
-    """Seeds of subjects that are kept for measuring: nothing is trained on their identity, tone, moles or pores, now or later."""
+    """Seeds of subjects that are kept for measuring: nothing is trained on their identity, tone, moles or pores, now or
+    later."""
     record = json.loads((Path(__file__).parent / "reserved.json").read_text(encoding="utf-8"))
     return frozenset(record["seeds"]).union(*(range(first, last + 1) for first, last in record["blocks"]))

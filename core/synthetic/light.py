@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light baked into the template's UV space with known truth: a smooth sky with its ambient occlusion, and a sun whose hard or soft
-shadows the head itself, leaves, blinds or a roof's edge cast. `uv_problem` is one texture as a capture would give it, with its answer.
+"""Light baked into the template's UV space with known truth: a smooth sky with its ambient occlusion, and a sun whose
+hard or soft shadows the head itself, leaves, blinds or a roof's edge cast. `uv_problem` is one texture as a capture
+would give it, with its answer.
 
-The sky is precomputed radiance transfer in second-order spherical harmonics (Sloan, Kautz and Snyder 2002); 1 is a white surface's light.
+The sky is precomputed radiance transfer in second-order spherical harmonics (Sloan, Kautz and Snyder 2002); 1 is a
+white surface's light.
 """
 
 from __future__ import annotations
@@ -28,9 +30,9 @@ SUN_RAYS = 20
 
 @dataclass(frozen=True)
 class UvProblem:
-    """float32, linear. texture = albedo * shading [S, S, 3]; normal [S, S, 3] tangent space detail; world_normal [S, S, 3] of the smooth head;
-    shadow [S, S]: the blocked share of the sun's light where the surface faces it, 0 elsewhere; sky [9, 3] and sun_colour [3] are the light,
-    sun [3] points to the sun; covered bool [S, S]."""
+    """float32, linear. texture = albedo * shading [S, S, 3]; normal [S, S, 3] tangent space detail; world_normal [S, S,
+    3] of the smooth head; shadow [S, S]: the blocked share of the sun's light where the surface faces it, 0 elsewhere;
+    sky [9, 3] and sun_colour [3] are the light, sun [3] points to the sun; covered bool [S, S]."""
 
     texture: np.ndarray
     albedo: np.ndarray
@@ -46,8 +48,8 @@ class UvProblem:
 
 @dataclass(frozen=True)
 class SkyAndSun:
-    """sky [9, 3]: coefficients of its radiance; sun [3]: unit direction to it; colour [3]: the shading of a surface that faces it, zeros for no sun; radius: of
-    the sun, in radians."""
+    """sky [9, 3]: coefficients of its radiance; sun [3]: unit direction to it; colour [3]: the shading of a surface
+    that faces it, zeros for no sun; radius: of the sun, in radians."""
 
     sky: np.ndarray
     sun: np.ndarray
@@ -56,7 +58,8 @@ class SkyAndSun:
 
 
 def uv_problem(seed: int, size: int = 512, shadows: str | None = None) -> UvProblem:
-    """A random subject under random light. `shadows`: none, self, leaves, blinds or edge; drawn from the seed if not given."""
+    """A random subject under random light. `shadows`: none, self, leaves, blinds or edge; drawn from the seed if not
+    given."""
     rng = np.random.default_rng([seed, 7])
     kind = shadows or str(rng.choice(["self", "leaves", "blinds", "edge"]))
     skin = make_skin(sample_parameters(seed), size)
@@ -86,7 +89,8 @@ def random_light(rng: np.random.Generator) -> SkyAndSun:
     return SkyAndSun(sky, sun, colour, float(np.exp(rng.uniform(np.log(0.005), np.log(0.12)))))
 
 
-def bake(mesh: Mesh, size: int, light: SkyAndSun, shadows: str, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def bake(mesh: Mesh, size: int, light: SkyAndSun, shadows: str,
+         rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What a light makes of a mesh, in its UVs, bled beyond the charts.
 
     Parameters
@@ -122,8 +126,10 @@ def bake(mesh: Mesh, size: int, light: SkyAndSun, shadows: str, rng: np.random.G
     return spread(shading), spread(shadow), spread(normals)
 
 
-def transfer(points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster, rays: int = TRANSFER_RAYS) -> np.ndarray:
-    """[N, 9]: shading of points [N, 3] per coefficient of the sky's radiance, blocked where the mesh is in the way; an open surface under radiance 1 gets 1."""
+def transfer(points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster,
+             rays: int = TRANSFER_RAYS) -> np.ndarray:
+    """[N, 9]: shading of points [N, 3] per coefficient of the sky's radiance, blocked where the mesh is in the way; an
+    open surface under radiance 1 gets 1."""
     return radiance_transfer(caster, points, normals, rays)
 
 
@@ -143,7 +149,8 @@ def _sun_seen(caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray,
         return np.ones(len(points))
     facing = np.flatnonzero(normals @ sun > 0)
     for ray, direction in enumerate(directions):
-        seen[ray, facing] = ~caster.blocked(points[facing] + 1e-3 * normals[facing], np.repeat(direction[None], len(facing), 0))
+        seen[ray, facing] = ~caster.blocked(points[facing] + 1e-3 * normals[facing],
+                                            np.repeat(direction[None], len(facing), 0))
     if shadows != "self":
         away = rng.uniform(0.25, 1.0)  # metres to what throws the shadow
         at = points[None, facing] + away * directions[:, None]
@@ -154,8 +161,8 @@ def _sun_seen(caster: raster.RayCaster, points: np.ndarray, normals: np.ndarray,
 
 
 def in_the_way(x: np.ndarray, y: np.ndarray, blur: float, kind: str, rng: np.random.Generator) -> np.ndarray:
-    """How far an opaque sheet with holes covers (x, y) [...] in metres, in a plane across the sunlight; edges are `blur` metres wide,
-    the distance between two of the sun's rays there, so that few rays make an even penumbra."""
+    """How far an opaque sheet with holes covers (x, y) [...] in metres, in a plane across the sunlight; edges are
+    `blur` metres wide, the distance between two of the sun's rays there, so that few rays make an even penumbra."""
     turn, shift = rng.uniform(0, np.pi), rng.uniform(-0.05, 0.05)
     along = (x - x.mean()) * np.cos(turn) + (y - y.mean()) * np.sin(turn) + shift
     if kind == "edge":
@@ -167,7 +174,8 @@ def in_the_way(x: np.ndarray, y: np.ndarray, blur: float, kind: str, rng: np.ran
         wavelength = rng.uniform(18, 60)
         flat = np.stack([x.ravel() * 1000, y.ravel() * 1000, np.zeros(x.size)], -1)
         leaves = noise(flat, wavelength, rng, smooth=True) + 0.35 * noise(flat, 9.0, rng, smooth=True)
-        inside = ((leaves - rng.uniform(-0.4, 0.5)) * wavelength * 0.4e-3).reshape(x.shape)  # about metres: over the noise's usual slope
+        # about metres: over the noise's usual slope
+        inside = ((leaves - rng.uniform(-0.4, 0.5)) * wavelength * 0.4e-3).reshape(x.shape)
     return np.clip(0.5 + inside / max(blur, 1e-4), 0, 1)
 
 

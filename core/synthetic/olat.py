@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A light stage around a synthetic head: which of some hundreds of lights each vertex sees, so that any environment is a matrix product.
+"""A light stage around a synthetic head: which of some hundreds of lights each vertex sees, so that any environment is
+a matrix product.
 
-One light at a time (Debevec et al. 2000): light is linear, so skin under an environment is the sum over the lights, weighted by its radiance.
-What is as hard as the sun falls between the lights; `sun_visibility` casts its rays at every pixel instead.
+One light at a time (Debevec et al. 2000): light is linear, so skin under an environment is the sum over the lights,
+weighted by its radiance. What is as hard as the sun falls between the lights; `sun_visibility` casts its rays at every
+pixel instead.
 """
 
 from __future__ import annotations
@@ -38,19 +40,23 @@ def light_stage(mesh: Mesh) -> LightStage:
     caster, normals = RayCaster(mesh), vertex_normals(mesh)
     visible = np.zeros((len(normals), LIGHTS), bool)
     for i, direction in enumerate(DIRECTIONS):
-        facing = np.flatnonzero(normals @ direction > -0.05)  # a little beyond, or interpolation would darken the edge of the lit side
-        visible[facing, i] = ~caster.blocked(mesh.vertices[facing] + LIFT * normals[facing], np.repeat(direction[None], len(facing), 0))
+        # a little beyond, or interpolation would darken the edge of the lit side
+        facing = np.flatnonzero(normals @ direction > -0.05)
+        visible[facing, i] = ~caster.blocked(mesh.vertices[facing] + LIFT * normals[facing],
+                                             np.repeat(direction[None], len(facing), 0))
     return LightStage(mesh, normals.astype(np.float32), visible)
 
 
 def transport(stage: LightStage, vertices: np.ndarray) -> np.ndarray:
-    """float32 [N, LIGHTS]: what each light of radiance 1 adds to the shading of these vertices; a row of an open surface adds up to 1."""
+    """float32 [N, LIGHTS]: what each light of radiance 1 adds to the shading of these vertices; a row of an open
+    surface adds up to 1."""
     cosine = stage.normals[vertices] @ DIRECTIONS.T.astype(np.float32)
     return np.maximum(cosine, 0) * stage.visible[vertices] * np.float32(4 / LIGHTS)
 
 
 def mirrored(stage: LightStage, vertices: np.ndarray, environment: np.ndarray, eye: np.ndarray) -> np.ndarray:
-    """float32 [N, 3]: the environment [LIGHTS, 3] as a lobe of exponent GLOSS about the mirrored view shows it, blocked by the head; `eye` [3] in metres.
+    """float32 [N, 3]: the environment [LIGHTS, 3] as a lobe of exponent GLOSS about the mirrored view shows it, blocked
+    by the head; `eye` [3] in metres.
 
     Times Fresnel's reflectance it is what glossy skin adds to its diffuse colour.
     """
@@ -65,10 +71,10 @@ def mirrored(stage: LightStage, vertices: np.ndarray, environment: np.ndarray, e
     return (lobe * stage.visible[vertices]) @ environment.astype(np.float32) / np.maximum(weight, 1e-6)
 
 
-def sun_visibility(caster: RayCaster, points: np.ndarray, normals: np.ndarray, sun: np.ndarray, radius: float, rays: int,
-                   rng: np.random.Generator) -> np.ndarray:
-    """The share [N] of a disc of light about the unit direction `sun`, `radius` in radians, that points see past the head: a denser cone of rays,
-    turned at random per point, so that few rays give an even penumbra."""
+def sun_visibility(caster: RayCaster, points: np.ndarray, normals: np.ndarray, sun: np.ndarray, radius: float,
+                   rays: int, rng: np.random.Generator) -> np.ndarray:
+    """The share [N] of a disc of light about the unit direction `sun`, `radius` in radians, that points see past the
+    head: a denser cone of rays, turned at random per point, so that few rays give an even penumbra."""
     right = np.cross(sun, [0.0, 0.0, 1.0] if abs(sun[2]) < 0.9 else [1.0, 0.0, 0.0])
     right /= np.linalg.norm(right)
     up = np.cross(right, sun)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A synthetic person before a busy wall, photographed by known cameras without a renderer: what cameras, motion and import are tested on.
+"""A synthetic person before a busy wall, photographed by known cameras without a renderer: what cameras, motion and
+import are tested on.
 
 World: metres, +Z up, the face towards -Y. Azimuth 0 is in front, positive on the person's left.
 """
@@ -34,7 +35,8 @@ def person(seed: int = SEED, texels: int = 256) -> tuple[raster.RayCaster, np.nd
 
 @cache
 def jaw_drop() -> tuple[np.ndarray, np.ndarray]:
-    """The vertices of the head that an opening jaw moves, and how far, [N] and [N, 3] in metres; the lips, which are one here, stretch."""
+    """The vertices of the head that an opening jaw moves, and how far, [N] and [N, 3] in metres; the lips, which are
+    one here, stretch."""
     with np.load(template.ASSETS / "face_units.npz", allow_pickle=False) as stored:
         rows, moves = np.cumsum(stored["rows_jawOpen"].astype(int)), stored["moves_jawOpen"].T * float(stored["step"])
         mirrored, count = stored["mirror"].astype(int)[rows], int(stored["head_vertices"])
@@ -52,8 +54,10 @@ def speaking(seed: int, jaw: float) -> tuple[raster.RayCaster, np.ndarray]:
     return raster.RayCaster(mesh), meshes.vertex_normals(mesh)
 
 
-def camera(azimuth_deg: float, height: float = 0.0, distance: float = 0.55, target=(0, -0.01, -0.035), scale: float = 1.0) -> View:
-    """A camera that looks at the head; `height` above the eyes and `distance` in metres; `scale` of its picture's size."""
+def camera(azimuth_deg: float, height: float = 0.0, distance: float = 0.55, target=(0, -0.01, -0.035),
+           scale: float = 1.0) -> View:
+    """A camera that looks at the head; `height` above the eyes and `distance` in metres; `scale` of its picture's
+    size."""
     a = np.radians(azimuth_deg)
     centre, target = np.array([np.sin(a) * distance, -np.cos(a) * distance, height]), np.array(target)
     z = (target - centre) / np.linalg.norm(target - centre)
@@ -61,30 +65,37 @@ def camera(azimuth_deg: float, height: float = 0.0, distance: float = 0.55, targ
     x /= np.linalg.norm(x)
     rotation = np.stack([x, np.cross(z, x), z])
     pinhole = pycolmap.Camera(camera_id=1, model="PINHOLE", width=round(WIDTH * scale), height=round(HEIGHT * scale),
-                              params=np.array([FOCAL * distance / 0.55, FOCAL * distance / 0.55, WIDTH / 2, HEIGHT / 2]) * scale)
+                              params=np.array([FOCAL * distance / 0.55, FOCAL * distance / 0.55, WIDTH / 2, HEIGHT / 2])
+                              * scale)
     return View("", Path(), pinhole, rotation, -rotation @ centre, True)
 
 
 def studio(scale: float = 1.0) -> list[View]:
-    """Sixteen fixed cameras a metre away in two rows, over 100 degrees from side to side: the layout of multi-view studios as NeRSemble's."""
-    return [camera(azimuth, height, 1.0, scale=scale) for height in (-0.15, 0.25) for azimuth in np.linspace(-50, 50, 8)]
+    """Sixteen fixed cameras a metre away in two rows, over 100 degrees from side to side: the layout of multi-view
+    studios as NeRSemble's."""
+    return [camera(azimuth, height, 1.0, scale=scale) for height in (-0.15, 0.25)
+            for azimuth in np.linspace(-50, 50, 8)]
 
 
-def photograph(view: View, turned_deg: float = 0.0, wall: bool = True, even: bool = False, seed: int = SEED, texels: int = 256,
-               jaw: float = 0.0) -> np.ndarray:
-    """sRGB [H, W, 3]. `even`: light from everywhere. `turned_deg`: how far the person has turned the head to their left; light and wall stay.
-    `jaw`: how far it is open, in [0, 1]. Without `wall` the background is plain grey."""
+def photograph(view: View, turned_deg: float = 0.0, wall: bool = True, even: bool = False, seed: int = SEED,
+               texels: int = 256, jaw: float = 0.0) -> np.ndarray:
+    """sRGB [H, W, 3]. `even`: light from everywhere. `turned_deg`: how far the person has turned the head to their
+    left; light and wall stay. `jaw`: how far it is open, in [0, 1]. Without `wall` the background is plain grey."""
     caster, normals, albedo = person(seed, texels)
     if jaw:
         caster, normals = speaking(seed, jaw)
     turn = np.radians(turned_deg)
     rotation = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
-    seen = View(view.name, view.path, view.camera, view.rotation @ rotation, view.translation, True)  # the camera as the head sees it
+    # the camera as the head sees it
+    seen = View(view.name, view.path, view.camera, view.rotation @ rotation, view.translation, True)
     face, bary, _ = raster.render_view(caster, seen, 2)
     uv = raster.interpolate(caster.mesh.uvs, caster.mesh.face_uvs, face, bary)
-    colour = raster.sample(albedo, np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2) * len(albedo)).reshape(*face.shape, 3)
+    colour = raster.sample(albedo,
+                           np.stack([uv[..., 0], 1 - uv[..., 1]], -1).reshape(-1, 2)
+                           * len(albedo)).reshape(*face.shape, 3)
     normal = raster.interpolate(normals, caster.mesh.faces, face, bary) @ rotation.T
-    shade = np.full(face.shape, 0.9) if even else 0.55 + 0.45 * np.clip(normal @ (np.array([0.3, -0.8, 0.5]) / 0.99), 0, 1)
+    shade = (np.full(face.shape, 0.9) if even
+             else 0.55 + 0.45 * np.clip(normal @ (np.array([0.3, -0.8, 0.5]) / 0.99), 0, 1))
     head = images.resize((colour * ((face >= 0) * shade * 1.6)[..., None]).astype(np.float32), view.width, view.height)
     cover = images.resize((face >= 0).astype(np.float32), view.width, view.height)[..., None]
     return images.linear_to_srgb(head * (cover > 0) + (1 - cover) * (_wall(view) if wall else 0.3))
@@ -105,4 +116,5 @@ def _wall(view: View) -> np.ndarray:
         reach = (WALL_AT - view.centre[1]) / rays[:, 1]
     hit = view.centre + rays * np.where(reach > 0, reach, 0)[:, None]
     at = ((hit[:, [0, 2]] / WALL_M + 0.5) % 1 * 1200).astype(np.float32)
-    return cv2.remap(_paper(), at[:, :1].reshape(y.shape), at[:, 1:].reshape(y.shape), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+    return cv2.remap(_paper(), at[:, :1].reshape(y.shape), at[:, 1:].reshape(y.shape), cv2.INTER_LINEAR,
+                     borderMode=cv2.BORDER_REFLECT)

@@ -50,7 +50,8 @@ class SkinParameters:
 
 
 def sample_parameters(seed: int) -> SkinParameters:
-    """A subject at random: the typology angle of the tone is uniform from -55 (dark) to 62 degrees (very light), half of the subjects are men."""
+    """A subject at random: the typology angle of the tone is uniform from -55 (dark) to 62 degrees (very light), half
+    of the subjects are men."""
     rng = np.random.default_rng([seed, 0])
     angle, blood = rng.uniform(-55, 62), float(np.exp(rng.uniform(np.log(0.009), np.log(0.04))))
     oxygen, scattering = float(rng.uniform(0.6, 0.9)), float(rng.uniform(0.7, 1.8))
@@ -66,17 +67,21 @@ def sample_parameters(seed: int) -> SkinParameters:
         melanin=melanin, blood=blood, oxygen=oxygen, scattering=scattering, slope=slope, chroma=chroma, age=age,
         redness=float(rng.uniform(0.4, 1.5)), eye_circles=float(rng.uniform(0.1, 1.2)),
         blotches=float(rng.uniform(0.6, 1.5)), mottling=float(np.exp(rng.uniform(np.log(0.15), np.log(0.9)))),
-        lip_melanin=float(1 - rng.uniform(0.05, 0.35) * (0.25 + 0.75 * lightness)), lip_blood=float(np.exp(rng.uniform(np.log(2.5), np.log(7.5)))),
-        pores=float(rng.uniform(0.4, 1.2) * (1.1 if male else 0.9)), wrinkles=float(rng.uniform(0.5, 1.3)), oiliness=float(rng.uniform(0.3, 1.4)),
+        lip_melanin=float(1 - rng.uniform(0.05, 0.35) * (0.25 + 0.75 * lightness)),
+        lip_blood=float(np.exp(rng.uniform(np.log(2.5), np.log(7.5)))),
+        pores=float(rng.uniform(0.4, 1.2) * (1.1 if male else 0.9)), wrinkles=float(rng.uniform(0.5, 1.3)),
+        oiliness=float(rng.uniform(0.3, 1.4)),
         freckles=float(rng.uniform(0.05, 0.8)) if freckled else 0.0, freckle_contrast=float(rng.uniform(0.3, 0.9)),
-        moles=float(rng.gamma(1.5, 6.0)), beard=beard, beard_length=float(np.exp(rng.uniform(np.log(0.25), np.log(3.0)))),
+        moles=float(rng.gamma(1.5, 6.0)), beard=beard,
+        beard_length=float(np.exp(rng.uniform(np.log(0.25), np.log(3.0)))),
         brow_density=float(rng.uniform(0.5, 1.4) * (1.15 if male else 0.85)), scalp_hair=float(rng.uniform(0.25, 1.0)),
         hair_colour=_greyed(hair, grey), brow_colour=_greyed(hair * 0.8, 0.4 * grey**2),
         tone_seed=seed, mole_seed=seed, pore_seed=seed, hair_seed=seed)
 
 
 def adorned(parameters: SkinParameters, seed: int) -> SkinParameters:
-    """The same subject with what only some people have: half of them scars, most women and few men make-up. What trains a network takes these."""
+    """The same subject with what only some people have: half of them scars, most women and few men make-up. What trains
+    a network takes these."""
     rng = np.random.default_rng([seed, 9])
     painted = rng.random() < (0.05 if parameters.beard > 0 else 0.6)
     make_up = float(rng.uniform(0.15, 1.0)) if painted else 0.0

@@ -3,10 +3,10 @@
 """Melanin and blood to diffuse reflectance: the colour of skin from its two pigments.
 
 A thin absorbing epidermis over a scattering dermis, computed per wavelength and integrated to linear sRGB (D65).
-Absorption and scattering: S. L. Jacques, "Skin optics", Oregon Medical Laser Center News, 1998; blood: S. Prahl's table of
-haemoglobin extinction (omlc.org, from Gratzer and Kollias); reflectance of the dermis: the diffusion result of Jensen and
-Buhler, "A rapid hierarchical rendering technique for translucent materials", 2002; colour matching: the fit of Wyman, Sloan
-and Shirley, "Simple analytic approximations to the CIE XYZ color matching functions", 2013.
+Absorption and scattering: S. L. Jacques, "Skin optics", Oregon Medical Laser Center News, 1998; blood: S. Prahl's table
+of haemoglobin extinction (omlc.org, from Gratzer and Kollias); reflectance of the dermis: the diffusion result of
+Jensen and Buhler, "A rapid hierarchical rendering technique for translucent materials", 2002; colour matching: the fit
+of Wyman, Sloan and Shirley, "Simple analytic approximations to the CIE XYZ color matching functions", 2013.
 """
 
 from __future__ import annotations
@@ -16,46 +16,59 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
-MELANIN_RANGE = 0.002, 0.9  # volume fraction of melanosomes in the epidermis; Jacques: 0.013 ... 0.43 from very light to very dark skin
+# volume fraction of melanosomes in the epidermis; Jacques: 0.013 ... 0.43 from very light to very dark skin
+MELANIN_RANGE = 0.002, 0.9
 BLOOD_RANGE = 0.001, 0.3  # volume fraction of blood in the dermis; normal skin 0.002 ... 0.07, lips and flush more
 EPIDERMIS_CM = 0.006
 OBLIQUE = 1.4  # mean length of diffuse light's way through the epidermis and back, over twice its thickness
-# Jacques' fits are of skin outside the body and make every face too dark; these factors bring photographed faces within the model
+# Jacques' fits are of skin outside the body and make every face too dark; these factors bring photographed faces within
+# the model
 SCATTERING = 3.0  # on the dermis's scattering
 BASELINE = 0.25  # on the absorption of skin without pigment
 BACKSCATTER = 0.012  # share of the light that returns from above the melanin
 
 WAVELENGTHS = np.arange(400, 701, 10, dtype=np.float64)  # nm
-D65 = np.array([82.75, 91.49, 93.43, 86.68, 104.86, 117.01, 117.81, 114.86, 115.92, 108.81, 109.35, 107.80, 104.79, 107.69, 104.41, 104.05,
-                100.00, 96.33, 95.79, 88.69, 90.01, 89.60, 87.70, 83.29, 83.70, 80.03, 80.21, 82.28, 78.28, 69.72, 71.61])
-OXYGENATED = np.array([266232, 466840, 480360, 246072, 102580, 62816, 44480, 33209, 26629, 23684, 20933, 20035, 24202, 39957, 53236, 43016,
-                       32613, 44496, 50104, 14401, 3200, 1506, 942, 610, 442, 368, 320, 294, 278, 276, 290], np.float64)  # 1/(cm M)
-DEOXYGENATED = np.array([223296, 303956, 407560, 528600, 413280, 103292, 23389, 16156, 14550, 16684, 20862, 25774, 31590, 39036, 46592, 53412,
-                         53788, 45072, 37020, 28324, 14677, 9444, 6510, 5149, 4345, 3750, 3227, 2795, 2408, 2052, 1794], np.float64)
+D65 = np.array([82.75, 91.49, 93.43, 86.68, 104.86, 117.01, 117.81, 114.86, 115.92, 108.81, 109.35, 107.80, 104.79,
+                107.69, 104.41, 104.05,
+                100.00, 96.33, 95.79, 88.69, 90.01, 89.60, 87.70, 83.29, 83.70, 80.03, 80.21, 82.28, 78.28, 69.72,
+                71.61])
+OXYGENATED = np.array([266232, 466840, 480360, 246072, 102580, 62816, 44480, 33209, 26629, 23684, 20933, 20035, 24202,
+                       39957, 53236, 43016,
+                       # 1/(cm M)
+                       32613, 44496, 50104, 14401, 3200, 1506, 942, 610, 442, 368, 320, 294, 278, 276, 290], np.float64)
+DEOXYGENATED = np.array([223296, 303956, 407560, 528600, 413280, 103292, 23389, 16156, 14550, 16684, 20862, 25774,
+                         31590, 39036, 46592, 53412,
+                         53788, 45072, 37020, 28324, 14677, 9444, 6510, 5149, 4345, 3750, 3227, 2795, 2408, 2052, 1794],
+                        np.float64)
 XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 TABLE = 512  # entries per axis; cv2.remap rounds to 1/32 of an entry
 
 
-def reflectance(melanin: np.ndarray, blood: np.ndarray, oxygen: float = 0.75, scattering: float = 1.0, slope: float = 2.4,
-                chroma: float = 1.0) -> np.ndarray:
-    """Diffuse albedo, linear sRGB float32 [..., 3], of melanin and blood volume fractions [...] (clipped to the model's range).
+def reflectance(melanin: np.ndarray, blood: np.ndarray, oxygen: float = 0.75, scattering: float = 1.0,
+                slope: float = 2.4, chroma: float = 1.0) -> np.ndarray:
+    """Diffuse albedo, linear sRGB float32 [..., 3], of melanin and blood volume fractions [...] (clipped to the model's
+    range).
 
-    `oxygen` is the saturated share of the blood, `scattering` a factor on the dermis's scattering (denser collagen is lighter),
-    `slope` the exponent by which melanin absorbs more towards blue: 3.33 for melanosomes alone (yellower), less steep as seen through skin,
-    `chroma` a power on the channels' ratios to luminance: cameras and artists show skin more saturated than a spectrometer does.
+    `oxygen` is the saturated share of the blood, `scattering` a factor on the dermis's scattering (denser collagen is
+    lighter), `slope` the exponent by which melanin absorbs more towards blue: 3.33 for melanosomes alone (yellower),
+    less steep as seen through skin, `chroma` a power on the channels' ratios to luminance: cameras and artists show
+    skin more saturated than a spectrometer does.
     """
     melanin, blood = np.asarray(melanin, np.float32), np.asarray(blood, np.float32)
     x = _position(blood, BLOOD_RANGE).reshape(1, -1)
     y = _position(melanin, MELANIN_RANGE).reshape(1, -1)
-    table = _table(round(float(oxygen), 3), round(float(scattering), 3), round(float(slope), 3), round(float(chroma), 3))
+    table = _table(round(float(oxygen), 3), round(float(scattering), 3), round(float(slope), 3),
+                   round(float(chroma), 3))
     step = 32000  # cv2.remap takes fewer than 32767 columns
-    parts = [cv2.remap(table, x[:, i:i + step], y[:, i:i + step], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) for i in range(0, x.size, step)]
+    parts = [cv2.remap(table, x[:, i:i + step], y[:, i:i + step], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+             for i in range(0, x.size, step)]
     return np.concatenate(parts, 1).reshape(*melanin.shape, 3)
 
 
 def typology_angle(linear: np.ndarray) -> np.ndarray:
-    """Individual typology angle in degrees of linear sRGB [..., 3]: above 55 very light, below -30 dark (Chardon et al. 1991)."""
+    """Individual typology angle in degrees of linear sRGB [..., 3]: above 55 very light, below -30 dark (Chardon et al.
+    1991)."""
     xyz = linear @ np.linalg.inv(XYZ_TO_SRGB).T / [0.9505, 1.0, 1.089]
     root = np.where(xyz > 216 / 24389, np.cbrt(xyz), (24389 / 27 * xyz + 16) / 116)
     return np.degrees(np.arctan2(116 * root[..., 1] - 66, 200 * (root[..., 1] - root[..., 2])))
@@ -70,7 +83,8 @@ def _position(fraction: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
 def _table(oxygen: float, scattering: float, slope: float, chroma: float) -> np.ndarray:
     """reflectance on a grid, uniform in the logarithms: linear sRGB float32 [TABLE melanin, TABLE blood, 3]."""
     nodes = 65  # smooth functions of two variables: computed coarsely, enlarged cubically
-    melanin, blood = np.geomspace(*MELANIN_RANGE, nodes)[:, None, None], np.geomspace(*BLOOD_RANGE, nodes)[None, :, None]
+    melanin, blood = np.geomspace(*MELANIN_RANGE, nodes)[:, None,
+                                                         None], np.geomspace(*BLOOD_RANGE, nodes)[None, :, None]
     rgb = _integrate(_spectrum(melanin, blood, oxygen, scattering, slope))
     luminance = (rgb @ LUMINANCE)[..., None]
     saturated = (rgb / luminance) ** chroma

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Portraits under any light, with their truth: a subject on the light stage, an environment, suns and lamps with what stands before them, a camera.
+"""Portraits under any light, with their truth: a subject on the light stage, an environment, suns and lamps with what
+stands before them, a camera.
 
-`relit` makes as many pictures of one sight as there are lights; `portrait` is one of a subject by seed, for tests and benchmarks.
+`relit` makes as many pictures of one sight as there are lights; `portrait` is one of a subject by seed, for tests and
+benchmarks.
 """
 
 from __future__ import annotations
@@ -29,9 +31,10 @@ GOBOS = ("none", "none", "none", "leaves", "leaves", "blinds", "edge")
 
 @dataclass(frozen=True)
 class FittedLight:
-    """The light as a fit to the registered head would find it, up to its usual errors, times the skin's tone: ambient [P, 3] of a second-order sky,
-    sunlit [P, 3] the same and a sun that only the head itself blocks; smooth normals [P, 3] of the registered head; direct [P, 3]: what the sun would add
-    where nothing blocks it, None where nobody asks for it."""
+    """The light as a fit to the registered head would find it, up to its usual errors, times the skin's tone: ambient
+    [P, 3] of a second-order sky, sunlit [P, 3] the same and a sun that only the head itself blocks; smooth normals [P,
+    3] of the registered head; direct [P, 3]: what the sun would add where nothing blocks it, None where nobody asks for
+    it."""
 
     ambient: np.ndarray
     sunlit: np.ndarray
@@ -41,7 +44,8 @@ class FittedLight:
 
 @dataclass(frozen=True)
 class LampOnHead:
-    """A lamp as it falls on a head: towards [3], unit direction to it; colour [3]: irradiance over pi; reach [P]: what the head itself lets through of it."""
+    """A lamp as it falls on a head: towards [3], unit direction to it; colour [3]: irradiance over pi; reach [P]: what
+    the head itself lets through of it."""
 
     towards: np.ndarray
     colour: np.ndarray
@@ -50,10 +54,12 @@ class LampOnHead:
 
 @dataclass(frozen=True)
 class Portrait:
-    """float32 pictures of side S. srgb [S, S, 3]: the file; albedo [S, S, 3]: linear, 0 off the head; shading [S, S, 3]: what the albedo was multiplied
-    by, highlights and clipping included; even [S, S, 3]: the same for skin of one tone, so that nothing of the pigment is in it, through what the camera's
-    curve does to pigment either; shadow [S, S] in [0, 1]: the share of the main light that is blocked or turned away, 0 where no light is
-    main; strong: that light's irradiance facing it over all other light's, as a share in [0, 1]; head, face and skin [S, S] in [0, 1]; fitted [P]."""
+    """float32 pictures of side S. srgb [S, S, 3]: the file; albedo [S, S, 3]: linear, 0 off the head; shading [S, S,
+    3]: what the albedo was multiplied by, highlights and clipping included; even [S, S, 3]: the same for skin of one
+    tone, so that nothing of the pigment is in it, through what the camera's curve does to pigment either; shadow [S, S]
+    in [0, 1]: the share of the main light that is blocked or turned away, 0 where no light is main; strong: that
+    light's irradiance facing it over all other light's, as a share in [0, 1]; head, face and skin [S, S] in [0, 1];
+    fitted [P]."""
 
     srgb: np.ndarray
     albedo: np.ndarray
@@ -67,7 +73,8 @@ class Portrait:
     fitted: FittedLight
 
 
-def portrait(seed: int, size: int = 256, light: int = 0, panoramas: list[np.ndarray] = (), texels: int = 1024) -> Portrait:
+def portrait(seed: int, size: int = 256, light: int = 0, panoramas: list[np.ndarray] = (),
+             texels: int = 1024) -> Portrait:
     """The subject of a seed, seen and lit as (seed, light) decide: the same numbers give the same picture."""
     stage, skin = light_stage(subject_mesh(seed)), make_skin(adorned(sample_parameters(seed), seed), texels)
     sight = sight_of(stage, skin, np.random.default_rng([seed, 40, light]), size)
@@ -80,10 +87,12 @@ def sight_of(stage: LightStage, skin: Skin, rng: np.random.Generator, size: int)
     return look(stage, camera, skin.diffuse, F0 * skin.specular, skin.normal, rng, open_eyes=rng.random() < 0.7)
 
 
-def relit(sight: Sight, stage: LightStage, rng: np.random.Generator, panoramas: list[np.ndarray] = (), albedo: np.ndarray | None = None) -> Portrait:
+def relit(sight: Sight, stage: LightStage, rng: np.random.Generator, panoramas: list[np.ndarray] = (),
+          albedo: np.ndarray | None = None) -> Portrait:
     """One picture of a sight under a random light. `albedo` [P, 3] replaces the sight's."""
     albedo = sight.albedo if albedo is None else albedo
-    environment = panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas) and rng.random() < 0.6 else made_environment(rng)
+    environment = (panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas)
+                   and rng.random() < 0.6 else made_environment(rng))
     carried = transport(stage, sight.vertices)
     ambient, shine = _under(environment, sight, stage, carried)
     lamps, colours, blocked = _lamps(environment, sight, rng)
@@ -106,27 +115,35 @@ def relit(sight: Sight, stage: LightStage, rng: np.random.Generator, panoramas: 
     shading = images.srgb_to_linear(picture) / np.maximum(truth, 0.004)
     shadow, strong = _shadow(sight, lamps, colours, blocked, ambient)
     bare = 1 - hair
-    return Portrait(develop(picture, rng), truth, shading * (head * bare)[..., None], (images.srgb_to_linear(even) / tone).astype(np.float32),
+    return Portrait(develop(picture, rng), truth, shading * (head * bare)[..., None],
+                    (images.srgb_to_linear(even) / tone).astype(np.float32),
                     sight.picture(shadow), strong, head * bare, face * bare,
-                    sight.picture(sight.masks[:, MASKS.index("skin")] * (1 - sight.masks[:, MASKS.index("eyes")])) * bare,
-                    _fitted(sight, carried, environment, lamps, colours, _tone(sight, albedo) * gains, rng))
+                    sight.picture(sight.masks[:, MASKS.index("skin")] * (1 - sight.masks[:, MASKS.index("eyes")]))
+                    * bare, _fitted(sight, carried, environment, lamps, colours, _tone(sight, albedo) * gains, rng))
 
 
-def _under(environment: Environment, sight: Sight, stage: LightStage, carried: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shading by the environment and its mirror image, [P, 3] each; `carried` is the light transport of the vertices seen."""
-    lit = np.concatenate([carried @ environment.radiance, mirrored(stage, sight.vertices, environment.radiance, sight.eye)], 1)
+def _under(environment: Environment, sight: Sight, stage: LightStage,
+           carried: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shading by the environment and its mirror image, [P, 3] each; `carried` is the light transport of the vertices
+    seen."""
+    lit = np.concatenate([carried @ environment.radiance,
+                          mirrored(stage, sight.vertices, environment.radiance, sight.eye)], 1)
     ambient, shine = np.split(sight.at_pixels(lit), 2, 1)
-    relief = 1 + 0.5 * ((sight.normal - sight.smooth) @ _brightest(environment))[:, None]  # the stage's vertices know no pores: these turn to its bright side
+    # the stage's vertices know no pores: these turn to its bright side
+    relief = 1 + 0.5 * ((sight.normal - sight.smooth) @ _brightest(environment))[:, None]
     return ambient * np.clip(relief, 0.5, 1.5), shine
 
 
 def _brightest(environment: Environment) -> np.ndarray:
     """The environment's dipole [3]: where its light comes from, of length 1 where all of it comes from there."""
-    return (DIRECTIONS * environment.radiance.mean(1, keepdims=True)).mean(0).astype(np.float32) / max(float(environment.radiance.mean()), 1e-6)
+    return (DIRECTIONS * environment.radiance.mean(1, keepdims=True)).mean(0).astype(np.float32) / max(
+        float(environment.radiance.mean()), 1e-6
+    )
 
 
 def _lamps(environment: Environment, sight: Sight, rng: np.random.Generator) -> tuple[list, list, list]:
-    """Up to two lamps beside the environment: unit directions, colours [3] as irradiance over pi, and the share [P] of each that arrives."""
+    """Up to two lamps beside the environment: unit directions, colours [3] as irradiance over pi, and the share [P] of
+    each that arrives."""
     lamps, colours, reach = [], [], []
     for k in rng.permutation(len(sight.lamps))[:rng.choice([0, 1, 1, 1, 1, 2])]:
         strength = np.exp(rng.uniform(np.log(0.35), np.log(9.0)))
@@ -137,18 +154,22 @@ def _lamps(environment: Environment, sight: Sight, rng: np.random.Generator) -> 
         lamp = sight.lamps[k]
         lamps.append(lamp)
         colours.append(colour.astype(np.float32))
-        reach.append(sight.reach[k] * (1 - gobo(sight.position, lamp, float(sight.radius[k]), str(rng.choice(GOBOS)), rng)))
+        reach.append(sight.reach[k]
+                     * (1 - gobo(sight.position, lamp, float(sight.radius[k]), str(rng.choice(GOBOS)), rng)))
     return lamps, colours, reach
 
 
-def gobo(position: np.ndarray, lamp: np.ndarray, radius: float, kind: str, rng: np.random.Generator) -> np.ndarray | float:
-    """The share [P] of a lamp's light that leaves, blinds or an edge before it take away from places [P, 3] in metres."""
+def gobo(position: np.ndarray, lamp: np.ndarray, radius: float, kind: str,
+         rng: np.random.Generator) -> np.ndarray | float:
+    """The share [P] of a lamp's light that leaves, blinds or an edge before it take away from places [P, 3] in
+    metres."""
     if kind == "none":
         return 0.0
     right = np.cross(lamp, [0.0, 0.0, 1.0] if abs(lamp[2]) < 0.9 else [1.0, 0.0, 0.0])
     right /= np.linalg.norm(right)
     away = rng.uniform(0.1, 0.8)
-    return in_the_way(position @ right, position @ np.cross(right, lamp), max(2 * away * min(radius, 0.03), 4e-4), kind, rng)
+    return in_the_way(position @ right, position @ np.cross(right, lamp), max(2 * away * min(radius, 0.03), 4e-4), kind,
+                      rng)
 
 
 def _fresnel(sight: Sight) -> np.ndarray:
@@ -171,20 +192,23 @@ def _highlight(sight: Sight, lamp: np.ndarray, roughness: float) -> np.ndarray:
 
 
 def _softened(sight: Sight, direct: np.ndarray, radius: float) -> np.ndarray:
-    """Direct light [P] -> [P, 3] spread under the skin, red farthest (d'Eon et al. 2007); `radius` in pixels, of the red."""
+    """Direct light [P] -> [P, 3] spread under the skin, red farthest (d'Eon et al. 2007); `radius` in pixels, of the
+    red."""
     picture, head = sight.picture(direct.astype(np.float32)), sight.picture(np.ones(len(direct), np.float32))
     channels = []
     for share in (1.0, 0.4, 0.2):
         if share * radius < 0.25:
             channels.append(direct)
             continue
-        spread = cv2.GaussianBlur(picture, (0, 0), share * radius) / np.maximum(cv2.GaussianBlur(head, (0, 0), share * radius), 1e-3)
+        spread = cv2.GaussianBlur(picture, (0, 0),
+                                  share * radius) / np.maximum(cv2.GaussianBlur(head, (0, 0), share * radius), 1e-3)
         channels.append(spread.reshape(-1)[sight.pixel])
     return np.stack(channels, -1).astype(np.float32)
 
 
 def _background(environment: Environment, sight: Sight, light: float, rng: np.random.Generator) -> np.ndarray:
-    """What lies behind the head [S, S, 3]: the panorama out of focus, a dark studio, or cloth and walls of any colour."""
+    """What lies behind the head [S, S, 3]: the panorama out of focus, a dark studio, or cloth and walls of any
+    colour."""
     kind = rng.random()
     if kind < 0.45:
         return background_radiance(environment, sight.rays) * np.float32(np.exp(rng.normal(0, 0.3)))
@@ -193,19 +217,23 @@ def _background(environment: Environment, sight: Sight, light: float, rng: np.ra
     else:
         ground = np.broadcast_to(rng.uniform(0.02, 0.7, 3), (sight.size, sight.size, 3)).astype(np.float32)
     for scale in (4, 9, 24):
-        blobs = np.exp(rng.normal(0, 0.35, (scale, scale, 1)) + rng.normal(0, 0.12, (scale, scale, 3))).astype(np.float32)
-        blobs = cv2.resize(blobs, (sight.size,) * 2, interpolation=int(rng.choice([cv2.INTER_CUBIC, cv2.INTER_NEAREST])))
+        blobs = np.exp(rng.normal(0, 0.35, (scale, scale, 1))
+                       + rng.normal(0, 0.12, (scale, scale, 3))).astype(np.float32)
+        blobs = cv2.resize(blobs, (sight.size,) * 2,
+                           interpolation=int(rng.choice([cv2.INTER_CUBIC, cv2.INTER_NEAREST])))
         ground = ground * np.clip(blobs, 0.1, 5)
     return ground * np.float32(light)
 
 
 def _haired(picture: np.ndarray, sight: Sight, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Strands from the crown over the forehead and down the sides, drawn onto an sRGB picture; the picture and where they cover [S, S]."""
+    """Strands from the crown over the forehead and down the sides, drawn onto an sRGB picture; the picture and where
+    they cover [S, S]."""
     rows = sight.pixel // sight.size
     columns = sight.pixel % sight.size
     top, left, right = np.quantile(rows, 0.01), np.quantile(columns, 0.02), np.quantile(columns, 0.98)
     height = np.quantile(rows, 0.98) - top
-    colour = np.clip(np.array([0.13, 0.09, 0.07]) * np.exp(rng.normal(0.2, 0.9)) * np.exp(rng.normal(0, 0.15, 3)), 0, 0.8)
+    colour = np.clip(np.array([0.13, 0.09, 0.07]) * np.exp(rng.normal(0.2, 0.9)) * np.exp(rng.normal(0, 0.15, 3)), 0,
+                     0.8)
     drawn, cover, out = picture.copy(), np.zeros(picture.shape[:2], np.uint8), picture
     fringe, sides = rng.uniform(0.05, 0.35), rng.uniform(0.1, 0.9)
     for _ in range(int(rng.integers(150, 500))):
@@ -224,11 +252,13 @@ def _haired(picture: np.ndarray, sight: Sight, rng: np.random.Generator) -> tupl
 
 
 def _shadow(sight: Sight, lamps: list, colours: list, reach: list, ambient: np.ndarray) -> tuple[np.ndarray, float]:
-    """The lost share [P] of the lamps' light, weighted by their strength, and how much of all light they are, in [0, 1]."""
+    """The lost share [P] of the lamps' light, weighted by their strength, and how much of all light they are, in [0,
+    1]."""
     if not lamps:
         return np.zeros(len(sight.pixel), np.float32), 0.0
     strength = np.array([float(np.mean(c)) for c in colours])
-    facing = [np.clip(1 + (sight.smooth @ lamp) / 0.06, 0, 1) for lamp in lamps]  # what turns away from a lamp is in its shadow too
+    # what turns away from a lamp is in its shadow too
+    facing = [np.clip(1 + (sight.smooth @ lamp) / 0.06, 0, 1) for lamp in lamps]
     lost = sum(s * (1 - r * f) for s, r, f in zip(strength, reach, facing, strict=True))
     return (lost / strength.sum()).astype(np.float32), float(strength.sum() / (strength.sum() + ambient.mean()))
 
@@ -236,7 +266,8 @@ def _shadow(sight: Sight, lamps: list, colours: list, reach: list, ambient: np.n
 def _fitted(sight: Sight, carried: np.ndarray, environment: Environment, lamps: list, colours: list, tone: np.ndarray,
             rng: np.random.Generator) -> FittedLight:
     transfer = sight.at_pixels(carried @ BASIS.astype(np.float32))
-    shining = [LampOnHead(lamp, colour, sight.reach[np.argmax(sight.lamps @ lamp)]) for lamp, colour in zip(lamps, colours, strict=True)]
+    shining = [LampOnHead(lamp, colour, sight.reach[np.argmax(sight.lamps @ lamp)])
+               for lamp, colour in zip(lamps, colours, strict=True)]
     return fitted_light(transfer, sight.smooth, shining, environment, tone, rng)
 
 
@@ -246,9 +277,10 @@ def _tone(sight: Sight, albedo: np.ndarray) -> np.ndarray:
     return (albedo[skin] if skin.any() else albedo).mean(0)
 
 
-def fitted_light(transfer: np.ndarray, smooth: np.ndarray, lamps: list[LampOnHead], environment: Environment, tone: np.ndarray,
-                 rng: np.random.Generator) -> FittedLight:
-    """What core/light/sunlight.py would find, without its search: the second-order sky and the strongest lamp, each a little off.
+def fitted_light(transfer: np.ndarray, smooth: np.ndarray, lamps: list[LampOnHead], environment: Environment,
+                 tone: np.ndarray, rng: np.random.Generator) -> FittedLight:
+    """What core/light/sunlight.py would find, without its search: the second-order sky and the strongest lamp, each a
+    little off.
 
     Parameters
     ----------
@@ -277,9 +309,12 @@ def fitted_light(transfer: np.ndarray, smooth: np.ndarray, lamps: list[LampOnHea
     if found:
         towards = lamps[main].towards + rng.normal(0, 0.06, 3)
         towards /= np.linalg.norm(towards)
-        direct = np.maximum(normal @ towards, 0)[:, None] * lamps[main].colour * np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.05, 3))
+        direct = np.maximum(normal @ towards, 0)[:,
+                                                 None] * lamps[main].colour * np.exp(rng.normal(0, 0.15)
+                                                                                     + rng.normal(0, 0.05, 3))
     sunlit = lit + direct * lamps[main].reach[:, None] if found else lit
-    return FittedLight(*((part * tone).astype(np.float32) for part in (lit, sunlit)), normal.astype(np.float32), (direct * tone).astype(np.float32))
+    return FittedLight(*((part * tone).astype(np.float32) for part in (lit, sunlit)), normal.astype(np.float32),
+                       (direct * tone).astype(np.float32))
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

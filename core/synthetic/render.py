@@ -4,8 +4,8 @@
 
     python -m core.synthetic.render JOB.json
 
-The job (written by sample.py) names the head, its maps, the leaves, the sun, the sky, the cameras and the output folder.
-Frames that exist are not rendered again.
+The job (written by sample.py) names the head, its maps, the leaves, the sun, the sky, the cameras and the output
+folder. Frames that exist are not rendered again.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ def main() -> None:
     apply_settings(scene, job)
     add_mesh(read_obj(Path(job["head"])), "head", _skin(job["maps"]))
     if job["leaves"]:
-        add_mesh(read_obj(Path(job["leaves"])), "leaves", plain("leaves", (0.05, 0.13, 0.03))).visible_camera = False  # they are nearer than the camera
+        # they are nearer than the camera
+        add_mesh(read_obj(Path(job["leaves"])), "leaves", plain("leaves", (0.05, 0.13, 0.03))).visible_camera = False
     add_lights(scene, job)
     if job["room"]:
         add_room(job["seed"])
@@ -57,7 +58,8 @@ def add_camera(scene: bpy.types.Scene, job: dict) -> bpy.types.Object:
     return camera
 
 
-def render_frames(scene: bpy.types.Scene, camera: bpy.types.Object, job: dict, place: Callable[[int], None] = lambda number: None) -> None:
+def render_frames(scene: bpy.types.Scene, camera: bpy.types.Object, job: dict,
+                  place: Callable[[int], None] = lambda number: None) -> None:
     """The job's frames that do not exist yet; `place` puts what moves where it is in a frame."""
     for number in job["frames"]:
         path = Path(job["out"]) / f"{number:05d}{job['suffix']}"
@@ -82,7 +84,8 @@ def apply_settings(scene: bpy.types.Scene, job: dict) -> None:
     scene.cycles.seed = job["seed"] % 65536
     scene.render.resolution_x, scene.render.resolution_y = job["width"], job["height"]
     scene.render.resolution_percentage = 100
-    scene.render.image_settings.file_format = 'OPEN_EXR' if job["suffix"] == ".exr" else 'PNG'  # an EXR holds linear light
+    # an EXR holds linear light
+    scene.render.image_settings.file_format = 'OPEN_EXR' if job["suffix"] == ".exr" else 'PNG'
     scene.render.use_persistent_data = True
     scene.view_settings.view_transform = 'Standard'
 
@@ -101,7 +104,8 @@ def add_mesh(mesh: Mesh, name: str, material: bpy.types.Material) -> bpy.types.O
 
 
 def _skin(maps: dict) -> bpy.types.Material:
-    """Albedo, gloss and relief as the truth says; no subsurface scattering, so that albedo means the same in the picture and in the truth."""
+    """Albedo, gloss and relief as the truth says; no subsurface scattering, so that albedo means the same in the
+    picture and in the truth."""
     material, nodes, links, shader = principled("skin")
 
     def texture(name: str, space: str) -> bpy.types.Node:
@@ -130,7 +134,8 @@ def plain(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
 def patterned(name: str, rng: np.random.Generator, scale: float) -> bpy.types.Material:
     """Two colours mixed by a random texture: corners and blobs for structure from motion."""
     material, nodes, links, shader = principled(name)
-    kind = rng.choice(["ShaderNodeTexVoronoi", "ShaderNodeTexNoise"])  # neither repeats: what repeats misleads the matching of features
+    # neither repeats: what repeats misleads the matching of features
+    kind = rng.choice(["ShaderNodeTexVoronoi", "ShaderNodeTexNoise"])
     texture, ramp, place = nodes.new(kind), nodes.new("ShaderNodeValToRGB"), nodes.new("ShaderNodeTexCoord")
     links.new(place.outputs["Object"], texture.inputs["Vector"])
     texture.inputs["Scale"].default_value = scale

@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A subject's hand-held video and its truth, in the layout that benchmarks read:
 
-    python -m core.synthetic.sample [--out FOLDER] [--work FOLDER] [--seed N] [--frames N] [--samples N] [--only 0,36,...]
+    python -m core.synthetic.sample [--out FOLDER] [--work FOLDER] [--seed N] [--frames N] [--samples N] [--only
+    0,36,...]
 
-capture.mp4; cameras.json (Blender camera-to-world matrices, metres); albedo/NNNN.png (true diffuse albedo, sRGB with alpha), face/NNNN.png
-(facial skin), shadow/NNNN.png (255 where the sun does not reach) of some frames; skin_tone.txt (sRGB of the mean over the face masks).
-Rendered frames stay in the work folder: a second run goes on where the first stopped.
+capture.mp4; cameras.json (Blender camera-to-world matrices, metres); albedo/NNNN.png (true diffuse albedo, sRGB with
+alpha), face/NNNN.png (facial skin), shadow/NNNN.png (255 where the sun does not reach) of some frames; skin_tone.txt
+(sRGB of the mean over the face masks). Rendered frames stay in the work folder: a second run goes on where the first
+stopped.
 """
 
 from __future__ import annotations
@@ -53,13 +55,14 @@ def main() -> None:
     asked = parser.parse_args()
     wanted = [int(n) for n in asked.only.split(",")] if asked.only else list(range(asked.frames))
     skin = make_skin(sample_parameters(asked.seed), MAPS)
-    render_frames(asked.work, asked.seed, skin, scene.Shot(scene.camera_path(asked.seed, asked.frames), wanted, asked.samples))
+    render_frames(asked.work, asked.seed, skin,
+                  scene.Shot(scene.camera_path(asked.seed, asked.frames), wanted, asked.samples))
     if not asked.only:
         write_sample(asked.out, asked.work, asked.seed, skin, asked.frames)
 
 
-def render_frames(work: Path, seed: int, skin: Skin, shot: scene.Shot, leaves: bool = True, light: scene.SceneLight | None = None,
-                  suffix: str = ".png") -> None:
+def render_frames(work: Path, seed: int, skin: Skin, shot: scene.Shot, leaves: bool = True,
+                  light: scene.SceneLight | None = None, suffix: str = ".png") -> None:
     """Renders a bald subject to work/NNNNN.png by Cycles in a process of its own; files that exist are kept.
 
     Parameters
@@ -86,21 +89,26 @@ def render_frames(work: Path, seed: int, skin: Skin, shot: scene.Shot, leaves: b
     images.write_data(work / "specular.png", skin.specular, bits=16)
     images.write_data(work / "normal.png", skin.normal / 2 + 0.5, bits=16)
     write_json(work / "job.json", {
-        "seed": seed, "room": shot.room, "head": str(work / "head.obj"), "leaves": str(work / "leaves.obj") if light.blockers else None,
+        "seed": seed, "room": shot.room, "head": str(work / "head.obj"),
+        "leaves": str(work / "leaves.obj") if light.blockers else None,
         "suffix": suffix, "out": str(work), "frames": shot.frames, "samples": shot.samples,
-        "maps": {name: str(work / f"{name}.png") for name in ("diffuse", "specular", "normal")}, "cameras": shot.cameras.tolist(),
+        "maps": {name: str(work / f"{name}.png") for name in ("diffuse", "specular", "normal")},
+        "cameras": shot.cameras.tolist(),
         "sun": asdict(light.sun) | {"direction": light.sun.direction.tolist()} if light.sun else None, "sky": sky,
         "lamps": [asdict(lamp) for lamp in light.lamps], "flash": light.flash,
-        "width": round(scene.WIDTH * shot.scale), "height": round(scene.HEIGHT * shot.scale), "focal_px": scene.FOCAL * shot.scale})
-    subprocess.run([sys.executable, "-m", "core.synthetic.render", str(work / "job.json")], cwd=Path(__file__).parents[2], check=True)
+        "width": round(scene.WIDTH * shot.scale), "height": round(scene.HEIGHT * shot.scale),
+        "focal_px": scene.FOCAL * shot.scale})
+    subprocess.run([sys.executable, "-m", "core.synthetic.render", str(work / "job.json")],
+                   cwd=Path(__file__).parents[2], check=True)
 
 
 def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> None:
     """The video and its truth from rendered frames."""
     out.mkdir(parents=True, exist_ok=True)
     cameras = scene.camera_path(seed, frames)
-    write_json(out / "cameras.json", {"name": "sample", "light": "sun", "focal_px": scene.FOCAL, "width": scene.WIDTH, "height": scene.HEIGHT,
-                                      "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
+    write_json(out / "cameras.json",
+               {"name": "sample", "light": "sun", "focal_px": scene.FOCAL, "width": scene.WIDTH, "height": scene.HEIGHT,
+                "cameras": [{"frame": k, "matrix_world": matrix.tolist()} for k, matrix in enumerate(cameras)]})
     write_video(out / "capture.mp4", (images.read_srgb(work / f"{k:05d}.png") for k in range(frames)))
     head, sun = subject_mesh(seed), scene.sun_of(seed)
     opaque = joined([head, scene.leaves(seed, sun)])
@@ -110,7 +118,8 @@ def write_sample(out: Path, work: Path, seed: int, skin: Skin, frames: int) -> N
         name = f"{frame:04d}.png"
         for folder in ("albedo", "face", "shadow"):
             (out / folder).mkdir(exist_ok=True)
-        images.write_srgb(out / "albedo" / name, np.concatenate([images.linear_to_srgb(albedo), alpha[..., None]], -1), small=True)
+        images.write_srgb(out / "albedo" / name, np.concatenate([images.linear_to_srgb(albedo), alpha[..., None]], -1),
+                          small=True)
         images.write_data(out / "face" / name, face.astype(np.float32))
         images.write_data(out / "shadow" / name, shadow.astype(np.float32))
         total, count = total + albedo[face].sum(0, dtype=np.float64), count + int(face.sum())
@@ -128,13 +137,15 @@ def view_of(matrix: np.ndarray, scale: float = 1.0) -> View:
     """A Blender camera-to-world matrix [4, 4] (looks along -z, y up) as a view; `scale`: of the picture's size."""
     rotation = np.diag([1, -1, -1]) @ matrix[:3, :3].T
     width, height, focal = round(scene.WIDTH * scale), round(scene.HEIGHT * scale), scene.FOCAL * scale
-    camera = pycolmap.Camera(camera_id=1, model="PINHOLE", width=width, height=height, params=[focal, focal, width / 2, height / 2])
+    camera = pycolmap.Camera(camera_id=1, model="PINHOLE", width=width, height=height,
+                             params=[focal, focal, width / 2, height / 2])
     return View("", Path(), camera, rotation, -rotation @ matrix[:3, 3], True)
 
 
 def frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarray | None,
                 over: int = 2) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Linear albedo [h, w, 3], alpha [h, w], and bool [h, w] each: facial skin, and the part of the head that the sun (unit direction, or None) does not reach.
+    """Linear albedo [h, w, 3], alpha [h, w], and bool [h, w] each: facial skin, and the part of the head that the sun
+    (unit direction, or None) does not reach.
 
     `opaque` is all that throws shadows, the head included; `over`: rays along a pixel's side.
     """
@@ -149,11 +160,13 @@ def frame_truth(head: Mesh, opaque: Mesh, skin: Skin, view: View, sun: np.ndarra
     albedo = _shrunk(colour, over) / np.maximum(cover, 1e-6)[..., None]
     in_face = np.zeros(hit.shape, np.float32)
     in_face[hit] = raster.sample(template.mask("face", 1024), at * 1024 / MAPS)
-    points, normals = raster.interpolate(head.vertices, head.faces, face, bary), raster.interpolate(vertex_normals(head), head.faces, face, bary)
+    points, normals = raster.interpolate(head.vertices, head.faces, face,
+                                         bary), raster.interpolate(vertex_normals(head), head.faces, face, bary)
     dark = np.zeros(hit.shape, np.float32)
     if sun is not None:
         away = (normals[hit] @ sun) <= 0
-        dark[hit] = away | raster.RayCaster(opaque).blocked(points[hit] + 5e-4 * normals[hit], np.repeat(sun[None], hit.sum(), 0))
+        dark[hit] = away | raster.RayCaster(opaque).blocked(points[hit] + 5e-4 * normals[hit],
+                                                            np.repeat(sun[None], hit.sum(), 0))
     return albedo, cover, (_shrunk(in_face, over) > 0.5) & (cover > 0.99), _shrunk(dark, over) > 0.5
 
 
@@ -165,7 +178,8 @@ def write_video(path: Path, pictures: Iterable[np.ndarray], crf: int = 18) -> No
         for number, picture in enumerate(pictures):
             if number == 0:  # the codec is open from the first picture on
                 stream.height, stream.width = picture.shape[:2]
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(np.round(picture * 255).astype(np.uint8), format="rgb24")))
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(np.round(picture * 255).astype(np.uint8),
+                                                                   format="rgb24")))
         container.mux(stream.encode())
 
 

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What stands around a synthetic subject: a hand-held camera path, a sun behind leaves, a cluttered room without walls.
 
-World: metres, +Z up, the head's middle at the origin, its face towards -Y. The same numbers make the rendered video and its truth.
+World: metres, +Z up, the head's middle at the origin, its face towards -Y. The same numbers make the rendered video and
+its truth.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ DISTANCE = 0.46  # metres from the camera to the head's middle
 
 @dataclass(frozen=True)
 class Sun:
-    """direction: unit vector towards the sun; strength: irradiance across the beam in W/m^2; angle: its diameter in radians; colour: linear sRGB."""
+    """direction: unit vector towards the sun; strength: irradiance across the beam in W/m^2; angle: its diameter in
+    radians; colour: linear sRGB."""
 
     direction: np.ndarray
     strength: float = 4.2
@@ -34,7 +36,8 @@ SKY = (0.42, 0.55, 0.80)
 
 @dataclass(frozen=True)
 class AreaLamp:
-    """A square area lamp that shines at the head: where it is [3] and its side in metres, its power in watts, its colour in linear sRGB."""
+    """A square area lamp that shines at the head: where it is [3] and its side in metres, its power in watts, its
+    colour in linear sRGB."""
 
     position: tuple[float, float, float]
     size: float
@@ -44,8 +47,9 @@ class AreaLamp:
 
 @dataclass(frozen=True)
 class SceneLight:
-    """All that lights a subject. sky: its radiance everywhere, [3], or an equirectangular panorama [H, W, 3] as Blender reads one (its middle column is +X);
-    blockers: what stands between the lights and the head, unseen by the camera; flash: watts of a small lamp in the camera's own place, that goes with it."""
+    """All that lights a subject. sky: its radiance everywhere, [3], or an equirectangular panorama [H, W, 3] as Blender
+    reads one (its middle column is +X); blockers: what stands between the lights and the head, unseen by the camera;
+    flash: watts of a small lamp in the camera's own place, that goes with it."""
 
     sky: tuple[float, float, float] | np.ndarray = SKY
     sun: Sun | None = None
@@ -56,9 +60,10 @@ class SceneLight:
 
 @dataclass(frozen=True)
 class Shot:
-    """What is rendered of a scene, and how well. cameras [N, 4, 4]: camera to world; frames: numbers into them; samples: of Cycles, a pixel; scale: of the
-    pictures' size; poses [N, 4, 4]: where the head is in each frame, head to world, None: still; room: whether there is anything behind the person; focal:
-    factor on the focal length, for close-ups."""
+    """What is rendered of a scene, and how well. cameras [N, 4, 4]: camera to world; frames: numbers into them;
+    samples: of Cycles, a pixel; scale: of the pictures' size; poses [N, 4, 4]: where the head is in each frame, head to
+    world, None: still; room: whether there is anything behind the person; focal: factor on the focal length, for
+    close-ups."""
 
     cameras: np.ndarray
     frames: Sequence[int]
@@ -77,7 +82,8 @@ def sun_of(seed: int) -> Sun:
 
 
 def leaves(seed: int, sun: Sun, distance: float = 0.40, count: int = 28, reach: float = 0.15) -> Mesh:
-    """A loose twig between head and sun: pointed leaves of 2 to 5 cm, strewn over a disc of radius `reach` across the beam.
+    """A loose twig between head and sun: pointed leaves of 2 to 5 cm, strewn over a disc of radius `reach` across the
+    beam.
 
     From `distance` metres the sun blurs their edges over 2 mm: hard shadows, as at noon under a tree.
     """
@@ -98,28 +104,33 @@ def leaves(seed: int, sun: Sun, distance: float = 0.40, count: int = 28, reach: 
 
 
 def camera_path(seed: int, frames: int, degrees: float = 46) -> np.ndarray:
-    """Camera-to-world matrices [frames, 4, 4] (the camera looks along its -z, y up): past the nose from so many degrees at one side to as many at the other,
-    up and down on the way, with the slow drift and the tremble of a hand."""
+    """Camera-to-world matrices [frames, 4, 4] (the camera looks along its -z, y up): past the nose from so many degrees
+    at one side to as many at the other, up and down on the way, with the slow drift and the tremble of a hand."""
     rng = np.random.default_rng([seed, 22])
     t = np.linspace(0, 1, frames)
     azimuth = np.radians(degrees) * (0.8 * (2 * t - 1) + 0.2 * np.sin(np.pi * (t - 0.5))) * rng.choice([-1, 1])
     height = np.radians(7 + 13 * np.sin(2 * np.pi * (1.5 * t + 0.1)))
     distance = DISTANCE * (1 + 0.05 * np.sin(2 * np.pi * (1.2 * t + rng.uniform())))
-    position = distance[:, None] * np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)
+    position = distance[:,
+                        None] * np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height),
+                                          np.sin(height)], -1)
     position += _drift(rng, frames, 0.008, 9) + _drift(rng, frames, 0.0015, 2)
     target = np.array([0, -0.01, -0.035]) + _drift(rng, frames, 0.010, 9) + _drift(rng, frames, 0.0015, 2)
     return looking(position, target, _drift(rng, frames, np.radians(1.5), 9)[:, 0])
 
 
 def rig() -> np.ndarray:
-    """Camera-to-world matrices [16, 4, 4] of a studio: two fixed rows of eight cameras, over 100 degrees from side to side, as in multi-view face datasets."""
+    """Camera-to-world matrices [16, 4, 4] of a studio: two fixed rows of eight cameras, over 100 degrees from side to
+    side, as in multi-view face datasets."""
     height, azimuth = (np.radians(a).ravel() for a in np.meshgrid([-6.0, 22.0], np.linspace(-50, 50, 8), indexing="ij"))
-    position = DISTANCE * np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)
+    position = DISTANCE * np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height),
+                                    np.sin(height)], -1)
     return looking(position, np.broadcast_to([0, -0.01, -0.035], position.shape), np.zeros(len(position)))
 
 
 def looking(position: np.ndarray, target: np.ndarray, roll: np.ndarray) -> np.ndarray:
-    """Camera-to-world matrices [N, 4, 4] of cameras at `position` [N, 3] that look at `target` [N, 3], turned about their axis by `roll` [N] radians."""
+    """Camera-to-world matrices [N, 4, 4] of cameras at `position` [N, 3] that look at `target` [N, 3], turned about
+    their axis by `roll` [N] radians."""
     back = position - target
     back /= np.linalg.norm(back, axis=1, keepdims=True)
     right = np.cross([0, 0, 1.0], back)

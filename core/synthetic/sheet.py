@@ -36,8 +36,14 @@ def portrait(seed: int, work: Path, scale: float = 0.5) -> np.ndarray:
     back = towards / np.linalg.norm(towards)
     right = np.cross([0, 0, 1.0], back)
     right /= np.linalg.norm(right)
-    camera[:3, 0], camera[:3, 1], camera[:3, 2], camera[:3, 3] = right, np.cross(back, right), back, scene.DISTANCE * 1.05 * back + [0, 0, -0.02]
-    render_frames(work, seed, make_skin(sample_parameters(seed), 1024), scene.Shot(camera[None], [0], 24, scale), leaves=False)
+    camera[:3, 0], camera[:3, 1], camera[:3, 2], camera[:3, 3] = (
+        right,
+        np.cross(back, right),
+        back,
+        scene.DISTANCE * 1.05 * back + [0, 0, -0.02],
+    )
+    render_frames(work, seed, make_skin(sample_parameters(seed), 1024), scene.Shot(camera[None], [0], 24, scale),
+                  leaves=False)
     picture = images.read_srgb(work / "00000.png")
     return picture[picture.shape[0] // 12:-picture.shape[0] // 6]
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a camera sees of a synthetic subject before there is light: albedo, gloss, normals and places per pixel, and how far some lamps reach.
+"""What a camera sees of a synthetic subject before there is light: albedo, gloss, normals and places per pixel, and how
+far some lamps reach.
 
 The heads of core/synthetic have closed lids; most people in a picture do not, so open eyes are drawn onto some.
 """
@@ -24,17 +25,19 @@ from .olat import LightStage, sun_visibility
 
 LAMPS, RAYS = 4, 8
 EYES = ((33, 133), (362, 263))  # corners among MediaPipe's landmarks
-IRISES = np.array([[0.06, 0.03, 0.015], [0.10, 0.06, 0.03], [0.10, 0.16, 0.22], [0.09, 0.12, 0.07]])  # linear albedo: dark brown, brown, blue, green
+# linear albedo: dark brown, brown, blue, green
+IRISES = np.array([[0.06, 0.03, 0.015], [0.10, 0.06, 0.03], [0.10, 0.16, 0.22], [0.09, 0.12, 0.07]])
 MASKS = ("face", "skin", "brows", "lips", "scalp", "eyes")
 
 
 @dataclass(frozen=True)
 class Sight:
-    """size S; pixel int32 [P]: which of the S x S pixels show the head; vertices int32 [N]: those of the mesh that are seen; corner int32 [P, 3]
-    into them and bary [P, 3]: what lies around a pixel; albedo [P, 3] linear;
-    gloss [P]: specular reflectance at normal incidence; normal, smooth [P, 3]: world normals with and without the skin's relief; position [P, 3] in
-    metres; eye [3] where the camera is; rotation [3, 3] world to camera; rays [S, S, 3] unit; masks float [P, len(MASKS)];
-    lamps [LAMPS, 3] unit directions, radius [LAMPS] in radians, reach [LAMPS, P] in [0, 1]: how much of a lamp a pixel sees past the head."""
+    """size S; pixel int32 [P]: which of the S x S pixels show the head; vertices int32 [N]: those of the mesh that are
+    seen; corner int32 [P, 3] into them and bary [P, 3]: what lies around a pixel; albedo [P, 3] linear;
+    gloss [P]: specular reflectance at normal incidence; normal, smooth [P, 3]: world normals with and without the
+    skin's relief; position [P, 3] in metres; eye [3] where the camera is; rotation [3, 3] world to camera; rays [S, S,
+    3] unit; masks float [P, len(MASKS)]; lamps [LAMPS, 3] unit directions, radius [LAMPS] in radians, reach [LAMPS, P]
+    in [0, 1]: how much of a lamp a pixel sees past the head."""
 
     size: int
     pixel: np.ndarray
@@ -62,7 +65,8 @@ class Sight:
     def at_pixels(self, values: np.ndarray) -> np.ndarray:
         """Values of the seen vertices [N, C] at the pixels, float32 [P, C]."""
         count = len(self.pixel)
-        around = csr_matrix((self.bary.ravel(), self.corner.ravel(), np.arange(0, 3 * count + 1, 3)), (count, len(self.vertices)))
+        around = csr_matrix((self.bary.ravel(), self.corner.ravel(), np.arange(0, 3 * count + 1, 3)),
+                            (count, len(self.vertices)))
         return (around @ np.asarray(values, np.float32)).astype(np.float32, copy=False)
 
     def picture(self, values: np.ndarray, empty: float = 0.0) -> np.ndarray:
@@ -90,7 +94,8 @@ def random_camera(landmarks: np.ndarray, size: int, rng: np.random.Generator) ->
     side = (high - low).max() * np.exp(rng.uniform(np.log(1.25), np.log(2.0)))
     centre = (low + high) / 2 + rng.uniform(-0.1, 0.1, 2) * side
     focal = size / side
-    camera = pycolmap.Camera(model="PINHOLE", width=size, height=size, params=[focal, focal, size / 2 - centre[0] * focal, size / 2 - centre[1] * focal])
+    camera = pycolmap.Camera(model="PINHOLE", width=size, height=size,
+                             params=[focal, focal, size / 2 - centre[0] * focal, size / 2 - centre[1] * focal])
     return View("", Path(), camera, rotation, np.array([0, 0, distance]) - rotation @ middle, True)
 
 
@@ -100,9 +105,10 @@ def landmarks_of(stage: LightStage) -> np.ndarray:
     return (stage.mesh.vertices[stage.mesh.faces[face]] * bary[..., None]).sum(1)
 
 
-def look(stage: LightStage, view: View, diffuse: np.ndarray, gloss: np.ndarray, relief: np.ndarray, rng: np.random.Generator,
-         open_eyes: bool = True) -> Sight:
-    """A head through a camera. diffuse [M, M, 3] linear albedo, gloss [M, M] reflectance at normal incidence, relief [M, M, 3] tangent-space normals."""
+def look(stage: LightStage, view: View, diffuse: np.ndarray, gloss: np.ndarray, relief: np.ndarray,
+         rng: np.random.Generator, open_eyes: bool = True) -> Sight:
+    """A head through a camera. diffuse [M, M, 3] linear albedo, gloss [M, M] reflectance at normal incidence, relief
+    [M, M, 3] tangent-space normals."""
     mesh, caster = stage.mesh, raster.RayCaster(stage.mesh)
     face, bary, _ = raster.render_view(caster, view)
     hit = face >= 0
@@ -121,12 +127,14 @@ def look(stage: LightStage, view: View, diffuse: np.ndarray, gloss: np.ndarray, 
     if open_eyes:
         _open_eyes(stage, view, hit, albedo, shine, masks, rng)
     lamps, radius = _random_lamps(rng)
-    reach = np.stack([sun_visibility(caster, position, smooth, lamp, r, RAYS, rng) for lamp, r in zip(lamps, radius, strict=True)])
+    reach = np.stack([sun_visibility(caster, position, smooth, lamp, r, RAYS, rng)
+                      for lamp, r in zip(lamps, radius, strict=True)])
     y, x = np.mgrid[0:view.height, 0:view.width]
     rays = view.rays(np.stack([x.ravel(), y.ravel()], -1) + 0.5).reshape(view.height, view.width, 3)
     vertices, local = np.unique(corner, return_inverse=True)
     single = [np.asarray(values, np.float32) for values in (bary, albedo, shine, normal, smooth, position)]
-    return Sight(view.width, np.flatnonzero(hit).astype(np.int32), vertices.astype(np.int32), local.reshape(corner.shape).astype(np.int32), *single,
+    return Sight(view.width, np.flatnonzero(hit).astype(np.int32), vertices.astype(np.int32),
+                 local.reshape(corner.shape).astype(np.int32), *single,
                  view.centre, view.rotation, rays.astype(np.float32), masks.astype(np.float32), lamps, radius, reach)
 
 
@@ -134,7 +142,8 @@ def save(path: Path, sight: Sight) -> None:
     """As an uncompressed .npz; floats of pixels as halves."""
     halves = ("bary", "albedo", "gloss", "normal", "smooth", "masks", "rays")
     arrays = {f.name: np.asarray(getattr(sight, f.name)) for f in fields(Sight)}
-    arrays |= {name: arrays[name].astype(np.float16) for name in halves} | {"reach": np.round(255 * arrays["reach"]).astype(np.uint8)}
+    arrays |= {name: arrays[name].astype(np.float16)
+               for name in halves} | {"reach": np.round(255 * arrays["reach"]).astype(np.uint8)}
     with replacing(path) as temporary, open(temporary, "wb") as file:
         np.savez(file, **arrays)
 
@@ -149,7 +158,8 @@ def load(path: Path) -> Sight:
 def full(sight: Sight) -> Sight:
     """A loaded sight in single precision."""
     arrays = {f.name: getattr(sight, f.name) for f in fields(Sight)}
-    arrays |= {name: value.astype(np.float32) for name, value in arrays.items() if getattr(value, "dtype", None) == np.float16}
+    arrays |= {name: value.astype(np.float32) for name, value in arrays.items()
+               if getattr(value, "dtype", None) == np.float16}
     arrays["reach"] = sight.reach.astype(np.float32) / 255 if sight.reach.dtype == np.uint8 else sight.reach
     return Sight(**arrays)
 
@@ -176,8 +186,10 @@ def _tangents(stage: LightStage) -> np.ndarray:
     return _unit((first * v[:, 1:] - second * u[:, 1:]) / np.where(np.abs(area) < 1e-12, 1, area)[:, None])
 
 
-def _open_eyes(stage: LightStage, view: View, hit: np.ndarray, albedo: np.ndarray, gloss: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> None:
-    """Draws sclera, iris, pupil and lash line between the corners of each eye that faces the camera, into arrays of the pixels hit."""
+def _open_eyes(stage: LightStage, view: View, hit: np.ndarray, albedo: np.ndarray, gloss: np.ndarray, masks: np.ndarray,
+               rng: np.random.Generator) -> None:
+    """Draws sclera, iris, pupil and lash line between the corners of each eye that faces the camera, into arrays of the
+    pixels hit."""
     points, _ = view.project(landmarks_of(stage))
     face, bary = template.landmarks()
     facing = (stage.normals[stage.mesh.faces[face]] * bary[..., None]).sum(1) @ view.axis < -0.35
@@ -195,8 +207,10 @@ def _open_eyes(stage: LightStage, view: View, hit: np.ndarray, albedo: np.ndarra
         at = middle + gaze * along - 0.1 * opening * over
         lash = np.zeros(hit.shape, np.uint8)
         cv2.polylines(lash, [np.round(upper * 8).astype(np.int32)], False, 1, max(1, round(0.05 * width)), shift=3)
-        ring, pupil = _disc(hit.shape, at, 0.20 * width) & lid, _disc(hit.shape, at, rng.uniform(0.07, 0.1) * width) & lid
-        for where, colour in ((lid, [0.36, 0.29, 0.26]), (ring, iris), (pupil, [0.01, 0.01, 0.01]), (lash > 0, [0.03, 0.022, 0.018])):
+        ring, pupil = _disc(hit.shape, at,
+                            0.20 * width) & lid, _disc(hit.shape, at, rng.uniform(0.07, 0.1) * width) & lid
+        for where, colour in ((lid, [0.36, 0.29, 0.26]), (ring, iris), (pupil, [0.01, 0.01, 0.01]),
+                              (lash > 0, [0.03, 0.022, 0.018])):
             albedo[where[hit]] = colour
         gloss[lid[hit]] = 0.035
         drawn = (lid | (lash > 0))[hit]

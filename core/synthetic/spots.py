@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Round things on the skin: pores, freckles, moles. Strewn over the surface by a density per mm^2, then splatted to the texels near them."""
+"""Round things on the skin: pores, freckles, moles. Strewn over the surface by a density per mm^2, then splatted to the
+texels near them."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ from .canvas import Canvas
 def strew(ground: Canvas, density: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Random points of the surface, float32 [M, 3] in mm, and the ground's texel under each, int [M].
 
-    `density` [N] in points per mm^2, on `ground`: one canvas for all sizes, so that a subject's marks stay where they are at any size.
+    `density` [N] in points per mm^2, on `ground`: one canvas for all sizes, so that a subject's marks stay where they
+    are at any size.
     """
     expected = np.cumsum(np.asarray(density, np.float64) * ground.area)
     texel = np.searchsorted(expected, rng.uniform(0, expected[-1], rng.poisson(expected[-1])), side="right")
@@ -29,7 +31,8 @@ def strew(ground: Canvas, density: np.ndarray, rng: np.random.Generator) -> tupl
 
 
 def splat(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.ndarray, blend=np.maximum) -> np.ndarray:
-    """Bell-shaped spots [N]: `strength` [M] at the points [M, 3], falling to nothing at twice `radius` [M] mm; `blend` where they overlap.
+    """Bell-shaped spots [N]: `strength` [M] at the points [M, 3], falling to nothing at twice `radius` [M] mm; `blend`
+    where they overlap.
 
     A radius below the texel's size becomes the texel's size, with the strength lowered by the same share of area.
     """
@@ -52,6 +55,8 @@ def patches(on: Canvas, points: np.ndarray, radius: np.ndarray, strength: np.nda
         edge = noise(on.position[texel], 1.3, rng, smooth=True) if len(texel) else np.zeros(0)
         inward = 1 - distance / radius[point] + ragged * 0.5 * edge
         softness = 0.25 + 0.25 / np.maximum(radius[point], 0.3)
-        np.maximum.at(stain, texel, (strength[point] * np.clip(inward / softness + 0.3, 0, 1) * (1 + 0.12 * edge)).astype(np.float32))
-        np.maximum.at(dome, texel, (strength[point] * np.clip(1 - (distance / radius[point]) ** 2, 0, 1)).astype(np.float32))
+        np.maximum.at(stain, texel,
+                      (strength[point] * np.clip(inward / softness + 0.3, 0, 1) * (1 + 0.12 * edge)).astype(np.float32))
+        np.maximum.at(dome, texel,
+                      (strength[point] * np.clip(1 - (distance / radius[point]) ** 2, 0, 1)).astype(np.float32))
     return stain, dome

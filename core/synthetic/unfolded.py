@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""People in the head's UV space, ready for any light: skin, where hair grows, what each vertex sees of a light stage, and what reaches each texel of some
-lamps. All of that is made once per person; colours are varied far beyond the plausible each time, for a delighter must not take pigment for light.
+"""People in the head's UV space, ready for any light: skin, where hair grows, what each vertex sees of a light stage,
+and what reaches each texel of some lamps. All of that is made once per person; colours are varied far beyond the
+plausible each time, for a delighter must not take pigment for light.
 """
 
 from __future__ import annotations
@@ -33,9 +34,10 @@ GROWTH = ("brows", "beard", "hair")
 
 @dataclass(frozen=True)
 class UnlitPerson:
-    """vertices float32 [V, 3] of the head; visible uint8 [V, LIGHTS / 8], bits: of the light stage; lamps float32 [LAMPS, 3] unit and radius [LAMPS] of each in
-    radians; reach uint8 [LAMPS, N] of 255: what of each lamp reaches the N covered texels of a map of SIDE; skin uint8 [S, S, 3] sRGB between the roots of
-    hair; growth uint8 [S, S, len(GROWTH)] of 255."""
+    """vertices float32 [V, 3] of the head; visible uint8 [V, LIGHTS / 8], bits: of the light stage; lamps float32
+    [LAMPS, 3] unit and radius [LAMPS] of each in radians; reach uint8 [LAMPS, N] of 255: what of each lamp reaches the
+    N covered texels of a map of SIDE; skin uint8 [S, S, 3] sRGB between the roots of hair; growth uint8 [S, S,
+    len(GROWTH)] of 255."""
 
     vertices: np.ndarray
     visible: np.ndarray
@@ -48,7 +50,8 @@ class UnlitPerson:
     @property
     def stage(self) -> LightStage:
         mesh = template.load().moved(self.vertices.astype(np.float64))
-        return LightStage(mesh, vertex_normals(mesh).astype(np.float32), np.unpackbits(self.visible, axis=1).astype(bool))
+        return LightStage(mesh, vertex_normals(mesh).astype(np.float32),
+                          np.unpackbits(self.visible, axis=1).astype(bool))
 
 
 def make_person(seed: int) -> UnlitPerson:
@@ -57,15 +60,18 @@ def make_person(seed: int) -> UnlitPerson:
     mesh = person_mesh(seed)
     stage, face, bary = light_stage(mesh), *template_raster(SIDE)
     inside = face >= 0
-    points, normals = (raster.interpolate(values, mesh.faces, face[inside], bary[inside]) for values in (mesh.vertices, stage.normals))
+    points, normals = (raster.interpolate(values, mesh.faces, face[inside], bary[inside])
+                       for values in (mesh.vertices, stage.normals))
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-6)
     lamps, radius = _lamps(rng), np.exp(rng.uniform(np.log(0.004), np.log(0.1), LAMPS))
     caster = raster.RayCaster(mesh)
-    reach = np.stack([sun_visibility(caster, points, normals, lamp, r, RAYS, rng) for lamp, r in zip(lamps, radius, strict=True)])
+    reach = np.stack([sun_visibility(caster, points, normals, lamp, r, RAYS, rng)
+                      for lamp, r in zip(lamps, radius, strict=True)])
     _, skin, growth = paint(sample_person(seed), SIDE)
     blank = np.zeros((SIDE, SIDE), np.float32)
     grown = np.stack([growth.get(name, blank) for name in GROWTH], -1)
-    return UnlitPerson(mesh.vertices.astype(np.float32), np.packbits(stage.visible, axis=1), lamps.astype(np.float32), radius.astype(np.float32),
+    return UnlitPerson(mesh.vertices.astype(np.float32), np.packbits(stage.visible, axis=1), lamps.astype(np.float32),
+                       radius.astype(np.float32),
                   np.round(255 * reach).astype(np.uint8), _bytes(images.linear_to_srgb(skin)), _bytes(grown))
 
 
@@ -94,9 +100,13 @@ def colours_of(person: UnlitPerson, side: int, rng: np.random.Generator) -> np.n
     albedo = albedo * np.exp(log)
     common = BROWS[rng.integers(len(BROWS))]
     for part in range(len(GROWTH)):
-        colour = (common if rng.random() < 0.6 else BROWS[rng.integers(len(BROWS))]) * np.exp(rng.normal(0, 0.35) + rng.normal(0, 0.08, 3))
-        strands = cv2.GaussianBlur(rng.standard_normal((side, side), np.float32), (0, 0), rng.uniform(0.5, 1.5) * side / SIDE)
-        share = growth[..., part] * rng.uniform(0.4, 1.2) * (1 + rng.uniform(0.1, 0.5) * strands / max(float(strands.std()), 1e-6))
+        colour = (common if rng.random() < 0.6
+                  else BROWS[rng.integers(len(BROWS))]) * np.exp(rng.normal(0, 0.35) + rng.normal(0, 0.08, 3))
+        strands = cv2.GaussianBlur(rng.standard_normal((side, side), np.float32), (0, 0),
+                                   rng.uniform(0.5, 1.5) * side / SIDE)
+        share = growth[..., part] * rng.uniform(0.4,
+                                                1.2) * (1 + rng.uniform(0.1, 0.5) * strands
+                                                        / max(float(strands.std()), 1e-6))
         share = np.clip(share, 0, 1)[..., None]
         albedo = albedo * (1 - share) + colour.astype(np.float32) * share
     return np.clip(albedo, 0.003, 0.92).astype(np.float32)

@@ -35,14 +35,14 @@ from .parts_shown import GROWTHS, PartsShown, tell_parts
 from .projection import UnwrappedView, observe
 
 OBSERVED = 1024
-"""Side of the maps on which views are looked at, aligned and weighed: all of that is smooth, and all views are held at once. Of a larger texture one view
-after the other is read along it."""
+"""Side of the maps on which views are looked at, aligned and weighed: all of that is smooth, and all views are held at
+once. Of a larger texture one view after the other is read along it."""
 
 
 def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     """delit/, cameras/, head.obj -> texture.exr (linear), texture.png (sRGB), texture_confidence.exr [S, S] in [0, 1],
-    texture_filmed.png (sRGB), the same with the light in it, and texture_parts.png (brows, beard and head hair in [0, 1]) where the frames are still there, and
-    texture_detail.exr where they show more than a texel.
+    texture_filmed.png (sRGB), the same with the light in it, and texture_parts.png (brows, beard and head hair in [0,
+    1]) where the frames are still there, and texture_detail.exr where they show more than a texel.
 
     Raises Problem where no view was delit or none of them sees the head.
     """
@@ -54,7 +54,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     covered = surface.covered_at(size)
     built = build(observations, surface, settings, report, size)
     if built.confidence[covered].max(initial=0) <= 0:
-        raise Problem("No delit frame sees the head.", "Check the cameras' and the head's pictures in the report, and run those stages again.")
+        raise Problem("No delit frame sees the head.",
+                      "Check the cameras' and the head's pictures in the report, and run those stages again.")
     texture = fill(np.exp(built.log_texture), built.confidence, covered)
 
     images.write_linear(capture.texture, texture)
@@ -69,7 +70,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     if detail is not None:
         images.write_data(capture.texture_detail, detail)
         report.figure("fine_detail_size_px", len(detail))
-        report.figure("fine_detail_agreed_percent", round(100 * float(detail[..., 1][detail[..., 1] > 0].mean()), 1) if detail[..., 1].any() else 0.0)
+        report.figure("fine_detail_agreed_percent",
+                      round(100 * float(detail[..., 1][detail[..., 1] > 0].mean()), 1) if detail[..., 1].any() else 0.0)
     lit = filmed(observations, surface.covered, size, report)
     if lit is not None:
         images.write_srgb(capture.texture_filmed, images.linear_to_srgb(fill(lit, built.confidence, covered)))
@@ -77,8 +79,8 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
 
 @dataclass
 class Built:
-    """log_texture [S, S, 3] natural logarithm of linear colour; confidence [S, S] in [0, 1]; log gains [V, 3]; mean warp in texels;
-    losses of the perceptual step before and after ({} where it is off)."""
+    """log_texture [S, S, 3] natural logarithm of linear colour; confidence [S, S] in [0, 1]; log gains [V, 3]; mean
+    warp in texels; losses of the perceptual step before and after ({} where it is off)."""
 
     log_texture: np.ndarray
     confidence: np.ndarray
@@ -87,11 +89,13 @@ class Built:
     losses: dict
 
 
-def observe_all(capture: Capture, head: Head, size: int, report: Reporter) -> tuple[list[UnwrappedView], Unfolded, PartsShown]:
-    """What each delit view sees of the head on a map of `size`, the frame's own sharpness counted, and which parts of the person they show. Raises Problem
-    where no view was delit."""
+def observe_all(capture: Capture, head: Head, size: int,
+                report: Reporter) -> tuple[list[UnwrappedView], Unfolded, PartsShown]:
+    """What each delit view sees of the head on a map of `size`, the frame's own sharpness counted, and which parts of
+    the person they show. Raises Problem where no view was delit."""
     frames = read_frames(capture).by_name
-    views = [(view, path) for view in read_views(capture) if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
+    views = [(view, path) for view in read_views(capture)
+             if (path := (capture.delit / view.name).with_suffix(".png")).is_file()]
     if not views:
         raise Problem("There is no delit frame of a registered view.",
                       "Run the stage delight, or put pictures named like the frames into the delighter's folder.")
@@ -116,10 +120,10 @@ def _delit(path: Path, view: View) -> np.ndarray:
     return linear
 
 
-def build(observations: list[UnwrappedView], surface: Unfolded, settings: Settings, report: Reporter, size: int | None = None,
-          aligned: bool = True) -> Built:
-    """One map from what the views see, of `size` or of the observations' own; changes the observations (gains, warps, weights). `aligned`: off for
-    measurements only."""
+def build(observations: list[UnwrappedView], surface: Unfolded, settings: Settings, report: Reporter,
+          size: int | None = None, aligned: bool = True) -> Built:
+    """One map from what the views see, of `size` or of the observations' own; changes the observations (gains, warps,
+    weights). `aligned`: off for measurements only."""
     built_in = surface.head.built_in
     if built_in:
         leave_out_background(observations, report)
@@ -135,14 +139,16 @@ def build(observations: list[UnwrappedView], surface: Unfolded, settings: Settin
         confidence = confidence * (1 - clothes(log_texture, confidence, surface))
     if size and size > own:
         log_texture = blend(observations, surface.covered, size, report)
-        confidence = cv2.resize(confidence, (size, size), interpolation=cv2.INTER_LINEAR) * surface.covered_at(size)  # as the weights: zero with them
+        # as the weights: zero with them
+        confidence = cv2.resize(confidence, (size, size), interpolation=cv2.INTER_LINEAR) * surface.covered_at(size)
     if settings.texture.perceptual > 0:
         from .features import load_features  # torch is only needed here
         from .perceptual import refine
 
         features = load_features(settings.texture.perceptual_network, settings.compute_device)
         wanted = (confidence > 0.3) & (template.mask("face", len(confidence)) > 0.5 if built_in else True)
-        log_texture, losses = refine(log_texture, observations, surface, wanted, features, settings.texture.perceptual, report)
+        log_texture, losses = refine(log_texture, observations, surface, wanted, features, settings.texture.perceptual,
+                                     report)
         report.figure("perceptual_network", features.name)
     return Built(log_texture, confidence, gains, shift, losses)
 
@@ -150,7 +156,8 @@ def build(observations: list[UnwrappedView], surface: Unfolded, settings: Settin
 def _leave_figures(capture, report, observations, built, texture, covered):
     log_texture, confidence = built.log_texture, built.confidence
     height = min(512, len(texture))
-    sheet = [images.resize(images.linear_to_srgb(texture), height, height), np.repeat(images.resize(confidence, height, height)[..., None], 3, 2)]
+    sheet = [images.resize(images.linear_to_srgb(texture), height, height),
+             np.repeat(images.resize(confidence, height, height)[..., None], 3, 2)]
     images.write_srgb(capture.picture("texture", "map_and_confidence"), np.hstack(sheet))
     small = images.resize(log_texture, *observations[0].weight.shape)
     residuals = [np.abs(o.log_colour - small)[o.weight > 0.25 * o.weight.max()].ravel()[::16] for o in observations]
@@ -160,7 +167,9 @@ def _leave_figures(capture, report, observations, built, texture, covered):
     report.figure("disagreement_percent", round(100 * float(np.median(np.concatenate(residuals))), 2))
     report.figure("alignment_shift_texels", round(built.shift, 2))
     report.figure("gain_spread_percent", round(100 * float(np.std(built.gains)), 2))
-    report.figure("fine_contrast_percent", round(100 * float(np.std(fine[cv2.erode((confidence > 0.3).astype(np.uint8), np.ones((9, 9))) > 0])), 2))
+    report.figure("fine_contrast_percent",
+                  round(100 * float(np.std(fine[cv2.erode((confidence > 0.3).astype(np.uint8), np.ones((9, 9))) > 0])),
+                        2))
     if built.losses:
         report.figure("perceptual_loss_before", round(built.losses["before"], 5))
         report.figure("perceptual_loss_after", round(built.losses["after"], 5))

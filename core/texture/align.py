@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Takes out what is left of pose and surface errors: a smooth warp of each view's UV texture onto the others' consensus.
+"""Takes out what is left of pose and surface errors: a smooth warp of each view's UV texture onto the others'
+consensus.
 
 After Zhou and Koltun, "Color Map Optimization for 3D Reconstruction with Consumer Depth Cameras" (2014), with dense
 optical flow (DIS) in UV space in the place of their control lattice.
@@ -26,7 +27,8 @@ SMOOTH = 24 / 1024
 
 
 def align(observations: list[UnwrappedView], surface: Unfolded, report: Reporter) -> float:
-    """Resamples every observation along its warp. Returns the mean length of the last warps in texels, where they count."""
+    """Resamples every observation along its warp. Returns the mean length of the last warps in texels, where they
+    count."""
     if len(observations) < 2:
         return 0.0
     size = len(surface.covered)
@@ -38,7 +40,8 @@ def align(observations: list[UnwrappedView], surface: Unfolded, report: Reporter
         details = [_detail(o) for o in observations]
         consensus = weighted_mean(details, (o.weight ** 3 for o in observations))
         for i, observation in enumerate(observations):
-            report.progress(total - 6 + (step * len(observations) + i) / len(observations), total, f"aligning {observation.name}")
+            report.progress(total - 6 + (step * len(observations) + i) / len(observations), total,
+                            f"aligning {observation.name}")
             warps[i] += _flow(consensus, details[i], observation.weight)
         del details
         drift = weighted_mean(warps, (o.weight for o in observations))
@@ -60,10 +63,12 @@ def _detail(observation: UnwrappedView) -> np.ndarray:
 
 
 def _flow(consensus: np.ndarray, detail: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Smooth float32 [S, S, 2] with consensus(x) = detail(x + flow(x)), decided by where the view sees well and there is something to see."""
+    """Smooth float32 [S, S, 2] with consensus(x) = detail(x + flow(x)), decided by where the view sees well and there
+    is something to see."""
     trust = np.clip(weight / max(np.percentile(weight[weight > 0], 80) if (weight > 0).any() else 1, 1e-9), 0, 1)
     spread = max(float(consensus[trust > 0.2].std()) if (trust > 0.2).any() else 0.0, 1e-4)
-    first, second = ((128 + 127 * np.tanh(trust * image / (3 * spread))).astype(np.uint8) for image in (consensus, detail))
+    first, second = ((128 + 127 * np.tanh(trust * image / (3 * spread))).astype(np.uint8)
+                     for image in (consensus, detail))
     dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     dis.setFinestScale(1)
     raw = dis.calc(first, second, None)

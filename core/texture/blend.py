@@ -16,11 +16,13 @@ from ..contract.messages import Reporter
 from .projection import UnwrappedView
 
 BANDS = ((2.0, 12.0), (8.0, 5.0), (24.0, 2.0), (np.inf, 1.0))
-"""(sigma in texels of a 1024 map up to which a band reaches, exponent of the weights in it): details come from the best view, tone from all."""
+"""(sigma in texels of a 1024 map up to which a band reaches, exponent of the weights in it): details come from the best
+view, tone from all."""
 
 
 def equalise(observations: list[UnwrappedView], rounds: int = 6) -> np.ndarray:
-    """Brings all views to one exposure and white balance; returns the log gains [views, 3] that were added (weighted mean zero).
+    """Brings all views to one exposure and white balance; returns the log gains [views, 3] that were added (weighted
+    mean zero).
 
     Alternates between the mean over views and each view's weighted median difference from it, which no highlight moves.
     """
@@ -45,7 +47,8 @@ def equalise(observations: list[UnwrappedView], rounds: int = 6) -> np.ndarray:
 
 
 def robust_weights(observations: list[UnwrappedView], tolerance: float = 0.10) -> None:
-    """Takes weight from views whose tone disagrees with the weighted median of all (a highlight, a passing shadow, hair in front).
+    """Takes weight from views whose tone disagrees with the weighted median of all (a highlight, a passing shadow, hair
+    in front).
 
     tolerance: log difference of local tone at which a view keeps half of its weight.
     """
@@ -64,9 +67,11 @@ def robust_weights(observations: list[UnwrappedView], tolerance: float = 0.10) -
         o.weight = o.weight * cv2.resize(factor, o.weight.shape[::-1], interpolation=cv2.INTER_LINEAR)
 
 
-def blend(observations: list[UnwrappedView], covered: np.ndarray, size: int, report: Reporter, what: str = "delit", done: int = 2) -> np.ndarray:
-    """One log texture [size, size, 3] of observations of the texels `covered` [S, S], each enlarged when its turn comes; zero weight everywhere leaves zeros.
-    `what` is blended, and how much was `done` before, are for the progress."""
+def blend(observations: list[UnwrappedView], covered: np.ndarray, size: int, report: Reporter, what: str = "delit",
+          done: int = 2) -> np.ndarray:
+    """One log texture [size, size, 3] of observations of the texels `covered` [S, S], each enlarged when its turn
+    comes; zero weight everywhere leaves zeros. `what` is blended, and how much was `done` before, are for the
+    progress."""
     largest = np.full_like(observations[0].weight, 1e-12)
     for o in observations:
         np.maximum(largest, o.weight, out=largest)
@@ -74,12 +79,14 @@ def blend(observations: list[UnwrappedView], covered: np.ndarray, size: int, rep
     sums, norms = ([np.zeros((*largest.shape, channels), np.float32) for _ in BANDS] for channels in (3, 1))
     scale = len(largest) / 1024
     for i, o in enumerate(observations):
-        report.progress(len(observations) + done + 2 * i / len(observations), len(observations) + 6, f"blending {o.name}, {what}")
+        report.progress(len(observations) + done + 2 * i / len(observations), len(observations) + 6,
+                        f"blending {o.name}, {what}")
         o = o.enlarged(size, covered)
         seen, share = o.weight > 0, o.weight / largest
         for band, (values, (reach, exponent)) in enumerate(zip(bands_of(o.log_colour, seen), BANDS, strict=True)):
             weight = share ** exponent
-            if np.isfinite(reach):  # feathered where the best view changes, but nothing taken from where the view is blind
+            # feathered where the best view changes, but nothing taken from where the view is blind
+            if np.isfinite(reach):
                 weight = _feathered(weight, reach, scale) * np.minimum(1, 4 * share)
             sums[band] += values * weight[..., None]
             norms[band] += weight[..., None]
@@ -87,8 +94,8 @@ def blend(observations: list[UnwrappedView], covered: np.ndarray, size: int, rep
 
 
 def _feathered(weight: np.ndarray, reach: float, scale: float) -> np.ndarray:
-    """Gaussian mean of weights [S, S] over `reach` texels of a 1024 map. Of a larger map it is taken at 1024: it is as soft there, and the cost of a
-    Gaussian grows with its width."""
+    """Gaussian mean of weights [S, S] over `reach` texels of a 1024 map. Of a larger map it is taken at 1024: it is as
+    soft there, and the cost of a Gaussian grows with its width."""
     if scale <= 1:
         return cv2.GaussianBlur(weight, (0, 0), max(reach * scale, 1))
     small = cv2.GaussianBlur(cv2.resize(weight, (1024, 1024), interpolation=cv2.INTER_AREA), (0, 0), reach)
@@ -108,7 +115,8 @@ def bands_of(log_colour: np.ndarray, seen: np.ndarray) -> list[np.ndarray]:
 
 
 def blurred(image: np.ndarray, weight: np.ndarray, sigma: float) -> np.ndarray:
-    """Gaussian mean of [S, S(, C)] over where weight [S, S] >= 0 says there is something (normalised convolution); large sigmas at lower resolution."""
+    """Gaussian mean of [S, S(, C)] over where weight [S, S] >= 0 says there is something (normalised convolution);
+    large sigmas at lower resolution."""
     height, width = weight.shape
     factor = max(1, int(sigma // 4))
     weighted = image * (weight if image.ndim == 2 else weight[..., None])

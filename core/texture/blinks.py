@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames in which a person blinks, or looks elsewhere with lids that follow: around that eye they show other skin than the rest, and are left out there."""
+"""Frames in which a person blinks, or looks elsewhere with lids that follow: around that eye they show other skin than
+the rest, and are left out there."""
 
 from __future__ import annotations
 
@@ -20,24 +21,30 @@ REACH = 1.7
 MARKS = 9
 
 
-def leave_out_blinks(capture: Capture, observations: list[UnwrappedView], surface: Unfolded, report: Reporter) -> list[str]:
-    """Takes quality and weight from the texels around an eye in the views whose frame shows it more or less open than the head would look there, next to what
-    the other frames show; returns their names.
+def leave_out_blinks(capture: Capture, observations: list[UnwrappedView], surface: Unfolded,
+                     report: Reporter) -> list[str]:
+    """Takes quality and weight from the texels around an eye in the views whose frame shows it more or less open than
+    the head would look there, next to what the other frames show; returns their names.
 
-    Nothing is done where the eyes were closed, and around an eye that no other view would be left for. Raises Problem for damaged records.
+    Nothing is done where the eyes were closed, and around an eye that no other view would be left for. Raises Problem
+    for damaged records.
     """
     if not surface.head.eyes_open:
         return []
     eyes = read_eyes(capture)
-    seen = {observation.name: _eyes_in(observation.view) for observation in observations if observation.view.path.is_file()}
+    seen = {observation.name: _eyes_in(observation.view) for observation in observations
+            if observation.view.path.is_file()}
     left_out = set()
     for side, ball in enumerate(eyes):
-        unlike = differing({o.name: _opening(seen[o.name], o.view, surface.mesh.vertices, side) for o in observations if o.name in seen})
+        unlike = differing({o.name: _opening(seen[o.name], o.view, surface.mesh.vertices, side) for o in observations
+                            if o.name in seen})
         zone = surface.spread(_around(surface, ball)) > 0
         if not any((o.weight[zone] > 0).any() for o in observations if o.name not in unlike):
             continue
         for observation in (o for o in observations if o.name in unlike):
-            observation.quality, observation.weight = np.where(zone, 0, observation.quality), np.where(zone, 0, observation.weight)
+            observation.quality, observation.weight = np.where(zone, 0,
+                                                               observation.quality), np.where(zone, 0,
+                                                                                              observation.weight)
             left_out.add(observation.name)
     if left_out:
         report.log(f"Left out around the eyes, for a blink or another look: {', '.join(sorted(left_out))}.")
@@ -52,10 +59,12 @@ def _eyes_in(view: View) -> tuple[float, faces.Eye, faces.Eye] | None:
 
 
 def _opening(found: tuple | None, view: View, vertices: np.ndarray, side: int) -> float | None:
-    """How far an eye is open in a view's frame, over how far the head's looks open from there; None where it is seen too much from the side."""
+    """How far an eye is open in a view's frame, over how far the head's looks open from there; None where it is seen
+    too much from the side."""
     if found is None or not faces.shows_eye(found[0], side):
         return None
-    upper, lower = (view.project(edge[np.linspace(0, len(edge) - 1, MARKS).round().astype(int)])[0] for edge in lids.edges(vertices, side))
+    upper, lower = (view.project(edge[np.linspace(0, len(edge) - 1, MARKS).round().astype(int)])[0]
+                    for edge in lids.edges(vertices, side))
     return found[1 + side].opening / max(faces.Eye(upper, lower, upper[0], 0.0).opening, 1e-3)
 
 

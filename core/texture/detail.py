@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the frames show that the texture is too coarse to hold: pores, the edges of moles, single hairs, as a band of log luminance on a finer map.
+"""What the frames show that the texture is too coarse to hold: pores, the edges of moles, single hairs, as a band of
+log luminance on a finer map.
 
-Each view is read again at more texels along the warp that aligned it. What several views show alike is skin, what differs between them is noise, so the
-band is shrunk by Wiener's factor, the share of it that the views agree on.
+Each view is read again at more texels along the warp that aligned it. What several views show alike is skin, what
+differs between them is noise, so the band is shrunk by Wiener's factor, the share of it that the views agree on.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from ..geometry import raster
 from .projection import UnwrappedView, log_colours
 
 WORTH = 1.3
-"""Pixels per texel of the texture from which a map twice as fine is worth its while; half of it, from twice as many, one four times as fine."""
+"""Pixels per texel of the texture from which a map twice as fine is worth its while; half of it, from twice as many,
+one four times as fine."""
 LARGEST = 4096
 COARSE = 1.0
 """Sigma, in texels of the texture, of the blur that parts what it holds from what it does not."""
@@ -27,9 +29,11 @@ SHARP = 2.0
 """Exponent of the views' weights: near the best view's own detail, yet of several."""
 
 
-def fine_detail(observations: list[UnwrappedView], surface: Unfolded, texels: int, report: Reporter) -> np.ndarray | None:
-    """Float32 [F S, F S, 2] for a texture of S = `texels`: the band of log luminance (natural), and Wiener's factor in [0, 1] that it is already multiplied by.
-    None where the frames hold nothing finer than the texture, or fewer than two views see the head."""
+def fine_detail(observations: list[UnwrappedView], surface: Unfolded, texels: int,
+                report: Reporter) -> np.ndarray | None:
+    """Float32 [F S, F S, 2] for a texture of S = `texels`: the band of log luminance (natural), and Wiener's factor in
+    [0, 1] that it is already multiplied by. None where the frames hold nothing finer than the texture, or fewer than
+    two views see the head."""
     factor = finer(observations, texels)
     if factor == 1 or len(observations) < 2:
         return None
@@ -38,7 +42,8 @@ def fine_detail(observations: list[UnwrappedView], surface: Unfolded, texels: in
     for observation in observations:
         report.progress(len(observations) + 5, len(observations) + 6, f"fine detail of {observation.name}")
         weight = cv2.resize(observation.weight, (size, size), interpolation=cv2.INTER_LINEAR) ** SHARP
-        pixels = cv2.resize(raster.bleed(observation.pixels, surface.covered), (size, size), interpolation=cv2.INTER_LINEAR)
+        pixels = cv2.resize(raster.bleed(observation.pixels, surface.covered), (size, size),
+                            interpolation=cv2.INTER_LINEAR)
         grey = log_colours(observation.picture, pixels).mean(-1)
         band = grey - cv2.GaussianBlur(grey, (0, 0), COARSE * factor)
         total += weight * band
@@ -51,15 +56,18 @@ def fine_detail(observations: list[UnwrappedView], surface: Unfolded, texels: in
 
     def around(values: np.ndarray) -> np.ndarray:
         sigma = AROUND * factor
-        return cv2.GaussianBlur(values * seen, (0, 0), sigma) / np.maximum(cv2.GaussianBlur(seen.astype(np.float32), (0, 0), sigma), 1e-6)
+        return cv2.GaussianBlur(values * seen, (0, 0),
+                                sigma) / np.maximum(cv2.GaussianBlur(seen.astype(np.float32), (0, 0), sigma), 1e-6)
 
-    noise = np.maximum(squares / np.maximum(weights, 1e-9) - mean ** 2, 0) / np.maximum(views - 1, 0.2)  # variance of the mean
+    # variance of the mean
+    noise = np.maximum(squares / np.maximum(weights, 1e-9) - mean ** 2, 0) / np.maximum(views - 1, 0.2)
     agreed = np.clip(1 - around(noise) / np.maximum(around(mean ** 2), 1e-9), 0, 1) * seen
     return np.stack([mean * agreed, agreed], -1).astype(np.float32)
 
 
 def finer(observations: list[UnwrappedView], texels: int) -> int:
-    """1, 2 or 4: how many texels of a side the frames can fill where a texture of `texels` has one, judged where each view sees the head best."""
+    """1, 2 or 4: how many texels of a side the frames can fill where a texture of `texels` has one, judged where each
+    view sees the head best."""
     density = []
     for observation in observations:
         across, down = (np.gradient(observation.pixels, axis=axis) for axis in (1, 0))

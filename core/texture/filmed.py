@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The texture as it was filmed, to compare with: the frames themselves in the place of the delit ones, from the same views with the same weights and warps."""
+"""The texture as it was filmed, to compare with: the frames themselves in the place of the delit ones, from the same
+views with the same weights and warps."""
 
 from __future__ import annotations
 
@@ -13,12 +14,14 @@ from .projection import UnwrappedView, log_colours
 
 
 def filmed(observations: list[UnwrappedView], covered: np.ndarray, size: int, report: Reporter) -> np.ndarray | None:
-    """Linear [size, size, 3] with the light in it, in the frames' exposure; 1 where no view sees anything. The observations, of the texels `covered`, show the
-    frames from then on. None where a frame is gone: it is only looked at."""
+    """Linear [size, size, 3] with the light in it, in the frames' exposure; 1 where no view sees anything. The
+    observations, of the texels `covered`, show the frames from then on. None where a frame is gone: it is only looked
+    at."""
     if not all(o.view.path.is_file() for o in observations):
         return None
     for o in observations:
         frame = images.read_linear(o.view.path)
-        o.pixels = o.pixels * np.float32([frame.shape[1] / o.picture.shape[1], frame.shape[0] / o.picture.shape[0]])  # a delighter may give another size
+        # a delighter may give another size
+        o.pixels = o.pixels * np.float32([frame.shape[1] / o.picture.shape[1], frame.shape[0] / o.picture.shape[0]])
         o.picture, o.log_colour = frame, log_colours(frame, o.pixels)
     return np.exp(blend(observations, covered, size, report, "as filmed", 4))

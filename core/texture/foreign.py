@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the views show where the head's surface is, but is not the head: the background past a wrong outline, clothes at the neck, hair.
+"""What the views show where the head's surface is, but is not the head: the background past a wrong outline, clothes at
+the neck, hair.
 
 None is taken for skin: such texels lose their weight or their confidence, and are completed from the skin around them.
-Background and clothes need the built-in head's masks, and the face itself is never doubted. Brows and beards stay: they belong to a face.
+Background and clothes need the built-in head's masks, and the face itself is never doubted. Brows and beards stay: they
+belong to a face.
 """
 
 from __future__ import annotations
@@ -20,11 +22,14 @@ from .parts_shown import ASKED, PartsShown
 from .projection import UnwrappedView
 
 COLOUR = 0.35
-"""How far the logarithms of R/G and B/G of a cloth lie from the face's skin; light that a delighter left does not reach that far."""
+"""How far the logarithms of R/G and B/G of a cloth lie from the face's skin; light that a delighter left does not reach
+that far."""
 DARK, BRIGHT = -1.3, 0.8
-"""Differences of log luminance to the face's skin from which the neck is no skin whatever its colour: black and white cloth."""
+"""Differences of log luminance to the face's skin from which the neck is no skin whatever its colour: black and white
+cloth."""
 SMOOTH = 5 / 1024
-"""Sigma of the smoothing before the comparison, as a part of the map's side: a pattern is judged by its mean, a mole not at all."""
+"""Sigma of the smoothing before the comparison, as a part of the map's side: a pattern is judged by its mean, a mole
+not at all."""
 GROW = 10 / 1024
 """How far a cloth's edge, where it throws its shade, is taken with it."""
 
@@ -36,13 +41,15 @@ LEAST_HAIR = 0.005
 
 
 def leave_out_hair(observations: list[UnwrappedView], shown: PartsShown, surface: Unfolded) -> np.ndarray:
-    """Takes quality and weight from texels that lie under hair of the head or cloth, and returns how surely they do, float32 [S, S] in [0, 1].
+    """Takes quality and weight from texels that lie under hair of the head or cloth, and returns how surely they do,
+    float32 [S, S] in [0, 1].
 
     What most views show so counts in all of them; what one view shows so (a strand before a cheek) counts in that one.
     """
     usual = shown.shares[..., [ASKED.index("hair"), ASKED.index("clothes")]].sum(-1)
     if surface.head.built_in:  # of the scalp behind what any crop shows, what is next to it tells
-        usual = np.where(~shown.told & (template.mask("scalp", len(usual)) > 0.5), raster.bleed(usual, shown.told), usual)
+        usual = np.where(~shown.told & (template.mask("scalp", len(usual)) > 0.5), raster.bleed(usual, shown.told),
+                         usual)
     if (usual[surface.covered] > HIDDEN[1]).mean() < LEAST_HAIR:
         return np.zeros_like(usual)
     low, high = HIDDEN
@@ -54,7 +61,8 @@ def leave_out_hair(observations: list[UnwrappedView], shown: PartsShown, surface
 
 
 def leave_out_background(observations: list[UnwrappedView], report: Reporter) -> int:
-    """Takes quality and weight from texels that a view sees outside the person (segmented in its frame). Returns how many views were so cut.
+    """Takes quality and weight from texels that a view sees outside the person (segmented in its frame). Returns how
+    many views were so cut.
 
     A frame that is not there, or whose segmentation misses the face, changes nothing.
     """
@@ -68,8 +76,8 @@ def leave_out_background(observations: list[UnwrappedView], report: Reporter) ->
         except Problem:
             return cut  # the network is not installed: the margin of the silhouette has to do
         height, width = observation.picture.shape[:2]
-        shown = cv2.remap(images.resize(person, width, height), *(observation.pixels[..., k] - 0.5 for k in range(2)), cv2.INTER_LINEAR,
-                          borderMode=cv2.BORDER_REPLICATE)
+        shown = cv2.remap(images.resize(person, width, height), *(observation.pixels[..., k] - 0.5 for k in range(2)),
+                          cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         in_face = (observation.weight > 0) & (face > 0.5)
         if not in_face.any() or np.median(shown[in_face]) < 0.8:
             continue
@@ -80,7 +88,8 @@ def leave_out_background(observations: list[UnwrappedView], report: Reporter) ->
 
 
 def clothes(log_texture: np.ndarray, confidence: np.ndarray, surface: Unfolded) -> np.ndarray:
-    """How surely each texel shows a cloth, float32 [S, S] in [0, 1]: parts of the neck that reach its rim and have not the colour of the face's skin.
+    """How surely each texel shows a cloth, float32 [S, S] in [0, 1]: parts of the neck that reach its rim and have not
+    the colour of the face's skin.
 
     The last texels at the rim always count: whatever the neck ends at throws its shade and its outline there.
     """
@@ -91,7 +100,8 @@ def clothes(log_texture: np.ndarray, confidence: np.ndarray, surface: Unfolded) 
         return np.zeros_like(confidence)
     weight = ((neck > 0.3) & surface.covered).astype(np.float32) * confidence
     sigma = SMOOTH * size
-    smooth = cv2.GaussianBlur(log_texture * weight[..., None], (0, 0), sigma) / np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-6)[..., None]
+    smooth = cv2.GaussianBlur(log_texture * weight[..., None], (0, 0),
+                              sigma) / np.maximum(cv2.GaussianBlur(weight, (0, 0), sigma), 1e-6)[..., None]
     away = smooth - np.median(log_texture[skin], axis=0)
     colour = np.hypot(away[..., 0] - away[..., 1], away[..., 2] - away[..., 1])
     strange = seen & ((colour > COLOUR) | (away.mean(-1) < DARK) | (away.mean(-1) > BRIGHT))
@@ -101,7 +111,9 @@ def clothes(log_texture: np.ndarray, confidence: np.ndarray, surface: Unfolded) 
     rim = cv2.dilate(_rim(surface, neck), disc) > 0
     at_rim = np.unique(labels[cv2.dilate(rim.astype(np.uint8), disc).astype(bool) & strange])
     found = cv2.dilate(np.isin(labels, at_rim[at_rim > 0]).astype(np.uint8), disc).astype(bool) | rim
-    return np.clip(1.5 * cv2.GaussianBlur(found.astype(np.float32), (0, 0), radius / 3, borderType=cv2.BORDER_REPLICATE), 0, 1) * surface.covered
+    return np.clip(1.5
+                   * cv2.GaussianBlur(found.astype(np.float32), (0, 0), radius / 3, borderType=cv2.BORDER_REPLICATE), 0,
+                   1) * surface.covered
 
 
 def _rim(surface: Unfolded, neck: np.ndarray) -> np.ndarray:

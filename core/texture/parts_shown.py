@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which part of the person each texel shows: what the face parser says of the views that see it, averaged as the texture is."""
+"""Which part of the person each texel shows: what the face parser says of the views that see it, averaged as the
+texture is."""
 
 from __future__ import annotations
 
@@ -22,8 +23,9 @@ ASKED = (*GROWTHS, "clothes")
 
 @dataclass(frozen=True)
 class PartsShown:
-    """shares float32 [S, S, len(ASKED)] in [0, 1], 0 where nobody tells; told bool [S, S]: where somebody does; hidden: of each view how much of what it shows
-    at a texel is hair of the head or cloth, float32 [S, S], or None where the view's picture tells nothing."""
+    """shares float32 [S, S, len(ASKED)] in [0, 1], 0 where nobody tells; told bool [S, S]: where somebody does; hidden:
+    of each view how much of what it shows at a texel is hair of the head or cloth, float32 [S, S], or None where the
+    view's picture tells nothing."""
 
     shares: np.ndarray
     told: np.ndarray
@@ -49,7 +51,8 @@ def tell_parts(observations: list[UnwrappedView], surface: Unfolded, report: Rep
 
 
 def _look(observation: UnwrappedView, surface: Unfolded) -> tuple[np.ndarray, np.ndarray] | None:
-    """The shares of ASKED at each texel of a view, float32 [S, S, len(ASKED)], and where they are known [S, S]; None where nobody tells."""
+    """The shares of ASKED at each texel of a view, float32 [S, S, len(ASKED)], and where they are known [S, S]; None
+    where nobody tells."""
     if not observation.view.path.is_file():
         return None
     srgb = images.read_srgb(observation.view.path)
@@ -59,12 +62,14 @@ def _look(observation: UnwrappedView, surface: Unfolded) -> tuple[np.ndarray, np
     parts = parser.parse(srgb, landmarks)
     height, width = observation.picture.shape[:2]
     at = [observation.pixels[..., k] - 0.5 for k in range(2)]
-    *shares, known = (cv2.remap(images.resize(part, width, height), *at, cv2.INTER_LINEAR) for part in (*(parts.of(name) for name in ASKED), parts.known()))
+    *shares, known = (cv2.remap(images.resize(part, width, height), *at, cv2.INTER_LINEAR)
+                      for part in (*(parts.of(name) for name in ASKED), parts.known()))
     return np.stack(shares, -1), known
 
 
 def _landmarks(srgb: np.ndarray, view: View, head: Head) -> np.ndarray | None:
-    """The face's landmarks [468, 2] in a view's frame: where the built-in head has them, from any side, or as they are found."""
+    """The face's landmarks [468, 2] in a view's frame: where the built-in head has them, from any side, or as they are
+    found."""
     if not head.built_in:
         face = faces.detect(srgb)
         return None if face is None else face.landmarks

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The paper's texture loss: a perceptual distance plus L1 of the gradients, between the textured head as the V views see it and their delit frames.
+"""The paper's texture loss: a perceptual distance plus L1 of the gradients, between the textured head as the V views
+see it and their delit frames.
 
 Starts from the blend, which also keeps the tone: only detail finer than KEPT is taken from the optimisation. The
 rendering is differentiable in the texture alone: where each pixel looks on the map is worked out once per view.
@@ -25,7 +26,8 @@ from .features import Features
 from .projection import DARKEST, UnwrappedView
 
 TILE = 288
-"""Pixels along a side of the part of a view that one step looks at: bounds memory and seconds whatever the frames' size; a multiple of 16."""
+"""Pixels along a side of the part of a view that one step looks at: bounds memory and seconds whatever the frames'
+size; a multiple of 16."""
 OVER = 2
 """Rays along a pixel's side; their mean is what keeps a map that is finer than the picture from aliasing."""
 RATE = 0.002
@@ -46,8 +48,8 @@ class Target:
     trust: np.ndarray  # float32 [h, w] in [0, 1]: how far a pixel may pull; zero off the head
 
 
-def refine(log_texture: np.ndarray, observations: list[UnwrappedView], surface: Unfolded, wanted: np.ndarray, features: Features, steps: int,
-           report: Reporter) -> tuple[np.ndarray, dict]:
+def refine(log_texture: np.ndarray, observations: list[UnwrappedView], surface: Unfolded, wanted: np.ndarray,
+           features: Features, steps: int, report: Reporter) -> tuple[np.ndarray, dict]:
     """The blend with its detail optimised; same machine, same map.
 
     Parameters
@@ -97,7 +99,8 @@ def refine(log_texture: np.ndarray, observations: list[UnwrappedView], surface: 
 
 
 def _target(observation: UnwrappedView, surface: Unfolded, wanted: np.ndarray) -> Target | None:
-    """A view's pixels that see wanted texels; None where there are none. Follows the alignment, so all views pull at the same texels."""
+    """A view's pixels that see wanted texels; None where there are none. Follows the alignment, so all views pull at
+    the same texels."""
     seen = (observation.weight > 0) & wanted
     if seen.sum() < 64:
         return None
@@ -113,19 +116,23 @@ def _target(observation: UnwrappedView, surface: Unfolded, wanted: np.ndarray) -
     face, bary, _ = caster.first_hits(np.repeat(view.centre[None], len(directions), 0), directions)
     uv = raster.interpolate(mesh.uvs, mesh.face_uvs, face, bary)
     texel = np.stack([uv[:, 0], 1 - uv[:, 1]], -1) * size
-    if observation.warp is not None:  # pixels(x) shows what lay at x + warp(x) before: the texel that now shows there is one warp back
+    # pixels(x) shows what lay at x + warp(x) before: the texel that now shows there is one warp back
+    if observation.warp is not None:
         texel -= raster.sample(observation.warp, texel)
     weight = np.minimum(observation.weight / max(np.percentile(observation.weight[seen], 80), 1e-9), 1) * wanted
     trust = np.where(face >= 0, raster.sample(weight.astype(np.float32), texel), 0).reshape(OVER * h, OVER * w)
     trust = cv2.resize(trust.astype(np.float32), (int(w), int(h)), interpolation=cv2.INTER_AREA)
     picture = images.linear_to_srgb(observation.picture[low[1]:high[1], low[0]:high[0]])
-    return Target(observation.name, picture, (texel / size * 2 - 1).astype(np.float32).reshape(OVER * h, OVER * w, 2), trust)
+    return Target(observation.name, picture, (texel / size * 2 - 1).astype(np.float32).reshape(OVER * h, OVER * w, 2),
+                  trust)
 
 
 def _tile(target: Target, rng: np.random.Generator, device: str) -> tuple[Tensor, Tensor, Tensor]:
-    """A random part of a view: picture [1, 3, t, t'], grid [1, OVER t, OVER t', 2], trust [1, 1, t, t']; sides at most TILE, around a trusted pixel."""
+    """A random part of a view: picture [1, 3, t, t'], grid [1, OVER t, OVER t', 2], trust [1, 1, t, t']; sides at most
+    TILE, around a trusted pixel."""
     height, width = target.trust.shape
-    y, x = np.unravel_index(rng.choice(np.flatnonzero(target.trust.ravel() > 0.2 * target.trust.max())), target.trust.shape)
+    y, x = np.unravel_index(rng.choice(np.flatnonzero(target.trust.ravel() > 0.2 * target.trust.max())),
+                            target.trust.shape)
     rows, columns = _span(y, height), _span(x, width)
     fine = tuple(slice(OVER * part.start, OVER * part.stop) for part in (rows, columns))
     grid = torch.from_numpy(target.grid[fine].copy())[None].to(device)
@@ -140,9 +147,11 @@ def _span(centre: int, side: int) -> slice:
 
 
 def _loss(log_texture: Tensor, tile: tuple[Tensor, Tensor, Tensor], features: Features) -> Tensor:
-    """Perceptual distance plus the gradients' L1; off the head and where a view sees badly, the rendering is the picture itself."""
+    """Perceptual distance plus the gradients' L1; off the head and where a view sees badly, the rendering is the
+    picture itself."""
     picture, grid, trust = tile
-    linear = functional.avg_pool2d(functional.grid_sample(log_texture.exp(), grid, mode="bilinear", padding_mode="border", align_corners=False), OVER)
+    linear = functional.avg_pool2d(functional.grid_sample(log_texture.exp(), grid, mode="bilinear",
+                                                          padding_mode="border", align_corners=False), OVER)
     rendered = _srgb(linear) * trust + picture * (1 - trust)
     with torch.no_grad():
         wanted = features.layers(picture)

@@ -33,22 +33,23 @@ class UnwrappedView:
     log_colour: np.ndarray  # [S, S, 3] natural logarithm of linear colour
     quality: np.ndarray  # [S, S] in [0, 1]: angle and silhouette only; makes the confidence map
     weight: np.ndarray  # [S, S] quality with distance and sharpness: who wins where
-    warp: np.ndarray | None = None  # [S, S, 2] texels by which the alignment moved it: `pixels` here is what was there, one warp further
+    # [S, S, 2] texels by which the alignment moved it: `pixels` here is what was there, one warp further
+    warp: np.ndarray | None = None
 
     @property
     def name(self) -> str:
         return self.view.name
 
     def resample(self, pixels: np.ndarray, warp: np.ndarray | None) -> None:
-        """Reads the picture anew, at other pixels [S, S, 2]; one resampling from the original, never two. They are kept with the warp that led to them,
-        where that is the last one."""
+        """Reads the picture anew, at other pixels [S, S, 2]; one resampling from the original, never two. They are kept
+        with the warp that led to them, where that is the last one."""
         if warp is not None:
             self.pixels, self.warp = pixels, warp
         self.log_colour = log_colours(self.picture, pixels)
 
     def enlarged(self, size: int, covered: np.ndarray) -> UnwrappedView:
-        """The same on a map of `size`, `covered` [S, S] being the texels of this one: where each texel is seen, and how well, vary smoothly; the picture is
-        read anew."""
+        """The same on a map of `size`, `covered` [S, S] being the texels of this one: where each texel is seen, and how
+        well, vary smoothly; the picture is read anew."""
         if size == len(self.weight):
             return self
 
@@ -57,11 +58,13 @@ class UnwrappedView:
 
         pixels = larger(raster.bleed(self.pixels, covered))
         warp = None if self.warp is None else larger(self.warp) * np.float32(size / len(self.weight))
-        return replace(self, pixels=pixels, log_colour=log_colours(self.picture, pixels), quality=larger(self.quality), weight=larger(self.weight), warp=warp)
+        return replace(self, pixels=pixels, log_colour=log_colours(self.picture, pixels), quality=larger(self.quality),
+                       weight=larger(self.weight), warp=warp)
 
 
 def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float) -> UnwrappedView:
-    """Projects every texel into a linear picture [H, W, 3] of any size of that view. sharpness in [0, 1] scales its weight."""
+    """Projects every texel into a linear picture [H, W, 3] of any size of that view. sharpness in [0, 1] scales its
+    weight."""
     count, scale = len(surface.points), [picture.shape[1] / view.width, picture.shape[0] / view.height]
     pixels, quality, distance = np.empty((count, 2), np.float32), np.empty(count), np.empty(count)
     seen, silhouette = np.empty(count, bool), _silhouette_distance(surface.caster, view)
@@ -72,11 +75,14 @@ def observe(view: View, picture: np.ndarray, surface: Unfolded, sharpness: float
     pixels = surface.spread(pixels)
     reference = np.median(distance[seen]) if seen.any() else 1.0
     weight = quality ** 2 * sharpness * (reference / distance) ** 2
-    return UnwrappedView(view, picture, pixels, log_colours(picture, pixels), surface.spread(quality), surface.spread(weight))
+    return UnwrappedView(view, picture, pixels, log_colours(picture, pixels), surface.spread(quality),
+                         surface.spread(weight))
 
 
-def _look(view: View, surface: Unfolded, part: slice, silhouette: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Of a part of the surface's points: pixels [N, 2] (nan behind the camera), quality [N], distance [N], and whether they are seen [N]."""
+def _look(view: View, surface: Unfolded, part: slice,
+          silhouette: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Of a part of the surface's points: pixels [N, 2] (nan behind the camera), quality [N], distance [N], and whether
+    they are seen [N]."""
     points, normals = surface.points[part], surface.normals[part]
     xy, depth = view.project(points)
     inside = (depth > 0) & (xy[:, 0] > 1) & (xy[:, 1] > 1) & (xy[:, 0] < view.width - 1) & (xy[:, 1] < view.height - 1)
@@ -103,6 +109,7 @@ def _silhouette_distance(caster: raster.RayCaster, view: View, scale: float = 0.
     _, _, distance = raster.render_view(caster, view, scale)
     footprint = 1 / (scale * view.camera.mean_focal_length())  # metres across a pixel, per metre of distance
     depth = np.where(np.isfinite(distance), distance, 1e3)
-    jump = cv2.morphologyEx(depth.astype(np.float32), cv2.MORPH_GRADIENT, np.ones((3, 3))) > 16 * footprint * depth  # 3 x 3 spans two pixels: 83 degrees
+    # 3 x 3 spans two pixels: 83 degrees
+    jump = cv2.morphologyEx(depth.astype(np.float32), cv2.MORPH_GRADIENT, np.ones((3, 3))) > 16 * footprint * depth
     to_jump = cv2.distanceTransform((~jump).astype(np.uint8), cv2.DIST_L2, 5) / scale
     return cv2.resize(to_jump, (view.width, view.height), interpolation=cv2.INTER_LINEAR)

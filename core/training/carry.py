@@ -4,9 +4,10 @@
 
     python -m core train carry FOLDER OUT [--mesh OBJ] [--size 1024]
 
-FOLDER holds colour maps that share one UV layout, and the OBJ of a head with these UVs. That head is laid over the built-in one, neutral to
-neutral, as an artist's template is in registration, and each map is baked through the two surfaces, as the stage transfer does. OUT gets NAME.png (sRGB),
-known.png (white where the other head has a counterpart), sheet.jpg to look at, and carried.json.
+FOLDER holds colour maps that share one UV layout, and the OBJ of a head with these UVs. That head is laid over the
+built-in one, neutral to neutral, as an artist's template is in registration, and each map is baked through the two
+surfaces, as the stage transfer does. OUT gets NAME.png (sRGB), known.png (white where the other head has a
+counterpart), sheet.jpg to look at, and carried.json.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ TILE = 256
 
 
 def carry(folder: Path, out: Path, mesh: Path | None, size: int, report: Reporter) -> dict:
-    """Carries every picture of `folder`; returns what carried.json holds. Raises Problem where there is no head or no picture."""
+    """Carries every picture of `folder`; returns what carried.json holds. Raises Problem where there is no head or no
+    picture."""
     heads = [mesh] if mesh else sorted(folder.glob("*.obj"))
     pictures = sorted(path for path in folder.iterdir() if path.suffix.lower() in PICTURES) if folder.is_dir() else []
     if not heads or not pictures:
@@ -50,22 +52,29 @@ def carry(folder: Path, out: Path, mesh: Path | None, size: int, report: Reporte
             shots.append(_marked(srgb))
         images.write_data(made / "known.png", at.known.astype(np.float32))
         images.write_srgb(made / "sheet.jpg", _grid(shots))
-        notices = [path.read_text(encoding="utf-8") for path in sorted(folder.glob("LICENSE*"))]  # whatever is made of the skins must carry them
-        told = {"from": folder.name, "notices": notices, "mesh": heads[0].name, "size_px": size, "skins": [path.stem for path in pictures],
-                "known_percent": round(100 * float(at.known.mean()), 1), "mesh_to_head_median_mm": round(1e3 * float(np.median(fitted.distances)), 3),
-                "mesh_to_head_p95_mm": round(1e3 * float(np.percentile(fitted.distances, 95)), 3), "flipped_triangles": fitted.flipped}
+        # whatever is made of the skins must carry them
+        notices = [path.read_text(encoding="utf-8") for path in sorted(folder.glob("LICENSE*"))]
+        told = {"from": folder.name, "notices": notices, "mesh": heads[0].name, "size_px": size,
+                "skins": [path.stem for path in pictures],
+                "known_percent": round(100 * float(at.known.mean()), 1),
+                "mesh_to_head_median_mm": round(1e3 * float(np.median(fitted.distances)), 3),
+                "mesh_to_head_p95_mm": round(1e3 * float(np.percentile(fitted.distances, 95)), 3),
+                "flipped_triangles": fitted.flipped}
         (made / "carried.json").write_text(json.dumps(told, indent=1), encoding="utf-8")
     return told
 
 
-def _places(own: own_mesh.OwnMesh, size: int, report: Reporter) -> tuple[baking.TexelPartners, own_template.FittedTemplate]:
+def _places(own: own_mesh.OwnMesh, size: int,
+            report: Reporter) -> tuple[baking.TexelPartners, own_template.FittedTemplate]:
     """Where each texel of the built-in head's map lies in the other head's."""
     if own.mesh.uvs is None:
         raise Problem(f"{own.path.name} has no UVs.", "Name the mesh whose UVs the colour maps are in.")
     model, head = registration.load_model(), template.load()
     fitted = own_template.fit(own, head, own_template.BuiltIn(model, *registration.weights_of(model)), report)
-    skin = replace(own.mesh, vertices=fitted.vertices, faces=own.mesh.faces[fitted.skin], face_uvs=own.mesh.face_uvs[fitted.skin])
-    return baking.places(head, (0, 0), baking.Source(skin), size, FAR_M, lambda done: report.progress(done, 1, "finding partners")), fitted
+    skin = replace(own.mesh, vertices=fitted.vertices, faces=own.mesh.faces[fitted.skin],
+                   face_uvs=own.mesh.face_uvs[fitted.skin])
+    return baking.places(head, (0, 0), baking.Source(skin), size, FAR_M,
+                         lambda done: report.progress(done, 1, "finding partners")), fitted
 
 
 def _marked(srgb: np.ndarray) -> np.ndarray:
@@ -87,13 +96,17 @@ def _grid(shots: list[np.ndarray], columns: int = 7) -> np.ndarray:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser("python -m core train carry", description="Carry the skins of another head into the built-in head's UVs.")
+    parser = argparse.ArgumentParser("python -m core train carry",
+                                     description="Carry the skins of another head into the built-in head's UVs.")
     parser.add_argument("folder", type=Path, metavar="FOLDER")
     parser.add_argument("out", type=Path, metavar="OUT")
-    parser.add_argument("--mesh", type=Path, metavar="OBJ", help="the head whose UVs the maps are in; the first OBJ of FOLDER by default")
+    parser.add_argument("--mesh", type=Path, metavar="OBJ",
+                        help="the head whose UVs the maps are in; the first OBJ of FOLDER by default")
     parser.add_argument("--size", type=int, default=1024)
     options = parser.parse_args(arguments)
     told = carry(options.folder, options.out, options.mesh, options.size, Reporter("carry"))
-    print(f"{len(told['skins'])} skins carried to {options.out}; {told['known_percent']} % of the map has a counterpart, "
-          f"the mesh lies {told['mesh_to_head_median_mm']} mm (95 %: {told['mesh_to_head_p95_mm']} mm) from the head. Look at sheet.jpg.")
+    print(f"{len(told['skins'])} skins carried to {options.out}; {told['known_percent']} % of the map has a "
+          "counterpart, "
+          f"the mesh lies {told['mesh_to_head_median_mm']} mm (95 %: {told['mesh_to_head_p95_mm']} mm) from the head. "
+          "Look at sheet.jpg.")
     return 0

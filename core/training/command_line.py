@@ -15,11 +15,15 @@ from .descent import TrainingRun
 
 
 def parser(training: str, description: str, configs: dict, out: Path) -> argparse.ArgumentParser:
-    """The options of every training; `training` is its name in `python -m core train NAME`, `out` where its weights go by default."""
-    options = argparse.ArgumentParser(f"python -m core train {training}", description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    """The options of every training; `training` is its name in `python -m core train NAME`, `out` where its weights go
+    by default."""
+    options = argparse.ArgumentParser(f"python -m core train {training}", description=description,
+                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--config", default="cpu", choices=tuple(configs))
-    options.add_argument("--minutes", type=float, help="in all, those of earlier runs included; the configuration's by default")
-    options.add_argument("--export", action="store_true", help="write the weights of the work folder's last checkpoint and stop")
+    options.add_argument("--minutes", type=float,
+                         help="in all, those of earlier runs included; the configuration's by default")
+    options.add_argument("--export", action="store_true",
+                         help="write the weights of the work folder's last checkpoint and stop")
     options.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / f"wildcap_{training}")
     options.add_argument("--out", type=Path, default=out)
     return options
@@ -28,15 +32,18 @@ def parser(training: str, description: str, configs: dict, out: Path) -> argpars
 def add_skins(options: argparse.ArgumentParser) -> None:
     """The options of a training that can learn from skins of other heads."""
     options.add_argument("--skins", type=Path, metavar="FOLDER", help="skins that `train carry` brought into our UVs")
-    options.add_argument("--held-out", nargs="+", default=[], metavar="NAME", help="skins of FOLDER that are kept from training, each with its cluster")
+    options.add_argument("--held-out", nargs="+", default=[], metavar="NAME",
+                         help="skins of FOLDER that are kept from training, each with its cluster")
 
 
-def carry_out(options: argparse.ArgumentParser, arguments: list[str] | None, train: Callable[..., dict], export: Callable[[Path, Path], dict],
+def carry_out(options: argparse.ArgumentParser, arguments: list[str] | None, train: Callable[..., dict],
+              export: Callable[[Path, Path], dict],
               prepare: Callable[[str, Path, Reporter], None] | None = None) -> int:
-    """Trains, or exports an earlier training: those options that no TrainingRun has are `train`'s keyword arguments. Returns the exit code. `prepare` answers
-    to --prepare, where a training has that option."""
+    """Trains, or exports an earlier training: those options that no TrainingRun has are `train`'s keyword arguments.
+    Returns the exit code. `prepare` answers to --prepare, where a training has that option."""
     asked = vars(options.parse_args(arguments))
-    report = Reporter("train", emit=lambda message: print(message.text, flush=True) if isinstance(message, Log) else None)
+    report = Reporter("train",
+                      emit=lambda message: print(message.text, flush=True) if isinstance(message, Log) else None)
     exports, prepares = asked.pop("export"), asked.pop("prepare", False)
     if exports:
         export(asked["work"], asked["out"])

@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Trains the delighting network on synthetic people and portraits whose light is known.
 
-    python -m core train delighter --config cpu|gpu [--minutes 80] [--hdri FOLDER] [--skins FOLDER --held-out NAME ...] [--start FILE] [--growing] [--work DIR]
-    python -m core train delighter --prepare [--config cpu|gpu] [--work DIR]   make the people's sights and stop
-    python -m core train delighter --export [--work DIR] [--out FILE]          write the running training's averaged weights now
+    python -m core train delighter --config cpu|gpu [--minutes 80] [--hdri FOLDER] [--skins FOLDER --held-out NAME ...]
+    [--start FILE] [--growing] [--work DIR] python -m core train delighter --prepare [--config cpu|gpu] [--work DIR]
+    make the people's sights and stop python -m core train delighter --export [--work DIR] [--out FILE]          write
+    the running training's averaged weights now
 
-Needs neither Blender nor the internet. A second run goes on where the first was killed. FOLDERs: panoramas (.hdr, .exr) that may light portraits, and skins
-that `train carry` brought into our UVs; without them all light and skin is procedural. --start: weights to begin with. --growing trains on the people that
-are there while another process prepares the others: what is drawn then depends on when.
+Needs neither Blender nor the internet. A second run goes on where the first was killed. FOLDERs: panoramas (.hdr, .exr)
+that may light portraits, and skins that `train carry` brought into our UVs; without them all light and skin is
+procedural. --start: weights to begin with. --growing trains on the people that are there while another process prepares
+the others: what is drawn then depends on when.
 """
 
 from __future__ import annotations
@@ -38,18 +40,22 @@ WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "delighter.safete
 _MODEL = {"widths": [64, 128, 192, 224], "depths": [2, 2, 2, 2]}
 CONFIGS = {
     "cpu": {"model": _MODEL,
-            "training": {"pairs": 2, "echo": 2, "rate": 4e-4, "minutes": 180, "skins": 48, "people": 120, "views": 8, "held_out": 6, "seed": 0,
+            "training": {"pairs": 2, "echo": 2, "rate": 4e-4, "minutes": 180, "skins": 48, "people": 120, "views": 8,
+                         "held_out": 6, "seed": 0,
                           "workers": 1}},
     "gpu": {"model": _MODEL,
-            "training": {"pairs": 16, "echo": 1, "rate": 1.0e-3, "minutes": 24, "skins": 160, "people": 360, "views": 8, "held_out": 6, "seed": 0,
+            "training": {"pairs": 16, "echo": 1, "rate": 1.0e-3, "minutes": 24, "skins": 160, "people": 360, "views": 8,
+                         "held_out": 6, "seed": 0,
                           "workers": 14}},
 }
-"""`people`, and `skins` bald subjects, are seen from `views` sides each; a step shows `pairs` of them under two lights each. Every `echo` steps show the
-same, mirrored in turn: where making them costs as much as learning from them, twice is cheaper than new."""
+"""`people`, and `skins` bald subjects, are seen from `views` sides each; a step shows `pairs` of them under two lights
+each. Every `echo` steps show the same, mirrored in turn: where making them costs as much as learning from them, twice
+is cheaper than new."""
 PEOPLE = 0.7
 """Share of the steps that show people; the others show bald subjects, whose maps are finer."""
 TONE, SLOPE, AGREEMENT, SHADOW = 0.25, 1.0, 0.25, 0.3
-"""Weights beside the log-shading's error: its mean over the face, its slopes, the albedo of one face under two lights, the shadows."""
+"""Weights beside the log-shading's error: its mean over the face, its slopes, the albedo of one face under two lights,
+the shadows."""
 
 
 def train_delighter(config: str, out: Path, report: Reporter, run: descent.TrainingRun, skins: Path | None = None,
@@ -78,28 +84,38 @@ def train_delighter(config: str, out: Path, report: Reporter, run: descent.Train
     work.mkdir(parents=True, exist_ok=True)
     t = CONFIGS[config]["training"]
     device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
-    data = named_data(t, skins, held_out) | {"panoramas": sorted(p.name for p in Path(hdri).glob("*.hdr")) if hdri else [],
-                                             "people": _people(t), "started": "the weights before" if start else "random weights"}
+    data = named_data(t, skins,
+                      held_out) | {"panoramas": sorted(p.name for p in Path(hdri).glob("*.hdr")) if hdri else [],
+                                   "people": _people(t), "started": "the weights before" if start else "random weights"}
     if not run.growing:
         prepare_delighter(config, work, report)
-    if not all(any(is_prepared(seed, t["views"], work) for seed in data[kind]) for kind in ("people", "held_out_seeds")):
-        raise Problem(f"There are no people in {work} yet.", "Wait for `train delighter --prepare`, or train without --growing.")
+    if not all(any(is_prepared(seed, t["views"], work) for seed in data[kind])
+               for kind in ("people", "held_out_seeds")):
+        raise Problem(f"There are no people in {work} yet.",
+                      "Wait for `train delighter --prepare`, or train without --growing.")
     prepare(data["seeds"], t["views"], work, report, skins, data["skins"], max(2, t["workers"]))
     prepare(data["held_out_seeds"], t["views"], work, report)
-    unseen = {"": Portraits(data["held_out_seeds"], t["views"], work, hdri).draw(4 * t["held_out"], np.random.default_rng(1), augment=False),
-              "people_": People(data["held_out_seeds"], t["views"], work, hdri).draw(4 * t["held_out"], np.random.default_rng(1))}
+    unseen = {"": Portraits(data["held_out_seeds"], t["views"], work,
+                            hdri).draw(4 * t["held_out"], np.random.default_rng(1), augment=False),
+              "people_": People(data["held_out_seeds"], t["views"], work,
+                                hdri).draw(4 * t["held_out"], np.random.default_rng(1))}
     torch.manual_seed(t["seed"])
     network = DelightNet(**CONFIGS[config]["model"])
     if start:
         network.load_state_dict({name: value.float() for name, value in load_file(start).items()})
     state = descent.resumed(work, descent.beginning(config, data, network))
     recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
-                                    rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
-                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"], save_every=600)
+                                    rate=lambda step,
+                                    share: t["rate"] * min(1.0, (step + 1) / 200)
+                                    * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
+                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"],
+                                    save_every=600)
     objective = descent.Objective(
-        _DelighterSteps(Portraits(data["seeds"], t["views"], work, hdri), People(data["people"], t["views"], work, hdri), t),
+        _DelighterSteps(Portraits(data["seeds"], t["views"], work, hdri),
+                        People(data["people"], t["views"], work, hdri), t),
         lambda batch, step, share: sum(losses(network, batch, device).values()),
-        lambda average: {kind + name: value for kind, batch in unseen.items() for name, value in figures(average, config, batch, device).items()})
+        lambda average: {kind + name: value for kind, batch in unseen.items()
+                         for name, value in figures(average, config, batch, device).items()})
     descent.descend(network, state, objective, recipe, work, device, report)
     return export(work, out)
 
@@ -108,12 +124,14 @@ def prepare_delighter(config: str, work: Path, report: Reporter) -> None:
     """The sights of all people, those of the held-out ones first."""
     t = CONFIGS[config]["training"]
     work.mkdir(parents=True, exist_ok=True)
-    prepare_people([*range(HELD_OUT_SEED, HELD_OUT_SEED + t["held_out"]), *_people(t)], t["views"], work, report, max(2, t["workers"]))
+    prepare_people([*range(HELD_OUT_SEED, HELD_OUT_SEED + t["held_out"]), *_people(t)], t["views"], work, report,
+                   max(2, t["workers"]))
 
 
 def _people(t: dict) -> list[int]:
     """Seeds of the people to learn from."""
-    return [seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * t["people"]) if seed not in reserved_seeds()][:t["people"]]
+    return [seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * t["people"])
+            if seed not in reserved_seeds()][:t["people"]]
 
 
 def losses(network: DelightNet, batch: PortraitBatch, device: str) -> dict[str, torch.Tensor]:
@@ -122,8 +140,8 @@ def losses(network: DelightNet, batch: PortraitBatch, device: str) -> dict[str, 
         shading, shadow = network(batch.layers.to(device, memory_format=torch.channels_last))
     weight = batch.weight.to(device)
     tone, error = split_tone(shading - batch.shading.to(device), weight)
-    terms = {"shading": mean_size(error, weight), "tone": TONE * tone.abs().mean(), "slope": SLOPE * slope_error(error, weight),
-             "agreement": AGREEMENT * disagreement(error, weight)}
+    terms = {"shading": mean_size(error, weight), "tone": TONE * tone.abs().mean(),
+             "slope": SLOPE * slope_error(error, weight), "agreement": AGREEMENT * disagreement(error, weight)}
     lost = functional.binary_cross_entropy_with_logits(shadow, batch.shadow.to(device), reduction="none")
     sure = batch.shadow_weight.to(device)
     terms["shadow"] = SHADOW * (lost * sure).sum() / sure.sum().clamp_min(1)
@@ -137,8 +155,9 @@ def _fast(device: str) -> bool:
 
 @torch.no_grad()
 def figures(average: dict, config: str, batch: PortraitBatch, device: str) -> dict[str, float]:
-    """The averaged network on held-out portraits: deviation of the log-albedo about its mean over the skin, with and without geometry, beside that of the
-    picture as it is (natural log units), and the intersection over union of the shadows."""
+    """The averaged network on held-out portraits: deviation of the log-albedo about its mean over the skin, with and
+    without geometry, beside that of the picture as it is (natural log units), and the intersection over union of the
+    shadows."""
     network = DelightNet(**CONFIGS[config]["model"])
     network.load_state_dict(average)
     network.to(device, memory_format=torch.channels_last)
@@ -162,22 +181,30 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from."""
     state = descent.read_state(work)
     data = state["data"]
-    told = ("Synthetic people with hair, beards and open eyes (core/synthetic/people) and portraits of bald subjects (core/synthetic) on the built-in head, "
+    told = ("Synthetic people with hair, beards and open eyes (core/synthetic/people) and portraits of bald subjects "
+            "(core/synthetic) on the built-in head, "
             "which derives from the MakeHuman base mesh (CC0)")
     if data["skins"]:
         told += f"; some wear one of {len(data['skins'])} skins of {data['from']}, carried into the built-in UVs"
     if data["panoramas"]:
         told += f"; light from procedural environments, lamps and {len(data['panoramas'])} panoramas (CC0)"
-    what = ("portraits of held-out subjects, and people_ of held-out people: mean error of the log-albedo about its own mean over the skin (natural log), "
-            "told the geometry or the picture only, beside the picture as it is; intersection over union of the shadows")
+    what = (
+        "portraits of held-out subjects, and people_ of held-out people: mean error of the log-albedo about its "
+        "own mean over the skin (natural log), "
+        "told the geometry or the picture only, beside the picture as it is; intersection over union of the shadows"
+    )
     command = again("delighter", state) + (" --hdri hdri" if data["panoramas"] else "")
-    ready = sum(is_prepared(seed, CONFIGS[state["config"]]["training"]["views"], work) for seed in data["people"])  # the others were not there yet
+    # the others were not there yet
+    ready = sum(is_prepared(seed, CONFIGS[state["config"]]["training"]["views"], work) for seed in data["people"])
     more = {"panoramas": data["panoramas"], "people": data["people"][:ready], "started": data["started"]}
-    return release(out, state, TrainingCard(CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what}, more))
+    return release(out, state,
+                   TrainingCard(CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what},
+                                more))
 
 
 class _DelighterSteps(Dataset):
-    """The batch of each step: it depends on the step alone, so a resumed training draws what an unbroken one would have."""
+    """The batch of each step: it depends on the step alone, so a resumed training draws what an unbroken one would
+    have."""
 
     def __init__(self, portraits: Portraits, people: People, options: dict):
         self.portraits, self.people, self.options = portraits, people, options
@@ -188,7 +215,8 @@ class _DelighterSteps(Dataset):
         index = step // self.options["echo"]
         rng = np.random.default_rng((self.options["seed"], index))
         if self.drawn[0] != index:
-            self.drawn = index, (self.people if rng.random() < PEOPLE else self.portraits).draw(self.options["pairs"], rng)
+            self.drawn = index, (self.people if rng.random() < PEOPLE
+                                 else self.portraits).draw(self.options["pairs"], rng)
         turned = step % 2 if self.options["echo"] > 1 else rng.random() < 0.5
         return mirrored(self.drawn[1]) if turned else self.drawn[1]
 
@@ -196,7 +224,8 @@ class _DelighterSteps(Dataset):
 def main(arguments: list[str] | None = None) -> int:
     options = command_line.parser("delighter", __doc__, CONFIGS, WEIGHTS)
     command_line.add_skins(options)
-    options.add_argument("--hdri", type=Path, metavar="FOLDER", help="panoramas whose licence lets weights trained with them be shipped")
+    options.add_argument("--hdri", type=Path, metavar="FOLDER",
+                         help="panoramas whose licence lets weights trained with them be shipped")
     options.add_argument("--start", type=Path, metavar="FILE", help="weights to begin with, in place of random ones")
     options.add_argument("--growing", action="store_true", help="train on the people that are there already")
     options.add_argument("--prepare", action="store_true", help="make the people's sights and stop")

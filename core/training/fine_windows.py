@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the upscaler learns from: windows of synthetic skins painted at 4096, and what a solver's 1024 map of the same place would be.
+"""What the upscaler learns from: windows of synthetic skins painted at 4096, and what a solver's 1024 map of the same
+place would be.
 
 Only the windows are painted, never a whole 4096 map: a skin is a function of points on the head.
 """
@@ -28,15 +29,16 @@ from ..synthetic.skin import GROUND, paint_skin
 
 SIZE = 4096
 SIDE, MARGIN = 1024, 96
-"""Texels of a painted window, and its border that is cut off: a hair whose root is outside is laid onto it. Scars, laid over
-any distance, are left out."""
+"""Texels of a painted window, and its border that is cut off: a hair whose root is outside is laid onto it. Scars, laid
+over any distance, are left out."""
 FACTOR, CHANNELS = 4, 7
 
 
 @dataclass(frozen=True)
 class Degradation:
-    """What the solver's maps lack beside size: sigma of a blur in texels of the small map, of the diffuse and of the other channels; deviation of the noise
-    (sRGB of the diffuse; the others take twice as much); the share of their fine relief that normals keep."""
+    """What the solver's maps lack beside size: sigma of a blur in texels of the small map, of the diffuse and of the
+    other channels; deviation of the noise (sRGB of the diffuse; the others take twice as much); the share of their fine
+    relief that normals keep."""
 
     blur: float
     other_blur: float
@@ -55,7 +57,8 @@ def prepare(seeds: list[int], views: int, work: Path, report: Reporter, workers:
 
 
 class FineWindows:
-    """Draws pairs (small, large) from prepared windows: float32 [N, 7, P, P] and [N, 7, 4P, 4P] in the network's channels."""
+    """Draws pairs (small, large) from prepared windows: float32 [N, 7, P, P] and [N, 7, 4P, 4P] in the network's
+    channels."""
 
     def __init__(self, seeds: list[int], views: int, work: Path):
         self.paths = [_path(work, seed, i) for seed in seeds for i in range(views)]
@@ -73,17 +76,20 @@ class FineWindows:
         small = degraded(large, random_degradation(rng), rng)
         edge = 4
         return (torch.from_numpy(np.ascontiguousarray(small[:, edge:-edge, edge:-edge])),
-                torch.from_numpy(np.ascontiguousarray(large[:, FACTOR * edge:-FACTOR * edge, FACTOR * edge:-FACTOR * edge])))
+                torch.from_numpy(np.ascontiguousarray(large[:, FACTOR * edge:-FACTOR * edge,
+                                                            FACTOR * edge:-FACTOR * edge])))
 
 
 def random_degradation(rng: np.random.Generator) -> Degradation:
     """From a plain reduction to the soft, faintly noisy maps that sampling a prior gives."""
     blur = rng.uniform(0.0, 0.8) if rng.random() < 0.7 else 0.0
-    return Degradation(blur, min(1.2, blur + rng.uniform(0.0, 0.5)) if rng.random() < 0.7 else blur, rng.uniform(0.0, 0.006), rng.uniform(0.8, 1.0))
+    return Degradation(blur, min(1.2, blur + rng.uniform(0.0, 0.5)) if rng.random() < 0.7 else blur,
+                       rng.uniform(0.0, 0.006), rng.uniform(0.8, 1.0))
 
 
 def degraded(large: np.ndarray, how: Degradation, rng: np.random.Generator) -> np.ndarray:
-    """The small map [7, H, W] (network channels) of a large one [7, 4H, 4W]: the albedo is averaged in linear light, normals are of length one again."""
+    """The small map [7, H, W] (network channels) of a large one [7, 4H, 4W]: the albedo is averaged in linear light,
+    normals are of length one again."""
     height, width = large.shape[1] // FACTOR, large.shape[2] // FACTOR
     linear = np.concatenate([images.srgb_to_linear(large[:3]), large[3:]])
     small = linear.reshape(CHANNELS, height, FACTOR, width, FACTOR).mean((2, 4))
@@ -129,7 +135,8 @@ def _paint(work: Path, what: tuple[int, int]) -> None:
     parameters = replace(adorned(sample_parameters(seed), seed), scars=0.0)
     skin = paint_skin(parameters, window_canvas(SIZE, row, column, SIDE), canvas(GROUND))
     inner = slice(MARGIN, SIDE - MARGIN)
-    maps = np.concatenate([images.linear_to_srgb(skin.diffuse), skin.normal, skin.specular[..., None]], -1)[inner, inner]
+    maps = np.concatenate([images.linear_to_srgb(skin.diffuse), skin.normal, skin.specular[..., None]],
+                          -1)[inner, inner]
     with replacing(_path(work, seed, index)) as temporary, open(temporary, "wb") as file:
         np.save(file, maps.transpose(2, 0, 1).astype(np.float16))
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""python -m core.training.manifest: writes core/contract/shipped.json after a network or an asset was made again (core/contract/shipped_files.py reads it)."""
+"""python -m core.training.manifest: writes core/contract/shipped.json after a network or an asset was made again
+(core/contract/shipped_files.py reads it)."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ FOLDERS = ("assets", "weights")
 
 def make_manifest() -> dict[str, dict[str, str]]:
     """What the manifest says of the files as they are now."""
-    files = (path for folder in FOLDERS for path in sorted((CORE / folder).rglob("*")) if path.is_file() and path.suffix not in (".py", ".pyc"))
+    files = (path for folder in FOLDERS for path in sorted((CORE / folder).rglob("*")) if path.is_file()
+             and path.suffix not in (".py", ".pyc"))
     return {"core": {path.relative_to(CORE).as_posix(): hash_shipped(path) for path in files}}
 
 

@@ -4,10 +4,12 @@
 
     python -m core train parser --config cpu|gpu [--minutes 60] [--hdri FOLDER] [--growing] [--work DIR]
     python -m core train parser --prepare [--config cpu|gpu] [--work DIR]      make the figures' sights and stop
-    python -m core train parser --export [--work DIR] [--out FILE]             write the running training's averaged weights now
+    python -m core train parser --export [--work DIR] [--out FILE]             write the running training's averaged
+    weights now
 
-Needs neither Blender nor the internet. A second run goes on where the first was killed. FOLDER: panoramas (.hdr, .exr) that may light photographs; without
-them all light is made. --growing trains on the figures that are there while another process prepares the others: what is drawn then depends on when.
+Needs neither Blender nor the internet. A second run goes on where the first was killed. FOLDER: panoramas (.hdr, .exr)
+that may light photographs; without them all light is made. --growing trains on the figures that are there while another
+process prepares the others: what is drawn then depends on when.
 """
 
 from __future__ import annotations
@@ -33,14 +35,20 @@ from .snapshots import SnapshotBatch, Snapshots, is_prepared, prepare
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "parser.safetensors"
 _MODEL = {"widths": [40, 64, 112, 144], "depths": [1, 1, 1, 2]}
 CONFIGS = {
-    "cpu": {"model": _MODEL, "training": {"batch": 8, "echo": 3, "rate": 8e-4, "minutes": 60, "figures": 360, "views": 10, "held_out": 6, "seed": 0,
-                                          "workers": 1}},
-    "gpu": {"model": _MODEL, "training": {"batch": 32, "echo": 1, "rate": 2e-3, "minutes": 30, "figures": 720, "views": 10, "held_out": 6, "seed": 0,
-                                          "workers": 14}},
+    "cpu": {"model": _MODEL,
+            "training": {"batch": 8, "echo": 3, "rate": 8e-4, "minutes": 60, "figures": 360, "views": 10, "held_out": 6,
+                         "seed": 0,
+                         "workers": 1}},
+    "gpu": {"model": _MODEL,
+            "training": {"batch": 32, "echo": 1, "rate": 2e-3, "minutes": 30, "figures": 720, "views": 10,
+                         "held_out": 6, "seed": 0,
+                         "workers": 14}},
 }
-"""A step shows `batch` crops; every `echo` steps show the same photographs, cropped and spoilt in other ways: making them costs as much as learning."""
+"""A step shows `batch` crops; every `echo` steps show the same photographs, cropped and spoilt in other ways: making
+them costs as much as learning."""
 SMALL = ("lips", "brows", "eyes", "beard")
-"""Parts of few pixels: what lies near one of them counts NEAR times more, whatever it is, so that their shares stay what they are."""
+"""Parts of few pixels: what lies near one of them counts NEAR times more, whatever it is, so that their shares stay
+what they are."""
 NEAR, REACH = 3.0, 7
 
 
@@ -67,19 +75,26 @@ def train_parser(config: str, out: Path, report: Reporter, run: descent.Training
     work.mkdir(parents=True, exist_ok=True)
     t = CONFIGS[config]["training"]
     device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
-    data = named_figures(t) | {"panoramas": sorted(p.name for p in Path(hdri).iterdir() if p.suffix.lower() in (".hdr", ".exr")) if hdri else []}
+    data = named_figures(t) | {"panoramas": sorted(p.name for p in Path(hdri).iterdir()
+                                                   if p.suffix.lower() in (".hdr", ".exr")) if hdri else []}
     if not run.growing:
         prepare_figures(config, work, report)
     if not all(any(is_prepared(seed, t["views"], work) for seed in data[kind]) for kind in ("seeds", "held_out_seeds")):
-        raise Problem(f"There are no figures in {work} yet.", "Wait for `train parser --prepare`, or train without --growing.")
-    unseen = Snapshots(data["held_out_seeds"], t["views"], work, hdri).draw(8 * t["held_out"], 1, np.random.default_rng(1), augment=False)[0]
+        raise Problem(f"There are no figures in {work} yet.",
+                      "Wait for `train parser --prepare`, or train without --growing.")
+    unseen = Snapshots(data["held_out_seeds"], t["views"], work,
+                       hdri).draw(8 * t["held_out"], 1, np.random.default_rng(1), augment=False)[0]
     torch.manual_seed(t["seed"])
     network = ParseNet(**CONFIGS[config]["model"])
     state = descent.resumed(work, descent.beginning(config, data, network))
     recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
-                                    rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 100) * max(0.02, 0.5 + 0.5 * math.cos(math.pi * share)),
-                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.995, workers=t["workers"], save_every=150)
-    objective = descent.Objective(Steps(Snapshots(data["seeds"], t["views"], work, hdri), t), lambda batch, step, share: loss(network, batch, device),
+                                    rate=lambda step,
+                                    share: t["rate"] * min(1.0, (step + 1) / 100)
+                                    * max(0.02, 0.5 + 0.5 * math.cos(math.pi * share)),
+                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.995, workers=t["workers"],
+                                    save_every=150)
+    objective = descent.Objective(Steps(Snapshots(data["seeds"], t["views"], work, hdri), t), lambda batch, step,
+                                  share: loss(network, batch, device),
                                   lambda average: figures(average, config, unseen, device))
     descent.descend(network, state, objective, recipe, work, device, report)
     return export(work, out)
@@ -87,8 +102,10 @@ def train_parser(config: str, out: Path, report: Reporter, run: descent.Training
 
 def named_figures(t: dict) -> dict:
     """Who is learnt from and who is kept from it."""
-    seeds = [seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * t["figures"]) if seed not in reserved_seeds()][:t["figures"]]
-    return {"seeds": seeds, "held_out_seeds": list(range(HELD_OUT_SEED, HELD_OUT_SEED + t["held_out"])), "skins": [], "held_out_skins": [], "notices": []}
+    seeds = [seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * t["figures"])
+             if seed not in reserved_seeds()][:t["figures"]]
+    return {"seeds": seeds, "held_out_seeds": list(range(HELD_OUT_SEED, HELD_OUT_SEED + t["held_out"])), "skins": [],
+            "held_out_skins": [], "notices": []}
 
 
 def prepare_figures(config: str, work: Path, report: Reporter) -> None:
@@ -112,7 +129,8 @@ def loss(network: ParseNet, batch: SnapshotBatch, device: str) -> torch.Tensor:
 
 @torch.no_grad()
 def figures(average: dict, config: str, batch: SnapshotBatch, device: str) -> dict[str, float]:
-    """The averaged network on photographs of held-out figures: intersection over union of each part, where a part is what most of a pixel is."""
+    """The averaged network on photographs of held-out figures: intersection over union of each part, where a part is
+    what most of a pixel is."""
     network = ParseNet(**CONFIGS[config]["model"])
     network.load_state_dict(average)
     network.to(device, memory_format=torch.channels_last).eval()
@@ -128,19 +146,23 @@ def figures(average: dict, config: str, batch: SnapshotBatch, device: str) -> di
 def export(work: Path, out: Path = WEIGHTS) -> dict:
     """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from."""
     state = descent.read_state(work)
-    told = "Photographs of synthetic people (core/synthetic/people) on the built-in head, which derives from the MakeHuman base mesh (CC0)"
+    told = ("Photographs of synthetic people (core/synthetic/people) on the built-in head, which derives from the "
+            "MakeHuman base mesh (CC0)")
     if state["data"]["panoramas"]:
         told += f"; light from procedural environments, lamps and {len(state['data']['panoramas'])} panoramas (CC0)"
-    what = "photographs of held-out figures: intersection over union of each part, where a part is what most of a pixel is"
+    what = ("photographs of held-out figures: intersection over union of each part, where a part is what most of a "
+            "pixel is")
     command = again("parser", state) + (" --hdri hdri" if state["data"]["panoramas"] else "")
     config, named = CONFIGS[state["config"]], state["data"]
-    ready = sum(is_prepared(seed, config["training"]["views"], work) for seed in named["seeds"])  # the others were not there yet
+    # the others were not there yet
+    ready = sum(is_prepared(seed, config["training"]["views"], work) for seed in named["seeds"])
     more = {"panoramas": named["panoramas"], "prepared": ready}
     return release(out, state, TrainingCard(config, told, command, {**state["history"][-1][2], "what": what}, more))
 
 
 class Steps(Dataset):
-    """The batch of each step: it depends on the step alone once all figures are prepared, so a resumed training draws what an unbroken one would have."""
+    """The batch of each step: it depends on the step alone once all figures are prepared, so a resumed training draws
+    what an unbroken one would have."""
 
     def __init__(self, snapshots: Snapshots, options: dict):
         self.snapshots, self.options = snapshots, options
@@ -150,13 +172,15 @@ class Steps(Dataset):
         torch.set_num_threads(1)
         index, turn = divmod(step, self.options["echo"])
         if self.drawn[0] != index:
-            self.drawn = index, self.snapshots.draw(self.options["batch"], self.options["echo"], np.random.default_rng((self.options["seed"], index)))
+            self.drawn = index, self.snapshots.draw(self.options["batch"], self.options["echo"],
+                                                    np.random.default_rng((self.options["seed"], index)))
         return self.drawn[1][turn]
 
 
 def main(arguments: list[str] | None = None) -> int:
     options = command_line.parser("parser", __doc__, CONFIGS, WEIGHTS)
-    options.add_argument("--hdri", type=Path, metavar="FOLDER", help="panoramas whose licence lets weights trained with them be shipped")
+    options.add_argument("--hdri", type=Path, metavar="FOLDER",
+                         help="panoramas whose licence lets weights trained with them be shipped")
     options.add_argument("--growing", action="store_true", help="train on the figures that are there already")
     options.add_argument("--prepare", action="store_true", help="make the figures' sights and stop")
     return command_line.carry_out(options, arguments, train_parser, export, prepare_figures)

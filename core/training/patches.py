@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random windows of the skins at three scales, mirrored and moved in tone, and the statistics that the prior's network is built around."""
+"""Random windows of the skins at three scales, mirrored and moved in tone, and the statistics that the prior's network
+is built around."""
 
 from __future__ import annotations
 
@@ -17,12 +18,14 @@ from .skins import SCALES, SIZE, Skins, shrink
 LN_MELANIN = np.log(0.008), np.log(0.45)
 """Range of the melanin fraction that a skin's tone is moved to: very light to very dark."""
 REACH, DARK_REACH = 1.2, 0.4
-"""Largest change of the logarithm of melanin; the lower one makes dark skin lighter, whose pigments are known less well."""
+"""Largest change of the logarithm of melanin; the lower one makes dark skin lighter, whose pigments are known less
+well."""
 
 
 @dataclass(frozen=True)
 class PatchBatch:
-    """clean [N, 7, P, P], known [N, 7, P, P]: 1 where `clean` is true; coords [N, 2, P, P], tone [N, 3], scale [N]; float32."""
+    """clean [N, 7, P, P], known [N, 7, P, P]: 1 where `clean` is true; coords [N, 2, P, P], tone [N, 3], scale [N];
+    float32."""
 
     clean: torch.Tensor
     known: torch.Tensor
@@ -40,12 +43,20 @@ class Windows:
         share = np.where(whole, (1 - real) / max(whole.sum(), 1), real / max((~whole).sum(), 1))
         self.chance = share / share.sum()
         self.face = np.argwhere(template.mask("face", SIZE) > 0.5)
-        bare = template.mask("skin", SIZE // SCALES[-1]) * template.mask("face", SIZE // SCALES[-1]) * (1 - template.mask("eyes", SIZE // SCALES[-1]))
+        bare = template.mask("skin",
+                             SIZE
+                             // SCALES[-1]) * template.mask("face",
+                                                            SIZE
+                                                            // SCALES[-1]) * (1
+                                                                              - template.mask("eyes",
+                                                                                              SIZE // SCALES[-1]))
         some = np.flatnonzero(bare > 0.9)[::29]  # enough texels of facial skin for its mean
-        self.sparse = [m[:, some // bare.shape[1], some % bare.shape[1]].float().numpy()[:, None] for m in skins.maps[SCALES[-1]]]
+        self.sparse = [m[:, some // bare.shape[1], some % bare.shape[1]].float().numpy()[:, None]
+                       for m in skins.maps[SCALES[-1]]]
 
     def draw(self, count: int, patch: int, rng: np.random.Generator, augment: bool = True) -> PatchBatch:
-        """`count` random windows: a third of each scale, three quarters of them on the face; mirrored and re-toned when `augment`."""
+        """`count` random windows: a third of each scale, three quarters of them on the face; mirrored and re-toned when
+        `augment`."""
         drawn = [self._one(patch, rng, augment) for _ in range(count)]
         return PatchBatch(*(torch.stack(parts) for parts in zip(*drawn, strict=True)))
 
@@ -74,13 +85,16 @@ class Windows:
         return clean, known, coords, tone, torch.tensor(scale)
 
     def _toned(self, maps: np.ndarray, index: int, rng: np.random.Generator) -> tuple[torch.Tensor, torch.Tensor]:
-        """A window [9, P, P] of skin `index` with more or less melanin and blood, and its tone, which is never known exactly."""
+        """A window [9, P, P] of skin `index` with more or less melanin and blood, and its tone, which is never known
+        exactly."""
         sparse = self.sparse[index]
         own = float(np.median(sparse[7]))
         lightest = -DARK_REACH if own > np.log(0.3) else -REACH
-        more = rng.uniform(max(LN_MELANIN[0] - own, lightest), np.clip(LN_MELANIN[1] - own, 0, REACH)), rng.normal(0, 0.15)
+        more = rng.uniform(max(LN_MELANIN[0] - own, lightest),
+                           np.clip(LN_MELANIN[1] - own, 0, REACH)), rng.normal(0, 0.15)
         gain = np.exp(rng.normal(0, 0.08) + rng.normal(0, 0.03, 3))[:, None, None]
-        albedo, everywhere = (np.clip((m[:3] + 1) / 2 * gain * _change(m[7], m[8], *more), 0, 1) for m in (maps, sparse))
+        albedo, everywhere = (np.clip((m[:3] + 1) / 2 * gain * _change(m[7], m[8], *more), 0, 1)
+                              for m in (maps, sparse))
         clean = torch.from_numpy(np.concatenate([2 * albedo - 1, maps[3:7]]).astype(np.float32))
         tone = everywhere.mean((1, 2)) * np.exp(rng.normal(0, 0.06) + rng.normal(0, 0.02, 3))
         return clean, torch.from_numpy(tone.astype(np.float32))
@@ -94,8 +108,8 @@ def _change(melanin: np.ndarray, blood: np.ndarray, more_melanin: float, more_bl
 
 
 def mean_map(skins: Skins, size: int = 256) -> torch.Tensor:
-    """The mean face [7, size, size], symmetric: geometric mean of albedo over tone, mean normal (of length one), mean 2 * specular - 1.
-    Each skin counts where it is known, which the whole ones are everywhere."""
+    """The mean face [7, size, size], symmetric: geometric mean of albedo over tone, mean normal (of length one), mean 2
+    * specular - 1. Each skin counts where it is known, which the whole ones are everywhere."""
     factor = SIZE // SCALES[1] // size
     total, weight = torch.zeros(7, size, size), torch.zeros(7, size, size)
     for maps, area, tone in zip(skins.maps[SCALES[1]], skins.known[SCALES[1]], skins.tones, strict=True):
@@ -113,7 +127,8 @@ def mean_map(skins: Skins, size: int = 256) -> torch.Tensor:
 
 
 def reference_skins(skins: Skins, count: int = 16, size: int = 128) -> torch.Tensor:
-    """The first `count` whole skins in the mean face's form [count, 7, size, size]: albedo over tone, normal, 2 * specular - 1."""
+    """The first `count` whole skins in the mean face's form [count, 7, size, size]: albedo over tone, normal, 2 *
+    specular - 1."""
     factor, found = SIZE // SCALES[1] // size, []
     for maps, area, tone in zip(skins.maps[SCALES[1]], skins.known[SCALES[1]], skins.tones, strict=True):
         if area is None and len(found) < count:

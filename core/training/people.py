@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""People with brows, beards, hair and open eyes for a delighter to learn from, beside the bald subjects of portraits.py.
+"""People with brows, beards, hair and open eyes for a delighter to learn from, beside the bald subjects of
+portraits.py.
 
-What light does not change is made once per figure and kept in a work folder: some four seconds a figure and one to three a view.
+What light does not change is made once per figure and kept in a work folder: some four seconds a figure and one to
+three a view.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The pictures a delighter learns from: subjects on the light stage seen from many sides, lit anew for every step.
 
-What light does not change is made once per subject and kept in a work folder: sights and the stage's visibility (some seconds each).
+What light does not change is made once per subject and kept in a work folder: sights and the stage's visibility (some
+seconds each).
 """
 
 from __future__ import annotations
@@ -39,8 +40,9 @@ CARRIED = 0.35
 
 @dataclass(frozen=True)
 class PortraitBatch:
-    """layers [N, CHANNELS, SIDE, SIDE]; at half the size: shading [N, 3, ...] the true log-shading less the picture's middle, weight [N, 1, ...] of its error,
-    shadow [N, 1, ...] and shadow_weight [N, 1, ...]. 2 k and 2 k + 1 are the same sight under two lights."""
+    """layers [N, CHANNELS, SIDE, SIDE]; at half the size: shading [N, 3, ...] the true log-shading less the picture's
+    middle, weight [N, 1, ...] of its error, shadow [N, 1, ...] and shadow_weight [N, 1, ...]. 2 k and 2 k + 1 are the
+    same sight under two lights."""
 
     layers: torch.Tensor
     shading: torch.Tensor
@@ -49,8 +51,10 @@ class PortraitBatch:
     shadow_weight: torch.Tensor
 
 
-def prepare(seeds: list[int], views: int, work: Path, report: Reporter, skins: Path | None = None, names: list[str] = (), processes: int = 2) -> None:
-    """Makes the sights of these subjects that the work folder lacks; `names` are carried skins of the folder `skins` that some of them wear."""
+def prepare(seeds: list[int], views: int, work: Path, report: Reporter, skins: Path | None = None,
+            names: list[str] = (), processes: int = 2) -> None:
+    """Makes the sights of these subjects that the work folder lacks; `names` are carried skins of the folder `skins`
+    that some of them wear."""
     missing = [seed for seed in seeds if not (work / f"subject_{seed}" / f"{views - 1}.npz").is_file()]
     jobs = [(seed, views, work, skins, list(names)) for seed in missing]
     if processes < 2:
@@ -81,17 +85,24 @@ class Portraits:
             seen = sight.full(sight.load(self.work / f"subject_{seed}" / f"{view}.npz"))
             albedo = seen.albedo
             if augment:  # other tones than the subjects' own
-                albedo = np.clip(albedo * np.exp(rng.normal(0, 0.12) + rng.normal(0, 0.04, 3)), 0.003, 0.9).astype(np.float32)
+                albedo = np.clip(albedo * np.exp(rng.normal(0, 0.12) + rng.normal(0, 0.04, 3)), 0.003,
+                                 0.9).astype(np.float32)
             for _ in range(2):
                 lit = relit(seen, self._stage(seed), rng, self.panoramas, albedo)
-                parts = lit.fitted.ambient, lit.fitted.sunlit, lit.fitted.normal @ seen.rotation.T.astype(np.float32), np.ones(len(seen.pixel), np.float32)
+                parts = (
+                    lit.fitted.ambient,
+                    lit.fitted.sunlit,
+                    lit.fitted.normal @ seen.rotation.T.astype(np.float32),
+                    np.ones(len(seen.pixel), np.float32),
+                )
                 yield lit, tuple(seen.picture(part) for part in parts)
 
     def _stage(self, seed: int) -> LightStage:
         if seed not in self.heads:
             bits = np.load(self.work / f"subject_{seed}" / "visible.npy")
             mesh = subject_mesh(seed)
-            self.heads[seed] = LightStage(mesh, vertex_normals(mesh).astype(np.float32), np.unpackbits(bits, axis=1).astype(bool))
+            self.heads[seed] = LightStage(mesh, vertex_normals(mesh).astype(np.float32),
+                                          np.unpackbits(bits, axis=1).astype(bool))
         return self.heads[seed]
 
 
@@ -101,18 +112,22 @@ def stacked(examples: list[tuple[np.ndarray, ...]]) -> PortraitBatch:
 
 
 def example(portrait: Portrait, known: tuple[np.ndarray, ...], rng: np.random.Generator) -> tuple[np.ndarray, ...]:
-    """What a batch holds of a portrait. known: ambient, sunlit and normal [S, S, 3] (camera coordinates) of the registered head, and where it is [S, S]."""
+    """What a batch holds of a portrait. known: ambient, sunlit and normal [S, S, 3] (camera coordinates) of the
+    registered head, and where it is [S, S]."""
     geometry = ()
     if rng.random() < WITH_GEOMETRY:
-        slip = np.float32([[1, 0, rng.normal(0, 0.8)], [0, 1, rng.normal(0, 0.8)]])  # a registered head lies a pixel off
-        geometry = [cv2.warpAffine(np.ascontiguousarray(part, np.float32), slip, (len(part), len(part))) for part in known]
+        # a registered head lies a pixel off
+        slip = np.float32([[1, 0, rng.normal(0, 0.8)], [0, 1, rng.normal(0, 0.8)]])
+        geometry = [cv2.warpAffine(np.ascontiguousarray(part, np.float32), slip, (len(part), len(part)))
+                    for part in known]
     layers, middle = network_input(portrait.srgb, *geometry)
     sure = (_half(portrait.head) > 0.99) & (_half(portrait.albedo).min(-1) > 0.002)
     shading = np.log(np.maximum(_half(portrait.even), LEAST)) - middle
     weight = sure * (0.25 + 0.75 * _half(portrait.skin))
     strong = portrait.strong
     trust = 1.0 if strong > 0.4 or strong < 0.1 else 0.3  # in between it is a matter of taste what is a shadow
-    parts = (layers, shading.transpose(2, 0, 1), weight[None], _half(portrait.shadow)[None] * (strong > 0.2), (sure * trust)[None])
+    parts = (layers, shading.transpose(2, 0, 1), weight[None], _half(portrait.shadow)[None] * (strong > 0.2),
+             (sure * trust)[None])
     parts = [np.ascontiguousarray(part, np.float32) for part in parts]
     return tuple(parts)
 
@@ -121,7 +136,8 @@ def mirrored(batch: PortraitBatch) -> PortraitBatch:
     """Left and right exchanged; a normal's x changes its sign."""
     layers = batch.layers.flip(-1)  # a copy
     layers[:, 12] *= -1
-    return replace(batch, layers=layers, **{name: getattr(batch, name).flip(-1) for name in ("shading", "weight", "shadow", "shadow_weight")})
+    return replace(batch, layers=layers,
+                   **{name: getattr(batch, name).flip(-1) for name in ("shading", "weight", "shadow", "shadow_weight")})
 
 
 def _half(picture: np.ndarray) -> np.ndarray:
@@ -148,7 +164,8 @@ def _prepare_one(job: tuple) -> None:
 def _skin(skins: Skins, index: int) -> Skin:
     """A map of `skins` as the generator's own type; height is not needed."""
     maps = skins.maps[1][index].float().numpy().transpose(1, 2, 0)
-    return Skin(np.ascontiguousarray((maps[..., :3] + 1) / 2), np.ascontiguousarray((maps[..., 6] + 1) / 2), np.zeros(maps.shape[:2], np.float32),
+    return Skin(np.ascontiguousarray((maps[..., :3] + 1) / 2), np.ascontiguousarray((maps[..., 6] + 1) / 2),
+                np.zeros(maps.shape[:2], np.float32),
                 np.ascontiguousarray(maps[..., 3:6]), np.ones(maps.shape[:2], bool))
 
 
@@ -156,4 +173,6 @@ def _wearing(skin: Skin, own: Skins, carried: Skins) -> Skin:
     """The subject with another's colours where these are known, and its own, moved to that tone, elsewhere."""
     known = cv2.GaussianBlur(carried.known[1][0].float().numpy(), (0, 0), 6)[..., None]
     tone = (carried.tones[0] / own.tones[0]).numpy()
-    return replace(skin, diffuse=np.clip(known * _skin(carried, 0).diffuse + (1 - known) * skin.diffuse * tone, 0, 1).astype(np.float32))
+    return replace(skin,
+                   diffuse=np.clip(known * _skin(carried, 0).diffuse + (1 - known) * skin.diffuse * tone, 0,
+                                   1).astype(np.float32))

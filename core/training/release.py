@@ -16,8 +16,9 @@ from ..contract.files import replacing
 
 @dataclass(frozen=True)
 class TrainingCard:
-    """What a training's card says beside what its state tells: its configuration; data: in words what was learnt from; command: what makes these weights
-    again; held_out: the last figures on held-out data and what they are; more: entries that only this training's card has."""
+    """What a training's card says beside what its state tells: its configuration; data: in words what was learnt from;
+    command: what makes these weights again; held_out: the last figures on held-out data and what they are; more:
+    entries that only this training's card has."""
 
     config: dict
     data: str
@@ -42,11 +43,14 @@ def release(out: Path, state: dict, card: TrainingCard, tensors: dict[str, torch
     """
     out, named = Path(out), state["data"]
     with replacing(out) as temporary:
-        save_file({**{name: value.half().contiguous() for name, value in state["average"].items()}, **(tensors or {})}, temporary)
-    told = {**card.config, "data": card.data, "licence": "GPL-3.0-or-later", "notices": named["notices"], "command": card.command, "steps": state["step"],
-            "minutes": round(state["seconds"] / 60, 1), "parameters": sum(v.numel() for v in state["average"].values()), "seeds": named["seeds"],
-            "held_out_seeds": named["held_out_seeds"], "skins": named["skins"], "held_out_skins": named["held_out_skins"],
-            "held_out": card.held_out, **card.more}
+        save_file({**{name: value.half().contiguous() for name, value in state["average"].items()}, **(tensors or {})},
+                  temporary)
+    told = {**card.config, "data": card.data, "licence": "GPL-3.0-or-later", "notices": named["notices"],
+            "command": card.command, "steps": state["step"],
+            "minutes": round(state["seconds"] / 60, 1), "parameters": sum(v.numel() for v in state["average"].values()),
+            "seeds": named["seeds"],
+            "held_out_seeds": named["held_out_seeds"], "skins": named["skins"],
+            "held_out_skins": named["held_out_skins"], "held_out": card.held_out, **card.more}
     with replacing(out.with_suffix(".json")) as temporary:
         temporary.write_text(json.dumps(told, indent=1), encoding="utf-8")
     return told

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the trainings of the delighters hold a log-shading to: errors [N, 3, S, S] in natural log units, weights [N, 1, S, S]."""
+"""What the trainings of the delighters hold a log-shading to: errors [N, 3, S, S] in natural log units, weights [N, 1,
+S, S]."""
 
 from __future__ import annotations
 
@@ -8,7 +9,8 @@ import torch
 
 
 def split_tone(error: torch.Tensor, weight: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """An error's mean over each map [N, 3, 1, 1], which is that of the exposure and of the skin's tone, and the rest."""
+    """An error's mean over each map [N, 3, 1, 1], which is that of the exposure and of the skin's tone, and the
+    rest."""
     tone = (error * weight).sum((2, 3), keepdim=True) / weight.sum((2, 3), keepdim=True).clamp_min(1)
     return tone, error - tone
 

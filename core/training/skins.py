@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reflectance maps a prior learns from: a synthetic light stage, and skins of other heads that `train carry` brought into our UVs.
+"""The reflectance maps a prior learns from: a synthetic light stage, and skins of other heads that `train carry`
+brought into our UVs.
 
-A map is float16 [9, S, S]: 2 * diffuse_linear - 1 (3), tangent-space normal xyz (3), 2 * specular - 1 (1), and the logarithms of the melanin and blood
-fractions that give this colour (2), by which `patches.draw` moves a skin's tone. Carried skins have neither normal nor specular.
+A map is float16 [9, S, S]: 2 * diffuse_linear - 1 (3), tangent-space normal xyz (3), 2 * specular - 1 (1), and the
+logarithms of the melanin and blood fractions that give this colour (2), by which `patches.draw` moves a skin's tone.
+Carried skins have neither normal nor specular.
 """
 
 from __future__ import annotations
@@ -32,7 +34,8 @@ SIZE = 1024
 SCALES = (1, 2, 4)
 """Sides of a texel in texels of the 1024 map; the solver goes from coarse to fine over them."""
 NODES = 97  # per axis of the pigments that are tried for a colour
-LEVELS, DARKEST = 40, 1e-3  # colours per channel for which the nearest are looked up, evenly in the logarithm from here to 1
+# colours per channel for which the nearest are looked up, evenly in the logarithm from here to 1
+LEVELS, DARKEST = 40, 1e-3
 FITTED = 256  # side at which baked shading is fitted
 USUAL_BLOOD = 0.15  # how much a factor e of blood away from the usual fraction counts, in factors e of a channel
 SAME_SKIN = 0.5  # correlation of fine detail from which two carried skins are one person's, painted over
@@ -40,8 +43,9 @@ SAME_SKIN = 0.5  # correlation of fine detail from which two carried skins are o
 
 @dataclass(frozen=True)
 class Skins:
-    """maps[scale]: float16 [9, SIZE / scale, SIZE / scale] per skin; known[scale]: bool [SIZE / scale, SIZE / scale] where a skin's diffuse can be
-    learnt from, None where all of it and the other channels can; tones: linear RGB float32 [N, 3]; names: seeds or file names."""
+    """maps[scale]: float16 [9, SIZE / scale, SIZE / scale] per skin; known[scale]: bool [SIZE / scale, SIZE / scale]
+    where a skin's diffuse can be learnt from, None where all of it and the other channels can; tones: linear RGB
+    float32 [N, 3]; names: seeds or file names."""
 
     maps: dict[int, list[torch.Tensor]]
     known: dict[int, list[torch.Tensor | None]]
@@ -49,7 +53,8 @@ class Skins:
     names: list[str]
 
     def __add__(self, other: Skins) -> Skins:
-        return Skins({s: self.maps[s] + other.maps[s] for s in SCALES}, {s: self.known[s] + other.known[s] for s in SCALES},
+        return Skins({s: self.maps[s] + other.maps[s] for s in SCALES},
+                     {s: self.known[s] + other.known[s] for s in SCALES},
                      torch.cat([self.tones, other.tones]), self.names + other.names)
 
 
@@ -67,7 +72,8 @@ def synthetic_skins(seeds: list[int], cache: Path, report: Reporter) -> Skins:
 
 
 def carried_skins(folder: Path, names: list[str], mean: torch.Tensor, cache: Path, report: Reporter) -> Skins:
-    """The skins NAME.png of a folder that `train carry` made, without the shading that was baked into them; mean as of `patches.mean_map`."""
+    """The skins NAME.png of a folder that `train carry` made, without the shading that was baked into them; mean as of
+    `patches.mean_map`."""
     paths = []
     for i, name in enumerate(names):
         source = Path(folder) / f"{name}.png"
@@ -90,7 +96,8 @@ def carried_names(folder: Path) -> list[str]:
 
 
 def clusters(folder: Path, names: list[str]) -> list[list[str]]:
-    """Names grouped by whose skin they are: fine detail that correlates is the same photographs painted over. Never split one across training and test."""
+    """Names grouped by whose skin they are: fine detail that correlates is the same photographs painted over. Never
+    split one across training and test."""
     where = _bare(512) > 0.5
     detail = []
     for name in names:
@@ -104,17 +111,21 @@ def clusters(folder: Path, names: list[str]) -> list[list[str]]:
 
 
 def unshaded(diffuse: np.ndarray, mean: torch.Tensor) -> np.ndarray:
-    """A skin [S, S, 3] (linear) divided by the shading baked into it: that of the second-order sky, with the head's own occlusion, whose product with
-    the mean face fits its luminance best. What the fit cannot hold (paint, highlights) stays."""
+    """A skin [S, S, 3] (linear) divided by the shading baked into it: that of the second-order sky, with the head's own
+    occlusion, whose product with the mean face fits its luminance best. What the fit cannot hold (paint, highlights)
+    stays."""
     small = images.resize(diffuse, FITTED, FITTED).mean(-1)
     face = np.asarray(mean[:3].mean(0), np.float32)
     face = cv2.resize(face, (FITTED, FITTED), interpolation=cv2.INTER_AREA)
-    basis, weight = _sky_basis(), _bare(FITTED) * (1 - template.mask("lips", FITTED)) * (1 - template.mask("brows", FITTED))
+    basis, weight = _sky_basis(), _bare(FITTED) * (1
+                                                   - template.mask("lips", FITTED)) * (1
+                                                                                       - template.mask("brows", FITTED))
     columns = (basis * face).reshape(9, -1).astype(np.float64)
     w = weight.reshape(-1)
     for _ in range(3):  # robust: what is far off is paint or hair, not light
         matrix = (columns * w) @ columns.T
-        coefficients = np.linalg.solve(matrix + 0.02 * np.trace(matrix) / 9 * np.diag([0.0] + [1.0] * 8), (columns * w) @ small.reshape(-1))
+        coefficients = np.linalg.solve(matrix + 0.02 * np.trace(matrix) / 9 * np.diag([0.0] + [1.0] * 8),
+                                       (columns * w) @ small.reshape(-1))
         ratio = np.log(np.maximum(small.reshape(-1), 1e-3) / np.maximum(coefficients @ columns, 1e-3))
         w = weight.reshape(-1) / (1 + (ratio / 0.15) ** 2)
     shading = np.maximum(np.tensordot(coefficients, basis, 1), 1e-3)
@@ -123,9 +134,11 @@ def unshaded(diffuse: np.ndarray, mean: torch.Tensor) -> np.ndarray:
 
 
 def pigments(albedo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Logarithms of the melanin and blood fractions whose reflectance is about nearest to an albedo [..., 3] (linear), float32 [...] each."""
+    """Logarithms of the melanin and blood fractions whose reflectance is about nearest to an albedo [..., 3] (linear),
+    float32 [...] each."""
     level = (1 - np.log(np.clip(albedo, DARKEST, 1)) / np.log(DARKEST)) * (LEVELS - 1)
-    return tuple(map_coordinates(table, level.reshape(-1, 3).T, order=1).reshape(albedo.shape[:-1]) for table in _pigment_table())
+    return tuple(map_coordinates(table, level.reshape(-1, 3).T, order=1).reshape(albedo.shape[:-1])
+                 for table in _pigment_table())
 
 
 def shrink(full: np.ndarray, scale: int) -> np.ndarray:
@@ -133,7 +146,8 @@ def shrink(full: np.ndarray, scale: int) -> np.ndarray:
     if scale == 1:
         return full
     side = full.shape[-1] // scale
-    small = np.stack([cv2.resize(channel.astype(np.float32), (side, side), interpolation=cv2.INTER_AREA) for channel in full])
+    small = np.stack([cv2.resize(channel.astype(np.float32), (side, side), interpolation=cv2.INTER_AREA)
+                      for channel in full])
     small[3:6] /= np.maximum(np.linalg.norm(small[3:6], axis=0), 1e-6)
     return small.astype(full.dtype)
 
@@ -153,33 +167,42 @@ def _read(paths: list[Path], names: list[str], known: np.ndarray | None) -> Skin
         for scale in SCALES:
             maps[scale].append(torch.from_numpy(shrink(full, scale)))
         tones.append(((full[:3].astype(np.float32) + 1) / 2 * skin).sum((1, 2)) / skin.sum())
-    areas = {scale: None if known is None else torch.from_numpy(cv2.resize(known.astype(np.float32), (SIZE // scale,) * 2, interpolation=cv2.INTER_AREA) > 0.99)
+    areas = {scale: None if known is None
+             else torch.from_numpy(cv2.resize(known.astype(np.float32), (SIZE // scale,) * 2,
+                                              interpolation=cv2.INTER_AREA) > 0.99)
              for scale in SCALES}
     tones = torch.from_numpy(np.stack(tones)).float() if tones else torch.zeros(0, 3)
     return Skins(maps, {scale: [areas[scale]] * len(paths) for scale in SCALES}, tones, names)
 
 
 def _bare(size: int) -> np.ndarray:
-    """The face [S, S] without what is another's: eyes, scalp, ears, and the nostrils, which are dark in every photograph."""
+    """The face [S, S] without what is another's: eyes, scalp, ears, and the nostrils, which are dark in every
+    photograph."""
     covered = [template.mask(name, size) for name in ("eyes", "scalp", "ears", "nostrils")]
     return template.mask("face", size) * np.prod([1 - mask for mask in covered], 0)
 
 
 @cache
 def _sky_basis() -> np.ndarray:
-    """Shading [9, FITTED, FITTED] of each coefficient of the sky's radiance on the built-in head, with its occlusion."""
+    """Shading [9, FITTED, FITTED] of each coefficient of the sky's radiance on the built-in head, with its
+    occlusion."""
     head = template.load()
     face, bary = raster.rasterize_uv(head, FITTED)
-    return raster.bleed(raster.interpolate(light.sky_transfer(), head.faces, face, bary), face >= 0).transpose(2, 0, 1).astype(np.float32)
+    return raster.bleed(raster.interpolate(light.sky_transfer(), head.faces, face, bary),
+                        face >= 0).transpose(2, 0, 1).astype(np.float32)
 
 
 @cache
 def _pigment_table() -> tuple[np.ndarray, np.ndarray]:
     """`pigments` of LEVELS colours per channel: float32 [LEVELS, LEVELS, LEVELS] each."""
-    tried = np.stack(np.meshgrid(*(np.geomspace(*limits, NODES) for limits in (pigment.MELANIN_RANGE, pigment.BLOOD_RANGE)), indexing="ij"), -1).reshape(-1, 2)
+    tried = np.stack(np.meshgrid(*(np.geomspace(*limits, NODES)
+                                   for limits in (pigment.MELANIN_RANGE, pigment.BLOOD_RANGE)), indexing="ij"),
+                     -1).reshape(-1, 2)
     logs = (1 - np.linspace(0, 1, LEVELS)) * np.log(DARKEST)
     colours = np.stack(np.meshgrid(logs, logs, logs, indexing="ij"), -1)
     known = np.log(pigment.reflectance(tried[:, 0], tried[:, 1]))
-    unusual = USUAL_BLOOD * np.log(tried[:, 1:] / 0.02)  # in dark skin blood hardly shows: of two that fit as well the usual one is taken
-    _, nearest = cKDTree(np.hstack([known, unusual])).query(np.concatenate([colours, np.zeros((*colours.shape[:3], 1))], -1), eps=0.3)
+    # in dark skin blood hardly shows: of two that fit as well the usual one is taken
+    unusual = USUAL_BLOOD * np.log(tried[:, 1:] / 0.02)
+    _, nearest = cKDTree(np.hstack([known, unusual])).query(np.concatenate([colours, np.zeros((*colours.shape[:3], 1))],
+                                                                           -1), eps=0.3)
     return tuple(np.log(tried).astype(np.float32)[nearest].transpose(3, 0, 1, 2))

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pictures a parser learns from: figures seen from many sides, lit, recoloured, covered and photographed anew for every step.
+"""The pictures a parser learns from: figures seen from many sides, lit, recoloured, covered and photographed anew for
+every step.
 
 What light does not change is made once per figure and kept in a work folder (some ten seconds and one per view).
 """
@@ -29,7 +30,8 @@ SHIFT, SCALE, TURN = 0.04, 0.09, 6.0
 
 @dataclass(frozen=True)
 class SnapshotBatch:
-    """layers [N, CHANNELS, SIDE, SIDE]; shares [N, len(PARTS), SIDE, SIDE] add up to one wherever known [N, 1, SIDE, SIDE] is 1."""
+    """layers [N, CHANNELS, SIDE, SIDE]; shares [N, len(PARTS), SIDE, SIDE] add up to one wherever known [N, 1, SIDE,
+    SIDE] is 1."""
 
     layers: torch.Tensor
     shares: torch.Tensor
@@ -64,10 +66,12 @@ class Snapshots:
             srgb, shares = photograph(sight, rng, self.panoramas)
             for batch in batches:
                 batch.append(example(srgb, shares, sight.landmarks, rng, augment))
-        return [SnapshotBatch(*(torch.from_numpy(np.stack(part)) for part in zip(*batch, strict=True))) for batch in batches]
+        return [SnapshotBatch(*(torch.from_numpy(np.stack(part)) for part in zip(*batch, strict=True)))
+                for batch in batches]
 
 
-def example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np.random.Generator, augment: bool = True) -> tuple[np.ndarray, ...]:
+def example(srgb: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np.random.Generator,
+            augment: bool = True) -> tuple[np.ndarray, ...]:
     """A photograph as the network sees it, the shares of its parts, and where they are known."""
     if augment and rng.random() < 0.5:
         srgb, shares = srgb[:, ::-1], shares[:, ::-1]
@@ -110,12 +114,17 @@ def _ended(rng: np.random.Generator) -> np.ndarray:
 def _spoilt(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Another white balance and gamma, less resolution, no colour, now and then."""
     if rng.random() < 0.6:
-        picture = np.clip(picture, 0, 1) ** np.float32(np.exp(rng.normal(0, 0.2))) * np.exp(rng.normal(0, 0.1, 3) + rng.normal(0, 0.15)).astype(np.float32)
+        picture = np.clip(picture, 0,
+                          1) ** np.float32(np.exp(rng.normal(0, 0.2))) * np.exp(rng.normal(0, 0.1, 3)
+                                                                                + rng.normal(0,
+                                                                                             0.15)).astype(np.float32)
     if rng.random() < 0.35:
         small = int(SIDE / np.exp(rng.uniform(np.log(1.2), np.log(4.0))))
-        picture = cv2.resize(cv2.resize(picture, (small, small), interpolation=cv2.INTER_AREA), (SIDE, SIDE), interpolation=cv2.INTER_LINEAR)
+        picture = cv2.resize(cv2.resize(picture, (small, small), interpolation=cv2.INTER_AREA), (SIDE, SIDE),
+                             interpolation=cv2.INTER_LINEAR)
     if rng.random() < 0.3:
-        picture = picture + rng.normal(0, np.exp(rng.uniform(np.log(0.004), np.log(0.05))), picture.shape).astype(np.float32)
+        picture = picture + rng.normal(0, np.exp(rng.uniform(np.log(0.004), np.log(0.05))),
+                                       picture.shape).astype(np.float32)
     if rng.random() < 0.06:
         picture = np.repeat(picture.mean(-1, keepdims=True), 3, 2)
     return np.clip(picture, 0, 1).astype(np.float32)

@@ -4,10 +4,12 @@
 
     python -m core train texels --config cpu|gpu [--minutes 120] [--hdri FOLDER] [--start FILE] [--growing] [--work DIR]
     python -m core train texels --prepare [--config cpu|gpu] [--work DIR]   make the people and stop
-    python -m core train texels --export [--work DIR] [--out FILE]          write the running training's averaged weights now
+    python -m core train texels --export [--work DIR] [--out FILE]          write the running training's averaged
+    weights now
 
-Needs neither Blender nor the internet. A second run goes on where the first was killed. FOLDER: panoramas (.hdr, .exr) that may light people; without it all
-light is procedural. --start: weights to begin with. --growing trains on the people that are there while another process makes the others.
+Needs neither Blender nor the internet. A second run goes on where the first was killed. FOLDER: panoramas (.hdr, .exr)
+that may light people; without it all light is procedural. --start: weights to begin with. --growing trains on the
+people that are there while another process makes the others.
 """
 
 from __future__ import annotations
@@ -43,22 +45,27 @@ from .unfolded import LitPerson, light_up
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "texels.safetensors"
 _MODEL = {"widths": [48, 96, 160, 224], "depths": [1, 2, 2, 2]}
 CONFIGS = {
-    "cpu": {"model": _MODEL, "training": {"pairs": 2, "fine_every": 3, "rate": 6e-4, "minutes": 120, "people": 96, "held_out": 6, "seed": 0, "workers": 1}},
-    "gpu": {"model": _MODEL, "training": {"pairs": 8, "fine_every": 2, "rate": 1e-3, "minutes": 24, "people": 320, "held_out": 6, "seed": 0, "workers": 14}},
+    "cpu": {"model": _MODEL,
+            "training": {"pairs": 2, "fine_every": 3, "rate": 6e-4, "minutes": 120, "people": 96, "held_out": 6,
+                         "seed": 0, "workers": 1}},
+    "gpu": {"model": _MODEL,
+            "training": {"pairs": 8, "fine_every": 2, "rate": 1e-3, "minutes": 24, "people": 320, "held_out": 6,
+                         "seed": 0, "workers": 14}},
 }
-"""A step shows `pairs` of the people under two lights each at half the maps' side, where four fit into the time of one; every `fine_every`th step shows a
-pair at the whole."""
+"""A step shows `pairs` of the people under two lights each at half the maps' side, where four fit into the time of one;
+every `fine_every`th step shows a pair at the whole."""
 TONE, SLOPE, AGREEMENT, SHADOW, SPREAD = 0.25, 1.0, 0.25, 0.2, 0.05
-"""Weights beside the log-shading's error: its mean over the face, its slopes, the albedo of one person under two lights, the shadows, and how well the size
-of the error is foretold."""
+"""Weights beside the log-shading's error: its mean over the face, its slopes, the albedo of one person under two
+lights, the shadows, and how well the size of the error is foretold."""
 OFF_FACE = 0.3
 """How much scalp, ears and neck count beside the face."""
 
 
 @dataclass(frozen=True)
 class TexelBatch:
-    """layers [N, CHANNELS, S, S] and light [N, 6, S, S]; shading [N, 3, S, S] the true log-shading less the face's mean log colour, weight [N, 1, S, S] of its
-    error; shadow and shadow_weight [N, 1, S, S]. 2 k and 2 k + 1 are the same person and colours under two lights."""
+    """layers [N, CHANNELS, S, S] and light [N, 6, S, S]; shading [N, 3, S, S] the true log-shading less the face's mean
+    log colour, weight [N, 1, S, S] of its error; shadow and shadow_weight [N, 1, S, S]. 2 k and 2 k + 1 are the same
+    person and colours under two lights."""
 
     layers: torch.Tensor
     light: torch.Tensor
@@ -91,7 +98,8 @@ def example(lit: LitPerson) -> tuple[np.ndarray, ...]:
     face = template.mask("face", side)
     weight = np.clip(lit.texels.seen / 0.15, 0, 1) * lit.texels.covered * (OFF_FACE + (1 - OFF_FACE) * face)
     trust = 1.0 if lit.strong > 0.4 or lit.strong < 0.1 else 0.3  # in between it is a matter of taste what is a shadow
-    parts = (layers, light, (lit.shading - middle).transpose(2, 0, 1), weight[None], (lit.shadow * (lit.strong > 0.2))[None], trust * weight[None])
+    parts = (layers, light, (lit.shading - middle).transpose(2, 0, 1), weight[None],
+             (lit.shadow * (lit.strong > 0.2))[None], trust * weight[None])
     return tuple(np.ascontiguousarray(part, np.float32) for part in parts)
 
 
@@ -99,7 +107,9 @@ def mirrored(batch: TexelBatch) -> TexelBatch:
     """Left and right exchanged; a normal's x changes its sign."""
     layers = batch.layers.flip(-1)  # a copy
     layers[:, 5] *= -1
-    return replace(batch, layers=layers, **{name: getattr(batch, name).flip(-1) for name in ("light", "shading", "weight", "shadow", "shadow_weight")})
+    return replace(batch, layers=layers,
+                   **{name: getattr(batch, name).flip(-1)
+                      for name in ("light", "shading", "weight", "shadow", "shadow_weight")})
 
 
 def train_texels(config: str, out: Path, report: Reporter, run: descent.TrainingRun) -> dict:
@@ -125,21 +135,28 @@ def train_texels(config: str, out: Path, report: Reporter, run: descent.Training
     work.mkdir(parents=True, exist_ok=True)
     t = CONFIGS[config]["training"]
     device = "cuda" if config == "gpu" and torch.cuda.is_available() else "cpu"
-    data = {"seeds": _people(t), "held_out_seeds": _held_out(t), "panoramas": sorted(p.name for p in Path(hdri).glob("*.hdr")) if hdri else [],
-            "started": "the weights before" if start else "random weights", "from": "", "skins": [], "held_out_skins": [], "notices": []}
+    data = {"seeds": _people(t), "held_out_seeds": _held_out(t),
+            "panoramas": sorted(p.name for p in Path(hdri).glob("*.hdr")) if hdri else [],
+            "started": "the weights before" if start else "random weights", "from": "", "skins": [],
+            "held_out_skins": [], "notices": []}
     if not run.growing:
         prepare(config, work, report)
     if not all(any(_path(work, seed).is_file() for seed in data[kind]) for kind in ("seeds", "held_out_seeds")):
-        raise Problem(f"There are no people in {work} yet.", "Wait for `train texels --prepare`, or train without --growing.")
-    unseen = UnfoldedPeople(data["held_out_seeds"], work, hdri).draw(2 * t["held_out"], SIDE // 2, np.random.default_rng(1))
+        raise Problem(f"There are no people in {work} yet.",
+                      "Wait for `train texels --prepare`, or train without --growing.")
+    unseen = UnfoldedPeople(data["held_out_seeds"], work,
+                            hdri).draw(2 * t["held_out"], SIDE // 2, np.random.default_rng(1))
     torch.manual_seed(t["seed"])
     network = TexelNet(**CONFIGS[config]["model"])
     if start:
         network.load_state_dict({name: value.float() for name, value in load_file(start).items()})
     state = descent.resumed(work, descent.beginning(config, data, network))
     recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
-                                    rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 200) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
-                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"], save_every=180)
+                                    rate=lambda step,
+                                    share: t["rate"] * min(1.0, (step + 1) / 200)
+                                    * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
+                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"],
+                                    save_every=180)
     objective = descent.Objective(_TexelSteps(UnfoldedPeople(data["seeds"], work, hdri), t),
                                   lambda batch, step, share: sum(losses(network, batch, device).values()),
                                   lambda average: figures(average, config, unseen, device))
@@ -161,11 +178,12 @@ def losses(network: TexelNet, batch: TexelBatch, device: str) -> dict[str, torch
     """The terms of the loss, each a scalar."""
     low = device == "cuda" or fast_dtype("cpu") == torch.bfloat16
     with torch.autocast(device, torch.bfloat16, enabled=low):
-        shading, shadow, spread = network(*(part.to(device, memory_format=torch.channels_last) for part in (batch.layers, batch.light)))
+        shading, shadow, spread = network(*(part.to(device, memory_format=torch.channels_last)
+                                            for part in (batch.layers, batch.light)))
     weight = batch.weight.to(device)
     tone, error = split_tone(shading - batch.shading.to(device), weight)
-    terms = {"shading": mean_size(error, weight), "tone": TONE * tone.abs().mean(), "slope": SLOPE * slope_error(error, weight),
-             "agreement": AGREEMENT * disagreement(error, weight)}
+    terms = {"shading": mean_size(error, weight), "tone": TONE * tone.abs().mean(),
+             "slope": SLOPE * slope_error(error, weight), "agreement": AGREEMENT * disagreement(error, weight)}
     lost = functional.binary_cross_entropy_with_logits(shadow, batch.shadow.to(device), reduction="none")
     sure = batch.shadow_weight.to(device)
     terms["shadow"] = SHADOW * (lost * sure).sum() / sure.sum().clamp_min(1)
@@ -175,7 +193,8 @@ def losses(network: TexelNet, batch: TexelBatch, device: str) -> dict[str, torch
 
 
 def bands_of(error: torch.Tensor, weight: torch.Tensor) -> list[tuple[torch.Tensor, torch.Tensor]]:
-    """The luminance's part of an error [N, 3, S, S] in each of BANDS, fine to coarse, [N, 1, h, h] of S divided by the band's texels, and their weights."""
+    """The luminance's part of an error [N, 3, S, S] in each of BANDS, fine to coarse, [N, 1, h, h] of S divided by the
+    band's texels, and their weights."""
     luminance, side, found = error.mean(1, keepdim=True), error.shape[-1], []
     for k, texels in enumerate(BANDS):
         here, base = _pooled(luminance, weight, max(1, texels * side // SIDE))
@@ -192,25 +211,30 @@ def _pooled(values: torch.Tensor, weight: torch.Tensor, by: int) -> tuple[torch.
 
 
 def _surprise(error: torch.Tensor, weight: torch.Tensor, spread: torch.Tensor) -> torch.Tensor:
-    """Negative log-likelihood [.] of errors under a Laplace distribution whose log scale is told in maps of any size."""
+    """Negative log-likelihood [.] of errors under a Laplace distribution whose log scale is told in maps of any
+    size."""
     log = functional.interpolate(spread, size=error.shape[-2:], mode="bilinear", align_corners=False)
     return ((error.abs() * torch.exp(-log) + log) * weight).sum() / weight.sum().clamp_min(1)
 
 
 @torch.no_grad()
 def figures(average: dict, config: str, batch: TexelBatch, device: str) -> dict[str, float]:
-    """The averaged network on held-out people: mean error of the log-albedo about its own mean over what was seen, beside that of the colours as they are
-    (natural log units); and by band how much better its own sizes of the error foretell it than the best constant does (nats)."""
+    """The averaged network on held-out people: mean error of the log-albedo about its own mean over what was seen,
+    beside that of the colours as they are (natural log units); and by band how much better its own sizes of the error
+    foretell it than the best constant does (nats)."""
     network = TexelNet(**CONFIGS[config]["model"])
     network.load_state_dict(average)
     network.to(device, memory_format=torch.channels_last).eval()
-    found = [network(*(part.to(device) for part in pair)) for pair in zip(batch.layers.split(4), batch.light.split(4), strict=True)]
+    found = [network(*(part.to(device) for part in pair))
+             for pair in zip(batch.layers.split(4), batch.light.split(4), strict=True)]
     shading, spread = (torch.cat([each[k].cpu() for each in found]) for k in (0, 2))
-    told = {"network": mean_deviation(shading - batch.shading, batch.weight), "none": mean_deviation(batch.shading, batch.weight)}
+    told = {"network": mean_deviation(shading - batch.shading, batch.weight),
+            "none": mean_deviation(batch.shading, batch.weight)}
     _, error = split_tone(shading - batch.shading, batch.weight)
     for k, (band, weight) in enumerate(bands_of(error, batch.weight)):
         constant = ((band.abs() * weight).sum() / weight.sum()).clamp_min(1e-6).log()
-        told[f"gain_{BANDS[k]}"] = (_surprise(band, weight, constant.expand(len(band), 1, 4, 4)) - _surprise(band, weight, spread[:, k:k + 1])).item()
+        told[f"gain_{BANDS[k]}"] = (_surprise(band, weight, constant.expand(len(band), 1, 4, 4))
+                                    - _surprise(band, weight, spread[:, k:k + 1])).item()
     return {name: round(float(value), 4) for name, value in told.items()}
 
 
@@ -218,16 +242,21 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from."""
     state = descent.read_state(work)
     data = state["data"]
-    told = ("Synthetic people with brows, beards and hair (core/synthetic/unfolded.py) on heads of the built-in topology, which derives from the MakeHuman "
+    told = ("Synthetic people with brows, beards and hair (core/synthetic/unfolded.py) on heads of the built-in "
+            "topology, which derives from the MakeHuman "
             "base mesh (CC0), in the head's own UVs")
     if data["panoramas"]:
         told += f"; light from procedural environments, lamps and {len(data['panoramas'])} panoramas (CC0)"
-    what = ("held-out people at half the maps' side: mean error of the log-albedo about its own mean over what was seen (natural log), beside that of the "
-            "colours as they are; gain_N: nats by which its own sizes of the error in bands of N texels foretell it better than the best constant")
+    what = ("held-out people at half the maps' side: mean error of the log-albedo about its own mean over what was "
+            "seen (natural log), beside that of the "
+            "colours as they are; gain_N: nats by which its own sizes of the error in bands of N texels foretell it "
+            "better than the best constant")
     command = again("texels", state) + (" --hdri hdri" if data["panoramas"] else "")
     ready = sum(_path(work, seed).is_file() for seed in data["seeds"])
     more = {"panoramas": data["panoramas"], "people": ready, "started": data["started"]}
-    return release(out, state, TrainingCard(CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what}, more))
+    return release(out, state,
+                   TrainingCard(CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what},
+                                more))
 
 
 class _TexelSteps(Dataset):
@@ -243,13 +272,15 @@ class _TexelSteps(Dataset):
         torch.set_num_threads(1)
         rng = np.random.default_rng([self.t["seed"], step])
         fine = step % self.t["fine_every"] == self.t["fine_every"] - 1
-        batch = self.people.draw(max(1, self.t["pairs"] // 2) if fine else self.t["pairs"], SIDE if fine else SIDE // 2, rng)
+        batch = self.people.draw(max(1, self.t["pairs"] // 2) if fine else self.t["pairs"], SIDE if fine else SIDE // 2,
+                                 rng)
         return mirrored(batch) if step % 2 else batch
 
 
 def _people(t: dict) -> list[int]:
     """Seeds of the people to learn from."""
-    return [seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * t["people"]) if seed not in reserved_seeds()][:t["people"]]
+    return [seed for seed in range(FIRST_SEED, FIRST_SEED + 2 * t["people"])
+            if seed not in reserved_seeds()][:t["people"]]
 
 
 def _held_out(t: dict) -> list[int]:
@@ -268,7 +299,8 @@ def _prepare_one(job: tuple[int, Path]) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     options = command_line.parser("texels", __doc__, CONFIGS, WEIGHTS)
-    options.add_argument("--hdri", type=Path, metavar="FOLDER", help="panoramas whose licence lets weights trained with them be shipped")
+    options.add_argument("--hdri", type=Path, metavar="FOLDER",
+                         help="panoramas whose licence lets weights trained with them be shipped")
     options.add_argument("--start", type=Path, metavar="FILE", help="weights to begin with, in place of random ones")
     options.add_argument("--growing", action="store_true", help="train on the people that are there already")
     options.add_argument("--prepare", action="store_true", help="make the people and stop")

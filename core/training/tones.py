@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the skin tone's estimate knows of people and of cameras: the tones of simulated subjects of all groups alike, and what phones make of them.
+"""What the skin tone's estimate knows of people and of cameras: the tones of simulated subjects of all groups alike,
+and what phones make of them.
 
     python -m core train tones [--subjects 160] [--out FILE]
 
-writes core/weights/tones.json in some minutes, on one core, without the internet. Subjects are those of seeds from 1000 up; held-out ones begin at 9000.
+writes core/weights/tones.json in some minutes, on one core, without the internet. Subjects are those of seeds from 1000
+up; held-out ones begin at 9000.
 """
 
 from __future__ import annotations
@@ -37,9 +39,9 @@ LIGHTS = 3  # of each subject
 
 @dataclass(frozen=True)
 class LitSkin:
-    """The subject of a seed under a light. colours [N, 3]: skin on a camera whose 1 is white in unit light, its sheen included; normals [N, 3] and weight
-    [N] as `look` takes them; tone [3]: the true mean albedo of the facial skin; light [3]: of a white surface, the mean over the face; card [3]: of a white
-    surface held before the face."""
+    """The subject of a seed under a light. colours [N, 3]: skin on a camera whose 1 is white in unit light, its sheen
+    included; normals [N, 3] and weight [N] as `look` takes them; tone [3]: the true mean albedo of the facial skin;
+    light [3]: of a white surface, the mean over the face; card [3]: of a white surface held before the face."""
 
     seed: int
     colours: np.ndarray
@@ -56,19 +58,24 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=FILE)
     options = parser.parse_args(arguments)
     if not 50 <= options.subjects <= HELD_OUT_SEED - FIRST_SEED:
-        raise Problem(f"{options.subjects} subjects are too few or too many.", f"Take 50 to {HELD_OUT_SEED - FIRST_SEED}.")
+        raise Problem(f"{options.subjects} subjects are too few or too many.",
+                      f"Take 50 to {HELD_OUT_SEED - FIRST_SEED}.")
     report = Reporter("tones", print)
     scenes = []
     for seed in range(FIRST_SEED, FIRST_SEED + options.subjects):
         report.progress(seed - FIRST_SEED, options.subjects, f"subject {seed}")
         scenes += scenes_of(seed)
-    write_json(options.out, {**fitted(scenes), "licence": "GPL-3.0-or-later", "command": f"python -m core train tones --subjects {options.subjects}",
-                             "data": f"Simulated skins and lights of core/synthetic, seeds {FIRST_SEED} to {FIRST_SEED + options.subjects - 1}"})
+    write_json(options.out,
+               {**fitted(scenes), "licence": "GPL-3.0-or-later",
+                "command": f"python -m core train tones --subjects {options.subjects}",
+                "data": f"Simulated skins and lights of core/synthetic, seeds {FIRST_SEED} to "
+                        f"{FIRST_SEED + options.subjects - 1}"})
     return 0
 
 
 def scenes_of(seed: int) -> list[LitSkin]:
-    """A random subject under a few random lights, in what light reaches its head past itself, with the sheen that is on all skin."""
+    """A random subject under a few random lights, in what light reaches its head past itself, with the sheen that is on
+    all skin."""
     skin_map = make_skin(sample_parameters(seed), SIZE).diffuse
     facial = template.mask("skin", SIZE) * template.mask("face", SIZE) * (1 - template.mask("eyes", SIZE))
     tone = np.average(skin_map.reshape(-1, 3), axis=0, weights=facial.ravel())
@@ -92,21 +99,23 @@ def scenes_of(seed: int) -> list[LitSkin]:
         turned /= np.linalg.norm(turned)
         card = np.maximum((sh_basis(turned) * per_function(LAMBERT)) @ sky, 0.005) + max(turned @ sun, 0) * colour
         used = (weight > 0.05) & ~shadowed
-        found.append(LitSkin(seed, (skin_map[where] * shading + sheen)[used], normals[used], weight[used], tone, bright, card))
+        found.append(LitSkin(seed, (skin_map[where] * shading + sheen)[used], normals[used], weight[used], tone, bright,
+                             card))
     return found
 
 
 @cache
 def _head():
-    """The built-in head's texels: bool [SIZE, SIZE] of those it covers; points and unit normals [N, 3], how far the sky lights them [N, 9], its ray caster."""
+    """The built-in head's texels: bool [SIZE, SIZE] of those it covers; points and unit normals [N, 3], how far the sky
+    lights them [N, 9], its ray caster."""
     mesh = template.load()
     face, bary = raster.rasterize_uv(mesh, SIZE)
     where = face >= 0
     face, bary = face[where], bary[where]
     normals = raster.interpolate(meshes.vertex_normals(mesh), mesh.faces, face, bary)
     normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-    return (where, raster.interpolate(mesh.vertices, mesh.faces, face, bary), normals, raster.interpolate(light.sky_transfer(), mesh.faces, face, bary),
-            raster.RayCaster(mesh))
+    return (where, raster.interpolate(mesh.vertices, mesh.faces, face, bary), normals,
+            raster.interpolate(light.sky_transfer(), mesh.faces, face, bary), raster.RayCaster(mesh))
 
 
 def photographed(shown: LitSkin, rng: np.random.Generator) -> tuple[Look, np.ndarray]:
@@ -124,25 +133,27 @@ def fitted(scenes: list[LitSkin]) -> dict:
     for each in scenes:
         for phone in range(PHONES):
             taken, card = photographed(each, np.random.default_rng([len(true), phone, 32]))
-            best, surroundings, front, white, tone = coordinates(np.stack([taken.best, taken.surroundings, taken.front, card, each.tone + SHEEN]))
+            best, surroundings, front, white, tone = coordinates(np.stack([taken.best, taken.surroundings, taken.front,
+                                                                           card, each.tone + SHEEN]))
             true.append(tone)
             shown.append(np.concatenate([best, surroundings, front - white]))
     system = np.concatenate([true, np.ones((len(true), 1))], 1)
     solution = np.linalg.lstsq(system, np.array(shown), rcond=None)[0]
     subjects = scenes[::LIGHTS]
-    result = {"tones": np.concatenate([[each.tone for each in subjects], beyond(subjects)]), "slope": solution[:3].T, "offset": solution[3],
-              "covariance": np.cov((np.array(shown) - system @ solution).T)}
+    result = {"tones": np.concatenate([[each.tone for each in subjects], beyond(subjects)]), "slope": solution[:3].T,
+              "offset": solution[3], "covariance": np.cov((np.array(shown) - system @ solution).T)}
     return {name: np.round(values, 5).tolist() for name, values in result.items()}
 
 
 def beyond(scenes: list[LitSkin]) -> np.ndarray:
-    """Tones [K, 3] a little lighter and darker than the outermost subjects', by their melanin: else the ends of the population would be drawn inwards."""
+    """Tones [K, 3] a little lighter and darker than the outermost subjects', by their melanin: else the ends of the
+    population would be drawn inwards."""
     found = []
     for each in scenes:
         subject, angle = sample_parameters(each.seed), float(pigment.typology_angle(each.tone))
         factor = 0.45 if angle > 42 else 1.8 if angle < -38 else None
         if factor is not None:
-            now, then = pigment.reflectance(subject.melanin * np.array([1, factor]), np.full(2, subject.blood), subject.oxygen, subject.scattering,
-                                            subject.slope, subject.chroma)
+            now, then = pigment.reflectance(subject.melanin * np.array([1, factor]), np.full(2, subject.blood),
+                                            subject.oxygen, subject.scattering, subject.slope, subject.chroma)
             found.append(np.clip(each.tone * then / now, 1e-3, 0.95))
     return np.array(found).reshape(-1, 3)

@@ -3,7 +3,8 @@
 """Trains the network that enlarges the solved maps four times (paper, supplement "Super-Resolution Network").
 
     python -m core train upscaler --config cpu|gpu|paper [--minutes 70] [--work DIR]
-    python -m core train upscaler --export [--work DIR] [--out FILE]      write the running training's averaged weights now
+    python -m core train upscaler --export [--work DIR] [--out FILE]      write the running training's averaged weights
+    now
 
 Needs neither Blender nor the internet. A second run goes on where the first was killed.
 """
@@ -29,20 +30,27 @@ from .release import TrainingCard, again, release
 
 _MODEL = {"groups": 5, "blocks": 10, "width": 64}
 CONFIGS = {
-    "cpu": {"model": _MODEL, "training": {"patch": 48, "batch": 8, "rate": 8e-4, "minutes": 70, "skins": 32, "views": 3, "held_out": 6, "seed": 0,
-                                          "workers": 0}},
-    "gpu": {"model": _MODEL, "training": {"patch": 48, "batch": 32, "rate": 5e-4, "minutes": 20, "skins": 96, "views": 4, "held_out": 6, "seed": 0,
-                                          "workers": 12}},
+    "cpu": {"model": _MODEL,
+            "training": {"patch": 48, "batch": 8, "rate": 8e-4, "minutes": 70, "skins": 32, "views": 3, "held_out": 6,
+                         "seed": 0,
+                         "workers": 0}},
+    "gpu": {"model": _MODEL,
+            "training": {"patch": 48, "batch": 32, "rate": 5e-4, "minutes": 20, "skins": 96, "views": 4, "held_out": 6,
+                         "seed": 0,
+                         "workers": 12}},
     "paper": {"model": {"groups": 10, "blocks": 20, "width": 64},
-              "training": {"patch": 48, "batch": 16, "rate": 2e-4, "minutes": 600, "skins": 160, "views": 6, "held_out": 6, "seed": 0, "workers": 12}},
+              "training": {"patch": 48, "batch": 16, "rate": 2e-4, "minutes": 600, "skins": 160, "views": 6,
+                           "held_out": 6, "seed": 0, "workers": 12}},
 }
-"""`views` windows of each of `skins` subjects. `paper` has the size of the paper's network; nothing of ours was trained with it."""
+"""`views` windows of each of `skins` subjects. `paper` has the size of the paper's network; nothing of ours was trained
+with it."""
 GROWTH = ((0.0, 2), (0.3, 5), (0.6, None))
-"""From which share of the time on how many blocks of each group take part: a shallow network learns most of what there is at a fraction of the cost, and
-new blocks begin as the identity (progressive stacking, Gong et al. 2019)."""
+"""From which share of the time on how many blocks of each group take part: a shallow network learns most of what there
+is at a fraction of the cost, and new blocks begin as the identity (progressive stacking, Gong et al. 2019)."""
 
 KEPT = 3
-"""Blocks of each group that are shipped: the first two learn first, and those that were added as the identity change little."""
+"""Blocks of each group that are shipped: the first two learn first, and those that were added as the identity change
+little."""
 
 
 def train_upscaler(config: str, out: Path, report: Reporter, run: descent.TrainingRun) -> dict:
@@ -70,7 +78,8 @@ def train_upscaler(config: str, out: Path, report: Reporter, run: descent.Traini
     data = named_data(t, None, [])
     for seeds in (data["seeds"], data["held_out_seeds"]):
         prepare(seeds, t["views"], work, report, max(2, t["workers"]))
-    held_out = FineWindows(data["held_out_seeds"], t["views"], work).draw(4 * t["held_out"], t["patch"], np.random.default_rng(1))
+    held_out = FineWindows(data["held_out_seeds"], t["views"],
+                           work).draw(4 * t["held_out"], t["patch"], np.random.default_rng(1))
     torch.manual_seed(t["seed"])
     network = Rcan(**CONFIGS[config]["model"])
     state = descent.resumed(work, descent.beginning(config, data, network))
@@ -79,8 +88,11 @@ def train_upscaler(config: str, out: Path, report: Reporter, run: descent.Traini
         return _error(network, batch, device, max(growth for growth in GROWTH if growth[0] <= share)[1]).mean()
 
     recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
-                                    rate=lambda step, share: t["rate"] * min(1.0, (step + 1) / 100) * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
-                                    betas=(0.9, 0.99), weight_decay=1e-4, averaging=0.995, workers=t["workers"], save_every=180)
+                                    rate=lambda step,
+                                    share: t["rate"] * min(1.0, (step + 1) / 100)
+                                    * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
+                                    betas=(0.9, 0.99), weight_decay=1e-4, averaging=0.995, workers=t["workers"],
+                                    save_every=180)
     objective = descent.Objective(_UpscalerSteps(FineWindows(data["seeds"], t["views"], work), t), loss,
                                   lambda average: figures(average, config, held_out, device))
     descent.descend(network, state, objective, recipe, work, device, report)
@@ -98,7 +110,8 @@ def _error(network: Rcan, pairs: tuple[torch.Tensor, torch.Tensor], device: str,
 
 @torch.no_grad()
 def figures(average: dict, config: str, pairs: tuple[torch.Tensor, torch.Tensor], device: str) -> dict[str, float]:
-    """The averaged network's mean absolute error on held-out patches as a share of bicubic resampling's: diffuse, normal, specular."""
+    """The averaged network's mean absolute error on held-out patches as a share of bicubic resampling's: diffuse,
+    normal, specular."""
     network = Rcan(**CONFIGS[config]["model"]).to(device, memory_format=torch.channels_last)
     network.load_state_dict(average)
     parts = [tuple(x[i:i + 4] for x in pairs) for i in range(0, len(pairs[0]), 4)]
@@ -112,15 +125,23 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from."""
     state = descent.read_state(work)
     config = CONFIGS[state["config"]]
-    state, config = state | {"average": shallow(state["average"], KEPT)}, config | {"model": config["model"] | {"blocks": min(KEPT, config["model"]["blocks"])}}
-    told = "Windows of procedural skins of core/synthetic at 4096 on the built-in head, which derives from the MakeHuman base mesh (CC0)"
-    what = "mean absolute error on degraded patches of held-out skins, as a share of bicubic resampling's, with all blocks that were trained"
-    return release(out, state, TrainingCard(config, told, again("upscaler", state), {**state["history"][-1][2], "what": what}, {"growth": GROWTH}))
+    state, config = (
+        state | {"average": shallow(state["average"], KEPT)},
+        config | {"model": config["model"] | {"blocks": min(KEPT, config["model"]["blocks"])}},
+    )
+    told = ("Windows of procedural skins of core/synthetic at 4096 on the built-in head, which derives from the "
+            "MakeHuman base mesh (CC0)")
+    what = ("mean absolute error on degraded patches of held-out skins, as a share of bicubic resampling's, with all "
+            "blocks that were trained")
+    return release(out, state,
+                   TrainingCard(config, told, again("upscaler", state), {**state["history"][-1][2], "what": what},
+                                {"growth": GROWTH}))
 
 
 def shallow(weights: dict[str, torch.Tensor], blocks: int) -> dict[str, torch.Tensor]:
     """A network's weights without the blocks of each group beyond the first `blocks`."""
-    return {name: value for name, value in weights.items() if not (name.startswith("groups.") and int(name.split(".")[2]) >= blocks)}
+    return {name: value for name, value in weights.items()
+            if not (name.startswith("groups.") and int(name.split(".")[2]) >= blocks)}
 
 
 class _UpscalerSteps(Dataset):
@@ -130,7 +151,8 @@ class _UpscalerSteps(Dataset):
         self.windows, self.options = windows, options
 
     def __getitem__(self, step: int) -> tuple[torch.Tensor, torch.Tensor]:
-        return self.windows.draw(self.options["batch"], self.options["patch"], np.random.default_rng((self.options["seed"], step)))
+        return self.windows.draw(self.options["batch"], self.options["patch"],
+                                 np.random.default_rng((self.options["seed"], step)))
 
 
 def main(arguments: list[str] | None = None) -> int:

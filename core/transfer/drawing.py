@@ -18,7 +18,8 @@ def own_map(capture: Capture, number: int, srgb: np.ndarray, side: int = 512) ->
     images.write_srgb(capture.picture("transfer", f"own_{number}"), images.resize(srgb, side, side))
 
 
-def scan_sheet(capture: Capture, mesh: Mesh, colours: np.ndarray, albedo: np.ndarray, views: list[View], height: int = 420) -> None:
+def scan_sheet(capture: Capture, mesh: Mesh, colours: np.ndarray, albedo: np.ndarray, views: list[View],
+               height: int = 420) -> None:
     """A frame, and the textured scan through the same camera: lit, then albedo; both linear maps [S, S, 3]."""
     around = sorted(views, key=lambda view: abs(np.arctan2(view.centre[0], -view.centre[1])))
     view = around[0]
@@ -27,7 +28,8 @@ def scan_sheet(capture: Capture, mesh: Mesh, colours: np.ndarray, albedo: np.nda
     shots = [images.resize(frame, width, height)]
     caster = raster.RayCaster(mesh)
     for texture in (colours, albedo):
-        shots.append(images.resize(images.linear_to_srgb(textured(caster, texture, view, height / view.height)), width, height))
+        shots.append(images.resize(images.linear_to_srgb(textured(caster, texture, view, height / view.height)), width,
+                                   height))
     images.write_srgb(capture.picture("transfer", "scan"), np.hstack(shots))
 
 

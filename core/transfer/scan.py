@@ -24,7 +24,8 @@ LEAST_PART = 0.02
 STEP_M = 0.003
 """How far behind what a view saw a point may lie and still count as seen: the scan's noise."""
 SHARPNESS = 6
-"""Power of the cosine between a view and the surface: the view that looks squarely wins, its neighbours hide the borders."""
+"""Power of the cosine between a view and the surface: the view that looks squarely wins, its neighbours hide the
+borders."""
 FAR_M = 0.010
 """Farthest that head and scan may lie apart for one to speak of the other."""
 FADE_PX = 6
@@ -32,7 +33,8 @@ FADE_PX = 6
 
 
 def reduced(scan: Mesh, cell: float) -> Mesh:
-    """The scan with about one vertex per cube of side `cell` (metres): the mean of those in it (vertex clustering, Rossignac and Borrel 1993).
+    """The scan with about one vertex per cube of side `cell` (metres): the mean of those in it (vertex clustering,
+    Rossignac and Borrel 1993).
 
     What a scan's own noise allows, in a tenth of a second; floaters are dropped.
     """
@@ -44,38 +46,46 @@ def reduced(scan: Mesh, cell: float) -> Mesh:
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(1)]
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
     faces = _two_sided(vertices, faces[np.sort(first)])
-    label = trimesh.graph.connected_component_labels(trimesh.graph.face_adjacency(faces), len(faces))  # across edges: what hangs by a corner is a floater
+    # across edges: what hangs by a corner is a floater
+    label = trimesh.graph.connected_component_labels(trimesh.graph.face_adjacency(faces), len(faces))
     faces = faces[np.bincount(label)[label] >= LEAST_PART * len(faces)]
     used, index = np.unique(faces, return_inverse=True)
     return Mesh(vertices[used], index.reshape(-1, 3))
 
 
 def _two_sided(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """The triangles without those that make an edge of more than two: fins first, where sheets of the scan were pressed into one, then the smallest."""
-    area = np.linalg.norm(np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]]), axis=1)
+    """The triangles without those that make an edge of more than two: fins first, where sheets of the scan were pressed
+    into one, then the smallest."""
+    area = np.linalg.norm(np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]],
+                                   vertices[faces[:, 2]] - vertices[faces[:, 0]]), axis=1)
     while True:
-        _, edge, uses = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_inverse=True, return_counts=True)
+        _, edge, uses = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0,
+                                  return_inverse=True, return_counts=True)
         of = uses[edge.ravel()].reshape(-1, 3)
         crowded = (of > 2).any(1)
         if not crowded.any():
             return faces
         order = np.lexsort((area, -(of == 1).sum(1)))
         order = order[crowded[order]]
-        _, worst = np.unique(np.where(of > 2, edge.reshape(-1, 3), -1).max(1)[order], return_index=True)  # one triangle per edge and round
+        # one triangle per edge and round
+        _, worst = np.unique(np.where(of > 2, edge.reshape(-1, 3), -1).max(1)[order], return_index=True)
         keep = np.ones(len(faces), bool)
         keep[order[worst]] = False
         faces, area = faces[keep], area[keep]
 
 
 def lit(scan: Mesh, at: TexelPartners, views: list[View], tick: Callable[[float], None]) -> np.ndarray:
-    """Linear colours [S, S, 3] of the unwrapped scan as the views show them, zero where none does. `at` gives the covered texels."""
+    """Linear colours [S, S, 3] of the unwrapped scan as the views show them, zero where none does. `at` gives the
+    covered texels."""
     size = len(at.covered)
     face, bary = raster.rasterize_uv(scan, size)
     points = raster.interpolate(scan.vertices, scan.faces, face[at.covered], bary[at.covered]).astype(np.float32)
-    normals = raster.interpolate(vertex_normals(scan), scan.faces, face[at.covered], bary[at.covered]).astype(np.float32)
+    normals = raster.interpolate(vertex_normals(scan), scan.faces, face[at.covered],
+                                 bary[at.covered]).astype(np.float32)
     del face, bary
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-    caster, total, weights = raster.RayCaster(scan), np.zeros((len(points), 3), np.float32), np.zeros(len(points), np.float32)
+    caster, total, weights = raster.RayCaster(scan), np.zeros((len(points), 3),
+                                                              np.float32), np.zeros(len(points), np.float32)
     for i, view in enumerate(views):
         tick(i / len(views))
         scale = min(1.0, 640 / max(view.width, view.height))
@@ -92,7 +102,10 @@ def lit(scan: Mesh, at: TexelPartners, views: list[View], tick: Callable[[float]
         looked, pixels = looked[seen], pixels[seen]
         picture = images.read_linear(view.path)
         weight = (cosine[looked] ** SHARPNESS).astype(np.float32)
-        total[looked] += weight[:, None] * raster.sample(picture, pixels * [picture.shape[1] / view.width, picture.shape[0] / view.height])
+        total[looked] += weight[:, None] * raster.sample(picture,
+                                                         pixels
+                                                         * [picture.shape[1] / view.width,
+                                                            picture.shape[0] / view.height])
         weights[looked] += weight
     colours = np.zeros((size, size, 3), np.float32)
     colours[at.covered] = total / np.maximum(weights, 1e-9)[:, None]
@@ -100,7 +113,8 @@ def lit(scan: Mesh, at: TexelPartners, views: list[View], tick: Callable[[float]
 
 
 def continued(albedo: np.ndarray, lit_map: np.ndarray, at: TexelPartners) -> np.ndarray:
-    """The albedo [S, S, 3] where the head's maps reach; elsewhere the colours as filmed, times the gain per channel that makes both meet."""
+    """The albedo [S, S, 3] where the head's maps reach; elsewhere the colours as filmed, times the gain per channel
+    that makes both meet."""
     seen = lit_map.max(2) > 0
     both = at.known & seen & (lit_map.min(2) > 0.01)
     if not both.any():
@@ -110,7 +124,8 @@ def continued(albedo: np.ndarray, lit_map: np.ndarray, at: TexelPartners) -> np.
 
 
 def displacement(head: Mesh, scan: Mesh, size: int, tick: Callable[[float], None]) -> np.ndarray:
-    """How far the scan lies outside the head, along the head's normals, in metres: float32 [S, S] in the head's UVs; zero where there is no scan."""
+    """How far the scan lies outside the head, along the head's normals, in metres: float32 [S, S] in the head's UVs;
+    zero where there is no scan."""
     surface, normals = surfaces.Surface(scan, 0.01), vertex_normals(head)
     out, known = np.zeros((size, size), np.float32), np.zeros((size, size), bool)
     for row in range(0, size, STRIP_ROWS):

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stage upscale: maps/ becomes maps_4k/, the same names at settings.upscale.size, the head completed; with masks of hair, the skin
-below it, and single hairs.
+"""Stage upscale: maps/ becomes maps_4k/, the same names at settings.upscale.size, the head completed; with masks of
+hair, the skin below it, and single hairs.
 
-Albedo, normals and specular are enlarged by a network, or by Lanczos resampling, which adds no detail; light and confidence by resampling.
+Albedo, normals and specular are enlarged by a network, or by Lanczos resampling, which adds no detail; light and
+confidence by resampling.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from .surface import lay_out
 from .whole_head import complete
 
 STRIP = 256
-"""Rows that are worked on at once: a whole 4096 map in float32 is 200 MB, and each operation on it would make another."""
+"""Rows that are worked on at once: a whole 4096 map in float32 is 200 MB, and each operation on it would make
+another."""
 WRITERS = 2
 """Maps that are encoded at once: each takes 0.5 GB meanwhile."""
 CROP = 0.12
@@ -48,18 +50,25 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.figure("specular_mean", round(gloss.on_cheeks_and_forehead(maps.specular, maps.confidence), 4))
     maps, found, hairs = _whole(capture, maps, settings, report)
     share = SHARES[method]
-    large = enlarged(maps, size, method, settings.compute_device, lambda done: report.progress(share * done, 1, "enlarging"))
+    large = enlarged(maps, size, method, settings.compute_device,
+                     lambda done: report.progress(share * done, 1, "enlarging"))
     with replacing_folder(capture.maps_4k) as folder:
         srgb = large[..., :3]
         if guided:
             texture = len(images.read_mask(capture.texture_confidence))
-            detail.guide(srgb, images.read_data(capture.texture_detail), texture, lambda done: report.progress(share, 1, "fine detail"))
+            detail.guide(srgb, images.read_data(capture.texture_detail), texture,
+                         lambda done: report.progress(share, 1, "fine detail"))
         _picture(capture, srgb)
         _write_together([
             lambda: images.write_srgb(folder / "diffuse_albedo.png", srgb, bits=16, check=report.check),
-            lambda: images.write_data(folder / "normal.png", _mapped(large[..., 3:6], lambda vectors: vectors * 0.5 + 0.5), bits=16, check=report.check),
-            *([] if found is None else [lambda: hair.write(folder, srgb, *found, report.check), lambda: grooming.write(folder / STRANDS, hairs)]),
-            lambda: images.write_linear(folder / "diffuse_albedo.exr", _mapped(srgb, images.srgb_to_linear), check=report.check),
+            lambda: images.write_data(folder / "normal.png",
+                                      _mapped(large[..., 3:6], lambda vectors: vectors * 0.5 + 0.5), bits=16,
+                                      check=report.check),
+            *([] if found is None
+              else [lambda: hair.write(folder, srgb, *found, report.check),
+                    lambda: grooming.write(folder / STRANDS, hairs)]),
+            lambda: images.write_linear(folder / "diffuse_albedo.exr", _mapped(srgb, images.srgb_to_linear),
+                                        check=report.check),
             lambda: images.write_data(folder / "specular_albedo.png", large[..., 6], bits=16, check=report.check),
             lambda: images.write_data(folder / "confidence.png", _resampled(maps.confidence, size), check=report.check),
             lambda: images.write_linear(folder / "shading.exr", _resampled(maps.shading, size), check=report.check),
@@ -67,8 +76,10 @@ def run(capture: Capture, settings: Settings, report: Reporter) -> None:
     report.progress(1, 1)
 
 
-def _whole(capture: Capture, maps: HeadMaps, settings: Settings, report: Reporter) -> tuple[HeadMaps, tuple | None, dict[str, Strands]]:
-    """The maps of the whole head; the hair's masks, the albedo without it and where that differs, or None where they are not asked for; single hairs."""
+def _whole(capture: Capture, maps: HeadMaps, settings: Settings,
+           report: Reporter) -> tuple[HeadMaps, tuple | None, dict[str, Strands]]:
+    """The maps of the whole head; the hair's masks, the albedo without it and where that differs, or None where they
+    are not asked for; single hairs."""
     options = settings.upscale
     if not (options.whole_head or options.hair):
         return maps, None, {}
@@ -77,7 +88,8 @@ def _whole(capture: Capture, maps: HeadMaps, settings: Settings, report: Reporte
     if options.whole_head:
         report.progress(0, 1, "completing neck, ears and scalp")
         seen, maps = maps, complete(maps, surface, report, settings.seed)
-        images.write_srgb(capture.picture("upscale", "before_and_after_completion"), drawing.turned(surface, [seen, maps]))
+        images.write_srgb(capture.picture("upscale", "before_and_after_completion"),
+                          drawing.turned(surface, [seen, maps]))
     if not options.hair:
         return maps, None, {}
     report.progress(0, 1, "finding brows, lashes and beard")
@@ -91,7 +103,8 @@ def _whole(capture: Capture, maps: HeadMaps, settings: Settings, report: Reporte
     behind = round(100 * float((found.hidden * found.brows).sum() / max(found.brows.sum(), 1e-6)))
     if behind:
         report.figure("brows_hidden_percent", behind)
-        report.log(f"Hair lies before {behind} % of the brows: there they are grown like the other side, or as brows usually are.")
+        report.log(f"Hair lies before {behind} % of the brows: there they are grown like the other side, or as brows "
+                   "usually are.")
     images.write_srgb(capture.picture("upscale", "albedo_hair_skin_below"), drawing.masks(maps.diffuse, found, cleaned))
     report.progress(0, 1, "growing hair")
     hairs = grooming.groom(maps, found, cleaned, surface, settings.seed, check=report.check)
@@ -122,19 +135,22 @@ def _joined(diffuse: np.ndarray, normal: np.ndarray, specular: np.ndarray, size:
     joined[..., 3:6] = _resampled(normal, size)
     progress(1.0)
     _by_strips(joined[..., :3], images.linear_to_srgb)
-    _by_strips(joined[..., 3:6], lambda vectors: vectors / np.maximum(np.linalg.norm(vectors, axis=2, keepdims=True), 1e-6))
+    _by_strips(joined[..., 3:6],
+               lambda vectors: vectors / np.maximum(np.linalg.norm(vectors, axis=2, keepdims=True), 1e-6))
     return joined
 
 
 def _resampled(image: np.ndarray, size: int) -> np.ndarray:
-    """[H, W(, C)] -> [size, size(, C)], within the range of `image`: Lanczos overshoots at hard edges, and no albedo is negative."""
+    """[H, W(, C)] -> [size, size(, C)], within the range of `image`: Lanczos overshoots at hard edges, and no albedo is
+    negative."""
     if image.shape[:2] == (size, size):
         return image
     return np.clip(images.resize(image, size, size), image.min(), image.max())
 
 
 def _write_together(writes: list[Callable[[], None]], tick: Callable[[float], None]) -> None:
-    """Runs all of them, WRITERS at a time. `tick` hears the share done several times a second, and may raise to cancel, as each of them may."""
+    """Runs all of them, WRITERS at a time. `tick` hears the share done several times a second, and may raise to cancel,
+    as each of them may."""
     with ThreadPoolExecutor(WRITERS) as pool:
         running = [pool.submit(write) for write in writes]
         try:

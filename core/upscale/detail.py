@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The frames' own fine detail in the enlarged albedo: where the views agreed on a band of it, that band takes the place of what was made up."""
+"""The frames' own fine detail in the enlarged albedo: where the views agreed on a band of it, that band takes the place
+of what was made up."""
 
 from __future__ import annotations
 
@@ -17,8 +18,8 @@ COARSE = 1.0
 
 
 def guide(srgb: np.ndarray, detail: np.ndarray, texture: int, progress: Callable[[float], None]) -> None:
-    """Puts `detail` [D, D, 2] (band of log luminance, already multiplied by the share of it that is certain, and that share) into an albedo, sRGB
-    [S, S, 3], in place. `texture`: side of the texture that the band is finer than."""
+    """Puts `detail` [D, D, 2] (band of log luminance, already multiplied by the share of it that is certain, and that
+    share) into an albedo, sRGB [S, S, 3], in place. `texture`: side of the texture that the band is finer than."""
     size = len(srgb)
     sigma = COARSE * size / texture
     detail = cv2.resize(detail, (size, size), interpolation=cv2.INTER_LINEAR if len(detail) <= size else cv2.INTER_AREA)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The report's pictures of the whole head and of the hair: the head from where no camera stood, and the masks on the albedo."""
+"""The report's pictures of the whole head and of the hair: the head from where no camera stood, and the masks on the
+albedo."""
 
 from __future__ import annotations
 
@@ -27,7 +28,11 @@ FACE = 0.04, 0.96  # rows and columns of the map that the face fills
 
 def turned(surface: HeadSurface, several: list[HeadMaps], side: int = 240) -> np.ndarray:
     """sRGB picture: a row for each of `several`, the head from SIDES under three lamps."""
-    caster, normals, tangent = raster.RayCaster(surface.mesh), vertex_normals(surface.mesh), surfaces.tangents(surface.mesh)
+    caster, normals, tangent = (
+        raster.RayCaster(surface.mesh),
+        vertex_normals(surface.mesh),
+        surfaces.tangents(surface.mesh),
+    )
     columns = []
     for direction in SIDES.values():
         towards, right, up = _axes(direction)
@@ -49,14 +54,16 @@ def turned(surface: HeadSurface, several: list[HeadMaps], side: int = 240) -> np
 
 
 def masks(diffuse: np.ndarray, hair: Hair, cleaned: np.ndarray, side: int = 400) -> np.ndarray:
-    """sRGB picture of the face: the albedo, the same with brows red, lashes green and beard blue, and the skin below."""
+    """sRGB picture of the face: the albedo, the same with brows red, lashes green and beard blue, and the skin
+    below."""
     tinted = images.linear_to_srgb(diffuse) * 0.6
     for name, tint in TINTS.items():
         cover = getattr(hair, name)[..., None]
         tinted = tinted * (1 - cover) + np.float32(tint) * cover
     first, last = (round(share * len(diffuse)) for share in FACE)
     inner = np.s_[first:last, first:last]
-    return np.hstack([images.resize(picture[inner], side, side) for picture in (images.linear_to_srgb(diffuse), tinted, images.linear_to_srgb(cleaned))])
+    return np.hstack([images.resize(picture[inner], side, side)
+                      for picture in (images.linear_to_srgb(diffuse), tinted, images.linear_to_srgb(cleaned))])
 
 
 def _axes(direction) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -68,7 +75,8 @@ def _axes(direction) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _lit(maps: HeadMaps, texel: np.ndarray, axes, eye) -> np.ndarray:
-    """Linear colours [N, 3] at texels [N, 2] (x, y) with tangent frames `axes`: Lambert, and Blinn's highlights (a picture, not a measurement)."""
+    """Linear colours [N, 3] at texels [N, 2] (x, y) with tangent frames `axes`: Lambert, and Blinn's highlights (a
+    picture, not a measurement)."""
     albedo, tilted, level = (raster.sample(picture, texel) for picture in (maps.diffuse, maps.normal, maps.specular))
     normal = sum(tilted[:, i:i + 1] * axis for i, axis in enumerate(axes))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)

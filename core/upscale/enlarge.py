@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The maps through the network, exactly: the body on the whole map, because its attention looks at all of it, the tail in strips with what they read around
-them. Without strips the tail's features at 4096 alone would be 4 GB."""
+"""The maps through the network, exactly: the body on the whole map, because its attention looks at all of it, the tail
+in strips with what they read around them. Without strips the tail's features at 4096 alone would be 4 GB."""
 
 from __future__ import annotations
 
@@ -27,8 +27,10 @@ STRIP = 64
 
 
 @torch.no_grad()
-def enlarge(maps: HeadMaps, progress: Callable[[float], None], device: str = "cpu", network: Rcan | None = None) -> np.ndarray:
-    """Diffuse (sRGB), unit normal and specular of `maps` [S, S], four times as large: float32 [4S, 4S, 7]. `progress` hears the share done."""
+def enlarge(maps: HeadMaps, progress: Callable[[float], None], device: str = "cpu",
+            network: Rcan | None = None) -> np.ndarray:
+    """Diffuse (sRGB), unit normal and specular of `maps` [S, S], four times as large: float32 [4S, 4S, 7]. `progress`
+    hears the share done."""
     network = network or load_network()
     network = network.to(device, memory_format=torch.channels_last)
     small = channels_of(maps).to(device, memory_format=torch.channels_last)
@@ -38,14 +40,16 @@ def enlarge(maps: HeadMaps, progress: Callable[[float], None], device: str = "cp
         features = network.features(small, tick=lambda share: progress(0.75 * share))
         for row in range(0, height, STRIP):
             rows = slice(row, min(row + STRIP, height))
-            large[FACTOR * rows.start:FACTOR * rows.stop] = _strip(network, small, features, rows).permute(1, 2, 0).cpu().numpy()
+            large[FACTOR * rows.start:FACTOR
+                  * rows.stop] = _strip(network, small, features, rows).permute(1, 2, 0).cpu().numpy()
             progress(0.75 + 0.25 * rows.stop / height)
     return large
 
 
 def channels_of(maps: HeadMaps) -> torch.Tensor:
     """What the network reads: [1, 7, S, S]."""
-    stacked = np.concatenate([images.linear_to_srgb(np.clip(maps.diffuse, 0, 1)), maps.normal, maps.specular[..., None]], -1)
+    stacked = np.concatenate([images.linear_to_srgb(np.clip(maps.diffuse, 0, 1)), maps.normal,
+                              maps.specular[..., None]], -1)
     return torch.from_numpy(np.ascontiguousarray(stacked.transpose(2, 0, 1), np.float32))[None]
 
 
@@ -54,7 +58,8 @@ def load_network(path: Path = WEIGHTS) -> Rcan:
     """The shipped network. Raises Problem where its files are missing."""
     card = Path(path).with_suffix(".json")
     if not (Path(path).is_file() and card.is_file()):
-        raise Problem(f"The upscaler's weights are missing ({Path(path).name}).", "Install the extension again, or choose Lanczos as the way to enlarge.")
+        raise Problem(f"The upscaler's weights are missing ({Path(path).name}).",
+                      "Install the extension again, or choose Lanczos as the way to enlarge.")
     shipped_files.require_whole(path)
     network = Rcan(**json.loads(card.read_text(encoding="utf-8"))["model"])
     network.load_state_dict({name: value.float() for name, value in load_file(path).items()})

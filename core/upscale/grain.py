@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pores and mottling like those of the solved skin, where no camera saw any: their strength and their colours are measured band by band on the skin that
-was seen, and noise of the same bands is painted at points in space, so that no UV seam shows.
+"""Pores and mottling like those of the solved skin, where no camera saw any: their strength and their colours are
+measured band by band on the skin that was seen, and noise of the same bands is painted at points in space, so that no
+UV seam shows.
 
 Colour, gloss and height share one noise where they go together on the solved skin.
 """
@@ -20,8 +21,8 @@ from .surface import HeadSurface
 SIGMAS = (0.24, 0.48, 0.96, 1.92)
 """mm; the bands lie between them, the first one below the first."""
 WAVELENGTHS = (0.55, 1.1, 2.2, 4.4)
-"""mm; of the noises that are mixed, one for each band. What is larger differs from place to place for a reason (blood, bone, light) and is left to the tone:
-repeated as noise it looks like a stain."""
+"""mm; of the noises that are mixed, one for each band. What is larger differs from place to place for a reason (blood,
+bone, light) and is left to the tone: repeated as noise it looks like a stain."""
 STEP = 0.05
 """mm between two points of whose heights a slope is taken."""
 BLUNT = 1.2
@@ -32,8 +33,8 @@ SAMPLE = 200_000
 
 @dataclass(frozen=True)
 class Grain:
-    """Per wavelength: mix [K, 4, 4], from independent noises (the first carries the most) to log albedo [3] and specular; slope [K]: height's
-    contribution to either slope of the normal; tie [K]: 1 where bright is high."""
+    """Per wavelength: mix [K, 4, 4], from independent noises (the first carries the most) to log albedo [3] and
+    specular; slope [K]: height's contribution to either slope of the normal; tie [K]: 1 where bright is high."""
 
     mix: np.ndarray
     slope: np.ndarray
@@ -41,11 +42,13 @@ class Grain:
 
 
 def measure(channels: np.ndarray, slopes: np.ndarray, weight: np.ndarray, surface: HeadSurface, seed: int = 0) -> Grain:
-    """channels [S, S, 4]: log albedo and specular; slopes [S, S, 2]: of the normal, x / z and y / z; weight [S, S]: where there is skin to learn from."""
+    """channels [S, S, 4]: log albedo and specular; slopes [S, S, 2]: of the normal, x / z and y / z; weight [S, S]:
+    where there is skin to learn from."""
     where = weight > 0.99
     texel = float(np.median(surface.texel[where])) if where.any() else 1.0
     parts = [bands(picture, weight, texel) for picture in (channels, slopes)]
-    found = [[np.cov(_clipped(band[where]), rowvar=False) if where.sum() > 100 else np.zeros((band.shape[-1],) * 2) for band in part] for part in parts]
+    found = [[np.cov(_clipped(band[where]), rowvar=False) if where.sum() > 100 else np.zeros((band.shape[-1],) * 2)
+              for band in part] for part in parts]
     answer, answer_slope = _answers(surface, where, texel, np.random.default_rng([seed, 1]))
     mix, tie = np.zeros((len(WAVELENGTHS), 4, 4)), np.ones(len(WAVELENGTHS))
     strength = np.stack([nnls(answer, [cov[i, i] for cov in found[0]])[0] for i in range(4)], 1)  # [K, 4] variances
@@ -60,7 +63,8 @@ def measure(channels: np.ndarray, slopes: np.ndarray, weight: np.ndarray, surfac
 
 
 def paint(grain: Grain, surface: HeadSurface, where: np.ndarray, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Log albedo and specular [N, 4] and slopes [N, 2] of mean 0 at the texels of bool [S, S]. The same seed paints the same head alike at any size."""
+    """Log albedo and specular [N, 4] and slopes [N, 2] of mean 0 at the texels of bool [S, S]. The same seed paints the
+    same head alike at any size."""
     points, texel = surface.position[where], surface.texel[where]
     tangent, bitangent = surface.frames(where)
     channels, slopes = np.zeros((len(points), 4), np.float32), np.zeros((len(points), 2), np.float32)
@@ -70,13 +74,15 @@ def paint(grain: Grain, surface: HeadSurface, where: np.ndarray, seed: int = 0) 
         parts = np.stack([height, *(noise(points, wavelength, _begun(seed, k, i)) for i in (1, 2, 3))], 1)
         channels += fits * (parts @ grain.mix[k].T.astype(np.float32))
         if grain.slope[k] > 0:
-            rise = [noise(points + np.float32(STEP) * way.astype(np.float32), wavelength, _begun(seed, k, 0)) - height for way in (tangent, bitangent)]
+            rise = [noise(points + np.float32(STEP) * way.astype(np.float32), wavelength, _begun(seed, k, 0)) - height
+                    for way in (tangent, bitangent)]
             slopes -= np.float32(grain.slope[k] * grain.tie[k] / STEP) * fits * np.stack(rise, 1)
     return channels, slopes
 
 
 def bands(picture: np.ndarray, weight: np.ndarray, texel: float) -> list[np.ndarray]:
-    """The bands [S, S, C] of a picture, fine to coarse, by means that count texels by their weight [S, S]; texel in mm."""
+    """The bands [S, S, C] of a picture, fine to coarse, by means that count texels by their weight [S, S]; texel in
+    mm."""
     found, finer = [], picture
     for sigma in SIGMAS:
         coarser = blurred(picture, weight, sigma / texel)
@@ -91,11 +97,14 @@ def blurred(picture: np.ndarray, weight: np.ndarray, sigma: float) -> np.ndarray
     return top / np.maximum(cv2.GaussianBlur(weight, (0, 0), max(sigma, 0.3)), 1e-4)[..., None]
 
 
-def _answers(surface: HeadSurface, where: np.ndarray, texel: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Variances [band, wavelength] that a noise of deviation 1, and the slopes of such a height, have in each band of the map."""
+def _answers(surface: HeadSurface, where: np.ndarray, texel: float,
+             rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Variances [band, wavelength] that a noise of deviation 1, and the slopes of such a height, have in each band of
+    the map."""
     rows, columns = np.nonzero(where)
     side = int(min(np.sqrt(SAMPLE), surface.size))
-    top, left = (int(np.clip(np.median(at) - side / 2, 0, surface.size - side)) if len(at) else 0 for at in (rows, columns))
+    top, left = (int(np.clip(np.median(at) - side / 2, 0, surface.size - side)) if len(at) else 0
+                 for at in (rows, columns))
     part = np.s_[top:top + side, left:left + side]
     points, inner = surface.position[part].reshape(-1, 3), np.ones((side, side), np.float32)
     there = np.zeros(surface.covered.shape, bool)

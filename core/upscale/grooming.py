@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Brows, lashes and beard as single hairs: as many as cover the skin as the masks say, along the strokes, in the hair's own colour.
+"""Brows, lashes and beard as single hairs: as many as cover the skin as the masks say, along the strokes, in the hair's
+own colour.
 
-A mask says what share of a texel hair covers. Hairs of length L and mean width w, strewn at n per mm^2, leave exp(-n L w) of the skin bare, so
-n = -log(1 - cover) / (L w).
+A mask says what share of a texel hair covers. Hairs of length L and mean width w, strewn at n per mm^2, leave exp(-n L
+w) of the skin bare, so n = -log(1 - cover) / (L w).
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ LEAST_COVER, FEWEST = 0.05, 20
 TAPER = 2 / 3
 """Mean width of a hair over that at its root: tips have a third of it (Strands)."""
 TRUST = 0.1
-"""How clear strokes must be (coherence) to outweigh the usual direction: `python -m benchmarks.groomed FOLDER --trust` chose it on three people."""
+"""How clear strokes must be (coherence) to outweigh the usual direction: `python -m benchmarks.groomed FOLDER --trust`
+chose it on three people."""
 STEPS = 6
 """Points of a hair."""
 WALK = 4
@@ -49,8 +51,8 @@ BROWN = 0.05, 0.03, 0.018
 
 @dataclass(frozen=True)
 class HairKind:
-    """Hair of one part of the face, named as in Hair. length: mean and spread in mm; diameter in mm at the root; lift: radians off the skin; most: hairs
-    per mm^2; bend: how far the skin draws it back along its length."""
+    """Hair of one part of the face, named as in Hair. length: mean and spread in mm; diameter in mm at the root; lift:
+    radians off the skin; most: hairs per mm^2; bend: how far the skin draws it back along its length."""
 
     name: str
     length: tuple[float, float]
@@ -61,7 +63,8 @@ class HairKind:
 
 
 KINDS = (HairKind("brows", (7.0, 1.3), 0.08, 0.30, 3.0, 0.35), HairKind("beard", (6.0, 1.5), 0.11, 0.45, 1.5, 0.25))
-"""Measures of usual hairs; in a mask, several can share a place. How long a beard is no texture tells: the button in Blender scales it."""
+"""Measures of usual hairs; in a mask, several can share a place. How long a beard is no texture tells: the button in
+Blender scales it."""
 LASH = {"upper": (110, 9.0), "lower": (60, 5.5)}
 """Lashes of a lid and their length in mm."""
 LASH_DIAMETER, LASH_DARKER, LASH_LIGHTEST = 0.1, 0.4, 0.05
@@ -72,8 +75,9 @@ OFF_SEAM = 0.0003
 
 def groom(maps: HeadMaps, hair: Hair, cleaned: np.ndarray, surface: HeadSurface, seed: int = 0, trust: float = TRUST,
           check: Callable[[], None] = lambda: None) -> dict[str, Strands]:
-    """The hairs of each part that has any, by its name; metres, on the head with closed lids. cleaned: linear albedo [S, S, 3] of the skin below; trust: how
-    clear strokes must be to outweigh the usual direction. `check` may raise to cancel."""
+    """The hairs of each part that has any, by its name; metres, on the head with closed lids. cleaned: linear albedo
+    [S, S, 3] of the skin below; trust: how clear strokes must be to outweigh the usual direction. `check` may raise to
+    cancel."""
     found, landmarks = {}, template.landmark_points(surface.mesh)
     for number, kind in enumerate(KINDS):
         check()
@@ -87,14 +91,17 @@ def groom(maps: HeadMaps, hair: Hair, cleaned: np.ndarray, surface: HeadSurface,
         way = strokes.choose_ways(tensors, texels, ways.usual(kind.name, texels.position, landmarks), trust)
         colours = _unmix(maps.diffuse, cleaned, cover * where * seen, COLOUR_REACH / texel)[where]
         check()
-        found[kind.name] = _grown(kind, cover[where], colours, texels, way, surface, np.random.default_rng([seed, number]))
+        found[kind.name] = _grown(kind, cover[where], colours, texels, way, surface,
+                                  np.random.default_rng([seed, number]))
     if "brows" in found:
-        found["lashes"] = _lashes(found["brows"].colour.mean(0), surface.mesh.vertices / 1000, np.random.default_rng([seed, len(KINDS)]))
+        found["lashes"] = _lashes(found["brows"].colour.mean(0), surface.mesh.vertices / 1000,
+                                  np.random.default_rng([seed, len(KINDS)]))
     return found
 
 
 def write(path: Path, found: dict[str, Strands]) -> None:
-    """An .npz: PART_points float32 [M, K, 3] metres, in the axes of head.obj, from root to tip; PART_radius [M, K] metres; PART_colour [M, 3] linear albedo."""
+    """An .npz: PART_points float32 [M, K, 3] metres, in the axes of head.obj, from root to tip; PART_radius [M, K]
+    metres; PART_colour [M, 3] linear albedo."""
     arrays = {}
     for part, hairs in found.items():
         arrays |= {f"{part}_points": hairs.points, f"{part}_radius": hairs.taper(), f"{part}_colour": hairs.colour}
@@ -102,8 +109,8 @@ def write(path: Path, found: dict[str, Strands]) -> None:
         np.savez_compressed(file, **arrays)
 
 
-def _grown(kind: HairKind, cover: np.ndarray, colours: np.ndarray, texels: HairTexels, way: np.ndarray, surface: HeadSurface,
-           rng: np.random.Generator) -> Strands:
+def _grown(kind: HairKind, cover: np.ndarray, colours: np.ndarray, texels: HairTexels, way: np.ndarray,
+           surface: HeadSurface, rng: np.random.Generator) -> Strands:
     """The hairs over texels of which hair covers `cover` [N], in `colours` [N, 3], along `way` [N, 3]."""
     texel = surface.texel[texels.where]
     density = np.minimum(-np.log1p(-np.minimum(cover, 0.95)) / (kind.length[0] * TAPER * kind.diameter), kind.most)
@@ -112,28 +119,36 @@ def _grown(kind: HairKind, cover: np.ndarray, colours: np.ndarray, texels: HairT
     before, tree = length * rng.uniform(0.3, 0.7, len(middle)), cKDTree(texels.position)
     beyond = float(np.median(texel))
     _, free = _walked(middle, -1, before, texels, way, tree, beyond)
-    root, back = _walked(middle, -1, np.where(free < before, free * rng.uniform(0, 1, len(middle)), before), texels, way, tree, beyond)  # no seam of roots
+    # no seam of roots
+    root, back = _walked(middle, -1, np.where(free < before, free * rng.uniform(0, 1, len(middle)), before), texels,
+                         way, tree, beyond)
     tip, on = _walked(middle, 1, length - before, texels, way, tree, beyond)
     length = np.maximum(back + on, 0.3 * length) / 1000
-    place = (texels.position[root] + texels.raise_up(rng.uniform(-0.5, 0.5, (len(root), 2)) * texel[root, None], root)) / 1000
+    place = (texels.position[root]
+             + texels.raise_up(rng.uniform(-0.5, 0.5, (len(root), 2)) * texel[root, None], root)) / 1000
     normal = texels.normal[root]
     roots = Roots(place, normal, _turned(way[root], normal, rng.normal(0, UNLIKE, len(root))), place)
     skin = strands.SkinSurface(surface.mesh.moved(surface.mesh.vertices / 1000))
     lift = rng.normal(kind.lift, 0.3 * kind.lift, len(root)).clip(0.05)
-    points = strands.grow(roots, length, lift, skin, way[tip] - way[root] - kind.bend * normal, np.full(len(root), CLEARANCE), STEPS)
+    points = strands.grow(roots, length, lift, skin, way[tip] - way[root] - kind.bend * normal,
+                          np.full(len(root), CLEARANCE), STEPS)
     colour = np.clip(colours[middle] * np.exp(rng.normal(0, 0.15, (len(root), 1))), DARKEST, 0.8)
     return Strands(points, np.full(len(root), kind.diameter / 2000, np.float32), colour.astype(np.float32), kind.name)
 
 
 def _strewn(expected: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Texels [M], each as often as is `expected` [N] of it, without the clumps of chance: one hair in each of M equal shares of the sum."""
+    """Texels [M], each as often as is `expected` [N] of it, without the clumps of chance: one hair in each of M equal
+    shares of the sum."""
     total = np.cumsum(expected)
     count = round(total[-1])
-    return np.minimum(np.searchsorted(total, (np.arange(count) + rng.uniform(size=count)) / max(count, 1) * total[-1]), len(expected) - 1)
+    return np.minimum(np.searchsorted(total, (np.arange(count) + rng.uniform(size=count)) / max(count, 1) * total[-1]),
+                      len(expected) - 1)
 
 
-def _walked(start: np.ndarray, sign: int, far: np.ndarray, texels: HairTexels, way: np.ndarray, tree: cKDTree, beyond: float) -> tuple[np.ndarray, np.ndarray]:
-    """Texels [M] `far` mm [M] along the ways (against them for sign -1), and how far those are: a hair ends where no texel with hair is within `beyond` mm."""
+def _walked(start: np.ndarray, sign: int, far: np.ndarray, texels: HairTexels, way: np.ndarray, tree: cKDTree,
+            beyond: float) -> tuple[np.ndarray, np.ndarray]:
+    """Texels [M] `far` mm [M] along the ways (against them for sign -1), and how far those are: a hair ends where no
+    texel with hair is within `beyond` mm."""
     at, gone = start.copy(), np.zeros(len(start))
     walking = np.ones(len(start), bool)
     step = far / WALK
@@ -151,8 +166,9 @@ def _turned(way: np.ndarray, normal: np.ndarray, radians: np.ndarray) -> np.ndar
 
 
 def _unmix(albedo: np.ndarray, skin: np.ndarray, cover: np.ndarray, reach: float) -> np.ndarray:
-    """The hair's linear albedo [S, S, 3]: what mixes with the skin below it to the albedo, by least squares over `reach` texels; never bluer than it is red,
-    as melanin has it, for in black hair the skin's error is more than the hair's own colour. Where none is seen, that of all."""
+    """The hair's linear albedo [S, S, 3]: what mixes with the skin below it to the albedo, by least squares over
+    `reach` texels; never bluer than it is red, as melanin has it, for in black hair the skin's error is more than the
+    hair's own colour. Where none is seen, that of all."""
     share = cover[..., None]
     mixed, square = (share * (albedo - (1 - share) * skin)).astype(np.float32), (share**2).astype(np.float32)
     whole = mixed.sum((0, 1)) / square.sum() if square.sum() > FEWEST else np.float32(BROWN)
@@ -162,21 +178,25 @@ def _unmix(albedo: np.ndarray, skin: np.ndarray, cover: np.ndarray, reach: float
 
 
 def _lashes(brows: np.ndarray, vertices: np.ndarray, rng: np.random.Generator) -> Strands:
-    """Along the edges of the lids, as they lie when these are closed: no texture shows lashes one by one. brows: their colour [3]; vertices [V, 3] of the head,
-    metres."""
-    rows = [_lash_row(lids.closed_edge(vertices, side, number, OFF_SEAM)[::-1], lid, rng) for side in (0, 1) for number, lid in enumerate(LASH)]
+    """Along the edges of the lids, as they lie when these are closed: no texture shows lashes one by one. brows: their
+    colour [3]; vertices [V, 3] of the head, metres."""
+    rows = [_lash_row(lids.closed_edge(vertices, side, number, OFF_SEAM)[::-1], lid, rng) for side in (0, 1)
+            for number, lid in enumerate(LASH)]
     lashes = np.concatenate(rows).astype(np.float32)
     colour = np.exp(rng.normal(0, 0.1, (len(lashes), 1))) * np.minimum(LASH_DARKER * brows, LASH_LIGHTEST)
     return Strands(lashes, np.full(len(lashes), LASH_DIAMETER / 2000, np.float32), colour.astype(np.float32), "lashes")
 
 
 def _lash_row(edge: np.ndarray, lid: str, rng: np.random.Generator) -> np.ndarray:
-    """Points [M, STEPS, 3] in metres of the lashes along a closed lid's edge [n, 3] from the inner to the outer corner."""
+    """Points [M, STEPS, 3] in metres of the lashes along a closed lid's edge [n, 3] from the inner to the outer
+    corner."""
     count, length = LASH[lid]
     up, outwards = 1 if lid == "upper" else -1, np.sign(edge[-1, 0])
     t = np.sort(rng.uniform(0.12, 0.96, count))
     at = np.stack([np.interp(t, np.linspace(0, 1, len(edge)), edge[:, axis]) for axis in range(3)], 1)
-    way = np.array([0, -1.0, -0.6 if up > 0 else -0.9]) + (2 * t - 0.9)[:, None] * [0.8 * outwards, 0, 0] + rng.normal(0, 0.12, at.shape)
+    way = np.array([0, -1.0, -0.6 if up > 0 else -0.9]) + (2 * t
+                                                           - 0.9)[:, None] * [0.8 * outwards, 0,
+                                                                              0] + rng.normal(0, 0.12, at.shape)
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     size = length / 1000 * rng.uniform(0.7, 1.1, count) * np.interp(t, [0, 0.4, 1], [0.55, 0.9, 1.0])
     bow = np.array([0, 0, 0.75 if up > 0 else -0.1])

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where brows and beard are. The face parser's answer and the strokes of the albedo together tell it; dark strokes alone, where no frames were asked."""
+"""Where brows and beard are. The face parser's answer and the strokes of the albedo together tell it; dark strokes
+alone, where no frames were asked."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from .surface import HeadSurface
 from .whole_head import seen_well
 
 FADE = 0.35, 0.65
-"""Probability of hair at which a texel begins to have some, and from which on it has; and share of hair of the head at which what lies behind is hidden."""
+"""Probability of hair at which a texel begins to have some, and from which on it has; and share of hair of the head at
+which what lies behind is hidden."""
 ALIKE = {"brows": 1.0, "beard": 3.0}
 """mm over which strokes are taken together: a brow is a few millimetres high."""
 LOUDEST = 4.0
@@ -23,13 +25,14 @@ LOUDEST = 4.0
 USUAL_LOUDNESS = float(np.sqrt(2 / np.pi))
 """Mean size of what has a normal distribution, in its deviations."""
 BESIDE = 6.0
-"""mm beyond the template's brows in which the parser may see brows: they differ, and a head is fitted to a millimetre or two."""
+"""mm beyond the template's brows in which the parser may see brows: they differ, and a head is fitted to a millimetre
+or two."""
 
 
 @dataclass(frozen=True)
 class Growth:
-    """How surely brows and beard grow at each texel, and hair of the head lies before it, float32 [S, S] in [0, 1] each; grain: deviation of the bare skin's
-    fine detail in log albedo; told: whether the parser was asked."""
+    """How surely brows and beard grow at each texel, and hair of the head lies before it, float32 [S, S] in [0, 1]
+    each; grain: deviation of the bare skin's fine detail in log albedo; told: whether the parser was asked."""
 
     brows: np.ndarray
     beard: np.ndarray
@@ -38,31 +41,39 @@ class Growth:
     told: bool
 
 
-def find(light: np.ndarray, confidence: np.ndarray, zones: dict[str, np.ndarray], surface: HeadSurface, parts: np.ndarray | None) -> Growth:
-    """From the log albedo's mean [S, S], how well each texel was seen, where hair may grow, and what the parser saw [S, S, len(GROWTHS)], or None."""
+def find(light: np.ndarray, confidence: np.ndarray, zones: dict[str, np.ndarray], surface: HeadSurface,
+         parts: np.ndarray | None) -> Growth:
+    """From the log albedo's mean [S, S], how well each texel was seen, where hair may grow, and what the parser saw [S,
+    S, len(GROWTHS)], or None."""
     size, texel = surface.size, float(np.median(surface.texel))
-    bare = (template.mask("skin", size) > 0.99) & (zones["beard"] < 0.05) & (zones["brows"] < 0.01) & (seen_well(confidence, surface) >= 1)
+    bare = (template.mask("skin", size) > 0.99) & (zones["beard"]
+                                                   < 0.05) & (zones["brows"]
+                                                              < 0.01) & (seen_well(confidence, surface) >= 1)
     head = np.zeros((size, size), np.float32) if parts is None else _faded(parts[..., GROWTHS.index("hair")])
     bare &= head == 0
     fine = beard.fine(light, texel)
     grain = beard.deviation(fine[bare])
     if parts is None:
-        return Growth(zones["brows"], beard.presence(fine, grain, bare, zones["beard"], surface.texel), head, grain, False)
+        return Growth(zones["brows"], beard.presence(fine, grain, bare, zones["beard"], surface.texel), head, grain,
+                      False)
     likely = {name: _likely(name, parts, np.minimum(np.abs(fine) / max(grain, 1e-6), LOUDEST), texel) for name in ALIKE}
-    bearded = keep_present(likely["beard"] * _bearable(zones["beard"]))  # hard shadows on a bare jaw are half a beard to the parser
+    # hard shadows on a bare jaw are half a beard to the parser
+    bearded = keep_present(likely["beard"] * _bearable(zones["beard"]))
     return Growth(_faded(likely["brows"]) * _near_brows(surface), _faded(bearded), head, grain, True)
 
 
 def _likely(name: str, parts: np.ndarray, loud: np.ndarray, texel: float) -> np.ndarray:
-    """Probability of that hair [S, S], by Bayes' rule: the parser's shares before, and strokes, which are as much likelier on hair of any kind as their power
-    is over that of bare skin's grain. loud [S, S]: fine detail in deviations of that grain."""
+    """Probability of that hair [S, S], by Bayes' rule: the parser's shares before, and strokes, which are as much
+    likelier on hair of any kind as their power is over that of bare skin's grain. loud [S, S]: fine detail in
+    deviations of that grain."""
     power = (cv2.GaussianBlur(loud, (0, 0), ALIKE[name] / texel) / USUAL_LOUDNESS) ** 2
     hairy = parts.sum(-1)
     return parts[..., GROWTHS.index(name)] * power / np.maximum(hairy * power + np.clip(1 - hairy, 0, 1), 1e-6)
 
 
 def _bearable(zone: np.ndarray) -> np.ndarray:
-    """Where the parser may see a beard, [S, S] in [0, 1]: on the face, and as far down the neck as beards usually go: there a collar has its edge."""
+    """Where the parser may see a beard, [S, S] in [0, 1]: on the face, and as far down the neck as beards usually go:
+    there a collar has its edge."""
     bar = np.maximum.reduce([template.mask(name, len(zone)) for name in ("lips", "ears", "nostrils", "nose", "eyes")])
     return np.maximum(zone, template.mask("face", len(zone))) * (1 - bar)
 
@@ -73,5 +84,6 @@ def _faded(share: np.ndarray) -> np.ndarray:
 
 def _near_brows(surface: HeadSurface) -> np.ndarray:
     """[S, S] in [0, 1]: the template's brows, and what is BESIDE them."""
-    away = cv2.distanceTransform((template.mask("brows", surface.size) < 0.5).astype(np.uint8), cv2.DIST_L2, 5) * float(np.median(surface.texel))
+    away = cv2.distanceTransform((template.mask("brows", surface.size) < 0.5).astype(np.uint8), cv2.DIST_L2,
+                                 5) * float(np.median(surface.texel))
     return np.clip(2 - 2 * away / BESIDE, 0, 1)

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Brows, lashes and beard as soft masks, and the albedo of the skin below them, so that hair can be groomed over clean skin.
+"""Brows, lashes and beard as soft masks, and the albedo of the skin below them, so that hair can be groomed over clean
+skin.
 
-Hair is what differs from the skin that would be there, where such hair grows (growth.py); how much of it there is says how far it differs.
+Hair is what differs from the skin that would be there, where such hair grows (growth.py); how much of it there is says
+how far it differs.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ LIDS = (33, 7, 163, 144, 145, 153, 154, 155, 133), (263, 249, 390, 373, 374, 380
 LASHES = 1.6
 """mm on either side of the rim in which lashes are looked for."""
 LEAST_HAIR = 0.25
-"""Log albedo by which hair must be darker than its skin to be told from it by that alone; the fair brows of some people are not."""
+"""Log albedo by which hair must be darker than its skin to be told from it by that alone; the fair brows of some people
+are not."""
 USUAL = {"brows": 0.5, "beard": 0.5}
 """Share that hair covers where there is some,"""
 SPREAD = 0.25
@@ -36,7 +39,8 @@ SPREAD = 0.25
 
 @dataclass(frozen=True)
 class Hair:
-    """How much of each texel hair covers, float32 [S, S] in [0, 1] each; hidden: how surely hair of the head lay before it in the frames."""
+    """How much of each texel hair covers, float32 [S, S] in [0, 1] each; hidden: how surely hair of the head lay before
+    it in the frames."""
 
     brows: np.ndarray
     lashes: np.ndarray
@@ -44,7 +48,8 @@ class Hair:
     hidden: np.ndarray
 
 
-def find(maps: HeadMaps, surface: HeadSurface, parts: np.ndarray | None = None, check: Callable[[], None] = lambda: None) -> Hair:
+def find(maps: HeadMaps, surface: HeadSurface, parts: np.ndarray | None = None,
+         check: Callable[[], None] = lambda: None) -> Hair:
     """The hair of a face. parts: what read_parts gives. `check` may raise to cancel, here and below."""
     channels, _ = apart(maps)
     light = channels[..., :3].mean(2)
@@ -55,14 +60,17 @@ def find(maps: HeadMaps, surface: HeadSurface, parts: np.ndarray | None = None, 
     darker = _skin(light[..., None], zones, grown.beard, grown.head, surface)[..., 0] - light
     lashes = _cover(_closed(light, texel) - light, zones["lashes"], grown.grain)
     if not grown.told:
-        return Hair(_cover(darker, grown.brows, grown.grain), lashes, _cover(darker, grown.beard, grown.grain), grown.head)
+        return Hair(_cover(darker, grown.brows, grown.grain), lashes, _cover(darker, grown.beard, grown.grain),
+                    grown.head)
     brows, clearest = _told_cover(darker, grown.brows * (1 - grown.head), grown.grain, USUAL["brows"])
     bearded, _ = _told_cover(darker, grown.beard, grown.grain, USUAL["beard"], clearest)
     return Hair(_behind(brows, grown, surface), lashes, bearded, grown.head)
 
 
-def clean(maps: HeadMaps, hair: Hair, surface: HeadSurface, seed: int = 0, check: Callable[[], None] = lambda: None) -> tuple[np.ndarray, np.ndarray]:
-    """Linear albedo [S, S, 3] without the hair, and how far each texel was replaced [S, S]; 0 leaves the albedo's bytes."""
+def clean(maps: HeadMaps, hair: Hair, surface: HeadSurface, seed: int = 0,
+          check: Callable[[], None] = lambda: None) -> tuple[np.ndarray, np.ndarray]:
+    """Linear albedo [S, S, 3] without the hair, and how far each texel was replaced [S, S]; 0 leaves the albedo's
+    bytes."""
     channels, slopes = apart(maps)
     zones, texel = _zones(surface), float(np.median(surface.texel))
     share = np.zeros_like(hair.brows)
@@ -73,7 +81,8 @@ def clean(maps: HeadMaps, hair: Hair, surface: HeadSurface, seed: int = 0, check
     where = (share > 0) & surface.covered
     if not where.any():
         return maps.diffuse, share
-    skin = _skin(channels, zones, cv2.dilate((hair.beard > 0.02).astype(np.float32), beard.disc(2.0 / texel)), hair.hidden, surface)
+    skin = _skin(channels, zones, cv2.dilate((hair.beard > 0.02).astype(np.float32), beard.disc(2.0 / texel)),
+                 hair.hidden, surface)
     check()
     lids = zones["lashes"][..., None]
     skin = skin * (1 - lids) + _closed(channels, texel) * lids  # a field from beyond the sockets knows no lid
@@ -88,8 +97,10 @@ def clean(maps: HeadMaps, hair: Hair, surface: HeadSurface, seed: int = 0, check
     return cleaned, share * surface.covered
 
 
-def write(folder: Path, albedo: np.ndarray, hair: Hair, cleaned: np.ndarray, share: np.ndarray, check: Callable[[], None] = lambda: None) -> None:
-    """The masks at the size of `albedo` (sRGB [L, L, 3]), and that albedo where `clean`'s share is 0, the cleaned one elsewhere."""
+def write(folder: Path, albedo: np.ndarray, hair: Hair, cleaned: np.ndarray, share: np.ndarray,
+          check: Callable[[], None] = lambda: None) -> None:
+    """The masks at the size of `albedo` (sRGB [L, L, 3]), and that albedo where `clean`'s share is 0, the cleaned one
+    elsewhere."""
     size = len(albedo)
     for name in ("brows", "lashes", "beard"):
         images.write_data(folder / f"{name}.png", _enlarged(getattr(hair, name), size), check=check)
@@ -128,7 +139,8 @@ def _off(position: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.linalg.norm(position - a - share[:, None] * along, axis=1)
 
 
-def _skin(channels: np.ndarray, zones: dict[str, np.ndarray], bearded: np.ndarray, hidden: np.ndarray, surface: HeadSurface) -> np.ndarray:
+def _skin(channels: np.ndarray, zones: dict[str, np.ndarray], bearded: np.ndarray, hidden: np.ndarray,
+          surface: HeadSurface) -> np.ndarray:
     """Channels [S, S, C] of the skin as they would be without hair, without detail."""
     size = surface.size
     other = np.maximum.reduce([*(template.mask(name, size) for name in (*FEATURES, "scalp")), zones["brows"]])
@@ -137,7 +149,8 @@ def _skin(channels: np.ndarray, zones: dict[str, np.ndarray], bearded: np.ndarra
 
 
 def _cover(darker: np.ndarray, zone: np.ndarray, usual: float) -> np.ndarray:
-    """Share of hair [S, S] from how much darker (in log albedo) than its skin a texel is: linear between the grain of bare skin and the darkest hairs."""
+    """Share of hair [S, S] from how much darker (in log albedo) than its skin a texel is: linear between the grain of
+    bare skin and the darkest hairs."""
     there = zone > 0.5
     full = float(np.percentile(darker[there], 99)) if there.sum() > 20 else 0.0
     if full < max(LEAST_HAIR, 4 * usual):
@@ -146,17 +159,21 @@ def _cover(darker: np.ndarray, zone: np.ndarray, usual: float) -> np.ndarray:
     return (np.clip((1 - np.exp(-darker) - least) / (most - least), 0, 1) * zone).astype(np.float32)
 
 
-def _told_cover(darker: np.ndarray, there: np.ndarray, grain: float, usual: float, clearest: float = 0.0) -> tuple[np.ndarray, float]:
-    """Share of hair [S, S] where the parser says that there is some, and how far below the skin's albedo the clearest hairs lie, as a share of it.
+def _told_cover(darker: np.ndarray, there: np.ndarray, grain: float, usual: float,
+                clearest: float = 0.0) -> tuple[np.ndarray, float]:
+    """Share of hair [S, S] where the parser says that there is some, and how far below the skin's albedo the clearest
+    hairs lie, as a share of it.
 
-    What a texel is darker or lighter than its skin over what the clearest hairs are, and `usual`, each weighed by how sure it is: the less hair differs from
-    its skin, over the `grain` of that, the less does its contrast tell. `clearest`: of the person's other dark hair, for stubble nowhere fills a texel.
+    What a texel is darker or lighter than its skin over what the clearest hairs are, and `usual`, each weighed by how
+    sure it is: the less hair differs from its skin, over the `grain` of that, the less does its contrast tell.
+    `clearest`: of the person's other dark hair, for stubble nowhere fills a texel.
     """
     off, sure = 1 - np.exp(-darker), there > 0.5
     if not sure.any():
         return np.zeros_like(there), clearest
     dark = off[sure].mean() >= 0
-    off = np.maximum(off, -off - 2 * grain) if dark else np.maximum(-off, off - 2 * grain)  # grey hair has strokes of the other sign, too
+    # grey hair has strokes of the other sign, too
+    off = np.maximum(off, -off - 2 * grain) if dark else np.maximum(-off, off - 2 * grain)
     full = max(float(np.percentile(off[sure], 99)), clearest if dark else 0.0, grain)
     trust = SPREAD**2 / (SPREAD**2 + (grain / full) ** 2)
     cover = (trust * np.clip(off / full, 0, 1) + (1 - trust) * usual) * there
@@ -164,9 +181,11 @@ def _told_cover(darker: np.ndarray, there: np.ndarray, grain: float, usual: floa
 
 
 def _behind(brows: np.ndarray, grown: Growth, surface: HeadSurface) -> np.ndarray:
-    """Brows with those that lie behind hair of the head: as the other one is, where that is seen, and as brows usually are where neither is."""
+    """Brows with those that lie behind hair of the head: as the other one is, where that is seen, and as brows usually
+    are where neither is."""
     other, hidden = brows[:, ::-1], grown.head[:, ::-1]  # the template's two sides mirror each other on the map
-    return brows * (1 - grown.head) + grown.head * (other * (1 - hidden) + USUAL["brows"] * template.mask("brows", surface.size) * hidden)
+    return brows * (1 - grown.head) + grown.head * (other * (1 - hidden) + USUAL["brows"]
+                                                    * template.mask("brows", surface.size) * hidden)
 
 
 def _closed(picture: np.ndarray, texel: float) -> np.ndarray:

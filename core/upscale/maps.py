@@ -15,8 +15,9 @@ from ..imaging import images
 
 @dataclass(frozen=True)
 class HeadMaps:
-    """All float32 on S x S texels. diffuse [S, S, 3]: albedo, linear sRGB; normal [S, S, 3]: unit, tangent space, OpenGL Y+; specular [S, S]: Principled
-    BSDF's Specular IOR Level; confidence [S, S] in [0, 1]; shading [S, S, 3]: linear, albedo x shading = texture."""
+    """All float32 on S x S texels. diffuse [S, S, 3]: albedo, linear sRGB; normal [S, S, 3]: unit, tangent space,
+    OpenGL Y+; specular [S, S]: Principled BSDF's Specular IOR Level; confidence [S, S] in [0, 1]; shading [S, S, 3]:
+    linear, albedo x shading = texture."""
 
     diffuse: np.ndarray
     normal: np.ndarray
@@ -27,14 +28,18 @@ class HeadMaps:
 
 def read_maps(folder: Path) -> HeadMaps:
     """The maps that the solver wrote. Raises Problem where one is damaged or of another size than the others."""
-    paths = {"diffuse": folder / "diffuse_albedo.exr", "normal": folder / "normal.png", "specular": folder / "specular_albedo.png",
+    paths = {"diffuse": folder / "diffuse_albedo.exr", "normal": folder / "normal.png",
+             "specular": folder / "specular_albedo.png",
              "confidence": folder / "confidence.png", "shading": folder / "shading.exr"}
     normal = images.read_normals(paths["normal"])
-    found = HeadMaps(images.read_linear(paths["diffuse"]), normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
-                     images.read_mask(paths["specular"]), images.read_mask(paths["confidence"]), images.read_linear(paths["shading"]))
+    found = HeadMaps(images.read_linear(paths["diffuse"]),
+                     normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
+                     images.read_mask(paths["specular"]), images.read_mask(paths["confidence"]),
+                     images.read_linear(paths["shading"]))
     side = len(found.diffuse)
     for name, pixels in vars(found).items():
         if pixels.shape[:2] != (side, side):
-            raise Problem(f"{paths[name]} is {pixels.shape[1]} x {pixels.shape[0]} pixels, but {paths['diffuse'].name} is {found.diffuse.shape[1]} x {side}.",
+            raise Problem(f"{paths[name]} is {pixels.shape[1]} x {pixels.shape[0]} pixels, but {paths['diffuse'].name} "
+                          f"is {found.diffuse.shape[1]} x {side}.",
                           "Run the stage solve again.")
     return found

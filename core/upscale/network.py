@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""RCAN (Zhang et al. 2018, "Image Super-Resolution Using Very Deep Residual Channel Attention Networks") with seven channels in and out, four times as
-large (paper, supplement "Super-Resolution Network"). It adds to bicubic resampling what that misses, so with a tail of zeros it is bicubic resampling.
+"""RCAN (Zhang et al. 2018, "Image Super-Resolution Using Very Deep Residual Channel Attention Networks") with seven
+channels in and out, four times as large (paper, supplement "Super-Resolution Network"). It adds to bicubic resampling
+what that misses, so with a tail of zeros it is bicubic resampling.
 
 Channels: sRGB-coded diffuse albedo (3), tangent-space normal xyz (3), specular level (1).
 """
@@ -22,7 +23,8 @@ SPREAD = (0.2, 0.2, 0.2, 0.15, 0.15, 0.05, 0.15)
 MISSED = (0.012, 0.012, 0.012, 0.05, 0.05, 0.015, 0.012)
 """How far bicubic resampling is off in a channel, about: the unit of what the network answers, and of its loss."""
 HALO = 2
-"""Texels of the small map that the tail reads around a strip: 1 + 1/2 + 1/4 by three 3 x 3 convolutions on ever finer grids, two by the bicubic kernel."""
+"""Texels of the small map that the tail reads around a strip: 1 + 1/2 + 1/4 by three 3 x 3 convolutions on ever finer
+grids, two by the bicubic kernel."""
 
 
 class ChannelAttention(nn.Module):
@@ -42,7 +44,11 @@ class ChannelAttentionBlock(nn.Module):
 
     def __init__(self, width: int, squeeze: int):
         super().__init__()
-        self.first, self.second, self.attention = nn.Conv2d(width, width, 3, padding=1), nn.Conv2d(width, width, 3, padding=1), ChannelAttention(width, squeeze)
+        self.first, self.second, self.attention = (
+            nn.Conv2d(width, width, 3, padding=1),
+            nn.Conv2d(width, width, 3, padding=1),
+            ChannelAttention(width, squeeze),
+        )
         nn.init.zeros_(self.second.weight)
         nn.init.zeros_(self.second.bias)
 
@@ -56,7 +62,8 @@ class Rcan(nn.Module):
     def __init__(self, groups: int, blocks: int, width: int, squeeze: int = 16):
         super().__init__()
         self.head = nn.Conv2d(CHANNELS, width, 3, padding=1)
-        self.groups = nn.ModuleList(nn.ModuleList(ChannelAttentionBlock(width, squeeze) for _ in range(blocks)) for _ in range(groups))
+        self.groups = nn.ModuleList(nn.ModuleList(ChannelAttentionBlock(width, squeeze) for _ in range(blocks))
+                                    for _ in range(groups))
         self.joins = nn.ModuleList(nn.Conv2d(width, width, 3, padding=1) for _ in range(groups))
         self.join = nn.Conv2d(width, width, 3, padding=1)
         self.widen = nn.ModuleList(nn.Conv2d(width, 4 * width, 3, padding=1) for _ in range(2))
@@ -66,11 +73,14 @@ class Rcan(nn.Module):
         nn.init.zeros_(self.tail.weight)
 
     def forward(self, maps: torch.Tensor, depth: int | None = None) -> torch.Tensor:
-        """maps [N, 7, H, W] -> what bicubic resampling misses [N, 7, 4H, 4W], in the channels' own units. `depth`: blocks used of each group."""
+        """maps [N, 7, H, W] -> what bicubic resampling misses [N, 7, 4H, 4W], in the channels' own units. `depth`:
+        blocks used of each group."""
         return self.details(self.features(maps, depth))
 
-    def features(self, maps: torch.Tensor, depth: int | None = None, tick: Callable[[float], None] = lambda share: None) -> torch.Tensor:
-        """The body: [N, 7, H, W] -> [N, width, H, W]. Its attention looks at the whole map, so it cannot be had in pieces. `tick` hears the share done."""
+    def features(self, maps: torch.Tensor, depth: int | None = None,
+                 tick: Callable[[float], None] = lambda share: None) -> torch.Tensor:
+        """The body: [N, 7, H, W] -> [N, width, H, W]. Its attention looks at the whole map, so it cannot be had in
+        pieces. `tick` hears the share done."""
         begun = self.head((maps - _channels(MIDDLE, maps)) / _channels(SPREAD, maps))
         x = begun
         for i, (group, join) in enumerate(zip(self.groups, self.joins, strict=True)):
@@ -83,7 +93,8 @@ class Rcan(nn.Module):
         return begun + self.join(x)
 
     def details(self, features: torch.Tensor) -> torch.Tensor:
-        """The tail: [N, width, H, W] -> [N, 7, 4H, 4W]. Local: strips with HALO texels around them give the same as the whole."""
+        """The tail: [N, width, H, W] -> [N, 7, 4H, 4W]. Local: strips with HALO texels around them give the same as the
+        whole."""
         x = features
         for widen in self.widen:
             x = functional.pixel_shuffle(widen(x), 2)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which way hair lies on the skin: along the strokes that the albedo has from the frames, which way along them by how such hair grows.
+"""Which way hair lies on the skin: along the strokes that the albedo has from the frames, which way along them by how
+such hair grows.
 
 By the structure tensor of the albedo's fine detail (Bigun and Granlund 1987) in the tangent plane.
 """
@@ -26,7 +27,8 @@ AROUND = 1.5
 
 @dataclass(frozen=True)
 class HairTexels:
-    """The N texels on which hair grows. where bool [S, S]; position [N, 3] mm, normal, tangent and bitangent [N, 3] unit, row by row."""
+    """The N texels on which hair grows. where bool [S, S]; position [N, 3] mm, normal, tangent and bitangent [N, 3]
+    unit, row by row."""
 
     where: np.ndarray
     position: np.ndarray
@@ -47,13 +49,15 @@ class HairTexels:
 def lay_texels(surface: HeadSurface, where: np.ndarray) -> HairTexels:
     """The texels of `where` bool [S, S], all of them on the head."""
     tangent, bitangent = surface.frames(where)
-    normal = raster.interpolate(vertex_normals(surface.mesh), surface.mesh.faces, surface.face[where], surface.bary[where])
-    return HairTexels(where, surface.position[where].astype(np.float64), normal / lengths(normal)[:, None], tangent, bitangent)
+    normal = raster.interpolate(vertex_normals(surface.mesh), surface.mesh.faces, surface.face[where],
+                                surface.bary[where])
+    return HairTexels(where, surface.position[where].astype(np.float64), normal / lengths(normal)[:, None], tangent,
+                      bitangent)
 
 
 def measure_tensors(albedo: np.ndarray, texels: HairTexels, texel: float) -> np.ndarray:
-    """Structure tensors [N, 2, 2] of the strokes of a linear albedo [S, S, 3] in the tangent plane, of trace 1 (0 where nothing is seen), over AROUND: large
-    across the strokes, small along them. texel: its width in mm."""
+    """Structure tensors [N, 2, 2] of the strokes of a linear albedo [S, S, 3] in the tangent plane, of trace 1 (0 where
+    nothing is seen), over AROUND: large across the strokes, small along them. texel: its width in mm."""
     grey = images.linear_to_srgb(albedo).mean(2)
     fine = cv2.GaussianBlur(grey - cv2.GaussianBlur(grey, (0, 0), COARSEST / texel), (0, 0), 0.7)
     right, down = (cv2.Scharr(fine, cv2.CV_32F, *axis, scale=1 / 32) for axis in ((1, 0), (0, 1)))
@@ -66,7 +70,8 @@ def measure_tensors(albedo: np.ndarray, texels: HairTexels, texel: float) -> np.
 def choose_ways(tensors: np.ndarray, texels: HairTexels, usual: np.ndarray, trust: float) -> np.ndarray:
     """Unit directions from root to tip along the skin [N, 3].
 
-    `usual` [N, 3], how such hair grows, tells root from tip, and the direction where strokes tell none: it counts as strokes of coherence `trust`."""
+    `usual` [N, 3], how such hair grows, tells root from tip, and the direction where strokes tell none: it counts as
+    strokes of coherence `trust`."""
     usual = texels.flatten(usual)
     across = np.stack([-usual[:, 1], usual[:, 0]], 1)
     along = np.linalg.eigh(tensors + trust * across[:, :, None] * across[:, None])[1][..., 0]

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The head's surface under its maps: where each texel lies in space, and smooth fields over it.
 
-What is worked out at points of the surface, by its distances, knows nothing of the UV layout: where the map is cut open, its two edges meet.
+What is worked out at points of the surface, by its distances, knows nothing of the UV layout: where the map is cut
+open, its two edges meet.
 """
 
 from __future__ import annotations
@@ -21,12 +22,14 @@ from ..geometry.meshes import Mesh, vertex_normals
 STRIP = 128
 """Rows whose triangles are found between two looks at a cancel."""
 FAR = 25.0
-"""mm over which a field falls back to its mean where nothing is known: one odd texel on the border must not colour the back of the head."""
+"""mm over which a field falls back to its mean where nothing is known: one odd texel on the border must not colour the
+back of the head."""
 
 
 @dataclass(frozen=True)
 class HeadSurface:
-    """mesh: in mm, its open edges sewn; size S of its maps; face int32 [S, S]: the triangle of a texel (-1: none), bary float32 [S, S, 3]."""
+    """mesh: in mm, its open edges sewn; size S of its maps; face int32 [S, S]: the triangle of a texel (-1: none), bary
+    float32 [S, S, 3]."""
 
     mesh: Mesh
     size: int
@@ -61,13 +64,17 @@ class HeadSurface:
 
     def spread(self, values: np.ndarray) -> np.ndarray:
         """Values of the vertices [V, C] as a map, float32 [S, S, C]."""
-        return raster.bleed(raster.interpolate(values, self.mesh.faces, self.face, self.bary).astype(np.float32), self.covered)
+        return raster.bleed(raster.interpolate(values, self.mesh.faces, self.face, self.bary).astype(np.float32),
+                            self.covered)
 
-    def smooth(self, values: np.ndarray, weight: np.ndarray, reach: float, tolerance: float | None = None) -> np.ndarray:
-        """The field [S, S, C] that follows a map's values [S, S, C] where their weight [S, S] is, and is as even as can be elsewhere.
+    def smooth(self, values: np.ndarray, weight: np.ndarray, reach: float,
+               tolerance: float | None = None) -> np.ndarray:
+        """The field [S, S, C] that follows a map's values [S, S, C] where their weight [S, S] is, and is as even as can
+        be elsewhere.
 
-        Minimises the integral of weight (x - value)^2 + reach^2 |grad x|^2 over the surface, with a weak pull to the mean where there is no weight.
-        reach in mm: detail below it is left out. Values that lie by more than about `tolerance` off a broader field lose their weight (Cauchy's).
+        Minimises the integral of weight (x - value)^2 + reach^2 |grad x|^2 over the surface, with a weak pull to the
+        mean where there is no weight. reach in mm: detail below it is left out. Values that lie by more than about
+        `tolerance` off a broader field lose their weight (Cauchy's).
         """
         means, known = self._on_vertices(values, weight * self.texel**2)
         if tolerance is not None:
@@ -102,7 +109,8 @@ class HeadSurface:
 
     @cached_property
     def _stiffness(self) -> sparse.csr_matrix:
-        """The cotangent Laplacian [V, V] (Pinkall and Polthier 1993), positive semi-definite; obtuse corners count as nothing."""
+        """The cotangent Laplacian [V, V] (Pinkall and Polthier 1993), positive semi-definite; obtuse corners count as
+        nothing."""
         corners, count = self.mesh.vertices[self.mesh.faces], len(self.mesh.vertices)
         rows, columns, weights = [], [], []
         for i in range(3):
@@ -111,7 +119,8 @@ class HeadSurface:
             rows.append(self.mesh.faces[:, (i + 1) % 3])
             columns.append(self.mesh.faces[:, (i + 2) % 3])
             weights.append(np.clip(cotangent, 1e-3, 20) / 2)
-        half = sparse.coo_matrix((np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))), (count, count)).tocsr()
+        half = sparse.coo_matrix((np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))),
+                                 (count, count)).tocsr()
         both = half + half.T
         return sparse.diags(np.asarray(both.sum(1)).ravel()) - both
 

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How hair of the face usually grows: by anatomy, from landmarks.
 
-Brows begin upright at the nose and lie along their arch from a third of it on; a moustache leaves the middle of the lip; a beard hangs.
+Brows begin upright at the nose and lie along their arch from a third of it on; a moustache leaves the middle of the
+lip; a beard hangs.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ NOSE_BASE, LIP_TOP, MOUTH_CORNER = 2, 0, 291
 
 
 def usual(part: str, position: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
-    """Directions from root to tip [N, 3], of any length and not yet along the skin, at positions [N, 3] mm with landmarks [468, 3] mm."""
+    """Directions from root to tip [N, 3], of any length and not yet along the skin, at positions [N, 3] mm with
+    landmarks [468, 3] mm."""
     return _brows(position, landmarks) if part == "brows" else _beard(position, landmarks)
 
 
@@ -37,5 +39,6 @@ def _brows(position: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
 def _beard(position: np.ndarray, landmarks: np.ndarray) -> np.ndarray:
     x = position[:, :1] - landmarks[NOSE_BASE, 0]
     corner = landmarks[MOUTH_CORNER]
-    above = np.clip((position[:, 2:] - corner[2]) / max(landmarks[NOSE_BASE, 2] - corner[2], 1.0), 0, 1) * (np.abs(x) < 1.2 * abs(corner[0]))
+    above = np.clip((position[:, 2:] - corner[2]) / max(landmarks[NOSE_BASE, 2] - corner[2], 1.0), 0,
+                    1) * (np.abs(x) < 1.2 * abs(corner[0]))
     return above * np.tanh(x / 8) * [1.0, 0, 0] + [0, 0, -1.0]

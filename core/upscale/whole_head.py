@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The whole head from the part that the cameras saw: its tone differs from that of the mean face by a smooth field over the surface, its pores and
-mottling come from the solved skin's own statistics.
+"""The whole head from the part that the cameras saw: its tone differs from that of the mean face by a smooth field over
+the surface, its pores and mottling come from the solved skin's own statistics.
 
-Scalp goes on as scalp and skin as skin: where cropped hair was seen, unseen scalp takes its tone. What was seen well keeps its values.
+Scalp goes on as scalp and skin as skin: where cropped hair was seen, unseen scalp takes its tone. What was seen well
+keeps its values.
 """
 
 from __future__ import annotations
@@ -28,11 +29,13 @@ UNSEEN, SEEN = 0.05, 0.30
 SPECK = 1.5
 """mm: darker lines and dots of the confidence are hairs and marks, not holes in what was seen."""
 SKIRT, FEATHER = 2.5, 5.0
-"""mm inside the border of the seen part: the skirt was seen at glancing angles only, and the solver mixed it with the mean face; then comes the fade."""
+"""mm inside the border of the seen part: the skirt was seen at glancing angles only, and the solver mixed it with the
+mean face; then comes the fade."""
 REACH = 2.5
 """mm below which detail is no tone."""
 ODD = 0.20
-"""Difference of log albedo from its surroundings at which the fringe of the seen part loses half of its say: stray light, clothes, hair in front."""
+"""Difference of log albedo from its surroundings at which the fringe of the seen part loses half of its say: stray
+light, clothes, hair in front."""
 LEAST_SCALP = 1500.0
 """mm^2 of scalp that must have been seen for it to have a tone of its own."""
 DATA_FILES = ("weights/prior.safetensors",)
@@ -42,8 +45,8 @@ DARKEST = 0.004
 
 
 def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int = 0) -> HeadMaps:
-    """The maps with what was not seen replaced; shading and confidence as they were. Texels whose `seen_well` is 1 keep their bytes, but for stray ones
-    beyond the face."""
+    """The maps with what was not seen replaced; shading and confidence as they were. Texels whose `seen_well` is 1 keep
+    their bytes, but for stray ones beyond the face."""
     report.check()
     seen = seen_well(maps.confidence, surface)
     size = surface.size
@@ -62,14 +65,16 @@ def complete(maps: HeadMaps, surface: HeadSurface, report: Reporter, seed: int =
     report.check()
     painted, tilt = grain.paint(learnt, surface, holes, seed)
     share, own = seen[holes][:, None], channels - _low(channels, seen, surface)
-    loud = 1 / np.sqrt(share**2 + (1 - share) ** 2)  # two grains that know nothing of each other would cancel where they mix
+    # two grains that know nothing of each other would cancel where they mix
+    loud = 1 / np.sqrt(share**2 + (1 - share) ** 2)
     found = tone[holes] + (channels - own - tone)[holes] * share + (own[holes] * share + painted * (1 - share)) * loud
     tilted = (slopes[holes] * share + tilt * (1 - share)) * loud
     return joined(maps, holes, found, tilted)
 
 
 def seen_well(confidence: np.ndarray, surface: HeadSurface) -> np.ndarray:
-    """[S, S] in [0, 1]: 1 where the cameras saw enough, 0 where the solver had nothing but the mean face, and a soft border on the seen side.
+    """[S, S] in [0, 1]: 1 where the cameras saw enough, 0 where the solver had nothing but the mean face, and a soft
+    border on the seen side.
 
     Holes in the face's features count as seen: their shape comes with the mean face, and no smooth field knows it.
     """
@@ -78,15 +83,18 @@ def seen_well(confidence: np.ndarray, surface: HeadSurface) -> np.ndarray:
     closed = cv2.morphologyEx(confidence, cv2.MORPH_CLOSE, disc)
     closed = np.maximum(closed, _features(surface.size))
     seen = _smoothstep((closed - UNSEEN) / (SEEN - UNSEEN))
-    inside = cv2.distanceTransform(np.pad((closed >= UNSEEN) | ~surface.covered, 1, mode="edge").astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
-    return (seen * _smoothstep((np.minimum(inside, 1e4) * surface.texel - SKIRT) / FEATHER) * surface.covered).astype(np.float32)
+    inside = cv2.distanceTransform(np.pad((closed >= UNSEEN) | ~surface.covered, 1, mode="edge").astype(np.uint8),
+                                   cv2.DIST_L2, 5)[1:-1, 1:-1]
+    return (seen * _smoothstep((np.minimum(inside, 1e4) * surface.texel - SKIRT) / FEATHER)
+            * surface.covered).astype(np.float32)
 
 
 def _without_strays(seen: np.ndarray, confidence: np.ndarray, off: np.ndarray) -> np.ndarray:
-    """`seen` [S, S] without what was seen at a glance only and lies `off` the head's tone (log albedo [S, S]): light that was divided out wrongly, cloth, hair.
+    """`seen` [S, S] without what was seen at a glance only and lies `off` the head's tone (log albedo [S, S]): light
+    that was divided out wrongly, cloth, hair.
 
-    What one believes of a texel is a matter of both: off by ODD it needs as much confidence as is missing to that of usual skin. Nothing goes from the face,
-    which every capture sees well and where marks are.
+    What one believes of a texel is a matter of both: off by ODD it needs as much confidence as is missing to that of
+    usual skin. Nothing goes from the face, which every capture sees well and where marks are.
     """
     sure = np.clip(confidence / max(float(np.median(confidence[seen == 1])), 1e-6), 0, 1)
     missing = (1 - sure) * (1 - template.mask("face", len(seen))) * off / ODD
@@ -116,7 +124,8 @@ def _features(size: int) -> np.ndarray:
 
 
 def _tone(channels: np.ndarray, trust: np.ndarray, surface: HeadSurface, seed: int) -> np.ndarray:
-    """Log albedo and specular [S, S, 4] without detail, everywhere: what is usual there, and a smooth field of how this person differs from it.
+    """Log albedo and specular [S, S, 4] without detail, everywhere: what is usual there, and a smooth field of how this
+    person differs from it.
 
     Bare skin goes on over the scalp too, unless enough of the scalp was seen: then it has a field of its own.
     """
@@ -129,12 +138,14 @@ def _tone(channels: np.ndarray, trust: np.ndarray, surface: HeadSurface, seed: i
     of_scalp = usual + surface.smooth(channels - usual, bare * scalp, REACH, ODD)
     uneven = noise(surface.position.reshape(-1, 3), 3.0, np.random.default_rng([seed, 3])).reshape(scalp.shape)
     soft = surface.smooth(scalp[..., None], np.ones_like(scalp), 3.0)[..., 0]
-    share = _smoothstep(np.clip(soft + 0.12 * uneven * (4 * soft * (1 - soft)), 0, 1))[..., None]  # no hairline is a drawn line
+    # no hairline is a drawn line
+    share = _smoothstep(np.clip(soft + 0.12 * uneven * (4 * soft * (1 - soft)), 0, 1))[..., None]
     return of_skin * (1 - share) + of_scalp * share
 
 
 def usual_skin(size: int) -> np.ndarray:
-    """The prior's mean face in the form of `apart`'s channels, [S, S, 4], its albedo over the skin tone: necks are paler than cheeks, ears redder."""
+    """The prior's mean face in the form of `apart`'s channels, [S, S, 4], its albedo over the skin tone: necks are
+    paler than cheeks, ears redder."""
     shipped_files.require_whole(MEAN_FACE)
     with safe_open(MEAN_FACE, "numpy") as file:
         mean = file.get_tensor("mean_face").astype(np.float32).transpose(1, 2, 0)

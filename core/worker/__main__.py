@@ -39,13 +39,15 @@ def main() -> None:
 
 
 def _step_back() -> None:
-    """Lowers the priority, so that whatever the artist does in Blender comes first; an idle Blender costs the worker nothing.
+    """Lowers the priority, so that whatever the artist does in Blender comes first; an idle Blender costs the worker
+    nothing.
 
-    Linux desktops share the processor between sessions first (sched(7), "The autogroup feature"). A worker is a session of its own, so its
-    nice value alone says nothing to Blender: that of its group does.
+    Linux desktops share the processor between sessions first (sched(7), "The autogroup feature"). A worker is a session
+    of its own, so its nice value alone says nothing to Blender: that of its group does.
     """
     os.nice(PRIORITY)
-    with contextlib.suppress(OSError), open("/proc/self/autogroup", "w", encoding="ascii") as group:  # only there on such a Linux
+    # only there on such a Linux
+    with contextlib.suppress(OSError), open("/proc/self/autogroup", "w", encoding="ascii") as group:
         group.write(str(PRIORITY))
 
 

@@ -24,7 +24,8 @@ GRACE_S = 1.0
 
 
 class BackgroundTask:
-    """`work(task)` in a thread. It may call `task.say` and `task.run`; what it returns is `result`, and a Problem it raises ends it as Failed."""
+    """`work(task)` in a thread. It may call `task.say` and `task.run`; what it returns is `result`, and a Problem it
+    raises ends it as Failed."""
 
     def __init__(self, name: str, work: Callable[[BackgroundTask], object]):
         self.name = name
@@ -42,7 +43,8 @@ class BackgroundTask:
         self._thread.start()
 
     def poll(self) -> list[Message]:
-        """The messages since the last call; the last of all is Done, Cancelled or Failed. After a cancel the thread is waited for a second at most."""
+        """The messages since the last call; the last of all is Done, Cancelled or Failed. After a cancel the thread is
+        waited for a second at most."""
         if self.running and self._cancelled_at is not None:
             self.running = self._thread.is_alive() and time.monotonic() - self._cancelled_at < GRACE_S
             return [] if self.running else [Cancelled(self.name)]
@@ -62,12 +64,15 @@ class BackgroundTask:
         self._messages.put(Progress(self.name, done, of, text))
 
     def run(self, command: list, hear: Callable[[str], None] = lambda line: None) -> tuple[int, str]:
-        """Runs a command, each line it writes through `hear`; its exit code and the last line with an error in it. Raises OSError when it cannot be
-        started, and CancelledError where the task is cancelled before or meanwhile."""
+        """Runs a command, each line it writes through `hear`; its exit code and the last line with an error in it.
+        Raises OSError when it cannot be started, and CancelledError where the task is cancelled before or meanwhile."""
         apart = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {"start_new_session": True}
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON") and name != switchlight_api.KEY_VARIABLE}
-        self._process = subprocess.Popen([str(word) for word in command], env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                         stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace", **apart)
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")
+                       and name != switchlight_api.KEY_VARIABLE}
+        self._process = subprocess.Popen([str(word) for word in command], env=environment, stdin=subprocess.DEVNULL,
+                                         stdout=subprocess.PIPE,
+                                         stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace",
+                                         **apart)
         if self._cancelled_at is not None:
             self._kill()
         last_error = ""

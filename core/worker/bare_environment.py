@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An empty Python environment with pip in it, made from a Python that may lack venv, ensurepip and pip, as Blender's own may.
+"""An empty Python environment with pip in it, made from a Python that may lack venv, ensurepip and pip, as Blender's
+own may.
 
-Standard library only. What is missing is made up for: the folder by hand, as PEP 405 has it, and pip from its wheel, whose hash requirements/locks/pip.txt has.
+Standard library only. What is missing is made up for: the folder by hand, as PEP 405 has it, and pip from its wheel,
+whose hash requirements/locks/pip.txt has.
 """
 
 from __future__ import annotations
@@ -24,9 +26,11 @@ Run = Callable[[list], tuple[int, str]]
 """Runs a command; its exit code and the last line with an error in it."""
 
 
-def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | None = None, wheel_only: bool = False, keep: str = "") -> Path:
-    """Makes an environment anew in `folder`, of which the file `keep` alone stays, from the Python `base`, and gives its Python. `wheels` is a folder to take
-    pip from in place of an index; with `wheel_only` pip comes from its wheel even where Python brings one. Raises Problem."""
+def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | None = None, wheel_only: bool = False,
+         keep: str = "") -> Path:
+    """Makes an environment anew in `folder`, of which the file `keep` alone stays, from the Python `base`, and gives
+    its Python. `wheels` is a folder to take pip from in place of an index; with `wheel_only` pip comes from its wheel
+    even where Python brings one. Raises Problem."""
     folder = Path(folder)
     _empty(folder, keep)
     code, error = run([base, "-m", "venv", "--without-pip", folder])
@@ -35,8 +39,11 @@ def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | 
         _by_hand(folder, base)
     python = python_of(folder)
     if answer(python, "import sys; print(sys.prefix != sys.base_prefix)") != "True":
-        raise Problem(f"No environment can be made from {base} ({error or 'it does not start'}).", "Use an Existing Python.")
-    if wheel_only or not answer(python, "import ensurepip; print(ensurepip.version())") or run([python, "-m", "ensurepip", "--default-pip"])[0]:
+        raise Problem(f"No environment can be made from {base} ({error or 'it does not start'}).",
+                      "Use an Existing Python.")
+    if wheel_only or not answer(python,
+                                "import ensurepip; print(ensurepip.version())") or run([python, "-m", "ensurepip",
+                                                                                        "--default-pip"])[0]:
         unpack_pip(folder, pip_source.fetch(requirements, wheels))
     if answer(python, "import pip; print('pip')") != "pip":
         raise Problem(f"pip does not work in {folder}.", "Use an Existing Python, or choose another folder.")
@@ -44,7 +51,8 @@ def make(folder: Path, base: Path, requirements: Path, run: Run, wheels: Path | 
 
 
 def unpack_pip(folder: Path, wheel: bytes) -> None:
-    """Puts a wheel of pure Python into an environment: its files as they are, which is all that one without scripts needs."""
+    """Puts a wheel of pure Python into an environment: its files as they are, which is all that one without scripts
+    needs."""
     said = answer(python_of(folder), "import sysconfig; print(sysconfig.get_paths()['purelib'])")
     if not said:
         raise Problem(f"The environment {folder} does not answer.", "Use an Existing Python, or choose another folder.")
@@ -68,7 +76,8 @@ def _empty(folder: Path, keep: str) -> None:
 
 def _by_hand(folder: Path, base: Path) -> None:
     """What the module venv makes, without it: pyvenv.cfg, the interpreter and the folder of packages (PEP 405)."""
-    said = answer(base, "import sys; print(sys._base_executable); print('%d.%d.%d' % sys.version_info[:3])").splitlines()
+    said = answer(base,
+                  "import sys; print(sys._base_executable); print('%d.%d.%d' % sys.version_info[:3])").splitlines()
     if len(said) != 2:
         raise Problem(f"{base} is not a working Python.", "Use an Existing Python, or install Blender again.")
     real, version = Path(said[0]), said[1]
@@ -85,7 +94,9 @@ def _by_hand(folder: Path, base: Path) -> None:
             (folder / "lib" / f"python{short}" / "site-packages").mkdir(parents=True, exist_ok=True)
             for name in ("python", "python3", f"python{short}"):
                 (python.parent / name).symlink_to(real)
-        (folder / "pyvenv.cfg").write_text(f"home = {real.parent}\ninclude-system-site-packages = false\nversion = {version}\nexecutable = {real}\n",
-                                           encoding="utf-8")
+        (folder
+         / "pyvenv.cfg").write_text(f"home = {real.parent}\ninclude-system-site-packages = false\nversion = "
+                                    f"{version}\nexecutable = {real}\n",
+                                    encoding="utf-8")
     except OSError as error:
         raise storage_problem(error, folder) from error

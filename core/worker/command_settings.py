@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings on the command line: --set and --settings for every one, a flag for those that have one, and the list of all.
+"""The settings on the command line: --set and --settings for every one, a flag for those that have one, and the list of
+all.
 
 Ground floor: standard library only. Names, types, choices and help come from the fields in contract/settings.py.
 """
@@ -24,7 +25,8 @@ WIDTH = 120
 
 
 def add_options(parser: argparse.ArgumentParser, command: str) -> None:
-    """Gives the parser of a command ('run' or 'deliver') --settings, --set, and the flags of the command's own settings.
+    """Gives the parser of a command ('run' or 'deliver') --settings, --set, and the flags of the command's own
+    settings.
 
     What is not given leaves nothing in the parsed options but `settings_file` None and `assignments` [].
     """
@@ -36,18 +38,21 @@ def add_options(parser: argparse.ArgumentParser, command: str) -> None:
 
 def add_assignments(parser: argparse.ArgumentParser, command: str) -> None:
     """Gives the parser --settings and --set alone."""
-    example = '{"solve": {"steps": 30}, "seed": 1}; its values replace those of the quality' if command == "run" else '{"deliver": {"preset": "unreal"}}'
+    example = ('{"solve": {"steps": 30}, "seed": 1}; its values replace those of the quality' if command == "run"
+               else '{"deliver": {"preset": "unreal"}}')
     parser.add_argument("--settings", dest="settings_file", metavar="FILE", type=Path,
                         help=f"a JSON file like {example}; relative paths in it begin at its folder")
     parser.add_argument("--set", dest="assignments", metavar="STAGE.NAME=VALUE", action="append", default=[],
-                        help="any setting that `settings` lists; may be given again for another; replaces the file's value, as flags do")
+                        help="any setting that `settings` lists; may be given again for another; replaces the file's "
+                             "value, as flags do")
 
 
 def read_options(options: argparse.Namespace, command: str) -> dict:
-    """The settings that a command line asks for, as a job has them: {stage: {name: value}, seed, device}. Paths are absolute.
+    """The settings that a command line asks for, as a job has them: {stage: {name: value}, seed, device}. Paths are
+    absolute.
 
-    --set and flags lie over the file. Raises Problem for what is no setting or of another command, for a value that cannot be, a file that cannot be read,
-    and where one setting is to have two values.
+    --set and flags lie over the file. Raises Problem for what is no setting or of another command, for a value that
+    cannot be, a file that cannot be read, and where one setting is to have two values.
     """
     values = read_file(options.settings_file) if options.settings_file else {}
     asked: dict[str, tuple[str, object]] = {}
@@ -63,29 +68,36 @@ def read_options(options: argparse.Namespace, command: str) -> dict:
 
 
 def read_file(path: Path) -> dict:
-    """The settings in a JSON file, its relative paths made absolute from its folder. Raises Problem for a file that is not there or not of settings."""
+    """The settings in a JSON file, its relative paths made absolute from its folder. Raises Problem for a file that is
+    not there or not of settings."""
     path = Path(absolute_path(str(path)))
     try:
         values = read_json(path)
     except (OSError, ValueError) as error:
-        raise Problem(f"The settings file {path} cannot be read ({error}).", 'It is a JSON file like {"solve": {"steps": 30}, "seed": 1}.') from error
+        raise Problem(f"The settings file {path} cannot be read ({error}).",
+                      'It is a JSON file like {"solve": {"steps": 30}, "seed": 1}.') from error
     from_json(values)
-    return {stage: {name: absolute_path(value, path.parent) if "path" in find_setting(f"{stage}.{name}").metadata else value for name, value in own.items()}
+    return {stage: {name: absolute_path(value, path.parent) if "path" in find_setting(f"{stage}.{name}").metadata
+                    else value for name, value in own.items()}
             if stage in STAGE_KINDS else own for stage, own in values.items()}
 
 
 def refuse_lone_flags(options: argparse.Namespace, values: dict) -> None:
-    """Raises Problem for a flag of `run` that means something beside another setting only; `values` are those of `read_options`."""
+    """Raises Problem for a flag of `run` that means something beside another setting only; `values` are those of
+    `read_options`."""
     given = vars(options)
     delighter = values.get("delight", {}).get("delighter")
     for name, wanted in (("delight.folder", "folder"), ("delight.checkpoint", "opendelight")):
         if given.get(name) and delighter != wanted:
             flag = find_setting(name).metadata["flag"]
-            raise Problem(f"{flag} goes with --delighter {wanted} only.", f"Add --delighter {wanted}, or leave {flag} out.")
+            raise Problem(f"{flag} goes with --delighter {wanted} only.",
+                          f"Add --delighter {wanted}, or leave {flag} out.")
     if (given.get("delight.switchlight_preview") or options.send_frames) and delighter != "switchlight":
-        raise Problem("--preview and --send-frames go with --delighter switchlight only.", "Add --delighter switchlight, or leave them out.")
+        raise Problem("--preview and --send-frames go with --delighter switchlight only.",
+                      "Add --delighter switchlight, or leave them out.")
     if given.get("registration.new_atlas") and not values.get("registration", {}).get("template"):
-        raise Problem("--new-atlas goes with --template only.", "Name your head mesh with --template, or leave --new-atlas out.")
+        raise Problem("--new-atlas goes with --template only.",
+                      "Name your head mesh with --template, or leave --new-atlas out.")
 
 
 def list_settings() -> str:
@@ -102,9 +114,11 @@ def _argument(name: str, field: Field) -> dict:
     """What argparse is told of a setting's flag, but for its name."""
     tooltip = _tooltip(name).replace("%", "%%")
     if isinstance(field.default, bool):
-        return {"action": "store_const", "const": not field.default, "help": f"switches off: {tooltip}" if field.default else tooltip}
+        return {"action": "store_const", "const": not field.default,
+                "help": f"switches off: {tooltip}" if field.default else tooltip}
     choices = field.metadata.get("choices")
-    return {"type": type(field.default), "help": tooltip, **({"choices": choices} if choices else {"metavar": _metavar(field)})}
+    return {"type": type(field.default), "help": tooltip,
+            **({"choices": choices} if choices else {"metavar": _metavar(field)})}
 
 
 def _metavar(field: Field) -> str:
@@ -117,7 +131,8 @@ def _metavar(field: Field) -> str:
 def _flag_words(field: Field) -> str:
     """The flag as it is written, with what stands for its value."""
     flag = field.metadata["flag"]
-    return flag if isinstance(field.default, bool) else f"{flag} {'VALUE' if 'choices' in field.metadata else _metavar(field)}"
+    return (flag if isinstance(field.default, bool)
+            else f"{flag} {'VALUE' if 'choices' in field.metadata else _metavar(field)}")
 
 
 def _tooltip(name: str) -> str:
@@ -138,7 +153,8 @@ def _assignment(text: str, command: str) -> tuple[str, str, object]:
     name = name.strip()
     field = find_setting(name)
     if not equals:
-        raise Problem(f"--set {text} gives no value.", f"Write --set {name}=VALUE, as {name}={value_to_text(field.default)}.")
+        raise Problem(f"--set {text} gives no value.",
+                      f"Write --set {name}=VALUE, as {name}={value_to_text(field.default)}.")
     if COMMANDS[name] != command:
         raise Problem(f"`core {command}` has no use for {name}.", f"It is a setting of `core {COMMANDS[name]}`.")
     return f"--set {text}", name, value_from_text(name, field, value)

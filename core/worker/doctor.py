@@ -15,7 +15,8 @@ from . import environment
 
 @dataclass(frozen=True)
 class Findings:
-    """What the doctor has to say: `lines` of what there is, `problems` and `remedies`, whole sentences; none where the chain can run."""
+    """What the doctor has to say: `lines` of what there is, `problems` and `remedies`, whole sentences; none where the
+    chain can run."""
 
     lines: tuple[str, ...]
     problems: tuple[str, ...]
@@ -23,7 +24,8 @@ class Findings:
 
     @property
     def text(self) -> str:
-        wrong = ["", "What is wrong:", *(f"  {problem}" for problem in self.problems), "What to do:", *(f"  {remedy}" for remedy in self.remedies)]
+        wrong = ["", "What is wrong:", *(f"  {problem}" for problem in self.problems), "What to do:",
+                 *(f"  {remedy}" for remedy in self.remedies)]
         return "\n".join((*self.lines, *(wrong if self.problems else ["Nothing is missing."])))
 
 
@@ -37,11 +39,13 @@ def examine(root: Path, python: Path, importing: bool = True) -> Findings:
              f"device        {found['device'] or 'not tried'}" + (f"  ({found['reason']})" if found["reason"] else "")]
     for name, version in environment.required(requirements).items():
         has = found["versions"][name]
-        lines.append(f"  {name:32} {has or 'missing':14}" + ("" if has and has.partition("+")[0] == version else f" {version} is needed"))
+        lines.append(f"  {name:32} {has or 'missing':14}"
+                     + ("" if has and has.partition("+")[0] == version else f" {version} is needed"))
     of_files = shipped_files.find_faults(root / "core")
     count = len(shipped_files.read_manifest()["core"])
     lines.append(f"own files     {count - len(of_files)} of {count} whole")
-    lines += [f"weights       {path.name}: {_described(path)}" for path in sorted((root / "core" / "weights").glob("*.safetensors"))]
+    lines += [f"weights       {path.name}: {_described(path)}"
+              for path in sorted((root / "core" / "weights").glob("*.safetensors"))]
     of_packages = environment.judge(found, requirements)
     remedies = []
     if of_packages:

@@ -18,12 +18,15 @@ from ..contract.messages import Problem
 from .background import BackgroundTask
 
 PYTHONS = ((3, 11), (3, 12), (3, 13))
-"""Versions of Python for which every direct requirement has a wheel; locks.py has those that an environment is made for."""
-MODULES = {"opencv-contrib-python-headless": "cv2", "openimageio": "OpenImageIO", "scikit-image": "skimage", "pillow-heif": "pillow_heif"}
+"""Versions of Python for which every direct requirement has a wheel; locks.py has those that an environment is made
+for."""
+MODULES = {"opencv-contrib-python-headless": "cv2", "openimageio": "OpenImageIO", "scikit-image": "skimage",
+           "pillow-heif": "pillow_heif"}
 """Modules of the packages that are called otherwise."""
 COMPUTE_FILE = "wildcap_compute.txt"
-"""Says in an environment for what, from where and by which lock it was made: another choice makes it anew, and so does one of an older WildCap. It is the
-first file in the folder, and says that the others are ours; empty while they are not complete."""
+"""Says in an environment for what, from where and by which lock it was made: another choice makes it anew, and so does
+one of an older WildCap. It is the first file in the folder, and says that the others are ours; empty while they are not
+complete."""
 
 
 def python_of(folder: Path) -> Path:
@@ -38,7 +41,8 @@ def default_folder() -> Path:
 
 def required(requirements: Path) -> dict[str, str]:
     """Package -> pinned version, of worker.txt in the folder `requirements`."""
-    lines = [line.partition("#")[0].strip() for line in (requirements / "worker.txt").read_text(encoding="utf-8").splitlines()]
+    lines = [line.partition("#")[0].strip()
+             for line in (requirements / "worker.txt").read_text(encoding="utf-8").splitlines()]
     return dict(line.split("==") for line in lines if line)
 
 
@@ -51,23 +55,25 @@ def verify(python: Path, requirements: Path, importing: bool = False) -> list[st
 
 
 def survey(python: Path, requirements: Path, importing: bool = False) -> dict:
-    """What a Python has: {"python": [major, minor], "versions": {package: version or None}, "opencv": [packages], "errors": {module: text},
-    "device": "cpu", "cuda" or "mps", "reason": why that one}. Raises Problem when it cannot be run. The device is proven by a pass of the network (importing),
-    else nothing is known of it: ''."""
+    """What a Python has: {"python": [major, minor], "versions": {package: version or None}, "opencv": [packages],
+    "errors": {module: text}, "device": "cpu", "cuda" or "mps", "reason": why that one}. Raises Problem when it cannot
+    be run. The device is proven by a pass of the network (importing), else nothing is known of it: ''."""
     modules = [MODULES.get(name, name) for name in required(requirements)] if importing else []
     root = str(Path(requirements).parent) if importing else ""
     printed = answer(python, _SURVEY % {"names": list(required(requirements)), "modules": modules, "root": root}, 300)
     try:
         return json.loads(printed.splitlines()[-1])
     except (ValueError, IndexError):
-        raise Problem(f"{python} is not a working Python.", "Choose another Python, or install the solver again.") from None
+        raise Problem(f"{python} is not a working Python.",
+                      "Choose another Python, or install the solver again.") from None
 
 
 def judge(found: dict, requirements: Path) -> list[str]:
     """What is wrong with a survey's findings, one sentence each."""
     problems = []
     if tuple(found["python"]) not in PYTHONS:
-        problems.append(f"It is Python {found['python'][0]}.{found['python'][1]}; " + " or ".join(f"{a}.{b}" for a, b in PYTHONS) + " is needed.")
+        problems.append(f"It is Python {found['python'][0]}.{found['python'][1]}; "
+                        + " or ".join(f"{a}.{b}" for a, b in PYTHONS) + " is needed.")
     for name, version in required(requirements).items():
         has = found["versions"][name]
         if has is None:
@@ -75,7 +81,8 @@ def judge(found: dict, requirements: Path) -> list[str]:
         elif has.partition("+")[0] != version:
             problems.append(f"{name} is {has}, not {version}.")
     if len(found["opencv"]) > 1:
-        problems.append(f"More than one OpenCV is installed ({', '.join(found['opencv'])}); remove all but opencv-contrib-python-headless.")
+        problems.append(f"More than one OpenCV is installed ({', '.join(found['opencv'])}); remove all but "
+                        "opencv-contrib-python-headless.")
     return problems + [f"{module} does not load: {text}." for module, text in found["errors"].items()]
 
 
@@ -94,7 +101,8 @@ def remove(folder: Path) -> None:
 def check_removable(folder: Path) -> None:
     """Raises Problem for a folder that is no environment of ours."""
     if Path(folder).exists() and not (Path(folder) / COMPUTE_FILE).is_file():
-        raise Problem(f"{folder} is no environment that WildCap made, so it is not deleted.", "Choose the folder that the solver was installed to.")
+        raise Problem(f"{folder} is no environment that WildCap made, so it is not deleted.",
+                      "Choose the folder that the solver was installed to.")
 
 
 def removal(folder: Path) -> BackgroundTask:
@@ -130,7 +138,8 @@ if %(root)r and "torch" in sys.modules and not errors:
         device, reason = "cpu", f"The network does not run: {type(error).__name__}: {error}".splitlines()[0]
 opencv = sorted({d.name for d in metadata.distributions() if d.name and d.name.lower().startswith("opencv")})
 versions = {name: version(name) for name in %(names)s}
-print(json.dumps({"python": sys.version_info[:2], "versions": versions, "opencv": opencv, "errors": errors, "device": device, "reason": reason}))
+print(json.dumps({"python": sys.version_info[:2], "versions": versions, "opencv": opencv, "errors": errors,
+                  "device": device, "reason": reason}))
 """
 
 
@@ -138,7 +147,8 @@ def answer(python: str | Path, code: str, timeout_s: float = 20) -> str:
     """What `python` prints for `code`; '' when it cannot be run."""
     flags = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {}
     try:
-        result = subprocess.run([str(python), "-E", "-s", "-c", code], capture_output=True, text=True, timeout=timeout_s, stdin=subprocess.DEVNULL, **flags)
+        result = subprocess.run([str(python), "-E", "-s", "-c", code], capture_output=True, text=True,
+                                timeout=timeout_s, stdin=subprocess.DEVNULL, **flags)
         return result.stdout.strip()
     except (OSError, subprocess.TimeoutExpired):
         return ""

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an installation will download and how much disk it takes, as the package index reports it for this machine, before anything is installed.
+"""What an installation will download and how much disk it takes, as the package index reports it for this machine,
+before anything is installed.
 
-Ground floor: standard library only. pip chooses the files (its dry run reads their descriptions alone); a wheel's own directory, at its end,
-says how large it is unpacked.
+Ground floor: standard library only. pip chooses the files (its dry run reads their descriptions alone); a wheel's own
+directory, at its end, says how large it is unpacked.
 """
 
 from __future__ import annotations
@@ -24,17 +25,20 @@ from ..contract.messages import Problem
 from . import bare_environment, pip_steps
 
 UNPACKED = 3.5
-"""Bytes on disk for each that is downloaded, where a wheel's directory cannot be read: 0.46 GB became 1.6 GB on Linux with torch for the CPU."""
+"""Bytes on disk for each that is downloaded, where a wheel's directory cannot be read: 0.46 GB became 1.6 GB on Linux
+with torch for the CPU."""
 COMPILED = 1.25
 """Bytes of compiled Python for each of source, which pip adds (PyTorch's and SciPy's: 1.20 and 1.38)."""
 END = struct.Struct("<4s4H2LH")
-"""End of a zip file's central directory without a comment (PKWARE APPNOTE 4.3.16): its size and offset are the sixth and seventh."""
+"""End of a zip file's central directory without a comment (PKWARE APPNOTE 4.3.16): its size and offset are the sixth
+and seventh."""
 RETRIES = ("--retries", "1")
 
 
 @dataclass(frozen=True)
 class InstallationPlan:
-    """The packages by name and version, the hosts they come from ('this disk' for files), bytes to download and bytes once unpacked."""
+    """The packages by name and version, the hosts they come from ('this disk' for files), bytes to download and bytes
+    once unpacked."""
 
     packages: dict[str, str]
     hosts: tuple[str, ...]
@@ -49,8 +53,9 @@ class InstallationPlan:
 
 def plan(requirements: Path, base: Path, compute: str, source: str, run: Callable[[list[str]], tuple[int, str]],
          say: Callable[[float, float, str], None] = lambda *_: None, wheels: Path | None = None) -> InstallationPlan:
-    """What an installation would bring (see installation.py). `base` is the Python to make it from, `run` runs a command and gives its exit code and last
-    error, `say` takes how far it is. Raises Problem when there is no solver for this machine, or the index cannot be reached or lacks a package."""
+    """What an installation would bring (see installation.py). `base` is the Python to make it from, `run` runs a
+    command and gives its exit code and last error, `say` takes how far it is. Raises Problem when there is no solver
+    for this machine, or the index cannot be reached or lacks a package."""
     lock = pip_steps.lock_of(base, requirements)
     wheels = Path(wheels) if source == "folder" else None
     with tempfile.TemporaryDirectory(prefix="wildcap_index_", ignore_cleanup_errors=True) as folder:
@@ -59,7 +64,8 @@ def plan(requirements: Path, base: Path, compute: str, source: str, run: Callabl
         pip = [python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", *RETRIES]
         say(1, 4, "preparing to ask the package index")
         if wheels is None:
-            run([*pip, "--quiet", "--upgrade", "pip"])  # one that reads descriptions without downloading packages; an old one works, slowly
+            # one that reads descriptions without downloading packages; an old one works, slowly
+            run([*pip, "--quiet", "--upgrade", "pip"])
         found, report = {}, Path(folder) / "report.json"
 
         def ask(words: tuple[str, ...]) -> tuple[int, str]:
@@ -69,9 +75,11 @@ def plan(requirements: Path, base: Path, compute: str, source: str, run: Callabl
             return code, error
 
         todo = pip_steps.steps(requirements, lock, compute, source, Path(folder), wheels)
-        code, error = pip_steps.carry_out(todo, ask, lambda done: say(2 + done / len(todo), 4, "asking the package index"))
+        code, error = pip_steps.carry_out(todo, ask,
+                                          lambda done: say(2 + done / len(todo), 4, "asking the package index"))
         if code:
-            raise Problem(f"The package index did not answer as expected ({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",
+            raise Problem(f"The package index did not answer as expected "
+                          f"({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",
                           "Check the network connection, and try again.")
         say(3, 4, "asking how large the packages are")
         with ThreadPoolExecutor(8) as pool:
@@ -85,7 +93,8 @@ def check_space(plan: InstallationPlan, folder: Path) -> int:
     """Bytes free on the disk of a folder that need not be there yet. Raises Problem when the plan does not fit."""
     free = free_space(folder)
     if free < plan.needed:
-        raise Problem(f"The disk that holds {folder} has {gigabytes(free)} free; {gigabytes(plan.needed)} are needed while the solver is installed.",
+        raise Problem(f"The disk that holds {folder} has {gigabytes(free)} free; {gigabytes(plan.needed)} are needed "
+                      "while the solver is installed.",
                       "Free some space, or choose a solver folder on another disk.")
     return free
 
@@ -107,18 +116,20 @@ def gigabytes(size: int) -> str:
 def wheel_size(url: str) -> tuple[int, int]:
     """(bytes to download, bytes unpacked) of a wheel at an address. Raises Problem when it is not there."""
     total, files = wheel_files(url)
-    return total, round(sum(size * (1 + COMPILED * name.endswith(".py")) for name, size in files) if files else UNPACKED * total)
+    return total, round(sum(size * (1 + COMPILED * name.endswith(".py")) for name, size in files) if files
+                        else UNPACKED * total)
 
 
 def wheel_files(url: str) -> tuple[int, list[tuple[str, int]]]:
-    """Bytes to download of a wheel at an address, and its files with their bytes unpacked; no files where the server gives no parts of one.
-    Raises Problem when it is not there."""
+    """Bytes to download of a wheel at an address, and its files with their bytes unpacked; no files where the server
+    gives no parts of one. Raises Problem when it is not there."""
     try:
         tail, total = _part(url, -END.size)
         signature, *_, size, offset, _ = END.unpack(tail)
         return total, _listed(_part(url, offset, size)[0]) if signature == b"PK\5\6" else []
     except (OSError, ValueError, struct.error) as error:
-        raise Problem(f"{urllib.parse.urlsplit(url).hostname or url} did not answer ({error}).", "Check the network connection, and try again.") from error
+        raise Problem(f"{urllib.parse.urlsplit(url).hostname or url} did not answer ({error}).",
+                      "Check the network connection, and try again.") from error
 
 
 def _part(url: str, offset: int, size: int | None = None) -> tuple[bytes, int]:

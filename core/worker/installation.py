@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Making the worker's own Python environment: from which Python, with which build of PyTorch, from where, and in the background.
+"""Making the worker's own Python environment: from which Python, with which build of PyTorch, from where, and in the
+background.
 
 Ground floor: standard library only. Nothing is installed into Blender's Python.
 """
@@ -25,17 +26,18 @@ from .pip_steps import carry_out, compute_of, lock_of, steps
 
 @dataclass(frozen=True)
 class PackageSource:
-    """Which packages come, and from where: compute is 'auto', 'cpu', 'cuda' or 'apple', what PyTorch is built for; source is one of pip_steps.SOURCES, and
-    wheels the folder of 'folder'."""
+    """Which packages come, and from where: compute is 'auto', 'cpu', 'cuda' or 'apple', what PyTorch is built for;
+    source is one of pip_steps.SOURCES, and wheels the folder of 'folder'."""
 
     compute: str = "auto"
     source: str = "pytorch"
     wheels: Path | None = None
 
 
-def installation(folder: Path, requirements: Path, log: Path, base: Path | None, chosen: PackageSource, packages: int = 0) -> BackgroundTask:
-    """Makes an environment in the background. One in the same folder as a broken or cancelled one continues that; where that does not work, it is made anew.
-    What a cancel leaves stays, and what was downloaded is in pip's cache.
+def installation(folder: Path, requirements: Path, log: Path, base: Path | None, chosen: PackageSource,
+                 packages: int = 0) -> BackgroundTask:
+    """Makes an environment in the background. One in the same folder as a broken or cancelled one continues that; where
+    that does not work, it is made anew. What a cancel leaves stays, and what was downloaded is in pip's cache.
 
     Parameters
     ----------
@@ -64,7 +66,8 @@ def installation(folder: Path, requirements: Path, log: Path, base: Path | None,
         try:
             log.parent.mkdir(parents=True, exist_ok=True)
             with open(log, "w", encoding="utf-8") as file:
-                _Installing(task, folder, requirements, base or base_python(), chosen, _listener(task, file, expected), log).run()
+                _Installing(task, folder, requirements, base or base_python(), chosen, _listener(task, file, expected),
+                            log).run()
         except OSError as error:
             raise storage_problem(error, folder) from error
 
@@ -72,11 +75,14 @@ def installation(folder: Path, requirements: Path, log: Path, base: Path | None,
 
 
 def find_python() -> Path | None:
-    """A Python on this machine that the environment can be made from, Blender's own before all others; None when there is none."""
+    """A Python on this machine that the environment can be made from, Blender's own before all others; None when there
+    is none."""
     own = "{}.{}".format(*sys.version_info)
     names = [f"python{major}.{minor}" for major, minor in locks.PYTHONS] + ["python3", "python"]
-    candidates = [sys.executable, f"{sys.base_prefix}/bin/python{own}", f"{sys.base_prefix}/bin/python.exe", *(shutil.which(name) for name in names)]
-    candidates += [f"{folder}/{name}" for folder in ("/usr/bin", "/usr/local/bin", "/opt/homebrew/bin") for name in names]
+    candidates = [sys.executable, f"{sys.base_prefix}/bin/python{own}", f"{sys.base_prefix}/bin/python.exe",
+                  *(shutil.which(name) for name in names)]
+    candidates += [f"{folder}/{name}" for folder in ("/usr/bin", "/usr/local/bin", "/opt/homebrew/bin")
+                   for name in names]
     if os.name == "nt":
         programs = Path(os.environ.get("LOCALAPPDATA", "")) / "Programs" / "Python"
         candidates += [programs / f"Python{major}{minor}" / "python.exe" for major, minor in locks.PYTHONS]
@@ -113,7 +119,8 @@ class _Installing:
         made_for = " ".join((self.chosen.compute, self.chosen.source, lock.name))
         continued = _begun(self.folder, made_for)
         problems = self._bring(lock, made_for, anew=not continued)
-        if problems and continued:  # pip believes what an environment says of itself, though files of it may be gone or cut
+        # pip believes what an environment says of itself, though files of it may be gone or cut
+        if problems and continued:
             problems = self._bring(lock, made_for, anew=True)
         if problems:
             raise Problem(problems[0], f"Install again; the log is {self.log}.")
@@ -125,9 +132,11 @@ class _Installing:
             task.say(0, 100, "making the solver's folder")
             folder.mkdir(parents=True, exist_ok=True)
             (folder / COMPUTE_FILE).write_text("", encoding="utf-8")
-            bare_environment.make(folder, self.base, requirements, lambda command: task.run(command, self.hear), chosen.wheels, keep=COMPUTE_FILE)
+            bare_environment.make(folder, self.base, requirements, lambda command: task.run(command, self.hear),
+                                  chosen.wheels, keep=COMPUTE_FILE)
             (folder / COMPUTE_FILE).write_text(made_for, encoding="utf-8")
-        pip = [python_of(folder), "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--progress-bar", "off"]
+        pip = [python_of(folder), "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--progress-bar",
+               "off"]
         todo = steps(requirements, lock, chosen.compute, chosen.source, folder, chosen.wheels)
         code, error = carry_out(todo, lambda words: task.run([*pip, *words], self.hear))
         if code:
@@ -139,7 +148,11 @@ class _Installing:
 def _begun(folder: Path, made_for: str) -> bool:
     """Whether an earlier installation of the same left an environment whose pip works."""
     mark = folder / COMPUTE_FILE
-    return mark.is_file() and mark.read_text(encoding="utf-8") == made_for and answer(python_of(folder), "import pip; print('pip')") == "pip"
+    return (
+        mark.is_file()
+        and mark.read_text(encoding="utf-8") == made_for
+        and answer(python_of(folder), "import pip; print('pip')") == "pip"
+    )
 
 
 def _listener(task: BackgroundTask, log, expected: int):
@@ -163,8 +176,10 @@ def _failure(last_error: str, folder: Path, log: Path) -> Problem:
         return Problem("A package is not the file that WildCap was made with: its hash is another.",
                        f"Install again, or ask who runs your package index; the log is {log}.")
     if "no space left" in text or "disk" in text:
-        return Problem(f"The disk that holds {folder} is full.", "Free some space, or choose another folder, and install again.")
+        return Problem(f"The disk that holds {folder} is full.",
+                       "Free some space, or choose another folder, and install again.")
     if any(words in text for words in ("no matching distribution", "connection", "timed out", "resolve", "retries")):
-        return Problem("A package could not be downloaded.", f"Check the network connection and install again; it continues. The log is {log}.")
+        return Problem("A package could not be downloaded.",
+                       f"Check the network connection and install again; it continues. The log is {log}.")
     said = last_error.removeprefix("ERROR: ").rstrip(".") or "no message"
     return Problem(f"The installation stopped ({said}).", f"Install again; the log is {log}.")

@@ -22,8 +22,8 @@ from ..contract.settings import Settings, from_json, preset
 
 @dataclass(frozen=True)
 class JobRequest:
-    """`source` is a video or a folder of photographs ('': the one the capture has); `chain` are the stages to run, in order;
-    `force` says that they run even where they are fresh."""
+    """`source` is a video or a folder of photographs ('': the one the capture has); `chain` are the stages to run, in
+    order; `force` says that they run even where they are fresh."""
 
     capture: Capture
     source: str
@@ -33,18 +33,19 @@ class JobRequest:
     tool: stages.Stage | None = None  # what runs in the chain's place
 
 
-def write_job(capture: Capture, *, source: str | Path = "", first: str | None = None, last: str | None = None, settings: dict | None = None,
-              quality: str = "standard", tool: str = "") -> Path:
+def write_job(capture: Capture, *, source: str | Path = "", first: str | None = None, last: str | None = None,
+              settings: dict | None = None, quality: str = "standard", tool: str = "") -> Path:
     """Writes the capture's job.json and returns its path.
 
     `first` (a stage's name) begins with that stage and forces it and those after it; None begins with the first one and
-    skips what is fresh. `last` ends the job, None: the last stage. `settings` ({stage: {name: value}}, seed, device) lie
-    over the preset `quality`. `tool` names one of stages.TOOLS that runs in place of the chain. Raises Problem for an unknown name or value, when the
-    folder cannot be written, for file names that are no text, and while another worker is at the capture: job.json is the record of what that one was asked.
+    skips what is fresh. `last` ends the job, None: the last stage. `settings` ({stage: {name: value}}, seed, device)
+    lie over the preset `quality`. `tool` names one of stages.TOOLS that runs in place of the chain. Raises Problem for
+    an unknown name or value, when the folder cannot be written, for file names that are no text, and while another
+    worker is at the capture: job.json is the record of what that one was asked.
     """
     chosen = convert_settings(settings or {}, lambda path: write_portable(path, capture.root))
-    values = {"capture": ".", "source": write_portable(source, capture.root) if str(source) else "", "from": first, "until": last, "settings": chosen,
-              "quality": quality, **({"tool": tool} if tool else {})}
+    values = {"capture": ".", "source": write_portable(source, capture.root) if str(source) else "", "from": first,
+              "until": last, "settings": chosen, "quality": quality, **({"tool": tool} if tool else {})}
     _check_names(capture.root, source)
     _job(values, capture.root)
     if str(source):
@@ -62,11 +63,13 @@ def read_job(path: Path) -> JobRequest:
     except Problem as problem:
         raise Problem(f"The job file {path} cannot be used: {problem.problem}", problem.remedy) from problem
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise Problem(f"The job file {path} cannot be read ({error}).", "Start the job again from Blender or with `python -m core run`.") from error
+        raise Problem(f"The job file {path} cannot be read ({error}).",
+                      "Start the job again from Blender or with `python -m core run`.") from error
 
 
 def _check_names(root: Path, source: str | Path) -> None:
-    """Raises Problem for a name that is no text, in the path of the capture or of its source, or of a photograph: no record could hold it."""
+    """Raises Problem for a name that is no text, in the path of the capture or of its source, or of a photograph: no
+    record could hold it."""
     inside = os.listdir(source) if str(source) and os.path.isdir(source) else []
     for name in (os.path.abspath(root), str(source), *inside):
         try:
@@ -81,11 +84,14 @@ def _job(values: dict, folder: Path) -> JobRequest:
     first, last = (stages.NAMES.index(stages.by_name(name).name) if name else default
                    for name, default in ((values.get("from"), 0), (values.get("until"), len(stages.NAMES) - 1)))
     if first > last:
-        raise Problem(f"The stage {stages.NAMES[first]} comes after {stages.NAMES[last]}.", "Name the first stage to run before the last one.")
+        raise Problem(f"The stage {stages.NAMES[first]} comes after {stages.NAMES[last]}.",
+                      "Name the first stage to run before the last one.")
     chosen = convert_settings(values.get("settings") or {}, lambda path: str(read_portable(path, folder)))
     settings = from_json(chosen, preset(values.get("quality") or "standard"))
     tool = next((each for each in stages.TOOLS if each.name == values.get("tool")), None)
     if values.get("tool") and tool is None:
-        raise Problem(f"There is no tool named {values['tool']!r}.", f"The tools are {', '.join(each.name for each in stages.TOOLS)}.")
+        raise Problem(f"There is no tool named {values['tool']!r}.",
+                      f"The tools are {', '.join(each.name for each in stages.TOOLS)}.")
     source = str(read_portable(values["source"], folder)) if values.get("source") else ""
-    return JobRequest(Capture(read_portable(values["capture"], folder)), source, stages.STAGES[first:last + 1], bool(values.get("from")), settings, tool)
+    return JobRequest(Capture(read_portable(values["capture"], folder)), source, stages.STAGES[first:last + 1],
+                      bool(values.get("from")), settings, tool)

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which packages go to which machine: requirements/locks/PLATFORM-PYTHON.txt names every one, with the hashes of its wheels.
+"""Which packages go to which machine: requirements/locks/PLATFORM-PYTHON.txt names every one, with the hashes of its
+wheels.
 
-`python -m benchmarks.locks` writes them. Beside a lock may lie PLATFORM-PYTHON-cpu.txt or -cuda.txt: PyTorch's build for that device where the
-lock's own is another, or what that build needs besides. Standard library only.
+`python -m benchmarks.locks` writes them. Beside a lock may lie PLATFORM-PYTHON-cpu.txt or -cuda.txt: PyTorch's build
+for that device where the lock's own is another, or what that build needs besides. Standard library only.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ PYTHONS = ((3, 11), (3, 13))
 """Versions of Python that there are locks for: those of Blender 4.2 to 5.0, and of 5.1 and newer."""
 PLATFORMS = {
     "win_amd64": ("win_amd64",),
-    "macosx_arm64": tuple(f"macosx_{major}_0_{kind}" for major in (14, 13, 12, 11) for kind in ("arm64", "universal2")) + ("macosx_10_9_universal2",),
+    "macosx_arm64": tuple(f"macosx_{major}_0_{kind}" for major in (14, 13, 12, 11) for kind in ("arm64", "universal2"))
+    + ("macosx_10_9_universal2",),
     "manylinux_x86_64": tuple(f"manylinux_2_{minor}_x86_64" for minor in range(28, 4, -1)) + ("manylinux2014_x86_64",),
 }
 """Platform of a lock -> tags of the wheels that it takes, the newest first."""
@@ -27,20 +29,22 @@ MACOS, GLIBC = (14, 0), (2, 28)
 """The oldest that the wheels are made for."""
 LONGEST_PATH = 250
 """Characters that no path of an installation exceeds; Windows without long paths switched on stops at 259."""
-ELSEWHERE = "Use an Existing Python that has what requirements/worker.txt lists; masks, materials and renders work without it."
+ELSEWHERE = ("Use an Existing Python that has what requirements/worker.txt lists; masks, materials and renders work "
+             "without it.")
 
 DESCRIBE = """
 import json, platform, struct, sys, sysconfig
-print(json.dumps({"python": sys.version_info[:2], "system": sys.platform, "machine": platform.machine().lower(), "bits": 8 * struct.calcsize("P"),
-                  "macos": platform.mac_ver()[0], "libc": platform.libc_ver(), "free_threaded": bool(sysconfig.get_config_var("Py_GIL_DISABLED"))}))
+print(json.dumps({"python": sys.version_info[:2], "system": sys.platform, "machine": platform.machine().lower(),
+                  "bits": 8 * struct.calcsize("P"), "macos": platform.mac_ver()[0], "libc": platform.libc_ver(),
+                  "free_threaded": bool(sysconfig.get_config_var("Py_GIL_DISABLED"))}))
 """
 """What a Python prints about itself for `lock_name`."""
 
 
 @dataclass(frozen=True)
 class Lock:
-    """`lines`: package -> its requirement with version and hashes; `longest` is the longest path below an environment's folder, in characters, while it
-    is installed, and `download` is in bytes; both 0 where the file does not say."""
+    """`lines`: package -> its requirement with version and hashes; `longest` is the longest path below an environment's
+    folder, in characters, while it is installed, and `download` is in bytes; both 0 where the file does not say."""
 
     name: str
     lines: dict[str, str]
@@ -66,26 +70,34 @@ def names() -> list[str]:
 
 
 def lock_name(description: str) -> str:
-    """The name of the lock for the Python that printed `description` (see DESCRIBE). Raises Problem where there is none, before anything is downloaded."""
+    """The name of the lock for the Python that printed `description` (see DESCRIBE). Raises Problem where there is
+    none, before anything is downloaded."""
     try:
         about = json.loads(description)
         python, system, machine = tuple(about["python"]), about["system"], about["machine"]
     except (ValueError, KeyError, TypeError):
-        raise Problem("The Python that the solver was to be made from does not answer.", "Use an Existing Python, or install Blender again.") from None
+        raise Problem("The Python that the solver was to be made from does not answer.",
+                      "Use an Existing Python, or install Blender again.") from None
     version = ".".join(map(str, python))
     if python not in PYTHONS or about["free_threaded"]:
         kind = f"{version} without its global lock" if about["free_threaded"] else version
-        raise Problem(f"This Python is {kind}; the solver's packages are made for {' and '.join(f'{a}.{b}' for a, b in PYTHONS)}.",
+        raise Problem(f"This Python is {kind}; the solver's packages are made for "
+                      f"{' and '.join(f'{a}.{b}' for a, b in PYTHONS)}.",
                       "Use an Existing Python of one of these, or the Blender from blender.org, which brings its own.")
     if system == "darwin" and machine != "arm64":
-        raise Problem("There is no solver for Macs with an Intel processor: PyTorch and pycolmap are no longer made for them.", ELSEWHERE)
+        raise Problem("There is no solver for Macs with an Intel processor: PyTorch and pycolmap are no longer made "
+                      "for them.", ELSEWHERE)
     if system == "darwin" and _numbers(about["macos"]) < MACOS:
-        raise Problem(f"The solver needs macOS {MACOS[0]} or newer; this is {about['macos']}.", f"Update macOS. Or: {ELSEWHERE}")
-    if machine not in ("arm64", "x86_64", "amd64") or about["bits"] != 64 or (machine == "arm64" and system != "darwin"):
-        raise Problem(f"There is no solver for this processor ({machine}, {about['bits']} bits): pycolmap is not made for it.", ELSEWHERE)
+        raise Problem(f"The solver needs macOS {MACOS[0]} or newer; this is {about['macos']}.",
+                      f"Update macOS. Or: {ELSEWHERE}")
+    if machine not in ("arm64", "x86_64",
+                       "amd64") or about["bits"] != 64 or (machine == "arm64" and system != "darwin"):
+        raise Problem(f"There is no solver for this processor ({machine}, {about['bits']} bits): pycolmap is not made "
+                      "for it.", ELSEWHERE)
     if system.startswith("linux") and (about["libc"][0] != "glibc" or _numbers(about["libc"][1]) < GLIBC):
         has = " ".join(filter(None, about["libc"])) or "another library"
-        raise Problem(f"The solver needs a Linux with glibc {'.'.join(map(str, GLIBC))} or newer; this has {has}.", ELSEWHERE)
+        raise Problem(f"The solver needs a Linux with glibc {'.'.join(map(str, GLIBC))} or newer; this has {has}.",
+                      ELSEWHERE)
     platform = {"darwin": "macosx_arm64", "win32": "win_amd64"}.get(system, "manylinux_x86_64")
     return f"{platform}-{version}"
 
@@ -102,16 +114,19 @@ def read(requirements: Path, name: str) -> Lock:
 
 
 def beside(requirements: Path, name: str, compute: str) -> Path | None:
-    """The file of PyTorch's build for a device ('cpu', 'cuda') beside a lock; None where the lock's own build is the one."""
+    """The file of PyTorch's build for a device ('cpu', 'cuda') beside a lock; None where the lock's own build is the
+    one."""
     path = Path(requirements) / "locks" / f"{name}-{compute}.txt"
     return path if path.is_file() else None
 
 
 def check_path(lock: Lock, folder: Path, limited: bool) -> None:
-    """Raises Problem where an installation to `folder` would have paths longer than LONGEST_PATH; `limited` says that this system cuts them."""
+    """Raises Problem where an installation to `folder` would have paths longer than LONGEST_PATH; `limited` says that
+    this system cuts them."""
     room = LONGEST_PATH - lock.longest - 1
     if limited and len(str(Path(folder).absolute())) > room:
-        raise Problem(f"The solver's folder {folder} has too long a path: with what comes into it, Windows cannot open some files.",
+        raise Problem(f"The solver's folder {folder} has too long a path: with what comes into it, Windows cannot open "
+                      "some files.",
                       f"Choose a folder whose path has at most {room} characters.")
 
 

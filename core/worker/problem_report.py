@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A report about a problem, for the user to send: a zip of logs, versions, settings and states. No picture is in it, and nothing that tells who or where.
+"""A report about a problem, for the user to send: a zip of logs, versions, settings and states. No picture is in it,
+and nothing that tells who or where.
 
-Names of people, machines, folders and files of the user's are taken out of every text (`Scrubber`). Nothing is sent. Standard library only.
+Names of people, machines, folders and files of the user's are taken out of every text (`Scrubber`). Nothing is sent.
+Standard library only.
 """
 
 from __future__ import annotations
@@ -40,22 +42,26 @@ TOLD = ("logs", "versions", "settings", "which stages ended and with what figure
 REMOVED = "<removed>"
 ABSOLUTE = re.compile(r"""(?<![\w<>:/\\.])(?:file:/{1,3}|[A-Za-z]:[\\/]|\\\\|~[\w.-]*[\\/]|/(?=[^\s/]))""")
 """Where an absolute path begins: POSIX, a drive, a server's share, somebody's home, a file's URL."""
-COMMON = {"root", "user", "admin", "frames", "video", "capture", "photographs", "home", "users", "tmp", "var", "wildcap"}
+COMMON = {"root", "user", "admin", "frames", "video", "capture", "photographs", "home", "users", "tmp", "var",
+          "wildcap"}
 """Words that tell nobody's name, and stand in every log."""
 
 
 def write(target: Path, root: Path, python: Path | None, capture: Capture | None = None, **versions: str) -> Path:
-    """Writes the zip; `root` holds core/, `python` is the worker's (None: there is none), `versions` those of the host. Raises Problem for a file that
-    is there already, and where it cannot be written."""
+    """Writes the zip; `root` holds core/, `python` is the worker's (None: there is none), `versions` those of the host.
+    Raises Problem for a file that is there already, and where it cannot be written."""
     target = Path(target)
     if target.suffix.lower() != ".zip":
         target = target.with_name(f"{target.name}.zip")
     if target.exists():
-        raise Problem(f"{target} is there already.", "Choose another name for the report: nothing of yours is written over.")
+        raise Problem(f"{target} is there already.",
+                      "Choose another name for the report: nothing of yours is written over.")
     scrub = Scrubber(root, python, capture)
     texts = {"doctor.txt": _examined(root, python), "unforeseen.txt": "\n".join(unforeseen.recent), **_logs(capture)}
-    told = {"versions": {"WildCap": __version__, "Python": platform.python_version(), "system": platform.system(), "release": platform.release(),
-                         "machine": platform.machine(), "processors": os.cpu_count(), **versions}, "capture": _described(capture)}
+    told = {"versions": {"WildCap": __version__, "Python": platform.python_version(), "system": platform.system(),
+                         "release": platform.release(),
+                         "machine": platform.machine(), "processors": os.cpu_count(), **versions},
+            "capture": _described(capture)}
     texts["report.json"] = json.dumps(told, indent=1, ensure_ascii=False)
     with replacing(target) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in texts.items():
@@ -64,19 +70,22 @@ def write(target: Path, root: Path, python: Path | None, capture: Capture | None
 
 
 class Scrubber:
-    """Takes out of a text what tells who the user is and where their files lie. What lies in the extension, in the capture or in Python's folders keeps its
-    path from there on, for that is what a report is about."""
+    """Takes out of a text what tells who the user is and where their files lie. What lies in the extension, in the
+    capture or in Python's folders keeps its path from there on, for that is what a report is about."""
 
-    def __init__(self, root: Path, python: Path | None = None, capture: Capture | None = None, more: Iterable[str] = ()):
+    def __init__(self, root: Path, python: Path | None = None, capture: Capture | None = None,
+                 more: Iterable[str] = ()):
         known = {root: "<WildCap>", sys.prefix: "<Python>", sys.base_prefix: "<Python>"}
         if python is not None:
             known[Path(python).parent.parent] = "<solver>"
         if capture is not None:
             known[capture.root] = "<capture>"
-        self._places = sorted(((form, word) for place, word in known.items() for path in {str(place), os.path.realpath(place)} for form in _forms(path)),
+        self._places = sorted(((form, word) for place, word in known.items()
+                               for path in {str(place), os.path.realpath(place)} for form in _forms(path)),
                               key=lambda pair: -len(pair[0]))
         names = {*_own_names(), *(_names_of(capture) if capture is not None else ()), *more}
-        self._names = sorted({form for name in names for form in _forms(name) if len(name) > 1 and name.lower() not in COMMON}, key=len, reverse=True)
+        self._names = sorted({form for name in names for form in _forms(name) if len(name) > 1
+                              and name.lower() not in COMMON}, key=len, reverse=True)
         key = os.environ.get(switchlight_api.KEY_VARIABLE, "").strip()
         self._secrets = [key] if key else []
 
@@ -97,11 +106,13 @@ def _own_file(inside: str) -> str:
     """A file's path in the capture where it is one that WildCap gives; others have names of the user's."""
     inside = re.sub(r"[\\/]+", "/", inside)
     stem = inside.rstrip(".")
-    return inside if stem in LOGS | BOOKS or any(fnmatch.fnmatchcase(stem, pattern) for pattern in FIRST_FORMAT) else "<file>"
+    return (inside if stem in LOGS | BOOKS or any(fnmatch.fnmatchcase(stem, pattern) for pattern in FIRST_FORMAT)
+            else "<file>")
 
 
 def _without_paths(line: str) -> str:
-    """A line without its absolute paths. Nobody can tell where one that holds blanks ends, but by the quote that it began with: the rest of the line goes."""
+    """A line without its absolute paths. Nobody can tell where one that holds blanks ends, but by the quote that it
+    began with: the rest of the line goes."""
     done = ""
     while found := ABSOLUTE.search(line):
         quote = line[found.start() - 1] if found.start() and line[found.start() - 1] in "'\"`" else ""
@@ -112,7 +123,8 @@ def _without_paths(line: str) -> str:
 
 
 def _forms(text: str) -> set[str]:
-    """A text as it may stand in a log: composed, with either slash, and with backslashes doubled as JSON and repr write them."""
+    """A text as it may stand in a log: composed, with either slash, and with backslashes doubled as JSON and repr write
+    them."""
     composed = unicodedata.normalize("NFC", str(text))
     return {composed, composed.replace("\\", "\\\\"), composed.replace("\\", "/"), json.dumps(composed)[1:-1]}
 
@@ -164,10 +176,12 @@ def _described(capture: Capture | None) -> dict:
     if capture is None:
         return {}
     try:
-        record, chosen = capture.read(), read_job(capture.job).settings if capture.job.is_file() else contract_settings.Settings()
+        record, chosen = (capture.read(),
+                          read_job(capture.job).settings if capture.job.is_file() else contract_settings.Settings())
     except Problem as problem:
         return {"problem": str(problem)}
-    done = {name: {"state": capture.state(stages.by_name(name), chosen), **{key: stage.get(key) for key in ("seconds", "version", "device", "figures")}}
+    done = {name: {"state": capture.state(stages.by_name(name), chosen),
+                   **{key: stage.get(key) for key in ("seconds", "version", "device", "figures")}}
             for name, stage in record["stages"].items() if name in stages.NAMES}
     return {"stages": done, "stopped": record.get("stopped"), "settings": _without_path_settings(chosen)}
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture on a disk that nothing can be written to, as an archive's, is delivered from a stand-in beside the delivery. Standard library only."""
+"""A capture on a disk that nothing can be written to, as an archive's, is delivered from a stand-in beside the
+delivery. Standard library only."""
 
 from __future__ import annotations
 
@@ -17,17 +18,20 @@ from ..contract.messages import Problem
 
 @contextlib.contextmanager
 def stand_in(capture: Capture, folder: str) -> Iterator[Capture]:
-    """The capture itself where it can be written to; else one of the same name in a temporary folder within `folder`, with links to its files
-    (copies where the system has no links), which is gone afterwards. Raises Problem where no folder is named, or that cannot be written to either."""
+    """The capture itself where it can be written to; else one of the same name in a temporary folder within `folder`,
+    with links to its files (copies where the system has no links), which is gone afterwards. Raises Problem where no
+    folder is named, or that cannot be written to either."""
     if os.access(capture.root, os.W_OK):
         yield capture
         return
     if not folder:
-        raise Problem(f"{capture.root} is read-only.", "Deliver to another folder: --to FOLDER, or Deliver To in the panel Deliver.")
+        raise Problem(f"{capture.root} is read-only.",
+                      "Deliver to another folder: --to FOLDER, or Deliver To in the panel Deliver.")
     place = Path(folder).expanduser() / f".wildcap.{os.getpid()}.tmp"
     try:
         try:
-            shutil.copytree(capture.root, place / capture.root.name, copy_function=_link, ignore=shutil.ignore_patterns("lock", ".*"))
+            shutil.copytree(capture.root, place / capture.root.name, copy_function=_link,
+                            ignore=shutil.ignore_patterns("lock", ".*"))
         except (OSError, shutil.Error) as error:
             raise storage_problem(error if isinstance(error, OSError) else OSError(0, str(error)), place) from error
         yield Capture(place / capture.root.name)

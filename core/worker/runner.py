@@ -22,14 +22,27 @@ from ..contract import ownership, report, slimmed, unforeseen
 from ..contract.capture import Capture
 from ..contract.files import storage_problem
 from ..contract.freshness import FINISHED, OLDER
-from ..contract.messages import Cancelled, CancelledError, Done, Failed, Log, Message, Problem, Progress, Reporter, StageDone, out_of_memory
+from ..contract.messages import (
+    Cancelled,
+    CancelledError,
+    Done,
+    Failed,
+    Log,
+    Message,
+    Problem,
+    Progress,
+    Reporter,
+    StageDone,
+    out_of_memory,
+)
 from ..contract.portable_paths import convert_settings, read_portable
 from ..contract.settings import Settings, from_json
 from ..contract.stages import Stage
 from .job import JobRequest, read_job
 
 
-def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None, cancelled: Callable[[], bool] = lambda: False) -> Message:
+def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None,
+            cancelled: Callable[[], bool] = lambda: False) -> Message:
     """Runs the job file `path`, sends what happens through `emit` and returns the final message, which is not sent.
 
     The capture's lock is given back before the return, so whoever reads the final message may start the next job.
@@ -56,7 +69,8 @@ def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None, 
                     raise CancelledError(stage)
                 kept += [step.label] if run_stage(step, job, emit, cancelled) == OLDER else []
             if kept:
-                emit(Log(f"Made by older code and kept: {', '.join(kept)}. Run a stage again to have it made by WildCap {__version__}."))
+                emit(Log(f"Made by older code and kept: {', '.join(kept)}. Run a stage again to have it made by "
+                         f"WildCap {__version__}."))
     except CancelledError:
         return Cancelled(stage)
     except Exception as error:
@@ -66,8 +80,8 @@ def run_job(path: Path, emit: Callable[[Message], None] = lambda message: None, 
 
 
 def run_stage(stage: Stage, job: JobRequest, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> str:
-    """Runs one stage, records it, and rebuilds the report, unless the stage is finished: done, or made by older code, which is not ours to replace.
-    Returns the state it was found in. Raises whatever the stage raises."""
+    """Runs one stage, records it, and rebuilds the report, unless the stage is finished: done, or made by older code,
+    which is not ours to replace. Returns the state it was found in. Raises whatever the stage raises."""
     capture, settings = job.capture, job.settings
     state = capture.state(stage, settings)
     if state in FINISHED:
@@ -105,8 +119,9 @@ def run_tool(tool: Stage, job: JobRequest, emit: Callable[[Message], None], canc
 
 
 def bring_back(step: Stage, job: JobRequest, emit: Callable[[Message], None], cancelled: Callable[[], bool]) -> None:
-    """Has made again what a stage or tool reads and was slimmed away, with the settings that it was made with. Where the same comes out, it is as if it had
-    never gone; where not, for the code is another or what it is made from has changed, it counts as new. Raises whatever the stages raise."""
+    """Has made again what a stage or tool reads and was slimmed away, with the settings that it was made with. Where
+    the same comes out, it is as if it had never gone; where not, for the code is another or what it is made from has
+    changed, it counts as new. Raises whatever the stages raise."""
     capture = job.capture
     for stage in slimmed.makers(capture.read(), [step]):
         entry = capture.read()["stages"][stage.name]
@@ -120,16 +135,20 @@ def bring_back(step: Stage, job: JobRequest, emit: Callable[[Message], None], ca
             emit(StageDone(stage.name, round(seconds, 2), False, reporter.figures))
             if not slimmed.is_back(capture.root, entry):
                 capture.finish(stage, conditions, seconds, settings, reporter.figures, __version__, reporter.findings)
-                emit(Log(f"{stage.label}: not what they were before, for other code made them, or from other inputs. What was made from them is out of date."))
+                emit(Log(f"{stage.label}: not what they were before, for other code made them, or from other inputs. "
+                         "What was made from them is out of date."))
                 continue
         capture.drop_hashes(stage)
 
 
 def _as_before(stage: Stage, entry: dict, job: JobRequest) -> Settings:
-    """The settings that a stage was last run with, by its entry in capture.json, on the same device where this machine has it."""
-    then = convert_settings({stage.name: entry["settings"]}, lambda path: str(read_portable(path, job.capture.root)))[stage.name]
+    """The settings that a stage was last run with, by its entry in capture.json, on the same device where this machine
+    has it."""
+    then = convert_settings({stage.name: entry["settings"]},
+                            lambda path: str(read_portable(path, job.capture.root)))[stage.name]
     known = asdict(getattr(job.settings, stage.name))
-    settings = from_json({stage.name: {name: value for name, value in then.items() if name in known}, "seed": entry["seed"]}, job.settings)
+    settings = from_json({stage.name: {name: value for name, value in then.items() if name in known},
+                          "seed": entry["seed"]}, job.settings)
     with contextlib.suppress(Problem):
         there = from_json({"device": entry["device"]}, settings)
         _check_device(there.device)
@@ -146,12 +165,14 @@ def _make(stage: Stage, capture: Capture, settings: Settings, reporter: Reporter
 
 
 def _check_slimmed(job: JobRequest) -> None:
-    """Raises Problem, before anything is changed, where the job needs what was slimmed away and the source that it is made from is gone."""
+    """Raises Problem, before anything is changed, where the job needs what was slimmed away and the source that it is
+    made from is gone."""
     capture = job.capture
     record = capture.read()
     if slimmed.hashes_of(record):
         chain = (job.tool,) if job.tool else job.chain
-        first = next((i for i, step in enumerate(chain) if job.tool or job.force or capture.state(step, job.settings) not in FINISHED), len(chain))
+        first = next((i for i, step in enumerate(chain) if job.tool or job.force
+                      or capture.state(step, job.settings) not in FINISHED), len(chain))
         if not all(stage.reads for stage in slimmed.makers(record, chain[first:])):
             try:
                 capture.require_source()
@@ -162,7 +183,8 @@ def _check_slimmed(job: JobRequest) -> None:
 
 
 def explained(error: Exception, stage: str, log: Path) -> Problem:
-    """What any exception means to the user: a problem and a remedy, both whole sentences. The traceback of one that nobody foresaw goes to `log`."""
+    """What any exception means to the user: a problem and a remedy, both whole sentences. The traceback of one that
+    nobody foresaw goes to `log`."""
     if isinstance(error, Problem):
         return error
     during = f"the stage {stage}" if stage else "the job"
@@ -178,7 +200,8 @@ def explained(error: Exception, stage: str, log: Path) -> Problem:
 
 
 def _take_source(job: JobRequest, emit: Callable[[Message], None]) -> None:
-    """Records the source where the job begins with the stage that reads it. Raises Problem when there is none, or another one than before."""
+    """Records the source where the job begins with the stage that reads it. Raises Problem when there is none, or
+    another one than before."""
     if job.chain[0].reads:
         return
     capture, first = job.capture, job.chain[0]
@@ -188,12 +211,15 @@ def _take_source(job: JobRequest, emit: Callable[[Message], None]) -> None:
         raise Problem("This capture has no video yet.", "Choose a video or a folder of photographs.")
     if not source.exists():
         if job.force or not capture.has(first.writes[0]) or first.name not in capture.read()["stages"]:
-            raise Problem(f"There is no video or folder at {source}.", "Check its name and whether the disk it is on is connected.")
+            raise Problem(f"There is no video or folder at {source}.",
+                          "Check its name and whether the disk it is on is connected.")
         emit(Log(f"{source} is not there any more; what was taken from it is used."))
         return
     if not job.force and not capture.made_from(source):
-        raise Problem(f"This capture was made from {known.name if known else 'another source'}, not from this {source.name}.",
-                      f"Choose another capture folder for another video, or run again from the stage {first.name} to replace everything but the painted masks.")
+        raise Problem(f"This capture was made from {known.name if known else 'another source'}, not from this "
+                      f"{source.name}.",
+                      f"Choose another capture folder for another video, or run again from the stage {first.name} to "
+                      "replace everything but the painted masks.")
     capture.set_source(source)
 
 
@@ -203,11 +229,13 @@ def _check_device(device: str) -> None:
         import torch
 
         if not (torch.cuda.is_available() if device == "cuda" else torch.backends.mps.is_available()):
-            raise Problem(f"This machine has no device {device} that torch can use.", "Choose auto, or see what `python -m core doctor` says.")
+            raise Problem(f"This machine has no device {device} that torch can use.",
+                          "Choose auto, or see what `python -m core doctor` says.")
 
 
 def _with_device(step: Stage, settings: Settings, reporter: Reporter) -> Settings:
-    """The settings with the device that was proven in the place of auto, where a step computes on one; why that one goes to its log."""
+    """The settings with the device that was proven in the place of auto, where a step computes on one; why that one
+    goes to its log."""
     if settings.device != "auto" or not step.on_device:
         return settings
     proof = importlib.import_module("..solve.device", __package__).prove()
@@ -217,11 +245,12 @@ def _with_device(step: Stage, settings: Settings, reporter: Reporter) -> Setting
 
 @contextlib.contextmanager
 def _at_work(step: Stage, capture: Capture, emit: Callable[[Message], None], cancelled: Callable[[], bool]):
-    """The reporter of a stage or tool; what is printed meanwhile, and the traceback of what stops it, go to its log. Raises Problem where an input is
-    missing."""
+    """The reporter of a stage or tool; what is printed meanwhile, and the traceback of what stops it, go to its log.
+    Raises Problem where an input is missing."""
     missing = [name for name in step.reads if not capture.has(name)]
     if missing:
-        raise Problem(f"{step.label} needs {missing[0]}, which this capture does not have.", "Run the stages before it first: click Reconstruct.")
+        raise Problem(f"{step.label} needs {missing[0]}, which this capture does not have.",
+                      "Run the stages before it first: click Reconstruct.")
     emit(Progress(step.name, 0, 1, "Starting"))
     kept_before = ownership.kept_files(capture.root)
     with _log_of(capture, step) as log:
@@ -233,7 +262,9 @@ def _at_work(step: Stage, capture: Capture, emit: Callable[[Message], None], can
             raise
         finally:
             for kept in sorted(ownership.kept_files(capture.root) - kept_before):
-                emit(Log(f"A file was not as WildCap had written it, and was in the way of a new one: it is now {kept}."))
+                emit(
+                    Log(f"A file was not as WildCap had written it, and was in the way of a new one: it is now {kept}.")
+                )
 
 
 def _room(step: Stage):

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Self-Test: the job that solves a copy of the sample head again. Standard library only; what it computes is core.solve.self_test's."""
+"""Self-Test: the job that solves a copy of the sample head again. Standard library only; what it computes is
+core.solve.self_test's."""
 
 from __future__ import annotations
 
@@ -15,8 +16,9 @@ SKIN_TONE = "0.6793,0.5099,0.4424"
 
 
 def prepare(folder: Path, seed: int = 0, device: str = "auto") -> Capture:
-    """A copy of the sample head in `folder`, new and for this alone, with the job for it: the draft, which takes seconds. Raises Problem where it cannot be
-    written."""
+    """A copy of the sample head in `folder`, new and for this alone, with the job for it: the draft, which takes
+    seconds. Raises Problem where it cannot be written."""
     capture = copy_to(folder)
-    write_job(capture, tool="self_test", quality="draft", settings={"solve": {"skin_tone": SKIN_TONE}, "seed": seed, "device": device})
+    write_job(capture, tool="self_test", quality="draft",
+              settings={"solve": {"skin_tone": SKIN_TONE}, "seed": seed, "device": device})
     return capture

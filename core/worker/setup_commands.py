@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The commands that set a machine up: python -m core install and wheels. Standard library only: the Python that runs them has no packages yet."""
+"""The commands that set a machine up: python -m core install and wheels. Standard library only: the Python that runs
+them has no packages yet."""
 
 from __future__ import annotations
 
@@ -20,12 +21,17 @@ POLL_S = 0.1
 
 def add_commands(commands) -> None:
     """Adds them to the subparsers of `python -m core`."""
-    install = commands.add_parser("install", help="make the solver's environment from this Python, as Install Solver does")
-    install.add_argument("folder", metavar="FOLDER", type=Path, help="new, empty, or one that an earlier installation began")
-    install.add_argument("--wheels", metavar="FOLDER", type=Path, help="a folder of wheels to install from, without a network")
+    install = commands.add_parser("install",
+                                  help="make the solver's environment from this Python, as Install Solver does")
+    install.add_argument("folder", metavar="FOLDER", type=Path,
+                         help="new, empty, or one that an earlier installation began")
+    install.add_argument("--wheels", metavar="FOLDER", type=Path,
+                         help="a folder of wheels to install from, without a network")
     _add_build(install)
     install.set_defaults(command=_install)
-    bring = commands.add_parser("wheels", help="download all wheels of a platform into a folder, to install from without a network")
+    bring = commands.add_parser("wheels",
+                                help="download all wheels of a platform into a folder, to install from without a "
+                                     "network")
     bring.add_argument("folder", metavar="FOLDER", type=Path)
     bring.add_argument("--for", dest="name", choices=locks.names(), metavar="PLATFORM-PYTHON",
                        help=f"{', '.join(locks.names())}; this machine and Python without it")
@@ -34,15 +40,19 @@ def add_commands(commands) -> None:
 
 
 def _add_build(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--compute", choices=("auto", "cpu", "cuda", "apple"), default="auto", help="what PyTorch computes on")
+    parser.add_argument("--compute", choices=("auto", "cpu", "cuda", "apple"), default="auto",
+                        help="what PyTorch computes on")
     parser.add_argument("--packages", choices=("pytorch", "pip"), default="pytorch",
-                        help="where PyTorch comes from: its own index where PyPI lacks the build, or with all others from where pip is set up to look")
+                        help="where PyTorch comes from: its own index where PyPI lacks the build, or with all others "
+                             "from where pip is set up to look")
 
 
 def _install(options: argparse.Namespace) -> int:
     folder = options.folder.absolute()
     task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), Path(sys.executable),
-                                     installation.PackageSource(options.compute, "folder" if options.wheels else options.packages, options.wheels))
+                                     installation.PackageSource(options.compute,
+                                                                "folder" if options.wheels else options.packages,
+                                                                options.wheels))
     _follow(task)
     print(f"The solver is ready: {python_of(folder)}")
     return 0
@@ -53,10 +63,13 @@ def _wheels(options: argparse.Namespace) -> int:
     compute = "cpu" if options.compute == "auto" else options.compute
     if compute == ("cuda" if name.startswith("macosx") else "apple"):
         raise Problem(f"There is no solver for {compute} on {name}.", "Leave --compute out, or choose another.")
-    task = BackgroundTask("wheels", lambda task: wheels.download(REQUIREMENTS, name, compute, options.packages, options.folder,
-                                                                 lambda command: task.run(command, lambda line: _hear(task, line))))
+    task = BackgroundTask("wheels",
+                          lambda task: wheels.download(REQUIREMENTS, name, compute, options.packages, options.folder,
+                                                       lambda command: task.run(command,
+                                                                                lambda line: _hear(task, line))))
     _follow(task)
-    print(f"{len(task.result)} wheels for {name} in {options.folder}, {index.gigabytes(sum(path.stat().st_size for path in task.result))}; "
+    print(f"{len(task.result)} wheels for {name} in {options.folder}, "
+          f"{index.gigabytes(sum(path.stat().st_size for path in task.result))}; "
           f"`python -m core install FOLDER --wheels {options.folder}` installs from them, and so does Install Solver")
     return 0
 

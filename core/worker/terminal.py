@@ -20,8 +20,8 @@ POLL_S = 0.1
 
 
 def follow(root: Path, capture: Capture, job: Path, environment: dict[str, str]) -> int:
-    """Runs a job with this Python and prints what it says; returns the exit code: 0, 2 for a problem, 130 after Ctrl-C. `environment` is the worker's own,
-    beside ours."""
+    """Runs a job with this Python and prints what it says; returns the exit code: 0, 2 for a problem, 130 after Ctrl-C.
+    `environment` is the worker's own, beside ours."""
     if read_job(job).settings.delight.delighter == "switchlight" and os.environ.get(switchlight_api.KEY_VARIABLE):
         environment = {**environment, switchlight_api.KEY_VARIABLE: os.environ[switchlight_api.KEY_VARIABLE]}
     worker = Worker(Path(sys.executable), root, job, capture.logs / "worker.log", environment)
@@ -45,11 +45,13 @@ def print_message(message: Message, capture: Capture, line: ProgressLine) -> int
         case Progress():
             share = message.done / message.of if message.of else 0
             left = f", {_duration(message.eta_s)} left" if message.eta_s and message.eta_s >= 1 else ""
-            line.show(f"{stages.LABELS[message.stage]:12} {share:4.0%}  {message.text}{left}", step=(message.stage, int(share * 4)))
+            line.show(f"{stages.LABELS[message.stage]:12} {share:4.0%}  {message.text}{left}",
+                      step=(message.stage, int(share * 4)))
         case Log():
             line.keep(message.text)
         case StageDone():
-            line.keep(f"{stages.LABELS[message.stage]:12} " + ("unchanged" if message.skipped else f"done in {_duration(message.seconds)}"))
+            line.keep(f"{stages.LABELS[message.stage]:12} "
+                      + ("unchanged" if message.skipped else f"done in {_duration(message.seconds)}"))
         case Done():
             told = f" {capture.report} has the pictures and figures." if capture.report.is_file() else ""
             line.keep(f"Finished in {_duration(message.seconds)}.{told}")

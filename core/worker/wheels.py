@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A folder of wheels from which the solver is installed without a network: all of a lock, PyTorch's build for the device, and pip itself.
+"""A folder of wheels from which the solver is installed without a network: all of a lock, PyTorch's build for the
+device, and pip itself.
 
-Standard library only. It is made on any machine that has a network, for any platform and Python that there is a lock for.
+Standard library only. It is made on any machine that has a network, for any platform and Python that there is a lock
+for.
 """
 
 from __future__ import annotations
@@ -16,19 +18,24 @@ from ..contract.messages import Problem
 from . import locks, pip_steps
 
 
-def download(requirements: Path, name: str, compute: str, source: str, folder: Path, run: Callable[[list], tuple[int, str]]) -> list[Path]:
-    """Brings the wheels of the lock `name` into `folder`, and gives them. `compute` and `source` as in pip_steps; `run` runs a command and gives its exit
-    code and its last error. Wheels that are there already stay. Raises Problem."""
+def download(requirements: Path, name: str, compute: str, source: str, folder: Path,
+             run: Callable[[list], tuple[int, str]]) -> list[Path]:
+    """Brings the wheels of the lock `name` into `folder`, and gives them. `compute` and `source` as in pip_steps; `run`
+    runs a command and gives its exit code and its last error. Wheels that are there already stay. Raises Problem."""
     lock = locks.read(requirements, name)
     folder = Path(folder)
     if folder.exists() and not folder.is_dir():
         raise Problem(f"{folder} is no folder.", "Choose a folder for the wheels.")
-    pip = [sys.executable, "-m", "pip", "download", "--disable-pip-version-check", "--no-input", "--progress-bar", "off", "--dest", folder, *tags(name)]
+    pip = [sys.executable, "-m", "pip", "download", "--disable-pip-version-check", "--no-input", "--progress-bar",
+           "off", "--dest", folder, *tags(name)]
     with tempfile.TemporaryDirectory(prefix="wildcap_wheels_") as scratch:
-        own_pip = pip_steps.PipStep(("--no-deps", "--require-hashes", "-r", str(Path(requirements) / "locks" / "pip.txt")))
-        code, error = pip_steps.carry_out([*pip_steps.steps(requirements, lock, compute, source, Path(scratch)), own_pip], lambda words: run([*pip, *words]))
+        own_pip = pip_steps.PipStep(("--no-deps", "--require-hashes", "-r",
+                                     str(Path(requirements) / "locks" / "pip.txt")))
+        code, error = pip_steps.carry_out([*pip_steps.steps(requirements, lock, compute, source, Path(scratch)),
+                                           own_pip], lambda words: run([*pip, *words]))
     if code:
-        raise Problem(f"Not all wheels for {name} could be had ({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",
+        raise Problem(f"Not all wheels for {name} could be had "
+                      f"({error.removeprefix('ERROR: ').rstrip('.') or 'no message'}).",
                       "Check the network connection and run the command again: it continues.")
     return sorted(folder.glob("*.whl"))
 

@@ -11,22 +11,27 @@ from pathlib import Path
 import pytest
 
 TOLD = 3000
-"""Characters of a failed flow's log in pytest's summary, where whoever cannot open the folder with the logs reads them."""
+"""Characters of a failed flow's log in pytest's summary, where whoever cannot open the folder with the logs reads
+them."""
 TRIES = 2
-"""A window waits for what a machine does beside it, and a shared one may stand still for a minute: a flow that failed is played once more, and says so."""
+"""A window waits for what a machine does beside it, and a shared one may stand still for a minute: a flow that failed
+is played once more, and says so."""
 UNTIL = float(os.environ.get("WILDCAP_UNTIL", "inf"))
-"""Seconds since the epoch after which no further flow is begun: a run of everything has only so much time, and what is skipped is named."""
+"""Seconds since the epoch after which no further flow is begun: a run of everything has only so much time, and what is
+skipped is named."""
 
 
 def play_flow(*arguments: str) -> None:
-    """Plays the flow that the last of run.sh's arguments names; fails with the end of what it said where it fails TRIES times."""
+    """Plays the flow that the last of run.sh's arguments names; fails with the end of what it said where it fails TRIES
+    times."""
     flow, said = arguments[-1], ""
     for attempt in range(TRIES):
         if time.time() > UNTIL:
             if said:
                 break
             pytest.skip("no time is left for it in this run")
-        done = subprocess.run([Path(__file__).with_name("run.sh"), *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace")
+        done = subprocess.run([Path(__file__).with_name("run.sh"), *arguments], stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, text=True, errors="replace")
         print(done.stdout, flush=True)
         if not done.returncode:
             return

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plays an artist in a real Blender window: moves the mouse, clicks, types, and looks at what the screen shows. What an artist would do with hands is counted.
+"""Plays an artist in a real Blender window: moves the mouse, clicks, types, and looks at what the screen shows. What an
+artist would do with hands is counted.
 
 A flow is a generator that yields seconds to wait: between two events Blender must get its event loop back, so one
 application timer runs the generator. Positions are window pixels from the lower left.
@@ -23,10 +24,12 @@ _actions = 0
 
 
 def play(flow, limit_s: float = 600) -> None:
-    """Runs the generator to its end and leaves Blender: exit code 0 and FLOW PASSED, or 1, a traceback and a screenshot."""
+    """Runs the generator to its end and leaves Blender: exit code 0 and FLOW PASSED, or 1, a traceback and a
+    screenshot."""
     survive_lost_contexts()
     bpy.context.preferences.view.show_splash = False
-    bpy.context.preferences.view.filebrowser_display_type = 'SCREEN'  # there is no window manager to place a second window
+    # there is no window manager to place a second window
+    bpy.context.preferences.view.filebrowser_display_type = 'SCREEN'
     bpy.context.preferences.use_preferences_save = False
 
     def step():
@@ -46,9 +49,10 @@ def play(flow, limit_s: float = 600) -> None:
 
 
 def survive_lost_contexts() -> None:
-    """Has Cycles make no OpenGL contexts of its own, and lets an X error pass, which ends Blender by default. To show a render
-    Cycles changes contexts in its thread while the main one draws: with Mesa's software renderer the X server then answers GLXBadContext now and then, or
-    the main thread crashes for want of one. The error handler is in C: one in Python would need the interpreter's lock.
+    """Has Cycles make no OpenGL contexts of its own, and lets an X error pass, which ends Blender by default. To show a
+    render Cycles changes contexts in its thread while the main one draws: with Mesa's software renderer the X server
+    then answers GLXBadContext now and then, or the main thread crashes for want of one. The error handler is in C: one
+    in Python would need the interpreter's lock.
     """
     import _cycles
     import cycles
@@ -60,7 +64,8 @@ def survive_lost_contexts() -> None:
 
 
 def act(times: int = 1) -> None:
-    """Counts clicks, keys, strokes, and things dropped: what flows do by themselves in place of an artist's hands, they count, too."""
+    """Counts clicks, keys, strokes, and things dropped: what flows do by themselves in place of an artist's hands, they
+    count, too."""
     global _actions
     _actions += times
 
@@ -150,7 +155,8 @@ def middle():
 
 
 def park():
-    """Takes the cursor off every button: a hovered one keeps its old state. A file browser in place of the 3D view needs none of that."""
+    """Takes the cursor off every button: a hovered one keeps its old state. A file browser in place of the 3D view
+    needs none of that."""
     if not any(area.type == 'VIEW_3D' for area in window().screen.areas):
         return
     x, y = middle()
@@ -173,7 +179,8 @@ def scroll(steps: int):
 
 
 def open_tab(name: str):
-    """Shows the sidebar on one tab; its tabs exist only after it was drawn once. An artist presses N and clicks on the tab."""
+    """Shows the sidebar on one tab; its tabs exist only after it was drawn once. An artist presses N and clicks on the
+    tab."""
     act(2)
     view().spaces.active.show_region_ui = True
     for _ in range(100):
@@ -215,7 +222,8 @@ def find(command: str, options: str = ""):
 
 
 def lead(command: str):
-    """Clicks the sidebar's first button, which must be the one that runs this operator: what a newcomer does who reads nothing."""
+    """Clicks the sidebar's first button, which must be the one that runs this operator: what a newcomer does who reads
+    nothing."""
     sidebar = region('UI')
     for y in range(sidebar.y + sidebar.height - 4, sidebar.y + 4, -11):
         position = sidebar.x + sidebar.width * 0.5, y
@@ -230,8 +238,9 @@ def lead(command: str):
 
 
 def browse(path: Path):
-    """Chooses a file or a folder in the file browser that a button has opened in place of the window's areas. An artist clicks on it, and on the
-    button below: which folder is shown at first, and how far it is from there, depends on the machine."""
+    """Chooses a file or a folder in the file browser that a button has opened in place of the window's areas. An artist
+    clicks on it, and on the button below: which folder is shown at first, and how far it is from there, depends on the
+    machine."""
     act(2)
     yield from until(lambda: any(area.type == 'FILE_BROWSER' for area in window().screen.areas), "the file browser", 10)
     area = next(area for area in window().screen.areas if area.type == 'FILE_BROWSER')
@@ -241,7 +250,8 @@ def browse(path: Path):
     if path != folder:  # a browser for folders has no name to fill in
         area.spaces.active.params.filename = path.name
     yield 0.5
-    with bpy.context.temp_override(window=window(), area=area, region=next(r for r in area.regions if r.type == 'WINDOW')):
+    with bpy.context.temp_override(window=window(), area=area,
+                                   region=next(r for r in area.regions if r.type == 'WINDOW')):
         bpy.ops.file.execute()
     yield from until(lambda: any(area.type == 'VIEW_3D' for area in window().screen.areas), "the 3D view", 10)
     yield 1.0

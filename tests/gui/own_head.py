@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The way from an empty Blender to an own head, as flows share it: the zip dragged into the window, a Python that has the solver's packages, the video,
-and a job by the large button; what the whole took is counted.
+"""The way from an empty Blender to an own head, as flows share it: the zip dragged into the window, a Python that has
+the solver's packages, the video, and a job by the large button; what the whole took is counted.
 
 The Python is chosen, as the line below Install Solver offers: that would download gigabytes.
 """
@@ -21,7 +21,8 @@ VIDEO = addon.CHECKOUT / "core" / "synthetic" / "sample" / "capture.mp4"
 
 
 def drag_in_zip():
-    """The zip dropped on the 3D view, by the operator that Blender calls for it, and its dialog confirmed. Returns when (time.monotonic)."""
+    """The zip dropped on the 3D view, by the operator that Blender calls for it, and its dialog confirmed. Returns when
+    (time.monotonic)."""
     started = time.monotonic()
     assert addon.INSTALLED not in bpy.context.preferences.addons, "the flow begins without the add-on"
     d.act()
@@ -85,7 +86,8 @@ def head():
 
 
 def lit_face(root: Path):
-    """Waits for the picture of the head under three lamps, and looks whether it is one; it is in the test's folder, too."""
+    """Waits for the picture of the head under three lamps, and looks whether it is one; it is in the test's folder,
+    too."""
     picture = root / "renders" / "three_point.png"
     yield from d.until(picture.is_file, "the picture", 240)
     yield 2.0
@@ -98,6 +100,8 @@ def lit_face(root: Path):
 
 def count(way: str, started: float) -> None:
     """Says how many clicks and minutes lie between a moment and now, and leaves them in clicks_WAY.json."""
-    found = {"blender": bpy.app.version_string, "clicks": d.actions(), "minutes": round((time.monotonic() - started) / 60, 1)}
+    found = {"blender": bpy.app.version_string, "clicks": d.actions(),
+             "minutes": round((time.monotonic() - started) / 60, 1)}
     (d.OUT / f"clicks_{way}.json").write_text(json.dumps(found) + "\n", encoding="utf-8")
-    d.say(f"{found['clicks']} clicks and {found['minutes']} min from dragging the zip to a relit own head, in Blender {found['blender']}")
+    d.say(f"{found['clicks']} clicks and {found['minutes']} min from dragging the zip to a relit own head, in Blender "
+          f"{found['blender']}")

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What flows that paint a mask share: a dab of the brush, the mask in Blender and on the disk, and which texel lies under the cursor.
+"""What flows that paint a mask share: a dab of the brush, the mask in Blender and on the disk, and which texel lies
+under the cursor.
 
 Masks are [H, W] in [0, 1], rows from the top. Data-blocks are looked up anew each time: an undo replaces them.
 """
@@ -61,7 +62,8 @@ def pixels(image) -> np.ndarray:
 
 def kept(path, wanted: np.ndarray, limit_s: float = 5):
     """Waits until the file holds that mask."""
-    yield from d.until(lambda: path.is_file() and np.abs(on_disk(path) - wanted).max() < 0.01, f"the mask in {path.name}", limit_s)
+    yield from d.until(lambda: path.is_file() and np.abs(on_disk(path) - wanted).max() < 0.01,
+                       f"the mask in {path.name}", limit_s)
 
 
 def facing(obj, towards: Vector) -> tuple[float, float]:

@@ -4,8 +4,8 @@
 
     python tests/gui/photographed.py [FOLDER]
 
-Seven photographs from one side of the face to the other, path-traced by Cycles in soft daylight before a cluttered room; minutes on two cores. They are kept
-in the repository, since a window test has no minutes to spare.
+Seven photographs from one side of the face to the other, path-traced by Cycles in soft daylight before a cluttered
+room; minutes on two cores. They are kept in the repository, since a window test has no minutes to spare.
 """
 
 import sys
@@ -34,23 +34,27 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     light = scene.SceneLight((0.42, 0.42, 0.42), lamps=(WINDOW,))
     with tempfile.TemporaryDirectory() as work:
-        filmed.render(Path(work), make_figure(somebody()), light, scene.Shot(cameras(), range(len(AZIMUTHS)), SAMPLES, SCALE))
+        filmed.render(Path(work), make_figure(somebody()), light,
+                      scene.Shot(cameras(), range(len(AZIMUTHS)), SAMPLES, SCALE))
         linear = [images.read_linear(Path(work) / f"{k:05d}.exr")[..., :3] for k in range(len(AZIMUTHS))]
     gain = 0.75 / np.percentile(linear[len(linear) // 2], 95)
     for k, picture in enumerate(linear):
-        images.write_srgb(folder / f"{k + 1:04d}.jpg", images.linear_to_srgb(np.clip(gain * picture, 0, 1).astype(np.float32)), quality=90)
+        images.write_srgb(folder / f"{k + 1:04d}.jpg",
+                          images.linear_to_srgb(np.clip(gain * picture, 0, 1).astype(np.float32)), quality=90)
 
 
 def somebody() -> Person:
     """The first person from FIRST_SEED on with open eyes, short hair, no fringe and no beard."""
     people = (sample_person(seed) for seed in range(FIRST_SEED, FIRST_SEED + 1000))
-    return next(one for one in people if one.openness > 0.5 and one.hair == "short" and not one.fringe and one.beard == "none")
+    return next(one for one in people if one.openness > 0.5 and one.hair == "short" and not one.fringe
+                and one.beard == "none")
 
 
 def cameras() -> np.ndarray:
     """Camera-to-world matrices [N, 4, 4]."""
     azimuth, height = np.radians(AZIMUTHS), np.radians(HEIGHTS)
-    position = scene.DISTANCE * np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height), np.sin(height)], -1)
+    position = scene.DISTANCE * np.stack([np.sin(azimuth) * np.cos(height), -np.cos(azimuth) * np.cos(height),
+                                          np.sin(height)], -1)
     target = np.broadcast_to([0, -0.01, -0.035], position.shape)
     return scene.looking(position + target, target, np.radians([1.0, -2.0, 1.5, 0.0, -1.0, 2.0, -1.5]))
 

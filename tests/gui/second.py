@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A second Blender beside the one that runs a flow, in the same profile and on the same screen, at the same captures.
 
-The flow calls `start` with the name of a part below, and the two speak by files in a folder: `tell` writes one, the flow waits for it.
-Run by Blender, this file plays that part.
+The flow calls `start` with the name of a part below, and the two speak by files in a folder: `tell` writes one, the
+flow waits for it. Run by Blender, this file plays that part.
 """
 
 import json
@@ -22,7 +22,8 @@ import painting  # noqa: E402
 
 
 def start(part: str, folder: Path) -> subprocess.Popen:
-    """The second Blender, in a smaller window that leaves the first one's tab to be seen. What it prints goes into the flow's log."""
+    """The second Blender, in a smaller window that leaves the first one's tab to be seen. What it prints goes into the
+    flow's log."""
     folder.mkdir(parents=True, exist_ok=True)
     return subprocess.Popen(["blender", "--enable-event-simulate", "--no-window-focus", "-p", "0", "0", "900", "700",
                              "-P", str(Path(__file__).resolve()), "--", part, str(folder)])
@@ -31,7 +32,8 @@ def start(part: str, folder: Path) -> subprocess.Popen:
 def heard(process: subprocess.Popen, folder: Path, name: str, limit_s: float):
     """Waits for a word of the second Blender; it must not have failed meanwhile. Returns what it told."""
     path = folder / f"{name}.json"
-    yield from d.until(lambda: path.is_file() or process.poll() is not None, f"the second Blender's word {name}", limit_s)
+    yield from d.until(lambda: path.is_file() or process.poll() is not None, f"the second Blender's word {name}",
+                       limit_s)
     assert path.is_file(), f"the second Blender ended with {process.poll()}"
     return json.loads(path.read_text())
 
@@ -56,13 +58,15 @@ def solve_and_quit():
 def solve():
     """The solver runs; it then waits to be killed."""
     root = yield from solving()
-    yield from d.until(lambda: (root / "checkpoints" / "solve.safetensors").is_file(), "the first checkpoint", addon.START_LIMIT_S)
+    yield from d.until(lambda: (root / "checkpoints" / "solve.safetensors").is_file(), "the first checkpoint",
+                       addon.START_LIMIT_S)
     tell("checkpoint", worker=addon.worker_process(root).pid)
     yield 600.0
 
 
 def refused_and_paint():
-    """A solve of what the first Blender solves, and strokes on the mask that is painted there, each told of when it is in the capture."""
+    """A solve of what the first Blender solves, and strokes on the mask that is painted there, each told of when it is
+    in the capture."""
     root = yield from addon.open_sample_head()
     addon.use_solver()
     yield 1.5
@@ -81,7 +85,8 @@ def refused_and_paint():
 
 
 def walk_and_quit():
-    """The folder's batch by the file browser, a stroke on the first of its masks, both accepted, all solved, and File > Quit at once."""
+    """The folder's batch by the file browser, a stroke on the first of its masks, both accepted, all solved, and File >
+    Quit at once."""
     addon.unfold("WILDCAP_PT_capture")
     batches, folder = addon.module("batches"), FOLDER / "batch"
     yield from d.open_tab("WildCap")
@@ -95,7 +100,8 @@ def walk_and_quit():
     yield from stroke(0, "stroke")
     d.screenshot("batch_1_walk")
     yield from d.press("wildcap.accept_mask")
-    yield from d.until(lambda: addon.module("paint.session").root() == str(folder / "bert.wildcap"), "the second mask", 20)
+    yield from d.until(lambda: addon.module("paint.session").root() == str(folder / "bert.wildcap"), "the second mask",
+                       20)
     yield from painting.in_hand()
     yield from d.press("wildcap.accept_mask")
     yield from d.until(lambda: bpy.context.mode == 'OBJECT' and batches.ready() == 2, "all masks being looked at", 20)

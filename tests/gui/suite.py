@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs the flows, each in a Blender with an empty profile on a virtual screen; ends with the line N passed, N failed.
 
-    python3 suite.py ZIP OUT [FLOW ...]        inside the chroot; a flow is flows/NAME.py, or by_name/NAME.py, which runs only when it is named
+    python3 suite.py ZIP OUT [FLOW ...]        inside the chroot; a flow is flows/NAME.py, or by_name/NAME.py, which
+    runs only when it is named
 
 Logs, and what flows leave, are in the folder OUT.
 """
@@ -46,15 +47,18 @@ def start_screen() -> str:
 
 
 def run(flow: Path, archive: Path, out: Path, display: str) -> tuple[bool, float]:
-    """Installs the zip into an empty profile, but for a flow that does so itself, and runs the flow. True if it passed, and its seconds."""
+    """Installs the zip into an empty profile, but for a flow that does so itself, and runs the flow. True if it passed,
+    and its seconds."""
     started = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder) / "home"
         (home / "Documents").mkdir(parents=True)
-        environment = {**os.environ, "DISPLAY": display, "HOME": str(home), "BLENDER_USER_RESOURCES": str(Path(folder) / "profile"),
+        environment = {**os.environ, "DISPLAY": display, "HOME": str(home),
+                       "BLENDER_USER_RESOURCES": str(Path(folder) / "profile"),
                        "WILDCAP_GUI_OUT": str(out), "WILDCAP_GUI_ZIP": str(archive), "PYTHONDONTWRITEBYTECODE": "1"}
         if flow.stem not in WITHOUT:
-            install = subprocess.run(["blender", "--command", "extension", "install-file", "-r", "user_default", "-e", str(archive)],
+            install = subprocess.run(["blender", "--command", "extension", "install-file", "-r", "user_default", "-e",
+                                      str(archive)],
                                      env=environment, capture_output=True, text=True)
             if install.returncode:
                 print(install.stdout, install.stderr, sep="\n")
@@ -62,7 +66,8 @@ def run(flow: Path, archive: Path, out: Path, display: str) -> tuple[bool, float
         log = out / f"{flow.stem}.log"
         with open(log, "w", encoding="utf-8") as file:
             try:
-                code = subprocess.call(["blender", "--enable-event-simulate", "--no-window-focus", "-p", "0", "0", str(SIZE[0]), str(SIZE[1]), "-P", str(flow)],
+                code = subprocess.call(["blender", "--enable-event-simulate", "--no-window-focus", "-p", "0", "0",
+                                        str(SIZE[0]), str(SIZE[1]), "-P", str(flow)],
                                        env=environment, stdout=file, stderr=subprocess.STDOUT, timeout=LIMIT_S)
             except subprocess.TimeoutExpired:
                 code = -1

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Six of the flows in a window of the newest Blender that Debian has (sid: 5.2), skipped where that cannot be installed: sid is another one every week,
-and what its mirrors hold does not always fit together."""
+"""Six of the flows in a window of the newest Blender that Debian has (sid: 5.2), skipped where that cannot be
+installed: sid is another one every week, and what its mirrors hold does not always fit together."""
 
 import subprocess
 from pathlib import Path

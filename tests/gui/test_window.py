@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flows in a real Blender window, each a test: run.sh enters the chroot that chroot.sh built and runs suite.py there."""
+"""The flows in a real Blender window, each a test: run.sh enters the chroot that chroot.sh built and runs suite.py
+there."""
 
 from pathlib import Path
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head that can act: the lips and lids of the registered head opened, eyes and mouth behind them, ARKit's face units as shape keys."""
+"""A head that can act: the lips and lids of the registered head opened, eyes and mouth behind them, ARKit's face units
+as shape keys."""
 
 import bpy
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""core/assets/face_units.npz: how the built-in head is cut open, and how its units move it. core/assets/face_units.py made the file."""
+"""core/assets/face_units.npz: how the built-in head is cut open, and how its units move it. core/assets/face_units.py
+made the file."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ GAZE = tuple(f"eye{kind}" for kind in ("Blink", "LookDown", "LookIn", "LookOut",
 
 @dataclass(frozen=True)
 class FaceUnits:
-    """V vertices of the head, C copies on the lower side of lips and lids, P inner ones. Metres, the head's own axes, at the template's shape."""
+    """V vertices of the head, C copies on the lower side of lips and lids, P inner ones. Metres, the head's own axes,
+    at the template's shape."""
 
     template: np.ndarray  # [V, 3]
     triangles: np.ndarray  # [F, 3] of the head as it is registered
@@ -41,7 +43,8 @@ class FaceUnits:
 
 @cache
 def load() -> FaceUnits:
-    """The file, with the units of the right side made from those of the left one. The arrays are shared: copy before writing."""
+    """The file, with the units of the right side made from those of the left one. The arrays are shared: copy before
+    writing."""
     template, triangles = _head()
     with np.load(ASSETS / "face_units.npz", allow_pickle=False) as stored:
         step, mirror = float(stored["step"]), stored["mirror"].astype(int)
@@ -50,8 +53,10 @@ def load() -> FaceUnits:
         for name in stored["names"].tolist():
             units[name] = _unit(stored, name, mirror, step)
         return FaceUnits(template, triangles, stored["copies"].astype(int), stored["seam"], stored["corners"],
-                         stored["faces"].astype(int), stored["slots"], stored["uvs"], stored["kind"], stored["anchors"].astype(int),
-                         weights / np.maximum(weights.sum(1, keepdims=True), 1e-9), stored["parts"] * step, stored["balls"].astype(np.float64), mirror, units)
+                         stored["faces"].astype(int), stored["slots"], stored["uvs"], stored["kind"],
+                         stored["anchors"].astype(int),
+                         weights / np.maximum(weights.sum(1, keepdims=True), 1e-9), stored["parts"] * step,
+                         stored["balls"].astype(np.float64), mirror, units)
 
 
 def _unit(stored, name: str, mirror: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:

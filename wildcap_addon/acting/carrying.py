@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The template's face units on a registered head: each displacement is turned and scaled as its neighbourhood was between the two.
+"""The template's face units on a registered head: each displacement is turned and scaled as its neighbourhood was
+between the two.
 
-In the spirit of deformation transfer (Sumner and Popovic 2004), with a similarity for each vertex, fitted over a centimetre around it,
-instead of one affine map per triangle: no equations to solve, and what moved two lips alike still does.
+In the spirit of deformation transfer (Sumner and Popovic 2004), with a similarity for each vertex, fitted over a
+centimetre around it, instead of one affine map per triangle: no equations to solve, and what moved two lips alike still
+does.
 """
 
 from __future__ import annotations
@@ -19,8 +21,10 @@ CLEAR = 0.0005  # metres between eyeball and lids
 BEHIND = 0.002  # metres between teeth and lips
 
 
-def carried(asset: FaceUnits, head: np.ndarray, filmed: FilmedEyes | None = None) -> tuple[np.ndarray, dict[str, tuple[np.ndarray, np.ndarray]]]:
-    """All vertices [V + C + P, 3] of the head cut open, at rest, and each unit's rows and displacements, for a registered head [V, 3].
+def carried(asset: FaceUnits, head: np.ndarray,
+            filmed: FilmedEyes | None = None) -> tuple[np.ndarray, dict[str, tuple[np.ndarray, np.ndarray]]]:
+    """All vertices [V + C + P, 3] of the head cut open, at rest, and each unit's rows and displacements, for a
+    registered head [V, 3].
 
     filmed: eyes that were open while filming: the balls are those, and `eyesOpen` opens the lids as far as they were.
     """
@@ -59,7 +63,8 @@ def carried(asset: FaceUnits, head: np.ndarray, filmed: FilmedEyes | None = None
 
 
 def _as_filmed(rest: np.ndarray, rows: np.ndarray, moves: np.ndarray, filmed: FilmedEyes) -> np.ndarray:
-    """An opening [n, 3] of the lids to where they were; what the capture does not tell of (the lips' seam is none of a lid's) moves as the unit says."""
+    """An opening [n, 3] of the lids to where they were; what the capture does not tell of (the lips' seam is none of a
+    lid's) moves as the unit says."""
     place = np.full(len(rest), -1)
     place[filmed.rows] = np.arange(len(filmed.rows))
     known = place[rows] >= 0
@@ -83,18 +88,22 @@ def _towards(gaze: np.ndarray) -> np.ndarray:
 
 
 def frames(triangles: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Rotation times scale [V, 3, 3] of each vertex's neighbourhood between two shapes [V, 3] of one mesh: least squares over moments
-    that spread along the edges."""
+    """Rotation times scale [V, 3, 3] of each vertex's neighbourhood between two shapes [V, 3] of one mesh: least
+    squares over moments that spread along the edges."""
     count = len(before)
-    edges = np.unique(np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), 1), axis=0)
+    edges = np.unique(np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), 1),
+                      axis=0)
     edges = np.concatenate([edges, edges[:, ::-1], np.arange(count)[:, None].repeat(2, 1)])
     edges = edges[np.argsort(edges[:, 0], kind="stable")]
     starts = np.searchsorted(edges[:, 0], np.arange(count))
     degree = np.diff(np.append(starts, len(edges)))[:, None]
-    normal = np.cross(before[triangles[:, 1]] - before[triangles[:, 0]], before[triangles[:, 2]] - before[triangles[:, 0]])
+    normal = np.cross(before[triangles[:, 1]] - before[triangles[:, 0]],
+                      before[triangles[:, 2]] - before[triangles[:, 0]])
     area = np.bincount(triangles.ravel(), np.linalg.norm(normal, axis=1).repeat(3), count)[:, None]
     outer = (after[:, :, None] * before[:, None]).reshape(-1, 9)
-    moments = area / area.mean() * np.concatenate([np.ones((count, 1)), before, after, (before**2).sum(1, keepdims=True), outer], 1)  # [V, 17]
+    # [V, 17]
+    moments = area / area.mean() * np.concatenate([np.ones((count, 1)), before, after,
+                                                   (before**2).sum(1, keepdims=True), outer], 1)
     moments, degree = moments.astype(np.float32), degree.astype(np.float32)
     for _ in range(STEPS):
         moments = np.add.reduceat((moments / degree)[edges[:, 1]], starts)
@@ -113,8 +122,10 @@ def _rotation_and_scale(covariance: np.ndarray, variance: np.ndarray) -> np.ndar
     return (u * sign[..., None, :]) @ vt * scale[..., None, None]
 
 
-def _similarity(asset: FaceUnits, head: np.ndarray, around: np.ndarray, reach: float, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation times scale [3, 3] of the head around a point of the template, and where the similarity takes `point`."""
+def _similarity(asset: FaceUnits, head: np.ndarray, around: np.ndarray, reach: float,
+                point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation times scale [3, 3] of the head around a point of the template, and where the similarity takes
+    `point`."""
     weight = np.clip(1 - np.linalg.norm(asset.template - around, axis=1) / reach, 0, None)[:, None]
     weight = weight / weight.sum()
     b, a = (weight * asset.template).sum(0), (weight * head).sum(0)
@@ -130,7 +141,8 @@ def _surface(direction: np.ndarray, matrix: np.ndarray, radius: float) -> np.nda
     return radius * (1 + CORNEA[0] * np.clip(1 - (angle / CORNEA[1]) ** 2, 0, None))
 
 
-def _behind_lids(asset: FaceUnits, head: np.ndarray, ball: np.ndarray, matrix: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
+def _behind_lids(asset: FaceUnits, head: np.ndarray, ball: np.ndarray, matrix: np.ndarray, centre: np.ndarray,
+                 radius: float) -> np.ndarray:
     """The eyeball's centre, moved along its gaze until the closed lids clear it."""
     gaze = matrix @ [0, -1, 0] / np.linalg.norm(matrix @ [0, -1, 0])
     arm = asset.template - ball[:3]

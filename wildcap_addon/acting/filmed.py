@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a capture knows of eyes that were open while filming: the eyeballs, the lids as they were, and the colour of the irises."""
+"""What a capture knows of eyes that were open while filming: the eyeballs, the lids as they were, and the colour of the
+irises."""
 
 from __future__ import annotations
 
@@ -18,8 +19,8 @@ SOCKETS_M = -0.02
 
 @dataclass(frozen=True)
 class FilmedEyes:
-    """eyes: the left and the right one; rows [N] of the head cut open, and where these vertices were [N, 3], metres; irises: linear colour of the left and the
-    right one, None where it was not measured."""
+    """eyes: the left and the right one; rows [N] of the head cut open, and where these vertices were [N, 3], metres;
+    irises: linear colour of the left and the right one, None where it was not measured."""
 
     eyes: tuple[Eyeball, Eyeball]
     rows: np.ndarray

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An empty before the face that both eyes look at: drivers on the eight look units. They are simple expressions, which Blender evaluates without any script."""
+"""An empty before the face that both eyes look at: drivers on the eight look units. They are simple expressions, which
+Blender evaluates without any script."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ KEY = "wildcap_gaze"
 """Custom property of the empty, and of the shape keys whose units look at it."""
 AHEAD_M = 0.5
 MOST = 1.2
-"""How far the units go: at 1 MakeHuman's turn eyes by 8 to 17 degrees, and at this by a fifth more; further on the lids are drawn out of shape."""
+"""How far the units go: at 1 MakeHuman's turn eyes by 8 to 17 degrees, and at this by a fifth more; further on the lids
+are drawn out of shape."""
 WAYS = ("Out", "In", "Up", "Down")
 
 
@@ -35,7 +37,8 @@ def of(obj) -> bpy.types.Object | None:
 
 
 def add(context, obj) -> bpy.types.Object:
-    """The empty half a metre before the eyes, where they look at rest, and the drivers. Raises Problem where the artist drives a look unit."""
+    """The empty half a metre before the eyes, where they look at rest, and the drivers. Raises Problem where the artist
+    drives a look unit."""
     _refuse_own(obj.data.shape_keys)
     eyes = [_eye(obj, number) for number in range(2)]
     empty = bpy.data.objects.new(f"{obj.name} Gaze", None)

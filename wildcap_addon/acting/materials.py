@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What lies inside the head: eyes with a clear coat over a picture of iris and white, mouth, teeth. Plain Principled, so that every export has them."""
+"""What lies inside the head: eyes with a clear coat over a picture of iris and white, mouth, teeth. Plain Principled,
+so that every export has them."""
 
 import bpy
 import numpy as np
@@ -10,7 +11,8 @@ from .. import node_trees
 SIZE = 512
 IRIS_ANGLE = 0.42  # radians from the pupil's middle to the iris' rim, seen from the eye's centre
 PUPIL_ANGLE = 0.15
-IRISES = {"brown": (0.13, 0.055, 0.02), "hazel": (0.25, 0.16, 0.06), "green": (0.14, 0.20, 0.10), "blue": (0.12, 0.22, 0.36), "grey": (0.24, 0.27, 0.29)}
+IRISES = {"brown": (0.13, 0.055, 0.02), "hazel": (0.25, 0.16, 0.06), "green": (0.14, 0.20, 0.10),
+          "blue": (0.12, 0.22, 0.36), "grey": (0.24, 0.27, 0.29)}
 """Linear colours."""
 DEFAULT = "brown"
 KEY = "wildcap_inside"
@@ -19,10 +21,12 @@ IRIS, IRIS_NODE = "iris", "WildCap Iris"
 
 
 def inside(name: str, iris: str | tuple) -> list[bpy.types.Material]:
-    """Eyes, mouth and teeth of a head, in the order of their slots; those that it has already keep the artist's changes. iris: one of IRISES, or a colour."""
+    """Eyes, mouth and teeth of a head, in the order of their slots; those that it has already keep the artist's
+    changes. iris: one of IRISES, or a colour."""
     eyes = _material(f"{name} Eyes", "eyes", (0.8, 0.8, 0.8), 0.35, 1.0)
     _paint(eyes, name, iris)
-    return [eyes, _material(f"{name} Mouth", "mouth", (0.22, 0.05, 0.045), 0.35, 0.3), _material(f"{name} Teeth", "teeth", (0.66, 0.58, 0.45), 0.25, 0.4)]
+    return [eyes, _material(f"{name} Mouth", "mouth", (0.22, 0.05, 0.045), 0.35, 0.3),
+            _material(f"{name} Teeth", "teeth", (0.66, 0.58, 0.45), 0.25, 0.4)]
 
 
 def recolour(obj, iris: str | tuple) -> None:
@@ -30,7 +34,8 @@ def recolour(obj, iris: str | tuple) -> None:
     for material in obj.data.materials:
         if material is not None and material.get(KEY) == "eyes":
             _paint(material, obj.name, iris)
-    for material in {slot.material for child in obj.children for slot in child.material_slots if slot.material is not None}:
+    for material in {slot.material for child in obj.children for slot in child.material_slots
+                     if slot.material is not None}:
         if material.get(KEY) == IRIS:
             tint(material, IRISES.get(iris, iris))
 
@@ -46,7 +51,8 @@ def tint(material, colour: tuple[float, float, float]) -> None:
 def colour_of(obj) -> tuple[float, float, float]:
     """The linear colour that the head's irises have."""
     for material in obj.data.materials:
-        node = material.node_tree.nodes.get("WildCap Eye") if material is not None and material.get(KEY) == "eyes" else None
+        node = (material.node_tree.nodes.get("WildCap Eye") if material is not None and material.get(KEY) == "eyes"
+                else None)
         told = node.image.get("wildcap_iris", "") if node is not None and node.image is not None else ""
         if told:
             return IRISES[told] if told in IRISES else tuple(float(value) for value in told.split())
@@ -91,14 +97,17 @@ def _paint(material, name: str, iris: str | tuple) -> None:
 
 
 def picture(iris: tuple[float, float, float]) -> np.ndarray:
-    """An eye as its UVs lay it out, sRGB float32 [SIZE, SIZE, 4]: rings around the pupil, the angle from it growing outwards (core/assets/acting.py)."""
+    """An eye as its UVs lay it out, sRGB float32 [SIZE, SIZE, 4]: rings around the pupil, the angle from it growing
+    outwards (core/assets/acting.py)."""
     y, x = (np.mgrid[:SIZE, :SIZE] + 0.5) / SIZE - 0.5
     angle = np.pi * (2 * np.hypot(x, y)) ** (1 / 0.6)
     turn = np.arctan2(y, x)
-    fibres = sum(np.sin(k * turn + p + 3 * np.sin(9 * angle + p)) / (1 + i) for i, (k, p) in enumerate(((23, 0.3), (41, 1.7), (67, 4.1), (97, 2.2))))
+    fibres = sum(np.sin(k * turn + p + 3 * np.sin(9 * angle + p)) / (1 + i)
+                 for i, (k, p) in enumerate(((23, 0.3), (41, 1.7), (67, 4.1), (97, 2.2))))
     rim, pupil = _step(angle, IRIS_ANGLE, 0.03), _step(angle, PUPIL_ANGLE, 0.012)
     across = np.clip((angle - PUPIL_ANGLE) / (IRIS_ANGLE - PUPIL_ANGLE), 0, 1)
-    brightness = (1 + 0.22 * fibres) * (1.25 - 0.4 * across) * (1 - 0.65 * np.clip((across - 0.8) / 0.2, 0, 1))  # a dark ring at the limbus
+    # a dark ring at the limbus
+    brightness = (1 + 0.22 * fibres) * (1.25 - 0.4 * across) * (1 - 0.65 * np.clip((across - 0.8) / 0.2, 0, 1))
     coloured = np.array(iris) * brightness[..., None] * (1 - pupil[..., None]) + 0.003
     veins = np.clip(angle - 0.7, 0, 0.9)[..., None]
     white = np.array([0.62, 0.56, 0.52]) * (1 - veins * [0.15, 0.42, 0.45])

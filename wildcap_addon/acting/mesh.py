@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head's mesh cut open, with eyes and mouth in it, and its shape keys: made once, later only moved, so that keys and animation stay.
+"""A head's mesh cut open, with eyes and mouth in it, and its shape keys: made once, later only moved, so that keys and
+animation stay.
 
-For exporters: the keys are called as ARKit calls them (`jawOpen`, `eyeBlinkLeft`), their basis is the head as solved, lids closed;
-`eyesOpenLeft` and `eyesOpenRight` open the lids and are no names of ARKit's. Slots: skin, "... Eyes", "... Mouth", "... Teeth".
-The custom property `MARK` of the mesh says that it has them.
+For exporters: the keys are called as ARKit calls them (`jawOpen`, `eyeBlinkLeft`), their basis is the head as solved,
+lids closed; `eyesOpenLeft` and `eyesOpenRight` open the lids and are no names of ARKit's. Slots: skin, "... Eyes", "...
+Mouth", "... Teeth". The custom property `MARK` of the mesh says that it has them.
 """
 
 from pathlib import Path
@@ -31,15 +32,16 @@ def has(obj) -> bool:
 
 
 def open_filmed_eyes(obj, capture: Capture) -> None:
-    """A head that was filmed with open eyes gets its face units, and its lids as they were; one that has them, or shape keys of its own, stays as it is.
-    `head.complete` asks."""
+    """A head that was filmed with open eyes gets its face units, and its lids as they were; one that has them, or shape
+    keys of its own, stays as it is. `head.complete` asks."""
     asset = load()
     if obj.data.shape_keys is None and is_built_in(obj, asset) and filmed.read(capture, asset) is not None:
         add(obj)
 
 
 def add(obj, iris: str = "") -> None:
-    """Cuts the head open and gives it its face units; iris: one of materials.IRISES, '' for what was filmed, or brown. Eyes that were filmed open are open.
+    """Cuts the head open and gives it its face units; iris: one of materials.IRISES, '' for what was filmed, or brown.
+    Eyes that were filmed open are open.
 
     Raises Problem if it is not the built-in head, unchanged, and for a damaged capture."""
     asset = load()
@@ -83,11 +85,13 @@ def filmed_iris(obj) -> tuple[float, float, float]:
 
 def filmed_eyes(obj, asset: FaceUnits) -> filmed.FilmedEyes | None:
     """What the head's capture knows of its eyes."""
-    return filmed.read(Capture(Path(bpy.path.abspath(obj[captures.HEAD_KEY]))), asset) if obj.get(captures.HEAD_KEY) else None
+    return (filmed.read(Capture(Path(bpy.path.abspath(obj[captures.HEAD_KEY]))), asset) if obj.get(captures.HEAD_KEY)
+            else None)
 
 
 def follow(obj, head: np.ndarray, normals: np.ndarray) -> None:
-    """Moves a head that has its units to another registered shape [V, 3]; values, animation, drivers and the artist's own keys stay."""
+    """Moves a head that has its units to another registered shape [V, 3]; values, animation, drivers and the artist's
+    own keys stay."""
     asset = load()
     obj.data[OUTER] = len(asset.triangles)  # a head of WildCap 0.1.0 did not say
     _shape(obj, *carrying.carried(asset, head, filmed_eyes(obj, asset)), normals)
@@ -134,9 +138,11 @@ def renewed(obj, mesh) -> bool:
 
 def _check(obj, asset: FaceUnits) -> None:
     if obj.data.shape_keys is not None:
-        raise Problem("This head has shape keys of its own.", "Remove them, or bring the head in anew, then click Add Face Units.")
+        raise Problem("This head has shape keys of its own.",
+                      "Remove them, or bring the head in anew, then click Add Face Units.")
     if not is_built_in(obj, asset):
-        raise Problem("Face units are made for the built-in head, and this is another mesh.", "Reconstruct with the built-in head, or bring the head in anew.")
+        raise Problem("Face units are made for the built-in head, and this is another mesh.",
+                      "Reconstruct with the built-in head, or bring the head in anew.")
 
 
 def is_built_in(obj, asset: FaceUnits) -> bool:
@@ -147,7 +153,8 @@ def is_built_in(obj, asset: FaceUnits) -> bool:
 
 
 def _built(old, asset: FaceUnits, rest: np.ndarray):
-    """The mesh at rest, its UVs those of the head; inner parts but the skin's have theirs in tiles to the right, where no map of the skin lies."""
+    """The mesh at rest, its UVs those of the head; inner parts but the skin's have theirs in tiles to the right, where
+    no map of the skin lies."""
     triangles = asset.triangles.copy()
     triangles[asset.corners[:, 0], asset.corners[:, 1]] = asset.corners[:, 2]
     inner = [[i for i in face if i >= 0] for face in asset.faces.tolist()]
@@ -164,7 +171,8 @@ def _built(old, asset: FaceUnits, rest: np.ndarray):
     extra = known[corners] + np.stack([tile, 0 * tile], 1)
     layer = mesh.uv_layers.new(name=old.uv_layers[0].name)
     layer.data.foreach_set("uv", np.concatenate([uv, extra.astype(np.float32).ravel()]))
-    mesh.polygons.foreach_set("material_index", np.concatenate([np.zeros(len(triangles), np.int32), asset.slots.astype(np.int32)]))
+    mesh.polygons.foreach_set("material_index",
+                              np.concatenate([np.zeros(len(triangles), np.int32), asset.slots.astype(np.int32)]))
     mesh.shade_smooth()
     _attributes(old, mesh, asset)
     mesh.update()
@@ -172,9 +180,15 @@ def _built(old, asset: FaceUnits, rest: np.ndarray):
 
 
 def _attributes(old, new, asset: FaceUnits) -> None:
-    """What is kept for each vertex of the head (its roughness, an artist's mask), on the copies as on what they double; zero inside."""
+    """What is kept for each vertex of the head (its roughness, an artist's mask), on the copies as on what they double;
+    zero inside."""
     for attribute in old.attributes:
-        if attribute.domain == 'POINT' and attribute.data_type in LAYOUT and not attribute.is_internal and not attribute.is_required:
+        if (
+            attribute.domain == 'POINT'
+            and attribute.data_type in LAYOUT
+            and not attribute.is_internal
+            and not attribute.is_required
+        ):
             field, width = LAYOUT[attribute.data_type]
             values = np.empty((len(old.vertices), width), np.float32)
             attribute.data.foreach_get(field, values.ravel())
@@ -203,10 +217,13 @@ def _set_normals(mesh, normals: np.ndarray) -> None:
 
 
 def _drive(keys, filmed_open: bool) -> None:
-    """Lids open by the slider, or as far as a unit of the eye is used: drivers of kind Maximum, which need no script."""
+    """Lids open by the slider, or as far as a unit of the eye is used: drivers of kind Maximum, which need no
+    script."""
     keys[OPEN] = 1.0 if filmed_open else 0.0
-    told = "How far the lids are open; 1 is as they were filmed" if filmed_open else "How far the lids are open; they were filmed closed"
-    keys.id_properties_ui(OPEN).update(min=0.0, max=1.0, soft_min=0.0, soft_max=1.0, default=keys[OPEN], description=told)
+    told = ("How far the lids are open; 1 is as they were filmed" if filmed_open
+            else "How far the lids are open; they were filmed closed")
+    keys.id_properties_ui(OPEN).update(min=0.0, max=1.0, soft_min=0.0, soft_max=1.0, default=keys[OPEN],
+                                       description=told)
     for side in SIDES:
         driver = keys.key_blocks[f"{OPEN}{side}"].driver_add("value").driver
         driver.type = 'MAX'

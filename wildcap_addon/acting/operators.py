@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: face units onto the head, the iris' colour, what the eyes look at, eyes and mouth for a close-up, and all sliders back to zero."""
+"""Operators: face units onto the head, the iris' colour, what the eyes look at, eyes and mouth for a close-up, and all
+sliders back to zero."""
 
 import bpy
 
@@ -28,13 +29,15 @@ class WILDCAP_OT_add_face_units(_OnHead, bpy.types.Operator):
     bl_label = "Add Face Units"
     bl_options = {'REGISTER', 'UNDO'}
 
-    iris: bpy.props.EnumProperty(name="Iris", description="Colour of the eyes", items=[FILMED, *((name, name.title(), "") for name in materials.IRISES)])
+    iris: bpy.props.EnumProperty(name="Iris", description="Colour of the eyes",
+                                 items=[FILMED, *((name, name.title(), "") for name in materials.IRISES)])
 
     def work(self, context):
         item = captures.require(context)
         obj = captures.require_head(context, item)
         if mesh.has(obj):
-            raise Problem("This head has its face units already.", "Move their sliders, here or under Shape Keys in the mesh's properties.")
+            raise Problem("This head has its face units already.",
+                          "Move their sliders, here or under Shape Keys in the mesh's properties.")
         mesh.add(obj, "" if self.iris == FILMED[0] else self.iris)
         head.complete(obj, captures.folder(item))
         self.warn(filmed_open(captures.folder(item)))
@@ -47,7 +50,8 @@ class WILDCAP_OT_iris(_OnHead, bpy.types.Operator):
     bl_label = "Iris"
     bl_options = {'REGISTER', 'UNDO'}
 
-    iris: bpy.props.EnumProperty(name="Iris", description="Colour of the eyes", items=[FILMED, *((name, name.title(), "") for name in materials.IRISES)])
+    iris: bpy.props.EnumProperty(name="Iris", description="Colour of the eyes",
+                                 items=[FILMED, *((name, name.title(), "") for name in materials.IRISES)])
 
     def work(self, context):
         obj = _acting(context)
@@ -87,7 +91,8 @@ class WILDCAP_OT_gaze(_Toggle, bpy.types.Operator):
 
 
 class WILDCAP_OT_close_up(_Toggle, bpy.types.Operator):
-    """Give the head eyes and a mouth worth a close-up, as objects of their own that go along with its face units; again to have its plain ones back"""
+    """Give the head eyes and a mouth worth a close-up, as objects of their own that go along with its face units; again
+    to have its plain ones back"""
 
     bl_idname = "wildcap.close_up"
     bl_label = "Close-Up Eyes"
@@ -95,10 +100,12 @@ class WILDCAP_OT_close_up(_Toggle, bpy.types.Operator):
 
 
 def filmed_open(capture) -> str:
-    """What there is to say of the lids of a face that was filmed with open eyes and reconstructed by WildCap 0.1.0, '' for others."""
+    """What there is to say of the lids of a face that was filmed with open eyes and reconstructed by WildCap 0.1.0, ''
+    for others."""
     seen = capture.read()["stages"].get("registration", {}).get("figures", {}).get("eye_opening")
     on_lids = seen is not None and seen > OPEN and not capture.eyes.is_file()
-    return ("The eyes were open while filming: the lids carry a picture of them, which shows when they move. Reconstruct again to have them open"
+    return ("The eyes were open while filming: the lids carry a picture of them, which shows when they move. "
+            "Reconstruct again to have them open"
             if on_lids else "")
 
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: reconstruct or solve all faces by a batch, open one that was planned elsewhere, and walk through its masks."""
+"""Operators: reconstruct or solve all faces by a batch, open one that was planned elsewhere, and walk through its
+masks."""
 
 from pathlib import Path
 
@@ -27,7 +28,8 @@ class AllFaces(BaseOperator):
                 and cls.allowed(not jobs.elsewhere(""), "A job is running: wait for it, or click Cancel"))
 
     def prepare(self, context) -> Batch:
-        """What is meant by all; a mask that is being painted is saved. Raises Problem where there is no solver, before anything is written."""
+        """What is meant by all; a mask that is being painted is saved. Raises Problem where there is no solver, before
+        anything is written."""
         preferences.require_python()
         for each in jobs.before_start:
             each()
@@ -38,7 +40,8 @@ class AllFaces(BaseOperator):
 
 
 class WILDCAP_OT_reconstruct_all(AllFaces, bpy.types.Operator):
-    """Reconstruct every face of the list, or of the open batch, up to its shadow mask: one after the other, also when Blender is closed meanwhile"""
+    """Reconstruct every face of the list, or of the open batch, up to its shadow mask: one after the other, also when
+    Blender is closed meanwhile"""
 
     bl_idname = "wildcap.reconstruct_all"
     bl_label = "Reconstruct All"
@@ -49,7 +52,8 @@ class WILDCAP_OT_reconstruct_all(AllFaces, bpy.types.Operator):
 
 
 class WILDCAP_OT_solve_all(AllFaces, bpy.types.Operator):
-    """Solve every face that has a shadow mask, with the mask as it is now: painted, or as it was proposed. It goes on when Blender is closed meanwhile"""
+    """Solve every face that has a shadow mask, with the mask as it is now: painted, or as it was proposed. It goes on
+    when Blender is closed meanwhile"""
 
     bl_idname = "wildcap.solve_all"
     bl_label = "Solve All"
@@ -81,7 +85,8 @@ class WILDCAP_OT_cancel_batch(BaseOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_open_batch(BaseOperator, bpy.types.Operator):
-    """Open the folder of a batch, also of one that was planned and run from a terminal or on a farm: its faces come into the list of captures"""
+    """Open the folder of a batch, also of one that was planned and run from a terminal or on a farm: its faces come
+    into the list of captures"""
 
     bl_idname = "wildcap.open_batch"
     bl_label = "Open Batch"
@@ -131,18 +136,21 @@ class MaskWalk(BaseOperator):
     @classmethod
     def poll(cls, context):
         return (cls.allowed(batches.current() is not None, "No batch is open: click Open Batch first")
-                and cls.allowed(context.mode == 'OBJECT' or walking.painting(), "Only in Object Mode, or while a mask is painted"))
+                and cls.allowed(context.mode == 'OBJECT' or walking.painting(),
+                                "Only in Object Mode, or while a mask is painted"))
 
 
 class WILDCAP_OT_next_mask(MaskWalk, bpy.types.Operator):
-    """Bring in the next face whose shadow mask waits to be looked at, and paint there. The mask that is being painted is saved, but not accepted"""
+    """Bring in the next face whose shadow mask waits to be looked at, and paint there. The mask that is being painted
+    is saved, but not accepted"""
 
     bl_idname = "wildcap.next_mask"
     bl_label = "Next Mask"
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and cls.allowed(cls.face(context) is not None, "No other mask waits to be looked at")
+        return super().poll(context) and cls.allowed(cls.face(context) is not None,
+                                                     "No other mask waits to be looked at")
 
     @staticmethod
     def face(context):
@@ -162,7 +170,8 @@ class WILDCAP_OT_accept_mask(MaskWalk, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         found = batches.state_of(captures.root(captures.active(context)))
-        return super().poll(context) and cls.allowed(found is not None and found.state == WAITING, "This face's mask does not wait: click Next Mask")
+        return super().poll(context) and cls.allowed(found is not None and found.state == WAITING,
+                                                     "This face's mask does not wait: click Next Mask")
 
     def work(self, context):
         root = captures.root(captures.require(context))
@@ -175,5 +184,5 @@ class WILDCAP_OT_accept_mask(MaskWalk, bpy.types.Operator):
             self.report({'INFO'}, rpt_("All masks are looked at: click Solve All"))
 
 
-CLASSES = (WILDCAP_OT_reconstruct_all, WILDCAP_OT_solve_all, WILDCAP_OT_cancel_batch, WILDCAP_OT_open_batch, WILDCAP_OT_close_batch, WILDCAP_OT_next_mask,
-           WILDCAP_OT_accept_mask)
+CLASSES = (WILDCAP_OT_reconstruct_all, WILDCAP_OT_solve_all, WILDCAP_OT_cancel_batch, WILDCAP_OT_open_batch,
+           WILDCAP_OT_close_batch, WILDCAP_OT_next_mask, WILDCAP_OT_accept_mask)

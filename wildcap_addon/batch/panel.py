@@ -30,7 +30,8 @@ class WILDCAP_PT_batch(WildcapPanel, bpy.types.Panel):
         problems.draw(layout, known.problem, width)
         if running.running():
             row = layout.row(align=True)
-            words = iface_("{} of {} faces").format(known.progress["ended"], known.progress["of"]) if known.progress else iface_("Starting")
+            words = (iface_("{} of {} faces").format(known.progress["ended"], known.progress["of"]) if known.progress
+                     else iface_("Starting"))
             row.progress(text=words, translate=False, factor=batches.share(known))
             row.operator("wildcap.cancel_batch", text="", icon='CANCEL')
             if batches.line(known):
@@ -56,7 +57,8 @@ def count_words(known: batches.BatchView) -> str:
     of, seen = len(known.batch.faces), len(known.states)
     waiting = len(batches.waiting())
     accepted = known.count(WAITING) - waiting  # and not looked at since
-    counts = [(waiting, iface_("masks waiting: {}")), (known.count(DONE), iface_("done: {}")), (known.count(WORKING), iface_("in work: {}")),
+    counts = [(waiting, iface_("masks waiting: {}")), (known.count(DONE), iface_("done: {}")),
+              (known.count(WORKING), iface_("in work: {}")),
               (known.count(STOPPED), iface_("stopped: {}")), (known.count(TO_DO) + accepted, iface_("to do: {}")),
               (of - seen, iface_("not looked at yet: {}"))]
     text = ", ".join(words.format(count) for count, words in counts if count)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The record of a batch of the captures that the scene lists, which stay where they are, with their settings as the panels have them."""
+"""The record of a batch of the captures that the scene lists, which stay where they are, with their settings as the
+panels have them."""
 
 import itertools
 import time
@@ -17,18 +18,22 @@ FOLDER = "batches"
 
 
 def prepare(context) -> tuple[Batch, list[str]]:
-    """The batch that is meant by "all", and the names of captures that it leaves out because there is no video to begin with. Raises Problem.
+    """The batch that is meant by "all", and the names of captures that it leaves out because there is no video to begin
+    with. Raises Problem.
 
-    The open one, as it is, if it was planned from a table. Else one of the scene's list: the open one anew where it has these very captures, or another.
+    The open one, as it is, if it was planned from a table. Else one of the scene's list: the open one anew where it has
+    these very captures, or another.
     """
     opened = read_batch(batches.current()) if batches.current() is not None else None
     if opened is not None and is_planned(opened):
         return opened, []
     faces, left_out = _list_faces(context)
     if not faces:
-        raise Problem("No capture of the list has a video or photographs that it could be made from.", "Choose videos: each becomes a capture of the list.")
+        raise Problem("No capture of the list has a video or photographs that it could be made from.",
+                      "Choose videos: each becomes a capture of the list.")
     same = opened is not None and {face.root for face in opened.faces} == {face.root for face in faces}
-    batch = Batch(opened.root if same else _make_folder(preferences.captures_folder() / FOLDER), tuple(faces), gate=GATES[1])
+    batch = Batch(opened.root if same else _make_folder(preferences.captures_folder() / FOLDER), tuple(faces),
+                  gate=GATES[1])
     write_batch(batch)
     batches.choose(batch.root)
     return batch, left_out
@@ -50,14 +55,17 @@ def _list_faces(context) -> tuple[list[BatchFace], list[str]]:
         if source is None:
             left_out.append(item.name)
         else:
-            faces.append(BatchFace(_name(capture.root.stem, taken), source, capture.root, item.quality, properties.job_settings(item)))
+            faces.append(BatchFace(_name(capture.root.stem, taken), source, capture.root, item.quality,
+                                   properties.job_settings(item)))
     return faces, left_out
 
 
 def _name(wanted: str, taken: set[str]) -> str:
     """A name of its own for a face; two captures in two folders may have the same."""
-    wanted = wanted.lstrip("-") if plain_name(wanted.lstrip("-")) else "face"  # on a command line a hyphen would begin an option
-    name = next(name for number in itertools.count(1) if (name := wanted if number == 1 else f"{wanted}_{number}").casefold() not in taken)
+    # on a command line a hyphen would begin an option
+    wanted = wanted.lstrip("-") if plain_name(wanted.lstrip("-")) else "face"
+    name = next(name for number in itertools.count(1)
+                if (name := wanted if number == 1 else f"{wanted}_{number}").casefold() not in taken)
     taken.add(name.casefold())
     return name
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The process that runs a batch: started here, apart from Blender, which may close meanwhile; asked to stop by a file; listened to through what it writes."""
+"""The process that runs a batch: started here, apart from Blender, which may close meanwhile; asked to stop by a file;
+listened to through what it writes."""
 
 import contextlib
 import os
@@ -19,7 +20,8 @@ from .. import batches, captures, jobs, preferences, problems, status
 INTERVAL_S = 0.5
 LOG = "run.log"
 BEHIND = 10
-"""Nice value of a batch, to which that of its workers is added: what the artist waits for comes first, a job of Blender's own among it."""
+"""Nice value of a batch, to which that of its workers is added: what the artist waits for comes first, a job of
+Blender's own among it."""
 SUMMARY = re.compile(r"\d+ faces?: ")
 """How the last line of a run that went to its end begins."""
 _process: subprocess.Popen | None = None  # of the batch that was started last, in this session
@@ -49,7 +51,8 @@ def start(batch: Batch, *words: str) -> None:
         raise storage_problem(error, log) from error
     with told:
         try:
-            _process = subprocess.Popen(command, cwd=jobs.ROOT, env=_environment(batch), stdin=subprocess.DEVNULL, stdout=told, stderr=told, **_apart())
+            _process = subprocess.Popen(command, cwd=jobs.ROOT, env=_environment(batch), stdin=subprocess.DEVNULL,
+                                        stdout=told, stderr=told, **_apart())
         except OSError as error:
             raise Problem(f"The solver's Python {python} could not be started ({error.strerror or error}).",
                           "Install the solver again, or choose another Python.") from error
@@ -61,14 +64,16 @@ def start(batch: Batch, *words: str) -> None:
 
 
 def cancel() -> None:
-    """Asks who runs the open batch to stop; what was finished is kept. Raises Problem where its folder cannot be written."""
+    """Asks who runs the open batch to stop; what was finished is kept. Raises Problem where its folder cannot be
+    written."""
     global _stopping
     _stopping = True
     _ask_to_stop()
 
 
 def poll() -> None:
-    """Tells how the process ended that was started here, and asks one that had not begun to listen once more to stop."""
+    """Tells how the process ended that was started here, and asks one that had not begun to listen once more to
+    stop."""
     global _process, _stopping
     if _process is not None and _process.poll() is not None:
         code, _process = _process.returncode, None
@@ -90,7 +95,8 @@ def _ask_to_stop() -> None:
 
 
 def _problem_of(code: int) -> Problem | None:
-    """Why a run did not go to its end, by the last lines that it wrote; None where it did: what stopped single faces stands in them."""
+    """Why a run did not go to its end, by the last lines that it wrote; None where it did: what stopped single faces
+    stands in them."""
     log = _batch.root / LOG
     try:
         problem, remedy = (["", "", *log.read_text(encoding="utf-8", errors="replace").strip().splitlines()])[-2:]
@@ -100,7 +106,8 @@ def _problem_of(code: int) -> Problem | None:
         return None
     if code in (1, 2) and problem:  # as the command line tells a Problem
         return Problem(problem, remedy)
-    return Problem(f"The batch ended unexpectedly (exit code {code}).", f"Start it again: what was finished is kept. If it happens again, read {log}.")
+    return Problem(f"The batch ended unexpectedly (exit code {code}).",
+                   f"Start it again: what was finished is kept. If it happens again, read {log}.")
 
 
 def _environment(batch: Batch) -> dict[str, str]:
@@ -113,7 +120,8 @@ def _environment(batch: Batch) -> dict[str, str]:
 def _apart() -> dict:
     """Popen arguments: a process that does not end with Blender, its terminal or its session."""
     if os.name == "nt":
-        return {"creationflags": subprocess.DETACHED_PROCESS | subprocess.BELOW_NORMAL_PRIORITY_CLASS | subprocess.CREATE_NEW_PROCESS_GROUP}
+        return {"creationflags": subprocess.DETACHED_PROCESS | subprocess.BELOW_NORMAL_PRIORITY_CLASS
+                | subprocess.CREATE_NEW_PROCESS_GROUP}
     return {"start_new_session": True}
 
 

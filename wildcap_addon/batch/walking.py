@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The walk through a batch's masks: which comes next, and how its face comes into the scene and the one before steps aside."""
+"""The walk through a batch's masks: which comes next, and how its face comes into the scene and the one before steps
+aside."""
 
 from pathlib import Path
 
@@ -30,7 +31,8 @@ def leave(root: str) -> None:
 
 
 def go(context, face: BatchFace) -> None:
-    """Brings a face in, alone, and begins to paint its mask. Raises Problem, as the clicks do that an artist would do it by."""
+    """Brings a face in, alone, and begins to paint its mask. Raises Problem, as the clicks do that an artist would do
+    it by."""
     before = captures.active(context)
     leave(captures.root(before))
     if before is not None and captures.root(before) != str(face.root):
@@ -55,14 +57,20 @@ def list_face(context, face: BatchFace):
 
 
 def _put_aside(context, item) -> None:
-    """Hides a face's head until its row is clicked, and gives the memory of its pictures back: two hundred faces are more than a machine holds."""
+    """Hides a face's head until its row is clicked, and gives the memory of its pictures back: two hundred faces are
+    more than a machine holds."""
     obj = captures.head(context, item)
     if obj is None or obj.name not in context.view_layer.objects:
         return
     captures.put_aside(obj)
     folder = captures.folder(item).root
     for image in bpy.data.images:
-        if image.source == 'FILE' and not image.is_dirty and not image.packed_file and Path(bpy.path.abspath(image.filepath)).is_relative_to(folder):
+        if (
+            image.source == 'FILE'
+            and not image.is_dirty
+            and not image.packed_file
+            and Path(bpy.path.abspath(image.filepath)).is_relative_to(folder)
+        ):
             image.buffers_free()
 
 

@@ -13,17 +13,26 @@ from ..base_operator import Dialog
 
 
 class WILDCAP_OT_delete_face(Dialog, bpy.types.Operator):
-    """Delete all that WildCap wrote of this face, renders and exports among it: first you are told what goes. Files that you added or changed stay"""
+    """Delete all that WildCap wrote of this face, renders and exports among it: first you are told what goes. Files
+    that you added or changed stay"""
 
     bl_idname = "wildcap.delete_face"
     bl_label = "Delete Face"
 
     @classmethod
     def poll(cls, context):
-        return (cls.in_object_mode(context) and jobs.can_start(cls, context)
-                and cls.allowed(jobs.of("") is None, "The solver is being set up, or another face is looked at: wait for it, or click Cancel")
-                and cls.allowed(not (batches.view().runner and batches.view().face(captures.root(captures.active(context)))),
-                                "This face is one of a batch that is running, which would make it again: wait for it, or cancel it"))
+        return (
+            cls.in_object_mode(context)
+            and jobs.can_start(cls, context)
+            and cls.allowed(
+                jobs.of("") is None,
+                "The solver is being set up, or another face is looked at: wait for it, or click Cancel",
+            )
+            and cls.allowed(
+                not (batches.view().runner and batches.view().face(captures.root(captures.active(context)))),
+                "This face is one of a batch that is running, which would make it again: wait for it, or cancel it",
+            )
+        )
 
     @staticmethod
     def tell() -> tuple[str, ...] | None:
@@ -34,11 +43,13 @@ class WILDCAP_OT_delete_face(Dialog, bpy.types.Operator):
         if found is None:
             asking.ask(key, lambda task: look_at(task, capture), "delete_face")
             return None
-        return (*deletion.lines(found, iface_), "A head in the scene stays as a mesh and loses its maps: deliver it first to keep them.")
+        return (*deletion.lines(found, iface_),
+                "A head in the scene stays as a mesh and loses its maps: deliver it first to keep them.")
 
     def work(self, context):
         capture = captures.folder(captures.require(context))
-        jobs.begin("", "ask", BackgroundTask("setup", lambda task: delete(task, capture)), lambda: forget(str(capture.root)))
+        jobs.begin("", "ask", BackgroundTask("setup", lambda task: delete(task, capture)),
+                   lambda: forget(str(capture.root)))
 
 
 def look_at(task: BackgroundTask, capture: Capture) -> deletion.Deletion:

@@ -12,7 +12,9 @@ from . import strip
 
 class WILDCAP_UL_captures(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_property):
-        layout.prop(item, "name", text="", emboss=False, icon='CHECKMARK' if item == captures.active(context) else 'USER')  # the active head decides
+        # the active head decides
+        layout.prop(item, "name", text="", emboss=False,
+                    icon='CHECKMARK' if item == captures.active(context) else 'USER')
         found = batches.state_of(captures.root(item))
         if found is not None:
             layout.label(text="", icon=batches.ICONS[found.state])

@@ -22,7 +22,8 @@ class WILDCAP_OT_open_sample_head(BaseOperator, bpy.types.Operator):
         if context.mode != 'OBJECT':
             bpy.ops.object.mode_set(mode='OBJECT')
         bpy.ops.wildcap.bring_in_head()
-        if all(path.is_file() for path in status.delivered(capture)):  # an artist's copy of it may be on its way to other maps
+        # an artist's copy of it may be on its way to other maps
+        if all(path.is_file() for path in status.delivered(capture)):
             bpy.ops.wildcap.assemble_material()
 
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scene's cameras as the JSON that the setting `cameras.import_from` reads (core/cameras/importers/blender_cameras.py says its layout).
+"""The scene's cameras as the JSON that the setting `cameras.import_from` reads
+(core/cameras/importers/blender_cameras.py says its layout).
 
 Not a button: `write_cameras(bpy.context.scene, "cameras.json")` from Blender's console or a script.
 """
@@ -13,9 +14,11 @@ from ...core.contract.files import write_json
 
 
 def write_cameras(scene: bpy.types.Scene, path: str) -> int:
-    """Each camera under its object's name, which is to be its photograph's; or, where there is one camera alone and it moves, one entry per frame
-    of the scene, numbered as the video's from 0. Pictures have the scene's resolution and square pixels. Gives how many were written."""
-    width, height = (round(side * scene.render.resolution_percentage / 100) for side in (scene.render.resolution_x, scene.render.resolution_y))
+    """Each camera under its object's name, which is to be its photograph's; or, where there is one camera alone and it
+    moves, one entry per frame of the scene, numbered as the video's from 0. Pictures have the scene's resolution and
+    square pixels. Gives how many were written."""
+    width, height = (round(side * scene.render.resolution_percentage / 100)
+                     for side in (scene.render.resolution_x, scene.render.resolution_y))
     objects = [thing for thing in scene.objects if thing.type == 'CAMERA' and thing.data.type == 'PERSP']
     before, entries = scene.frame_current, []
     if len(objects) == 1 and objects[0].animation_data is not None and objects[0].animation_data.action is not None:
@@ -31,7 +34,8 @@ def write_cameras(scene: bpy.types.Scene, path: str) -> int:
 
 
 def _entry(thing: bpy.types.Object, width: int, height: int) -> dict:
-    """The sensor's width is that of the picture's longer side where its fit is automatic; the lens's shift is a share of the same side."""
+    """The sensor's width is that of the picture's longer side where its fit is automatic; the lens's shift is a share
+    of the same side."""
     lens = thing.data
     across = lens.sensor_fit == 'HORIZONTAL' or (lens.sensor_fit == 'AUTO' and width >= height)
     side = width if across else height

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The video or the photographs of a face: chosen in the file browser, or dropped on a 3D view that shows the WildCap tab."""
+"""The video or the photographs of a face: chosen in the file browser, or dropped on a 3D view that shows the WildCap
+tab."""
 
 import re
 from pathlib import Path
@@ -22,7 +23,8 @@ WIDTH = 240
 
 
 class WILDCAP_OT_choose_video(BaseOperator, bpy.types.Operator):
-    """Choose the video of a face, or any one of its photographs: all in that folder are used. A capture folder is made for it"""
+    """Choose the video of a face, or any one of its photographs: all in that folder are used. A capture folder is made
+    for it"""
 
     bl_idname = "wildcap.choose_video"
     bl_label = "Choose Video"
@@ -31,7 +33,8 @@ class WILDCAP_OT_choose_video(BaseOperator, bpy.types.Operator):
     filepath: bpy.props.StringProperty(subtype='FILE_PATH', options={'SKIP_SAVE'})
     directory: bpy.props.StringProperty(subtype='DIR_PATH', options={'SKIP_SAVE', 'HIDDEN'})
     files: bpy.props.CollectionProperty(type=bpy.types.OperatorFileListElement, options={'SKIP_SAVE', 'HIDDEN'})
-    filter_glob: bpy.props.StringProperty(default=";".join(f"*{s};*{s.upper()}" for s in VIDEOS + PHOTOGRAPHS), options={'HIDDEN'})
+    filter_glob: bpy.props.StringProperty(default=";".join(f"*{s};*{s.upper()}" for s in VIDEOS + PHOTOGRAPHS),
+                                          options={'HIDDEN'})
 
     def invoke(self, context, event):
         if self.filepath or self.files:  # dropped
@@ -44,7 +47,8 @@ class WILDCAP_OT_choose_video(BaseOperator, bpy.types.Operator):
         folder = preferences.captures_folder()
         problems.draw_text(self.layout, iface_("The capture goes to {}.").format(folder), WIDTH)
         if not bpy.data.filepath and folder == preferences.captures_default():
-            told = "No cloud copies that folder. Another one is chosen in the preferences, and a saved .blend has its captures beside it."
+            told = ("No cloud copies that folder. Another one is chosen in the preferences, and a saved .blend has its "
+                    "captures beside it.")
             problems.draw_text(self.layout, told, WIDTH)
 
     def work(self, context):
@@ -57,7 +61,8 @@ class WILDCAP_OT_choose_video(BaseOperator, bpy.types.Operator):
 
 
 class WILDCAP_FH_source(bpy.types.FileHandler):
-    """Takes what is dropped on a 3D view while its sidebar shows the WildCap tab. Blender then asks whether a reference image was meant."""
+    """Takes what is dropped on a 3D view while its sidebar shows the WildCap tab. Blender then asks whether a reference
+    image was meant."""
 
     bl_idname = "WILDCAP_FH_source"
     bl_label = "Face for WildCap"
@@ -69,11 +74,13 @@ class WILDCAP_FH_source(bpy.types.FileHandler):
         area = context.area
         if area is None or area.type != 'VIEW_3D' or not area.spaces.active.show_region_ui:
             return False
-        return any(region.type == 'UI' and region.active_panel_category == WildcapPanel.bl_category for region in area.regions)
+        return any(region.type == 'UI' and region.active_panel_category == WildcapPanel.bl_category
+                   for region in area.regions)
 
 
 def sources(chosen: list[Path]) -> list[Path]:
-    """What was meant by some files: each video by itself, and for photographs the folder that they lie in. Raises Problem where there is nothing to see."""
+    """What was meant by some files: each video by itself, and for photographs the folder that they lie in. Raises
+    Problem where there is nothing to see."""
     found = []
     for path in chosen:
         if not path.exists() or path == Path():
@@ -81,7 +88,8 @@ def sources(chosen: list[Path]) -> list[Path]:
         if path.is_file() and path.suffix.lower() in PHOTOGRAPHS:
             path = path.parent
         elif path.is_file() and path.suffix.lower() not in VIDEOS:
-            raise Problem(f"{path.name} is neither a video nor a photograph.", f"Choose one of {', '.join(s[1:] for s in VIDEOS)}, or a folder of photographs.")
+            raise Problem(f"{path.name} is neither a video nor a photograph.",
+                          f"Choose one of {', '.join(s[1:] for s in VIDEOS)}, or a folder of photographs.")
         if path.is_dir() and not any(file.suffix.lower() in PHOTOGRAPHS for file in path.iterdir()):
             raise Problem(f"There are no photographs in {path}.", "Choose a video, or a folder of photographs.")
         found.append(path.absolute())
@@ -89,13 +97,15 @@ def sources(chosen: list[Path]) -> list[Path]:
 
 
 def new_folder(parent: Path, source: Path) -> Path:
-    """parent/NAME.wildcap for a source; the same source finds its folder again, another one of the same name gets a number."""
+    """parent/NAME.wildcap for a source; the same source finds its folder again, another one of the same name gets a
+    number."""
     name = re.sub(r'[<>:"/\\|?*\x00-\x1f]', "_", source.stem if source.is_file() else source.name).strip(" .") or "face"
     for number in range(1, 1000):
         folder = parent / (f"{name}.wildcap" if number == 1 else f"{name}_{number}.wildcap")
         if not folder.exists() or (Capture(folder).json.is_file() and Capture(folder).source == source):
             return folder
-    raise Problem(f"{parent} holds a thousand captures named {name}.", "Choose another captures folder in the preferences.")
+    raise Problem(f"{parent} holds a thousand captures named {name}.",
+                  "Choose another captures folder in the preferences.")
 
 
 CLASSES = (WILDCAP_OT_choose_video, WILDCAP_FH_source)

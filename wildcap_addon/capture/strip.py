@@ -30,7 +30,8 @@ class Frame:
 
 @dataclass(frozen=True)
 class Strip:
-    """Some frames of a capture, those that the texture uses first choice; how many there are, are used, and are blurred in all."""
+    """Some frames of a capture, those that the texture uses first choice; how many there are, are used, and are blurred
+    in all."""
 
     frames: tuple[Frame, ...]
     count: int
@@ -72,7 +73,8 @@ def _read(capture: Capture) -> Strip | None:
     choice = used or list(range(len(frames)))
     shown = [choice[i * len(choice) // min(MOST, len(choice))] for i in range(min(MOST, len(choice)))]
     sharpest = max(values) or 1.0
-    return Strip(tuple(Frame(frames[i].name.rpartition(".")[0], values[i] / sharpest, values[i] < limit, frame_icons.load(capture.frames / frames[i].name))
+    return Strip(tuple(Frame(frames[i].name.rpartition(".")[0], values[i] / sharpest, values[i] < limit,
+                             frame_icons.load(capture.frames / frames[i].name))
                        for i in shown), len(frames), len(used), sum(value < limit for value in values))
 
 

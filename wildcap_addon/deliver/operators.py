@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: deliver the head, the artist's own mesh or the scan to another program; the maps are the worker's, the mesh file is Blender's."""
+"""Operators: deliver the head, the artist's own mesh or the scan to another program; the maps are the worker's, the
+mesh file is Blender's."""
 
 from contextlib import ExitStack
 
@@ -30,7 +31,8 @@ class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
         """What is written where, what of an older delivery goes, and what the format drops."""
         plan = planned(bpy.context)
         where = iface_("{} with its maps, for {}, goes to {}").format(plan.mesh, plan.preset.title, plan.target)
-        replaced = (iface_("The delivery that is there is replaced once the new one is complete; files that you added stay."),) if plan.target.exists() else ()
+        replaced = ((iface_("The delivery that is there is replaced once the new one is complete; files that you added "
+                            "stay."),) if plan.target.exists() else ())
         return (where, *replaced, *plan.format.drops, plan.preset.hint)
 
     def work(self, context):
@@ -38,11 +40,13 @@ class WILDCAP_OT_deliver(Dialog, bpy.types.Operator):
         plan, root = planned(context), captures.root(item)
         delivery_plan.check_target(plan)
         stand.require_eyes(plan, captures.head(context, item))
-        chosen = {**properties.job_settings(item)["deliver"], "roughness": roughness(captures.head(context, item)), "whole": False}
+        chosen = {**properties.job_settings(item)["deliver"], "roughness": roughness(captures.head(context, item)),
+                  "whole": False}
         until_it_ends = ExitStack()
         at = until_it_ends.enter_context(read_only.stand_in(captures.folder(item), chosen["folder"]))
         try:
-            jobs.start_tool(item, "deliver", "deliver", then=lambda: waiting.maps_made(root, plan), at=at, ended=until_it_ends.close, deliver=chosen)
+            jobs.start_tool(item, "deliver", "deliver", then=lambda: waiting.maps_made(root, plan), at=at,
+                            ended=until_it_ends.close, deliver=chosen)
         except BaseException:
             until_it_ends.close()
             raise
@@ -99,7 +103,9 @@ def planned(context) -> DeliveryPlan:
 def roughness(head) -> int:
     """The roughness of the head's skin material in percent; 45 where there is none."""
     for slot in head.material_slots if head is not None else ():
-        for node in slot.material.node_tree.nodes if slot.material is not None and slot.material.node_tree is not None else ():
+        for node in (
+            slot.material.node_tree.nodes if slot.material is not None and slot.material.node_tree is not None else ()
+        ):
             if node.type == 'GROUP' and "Roughness" in node.inputs and not node.inputs["Roughness"].is_linked:
                 return round(100 * min(1.0, max(0.0, node.inputs["Roughness"].default_value)))
     return 45

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel: for which program, which mesh, in which file; what that file drops; and what the artist's own mesh and the scan are made by."""
+"""Panel: for which program, which mesh, in which file; what that file drops; and what the artist's own mesh and the
+scan are made by."""
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_

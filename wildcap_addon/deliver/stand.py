@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is exported: copies of the meshes in a scene of their own, in the delivery's unit, with plain materials that refer to the delivered maps.
+"""What is exported: copies of the meshes in a scene of their own, in the delivery's unit, with plain materials that
+refer to the delivered maps.
 
 The artist's objects, materials and scene stay as they are; all of it is gone again when the export has ended.
 """
@@ -22,8 +23,10 @@ from .. import captures, colours, head, node_trees
 SCENE = "WildCap Delivery"
 HEAD_TILE = 1001
 FACTORS = {"m": 1.0, "cm": 100.0}
-LINKED = {".glb": ("base_color", "normal"), ".gltf": ("base_color", "normal"), ".usdc": ("base_color", "normal", "roughness"),
-          ".fbx": ("base_color", "normal", "roughness", "specular"), ".obj": ("base_color", "normal", "roughness", "specular")}
+LINKED = {".glb": ("base_color", "normal"), ".gltf": ("base_color", "normal"),
+          ".usdc": ("base_color", "normal", "roughness"),
+          ".fbx": ("base_color", "normal", "roughness", "specular"),
+          ".obj": ("base_color", "normal", "roughness", "specular")}
 """What each format's exporter writes as it is. glTF's would make new pictures of roughness and specular."""
 HAIR_IN = ".usdc"
 """The format that holds hair curves."""
@@ -33,10 +36,11 @@ SOCKETS = {"base_color": "Base Color", "roughness": "Roughness", "specular": "Sp
 
 @contextmanager
 def standing(context, plan: DeliveryPlan, source: bpy.types.Object | Path) -> Iterator[bpy.types.Object]:
-    """The copy to export, selected and active in a scene of its own; `source` is the object in the scene, or the mesh file. The packing in plan.staged says
-    which maps there are."""
+    """The copy to export, selected and active in a scene of its own; `source` is the object in the scene, or the mesh
+    file. The packing in plan.staged says which maps there are."""
     packing = json.loads((plan.staged / PACKING).read_text(encoding="utf-8"))
-    before = {name: set(getattr(bpy.data, name)) for name in ("materials", "images", "meshes", "hair_curves", "objects", "scenes", "shape_keys")}
+    before = {name: set(getattr(bpy.data, name))
+              for name in ("materials", "images", "meshes", "hair_curves", "objects", "scenes", "shape_keys")}
     window, shown = context.window, context.window.scene
     try:
         scene = bpy.data.scenes.new(SCENE)
@@ -69,7 +73,8 @@ def standing(context, plan: DeliveryPlan, source: bpy.types.Object | Path) -> It
 
 
 def _hairs(plan: DeliveryPlan, source: bpy.types.Object, obj) -> list[bpy.types.Object]:
-    """Copies of the head's hair at rest, children of the copy `obj`, in one plain colour each: USD's preview material reads no attribute."""
+    """Copies of the head's hair at rest, children of the copy `obj`, in one plain colour each: USD's preview material
+    reads no attribute."""
     found = []
     for hair in captures.hair(source):
         copy = bpy.data.objects.new(f"{plan.name}_{hair[captures.HAIR_KEY]}", hair.data.copy())
@@ -101,7 +106,8 @@ def require_eyes(plan: DeliveryPlan, obj: bpy.types.Object | None) -> None:
 
 def _lids(mesh) -> list:
     """The shape keys that open the lids: those that the head's face units bring along."""
-    return [mesh.shape_keys.key_blocks[name] for name in LIDS if name in mesh.shape_keys.key_blocks] if mesh.shape_keys is not None else []
+    return ([mesh.shape_keys.key_blocks[name] for name in LIDS if name in mesh.shape_keys.key_blocks]
+            if mesh.shape_keys is not None else [])
 
 
 def _open_eyes(obj) -> None:
@@ -130,13 +136,15 @@ def _at_rest(mesh) -> None:
 
 
 def _materials(mesh, plan: DeliveryPlan, packing: dict) -> None:
-    """The skin's slot becomes the delivered material, one per UV tile where there are several; other slots (eyes) plain ones of the same name and colour."""
+    """The skin's slot becomes the delivered material, one per UV tile where there are several; other slots (eyes) plain
+    ones of the same name and colour."""
     several, tiles = packing["several"], sorted({entry["tile"] for entry in packing["maps"]})
     slots, others = [polygon.material_index for polygon in mesh.polygons], list(mesh.materials)[1:]
     mesh.materials.clear()  # and every polygon is in the first slot
     for tile in tiles:
         maps = [entry for entry in packing["maps"] if entry["tile"] == tile]
-        mesh.materials.append(_skin(plan.material(tile, several), plan, maps, packing["roughness"], mesh.uv_layers[0].name))
+        mesh.materials.append(_skin(plan.material(tile, several), plan, maps, packing["roughness"],
+                                    mesh.uv_layers[0].name))
     for other in others:
         mesh.materials.append(_plain(other, plan))
     layer = mesh.uv_layers[0].uv
@@ -174,7 +182,8 @@ def _skin(name: str, plan: DeliveryPlan, maps: list[dict], roughness: float, uv_
 
 
 def _plain(other, plan: DeliveryPlan) -> bpy.types.Material:
-    """A plain material in another's place, with its name, its colour in the viewport and the picture of its colour, if that is packed (the eyes')."""
+    """A plain material in another's place, with its name, its colour in the viewport and the picture of its colour, if
+    that is packed (the eyes')."""
     material, shader = _new(f"{other.name} Delivered" if other is not None else "Plain")
     if other is None:
         return material

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Deliveries whose maps are made: Blender adds the mesh at once where the artist is in Object Mode and not in the middle of a move, else at the next click.
+"""Deliveries whose maps are made: Blender adds the mesh at once where the artist is in Object Mode and not in the
+middle of a move, else at the next click.
 
 Run-time state only, per capture folder.
 """
@@ -42,13 +43,15 @@ def maps_made(root: str, plan: DeliveryPlan) -> None:
 
 
 def finish(context, item) -> Path:
-    """The mesh beside the maps, and the folder by its name; returns it. Raises Problem, and then what was delivered before is as it was."""
+    """The mesh beside the maps, and the folder by its name; returns it. Raises Problem, and then what was delivered
+    before is as it was."""
     root = captures.root(item)
     plan = _ready.pop(root, None)
     if plan is None or not (plan.staged / PACKING).is_file():
         raise Problem("The maps of this delivery are not there any more.", "Click Deliver again.")
     try:
-        mesh = captures.require_head(context, item) if plan.what == "head" else delivery_plan.needs(captures.folder(item), plan.what)
+        mesh = (captures.require_head(context, item) if plan.what == "head"
+                else delivery_plan.needs(captures.folder(item), plan.what))
         files.check(plan.format.suffix)
         if plan.what == "head":
             stand.require_eyes(plan, mesh)

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair curves on a head: rooted in its UVs, so that they go along with its face units and can be combed with Blender's own brushes.
+"""Hair curves on a head: rooted in its UVs, so that they go along with its face units and can be combed with Blender's
+own brushes.
 
-One object for each part, a child of the head, marked by the custom property captures.HAIR_KEY. A digest tells whether somebody combed them since.
+One object for each part, a child of the head, marked by the custom property captures.HAIR_KEY. A digest tells whether
+somebody combed them since.
 """
 
 import hashlib
@@ -36,8 +38,8 @@ def of(obj) -> list[bpy.types.Object]:
 
 
 def grow(context, obj, part: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray) -> bool:
-    """The hairs of a part on the head: points [M, K, 3] in its axes, radius [M, K], colour [M, 3] linear. False where somebody combed the ones that are
-    there: then only their material is seen to."""
+    """The hairs of a part on the head: points [M, K, 3] in its axes, radius [M, K], colour [M, 3] linear. False where
+    somebody combed the ones that are there: then only their material is seen to."""
     hair = next((child for child in of(obj) if child[captures.HAIR_KEY] == part), None)
     if hair is not None and is_combed(hair):
         follow(hair, obj)
@@ -71,8 +73,8 @@ def is_combed(hair) -> bool:
 
 
 def follow(hair, obj) -> None:
-    """Moves each hair as the skin under its root moved, where the head has another shape than when they were rooted, and keeps what was combed. Hairs that a
-    brush added since have no such place yet: they are rooted where they are."""
+    """Moves each hair as the skin under its root moved, where the head has another shape than when they were rooted,
+    and keeps what was combed. Hairs that a brush added since have no such place yet: they are rooted where they are."""
     data, combed = hair.data, is_combed(hair)
     if ROOT not in data.attributes or UVS not in data.attributes or not data.curves:
         return
@@ -102,7 +104,8 @@ def _made(name: str, points: np.ndarray, radius: np.ndarray, colour: np.ndarray)
     data.attributes["position"].data.foreach_set("vector", points.astype(np.float32).ravel())
     _attribute(data, "radius", 'FLOAT', 'POINT').data.foreach_set("value", radius.astype(np.float32).ravel())
     rgba = np.concatenate([colour, np.ones((count, 1))], 1)
-    _attribute(data, captures.HAIR_COLOUR, 'FLOAT_COLOR', 'CURVE').data.foreach_set("color", rgba.astype(np.float32).ravel())
+    _attribute(data, captures.HAIR_COLOUR, 'FLOAT_COLOR',
+               'CURVE').data.foreach_set("color", rgba.astype(np.float32).ravel())
     return data
 
 
@@ -159,10 +162,12 @@ def _places(mesh, uv: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
 
 
 def _skin(mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Triangles [F, 3] of the head's own skin at rest, the places of all vertices [V, 3], and the triangles' UVs [F, 3, 2]."""
+    """Triangles [F, 3] of the head's own skin at rest, the places of all vertices [V, 3], and the triangles' UVs [F, 3,
+    2]."""
     mesh.calc_loop_triangles()
     triangles = mesh.loop_triangles
-    corners, loops, polygons = (np.empty(count, np.int32) for count in (3 * len(triangles), 3 * len(triangles), len(triangles)))
+    corners, loops, polygons = (np.empty(count, np.int32)
+                                for count in (3 * len(triangles), 3 * len(triangles), len(triangles)))
     triangles.foreach_get("vertices", corners)
     triangles.foreach_get("loops", loops)
     triangles.foreach_get("polygon_index", polygons)
@@ -170,7 +175,11 @@ def _skin(mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     (mesh.shape_keys.reference_key.data if mesh.shape_keys else mesh.vertices).foreach_get("co", places)
     mesh.uv_layers[0].data.foreach_get("uv", uvs)
     skin = polygons < mesh.get(head.OUTER, len(mesh.polygons))
-    return corners.reshape(-1, 3)[skin], places.reshape(-1, 3).astype(np.float64), uvs.reshape(-1, 2)[loops.reshape(-1, 3)[skin]].astype(np.float64)
+    return (
+        corners.reshape(-1, 3)[skin],
+        places.reshape(-1, 3).astype(np.float64),
+        uvs.reshape(-1, 2)[loops.reshape(-1, 3)[skin]].astype(np.float64),
+    )
 
 
 def _deform_group() -> bpy.types.NodeTree:
@@ -181,7 +190,9 @@ def _deform_group() -> bpy.types.NodeTree:
         group.is_modifier = True
         for side in ('INPUT', 'OUTPUT'):
             group.interface.new_socket("Geometry", in_out=side, socket_type='NodeSocketGeometry')
-        source, deform, target = (group.nodes.new(kind) for kind in ('NodeGroupInput', 'GeometryNodeDeformCurvesOnSurface', 'NodeGroupOutput'))
+        source, deform, target = (group.nodes.new(kind)
+                                  for kind in ('NodeGroupInput', 'GeometryNodeDeformCurvesOnSurface',
+                                               'NodeGroupOutput'))
         deform.location, target.location = (200, 0), (420, 0)
         group.links.new(source.outputs[0], deform.inputs["Curves"])
         group.links.new(deform.outputs["Curves"], target.inputs[0])
@@ -191,7 +202,8 @@ def _deform_group() -> bpy.types.NodeTree:
 def _material(name: str, mean: np.ndarray) -> bpy.types.Material:
     """Hair in its own colour, in Solid shading in their mean [3]; one of that name keeps the artist's changes.
 
-    Opaque: what was measured is an albedo. Principled Hair's colour is that of a whole head of hair, and single hairs of it over light skin come out blond."""
+    Opaque: what was measured is an albedo. Principled Hair's colour is that of a whole head of hair, and single hairs
+    of it over light skin come out blond."""
     found = bpy.data.materials.get(name)
     if found is not None and MATERIAL in found:
         return found

@@ -23,17 +23,24 @@ AGAIN = "Run the stage 4K Maps again."
 
 
 class WILDCAP_OT_grow_hair(BaseOperator, bpy.types.Operator):
-    """Grow brows, lashes and beard as hair curves from the capture's masks, over the skin below them; what you combed since stays as it is"""
+    """Grow brows, lashes and beard as hair curves from the capture's masks, over the skin below them; what you combed
+    since stays as it is"""
 
     bl_idname = "wildcap.grow_hair"
     bl_label = "Grow Hair"
     bl_options = {'REGISTER', 'UNDO'}
 
-    beard_mm: bpy.props.FloatProperty(name="Beard Length (mm)", description="How long a beard is, which its picture does not tell: stubble has 1 to 2 mm",
+    beard_mm: bpy.props.FloatProperty(name="Beard Length (mm)",
+                                      description="How long a beard is, which its picture does not tell: stubble has 1 "
+                                                  "to 2 mm",
                                       default=BEARD_MM, min=0.5, max=60.0)
-    length: bpy.props.FloatProperty(name="Length", description="Times the length of brows and lashes", default=1.0, min=0.2, max=3.0)
-    thickness: bpy.props.FloatProperty(name="Thickness", description="Times the thickness of the hairs, 0.08 to 0.11 mm", default=1.0, min=0.2, max=4.0)
-    share: bpy.props.FloatProperty(name="Share", description="How many of the hairs are grown", default=1.0, min=0.02, max=1.0, subtype='FACTOR')
+    length: bpy.props.FloatProperty(name="Length", description="Times the length of brows and lashes", default=1.0,
+                                    min=0.2, max=3.0)
+    thickness: bpy.props.FloatProperty(name="Thickness",
+                                       description="Times the thickness of the hairs, 0.08 to 0.11 mm", default=1.0,
+                                       min=0.2, max=4.0)
+    share: bpy.props.FloatProperty(name="Share", description="How many of the hairs are grown", default=1.0, min=0.02,
+                                   max=1.0, subtype='FACTOR')
 
     @classmethod
     def poll(cls, context):
@@ -52,11 +59,13 @@ class WILDCAP_OT_grow_hair(BaseOperator, bpy.types.Operator):
                 combed.append(curves.TITLES[part])
         show_skin_below(captures.folder(item))
         if combed:
-            self.report({'INFO'}, f"{', '.join(combed)}: combed since, and left as they are; delete them to grow them anew")
+            self.report({'INFO'},
+                        f"{', '.join(combed)}: combed since, and left as they are; delete them to grow them anew")
 
 
 def keep_up(obj, capture: Capture) -> None:
-    """A head that was assembled anew and has hair: the hair follows its shape, and its skin shows what is below. `head.complete` asks."""
+    """A head that was assembled anew and has hair: the hair follows its shape, and its skin shows what is below.
+    `head.complete` asks."""
     hairs = curves.of(obj)
     for hair in hairs:
         curves.follow(hair, obj)
@@ -71,11 +80,12 @@ def show_skin_below(capture: Capture) -> None:
 
 
 def read_strands(capture: Capture) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Of each part that has hair: points [M, K, 3] in the head's axes (metres), radii [M, K] in metres, linear colours [M, 3]. Raises Problem where there are
-    none, or the file is damaged."""
+    """Of each part that has hair: points [M, K, 3] in the head's axes (metres), radii [M, K] in metres, linear colours
+    [M, 3]. Raises Problem where there are none, or the file is damaged."""
     path = status.delivered(capture)[0].with_name(STRANDS)
     if not path.is_file():
-        raise Problem("This capture has no hair to grow yet.", "Switch on Hair among the settings of 4K Maps, and run that stage.")
+        raise Problem("This capture has no hair to grow yet.",
+                      "Switch on Hair among the settings of 4K Maps, and run that stage.")
     try:
         with zipfile.ZipFile(path) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > MOST_BYTES:
@@ -88,10 +98,18 @@ def read_strands(capture: Capture) -> dict[str, tuple[np.ndarray, np.ndarray, np
     for points, radius, colour in found.values():
         shape = points.shape
         finite = all(np.isfinite(values).all() for values in (points, radius, colour))
-        if len(shape) != 3 or shape[1] < 2 or shape[2] != 3 or radius.shape != shape[:2] or colour.shape != (shape[0], 3) or not finite:
+        if (
+            len(shape) != 3
+            or shape[1] < 2
+            or shape[2] != 3
+            or radius.shape != shape[:2]
+            or colour.shape != (shape[0], 3)
+            or not finite
+        ):
             raise Problem(f"{path} is damaged (what it holds are no hairs).", AGAIN)
     if not found:
-        raise Problem("No brows and no beard were found on this face.", "Hair that is as light as the skin is not told from it; comb curves of your own.")
+        raise Problem("No brows and no beard were found on this face.",
+                      "Hair that is as light as the skin is not told from it; comb curves of your own.")
     return found
 
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The chain as words of the terminal: run and solve, by the solver that is set up in this Blender's preferences; its own words come through."""
+"""The chain as words of the terminal: run and solve, by the solver that is set up in this Blender's preferences; its
+own words come through."""
 
 import argparse
 import subprocess
@@ -22,7 +23,8 @@ def _core(*words: str) -> int:
     """The solver's own command line; returns its exit code. Raises Problem where no solver is set up."""
     python = preferences.python()
     if python is None:
-        raise Problem("The solver is not set up on this machine.", "Click Install Solver in the Setup panel of Blender's window, once.")
+        raise Problem("The solver is not set up on this machine.",
+                      "Click Install Solver in the Setup panel of Blender's window, once.")
     return subprocess.run([str(python), "-m", "core", *words], cwd=jobs.ROOT).returncode
 
 
@@ -33,10 +35,12 @@ def _of_run(kind) -> None:
 
 def _of_solve(kind) -> None:
     kind.add_argument("capture", help="the face's folder, usually NAME.wildcap")
-    kind.add_argument("options", nargs=argparse.REMAINDER, help="as `python -m core run --help` tells them, --quality high among them")
+    kind.add_argument("options", nargs=argparse.REMAINDER,
+                      help="as `python -m core run --help` tells them, --quality high among them")
 
 
 COMMANDS = (
-    Command("run", "from a video or photographs to the maps; a second run continues where the first stopped", _of_run, _run),
+    Command("run", "from a video or photographs to the maps; a second run continues where the first stopped", _of_run,
+            _run),
     Command("solve", "the maps again, from the texture and the mask", _of_solve, _solve),
 )

@@ -17,7 +17,8 @@ class _Making(BaseOperator):
 
 
 class WILDCAP_OT_make_my_head(_Making, bpy.types.Operator):
-    """Do all from the video or the photographs to a relit head: reconstruct, solve with the proposed shadow mask, put the maps on the head, render it"""
+    """Do all from the video or the photographs to a relit head: reconstruct, solve with the proposed shadow mask, put
+    the maps on the head, render it"""
 
     bl_idname = "wildcap.make_my_head"
     bl_label = "Make My Head"
@@ -26,12 +27,14 @@ class WILDCAP_OT_make_my_head(_Making, bpy.types.Operator):
         item = captures.require(context)
         capture = captures.folder(item)
         if not capture.source and not capture.texture.is_file():
-            raise Problem("This capture has no video: there is nothing to make a head of.", "Choose the video of your own face.")
+            raise Problem("This capture has no video: there is nothing to make a head of.",
+                          "Choose the video of your own face.")
         results.begin(item)
 
 
 class WILDCAP_OT_accept_proposal(_Making, bpy.types.Operator):
-    """Solve with the shadow mask that was found by itself, or as it was painted, and go on to a relit head; painting it and solving again stays possible"""
+    """Solve with the shadow mask that was found by itself, or as it was painted, and go on to a relit head; painting it
+    and solving again stays possible"""
 
     bl_idname = "wildcap.accept_proposal"
     bl_label = "Accept Proposal"

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender does while Make My Head runs: the head comes in when it has its texture, the material when it is solved and again in 4K, a picture at the end.
+"""What Blender does while Make My Head runs: the head comes in when it has its texture, the material when it is solved
+and again in 4K, a picture at the end.
 
-Nothing of it happens while somebody paints, edits or moves something: it then waits for the next moment. Run-time state only, nothing of it reaches the .blend.
+Nothing of it happens while somebody paints, edits or moves something: it then waits for the next moment. Run-time state
+only, nothing of it reaches the .blend.
 """
 
 from dataclasses import dataclass, field
@@ -19,7 +21,8 @@ NEWS = {"texture", *MAPS}
 
 @dataclass
 class _Made:
-    """What there is of a head: stages that ended; whether the job did, and well; whether the 3D view was turned to it."""
+    """What there is of a head: stages that ended; whether the job did, and well; whether the 3D view was turned to
+    it."""
 
     stages: set[str] = field(default_factory=set)
     ended: bool = False
@@ -83,4 +86,6 @@ def _finish(context, item) -> None:
     status.refresh(context)
     if captures.head(context, item) is not None and bpy.ops.wildcap.render.poll():
         bpy.ops.wildcap.render('EXEC_DEFAULT')
-    problems.show(captures.root(item), problems.Notice("Your head is ready.", "Choose another light under Relight, or paint its shadow mask and solve again."))
+    problems.show(captures.root(item),
+                  problems.Notice("Your head is ready.",
+                                  "Choose another light under Relight, or paint its shadow mask and solve again."))

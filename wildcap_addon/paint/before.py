@@ -3,7 +3,8 @@
 """What an artist had before painting a mask: canvas, stencil, symmetry, shading, overlays, active object, selection and
 mode; and how it comes back.
 
-Names and plain values only: an undo replaces every data-block, and a .blend that is saved while a mask is painted keeps them as JSON.
+Names and plain values only: an undo replaces every data-block, and a .blend that is saved while a mask is painted keeps
+them as JSON.
 """
 
 import contextlib
@@ -26,7 +27,8 @@ def remember(context, head: bpy.types.Object) -> dict:
         "views": view.remember(context.screen) if context.screen is not None else [],
         "mode": context.mode, "active": active.name if active else "",
         "selected": [o.name for o in context.view_layer.objects if o.select_get()],
-        "head": head.name, "mirrored": head.data.use_mirror_x, "pose": [head.show_only_shape_key, head.active_shape_key_index],
+        "head": head.name, "mirrored": head.data.use_mirror_x,
+        "pose": [head.show_only_shape_key, head.active_shape_key_index],
     }
 
 
@@ -57,4 +59,5 @@ def put_back(context, before: dict) -> None:
 
 
 def _plain(value):
-    return value.name if isinstance(value, bpy.types.Image) else value if isinstance(value, (str, bool, type(None))) else tuple(value)
+    return (value.name if isinstance(value, bpy.types.Image) else value if isinstance(value, (str, bool, type(None)))
+            else tuple(value))

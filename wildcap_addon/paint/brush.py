@@ -16,14 +16,17 @@ RADIUS_PX = 40
 def activate(context) -> dict:
     """Makes the mask brush the active one in Texture Paint mode; returns what `restore` needs."""
     paint = context.scene.tool_settings.image_paint
-    before = {"brush": paint.brush.name if paint.brush else "", "reference": _reference(paint), "brushes": [b.name for b in bpy.data.brushes]}
+    before = {"brush": paint.brush.name if paint.brush else "", "reference": _reference(paint),
+              "brushes": [b.name for b in bpy.data.brushes]}
     brush = bpy.data.brushes.get(NAME) or bpy.data.brushes.new(NAME, mode='TEXTURE_PAINT')
     setattr(brush, _type_property(brush), 'MASK')
     brush.weight = 1.0
     brush.strength = 1.0
     _use(context, brush)
     unified = _unified(context.scene)
-    before["unified"] = {name: getattr(unified, name) for name in ("use_unified_size", "use_unified_strength", "use_unified_weight") if hasattr(unified, name)}
+    before["unified"] = {name: getattr(unified, name)
+                         for name in ("use_unified_size", "use_unified_strength", "use_unified_weight")
+                         if hasattr(unified, name)}
     for name in before["unified"]:
         setattr(unified, name, False)
     brush.size = RADIUS_PX * (2 if bpy.app.version >= (5, 0, 0) else 1)  # 5.0 counts diameters
@@ -31,7 +34,8 @@ def activate(context) -> dict:
 
 
 def restore(context, before: dict) -> None:
-    """The brush of before, in Texture Paint mode; ours is removed, and so is the one that Blender links from its library for the mask tool."""
+    """The brush of before, in Texture Paint mode; ours is removed, and so is the one that Blender links from its
+    library for the mask tool."""
     unified = _unified(context.scene)
     for name, value in before["unified"].items():
         setattr(unified, name, value)
@@ -40,7 +44,8 @@ def restore(context, before: dict) -> None:
     with contextlib.suppress(RuntimeError):  # its library may be gone
         if reference is not None and reference["relative_asset_identifier"]:
             bpy.ops.brush.asset_activate(**reference)
-    if before["brush"] and (paint.brush is None or paint.brush.name != before["brush"]) and before["brush"] in bpy.data.brushes:
+    if before["brush"] and (paint.brush is None
+                            or paint.brush.name != before["brush"]) and before["brush"] in bpy.data.brushes:
         with contextlib.suppress(AttributeError):  # read-only since 5.0
             paint.brush = bpy.data.brushes[before["brush"]]
     for each in list(bpy.data.brushes):
@@ -49,7 +54,11 @@ def restore(context, before: dict) -> None:
 
 
 def _came_with_tool(brush, before: dict) -> bool:
-    return brush.library is not None and getattr(brush, _type_property(brush)) == 'MASK' and brush.name not in before.get("brushes", [brush.name])
+    return (
+        brush.library is not None
+        and getattr(brush, _type_property(brush)) == 'MASK'
+        and brush.name not in before.get("brushes", [brush.name])
+    )
 
 
 def _use(context, brush) -> None:

@@ -46,7 +46,8 @@ def mirror(mask: np.ndarray) -> np.ndarray:
 
 
 def _widened(mask: np.ndarray, corners: bool) -> np.ndarray:
-    """The largest value among a texel and its four neighbours, or eight with `corners`: in turn they make a round shape."""
+    """The largest value among a texel and its four neighbours, or eight with `corners`: in turn they make a round
+    shape."""
     out = mask.copy()
     for axis in (0, 1):
         source = out if corners else mask

@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A painting session while .blend files are saved and opened: nothing that was painted is lost, and a file that was saved in the middle of it goes on.
-And after an undo, which is as a file opened anew: what it did not bring back follows it."""
+"""A painting session while .blend files are saved and opened: nothing that was painted is lost, and a file that was
+saved in the middle of it goes on. And after an undo, which is as a file opened anew: what it did not bring back follows
+it."""
 
 import bpy
 

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a painted mask gets to the capture: at once, or aside in a thread, so that compressing and writing never hold up a stroke; Blender itself only
-reads the pixels, into an array that is kept, as a fresh one takes longer to come by than the reading.
+"""How a painted mask gets to the capture: at once, or aside in a thread, so that compressing and writing never hold up
+a stroke; Blender itself only reads the pixels, into an array that is kept, as a fresh one takes longer to come by than
+the reading.
 
-A mask in the capture that this session did not write (the one of before it, or one that another Blender or the command line has put there since)
-goes to the history first.
+A mask in the capture that this session did not write (the one of before it, or one that another Blender or the command
+line has put there since) goes to the history first.
 """
 
 import threading
@@ -19,8 +20,8 @@ from . import mask_image
 
 
 def store(mask: np.ndarray, capture: Capture, which: str, written: tuple) -> tuple:
-    """Writes a mask [H, W], rows from the top, if it differs from the capture's. `written` is the stamp of what this session wrote last; returns the
-    new one. Raises Problem when it cannot be written."""
+    """Writes a mask [H, W], rows from the top, if it differs from the capture's. `written` is the stamp of what this
+    session wrote last; returns the new one. Raises Problem when it cannot be written."""
     path = mask_image.file_of(capture, which)
     return _stamp(path) if mask_image.store(mask, capture, which, keep=_stamp(path) != tuple(written)) else written
 
@@ -29,7 +30,8 @@ _pixels: np.ndarray | None = None  # of the last look; a session has one Saving 
 
 
 class Saving(threading.Thread):
-    """One `store` of an image's mask aside. Its thread touches nothing of Blender's; `result` is for the main thread, once it has ended."""
+    """One `store` of an image's mask aside. Its thread touches nothing of Blender's; `result` is for the main thread,
+    once it has ended."""
 
     def __init__(self, image: bpy.types.Image, capture: Capture, which: str, written: tuple):
         global _pixels

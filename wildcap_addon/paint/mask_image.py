@@ -25,8 +25,8 @@ def file_of(capture: Capture, which: str) -> Path:
 
 
 def load(capture: Capture, which: str = 'SHADOW') -> bpy.types.Image:
-    """The artist's mask as a Non-Color image of the texture's size that is ready to be painted on; where there is none yet the
-    proposal for the shadow, and nothing for what is to be protected."""
+    """The artist's mask as a Non-Color image of the texture's size that is ready to be painted on; where there is none
+    yet the proposal for the shadow, and nothing for what is to be protected."""
     kept = file_of(capture, which)
     path = kept if kept.is_file() else capture.shadow_mask_auto
     if not path.is_file():
@@ -42,7 +42,8 @@ def load(capture: Capture, which: str = 'SHADOW') -> bpy.types.Image:
     colours.as_data(image)
     if not image.size[0]:  # asking for the size reads the file
         bpy.data.images.remove(image)
-        raise Problem(f"{path} is not a picture that can be read.", "Restore it from mask_history, or delete it to start from the proposal.")
+        raise Problem(f"{path} is not a picture that can be read.",
+                      "Restore it from mask_history, or delete it to start from the proposal.")
     # The proposal is never overwritten: should Blender save the image itself, it goes where masks of artists go.
     image.filepath_raw = str(kept)
     if which == 'PROTECT' and not kept.is_file():
@@ -51,7 +52,8 @@ def load(capture: Capture, which: str = 'SHADOW') -> bpy.types.Image:
 
 
 def settle(image: bpy.types.Image, capture: Capture, which: str) -> None:
-    """A mask that a .blend has packed against the capture's own: the newer one becomes the capture's, the other goes to the history."""
+    """A mask that a .blend has packed against the capture's own: the newer one becomes the capture's, the other goes to
+    the history."""
     path = file_of(capture, which)
     if image.packed_file is None or not bpy.data.filepath or not image.size[0]:
         return
@@ -66,7 +68,8 @@ def settle(image: bpy.types.Image, capture: Capture, which: str) -> None:
 
 
 def refresh(image: bpy.types.Image, capture: Capture, which: str) -> None:
-    """The image of a .blend that was opened again, as the newer of that file and the capture has it. Raises Problem when there is no mask."""
+    """The image of a .blend that was opened again, as the newer of that file and the capture has it. Raises Problem
+    when there is no mask."""
     path = file_of(capture, which)
     settle(image, capture, which)
     if image.packed_file is not None:
@@ -76,7 +79,9 @@ def refresh(image: bpy.types.Image, capture: Capture, which: str) -> None:
         image.reload()
     elif capture.shadow_mask_auto.is_file():
         image.source = 'FILE'
-        set_values(image, proposal(image, capture.shadow_mask_auto) if which == 'SHADOW' else np.zeros_like(mask_values(image)))
+        set_values(image,
+                   proposal(image, capture.shadow_mask_auto) if which == 'SHADOW'
+                   else np.zeros_like(mask_values(image)))
     colours.as_data(image)
     if not image.size[0]:
         raise Problem("The mask that was being painted is gone.", "Click Paint Mask: it is looked for again.")
@@ -88,7 +93,8 @@ def mask_values(image: bpy.types.Image) -> np.ndarray:
 
 
 def pixels(image: bpy.types.Image, into: np.ndarray | None = None) -> np.ndarray:
-    """All that Blender keeps of a mask, float32 [H, W, channels], rows from the bottom; in the array `into` where that has the shape."""
+    """All that Blender keeps of a mask, float32 [H, W, channels], rows from the bottom; in the array `into` where that
+    has the shape."""
     shape = image.size[1], image.size[0], image.channels
     found = into if into is not None and into.shape == shape else np.empty(shape, np.float32)
     image.pixels.foreach_get(found.ravel())
@@ -112,7 +118,8 @@ def set_values(image: bpy.types.Image, mask: np.ndarray) -> None:
 def proposal(image: bpy.types.Image, path: Path) -> np.ndarray:
     """The mask of a file [H, W], at the image's size. Raises Problem where there is none."""
     if not path.is_file():
-        raise Problem("This capture has no proposal for its shadow mask.", "Click Reconstruct, or paint the mask by hand.")
+        raise Problem("This capture has no proposal for its shadow mask.",
+                      "Click Reconstruct, or paint the mask by hand.")
     other = bpy.data.images.load(str(path))
     try:
         colours.as_data(other)
@@ -129,7 +136,8 @@ def save(image: bpy.types.Image, capture: Capture, which: str = 'SHADOW', keep: 
 
 
 def store(mask: np.ndarray, capture: Capture, which: str, keep: bool) -> bool:
-    """Writes a mask [H, W] to its file (8 bit grey), atomically, and with `keep` the mask that was there to mask_history. Knows no bpy: a thread may do it.
+    """Writes a mask [H, W] to its file (8 bit grey), atomically, and with `keep` the mask that was there to
+    mask_history. Knows no bpy: a thread may do it.
 
     False, and nothing is written, where the file holds that mask already, or there is nothing to protect and never was.
     """
@@ -158,4 +166,5 @@ def grey_png(mask: np.ndarray) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
     header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows.tobytes(), 6)) + chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR",
+                                        header) + chunk(b"IDAT", zlib.compress(rows.tobytes(), 6)) + chunk(b"IEND", b"")

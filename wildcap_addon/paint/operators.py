@@ -11,23 +11,27 @@ from .. import captures, jobs
 from ..base_operator import BaseOperator
 from . import edits, mask_image, session
 
-EDITS = {"GROW": edits.grow, "SHRINK": edits.shrink, "SOFTEN": edits.soften, "MIRROR": edits.mirror, "INVERT": edits.invert, "CLEAR": edits.clear}
+EDITS = {"GROW": edits.grow, "SHRINK": edits.shrink, "SOFTEN": edits.soften, "MIRROR": edits.mirror,
+         "INVERT": edits.invert, "CLEAR": edits.clear}
 
 
 class WILDCAP_OT_paint_mask(BaseOperator, bpy.types.Operator):
-    """Paint where the shadow is (red), or what must be kept as skin (green): Ctrl takes away; on the head or on a flat sheet of its texture"""
+    """Paint where the shadow is (red), or what must be kept as skin (green): Ctrl takes away; on the head or on a flat
+    sheet of its texture"""
 
     bl_idname = "wildcap.paint_mask"
     bl_label = "Paint Mask"
     bl_options = {'REGISTER', 'UNDO'}
 
     on: bpy.props.EnumProperty(
-        name="On", items=[('HEAD', "Head", "Paint on the head"), ('SHEET', "Sheet", "Paint on the flat texture")], default='HEAD', options={'SKIP_SAVE'},
+        name="On", items=[('HEAD', "Head", "Paint on the head"), ('SHEET', "Sheet", "Paint on the flat texture")],
+        default='HEAD', options={'SKIP_SAVE'},
     )
     mask: bpy.props.EnumProperty(
         name="Mask", default='SHADOW', options={'SKIP_SAVE'},
         items=[('SHADOW', "Shadow", "Where a shadow is baked into the texture"),
-               ('PROTECT', "Protect", "Moles, scars and make-up that the solver must not take for shadow; it wins over the shadow mask")])
+               ('PROTECT', "Protect",
+                "Moles, scars and make-up that the solver must not take for shadow; it wins over the shadow mask")])
 
     @classmethod
     def poll(cls, context):
@@ -60,9 +64,12 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
     bl_options = {'REGISTER'}  # a step of the image's own undo is pushed below: the global one knows nothing of pixels
 
     kind: bpy.props.EnumProperty(name="Change", options={'SKIP_SAVE'}, items=[
-        ('GROW', "Grow", "Wider by a few texels"), ('SHRINK', "Shrink", "Narrower by a few texels"), ('SOFTEN', "Soften", "Fade the borders"),
-        ('MIRROR', "Mirror", "What is masked on one side is masked on the other, too"), ('INVERT', "Invert", "Shadow where there was none"),
-        ('CLEAR', "Clear", "No shadow anywhere"), ('PROPOSAL', "Back to Proposal", "Start again from the mask that was found by itself"),
+        ('GROW', "Grow", "Wider by a few texels"), ('SHRINK', "Shrink", "Narrower by a few texels"),
+        ('SOFTEN', "Soften", "Fade the borders"),
+        ('MIRROR', "Mirror", "What is masked on one side is masked on the other, too"),
+        ('INVERT', "Invert", "Shadow where there was none"),
+        ('CLEAR', "Clear", "No shadow anywhere"),
+        ('PROPOSAL', "Back to Proposal", "Start again from the mask that was found by itself"),
         ('SNAPPED', "Take Snapped Mask", "The mask that was painted, laid on the shadow's edges")])
 
     @classmethod
@@ -83,7 +90,8 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
         mask = mask_image.mask_values(image)
         files = {"PROPOSAL": capture.shadow_mask_auto, "SNAPPED": capture.shadow_mask_edges}
         changed = mask_image.proposal(image, files[self.kind]) if self.kind in files else EDITS[self.kind](mask)
-        if not image.is_dirty or bpy.app.version >= (5, 0, 0):  # what Ctrl-Z comes back to: Blender 5 keeps what was before a step, not what was after it
+        # what Ctrl-Z comes back to: Blender 5 keeps what was before a step, not what was after it
+        if not image.is_dirty or bpy.app.version >= (5, 0, 0):
             session.push_undo(context)
         mask_image.set_values(image, changed)
         session.push_undo(context)
@@ -92,16 +100,19 @@ class WILDCAP_OT_edit_mask(BaseOperator, bpy.types.Operator):
 
 
 class ToolOperator(BaseOperator):
-    """Mixin: an operator that has a worker look at the texture while the painting goes on. Its result waits for a click: no stroke is ever overwritten."""
+    """Mixin: an operator that has a worker look at the texture while the painting goes on. Its result waits for a
+    click: no stroke is ever overwritten."""
 
     @classmethod
     def poll(cls, context):
-        return (cls.allowed(session.painted_kind() == 'SHADOW', "Click Paint Mask first, and choose Shadow: it is the shadow mask that is found by itself")
+        return (cls.allowed(session.painted_kind() == 'SHADOW',
+                            "Click Paint Mask first, and choose Shadow: it is the shadow mask that is found by itself")
                 and jobs.can_start(cls, context))
 
 
 class WILDCAP_OT_detect_mask(ToolOperator, bpy.types.Operator):
-    """Look for the shadows in the texture again, with the sensitivity set under Reconstruction; the result waits for a click, what you painted stays"""
+    """Look for the shadows in the texture again, with the sensitivity set under Reconstruction; the result waits for a
+    click, what you painted stays"""
 
     bl_idname = "wildcap.detect_mask"
     bl_label = "Detect"
@@ -112,12 +123,14 @@ class WILDCAP_OT_detect_mask(ToolOperator, bpy.types.Operator):
         lacking = [name for name in stage.reads if not captures.folder(item).has(name)]
         if lacking:
             raise Problem(f"Shadows are looked for in {lacking[0]}, which this capture does not have.",
-                          "Paint by hand: the sample head comes without it. Your own video brings it, once it is reconstructed.")
+                          "Paint by hand: the sample head comes without it. Your own video brings it, once it is "
+                          "reconstructed.")
         jobs.start(item, "tool", first=stage.name, last=stage.name, then=lambda: session.offer('PROPOSAL'))
 
 
 class WILDCAP_OT_snap_mask(ToolOperator, bpy.types.Operator):
-    """Lay the border of what you painted on the shadow's own edge, hard or soft as it is in the texture; the result waits for a click"""
+    """Lay the border of what you painted on the shadow's own edge, hard or soft as it is in the texture; the result
+    waits for a click"""
 
     bl_idname = "wildcap.snap_mask"
     bl_label = "Snap to Edges"
@@ -127,4 +140,5 @@ class WILDCAP_OT_snap_mask(ToolOperator, bpy.types.Operator):
         jobs.start_tool(item, "mask_edges", then=lambda: session.offer('SNAPPED'))
 
 
-CLASSES = (WILDCAP_OT_paint_mask, WILDCAP_OT_finish_mask, WILDCAP_OT_edit_mask, WILDCAP_OT_detect_mask, WILDCAP_OT_snap_mask)
+CLASSES = (WILDCAP_OT_paint_mask, WILDCAP_OT_finish_mask, WILDCAP_OT_edit_mask, WILDCAP_OT_detect_mask,
+           WILDCAP_OT_snap_mask)

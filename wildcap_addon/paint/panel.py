@@ -23,11 +23,13 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
         layout = self.layout
         column = layout.column(align=True)
         here = 'SHEET' if session.on_sheet() else 'HEAD'
-        for name, values in (("mask", (("Shadow", 'SHADOW'), ("Protect", 'PROTECT'))), ("on", (("On the Head", 'HEAD'), ("On the Flat Sheet", 'SHEET')))):
+        for name, values in (("mask", (("Shadow", 'SHADOW'), ("Protect", 'PROTECT'))),
+                             ("on", (("On the Head", 'HEAD'), ("On the Flat Sheet", 'SHEET')))):
             row = column.row(align=True)
             for text, value in values:
                 options = {"mask": session.painted_kind(), "on": here, name: value}
-                button = row.operator("wildcap.paint_mask", text=text, depress=options == {"mask": session.painted_kind(), "on": here})
+                button = row.operator("wildcap.paint_mask", text=text,
+                                      depress=options == {"mask": session.painted_kind(), "on": here})
                 button.mask, button.on = options["mask"], options["on"]
         brush = context.scene.tool_settings.image_paint.brush
         if brush is not None:
@@ -53,9 +55,11 @@ class WILDCAP_PT_painting(WildcapPanel, bpy.types.Panel):
                 column.prop(item.shadow_mask, "softened", text="")
             found = session.offered()
             if found == 'SNAPPED':
-                layout.operator("wildcap.edit_mask", text="Take Snapped Mask", icon='CHECKMARK', depress=True).kind = found
+                layout.operator("wildcap.edit_mask", text="Take Snapped Mask", icon='CHECKMARK',
+                                depress=True).kind = found
             text = "Take Detected Mask" if found == 'PROPOSAL' else "Back to Proposal"
-            layout.operator("wildcap.edit_mask", text=text, icon='LOOP_BACK', depress=found == 'PROPOSAL').kind = 'PROPOSAL'
+            layout.operator("wildcap.edit_mask", text=text, icon='LOOP_BACK',
+                            depress=found == 'PROPOSAL').kind = ('PROPOSAL')
 
 
 class WILDCAP_PT_mask(CapturePanel, bpy.types.Panel):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the mask of a session is painted: on the head, or on the flat sheet; into Texture Paint on either, and back. Which of them it is, the scene says,
-for an undo may take the sheet away or bring it back."""
+"""Where the mask of a session is painted: on the head, or on the flat sheet; into Texture Paint on either, and back.
+Which of them it is, the scene says, for an undo may take the sheet away or bring it back."""
 
 import bpy
 

@@ -3,8 +3,8 @@
 """A painting session: from Paint Mask to the saved mask, with everything put back as it was.
 
 Its state is names and values, never references: an undo replaces every data-block. However the artist leaves
-(the button, Tab, opening or saving a file), the mask reaches the capture's folder, and within seconds of a stroke's end anyway: Blender may be killed.
-A .blend that is saved in the middle of it is opened in the middle of it.
+(the button, Tab, opening or saving a file), the mask reaches the capture's folder, and within seconds of a stroke's end
+anyway: Blender may be killed. A .blend that is saved in the middle of it is opened in the middle of it.
 """
 
 import json
@@ -39,7 +39,8 @@ class Session:
     brush: dict = field(default_factory=dict)
     looked: float = 0.0  # when the mask was last looked at (time.monotonic)
     offered: str = ""  # the kind of edit that a worker has prepared
-    written: tuple = ()  # size and time of the mask's file as this session wrote it; another one goes to the history first
+    # size and time of the mask's file as this session wrote it; another one goes to the history first
+    written: tuple = ()
 
 
 _session: Session | None = None
@@ -85,8 +86,8 @@ def offer(kind: str) -> None:
 
 
 def push_undo(context) -> None:
-    """A step of the mask's own undo. Pixels written by a script are in no undo step; an operator of Blender's that changes nothing,
-    run after them, makes them one among the strokes."""
+    """A step of the mask's own undo. Pixels written by a script are in no undo step; an operator of Blender's that
+    changes nothing, run after them, makes them one among the strokes."""
     if not bpy.app.background:  # without a window the operator crashes, and there is nobody to press Ctrl-Z
         with context.temp_override(edit_image=mask()):
             bpy.ops.image.invert(invert_r=False, invert_g=False, invert_b=False, invert_a=False)
@@ -105,7 +106,8 @@ def begin(context, item, use_sheet: bool, which: str = 'SHADOW') -> None:
     if texture is None:
         raise Problem("This capture has no texture to paint over.", "Click Reconstruct first.")
     image = mask_image.load(capture, which)
-    _session = Session(str(capture.root), context.scene.name, obj.name, image.name, which, before=before.remember(context, obj))
+    _session = Session(str(capture.root), context.scene.name, obj.name, image.name, which,
+                       before=before.remember(context, obj))
     before.at_rest(obj)
     props, paint = context.scene.wildcap, context.scene.tool_settings.image_paint
     view.set_up(_session.before["views"], props.tint_strength)
@@ -133,7 +135,8 @@ def end(context) -> None:
     if session is None:
         return
     save()  # a Problem here leaves the session open, and nothing is lost
-    if context.mode != 'PAINT_TEXTURE' and session.head in context.scene.objects:  # only in this mode does Blender let go of a brush
+    # only in this mode does Blender let go of a brush
+    if context.mode != 'PAINT_TEXTURE' and session.head in context.scene.objects:
         places.enter(context, session, sheet.is_there())
     brush.restore(context, session.brush)
     _keep_tint(context)
@@ -149,13 +152,16 @@ def end(context) -> None:
 
 
 def after_undo(context) -> None:
-    """Undo and redo bring objects and modes back, but not what the views look at, and nothing of a painting that has ended: the mask stays as it was left."""
+    """Undo and redo bring objects and modes back, but not what the views look at, and nothing of a painting that has
+    ended: the mask stays as it was left."""
     active = context.view_layer.objects.active
-    if _session is not None and context.mode == 'OBJECT':  # undone past its start: the watch ends it, and what was saved before goes to the history
+    # undone past its start: the watch ends it, and what was saved before goes to the history
+    if _session is not None and context.mode == 'OBJECT':
         _session.written = ()
     elif _session is not None:
         places.face(_session, sheet.is_there())
-    elif _ended is not None and context.mode == 'PAINT_TEXTURE' and active is not None and active.name in (_ended.head, sheet.NAME):
+    elif _ended is not None and context.mode == 'PAINT_TEXTURE' and active is not None and active.name in (_ended.head,
+                                                                                                           sheet.NAME):
         places.leave(context, _ended)
         before.put_back(context, _ended.before)
 
@@ -172,11 +178,13 @@ def save() -> None:
     wait()
     image = bpy.data.images.get(_session.mask) if _session else None
     if image is not None:
-        _session.written = keeping.store(mask_image.mask_values(image), Capture(_session.root), _session.which, _session.written)
+        _session.written = keeping.store(mask_image.mask_values(image), Capture(_session.root), _session.which,
+                                         _session.written)
 
 
 def keep_up(stroking: bool) -> None:
-    """Saves a mask that was painted on, every few seconds, but not in the middle of a stroke; the main thread reads the pixels and no more."""
+    """Saves a mask that was painted on, every few seconds, but not in the middle of a stroke; the main thread reads the
+    pixels and no more."""
     global _saving
     if _saving is not None and _saving.is_alive():
         return

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flat sheet: one square with the whole texture on it, looked at from straight above, to paint the mask in UV space.
+"""The flat sheet: one square with the whole texture on it, looked at from straight above, to paint the mask in UV
+space.
 
 What it hides it keeps in a property of its own, which an undo brings back together with it.
 """
@@ -22,8 +23,8 @@ def is_there() -> bool:
 
 
 def make(context, image: bpy.types.Image, head: bpy.types.Object) -> bpy.types.Object:
-    """The sheet in the scene: SIDE_M wide, UV (0, 0) at its lower left, the texture in a material, painted with the head's symmetry. Everything else
-    is hidden."""
+    """The sheet in the scene: SIDE_M wide, UV (0, 0) at its lower left, the texture in a material, painted with the
+    head's symmetry. Everything else is hidden."""
     remove()
     mesh = bpy.data.meshes.new(NAME)
     half = SIDE_M / 2
@@ -48,7 +49,8 @@ def make(context, image: bpy.types.Image, head: bpy.types.Object) -> bpy.types.O
 
 
 def remove(head: bpy.types.Object | None = None) -> None:
-    """Takes the sheet and all it is made of away, and shows what it hid; the symmetry that was set on it goes over to the head."""
+    """Takes the sheet and all it is made of away, and shows what it hid; the symmetry that was set on it goes over to
+    the head."""
     if head is not None and NAME in bpy.data.meshes:
         head.data.use_mirror_x = bpy.data.meshes[NAME].use_mirror_x
     hidden = json.loads(bpy.data.objects[NAME].get(HIDDEN_KEY, "[]")) if is_there() else []

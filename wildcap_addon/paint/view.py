@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the 3D views look like while the mask is painted: flat texture, the mask tinted over it; and how they were before."""
+"""What the 3D views look like while the mask is painted: flat texture, the mask tinted over it; and how they were
+before."""
 
 import bpy
 
@@ -12,9 +13,12 @@ def remember(screen: bpy.types.Screen) -> list[dict]:
     return [{
         "screen": screen.name, "area": index,
         "shading": {name: getattr(area.spaces.active.shading, name) for name in SHADING},
-        "overlays": area.spaces.active.overlay.show_overlays, "opacity": area.spaces.active.overlay.texture_paint_mode_opacity,
-        "perspective": area.spaces.active.region_3d.view_perspective, "rotation": tuple(area.spaces.active.region_3d.view_rotation),
-        "location": tuple(area.spaces.active.region_3d.view_location), "distance": area.spaces.active.region_3d.view_distance,
+        "overlays": area.spaces.active.overlay.show_overlays,
+        "opacity": area.spaces.active.overlay.texture_paint_mode_opacity,
+        "perspective": area.spaces.active.region_3d.view_perspective,
+        "rotation": tuple(area.spaces.active.region_3d.view_rotation),
+        "location": tuple(area.spaces.active.region_3d.view_location),
+        "distance": area.spaces.active.region_3d.view_distance,
     } for index, area in enumerate(screen.areas) if area.type == 'VIEW_3D']
 
 
@@ -37,7 +41,8 @@ def opacity(before: list[dict]) -> float | None:
 
 
 def restore(before: list[dict]) -> None:
-    """Shading and overlays as they were, of the views that are still there. The viewpoint stays where the artist turned it to."""
+    """Shading and overlays as they were, of the views that are still there. The viewpoint stays where the artist turned
+    it to."""
     for kept in before:
         space = _space(kept)
         if space is None:
@@ -55,7 +60,9 @@ def face_sheet(before: list[dict], centre, size: float) -> None:
     for kept in before:
         space = _space(kept)
         if space is not None:
-            _look(space, {"perspective": 'ORTHO', "rotation": (1, 0, 0, 0), "location": centre, "distance": size * 1.25 * space.lens / 36})
+            _look(space,
+                  {"perspective": 'ORTHO', "rotation": (1, 0, 0, 0), "location": centre,
+                   "distance": size * 1.25 * space.lens / 36})
 
 
 def face_head(before: list[dict]) -> None:
@@ -69,7 +76,11 @@ def face_head(before: list[dict]) -> None:
 def _look(space, kept: dict) -> None:
     region = space.region_3d
     region.view_perspective = kept["perspective"]
-    region.view_rotation, region.view_location, region.view_distance = kept["rotation"], kept["location"], kept["distance"]
+    region.view_rotation, region.view_location, region.view_distance = (
+        kept["rotation"],
+        kept["location"],
+        kept["distance"],
+    )
 
 
 def _space(kept: dict):

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators on what a head is made with: the head mesh that is fitted beside the built-in one, and a look at what a delighter did."""
+"""Operators on what a head is made with: the head mesh that is fitted beside the built-in one, and a look at what a
+delighter did."""
 
 from pathlib import Path
 
@@ -14,7 +15,8 @@ from . import delighters
 
 
 class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
-    """Fit the active mesh, too: the maps are baked into its UVs in the end. It is kept in the capture as it is now, without its modifiers"""
+    """Fit the active mesh, too: the maps are baked into its UVs in the end. It is kept in the capture as it is now,
+    without its modifiers"""
 
     bl_idname = "wildcap.use_active_mesh"
     bl_label = "Use Active Mesh"
@@ -23,9 +25,17 @@ class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         thing = context.view_layer.objects.active
-        return (cls.in_object_mode(context) and cls.with_capture(context)
-                and cls.allowed(thing is not None and thing.type == 'MESH', "Make a head mesh of your own the active object first")
-                and cls.allowed(captures.HEAD_KEY not in thing, "This is the capture's own head or scan: make a head mesh of your own the active object"))
+        return (
+            cls.in_object_mode(context)
+            and cls.with_capture(context)
+            and cls.allowed(
+                thing is not None and thing.type == 'MESH', "Make a head mesh of your own the active object first"
+            )
+            and cls.allowed(
+                captures.HEAD_KEY not in thing,
+                "This is the capture's own head or scan: make a head mesh of your own the active object",
+            )
+        )
 
     def work(self, context):
         item, thing = captures.require(context), context.view_layer.objects.active
@@ -39,8 +49,8 @@ class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
         for other in context.view_layer.objects:
             other.select_set(other == thing)
         try:
-            bpy.ops.wm.obj_export(filepath=str(path), export_selected_objects=True, apply_modifiers=False, export_materials=False, export_normals=False,
-                                  forward_axis='Y', up_axis='Z')
+            bpy.ops.wm.obj_export(filepath=str(path), export_selected_objects=True, apply_modifiers=False,
+                                  export_materials=False, export_normals=False, forward_axis='Y', up_axis='Z')
         finally:
             for other in context.view_layer.objects:
                 other.select_set(other in selected)
@@ -48,7 +58,8 @@ class WILDCAP_OT_use_active_mesh(BaseOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_choose_template(BaseOperator, bpy.types.Operator):
-    """Fit a head mesh of your own, too: an OBJ, or a folder with a neutral OBJ and its shapes, as ICT-FaceKit. Maps are baked into its UVs"""
+    """Fit a head mesh of your own, too: an OBJ, or a folder with a neutral OBJ and its shapes, as ICT-FaceKit. Maps are
+    baked into its UVs"""
 
     bl_idname = "wildcap.choose_template"
     bl_label = "Choose Head Mesh"
@@ -68,9 +79,12 @@ class WILDCAP_OT_choose_template(BaseOperator, bpy.types.Operator):
     def work(self, context):
         path = Path(bpy.path.abspath(self.filepath)).absolute()
         if not self.filepath or not (path.is_file() and path.suffix.lower() == ".obj" or path.is_dir()):
-            raise Problem(f"{path} is neither an OBJ nor a folder.", "Choose an OBJ of a head, or a folder with a neutral OBJ and its shapes.")
-        if path.is_dir() and not any("neutral" in file.name.lower() for file in (*path.glob("*.obj"), *path.glob("*/*.obj"))):
-            raise Problem(f"{path} holds no OBJ with 'neutral' in its name.", "Choose the OBJ itself, or the folder of shapes (FaceXModel in ICT-FaceKit).")
+            raise Problem(f"{path} is neither an OBJ nor a folder.",
+                          "Choose an OBJ of a head, or a folder with a neutral OBJ and its shapes.")
+        if path.is_dir() and not any("neutral" in file.name.lower()
+                                     for file in (*path.glob("*.obj"), *path.glob("*/*.obj"))):
+            raise Problem(f"{path} holds no OBJ with 'neutral' in its name.",
+                          "Choose the OBJ itself, or the folder of shapes (FaceXModel in ICT-FaceKit).")
         captures.require(context).registration.template = str(path)
 
 
@@ -83,7 +97,8 @@ class WILDCAP_OT_use_built_in_head(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return cls.with_capture(context) and cls.allowed(captures.active(context).registration.template, "The built-in head is fitted alone already")
+        return cls.with_capture(context) and cls.allowed(captures.active(context).registration.template,
+                                                         "The built-in head is fitted alone already")
 
     def work(self, context):
         captures.require(context).registration.template = ""
@@ -95,7 +110,8 @@ class WILDCAP_OT_compare_delit(BaseOperator, bpy.types.Operator):
     bl_idname = "wildcap.compare_delit"
     bl_label = "Before and After"
 
-    which: bpy.props.IntProperty(name="Frame", default=-1, options={'SKIP_SAVE'}, description="Which of the delit frames; -1: the next one")
+    which: bpy.props.IntProperty(name="Frame", default=-1, options={'SKIP_SAVE'},
+                                 description="Which of the delit frames; -1: the next one")
 
     @classmethod
     def poll(cls, context):
@@ -112,4 +128,5 @@ class WILDCAP_OT_compare_delit(BaseOperator, bpy.types.Operator):
         delighters.show(capture, self.which if self.which >= 0 else following, context.window_manager.wildcap_wipe)
 
 
-CLASSES = (WILDCAP_OT_use_active_mesh, WILDCAP_OT_choose_template, WILDCAP_OT_use_built_in_head, WILDCAP_OT_compare_delit)
+CLASSES = (WILDCAP_OT_use_active_mesh, WILDCAP_OT_choose_template, WILDCAP_OT_use_built_in_head,
+           WILDCAP_OT_compare_delit)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture's cameras as the scene needs them, read from COLMAP's binary files with the standard library alone: the worker's reader needs a package.
+"""A capture's cameras as the scene needs them, read from COLMAP's binary files with the standard library alone: the
+worker's reader needs a package.
 
 File format: https://colmap.github.io/format.html (cameras.bin, images.bin).
 """
@@ -25,8 +26,9 @@ TWO_FOCALS = (1, 4, 5, 6, 7, 10)
 
 @dataclass(frozen=True)
 class FrameCamera:
-    """Name of a registered frame, its size in pixels, focal length and principal point in pixels (of the horizontal axis; without lens distortion,
-    which Blender's camera does not have), and the camera in the capture's world as Blender has cameras: looking along its -Z, +Y up."""
+    """Name of a registered frame, its size in pixels, focal length and principal point in pixels (of the horizontal
+    axis; without lens distortion, which Blender's camera does not have), and the camera in the capture's world as
+    Blender has cameras: looking along its -Z, +Y up."""
 
     name: str
     width: int
@@ -44,9 +46,11 @@ def read(folder: Path) -> list[FrameCamera]:
             _check(camera)
         return found
     except FileNotFoundError as error:
-        raise Problem("This capture has no cameras yet.", "Click Reconstruct: they are found from the frames.") from error
+        raise Problem("This capture has no cameras yet.",
+                      "Click Reconstruct: they are found from the frames.") from error
     except (OSError, struct.error, KeyError, UnicodeDecodeError, ValueError) as error:
-        raise Problem(f"The cameras in {folder} cannot be read ({type(error).__name__}: {error}).", "Do the stage Cameras again.") from error
+        raise Problem(f"The cameras in {folder} cannot be read ({type(error).__name__}: {error}).",
+                      "Do the stage Cameras again.") from error
 
 
 def _check(camera: FrameCamera) -> None:

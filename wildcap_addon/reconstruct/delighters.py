@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a delighter did to a frame: before and after, with a wipe between them.
 
-The wipe is an icon of its own: no data-block stays behind. Its frame is read when the artist asks for it, not while a panel is drawn.
+The wipe is an icon of its own: no data-block stays behind. Its frame is read when the artist asks for it, not while a
+panel is drawn.
 """
 
 from pathlib import Path
@@ -19,7 +20,8 @@ SIDE = 256
 """Of the square icon, pixels"""
 
 _icons: bpy.utils.previews.ImagePreviewCollection | None = None
-_pair: tuple[str, str, np.ndarray, np.ndarray] | None = None  # capture folder, frame, and the frame before and after [SIDE, SIDE, 4], rows from below
+# capture folder, frame, and the frame before and after [SIDE, SIDE, 4], rows from below
+_pair: tuple[str, str, np.ndarray, np.ndarray] | None = None
 
 
 def frames(capture: Capture) -> list[str]:
@@ -28,7 +30,8 @@ def frames(capture: Capture) -> list[str]:
 
 
 def show(capture: Capture, which: int, wipe: float) -> None:
-    """Reads a frame before and after delighting. `which` counts the delit frames and goes round. Raises Problem where there is none."""
+    """Reads a frame before and after delighting. `which` counts the delit frames and goes round. Raises Problem where
+    there is none."""
     global _pair
     found = frames(capture)
     if not found:

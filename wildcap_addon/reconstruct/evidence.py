@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the head was made from, brought into the scene: the cameras with their frames behind them, and the scan.
 
-Both are children of the head if it is there, so that it may stand anywhere; their own coordinates are those of the capture's world (metres).
+Both are children of the head if it is there, so that it may stand anywhere; their own coordinates are those of the
+capture's world (metres).
 """
 
 import contextlib
@@ -22,8 +23,8 @@ SENSOR_MM = 36.0
 
 
 def bring_in_cameras(context, item, every: bool = False) -> int:
-    """A camera for each frame that the texture uses, or for every registered one, in place of those that are there. Returns how many.
-    Raises Problem where the capture has none."""
+    """A camera for each frame that the texture uses, or for every registered one, in place of those that are there.
+    Returns how many. Raises Problem where the capture has none."""
     capture = captures.folder(item)
     found = colmap_cameras.read(capture.cameras)
     if not every:
@@ -45,7 +46,11 @@ def bring_in_scan(context, item) -> bpy.types.Object:
     capture = captures.folder(item)
     if not capture.scan.is_file():
         raise Problem("This capture has no scan yet.", "Click Reconstruct: it is made from the frames.")
-    active, selected, before = context.view_layer.objects.active, list(context.selected_objects), set(context.scene.objects)
+    active, selected, before = (
+        context.view_layer.objects.active,
+        list(context.selected_objects),
+        set(context.scene.objects),
+    )
     with contextlib.suppress(RuntimeError):  # of a file that is no PLY: nothing came in
         bpy.ops.wm.ply_import(filepath=str(capture.scan), forward_axis='Y', up_axis='Z')
     new = [thing for thing in context.scene.objects if thing not in before]
@@ -77,8 +82,10 @@ def _camera(context, item, capture: Capture, camera: colmap_cameras.FrameCamera)
         behind = lens.background_images.new()
         behind.image = bpy.data.images.load(str(capture.frames / camera.name), check_existing=True)
         behind.alpha = 1.0
-        render = context.scene.render  # the frame's width is the sensor's: of a wider picture the height is cut, of a narrower one there is more
-        behind.frame_method = 'CROP' if camera.width * render.resolution_y <= camera.height * render.resolution_x else 'FIT'
+        # the frame's width is the sensor's: of a wider picture the height is cut, of a narrower one there is more
+        render = context.scene.render
+        behind.frame_method = ('CROP' if camera.width * render.resolution_y <= camera.height * render.resolution_x
+                               else 'FIT')
     thing = bpy.data.objects.new(lens.name, lens)
     thing.lock_location = thing.lock_rotation = thing.lock_scale = (True, True, True)
     _belongs(thing, context, item, 'camera')

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The landmarks that placed the head, as empties on it: the artist moves those that are wrong, and the head is fitted again to them.
+"""The landmarks that placed the head, as empties on it: the artist moves those that are wrong, and the head is fitted
+again to them.
 
-Each empty is a child of the head, so that the head may stand anywhere; its own coordinates are those of the capture's world.
+Each empty is a child of the head, so that the head may stand anywhere; its own coordinates are those of the capture's
+world.
 """
 
 import bpy
@@ -24,15 +26,16 @@ MOVED_M = 1e-4
 NAMES = {
     33: "Right Eye Outer", 133: "Right Eye Inner", 159: "Right Upper Lid", 145: "Right Lower Lid",
     362: "Left Eye Inner", 263: "Left Eye Outer", 386: "Left Upper Lid", 374: "Left Lower Lid",
-    70: "Right Brow Outer", 105: "Right Brow", 107: "Right Brow Inner", 336: "Left Brow Inner", 334: "Left Brow", 300: "Left Brow Outer",
-    168: "Nose Bridge", 1: "Nose Tip", 2: "Nose Base", 98: "Right Nostril", 327: "Left Nostril",
+    70: "Right Brow Outer", 105: "Right Brow", 107: "Right Brow Inner", 336: "Left Brow Inner", 334: "Left Brow",
+    300: "Left Brow Outer", 168: "Nose Bridge", 1: "Nose Tip", 2: "Nose Base", 98: "Right Nostril", 327: "Left Nostril",
     61: "Right Mouth Corner", 0: "Upper Lip", 17: "Lower Lip", 291: "Left Mouth Corner",
     152: "Chin", 10: "Forehead", 234: "Right Cheek Bone", 454: "Left Cheek Bone", 172: "Right Jaw", 397: "Left Jaw",
 }
 
 
 def show(context, item) -> int:
-    """Puts the capture's landmarks on its head, in place of any that are shown. Returns how many. Raises Problem where there are none."""
+    """Puts the capture's landmarks on its head, in place of any that are shown. Returns how many. Raises Problem where
+    there are none."""
     capture = captures.folder(item)
     head = captures.require_head(context, item)
     points = _known(capture)
@@ -60,7 +63,8 @@ def shown_landmarks() -> list[bpy.types.Object]:
 
 
 def keep_moved(item) -> int:
-    """Writes the landmarks that were moved to the capture, where they win over what the frames say. Returns how many."""
+    """Writes the landmarks that were moved to the capture, where they win over what the frames say. Returns how
+    many."""
     moved = {o[INDEX_KEY]: tuple(o.location) for o in shown_landmarks()
              if o.get(captures.HEAD_KEY) == item.path and (o.location - Vector(o[FOUND_KEY])).length > MOVED_M}
     if moved:
@@ -83,7 +87,9 @@ def _known(capture: Capture) -> dict[int, list[float]]:
         found = read_json(capture.landmarks)["points"]
         points = {int(index): [float(v) for v in point] for index, point in found.items()}
     except FileNotFoundError as error:
-        raise Problem("This capture has no landmarks.", "Click Reconstruct first: they are found in the frames.") from error
+        raise Problem("This capture has no landmarks.",
+                      "Click Reconstruct first: they are found in the frames.") from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise Problem(f"{capture.landmarks} cannot be read ({type(error).__name__}: {error}).", "Do the stage Head again.") from error
+        raise Problem(f"{capture.landmarks} cannot be read ({type(error).__name__}: {error}).",
+                      "Do the stage Head again.") from error
     return points | {index: list(point) for index, point in artist_landmarks.read(capture.landmarks_artist).items()}

@@ -17,7 +17,9 @@ class WILDCAP_OT_reconstruct(BaseOperator, bpy.types.Operator):
     bl_idname = "wildcap.reconstruct"
     bl_label = "Reconstruct"
 
-    first: bpy.props.StringProperty(name="From", description="The stage to begin with, done again even if it is fresh; empty: what is not done yet",
+    first: bpy.props.StringProperty(name="From",
+                                    description="The stage to begin with, done again even if it is fresh; empty: what "
+                                                "is not done yet",
                                     options={'SKIP_SAVE'})
 
     @classmethod
@@ -25,7 +27,8 @@ class WILDCAP_OT_reconstruct(BaseOperator, bpy.types.Operator):
         if properties.first not in stages.NAMES:
             return cls.bl_description
         after_mask = stages.NAMES.index(properties.first) > stages.NAMES.index(stages.MASK_STAGE)
-        return f"Run from the stage {stages.by_name(properties.first).label}, also where it is done, {'to the end' if after_mask else 'up to the mask'}"
+        end = "to the end" if after_mask else "up to the mask"
+        return f"Run from the stage {stages.by_name(properties.first).label}, also where it is done, {end}"
 
     @classmethod
     def poll(cls, context):
@@ -33,10 +36,14 @@ class WILDCAP_OT_reconstruct(BaseOperator, bpy.types.Operator):
 
     def work(self, context):
         item = captures.require(context)
-        after_mask = self.first and stages.NAMES.index(stages.by_name(self.first).name) > stages.NAMES.index(stages.MASK_STAGE)
+        after_mask = self.first and stages.NAMES.index(stages.by_name(self.first).name) > stages.NAMES.index(
+            stages.MASK_STAGE
+        )
         if not after_mask and not captures.folder(item).source:
-            raise Problem("This capture has no video: there is nothing to reconstruct it from.", "Choose the video of your own face.")
-        jobs.start(item, "solve" if after_mask else "reconstruct", first=self.first or None, last=None if after_mask else stages.MASK_STAGE)
+            raise Problem("This capture has no video: there is nothing to reconstruct it from.",
+                          "Choose the video of your own face.")
+        jobs.start(item, "solve" if after_mask else "reconstruct", first=self.first or None,
+                   last=None if after_mask else stages.MASK_STAGE)
 
 
 class WILDCAP_OT_cancel(BaseOperator, bpy.types.Operator):
@@ -45,7 +52,9 @@ class WILDCAP_OT_cancel(BaseOperator, bpy.types.Operator):
     bl_idname = "wildcap.cancel"
     bl_label = "Cancel"
 
-    capture: bpy.props.StringProperty(name="Capture", description="Folder of the capture whose job is meant; empty: the active one", options={'SKIP_SAVE'})
+    capture: bpy.props.StringProperty(name="Capture",
+                                      description="Folder of the capture whose job is meant; empty: the active one",
+                                      options={'SKIP_SAVE'})
 
     @classmethod
     def poll(cls, context):
@@ -84,7 +93,8 @@ class WILDCAP_OT_bring_in_cameras(BaseOperator, bpy.types.Operator):
     bl_label = "Bring In Cameras"
     bl_options = {'REGISTER', 'UNDO'}
 
-    every: bpy.props.BoolProperty(name="Every Frame", default=False, description="All registered frames; off: those that the texture is made from")
+    every: bpy.props.BoolProperty(name="Every Frame", default=False,
+                                  description="All registered frames; off: those that the texture is made from")
 
     @classmethod
     def poll(cls, context):
@@ -112,7 +122,8 @@ class WILDCAP_OT_bring_in_scan(BaseOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_show_landmarks(BaseOperator, bpy.types.Operator):
-    """Show the landmarks that placed the head as small spheres on it: move those that are wrong, then click Fit Head Again"""
+    """Show the landmarks that placed the head as small spheres on it: move those that are wrong, then click Fit Head
+    Again"""
 
     bl_idname = "wildcap.show_landmarks"
     bl_label = "Show Landmarks"
@@ -135,7 +146,8 @@ class WILDCAP_OT_hide_landmarks(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return cls.in_object_mode(context) and cls.allowed(landmarks.shown_landmarks(), "No landmarks are shown: click Show Landmarks first")
+        return cls.in_object_mode(context) and cls.allowed(landmarks.shown_landmarks(),
+                                                           "No landmarks are shown: click Show Landmarks first")
 
     def work(self, context):
         landmarks.hide()
@@ -149,16 +161,18 @@ class WILDCAP_OT_fit_landmarks(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        shown = cls.in_object_mode(context) and cls.allowed(landmarks.shown_landmarks(), "No landmarks are shown: click Show Landmarks first")
+        shown = cls.in_object_mode(context) and cls.allowed(landmarks.shown_landmarks(),
+                                                            "No landmarks are shown: click Show Landmarks first")
         return shown and jobs.can_start(cls, context)
 
     def work(self, context):
         item = captures.require(context)
         if not landmarks.keep_moved(item):
-            raise Problem("No landmark was moved.", "Move a sphere to where it belongs on the face, then click Fit Head Again.")
+            raise Problem("No landmark was moved.",
+                          "Move a sphere to where it belongs on the face, then click Fit Head Again.")
         jobs.start(item, "reconstruct", first="registration", last=stages.MASK_STAGE)
         landmarks.hide()
 
 
-CLASSES = (WILDCAP_OT_reconstruct, WILDCAP_OT_cancel, WILDCAP_OT_bring_in_head, WILDCAP_OT_bring_in_cameras, WILDCAP_OT_bring_in_scan,
-           WILDCAP_OT_show_landmarks, WILDCAP_OT_hide_landmarks, WILDCAP_OT_fit_landmarks)
+CLASSES = (WILDCAP_OT_reconstruct, WILDCAP_OT_cancel, WILDCAP_OT_bring_in_head, WILDCAP_OT_bring_in_cameras,
+           WILDCAP_OT_bring_in_scan, WILDCAP_OT_show_landmarks, WILDCAP_OT_hide_landmarks, WILDCAP_OT_fit_landmarks)

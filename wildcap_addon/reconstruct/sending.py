@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: agree that a paid service gets frames of this capture, told first what leaves the machine, to whom and for how much; and take that back."""
+"""Operators: agree that a paid service gets frames of this capture, told first what leaves the machine, to whom and for
+how much; and take that back."""
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -15,8 +16,8 @@ COLUMNS, SCALE = 6, 4.0
 
 
 class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
-    """Agree that SwitchLight gets the chosen frames of this capture: first you are told what leaves your machine, who gets it, and what it costs.
-    Nothing is sent before that"""
+    """Agree that SwitchLight gets the chosen frames of this capture: first you are told what leaves your machine, who
+    gets it, and what it costs. Nothing is sent before that"""
 
     bl_idname = "wildcap.allow_sending"
     bl_label = "Allow Sending"
@@ -27,7 +28,8 @@ class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         return cls.with_capture(context) and cls.allowed(captures.active(context).delight.delighter == "switchlight",
-                                                         "Only SwitchLight sends anything: choose it as the delighter first")
+                                                         "Only SwitchLight sends anything: choose it as the delighter "
+                                                         "first")
 
     def tell(self) -> tuple[str, ...]:
         item = captures.require(bpy.context)
@@ -45,12 +47,14 @@ class WILDCAP_OT_allow_sending(Dialog, bpy.types.Operator):
         item = captures.require(context)
         now = plan(item)
         if self.told is not None and now != self.told:
-            raise Problem("The frames have changed while you were asked.", "Click Allow Sending again, and look at what would be sent now.")
+            raise Problem("The frames have changed while you were asked.",
+                          "Click Allow Sending again, and look at what would be sent now.")
         consent.give(captures.folder(item), now)
 
 
 class WILDCAP_OT_withdraw_consent(BaseOperator, bpy.types.Operator):
-    """Take your consent back: no frame of this capture is sent any more. What SwitchLight has answered stays in the capture"""
+    """Take your consent back: no frame of this capture is sent any more. What SwitchLight has answered stays in the
+    capture"""
 
     bl_idname = "wildcap.withdraw_consent"
     bl_label = "Withdraw Consent"

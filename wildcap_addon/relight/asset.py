@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""WildCap Skin as an asset: with tags, a preview and a catalogue, so that a file in an asset library offers it for other heads."""
+"""WildCap Skin as an asset: with tags, a preview and a catalogue, so that a file in an asset library offers it for
+other heads."""
 
 import contextlib
 from pathlib import Path
@@ -19,13 +20,14 @@ SIDE = 128
 
 
 def mark(group: bpy.types.NodeTree) -> None:
-    """Marks the group as an asset, once; an artist who clears the mark afterwards is not overruled. A library of the preferences that the .blend lies in
-    gets the catalogue's name."""
+    """Marks the group as an asset, once; an artist who clears the mark afterwards is not overruled. A library of the
+    preferences that the .blend lies in gets the catalogue's name."""
     if not group.get("wildcap_asset"):
         group["wildcap_asset"] = True
         group.asset_mark()
         data = group.asset_data
-        data.description = "Skin for solved heads: albedo, specular and normal in, a Principled BSDF with subsurface scattering out"
+        data.description = ("Skin for solved heads: albedo, specular and normal in, a Principled BSDF with subsurface "
+                            "scattering out")
         data.author = "WildCap for Blender"
         data.license = "GPL-3.0-or-later"
         for tag in ("skin", "head", "relight"):
@@ -39,7 +41,8 @@ def mark(group: bpy.types.NodeTree) -> None:
 
 
 def ball() -> np.ndarray:
-    """The preview: a ball of skin under one lamp, sRGB with alpha, float32 [SIDE, SIDE, 4], rows from the bottom. Drawn, as a window is not always there."""
+    """The preview: a ball of skin under one lamp, sRGB with alpha, float32 [SIDE, SIDE, 4], rows from the bottom.
+    Drawn, as a window is not always there."""
     y, x = (np.mgrid[:SIDE, :SIDE] + 0.5) / SIDE * 2.2 - 1.1
     inside = np.hypot(x, y)
     normal = np.stack([x, y, np.sqrt(np.clip(1 - inside**2, 0, None))], -1)
@@ -59,7 +62,8 @@ def _name_catalogue() -> None:
         root = Path(bpy.path.abspath(library.path))
         if bpy.data.filepath and library.path and blend.is_relative_to(root):
             file = root / FILE
-            with contextlib.suppress(OSError, Problem, UnicodeDecodeError):  # a library that is read-only keeps the asset without a catalogue
+            # a library that is read-only keeps the asset without a catalogue
+            with contextlib.suppress(OSError, Problem, UnicodeDecodeError):
                 known = file.read_text(encoding="utf-8") if file.is_file() else HEADER
                 if CATALOGUE not in known:
                     with replacing(file) as temporary:

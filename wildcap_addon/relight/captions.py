@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lines of text as pictures, in Blender's own font: its text objects become triangles, which are filled here. No window, no scene and no render is needed."""
+"""Lines of text as pictures, in Blender's own font: its text objects become triangles, which are filled here. No
+window, no scene and no render is needed."""
 
 import bpy
 import numpy as np
@@ -12,7 +13,8 @@ FINE = 4
 
 
 def draw(lines: list[list[str]], width: int, height: int) -> list[np.ndarray]:
-    """Each line's words, each in the middle of its share of the width: how white [height, width, 1] is, float32 in [0, 1], rows from the bottom."""
+    """Each line's words, each in the middle of its share of the width: how white [height, width, 1] is, float32 in [0,
+    1], rows from the bottom."""
     strips = []
     for words in lines:
         fine = np.zeros((height * FINE, width * FINE), bool)
@@ -48,5 +50,6 @@ def _fill(picture: np.ndarray, triangle: np.ndarray) -> None:
     if (high <= low).any():
         return
     x, y = np.meshgrid(np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1]) + 0.5)
-    sides = [(b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]) for a, b in zip(triangle, np.roll(triangle, -1, 0), strict=True)]
+    sides = [(b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
+             for a, b in zip(triangle, np.roll(triangle, -1, 0), strict=True)]
     picture[low[1]:high[1], low[0]:high[0]] |= (np.min(sides, 0) >= 0) | (np.max(sides, 0) <= 0)

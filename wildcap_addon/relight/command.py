@@ -9,16 +9,18 @@ from . import headless
 
 
 def _relight(asked) -> list[Path]:
-    return headless.render_relit(asked.capture, asked.lights or headless.ALL, resolution=asked.resolution, samples=asked.samples)
+    return headless.render_relit(asked.capture, asked.lights or headless.ALL, resolution=asked.resolution,
+                                 samples=asked.samples)
 
 
 def _contact_sheet(asked) -> list[Path]:
-    return [headless.render_contact_sheet(asked.capture, view=asked.view, resolution=asked.resolution, samples=asked.samples)]
+    return [headless.render_contact_sheet(asked.capture, view=asked.view, resolution=asked.resolution,
+                                          samples=asked.samples)]
 
 
 def _turntable(asked) -> list[Path]:
-    return [headless.render_turntable(asked.capture, asked.light, asked.turns.upper(), asked.frames, asked.film, resolution=asked.resolution,
-                                      samples=asked.samples)]
+    return [headless.render_turntable(asked.capture, asked.light, asked.turns.upper(), asked.frames, asked.film,
+                                      resolution=asked.resolution, samples=asked.samples)]
 
 
 def _sized(kind) -> None:
@@ -29,7 +31,8 @@ def _sized(kind) -> None:
 
 def _of_relight(kind) -> None:
     _sized(kind)
-    kind.add_argument("lights", nargs="*", metavar="LIGHT", help=f"{', '.join(headless.ALL)}, or one of Blender's worlds; default: all presets")
+    kind.add_argument("lights", nargs="*", metavar="LIGHT",
+                      help=f"{', '.join(headless.ALL)}, or one of Blender's worlds; default: all presets")
 
 
 def _of_contact_sheet(kind) -> None:

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operator: the skin as it was filmed, as it was delit, solved, or without its hair, in the same material under the same light and at the same exposure."""
+"""Operator: the skin as it was filmed, as it was delit, solved, or without its hair, in the same material under the
+same light and at the same exposure."""
 
 import bpy
 
@@ -14,20 +15,23 @@ SHOWN = {
     'FILMED': ("As Filmed", "filmed.png", "The texture with all of its light, as it was filmed"),
     'DELIT': ("Delit", "delit.png", "The texture that the delighter left, with the shadows that stayed in it"),
     'SOLVED': ("Albedo", "diffuse_albedo.png", "What the solver found"),
-    'SKIN': ("Skin Below Hair", "clean_albedo.png", "The albedo without brows, lashes and beard, for hair to grow over"),
+    'SKIN': ("Skin Below Hair", "clean_albedo.png",
+             "The albedo without brows, lashes and beard, for hair to grow over"),
 }
 REMEDIES = ("Click Solve: it leaves what is compared, as long as the frames are there.",
             "Switch on Hair among the settings of 4K Maps, and run that stage.")
 
 
 class WILDCAP_OT_compare(BaseOperator, bpy.types.Operator):
-    """Show the head with its texture as filmed, as delit, with the solved albedo, or that of the skin below the hair; all at one exposure, renders included"""
+    """Show the head with its texture as filmed, as delit, with the solved albedo, or that of the skin below the hair;
+    all at one exposure, renders included"""
 
     bl_idname = "wildcap.compare"
     bl_label = "Compare"
     bl_options = {'REGISTER', 'UNDO'}
 
-    show: bpy.props.EnumProperty(name="Show", items=[(kind, label, tip) for kind, (label, _, tip) in SHOWN.items()], default='SOLVED')
+    show: bpy.props.EnumProperty(name="Show", items=[(kind, label, tip) for kind, (label, _, tip) in SHOWN.items()],
+                                 default='SOLVED')
 
     @classmethod
     def poll(cls, context):

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The contact sheet: a head in all light presets in one picture, each with its name, and below them how all of it is shown.
+"""The contact sheet: a head in all light presets in one picture, each with its name, and below them how all of it is
+shown.
 
     renders/contact_sheet.png, and the pictures it is made of as renders/PRESET.png and .exr
 """

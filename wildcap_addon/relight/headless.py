@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Relit pictures without a window: the same functions as the buttons, in a bpy process in which the extension is enabled."""
+"""Relit pictures without a window: the same functions as the buttons, in a bpy process in which the extension is
+enabled."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -18,30 +19,37 @@ ALL = tuple(lights.PRESETS)
 FRAMES_PER_SECOND = 24
 
 
-def render_relit(capture_folder: Path, names: Iterable[str | Hdri] = ALL, resolution: int = 640, samples: int = 32) -> list[Path]:
-    """Brings in the head, assembles its material and renders renders/NAME.png and the linear renders/NAME.exr for each light: a preset, one of Blender's
-    worlds by its name, or a picture. Returns the PNGs.
+def render_relit(capture_folder: Path, names: Iterable[str | Hdri] = ALL, resolution: int = 640,
+                 samples: int = 32) -> list[Path]:
+    """Brings in the head, assembles its material and renders renders/NAME.png and the linear renders/NAME.exr for each
+    light: a preset, one of Blender's worlds by its name, or a picture. Returns the PNGs.
 
     Empties the open file first. Raises Problem when the capture has no head or no maps, or there is no such light.
     """
     chosen = [light_of(name) for name in names]
     obj, item = open_head(capture_folder)
-    return [render_light(obj, captures.folder(item).renders, light, RenderSettings(resolution, samples)) for light in chosen]
+    return [render_light(obj, captures.folder(item).renders, light, RenderSettings(resolution, samples))
+            for light in chosen]
 
 
-def render_contact_sheet(capture_folder: Path, resolution: int = 512, samples: int = 32, view: str = colours.VIEWS[0]) -> Path:
+def render_contact_sheet(capture_folder: Path, resolution: int = 512, samples: int = 32,
+                         view: str = colours.VIEWS[0]) -> Path:
     """As `render_relit`, in all presets, joined to renders/contact_sheet.png, which is returned."""
     obj, item = open_head(capture_folder)
-    return contact_sheet.render(obj, captures.folder(item).renders, True, RenderSettings(resolution, samples, view=view))
+    return contact_sheet.render(obj, captures.folder(item).renders, True,
+                                RenderSettings(resolution, samples, view=view))
 
 
 def render_turntable(
-    capture_folder: Path, name: str | Hdri = ALL[0], turns: str = 'HEAD', frames: int = 48, film: bool = False, resolution: int = 512, samples: int = 32,
+    capture_folder: Path, name: str | Hdri = ALL[0], turns: str = 'HEAD', frames: int = 48, film: bool = False,
+    resolution: int = 512, samples: int = 32,
 ) -> Path:
-    """The 'HEAD' or the 'LIGHT' once around, to renders/turntable/, which is returned: PNG frames, or one film. Raises Problem as `render_relit` does."""
+    """The 'HEAD' or the 'LIGHT' once around, to renders/turntable/, which is returned: PNG frames, or one film. Raises
+    Problem as `render_relit` does."""
     light = light_of(name)
     obj, item = open_head(capture_folder)
-    return turntable(obj, captures.folder(item).renders, light, Turn(turns, frames, film), RenderSettings(resolution, samples), True)
+    return turntable(obj, captures.folder(item).renders, light, Turn(turns, frames, film),
+                     RenderSettings(resolution, samples), True)
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lights for a first look at a head: six of lamps under a sky, or the surroundings of a picture. Built in a scene of their own, around a head of any
-place, turn and size.
+"""Lights for a first look at a head: six of lamps under a sky, or the surroundings of a picture. Built in a scene of
+their own, around a head of any place, turn and size.
 
-Directions are the head's: +X its left, -Y where it looks, +Z up. Distances are in head radii, powers are for a head of the reference radius.
+Directions are the head's: +X its left, -Y where it looks, +Z up. Distances are in head radii, powers are for a head of
+the reference radius.
 """
 
 from dataclasses import dataclass
@@ -75,8 +76,9 @@ def preset(name: str) -> LightingPreset:
 
 
 def build(scene: bpy.types.Scene, light: str | Hdri | None, frame: Matrix, radius: float, turn: float = 0.0) -> None:
-    """Replaces the lamps and the world of `scene` by those of a preset or of a picture. `frame` [4, 4] is the head's place without scale, `radius` its
-    size in scene units; `turn` turns the light about the head, in radians, counter-clockwise from above."""
+    """Replaces the lamps and the world of `scene` by those of a preset or of a picture. `frame` [4, 4] is the head's
+    place without scale, `radius` its size in scene units; `turn` turns the light about the head, in radians,
+    counter-clockwise from above."""
     clear(scene)
     frame = frame @ Matrix.Rotation(turn, 4, 'Z')
     scene.world = sky.world()
@@ -135,5 +137,6 @@ def _lamp(lamp: Lamp, radius: float) -> bpy.types.Object:
         data.angle = radians(lamp.angle)
     obj = bpy.data.objects.new(data.name, data)
     direction = Vector(lamp.direction).normalized()
-    obj.matrix_local = Matrix.Translation(direction * lamp.distance * radius) @ direction.to_track_quat('Z', 'Y').to_matrix().to_4x4()
+    obj.matrix_local = Matrix.Translation(direction * lamp.distance
+                                          * radius) @ direction.to_track_quat('Z', 'Y').to_matrix().to_4x4()
     return obj

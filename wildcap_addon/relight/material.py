@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Assemble Material: the capture's maps, each with its colour space, into WildCap Skin on the head. Again in place, keeping values.
+"""Assemble Material: the capture's maps, each with its colour space, into WildCap Skin on the head. Again in place,
+keeping values.
 
     UV Map -> Albedo (sRGB), Specular (Non-Color), Normal (Non-Color) -> Normal Map -> WildCap Skin -> Material Output
               Displacement (Non-Color, where the scan gave one) and the regions' attribute -> WildCap Skin
@@ -32,7 +33,8 @@ SET = "wildcap_set"
 
 
 def assemble(context, item) -> bpy.types.Material:
-    """The skin material on the capture's head, from the 4K maps where they are newest, else from the solved ones; and what else belongs to a finished head."""
+    """The skin material on the capture's head, from the 4K maps where they are newest, else from the solved ones; and
+    what else belongs to a finished head."""
     capture = captures.folder(item)
     obj = captures.require_head(context, item)
     maps = status.delivered(capture)
@@ -44,7 +46,9 @@ def assemble(context, item) -> bpy.types.Material:
     regions.write(obj.data)
     height = capture.delivery / DISPLACEMENT[1]
     _build(material, {path.name: path for path in (*maps, height) if path.is_file()}, obj)
-    _set(material, {"Specular Amount": _specular_amount(capture), "Subsurface Scale": node_group.SCATTERING_M * _scale(obj)}, before)
+    _set(material,
+         {"Specular Amount": _specular_amount(capture), "Subsurface Scale": node_group.SCATTERING_M * _scale(obj)},
+         before)
     obj["wildcap_maps_time"] = max(path.stat().st_mtime for path in maps)
     head.complete(obj, capture)
     material[MADE] = _fingerprint(material)
@@ -60,14 +64,16 @@ def is_edited(obj) -> bool:
 
 
 def _fingerprint(material) -> str:
-    """Stands for the nodes, their values and links; the pictures that they show, and what stands where, count for nothing."""
+    """Stands for the nodes, their values and links; the pictures that they show, and what stands where, count for
+    nothing."""
     if material.node_tree is None:
         return ""
     told = []
     for node in sorted(material.node_tree.nodes, key=lambda node: node.name):
         if node.name != head.PREVIEW:  # comes and goes with a running solve
             values = [_plain(socket.default_value) for socket in node.inputs if hasattr(socket, "default_value")]
-            links = [[link.from_node.name, link.from_socket.identifier] for socket in node.inputs for link in socket.links]
+            links = [[link.from_node.name, link.from_socket.identifier] for socket in node.inputs
+                     for link in socket.links]
             told.append([node.name, node.bl_idname, node.mute, values, links])
     return hashlib.blake2b(json.dumps(told).encode(), digest_size=16).hexdigest()
 
@@ -75,11 +81,13 @@ def _fingerprint(material) -> str:
 def _plain(value):
     if isinstance(value, float):
         return round(value, 5)
-    return str(value) if isinstance(value, (str, int)) or not hasattr(value, "__len__") else [round(float(part), 5) for part in value]
+    return (str(value) if isinstance(value, (str, int)) or not hasattr(value, "__len__")
+            else [round(float(part), 5) for part in value])
 
 
 def _material(obj) -> bpy.types.Material:
-    """The head's skin material; somebody else's material in the first slot is replaced on this head only, never changed."""
+    """The head's skin material; somebody else's material in the first slot is replaced on this head only, never
+    changed."""
     slots = obj.data.materials
     current = slots[0] if slots else None
     if current is not None and (KEY in current or current.get("wildcap_texture")):
@@ -125,15 +133,19 @@ def _build(material, paths: dict, obj) -> None:
     normal.uv_map = obj.data.uv_layers[0].name
     attribute = _node(tree, "WildCap Regions", 'ShaderNodeAttribute', (-200, -520))
     attribute.attribute_name = regions.ATTRIBUTE
-    output = next((n for n in tree.nodes if n.type == 'OUTPUT_MATERIAL'), None) or _node(tree, "Material Output", 'ShaderNodeOutputMaterial', (340, 0))
+    output = next((n for n in tree.nodes if n.type == 'OUTPUT_MATERIAL'),
+                  None) or _node(tree, "Material Output", 'ShaderNodeOutputMaterial', (340, 0))
     for source, socket, target, name in (
         ("WildCap Albedo", "Color", skin, "Albedo"), ("WildCap Specular", "Color", skin, "Specular"),
-        ("WildCap Normal", "Color", normal, "Color"), ("WildCap Normal Map", "Normal", skin, "Normal"), ("WildCap Skin", "BSDF", output, "Surface"),
-        ("WildCap Regions", "Fac", skin, "Region"), ("WildCap Displacement", "Color", skin, "Height"), ("WildCap Skin", "Displacement", output, "Displacement"),
+        ("WildCap Normal", "Color", normal, "Color"), ("WildCap Normal Map", "Normal", skin, "Normal"),
+        ("WildCap Skin", "BSDF", output, "Surface"),
+        ("WildCap Regions", "Fac", skin, "Region"), ("WildCap Displacement", "Color", skin, "Height"),
+        ("WildCap Skin", "Displacement", output, "Displacement"),
     ):
         if source in tree.nodes and (name != "Displacement" or "WildCap Displacement" in tree.nodes):
             outputs = tree.nodes[source].outputs
-            _link(tree, outputs["Factor" if socket == "Fac" and "Factor" in outputs else socket], target.inputs[name])  # its name from Blender 5 on
+            # its name from Blender 5 on
+            _link(tree, outputs["Factor" if socket == "Fac" and "Factor" in outputs else socket], target.inputs[name])
     tree.nodes.active = tree.nodes["WildCap Albedo"]  # what Solid shading shows
     material[KEY] = True
 
@@ -157,11 +169,14 @@ def _set_before(material, obj) -> dict[str, float]:
     """What Assemble Material set the last time; {} for a material that is new."""
     if KEY not in material:
         return {}
-    return material[SET].to_dict() if SET in material else {"Specular Amount": 1.44, "Subsurface Scale": 0.0037 * _scale(obj)}  # of the group's version 1
+    # of the group's version 1
+    return (material[SET].to_dict() if SET in material
+            else {"Specular Amount": 1.44, "Subsurface Scale": 0.0037 * _scale(obj)})
 
 
 def _set(material, values: dict[str, float], before: dict[str, float]) -> None:
-    """Sets sockets of the skin to what this capture and the head's size ask for, but for those that the artist changed since."""
+    """Sets sockets of the skin to what this capture and the head's size ask for, but for those that the artist changed
+    since."""
     sockets = material.node_tree.nodes["WildCap Skin"].inputs
     for name, value in values.items():
         if name not in before or isclose(sockets[name].default_value, before[name], rel_tol=1e-4):

@@ -6,8 +6,8 @@
     Specular x Specular Amount, clamped -> Specular IOR Level        Roughness x (1 + Region) -> Roughness
     Height, Midlevel, Displacement -> Displacement, in the object's own units
 
-Sockets are addressed by name, which is the same from Blender 4.2 to 5.x. A group of an older version is rebuilt inside: sockets, their values, and an
-artist's own nodes and links stay.
+Sockets are addressed by name, which is the same from Blender 4.2 to 5.x. A group of an older version is rebuilt inside:
+sockets, their values, and an artist's own nodes and links stay.
 """
 
 import bpy
@@ -20,10 +20,11 @@ SCATTERING_M = 0.003
 SCATTERING_RGB = (1.0, 0.37, 0.19)
 """Mean free paths of red, green and blue light over red's (Jensen et al. 2001, skin1: 3.67, 1.37 and 0.68 mm)"""
 GIVEN_BACK = (0.954, 0.932, 0.928)
-"""Share of its Base Color that skin gives back under even light by Cycles's *Random Walk (Skin)*, red, green, blue: the mean over six tones of
-`python -m benchmarks.even_light`. The other random walk gives back 0.78 to 0.91."""
+"""Share of its Base Color that skin gives back under even light by Cycles's *Random Walk (Skin)*, red, green, blue: the
+mean over six tones of `python -m benchmarks.even_light`. The other random walk gives back 0.78 to 0.91."""
 TYPICAL_SPECULAR = 0.35
-"""Mean of the specular map on cheeks and forehead where nobody measured it. The map holds levels for an IOR of 1.5, of which 0.35 is skin's 2.8 percent"""
+"""Mean of the specular map on cheeks and forehead where nobody measured it. The map holds levels for an IOR of 1.5, of
+which 0.35 is skin's 2.8 percent"""
 
 # name, socket type, default, range, tooltip; what the maps feed comes first
 INPUTS = (
@@ -31,13 +32,17 @@ INPUTS = (
     ("Specular", 'NodeSocketFloat', 0.5, (0.0, 1.0), "Specular albedo, as solved"),
     ("Normal", 'NodeSocketVector', (0.0, 0.0, 0.0), None, "The skin's relief"),
     ("Specular Amount", 'NodeSocketFloat', 0.5 / TYPICAL_SPECULAR, (0.0, 10.0),
-     "Times the specular albedo: the Specular IOR Level, at most 1. Half over the map's mean on cheeks and forehead gives these the 2.8 percent of skin"),
-    ("Roughness", 'NodeSocketFloat', 0.45, (0.0, 1.0), "Roughness of the cheeks; the other regions follow in their proportions"),
+     "Times the specular albedo: the Specular IOR Level, at most 1. Half over the map's mean on cheeks and forehead "
+     "gives these the 2.8 percent of skin"),
+    ("Roughness", 'NodeSocketFloat', 0.45, (0.0, 1.0),
+     "Roughness of the cheeks; the other regions follow in their proportions"),
     ("IOR", 'NodeSocketFloat', 1.4, (1.0, 3.0), "Index of refraction; 1.4 reflects 2.8 percent at normal incidence"),
     ("Subsurface", 'NodeSocketFloat', 1.0, (0.0, 1.0), "How much of the diffuse light goes through the skin"),
-    ("Subsurface Scale", 'NodeSocketFloat', SCATTERING_M, (0.0, 10.0), "Mean free path of red light: 3 mm at the head's size"),
+    ("Subsurface Scale", 'NodeSocketFloat', SCATTERING_M, (0.0, 10.0),
+     "Mean free path of red light: 3 mm at the head's size"),
     ("Region", 'NodeSocketFloat', 0.0, (-1.0, 1.0), "How much rougher than the cheeks this region is, as a share"),
-    ("Height", 'NodeSocketFloat', 0.0, (-10.0, 10.0), "How far the surface stands out, in metres of the head's own space"),
+    ("Height", 'NodeSocketFloat', 0.0, (-10.0, 10.0),
+     "How far the surface stands out, in metres of the head's own space"),
     ("Displacement", 'NodeSocketFloat', 0.0, (0.0, 10.0), "Times the height; 1 is the scan's own relief, 0 is none"),
     ("Midlevel", 'NodeSocketFloat', 0.0, (-10.0, 10.0), "Height that displaces nothing"),
 )
@@ -56,17 +61,24 @@ NODES = (
 MIX_FACTOR, MIX_A, MIX_B, MIX_RESULT = 0, 6, 7, 2
 """Numbers of a Mix node's sockets for colours: its names are used several times."""
 LINKS = (
-    ("WildCap Input", "Specular", "WildCap Specular Level", 0), ("WildCap Input", "Specular Amount", "WildCap Specular Level", 1),
+    ("WildCap Input", "Specular", "WildCap Specular Level", 0),
+    ("WildCap Input", "Specular Amount", "WildCap Specular Level", 1),
     ("WildCap Specular Level", 0, "WildCap Principled", "Specular IOR Level"),
     ("WildCap Input", "Region", "WildCap Regions", 0), ("WildCap Input", "Roughness", "WildCap Regions", 1),
     ("WildCap Input", "Roughness", "WildCap Regions", 2),
     ("WildCap Regions", 0, "WildCap Principled", "Roughness"),
-    ("WildCap Input", "Subsurface", "WildCap Given Back", MIX_FACTOR), ("WildCap Input", "Albedo", "WildCap Given Back", MIX_A),
-    ("WildCap Given Back", MIX_RESULT, "WildCap Principled", "Base Color"), ("WildCap Input", "Normal", "WildCap Principled", "Normal"),
-    ("WildCap Input", "IOR", "WildCap Principled", "IOR"), ("WildCap Input", "Subsurface", "WildCap Principled", "Subsurface Weight"),
-    ("WildCap Input", "Subsurface Scale", "WildCap Principled", "Subsurface Scale"), ("WildCap Principled", "BSDF", "WildCap Output", "BSDF"),
-    ("WildCap Input", "Height", "WildCap Displacement", "Height"), ("WildCap Input", "Midlevel", "WildCap Displacement", "Midlevel"),
-    ("WildCap Input", "Displacement", "WildCap Displacement", "Scale"), ("WildCap Displacement", "Displacement", "WildCap Output", "Displacement"),
+    ("WildCap Input", "Subsurface", "WildCap Given Back", MIX_FACTOR),
+    ("WildCap Input", "Albedo", "WildCap Given Back", MIX_A),
+    ("WildCap Given Back", MIX_RESULT, "WildCap Principled", "Base Color"),
+    ("WildCap Input", "Normal", "WildCap Principled", "Normal"),
+    ("WildCap Input", "IOR", "WildCap Principled", "IOR"),
+    ("WildCap Input", "Subsurface", "WildCap Principled", "Subsurface Weight"),
+    ("WildCap Input", "Subsurface Scale", "WildCap Principled", "Subsurface Scale"),
+    ("WildCap Principled", "BSDF", "WildCap Output", "BSDF"),
+    ("WildCap Input", "Height", "WildCap Displacement", "Height"),
+    ("WildCap Input", "Midlevel", "WildCap Displacement", "Midlevel"),
+    ("WildCap Input", "Displacement", "WildCap Displacement", "Scale"),
+    ("WildCap Displacement", "Displacement", "WildCap Output", "Displacement"),
 )
 
 
@@ -120,7 +132,8 @@ def _set_up(nodes: dict[str, bpy.types.Node]) -> None:
     back = nodes["WildCap Given Back"]
     back.data_type, back.blend_type = 'RGBA', 'MULTIPLY'
     back.inputs[MIX_B].default_value = (*(1 / share for share in GIVEN_BACK), 1)
-    nodes["WildCap Displacement"].space = 'OBJECT'  # heights are in the head's own units: they grow with the object's scale
+    # heights are in the head's own units: they grow with the object's scale
+    nodes["WildCap Displacement"].space = 'OBJECT'
 
 
 def _wire(group) -> None:

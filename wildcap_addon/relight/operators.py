@@ -17,7 +17,8 @@ class WILDCAP_OT_assemble_material(BaseOperator, bpy.types.Operator):
     bl_label = "Assemble Material"
     bl_options = {'REGISTER', 'UNDO'}
 
-    unless_edited: bpy.props.BoolProperty(description="Leave a material alone that somebody changed", options={'HIDDEN', 'SKIP_SAVE'})
+    unless_edited: bpy.props.BoolProperty(description="Leave a material alone that somebody changed",
+                                          options={'HIDDEN', 'SKIP_SAVE'})
 
     @classmethod
     def poll(cls, context):
@@ -49,7 +50,8 @@ class Render(BaseOperator):
 
 
 class WILDCAP_OT_render(Render, bpy.types.Operator):
-    """Render the head with Cycles under the chosen light, to renders in the capture folder: a picture, and a linear EXR beside it"""
+    """Render the head with Cycles under the chosen light, to renders in the capture folder: a picture, and a linear EXR
+    beside it"""
 
     bl_idname = "wildcap.render"
     bl_label = "Render"

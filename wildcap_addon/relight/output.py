@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a render leaves. A file or folder that bears its name is complete. A still is rendered as linear EXR (scene referred, half float), from which figures
-are taken, and its PNG is made of that, through the scene's view transform.
+"""What a render leaves. A file or folder that bears its name is complete. A still is rendered as linear EXR (scene
+referred, half float), from which figures are taken, and its PNG is made of that, through the scene's view transform.
 
-Blender renders in a thread of its own, in which nothing of Blender may be touched: what is left to do waits for the window's next moment.
+Blender renders in a thread of its own, in which nothing of Blender may be touched: what is left to do waits for the
+window's next moment.
 """
 
 import shutil
@@ -22,7 +23,8 @@ SCENE = "WildCap Relight"
 
 @dataclass
 class Running:
-    """A render on its way: `stills`, each by the hidden EXR it is rendered to, or a `folder` of all frames; `then` is called when all is complete."""
+    """A render on its way: `stills`, each by the hidden EXR it is rendered to, or a `folder` of all frames; `then` is
+    called when all is complete."""
 
     stills: dict[Path, Path] = field(default_factory=dict)
     folder: Path | None = None
@@ -38,7 +40,8 @@ def busy() -> bool:
 
 
 def still(scene: bpy.types.Scene, path: Path, wait: bool) -> None:
-    """Renders `path`, a PNG, and its EXR. wait=False returns at once and shows Blender's render window. Raises Problem when the folder cannot be written."""
+    """Renders `path`, a PNG, and its EXR. wait=False returns at once and shows Blender's render window. Raises Problem
+    when the folder cannot be written."""
     global _running
     make_room(path)
     source = _hidden(path.with_suffix(".exr"))
@@ -55,13 +58,15 @@ def stills(scene: bpy.types.Scene, paths: list[Path], wait: bool, then: Callable
     scene.frame_start, scene.frame_end = 1, len(paths)
     as_linear(scene)
     scene.render.filepath = str(paths[0].with_name(".frame_####.exr"))
-    _running = Running(stills={paths[0].with_name(f".frame_{i:04d}.exr"): path for i, path in enumerate(paths, 1)}, then=then)
+    _running = Running(stills={paths[0].with_name(f".frame_{i:04d}.exr"): path for i, path in enumerate(paths, 1)},
+                       then=then)
     scene.render.use_persistent_data = True  # the head and its maps are the same in all frames
     _render(scene, wait, animation=True)
 
 
 def frames(scene: bpy.types.Scene, folder: Path, name: str, count: int, wait: bool) -> None:
-    """Renders the frames 1 to `count` to folder/name, which holds #### or is a film's; the folder replaces the one before when all are there."""
+    """Renders the frames 1 to `count` to folder/name, which holds #### or is a film's; the folder replaces the one
+    before when all are there."""
     global _running
     hidden = _hidden(folder)
     shutil.rmtree(hidden, ignore_errors=True)
@@ -178,7 +183,8 @@ def _picture(path: Path) -> None:
     data = _hidden(path).read_bytes()
     note = b"tEXtNote\0" + view_label(scene).encode("latin-1", "replace")
     header = 8 + 25  # the signature and IHDR, which comes first
-    _hidden(path).write_bytes(data[:header] + struct.pack(">I", len(note) - 4) + note + struct.pack(">I", zlib.crc32(note)) + data[header:])
+    _hidden(path).write_bytes(data[:header] + struct.pack(">I", len(note) - 4) + note
+                              + struct.pack(">I", zlib.crc32(note)) + data[header:])
     place_file(_hidden(path), path)
 
 

@@ -22,8 +22,8 @@ FOCAL_LENGTH_MM = 85.0
 
 @dataclass(frozen=True)
 class RenderSettings:
-    """How pictures are rendered: resolution, pixels of a side; samples of Cycles; turn: of the light about the head, in radians; view: the view transform that
-    they are shown by."""
+    """How pictures are rendered: resolution, pixels of a side; samples of Cycles; turn: of the light about the head, in
+    radians; view: the view transform that they are shown by."""
 
     resolution: int
     samples: int
@@ -35,9 +35,10 @@ class RenderSettings:
         return set_up(obj, light, self.resolution, self.samples, self.turn, self.view)
 
 
-def set_up(obj: bpy.types.Object, light: str | Hdri | None, resolution: int, samples: int, turn: float = 0.0, view: str = colours.VIEWS[0]) -> bpy.types.Scene:
-    """The relight scene with this head and what it wears alone in it, framed and lit (None: dark); the light is turned by `turn` radians about the head. The
-    picture is shown by the view transform `view`, and its file says so."""
+def set_up(obj: bpy.types.Object, light: str | Hdri | None, resolution: int, samples: int, turn: float = 0.0,
+           view: str = colours.VIEWS[0]) -> bpy.types.Scene:
+    """The relight scene with this head and what it wears alone in it, framed and lit (None: dark); the light is turned
+    by `turn` radians about the head. The picture is shown by the view transform `view`, and its file says so."""
     scene = bpy.data.scenes.get(SCENE) or bpy.data.scenes.new(SCENE)
     for other in [o for o in scene.collection.objects if o.type not in ('CAMERA', 'LIGHT')]:
         scene.collection.objects.unlink(other)
@@ -96,5 +97,9 @@ def _camera(scene, frame: Matrix, radius: float) -> None:
     camera.data.lens = FOCAL_LENGTH_MM
     direction = Vector(CAMERA_DIRECTION).normalized()
     distance = radius * 1.12 / tan(camera.data.angle / 2)
-    camera.matrix_world = frame @ Matrix.Translation(direction * (distance + radius * 0.2)) @ direction.to_track_quat('Z', 'Y').to_matrix().to_4x4()
+    camera.matrix_world = (
+        frame
+        @ Matrix.Translation(direction * (distance + radius * 0.2))
+        @ direction.to_track_quat('Z', 'Y').to_matrix().to_4x4()
+    )
     camera.data.clip_start, camera.data.clip_end = distance * 0.01, distance * 100

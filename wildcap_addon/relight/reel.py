@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several pictures in one render, which Esc stops as it does any of Blender's: each frame has a light of its own, or the head or the light turns.
+"""Several pictures in one render, which Esc stops as it does any of Blender's: each frame has a light of its own, or
+the head or the light turns.
 
-Every frame has its key, so nothing lies in between; the head, which is the artist's object, has none: where it turns, all else turns the other way.
+Every frame has its key, so nothing lies in between; the head, which is the artist's object, has none: where it turns,
+all else turns the other way.
 """
 
 from math import tau
@@ -32,14 +34,17 @@ def each_light(obj: bpy.types.Object, presets: tuple[str, ...], settings: pictur
     return scene
 
 
-def turning(obj: bpy.types.Object, light: str | Hdri, turns: str, frames: int, settings: picture.RenderSettings) -> bpy.types.Scene:
-    """The relight scene in which, over the frames 1 to `frames`, the 'HEAD' or the 'LIGHT' goes once around, counter-clockwise from above."""
+def turning(obj: bpy.types.Object, light: str | Hdri, turns: str, frames: int,
+            settings: picture.RenderSettings) -> bpy.types.Scene:
+    """The relight scene in which, over the frames 1 to `frames`, the 'HEAD' or the 'LIGHT' goes once around,
+    counter-clockwise from above."""
     scene = settings.scene(obj, light)
     frame, _ = picture.frame_of(obj)
     rig, camera = lights.rig(scene), scene.camera
     moved = [o for o in (rig, camera if turns == 'HEAD' else None) if o is not None]
     start = {o: o.matrix_world.copy() for o in moved}
-    mapping = next((n for n in scene.world.node_tree.nodes if n.type == 'MAPPING'), None) if isinstance(light, Hdri) else None
+    mapping = (next((n for n in scene.world.node_tree.nodes if n.type == 'MAPPING'), None) if isinstance(light, Hdri)
+               else None)
     first = mapping.inputs["Rotation"].default_value[2] if mapping else 0.0
     for i in range(frames):
         angle = tau * i / frames * (-1 if turns == 'HEAD' else 1)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How rough each region of the head is against the cheeks, as a vertex attribute: no map, and it stays with the mesh."""
+"""How rough each region of the head is against the cheeks, as a vertex attribute: no map, and it stays with the
+mesh."""
 
 from functools import cache
 from pathlib import Path
@@ -19,7 +20,8 @@ SHARES = skin_regions.ROUGHNESS
 
 
 def write(mesh: bpy.types.Mesh) -> None:
-    """Writes the attribute: 0 is the cheeks' roughness, -0.2 a fifth less. The mesh has the built-in head's UVs; what has none of its own stays 0."""
+    """Writes the attribute: 0 is the cheeks' roughness, -0.2 a fifth less. The mesh has the built-in head's UVs; what
+    has none of its own stays 0."""
     uvs, corners = np.empty(2 * len(mesh.loops), np.float32), np.empty(len(mesh.loops), np.int32)
     mesh.uv_layers[0].data.foreach_get("uv", uvs)
     mesh.loops.foreach_get("vertex_index", corners)
@@ -41,7 +43,8 @@ def _shares() -> np.ndarray:
     """[S, S], rows from the bottom as v goes."""
     masks = {name: _mask(name) for name in ("face", "brows", "neck", "ears", "scalp", "nose", "eyes", "lips")}
     rows = np.arange(len(masks["face"]))
-    above = np.clip((rows - np.flatnonzero(masks["brows"].max(1) > 0.5).max()) / (skin_regions.FOREHEAD_FADE * len(rows)), 0, 1)
+    above = np.clip((rows - np.flatnonzero(masks["brows"].max(1) > 0.5).max())
+                    / (skin_regions.FOREHEAD_FADE * len(rows)), 0, 1)
     masks["forehead"] = masks["face"] * above[:, None]
     result = np.zeros_like(masks["face"])
     for name, share in SHARES.items():

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The world of the relight scene: a sky that goes from the horizon to the zenith, over a ground.
 
-Radiance is linear in the sine of the elevation: with a zenith three times as bright as the horizon that is the overcast sky of Moon and Spencer (1942),
-the CIE's traditional one.
+Radiance is linear in the sine of the elevation: with a zenith three times as bright as the horizon that is the overcast
+sky of Moon and Spencer (1942), the CIE's traditional one.
 """
 
 from dataclasses import astuple, dataclass
@@ -58,7 +58,8 @@ def show(found: bpy.types.World, sky: Sky, frame: Matrix) -> None:
     coordinates, upright, split, edge, rise = (nodes.new(kind) for kind in (
         'ShaderNodeTexCoord', 'ShaderNodeMapping', 'ShaderNodeSeparateXYZ', 'ShaderNodeMapRange', 'ShaderNodeClamp'))
     above, below = _mix(nodes, "WildCap Sky"), _mix(nodes, "WildCap Ground")
-    for node, x in ((coordinates, -1100), (upright, -920), (split, -740), (rise, -560), (edge, -560), (above, -380), (below, -200)):
+    for node, x in ((coordinates, -1100), (upright, -920), (split, -740), (rise, -560), (edge, -560), (above, -380),
+                    (below, -200)):
         node.location = (x, -160 if node == edge else 0)
     upright.inputs["Rotation"].default_value = frame.to_quaternion().inverted().to_euler()
     edge.inputs["From Min"].default_value, edge.inputs["From Max"].default_value = -HORIZON_BLEND, HORIZON_BLEND
@@ -70,7 +71,8 @@ def show(found: bpy.types.World, sky: Sky, frame: Matrix) -> None:
     links.new(edge.outputs["Result"], below.inputs[0])
     links.new(_colour(above, "Result", 'outputs'), _colour(below, "B"))
     links.new(_colour(below, "Result", 'outputs'), background.inputs["Color"])
-    found.cycles.sampling_method, found.cycles.sample_map_resolution = 'MANUAL', 128  # it is smooth; a fine map of it would take a second to make
+    # it is smooth; a fine map of it would take a second to make
+    found.cycles.sampling_method, found.cycles.sample_map_resolution = 'MANUAL', 128
     for socket, colour in zip(sockets(found), colours(sky), strict=True):
         socket.default_value = colour
 

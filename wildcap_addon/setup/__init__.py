@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solver: in an environment of its own or in an existing Python; whether it answers, and whether it solves as it should."""
+"""The solver: in an environment of its own or in an existing Python; whether it answers, and whether it solves as it
+should."""
 
 import bpy
 
 from . import checking, install, operators, panel, report, self_test
 
-_register, _unregister = bpy.utils.register_classes_factory((*install.CLASSES, *operators.CLASSES, *report.CLASSES, *self_test.CLASSES, *panel.CLASSES))
+_register, _unregister = bpy.utils.register_classes_factory((*install.CLASSES, *operators.CLASSES, *report.CLASSES,
+                                                             *self_test.CLASSES, *panel.CLASSES))
 
 
 def register():

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the solver's Python answers: asked in a thread when Blender has started, and, with every package loaded once, after it was chosen.
+"""Whether the solver's Python answers: asked in a thread when Blender has started, and, with every package loaded once,
+after it was chosen.
 
 One that does not answer is set aside, and the tab shows the first steps again.
 """
@@ -20,7 +21,8 @@ _checks: list[BackgroundTask] = []  # the one under way or done, if any
 
 
 def judge(python: Path, importing: bool) -> tuple[str, str]:
-    """The device that a Python computes on, and why; '' if its packages are not loaded. Raises Problem where it cannot run the solver."""
+    """The device that a Python computes on, and why; '' if its packages are not loaded. Raises Problem where it cannot
+    run the solver."""
     found = environment.survey(python, REQUIREMENTS, importing)
     refuse(python, environment.judge(found, REQUIREMENTS))
     return (found["device"], found["reason"]) if importing else ("", "")
@@ -29,7 +31,8 @@ def judge(python: Path, importing: bool) -> tuple[str, str]:
 def refuse(python: Path, faults: list[str]) -> None:
     if faults:
         raise Problem(f"{python} cannot run the solver. {' '.join(faults[:3])}",
-                      f"Install what {REQUIREMENTS / 'worker.txt'} lists; or click Install Solver, which brings it up to date.")
+                      f"Install what {REQUIREMENTS / 'worker.txt'} lists; or click Install Solver, which brings it up "
+                      "to date.")
 
 
 def accept(python: Path) -> None:

@@ -17,8 +17,8 @@ COMPUTES = {"cpu": "the CPU", "cuda": "NVIDIA GPUs (CUDA)", "apple": "Apple GPUs
 
 
 class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
-    """Install the solver's packages into a folder of their own: first you are told what, how much, from where and to where. Blender's Python
-    stays as it is"""
+    """Install the solver's packages into a folder of their own: first you are told what, how much, from where and to
+    where. Blender's Python stays as it is"""
 
     bl_idname = "wildcap.install_solver"
     bl_label = "Install Solver"
@@ -32,7 +32,8 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
         compute, source, wheels, folder = *chosen_packages(), preferences.environment_folder()
         plan = asking.answer(("plan", compute, source, wheels))
         if plan is None:
-            asking.ask(("plan", compute, source, wheels), lambda task: look_up(task, compute, source, wheels, folder), "install_solver")
+            asking.ask(("plan", compute, source, wheels), lambda task: look_up(task, compute, source, wheels, folder),
+                       "install_solver")
             return None
         return describe_plan(plan, compute, folder, index.check_space(plan, folder))
 
@@ -42,13 +43,15 @@ class WILDCAP_OT_install_solver(Dialog, bpy.types.Operator):
         if plan is not None:
             index.check_space(plan, folder)
         task = installation.installation(folder, REQUIREMENTS, folder.with_name(f"{folder.name}.log"), None,
-                                         installation.PackageSource(compute, source, wheels), len(plan.packages) if plan is not None else 0)
+                                         installation.PackageSource(compute, source, wheels),
+                                         len(plan.packages) if plan is not None else 0)
         asking.forget(("size", str(folder)))
         jobs.begin("", "install", task, lambda: accept(environment.python_of(folder)))
 
 
 class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
-    """Delete the folder that Install Solver made, also one that it did not finish; you are told first how much that frees. Captures stay"""
+    """Delete the folder that Install Solver made, also one that it did not finish; you are told first how much that
+    frees. Captures stay"""
 
     bl_idname = "wildcap.remove_solver"
     bl_label = "Remove Solver"
@@ -56,7 +59,8 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         return (cls.allowed(jobs.of("") is None, "The solver is being installed: wait for it, or click Cancel")
-                and cls.allowed(preferences.environment_folder().is_dir(), "Install Solver has made no folder on this machine"))
+                and cls.allowed(preferences.environment_folder().is_dir(),
+                                "Install Solver has made no folder on this machine"))
 
     @staticmethod
     def tell() -> tuple[str, ...] | None:
@@ -79,18 +83,21 @@ class WILDCAP_OT_remove_solver(Dialog, bpy.types.Operator):
 
 def describe_plan(plan: index.InstallationPlan, compute: str, folder: Path, free: int) -> tuple[str, ...]:
     """What an installation means, before the artist says yes; `free` bytes are on the folder's disk."""
-    return (iface_("PyTorch {} for {} and {} more packages.").format(plan.packages.get("torch", ""), iface_(COMPUTES[compute]), len(plan.packages) - 1),
+    return (iface_("PyTorch {} for {} and {} more packages.").format(plan.packages.get("torch", ""),
+                                                                     iface_(COMPUTES[compute]), len(plan.packages) - 1),
             iface_("{} to download from {}.").format(index.gigabytes(plan.download), ", ".join(plan.hosts)),
-            iface_("{} on disk in {}, where {} are free.").format(index.gigabytes(plan.disk), folder, index.gigabytes(free)),
+            iface_("{} on disk in {}, where {} are free.").format(index.gigabytes(plan.disk), folder,
+                                                                  index.gigabytes(free)),
             "You can go on working meanwhile, cancel, and continue later.")
 
 
 def chosen_packages() -> tuple[str, str, Path | None]:
-    """(compute, source, wheels) of the preferences, with what Automatic means here. Raises Problem for what cannot be here, and while Blender is to stay off
-    a network that is needed."""
+    """(compute, source, wheels) of the preferences, with what Automatic means here. Raises Problem for what cannot be
+    here, and while Blender is to stay off a network that is needed."""
     source = preferences.get().packages
     if source != 'folder':
-        preferences.require_online("choose A Folder of Wheels under Packages From, or use a Python that has the packages already")
+        preferences.require_online("choose A Folder of Wheels under Packages From, or use a Python that has the "
+                                   "packages already")
     return pip_steps.compute_of(preferences.get().compute), source, preferences.wheels_folder()
 
 

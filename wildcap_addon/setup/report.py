@@ -16,7 +16,8 @@ from ..base_operator import BaseOperator
 
 
 class WILDCAP_OT_save_report(BaseOperator, bpy.types.Operator):
-    """Save a zip with logs, versions and settings, to send with a question: no pictures, no names, no paths of yours. Nothing is sent"""
+    """Save a zip with logs, versions and settings, to send with a question: no pictures, no names, no paths of yours.
+    Nothing is sent"""
 
     bl_idname = "wildcap.save_report"
     bl_label = "Save Report"

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The running solve's albedo on the head itself: an image node in its material, made by the click on Solve, that the timer reads anew.
+"""The running solve's albedo on the head itself: an image node in its material, made by the click on Solve, that the
+timer reads anew.
 
-Solid shading shows a material's active image node, so nothing is linked and the artist's own nodes stay. While somebody paints or edits, nothing is touched.
+Solid shading shows a material's active image node, so nothing is linked and the artist's own nodes stay. While somebody
+paints or edits, nothing is touched.
 """
 
 from pathlib import Path
@@ -14,7 +16,8 @@ from .. import captures, head, jobs
 
 
 def prepare(context, item) -> None:
-    """Puts the node into the head's material, for `update` to show once there is a picture. Without a head or a material there is nothing to show it on."""
+    """Puts the node into the head's material, for `update` to show once there is a picture. Without a head or a
+    material there is nothing to show it on."""
     obj = captures.head(context, item)
     material = obj.active_material if obj is not None else None
     if material is None or material.node_tree is None:
@@ -35,7 +38,8 @@ def prepare(context, item) -> None:
 
 
 def update(root: str) -> None:
-    """Shows the newest picture of the capture's solve on its heads, and what they showed before once it has ended. Makes no data-blocks."""
+    """Shows the newest picture of the capture's solve on its heads, and what they showed before once it has ended.
+    Makes no data-blocks."""
     if bpy.context.mode != 'OBJECT':
         return
     for nodes, node in _nodes(root):
@@ -54,5 +58,9 @@ def _nodes(root: str):
     preview = str(Capture(root).preview)
     for material in bpy.data.materials:
         node = material.node_tree.nodes.get(head.PREVIEW) if material.node_tree is not None else None
-        if node is not None and node.image is not None and str(Path(bpy.path.abspath(node.image.filepath)).parent) == preview:
+        if (
+            node is not None
+            and node.image is not None
+            and str(Path(bpy.path.abspath(node.image.filepath)).parent) == preview
+        ):
             yield material.node_tree.nodes, node

@@ -47,7 +47,8 @@ class WILDCAP_OT_solve_edited(BaseOperator, bpy.types.Operator):
 
 
 class WILDCAP_OT_estimate_skin_tone(BaseOperator, bpy.types.Operator):
-    """Look at the skin outside of the shadow mask in all frames, and set the skin tone from it, with how sure it is; a measured white point helps most"""
+    """Look at the skin outside of the shadow mask in all frames, and set the skin tone from it, with how sure it is; a
+    measured white point helps most"""
 
     bl_idname = "wildcap.estimate_skin_tone"
     bl_label = "Estimate"
@@ -62,7 +63,8 @@ class WILDCAP_OT_estimate_skin_tone(BaseOperator, bpy.types.Operator):
 
 
 def begin(context, item, **shared) -> None:
-    """Starts a capture's solve, or puts it in line, and makes its head ready to show how far it is. Raises Problem when it cannot."""
+    """Starts a capture's solve, or puts it in line, and makes its head ready to show how far it is. Raises Problem when
+    it cannot."""
     jobs.start(item, "solve", first="solve", **shared).on_preview = live.update
     preview.forget()
     live.prepare(context, item)
@@ -75,7 +77,8 @@ def set_tone(root: str, figures: dict) -> None:
             if captures.root(item) == root:
                 item.skin_tone, item.use_skin_tone = figures["skin_tone_srgb"], True
                 item.estimated_tone = figures["skin_tone_srgb"]
-                item.tone_group, item.tone_source = figures.get("skin_tone_group", ""), figures.get("skin_tone_source", "")
+                item.tone_group, item.tone_source = figures.get("skin_tone_group",
+                                                                ""), figures.get("skin_tone_source", "")
                 item.tone_deviation = figures.get("skin_tone_deviation_l", 0.0)
 
 

@@ -34,7 +34,8 @@ class WILDCAP_PT_solve(CapturePanel, bpy.types.Panel):
         layout.use_property_split = True
         item = captures.active(context)
         layout.prop(item, "quality")
-        times = timings.describe_minutes(properties.device(item).replace("auto", "cpu"))  # not tried yet: the CPU is there in any case
+        # not tried yet: the CPU is there in any case
+        times = timings.describe_minutes(properties.device(item).replace("auto", "cpu"))
         if times:
             layout.label(text=times, icon='TIME')
         layout.prop(item, "use_skin_tone")
@@ -63,7 +64,9 @@ def tone_words(item) -> str:
         return iface_("Chosen by you: this wins")
     if not item.tone_group:
         return iface_("Told by the texture alone")
-    return iface_("{}, ± {} L*, by {}").format(iface_(item.tone_group), round(item.tone_deviation), iface_(item.tone_source))  # a sidebar is narrow
+    # a sidebar is narrow
+    return iface_("{}, ± {} L*, by {}").format(iface_(item.tone_group), round(item.tone_deviation),
+                                               iface_(item.tone_source))
 
 
 def _draw_white_point(layout, item) -> None:

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pictures a running solve shows in the panel. Icons of their own, so that no data-block is made behind the artist's back."""
+"""The pictures a running solve shows in the panel. Icons of their own, so that no data-block is made behind the
+artist's back."""
 
 import bpy
 import bpy.utils.previews

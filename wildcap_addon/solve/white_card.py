@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators: the white point, from a ColorChecker that the solver's Python finds in the frames, or from a click on a grey card or white paper in one."""
+"""Operators: the white point, from a ColorChecker that the solver's Python finds in the frames, or from a click on a
+grey card or white paper in one."""
 
 import bpy
 import numpy as np
@@ -17,7 +18,8 @@ BURNT, BLACK = 0.97, 0.04
 
 
 class WILDCAP_OT_find_color_checker(BaseOperator, bpy.types.Operator):
-    """Look for a ColorChecker in the frames and take the white point from its greys; the colour of the light then no longer has to be guessed"""
+    """Look for a ColorChecker in the frames and take the white point from its greys; the colour of the light then no
+    longer has to be guessed"""
 
     bl_idname = "wildcap.find_color_checker"
     bl_label = "Find ColorChecker"
@@ -28,17 +30,21 @@ class WILDCAP_OT_find_color_checker(BaseOperator, bpy.types.Operator):
 
     def work(self, context):
         root = captures.root(captures.require(context))
-        job = jobs.start_tool(captures.require(context), "white_point", then=lambda: set_white(root, job.figures["white_point"]))
+        job = jobs.start_tool(captures.require(context), "white_point",
+                              then=lambda: set_white(root, job.figures["white_point"]))
 
 
 class WILDCAP_OT_pick_white_point(BaseOperator, bpy.types.Operator):
-    """Shows a frame: click on a grey card or white paper that is in the face's light. Mouse wheel or arrow keys go to other frames, Esc leaves it"""
+    """Shows a frame: click on a grey card or white paper that is in the face's light. Mouse wheel or arrow keys go to
+    other frames, Esc leaves it"""
 
     bl_idname = "wildcap.pick_white_point"
     bl_label = "Pick White Point"
     bl_options = {'REGISTER', 'UNDO'}
 
-    card: bpy.props.EnumProperty(name="Card", items=[('grey', "Grey Card", "Of 18 percent"), ('white', "White Paper", "Plain paper, not glossy")])
+    card: bpy.props.EnumProperty(name="Card",
+                                 items=[('grey', "Grey Card", "Of 18 percent"),
+                                        ('white', "White Paper", "Plain paper, not glossy")])
     frame: bpy.props.StringProperty(name="Frame", description="Name of the frame's file")
     uv: bpy.props.FloatVectorProperty(name="UV", size=2, description="Where on the frame to look; a click says it")
 
@@ -79,7 +85,8 @@ class WILDCAP_OT_pick_white_point(BaseOperator, bpy.types.Operator):
             return
         path = captures.folder(item).frames / self.frame
         if not self.frame or not path.is_file():
-            raise Problem("There is no such frame in this capture.", "Click Reconstruct first: the frames come with it.")
+            raise Problem("There is no such frame in this capture.",
+                          "Click Reconstruct first: the frames come with it.")
         if not all(0 <= c < 1 for c in self.uv):
             raise Problem("That was beside the frame: nothing was measured.", "Click on the card.")
         image = bpy.data.images.load(str(path))
@@ -88,17 +95,23 @@ class WILDCAP_OT_pick_white_point(BaseOperator, bpy.types.Operator):
         finally:
             bpy.data.images.remove(image)
         if colour.max() > BURNT or colour.min() < BLACK:
-            raise Problem("The card is burnt out or black there.", "Choose another frame or place, or a grey card instead of white paper.")
+            raise Problem("The card is burnt out or black there.",
+                          "Choose another frame or place, or a grey card instead of white paper.")
         linear = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4) / CARDS[self.card]
         set_white(captures.root(item), linear.tolist())
 
     def _show(self, context):
         """Puts the frame into the editor in place of the one before."""
-        before, self._shown = self._shown, bpy.data.images.load(str(captures.folder(captures.require(context)).frames / self._frames[self._at]))
+        before, self._shown = self._shown, bpy.data.images.load(str(captures.folder(captures.require(context)).frames
+                                                                    / self._frames[self._at]))
         self._area.spaces.active.image = self._shown
         if before is not None:
             bpy.data.images.remove(before)
-        self._area.header_text_set(iface_("Frame {}: click on the card, wheel or arrows for other frames, Esc to leave").format(self._frames[self._at]))
+        self._area.header_text_set(
+            iface_("Frame {}: click on the card, wheel or arrows for other frames, Esc to leave").format(
+                self._frames[self._at]
+            )
+        )
 
     def _leave(self, context):
         context.window.cursor_modal_restore()

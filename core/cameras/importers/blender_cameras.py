@@ -3,10 +3,11 @@
 """Blender's cameras as JSON, as the add-on writes them from a scene:
 
     {"width": 720, "height": 960, "focal_px": 933.3,
-     "cameras": [{"frame": 0 and/or "name": "IMG_0001", "matrix_world": [[4 numbers] x 4], and, where they differ, "focal_px", "centre_px": [x, y],
-                  "width", "height"}, ...]}
+     "cameras": [{"frame": 0 and/or "name": "IMG_0001", "matrix_world": [[4 numbers] x 4], and, where they differ,
+                  "focal_px", "centre_px": [x, y], "width", "height"}, ...]}
 
-matrix_world is Blender's own: camera to world, row by row, the camera looking along its -z, y up. Pixels from the upper left corner, centres at +0.5.
+matrix_world is Blender's own: camera to world, row by row, the camera looking along its -z, y up. Pixels from the upper
+left corner, centres at +0.5.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ def read(text: str, name: str) -> list[Calibrated]:
     except ValueError as error:
         raise Problem(f"{name} is damaged ({error}).", "Write the cameras from Blender again.") from error
     if not isinstance(record, dict) or not isinstance(record.get("cameras"), list):
-        raise Problem(f"{name} is JSON, but no list of Blender's cameras.", "Write the cameras from Blender's scene with the add-on.")
+        raise Problem(f"{name} is JSON, but no list of Blender's cameras.",
+                      "Write the cameras from Blender's scene with the add-on.")
     found = []
     for index, camera in enumerate(record["cameras"]):
         label = str(camera.get("name", camera.get("frame", index))) if isinstance(camera, dict) else str(index)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A COLMAP model's folder: cameras, images, points3D as .bin or .txt, directly or in sparse/ or sparse/0/. Nothing to convert."""
+"""A COLMAP model's folder: cameras, images, points3D as .bin or .txt, directly or in sparse/ or sparse/0/. Nothing to
+convert."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from ..calibrated import PIXELS, Calibrated, trailing_number
 
 def read(folder: Path) -> list[Calibrated]:
     """Raises Problem where there is no model, it is damaged, or its lens model is one of fisheyes."""
-    places = [folder / part for part in (".", "sparse", "sparse/0", "0") if any((folder / part / f"images.{kind}").is_file() for kind in ("bin", "txt"))]
+    places = [folder / part for part in (".", "sparse", "sparse/0", "0")
+              if any((folder / part / f"images.{kind}").is_file() for kind in ("bin", "txt"))]
     if not places:
         raise Problem(f"The folder {folder.name} holds no COLMAP model (cameras.bin and images.bin, or .txt).",
                       "Choose the folder that COLMAP wrote; in its window: File, Export model.")
@@ -31,8 +33,9 @@ def read(folder: Path) -> list[Calibrated]:
         camera = model.cameras[image.camera_id]
         kind = camera.model.name
         if kind not in PIXELS:
-            raise Problem(f"The COLMAP model has a lens of kind {kind}, which is not supported.", f"Solve it with one of {', '.join(PIXELS)}.")
+            raise Problem(f"The COLMAP model has a lens of kind {kind}, which is not supported.",
+                          f"Solve it with one of {', '.join(PIXELS)}.")
         pose = pose_of(image)
-        found.append(Calibrated(image.name, trailing_number(image.name), kind, tuple(camera.params), camera.width, camera.height,
-                                pose.rotation.matrix(), np.array(pose.translation)))
+        found.append(Calibrated(image.name, trailing_number(image.name), kind, tuple(camera.params), camera.width,
+                                camera.height, pose.rotation.matrix(), np.array(pose.translation)))
     return found

@@ -21,11 +21,14 @@ RADIUS_M = {"stubble": 0.00004, "moustache": 0.00005, "full": 0.00006}
 def beard(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
     """Hairs that leave the mouth aside and fall; a longer beard is bent down and clumps."""
     on, kind = ground.canvas, person.beard
-    roots = strewn(ground, DENSITY[kind] * beard_density(kind, on, np.random.default_rng([person.seed, 65])), _ways(on), rng)
+    roots = strewn(ground, DENSITY[kind] * beard_density(kind, on, np.random.default_rng([person.seed, 65])), _ways(on),
+                   rng)
     roots = turned(roots, rng.normal(0, 0.3, len(roots.at)))
     count = len(roots.at)
-    upper = np.clip((roots.at[:, 2] - on.landmarks[0, 2] + 6) / 8, 0, 1) * (np.abs(roots.at[:, 0]) < 32)  # a moustache is kept out of the mouth
-    most = np.interp(np.abs(roots.at[:, 0]), [0, 30, 60], [1.0, 0.8, 0.45]) if kind == "full" else np.ones(count)  # full on the chin, short by the ears
+    # a moustache is kept out of the mouth
+    upper = np.clip((roots.at[:, 2] - on.landmarks[0, 2] + 6) / 8, 0, 1) * (np.abs(roots.at[:, 0]) < 32)
+    # full on the chin, short by the ears
+    most = np.interp(np.abs(roots.at[:, 0]), [0, 30, 60], [1.0, 0.8, 0.45]) if kind == "full" else np.ones(count)
     length = person.beard_length * rng.uniform(0.55, 1.15, count) * most
     length = np.where(upper > 0.5, np.minimum(length, 0.009 * rng.uniform(0.6, 1.1, count)), length)
     lift = rng.normal(0.75 if kind == "stubble" else 0.6, 0.15, count).clip(0.1, 1.3)
@@ -41,19 +44,24 @@ def beard(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Gene
 
 def beard_density(kind: str, on: Canvas, rng: np.random.Generator) -> np.ndarray:
     """Where it grows on a canvas, [N] in [0, 1], with the gaps that beards have."""
-    region = _moustache(on) if kind == "moustache" else np.maximum(beard_region(on), 0.9 * _sideburns(on) * (1 - regions(on)["ears"]))
+    region = (_moustache(on) if kind == "moustache"
+              else np.maximum(beard_region(on), 0.9 * _sideburns(on) * (1 - regions(on)["ears"])))
     patchy = on.soft(lambda at: octaves(at, [16.0, 9.0], rng, smooth=True))
     return np.clip(region * (1.05 + 0.15 * patchy) - 0.05, 0, 1)
 
 
 def beard_region(on: Canvas) -> np.ndarray:
-    """Where a man's beard can grow, [N] in [0, 1]: below a line from the ears to the corners of the nose, before the ears, down to below the jaw."""
+    """Where a man's beard can grow, [N] in [0, 1]: below a line from the ears to the corners of the nose, before the
+    ears, down to below the jaw."""
     x, y, z = np.abs(on.position[:, 0]), on.position[:, 1], on.position[:, 2]
     nose, corner, chin, ear = (on.landmarks[mark] for mark in (2, 291, 152, 454))
-    line = np.interp(x, [0, 13, 24, 36, 52, ear[0]], [nose[2] + 1, nose[2] - 2, nose[2] - 2, corner[2] + 15, corner[2] + 25, ear[2] - 5])
+    line = np.interp(x, [0, 13, 24, 36, 52, ear[0]],
+                     [nose[2] + 1, nose[2] - 2, nose[2] - 2, corner[2] + 15, corner[2] + 25, ear[2] - 5])
     jaw = np.interp(y, [chin[1], ear[1] - 10], [chin[2] - 10, corner[2] - 22])
-    soft = np.clip((line - z) / 9 + 0.4, 0, 1) * np.clip((ear[1] + 4 - y) / 8, 0, 1) * np.clip((z - jaw) / 14 + 0.5, 0, 1)
-    bare = 0.55 * np.exp(-0.5 * ((x - 15) / 5) ** 2 - 0.5 * ((z - corner[2] + 15) / 4) ** 2)  # on either side below the lower lip
+    soft = np.clip((line - z) / 9 + 0.4, 0, 1) * np.clip((ear[1] + 4 - y) / 8, 0,
+                                                         1) * np.clip((z - jaw) / 14 + 0.5, 0, 1)
+    # on either side below the lower lip
+    bare = 0.55 * np.exp(-0.5 * ((x - 15) / 5) ** 2 - 0.5 * ((z - corner[2] + 15) / 4) ** 2)
     return (soft * (1 - bare) * (1 - np.clip(1.5 * regions(on)["lips"], 0, 1))).astype(np.float32)
 
 
@@ -65,7 +73,8 @@ def _moustache(on: Canvas) -> np.ndarray:
 
 def _sideburns(on: Canvas, radius: float = 9.0) -> np.ndarray:
     """Closeness [N] in [0, 1] to the lines before the ears."""
-    lines = [on.landmarks[a] + t * (on.landmarks[b] - on.landmarks[a]) for side in SIDEBURNS for a, b in zip(side, side[1:], strict=False)
+    lines = [on.landmarks[a] + t * (on.landmarks[b] - on.landmarks[a]) for side in SIDEBURNS
+             for a, b in zip(side, side[1:], strict=False)
              for t in np.linspace(0, 1, 6)]
     forward = np.array([0, -9.0, 0])
     square = np.min([((on.position - at - forward) ** 2).sum(1) for at in lines], axis=0)

@@ -19,27 +19,33 @@ RIMS = 0.1
 
 
 def backdrop(directions: np.ndarray, environment: Environment, light: float, rng: np.random.Generator) -> np.ndarray:
-    """Radiance [S, S, 3] behind the person: the panorama out of focus, or walls and cloth of any colour, with or without things before them."""
+    """Radiance [S, S, 3] behind the person: the panorama out of focus, or walls and cloth of any colour, with or
+    without things before them."""
     size = len(directions)
     kind = rng.random()
     if kind < 0.4:
         ground = background_radiance(environment, directions) * np.float32(np.exp(rng.normal(0, 0.3)))
         ground = cv2.resize(ground, (size, size))
     else:
-        ground = np.broadcast_to(rng.uniform(0.02, 0.8) * np.exp(rng.normal(0, 0.3, 3)), (size, size, 3)).astype(np.float32) * light
+        ground = np.broadcast_to(rng.uniform(0.02, 0.8) * np.exp(rng.normal(0, 0.3, 3)),
+                                 (size, size, 3)).astype(np.float32) * light
         for scale in (2, 5, 12, 40):
-            blobs = rng.normal(0, 0.3 * rng.random(), (scale, scale, 1)) + rng.normal(0, 0.12 * rng.random() / scale**0.4, (scale, scale, 3))
-            ground = ground * np.clip(cv2.resize(np.exp(blobs).astype(np.float32), (size, size), interpolation=cv2.INTER_CUBIC), 0.1, 5)
+            blobs = rng.normal(0, 0.3 * rng.random(),
+                               (scale, scale, 1)) + rng.normal(0, 0.12 * rng.random() / scale**0.4, (scale, scale, 3))
+            ground = ground * np.clip(cv2.resize(np.exp(blobs).astype(np.float32), (size, size),
+                                                 interpolation=cv2.INTER_CUBIC), 0.1, 5)
     if rng.random() < 0.6:
         for _ in range(int(rng.integers(1, 14))):
-            ground = _thing(ground, rng.uniform(-0.1, 1.1, 2) * size, np.exp(rng.uniform(np.log(0.02), np.log(0.4))) * size, light, rng)[0]
+            ground = _thing(ground, rng.uniform(-0.1, 1.1, 2) * size,
+                            np.exp(rng.uniform(np.log(0.02), np.log(0.4))) * size, light, rng)[0]
     blur = np.exp(rng.uniform(np.log(0.4), np.log(9.0)))
     return cv2.GaussianBlur(np.maximum(ground, 0), (0, 0), blur)
 
 
 def cover(radiance: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, light: float, rng: np.random.Generator,
           rims: float = RIMS) -> tuple[np.ndarray, np.ndarray]:
-    """Things before the person, a hat or, in a share `rims` of pictures, the rims of glasses, now and then: they are background."""
+    """Things before the person, a hat or, in a share `rims` of pictures, the rims of glasses, now and then: they are
+    background."""
     size, face = len(radiance), float(np.ptp(landmarks[:, 1]))
     hidden = np.zeros((size, size), np.float32)
     if rng.random() < 0.25:
@@ -49,7 +55,8 @@ def cover(radiance: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, light
     if rng.random() < 0.08:
         crown, chin = landmarks[10], landmarks[152]
         up = (crown - chin) / max(np.linalg.norm(crown - chin), 1e-6)
-        radiance, over = _thing(radiance, crown + up * face * rng.uniform(0.15, 0.6), face * rng.uniform(0.4, 0.75), light, rng, kind="ellipse")
+        radiance, over = _thing(radiance, crown + up * face * rng.uniform(0.15, 0.6), face * rng.uniform(0.4, 0.75),
+                                light, rng, kind="ellipse")
         hidden = np.maximum(hidden, over)
     if rng.random() < rims:
         radiance, over = _glasses(radiance, landmarks, light, rng)
@@ -59,7 +66,8 @@ def cover(radiance: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, light
     return radiance, shares
 
 
-def with_open_mouth(albedo: np.ndarray, shares: np.ndarray, landmarks: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def with_open_mouth(albedo: np.ndarray, shares: np.ndarray, landmarks: np.ndarray,
+                    rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """A mouth that stands open on some: dark, with teeth or without; it belongs to the lips."""
     if rng.random() > 0.25:
         return albedo, shares
@@ -73,7 +81,9 @@ def with_open_mouth(albedo: np.ndarray, shares: np.ndarray, landmarks: np.ndarra
     lower = middle + np.cos(turn)[:, None] * half + np.sin(turn)[:, None] * down * gape
     upper = middle - np.cos(turn)[:, None] * half - np.sin(turn)[:, None] * down * gape * rng.uniform(0.0, 0.5)
     opening = _filled(size, np.concatenate([lower, upper]))
-    teeth = _filled(size, np.concatenate([middle + np.cos(turn)[:, None] * half * 0.9 + np.sin(turn)[:, None] * down * gape * rng.uniform(0.2, 0.8), upper]))
+    teeth = _filled(size,
+                    np.concatenate([middle + np.cos(turn)[:, None] * half * 0.9 + np.sin(turn)[:, None] * down * gape
+                                    * rng.uniform(0.2, 0.8), upper]))
     teeth = teeth * opening * (rng.random() < 0.75)
     there = 1 - shares[..., -1]
     inner = np.float32([0.03, 0.012, 0.01]) * np.float32(rng.uniform(0.3, 2.5))
@@ -84,7 +94,8 @@ def with_open_mouth(albedo: np.ndarray, shares: np.ndarray, landmarks: np.ndarra
     return albedo * (1 - share) + colour * share, shares * (1 - share) + lips * share
 
 
-def _thing(ground: np.ndarray, at: np.ndarray, reach: float, light: float, rng: np.random.Generator, kind: str = "") -> tuple[np.ndarray, np.ndarray]:
+def _thing(ground: np.ndarray, at: np.ndarray, reach: float, light: float, rng: np.random.Generator,
+           kind: str = "") -> tuple[np.ndarray, np.ndarray]:
     """One thing drawn onto a picture, and where it is [S, S]."""
     size = len(ground)
     kind = kind or str(rng.choice(["ellipse", "polygon", "bar"]))
@@ -99,14 +110,17 @@ def _thing(ground: np.ndarray, at: np.ndarray, reach: float, light: float, rng: 
         outline = at + np.stack([along * np.cos(turn), across * np.sin(turn)], 1) @ np.array([[c, s], [-s, c]])
     where = cv2.GaussianBlur(_filled(size, outline), (0, 0), rng.uniform(0.3, 1.5))
     drawn = rng.random()
-    colour = SKINS[rng.integers(len(SKINS))] if drawn < 0.25 else BROWS[rng.integers(len(BROWS))] if drawn < 0.4 else rng.uniform(0.01, 0.9, 3)
-    texture = np.exp(cv2.resize(rng.normal(0, rng.uniform(0.05, 0.5), (24, 24, 1)).astype(np.float32), (size, size), interpolation=cv2.INTER_CUBIC))[..., None]
+    colour = (SKINS[rng.integers(len(SKINS))] if drawn < 0.25 else BROWS[rng.integers(len(BROWS))] if drawn < 0.4
+              else rng.uniform(0.01, 0.9, 3))
+    texture = np.exp(cv2.resize(rng.normal(0, rng.uniform(0.05, 0.5), (24, 24, 1)).astype(np.float32), (size, size),
+                                interpolation=cv2.INTER_CUBIC))[..., None]
     shade = np.float32(light * np.exp(rng.normal(-0.2, 0.6)))
     painted = np.asarray(colour, np.float32) * texture * shade
     return ground * (1 - where[..., None]) + painted * where[..., None], where
 
 
-def _glasses(radiance: np.ndarray, landmarks: np.ndarray, light: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def _glasses(radiance: np.ndarray, landmarks: np.ndarray, light: float,
+             rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """The rims of a pair of glasses, and where they are [S, S]."""
     size = len(radiance)
     over = np.zeros((size, size), np.uint8)
@@ -114,7 +128,8 @@ def _glasses(radiance: np.ndarray, landmarks: np.ndarray, light: float, rng: np.
     for eye in EYES:
         one, other = landmarks[list(eye)]
         reach = 0.85 * np.linalg.norm(other - one)
-        turn, axes = float(np.degrees(np.arctan2(*(other - one)[::-1]))), (max(2, int(reach)), max(2, int(reach * round_)))
+        turn, axes = float(np.degrees(np.arctan2(*(other - one)[::-1]))), (max(2, int(reach)),
+                                                                           max(2, int(reach * round_)))
         cv2.ellipse(over, np.round((one + other) / 2).astype(int).tolist(), axes, turn, 0, 360, 255, thick, cv2.LINE_AA)
     where = over.astype(np.float32) / 255
     colour = np.float32(rng.uniform(0.005, 0.3) * light) * np.exp(rng.normal(0, 0.2, 3)).astype(np.float32)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A whole person, put together: open or closed head, eyes, hair, clothes, and the maps of the skin with and without what grows on it."""
+"""A whole person, put together: open or closed head, eyes, hair, clothes, and the maps of the skin with and without
+what grows on it."""
 
 from __future__ import annotations
 
@@ -24,13 +25,15 @@ from .shape import person_mesh
 PARTS = ("skin", "lips", "brows", "lashes", "beard", "hair", "eyes", "clothes")
 """What is told apart in the truth."""
 OPENEST = 0.2  # lids that are less open than this are shut
-UNDER = {"hair": 0.8, "beard": 0.35, "brows": 0.15}  # how much of the hair's colour the skin between the roots takes where they are densest
+# how much of the hair's colour the skin between the roots takes where they are densest
+UNDER = {"hair": 0.8, "beard": 0.35, "brows": 0.15}
 
 
 @dataclass(frozen=True)
 class Figure:
-    """head: the closed head in the template's topology; opened: the same with its lids as they are; skin: the bare skin's maps; seen float32 [S, S, 3]: its
-    linear albedo between the roots of hair; eye [E, E, 3]: the eyes' albedo; growth: UV map of each growth in [0, 1], [S, S] by part; strands: all hairs."""
+    """head: the closed head in the template's topology; opened: the same with its lids as they are; skin: the bare
+    skin's maps; seen float32 [S, S, 3]: its linear albedo between the roots of hair; eye [E, E, 3]: the eyes' albedo;
+    growth: UV map of each growth in [0, 1], [S, S] by part; strands: all hairs."""
 
     person: Person
     head: Mesh
@@ -44,14 +47,16 @@ class Figure:
 
 
 def make_figure(person: Person | int, size: int = 2048, facekit: Path | None = None) -> Figure:
-    """A person, or the one that a seed stands for, with maps of `size` texels. The same arguments give the same bytes."""
+    """A person, or the one that a seed stands for, with maps of `size` texels. The same arguments give the same
+    bytes."""
     if not isinstance(person, Person):
         person = sample_person(person)
     head = person_mesh(person.seed, facekit)
     opened = open_lids(head, person.openness if person.openness >= OPENEST else 0.0, np.array(person.gaze))
     skin, seen, growth = paint(person, size)
     cloth = shirt(person, head)
-    return Figure(person, head, opened, cloth, skin, seen, eyes.eye_picture(np.array(person.iris), opened.balls[0].radius, person.seed),
+    return Figure(person, head, opened, cloth, skin, seen,
+                  eyes.eye_picture(np.array(person.iris), opened.balls[0].radius, person.seed),
                   growth, grown(person, head, opened, cloth))
 
 
@@ -70,7 +75,8 @@ def paint(person: Person, size: int) -> tuple[Skin, np.ndarray, dict[str, np.nda
         colour = np.asarray(person.brow_colour if part == "brows" else person.hair_colour, np.float32)
         share = (UNDER[part] if person.beard != "stubble" or part != "beard" else 0.1) * where[:, None]
         diffuse = diffuse * (1 - share) + np.minimum(colour, diffuse) * share
-    return skin, on.spread(diffuse.astype(np.float32)), {part: on.spread(where.astype(np.float32)) for part, where in growth.items()}
+    return skin, on.spread(diffuse.astype(np.float32)), {part: on.spread(where.astype(np.float32))
+                                                         for part, where in growth.items()}
 
 
 def grown(person: Person, head: Mesh, opened: OpenHead, cloth: Mesh) -> tuple[Strands, ...]:

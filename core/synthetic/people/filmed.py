@@ -22,7 +22,8 @@ TRACED = f"{__package__}.render"
 """The module that traces every frame's light anew."""
 
 
-def render(work: Path, figure: Figure, light: scene.SceneLight, shot: scene.Shot, bare: bool = False, module: str = TRACED) -> None:
+def render(work: Path, figure: Figure, light: scene.SceneLight, shot: scene.Shot, bare: bool = False,
+           module: str = TRACED) -> None:
     """Renders a person to work/NNNNN.exr, linear; files that exist are kept.
 
     Parameters
@@ -34,18 +35,20 @@ def render(work: Path, figure: Figure, light: scene.SceneLight, shot: scene.Shot
     bare : without hair, lashes and clothes
     module : what is run to do the job
     """
-    parts = {"skin": skin_part(work, figure.opened.skin, figure.skin.diffuse if bare else figure.seen, figure.skin.specular, figure.skin.normal)}
+    parts = {"skin": skin_part(work, figure.opened.skin, figure.skin.diffuse if bare else figure.seen,
+                               figure.skin.specular, figure.skin.normal)}
     for side, ball in zip(("left", "right"), figure.opened.balls, strict=True):
         parts[f"{side}_eye"] = _written(work, f"{side}_eye", ball.mesh, "eyes", figure.eye)
     strands = []
     if not bare:
-        parts["shirt"] = _written(work, "shirt", figure.shirt, "cloth", np.full((2, 2, 3), figure.person.clothes, np.float32))
+        parts["shirt"] = _written(work, "shirt", figure.shirt, "cloth",
+                                  np.full((2, 2, 3), figure.person.clothes, np.float32))
         strands = [_write_strands(work, growth) for growth in figure.strands]
     render_parts(work, figure.person.seed, parts, strands, light, shot, module)
 
 
-def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Path], light: scene.SceneLight, shot: scene.Shot,
-                 module: str = TRACED) -> None:
+def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Path], light: scene.SceneLight,
+                 shot: scene.Shot, module: str = TRACED) -> None:
     """As `render`, of meshes and strands that are files already.
 
     Parameters
@@ -65,8 +68,8 @@ def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Pa
     still = np.tile(np.eye(4), (len(shot.cameras), 1, 1))
     write_json(work / "job.json", {
         "seed": seed, "room": shot.room, "meshes": parts, "strands": [str(path) for path in strands],
-        "leaves": str(work / "leaves.obj") if light.blockers else None, "suffix": ".exr", "out": str(work), "frames": list(shot.frames),
-        "samples": shot.samples,
+        "leaves": str(work / "leaves.obj") if light.blockers else None, "suffix": ".exr", "out": str(work),
+        "frames": list(shot.frames), "samples": shot.samples,
         "cameras": shot.cameras.tolist(), "poses": (still if shot.poses is None else shot.poses).tolist(),
         "sun": asdict(light.sun) | {"direction": light.sun.direction.tolist()} if light.sun else None, "sky": sky,
         "lamps": [asdict(lamp) for lamp in light.lamps], "flash": light.flash,
@@ -77,7 +80,8 @@ def render_parts(work: Path, seed: int, parts: dict[str, dict], strands: list[Pa
 
 
 def skin_part(work: Path, mesh: Mesh, albedo: np.ndarray, specular: np.ndarray, normal: np.ndarray) -> dict:
-    """A skin for render_parts: a mesh with UVs, its linear albedo [S, S, 3], Specular IOR Level [S, S] and unit tangent normals [S, S, 3]."""
+    """A skin for render_parts: a mesh with UVs, its linear albedo [S, S, 3], Specular IOR Level [S, S] and unit tangent
+    normals [S, S, 3]."""
     part = _written(work, "skin", mesh, "skin", albedo)
     images.write_data(work / "specular.png", specular, bits=16)
     images.write_data(work / "normal.png", normal / 2 + 0.5, bits=16)

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pairs of glasses on people: two rims, a bridge and temples as curves before the head, drawn into what a camera sees of it.
+"""Pairs of glasses on people: two rims, a bridge and temples as curves before the head, drawn into what a camera sees
+of it.
 
-The measures are those of frames as opticians sell them: lenses of 42 to 60 mm, bridges of 13 to 23, some 12 mm before the eye, leaning in below by 2 to 12
-degrees.
+The measures are those of frames as opticians sell them: lenses of 42 to 60 mm, bridges of 13 to 23, some 12 mm before
+the eye, leaning in below by 2 to 12 degrees.
 """
 
 from __future__ import annotations
@@ -20,15 +21,16 @@ EYES, BRIDGE, SIDES = ((33, 133), (263, 362)), (168, 6), (234, 454)
 KINDS = ("thick", "thin", "half", "rimless", "sunglasses")
 OFTEN = (0.3, 0.35, 0.12, 0.13, 0.1)
 STEPS, OVER = 96, 3  # points of a rim; drawn pixels along a pixel's side
-COLOURS = np.array([[0.006, 0.006, 0.007], [0.02, 0.012, 0.008], [0.09, 0.035, 0.012], [0.45, 0.33, 0.14], [0.5, 0.5, 0.52], [0.12, 0.12, 0.13],
-                    [0.02, 0.04, 0.15], [0.25, 0.02, 0.03], [0.6, 0.55, 0.5]])
+COLOURS = np.array([[0.006, 0.006, 0.007], [0.02, 0.012, 0.008], [0.09, 0.035, 0.012], [0.45, 0.33, 0.14],
+                    [0.5, 0.5, 0.52], [0.12, 0.12, 0.13], [0.02, 0.04, 0.15], [0.25, 0.02, 0.03], [0.6, 0.55, 0.5]])
 """Linear albedo of black, dark brown, tortoise, gold, silver, gunmetal, blue, red, clear."""
 
 
 @dataclass(frozen=True)
 class Glasses:
-    """rims: two closed curves [STEPS, 3] in metres in the head's axes; bars: bridge and temples, open curves [N, 3]; rim, bar: their thickness in metres;
-    solid: how opaque each rim is along its curve [STEPS]; colour: linear albedo [3]; shiny in [0, 1]; passes [3]: what the lenses let through."""
+    """rims: two closed curves [STEPS, 3] in metres in the head's axes; bars: bridge and temples, open curves [N, 3];
+    rim, bar: their thickness in metres; solid: how opaque each rim is along its curve [STEPS]; colour: linear albedo
+    [3]; shiny in [0, 1]; passes [3]: what the lenses let through."""
 
     rims: tuple[np.ndarray, np.ndarray]
     bars: tuple[np.ndarray, ...]
@@ -41,7 +43,8 @@ class Glasses:
 
 
 def sample_glasses(landmarks: np.ndarray, rng: np.random.Generator, kind: str = "") -> Glasses:
-    """A pair, of any kind or of one of KINDS, for a head whose landmarks [468, 3] lie there, metres, face towards -Y."""
+    """A pair, of any kind or of one of KINDS, for a head whose landmarks [468, 3] lie there, metres, face towards
+    -Y."""
     kind = kind or str(rng.choice(KINDS, p=OFTEN))
     eyes = np.array([landmarks[list(corners)].mean(0) for corners in EYES])
     front = min(eyes[:, 1].mean() - 0.013, landmarks[list(BRIDGE), 1].min() - 0.002) + rng.normal(0, 0.001)
@@ -71,20 +74,25 @@ def sample_glasses(landmarks: np.ndarray, rng: np.random.Generator, kind: str = 
         share = np.linspace(0, 1, 40)[:, None]
         corner = begin + [side * rng.uniform(0.002, 0.006), 0.004, 0.0]
         bars.append(np.concatenate([[begin], corner + share * (end - corner)]))
-    rim = np.exp(rng.uniform(*np.log([0.0025, 0.007]))) if kind in ("thick", "sunglasses") else np.exp(rng.uniform(*np.log([0.0008, 0.0025])))
+    rim = (np.exp(rng.uniform(*np.log([0.0025, 0.007]))) if kind in ("thick", "sunglasses")
+           else np.exp(rng.uniform(*np.log([0.0008, 0.0025]))))
     solid = np.ones(STEPS)
     if kind == "half":
         solid = np.clip(0.5 + 3 * (up + 0.2), 0.12, 1)
     if kind == "rimless":
         rim, solid = 0.0012, np.full(STEPS, rng.uniform(0.1, 0.35))
     colour = COLOURS[rng.integers(len(COLOURS))] * np.exp(rng.normal(0, 0.25)) * np.exp(rng.normal(0, 0.08, 3))
-    passes = rng.uniform(0.86, 0.98) * np.exp(rng.normal(0, 0.02, 3)) if kind != "sunglasses" else rng.uniform(0.03, 0.35) * np.exp(rng.normal(0, 0.2, 3))
-    return Glasses(rims, tuple(bars), float(rim), float(max(0.0011, rim * rng.uniform(0.6, 1.1)) if kind != "rimless" else rng.uniform(0.001, 0.002)), solid,
-                   np.clip(colour, 0.003, 0.85), float(rng.random()), passes)
+    passes = (rng.uniform(0.86, 0.98) * np.exp(rng.normal(0, 0.02, 3)) if kind != "sunglasses"
+              else rng.uniform(0.03, 0.35) * np.exp(rng.normal(0, 0.2, 3)))
+    return Glasses(rims, tuple(bars), float(rim),
+                   float(max(0.0011, rim * rng.uniform(0.6, 1.1)) if kind != "rimless" else rng.uniform(0.001, 0.002)),
+                   solid, np.clip(colour, 0.003, 0.85), float(rng.random()), passes)
 
 
-def put_on(radiance: np.ndarray, view: View, depth: np.ndarray, glasses: Glasses, light: float, rng: np.random.Generator) -> np.ndarray:
-    """The picture [H, W, 3] of a head with the glasses before it. depth [H, W]: how far away in metres what is seen lies; light: radiance of a white thing."""
+def put_on(radiance: np.ndarray, view: View, depth: np.ndarray, glasses: Glasses, light: float,
+           rng: np.random.Generator) -> np.ndarray:
+    """The picture [H, W, 3] of a head with the glasses before it. depth [H, W]: how far away in metres what is seen
+    lies; light: radiance of a white thing."""
     frame, colour = np.zeros(radiance.shape[:2], np.float32), np.zeros(radiance.shape, np.float32)
     lens = np.zeros_like(frame)
     for curve, closed, thick, solid in _curves(glasses):
@@ -101,8 +109,10 @@ def put_on(radiance: np.ndarray, view: View, depth: np.ndarray, glasses: Glasses
             lens = np.maximum(lens, _filled(radiance.shape[:2], pixels))
     colour = colour / np.maximum(frame, 1e-4)[..., None]
     away = rng.normal(0, 0.012, 2) * len(frame) + [0, 0.01 * len(frame)]
-    shadow = cv2.GaussianBlur(cv2.warpAffine(frame, np.float32([[1, 0, away[0]], [0, 1, away[1]]]), frame.shape[::-1]), (0, 0), rng.uniform(0.6, 3))
-    picture = radiance * (1 - (rng.random() < 0.6) * rng.uniform(0.1, 0.6) * shadow[..., None] * (1 - lens[..., None] * 0.3))
+    shadow = cv2.GaussianBlur(cv2.warpAffine(frame, np.float32([[1, 0, away[0]], [0, 1, away[1]]]), frame.shape[::-1]),
+                              (0, 0), rng.uniform(0.6, 3))
+    picture = radiance * (1 - (rng.random() < 0.6) * rng.uniform(0.1, 0.6) * shadow[..., None]
+                          * (1 - lens[..., None] * 0.3))
     passes = np.float32(glasses.passes)
     picture = picture * (1 + lens[..., None] * (passes - 1)) + lens[..., None] * _reflected(frame.shape, light, rng)
     return picture * (1 - frame[..., None]) + colour * frame[..., None]
@@ -111,19 +121,22 @@ def put_on(radiance: np.ndarray, view: View, depth: np.ndarray, glasses: Glasses
 def _curves(glasses: Glasses) -> list[tuple]:
     """(curve, closed, thickness, opacity along it), from the back to the front."""
     bridge, *others = glasses.bars
-    return [*((bar, False, glasses.bar, np.ones(len(bar))) for bar in others), *((rim, True, glasses.rim, glasses.solid) for rim in glasses.rims),
+    return [*((bar, False, glasses.bar, np.ones(len(bar))) for bar in others),
+            *((rim, True, glasses.rim, glasses.solid) for rim in glasses.rims),
             (bridge, False, glasses.bar, np.ones(len(bridge)))]
 
 
-def _drawn(shape: tuple, pixels: np.ndarray, width: np.ndarray, solid: np.ndarray, closed: bool, glasses: Glasses, light: float,
-           rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def _drawn(shape: tuple, pixels: np.ndarray, width: np.ndarray, solid: np.ndarray, closed: bool, glasses: Glasses,
+           light: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """How much of each pixel [H, W] a curve covers, and its radiance there [H, W, 3]."""
     big = (shape[0] * OVER, shape[1] * OVER)
     where, shade = np.zeros(big, np.float32), np.zeros((*big, 3), np.float32)
     count = len(pixels)
     base = glasses.colour * light * np.exp(rng.normal(-0.3, 0.4))
     along = np.interp(np.arange(count), np.linspace(0, count, 7), np.exp(rng.normal(0, 0.25, 7)))
-    bright = glasses.shiny * 0.5 * light * np.exp(-0.5 * ((np.arange(count)[:, None] - rng.uniform(0, count, 3)) / (0.03 * count + 1)) ** 2).max(1)
+    bright = glasses.shiny * 0.5 * light * np.exp(-0.5
+                                                  * ((np.arange(count)[:, None] - rng.uniform(0, count, 3))
+                                                     / (0.03 * count + 1)) ** 2).max(1)
     edge, lean = np.exp(rng.normal(0.3, 0.5)), rng.normal(0, 0.25, 2)
     points = np.round(OVER * pixels).astype(int)
     for step in range(count if closed else count - 1):
@@ -137,7 +150,8 @@ def _drawn(shape: tuple, pixels: np.ndarray, width: np.ndarray, solid: np.ndarra
         cv2.line(shade, points[step].tolist(), points[other].tolist(), value, thick + 2)
         if thick > 3:
             shift = np.round(lean * thick).astype(int)
-            cv2.line(shade, (points[step] + shift).tolist(), (points[other] + shift).tolist(), (np.array(value) * edge).tolist(), thick // 3)
+            cv2.line(shade, (points[step] + shift).tolist(), (points[other] + shift).tolist(),
+                     (np.array(value) * edge).tolist(), thick // 3)
     size = shape[::-1]
     return cv2.resize(where, size, interpolation=cv2.INTER_AREA), cv2.resize(shade, size, interpolation=cv2.INTER_AREA)
 

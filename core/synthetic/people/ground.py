@@ -20,7 +20,8 @@ from ..spots import strew
 
 @dataclass(frozen=True)
 class Ground:
-    """position [N, 3] metres and normal [N, 3] of a person's skin under each texel of the template's canvas of GROUND texels."""
+    """position [N, 3] metres and normal [N, 3] of a person's skin under each texel of the template's canvas of GROUND
+    texels."""
 
     canvas: Canvas
     position: np.ndarray
@@ -31,11 +32,13 @@ def ground_of(skin: Mesh) -> Ground:
     """Of a person's closed head, in the template's topology."""
     on, (face, bary) = canvas(GROUND), _texels()
     normals = raster.interpolate(vertex_normals(skin), skin.faces, face, bary)
-    return Ground(on, raster.interpolate(skin.vertices, skin.faces, face, bary), normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9))
+    return Ground(on, raster.interpolate(skin.vertices, skin.faces, face, bary),
+                  normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9))
 
 
 def strewn(ground: Ground, density: np.ndarray, way: np.ndarray, rng: np.random.Generator) -> Roots:
-    """Roots at `density` [N] hairs per mm^2 whose hairs lie along `way` [N, 3] (template's space, any length), flattened onto the skin."""
+    """Roots at `density` [N] hairs per mm^2 whose hairs lie along `way` [N, 3] (template's space, any length),
+    flattened onto the skin."""
     at, texel = strew(ground.canvas, density, rng)
     offset = (at - ground.canvas.position[texel]) / 1000
     normal = ground.normal[texel]
@@ -46,7 +49,8 @@ def strewn(ground: Ground, density: np.ndarray, way: np.ndarray, rng: np.random.
 def turned(roots: Roots, radians: np.ndarray) -> Roots:
     """The same roots with their directions turned about the skin's normal by `radians` [M]."""
     c, s = np.cos(radians)[:, None], np.sin(radians)[:, None]
-    return Roots(roots.position, roots.normal, c * roots.direction + s * np.cross(roots.normal, roots.direction), roots.at)
+    return Roots(roots.position, roots.normal, c * roots.direction + s * np.cross(roots.normal, roots.direction),
+                 roots.at)
 
 
 def _flat(way: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -14,15 +14,18 @@ from .ground import Ground, strewn, turned
 from .person import Person
 
 COUNT = {"cropped": 34000, "short": 26000, "long": 24000}
-RADIUS_M = {"cropped": 0.00006, "short": 0.00008, "long": 0.00010}  # fewer hairs than people have, each a little thicker
+# fewer hairs than people have, each a little thicker
+RADIUS_M = {"cropped": 0.00006, "short": 0.00008, "long": 0.00010}
 STEPS = {"cropped": 4, "short": 10, "long": 20}
 CROWN_MM = np.array([8.0, 120.0, 95.0])
 NAPE_MM, BEHIND_MM = -72.0, 100.0  # below the nape, and below the ears before them, grows nothing
 FRINGE_MM = 56.0  # half the width of a fringe of long hair
 AXIS = np.array([0.0, 0.075])  # x and y about which long hair hangs, metres
-GATHER = 0.092, 0.125, 0.12  # half the width and depth beyond which it is drawn in, and the share by which single hairs may pass them
+# half the width and depth beyond which it is drawn in, and the share by which single hairs may pass them
+GATHER = 0.092, 0.125, 0.12
 SIDEBURN_MM = 34.0, 56.0, -6.0, 40.0  # front, back, bottom and top of the hair before the ears
-FACE = np.array([0.066, 0.026])  # half the width of the face and the depth (y) before which long hair does not hang, metres
+# half the width of the face and the depth (y) before which long hair does not hang, metres
+FACE = np.array([0.066, 0.026])
 
 
 def scalp_density(on: Canvas, seed: int) -> np.ndarray:
@@ -39,7 +42,8 @@ def _before_the_ears(on: Canvas) -> np.ndarray:
     """Where hair of the head comes down between temple and ear, [N] in [0, 1]."""
     x, y, z = on.position.T
     band = np.clip((y - SIDEBURN_MM[0]) / 5, 0, 1) * np.clip((SIDEBURN_MM[1] - y) / 4, 0, 1) * (np.abs(x) > 50)
-    return band * np.clip((z - SIDEBURN_MM[2]) / 8, 0, 1) * np.clip((SIDEBURN_MM[3] - z) / 8, 0, 1) * (1 - regions(on)["ears"])
+    return band * np.clip((z - SIDEBURN_MM[2]) / 8, 0,
+                          1) * np.clip((SIDEBURN_MM[3] - z) / 8, 0, 1) * (1 - regions(on)["ears"])
 
 
 def head_hair(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.Generator) -> Strands:
@@ -53,20 +57,24 @@ def head_hair(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.
     clearance = rng.uniform(0.0005, 1.0, count)
     if style == "cropped":
         length = length * np.interp(roots.at[:, 2], [-60, 70], [0.45, 1.0])  # shorter at the sides
-        points = grow(roots, length, rng.normal(0.75, 0.15, count).clip(0.2), skin, -0.3 * roots.normal, 0.25 * length, STEPS[style])
+        points = grow(roots, length, rng.normal(0.75, 0.15, count).clip(0.2), skin, -0.3 * roots.normal, 0.25 * length,
+                      STEPS[style])
     elif style == "short":
         length = length * np.interp(roots.at[:, 2], [-70, 20, 80], [0.22, 0.5, 1.0])
         if person.fringe:
             length = np.where(front > 0.4, np.minimum(1.25 * length, _to_brows(roots.at)), length)
         above = 0.001 + 0.24 * clearance * length
-        points = grow(roots, length, rng.normal(0.55, 0.12, count).clip(0.1), skin, _weight(front, 0.55, 0.9), above, STEPS[style])
+        points = grow(roots, length, rng.normal(0.55, 0.12, count).clip(0.1), skin, _weight(front, 0.55, 0.9), above,
+                      STEPS[style])
     else:
         fringe = (front > 0.4) & (np.abs(roots.at[:, 0]) < FRINGE_MM) & person.fringe
         length = np.where(fringe, np.minimum(length, _to_brows(roots.at)), length)
         pull = np.where(fringe[:, None], [0, 0.1, -1.2], [0, 0.15, -3.6])
-        points = grow(roots, length, rng.normal(0.3, 0.08, count).clip(0.05), skin, pull, 0.002 + 0.007 * clearance, STEPS[style])
+        points = grow(roots, length, rng.normal(0.3, 0.08, count).clip(0.05), skin, pull, 0.002 + 0.007 * clearance,
+                      STEPS[style])
         points = np.where(fringe[:, None, None], points, _beside_the_face(points))
-    points = waved(points, roots.at, person.curl * {"cropped": 0.0008, "short": 0.004, "long": 0.006}[style], 14.0, rng, 0.2)
+    points = waved(points, roots.at, person.curl * {"cropped": 0.0008, "short": 0.004, "long": 0.006}[style], 14.0, rng,
+                   0.2)
     if style != "cropped":
         points = clumped(points, 26, 0.55, rng)
         points = clumped(points, 8, 0.35, rng)
@@ -77,7 +85,8 @@ def head_hair(person: Person, ground: Ground, skin: SkinSurface, rng: np.random.
 
 
 def _gathered(points: np.ndarray) -> np.ndarray:
-    """Long hair [M, K, 3] that stands far off below the ears' tops, drawn in: its neighbours hold it. What lies on the shoulders stays."""
+    """Long hair [M, K, 3] that stands far off below the ears' tops, drawn in: its neighbours hold it. What lies on the
+    shoulders stays."""
     x, y, z = np.moveaxis(points.astype(np.float64), -1, 0)
     across = np.stack([x, y - AXIS[1]], -1)
     reach = np.linalg.norm(across / GATHER[:2], axis=-1)
@@ -126,4 +135,5 @@ def _beside_the_face(points: np.ndarray) -> np.ndarray:
     below = np.clip((0.055 - z) / 0.03, 0, 1)
     inside = np.clip((FACE[1] - y) / 0.01, 0, 1) * below
     aside = np.where(x < 0, -1, 1) * np.maximum(np.abs(x), FACE[0] + 0.006 * np.abs(np.sin(700 * x)))
-    return np.stack([x * (1 - inside) + aside * inside, y * (1 - inside) + np.maximum(y, FACE[1] - 0.008) * inside, z], -1).astype(np.float32)
+    return np.stack([x * (1 - inside) + aside * inside, y * (1 - inside) + np.maximum(y, FACE[1] - 0.008) * inside, z],
+                    -1).astype(np.float32)

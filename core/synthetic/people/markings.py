@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What may be on a skin beyond the plausible, drawn into a picture as logarithms of factors of the albedo: a delighter must not take it for light."""
+"""What may be on a skin beyond the plausible, drawn into a picture as logarithms of factors of the albedo: a delighter
+must not take it for light."""
 
 from __future__ import annotations
 
@@ -24,13 +25,17 @@ def moles(side: int, rng: np.random.Generator) -> np.ndarray:
         spot = np.zeros((side, side), np.uint8)
         at, radius = rng.uniform(0.1, 0.9, 2) * side, np.exp(rng.uniform(np.log(0.5), np.log(6.0)))
         axes = (radius * np.exp(rng.normal(0, 0.2, 2)) * 16).astype(int)
-        cv2.ellipse(spot, (at * 16).astype(int).tolist(), axes.tolist(), float(rng.uniform(0, 180)), 0, 360, 255, -1, cv2.LINE_AA, 4)
-        log += (spot.astype(np.float32) / 255)[..., None] * (rng.normal(-0.5, 0.4) + rng.normal(0, 0.1, 3)).astype(np.float32)
+        cv2.ellipse(spot, (at * 16).astype(int).tolist(), axes.tolist(), float(rng.uniform(0, 180)), 0, 360, 255, -1,
+                    cv2.LINE_AA, 4)
+        log += (spot.astype(np.float32) / 255)[...,
+                                               None] * (rng.normal(-0.5, 0.4)
+                                                        + rng.normal(0, 0.1, 3)).astype(np.float32)
     return np.clip(log, -1.6, 1.0)
 
 
 def tufts(side: int, landmarks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Tufts of short hairs anywhere on a face [S, S, 3] as logarithms, dense or sparse, dark or fair: what a brow is, where no brow is."""
+    """Tufts of short hairs anywhere on a face [S, S, 3] as logarithms, dense or sparse, dark or fair: what a brow is,
+    where no brow is."""
     log = np.zeros((side, side, 3), np.float32)
     low, high = landmarks.min(0), landmarks.max(0)
     face = float((high - low).max())
@@ -47,5 +52,6 @@ def tufts(side: int, landmarks: np.ndarray, rng: np.random.Generator) -> np.ndar
         lines = [np.round(16 * np.stack(pair)).astype(np.int32) for pair in zip(roots, ends, strict=True)]
         cv2.polylines(strands, lines, False, 255, width, cv2.LINE_AA, 4)
         colour = rng.normal(-0.9, 0.5) + rng.normal(0, 0.12, 3)
-        log += (cv2.GaussianBlur(strands, (0, 0), rng.uniform(0.3, 1.2)).astype(np.float32) / 255)[..., None] * colour.astype(np.float32)
+        log += (cv2.GaussianBlur(strands, (0, 0), rng.uniform(0.3, 1.2)).astype(np.float32)
+                / 255)[..., None] * colour.astype(np.float32)
     return np.clip(log, -2.2, 1.2)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What moves while a phone films: the head that sways on its neck, the picture that smears while a row is exposed, rows that are read one after the other."""
+"""What moves while a phone films: the head that sways on its neck, the picture that smears while a row is exposed, rows
+that are read one after the other."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ FAR_M = 1.6  # what is behind the person
 
 
 def sway(frames: int, millimetres: float, degrees: float, rng: np.random.Generator) -> np.ndarray:
-    """Head-to-world matrices [frames, 4, 4] of a person who keeps still as well as people do: smooth motion of these deviations per axis, of mean zero."""
+    """Head-to-world matrices [frames, 4, 4] of a person who keeps still as well as people do: smooth motion of these
+    deviations per axis, of mean zero."""
     path = gaussian_filter1d(rng.normal(size=(frames + 8 * PERIOD, 6)), PERIOD, axis=0)[4 * PERIOD:4 * PERIOD + frames]
     path = (path - path.mean(0)) / np.maximum(path.std(0), 1e-9)
     turn = Rotation.from_rotvec(np.radians(degrees) * path[:, :3]).as_matrix()
@@ -29,16 +31,18 @@ def sway(frames: int, millimetres: float, degrees: float, rng: np.random.Generat
     return poses
 
 
-def image_motion(caster: raster.RayCaster, views: tuple[View, View, View], poses: np.ndarray, coarse: float = 0.125) -> np.ndarray:
-    """How far each pixel of the middle view moves in a frame's time, [H, W, 2] in pixels: from the views before and after it, the head (`caster`) being where
-    poses [3, 4, 4] say; all else stands still."""
+def image_motion(caster: raster.RayCaster, views: tuple[View, View, View], poses: np.ndarray,
+                 coarse: float = 0.125) -> np.ndarray:
+    """How far each pixel of the middle view moves in a frame's time, [H, W, 2] in pixels: from the views before and
+    after it, the head (`caster`) being where poses [3, 4, 4] say; all else stands still."""
     before, now, after = views
     width, height = round(now.width * coarse), round(now.height * coarse)
     y, x = np.mgrid[0:height, 0:width]
     pixels = (np.stack([x.ravel(), y.ravel()], -1) + 0.5) * [now.width / width, now.height / height]
     rays = now.rays(pixels)
     back = np.linalg.inv(poses[1])
-    _, _, depth = caster.first_hits(np.repeat((back[:3, :3] @ now.centre + back[:3, 3])[None], len(rays), 0), rays @ back[:3, :3].T)
+    _, _, depth = caster.first_hits(np.repeat((back[:3, :3] @ now.centre + back[:3, 3])[None], len(rays), 0),
+                                    rays @ back[:3, :3].T)
     head = np.isfinite(depth)
     points = now.centre + rays * np.where(head, depth, FAR_M)[:, None]
     moved = []
@@ -50,14 +54,17 @@ def image_motion(caster: raster.RayCaster, views: tuple[View, View, View], poses
 
 
 def rolling_shutter(picture: np.ndarray, flow: np.ndarray, readout: float) -> np.ndarray:
-    """A picture [H, W, C] whose rows are read during `readout` of a frame's time, the middle one on time; flow [H, W, 2] in pixels per frame."""
+    """A picture [H, W, C] whose rows are read during `readout` of a frame's time, the middle one on time; flow [H, W,
+    2] in pixels per frame."""
     rows = (np.arange(len(picture)) + 0.5) / len(picture) - 0.5
     return shifted(picture, flow * (readout * rows)[:, None, None])
 
 
 def motion_blur(picture: np.ndarray, flow: np.ndarray, shutter: float) -> np.ndarray:
-    """The mean of a picture [H, W, C] over an exposure of `shutter` of a frame's time, along the flow [H, W, 2] in pixels per frame."""
-    return np.mean([shifted(picture, flow * t) for t in shutter * (np.arange(TAPS) + 0.5 - TAPS / 2) / TAPS], axis=0, dtype=np.float32)
+    """The mean of a picture [H, W, C] over an exposure of `shutter` of a frame's time, along the flow [H, W, 2] in
+    pixels per frame."""
+    return np.mean([shifted(picture, flow * t) for t in shutter * (np.arange(TAPS) + 0.5 - TAPS / 2) / TAPS], axis=0,
+                   dtype=np.float32)
 
 
 def shifted(picture: np.ndarray, by: np.ndarray) -> np.ndarray:

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From linear light to what a phone stores: exposure, noise, noise reduction, tone curve, local contrast, sharpening with its halo, compression.
+"""From linear light to what a phone stores: exposure, noise, noise reduction, tone curve, local contrast, sharpening
+with its halo, compression.
 
-Each step is a function of a picture float32 [H, W, 3] and of its own parameters; `develop` does them in a phone's order. What moves is in motion.py.
+Each step is a function of a picture float32 [H, W, 3] and of its own parameters; `develop` does them in a phone's
+order. What moves is in motion.py.
 """
 
 from __future__ import annotations
@@ -17,10 +19,11 @@ from ..pigment import LUMINANCE
 
 @dataclass(frozen=True)
 class Phone:
-    """shot, read: the noise's variance is shot x signal + read^2, linear; reduction: strength of noise reduction in [0, 1]; contrast: of the tone curve, 0 is
-    none; shoulder: sRGB level from which highlights are rolled off; local: local contrast, and its radius as a share of the height; sharpening, and its radius
-    in pixels; crf: of H.264; readout, shutter: share of a frame's time in which the rows are read one after the other, and in which each is exposed; sway_mm,
-    sway_degrees: deviations of the head's place and turn."""
+    """shot, read: the noise's variance is shot x signal + read^2, linear; reduction: strength of noise reduction in [0,
+    1]; contrast: of the tone curve, 0 is none; shoulder: sRGB level from which highlights are rolled off; local: local
+    contrast, and its radius as a share of the height; sharpening, and its radius in pixels; crf: of H.264; readout,
+    shutter: share of a frame's time in which the rows are read one after the other, and in which each is exposed;
+    sway_mm, sway_degrees: deviations of the head's place and turn."""
 
     shot: float
     read: float
@@ -42,15 +45,19 @@ def sample_phone(seed: int) -> Phone:
     """A phone at random, from a plain one in good light to a heavy hand in the dark."""
     rng = np.random.default_rng([seed, 70])
     noise = np.exp(rng.uniform(np.log(0.002), np.log(0.012)))
-    return Phone(shot=float(noise**2 * 4), read=float(noise / 4), reduction=float(rng.uniform(0.2, 0.9)), contrast=float(rng.uniform(0.0, 0.45)),
-                 shoulder=float(rng.uniform(0.72, 0.9)), local=float(rng.uniform(0.0, 0.25)), local_radius=float(rng.uniform(0.02, 0.06)),
-                 sharpening=float(rng.uniform(0.1, 0.8)), sharpening_px=float(rng.uniform(0.7, 1.4)), crf=int(rng.integers(17, 24)),
-                 readout=float(rng.uniform(0.2, 0.7)), shutter=float(rng.uniform(0.1, 0.5)), sway_mm=float(rng.uniform(0.4, 1.6)),
-                 sway_degrees=float(rng.uniform(0.1, 0.6)))
+    return Phone(shot=float(noise**2 * 4), read=float(noise / 4), reduction=float(rng.uniform(0.2, 0.9)),
+                 contrast=float(rng.uniform(0.0, 0.45)),
+                 shoulder=float(rng.uniform(0.72, 0.9)), local=float(rng.uniform(0.0, 0.25)),
+                 local_radius=float(rng.uniform(0.02, 0.06)),
+                 sharpening=float(rng.uniform(0.1, 0.8)), sharpening_px=float(rng.uniform(0.7, 1.4)),
+                 crf=int(rng.integers(17, 24)),
+                 readout=float(rng.uniform(0.2, 0.7)), shutter=float(rng.uniform(0.1, 0.5)),
+                 sway_mm=float(rng.uniform(0.4, 1.6)), sway_degrees=float(rng.uniform(0.1, 0.6)))
 
 
 def develop(linear: np.ndarray, phone: Phone, gain: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """sRGB [H, W, 3] in [0, 1] of scene light; `gain` [3] is the exposure and white balance. Compression is left to what stores the picture."""
+    """sRGB [H, W, 3] in [0, 1] of scene light; `gain` [3] is the exposure and white balance. Compression is left to
+    what stores the picture."""
     sensed = np.clip(noisy(np.clip(linear * gain, 0, 4), phone.shot, phone.read, rng), 0, None)
     picture = tone(reduced(sensed, phone.reduction, phone.shot, phone.read), phone.contrast, phone.shoulder)
     picture = with_local_contrast(picture, phone.local, phone.local_radius * len(picture))
@@ -59,22 +66,25 @@ def develop(linear: np.ndarray, phone: Phone, gain: np.ndarray, rng: np.random.G
 
 def noisy(linear: np.ndarray, shot: float, read: float, rng: np.random.Generator) -> np.ndarray:
     """A sensor's noise: photons and reading, of variance shot x signal + read^2."""
-    return (linear + rng.standard_normal(linear.shape, np.float32) * np.sqrt(shot * np.maximum(linear, 0) + read**2)).astype(np.float32)
+    return (linear + rng.standard_normal(linear.shape, np.float32)
+            * np.sqrt(shot * np.maximum(linear, 0) + read**2)).astype(np.float32)
 
 
 def reduced(linear: np.ndarray, strength: float, shot: float, read: float) -> np.ndarray:
-    """Noise reduction that keeps edges (bilateral, in the space where the noise is even), mixed in by `strength`: fine texture goes with the noise."""
+    """Noise reduction that keeps edges (bilateral, in the space where the noise is even), mixed in by `strength`: fine
+    texture goes with the noise."""
     if strength <= 0:
         return linear
-    even = (2 / max(shot, 1e-9) * np.sqrt(np.maximum(shot * linear + read**2, 0))).astype(np.float32)  # deviation 1 everywhere (Anscombe 1948)
+    # deviation 1 everywhere (Anscombe 1948)
+    even = (2 / max(shot, 1e-9) * np.sqrt(np.maximum(shot * linear + read**2, 0))).astype(np.float32)
     smooth = np.maximum(cv2.bilateralFilter(even, 5, 3.0, 1.5), 0)
     smooth = ((smooth * shot / 2) ** 2 - read**2) / max(shot, 1e-9)
     return (linear * (1 - strength) + smooth * strength).astype(np.float32)
 
 
 def tone(linear: np.ndarray, contrast: float, shoulder: float) -> np.ndarray:
-    """Linear [..., 3] to sRGB under a phone's curve: more contrast about the middle (0, 1/2 and 1 stay, the slope at 1/2 is 1 + contrast / 2), and a shoulder
-    from which brighter light approaches white instead of clipping."""
+    """Linear [..., 3] to sRGB under a phone's curve: more contrast about the middle (0, 1/2 and 1 stay, the slope at
+    1/2 is 1 + contrast / 2), and a shoulder from which brighter light approaches white instead of clipping."""
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
     over = np.maximum(srgb - shoulder, 0) / (1 - shoulder)
     srgb = np.where(srgb > shoulder, shoulder + (1 - shoulder) * over / (1 + over), srgb)
@@ -83,7 +93,8 @@ def tone(linear: np.ndarray, contrast: float, shoulder: float) -> np.ndarray:
 
 
 def with_local_contrast(srgb: np.ndarray, amount: float, radius: float) -> np.ndarray:
-    """What differs from its surroundings (a Gaussian of `radius` pixels on the luma) by 1 + amount as much; brighter and darker, not more colourful."""
+    """What differs from its surroundings (a Gaussian of `radius` pixels on the luma) by 1 + amount as much; brighter
+    and darker, not more colourful."""
     if amount <= 0:
         return srgb
     luma = (srgb @ LUMINANCE).astype(np.float32)

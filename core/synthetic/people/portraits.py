@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Portraits of people whose shading is known, for a delighter to learn what is light and what is hair, a mole or a stain.
+"""Portraits of people whose shading is known, for a delighter to learn what is light and what is hair, a mole or a
+stain.
 
-The shading of what grows on a face, and of its eyes, is that of the bare skin there: *light knows no brows*. The colours are varied far beyond the plausible.
+The shading of what grows on a face, and of its eyes, is that of the bare skin there: *light knows no brows*. The
+colours are varied far beyond the plausible.
 """
 
 from __future__ import annotations
@@ -36,16 +38,18 @@ SIDE = 256
 CLOSEST, WIDEST = 1.25, 2.0  # side of the picture in sides of the face's landmarks
 RAYS = 160
 STRONGEST = 25.0
-"""Of a lamp's irradiance over pi, where the sky's radiance is one in the mean: the sun is some nine times its sky, a lamp in a dark room more."""
+"""Of a lamp's irradiance over pi, where the sky's radiance is one in the mean: the sun is some nine times its sky, a
+lamp in a dark room more."""
 BARE = ("skin", "lips", "clothes")
 """Parts whose own shading is what a delighter is to find."""
 
 
 @dataclass(frozen=True)
 class RelightableView:
-    """A sight of a person with what any light needs. unlit: what is seen; position float16 [S, S, 3] of it in metres about the head's middle; and of the
-    bare head alone, as a capture would register it: here bool [S, S], normal int8 [S, S, 3] of 127, transfer float16 [S, S, 9] of the sky's coefficients and
-    reach uint8 [S, S, LAMPS] of 255, what it lets through to itself."""
+    """A sight of a person with what any light needs. unlit: what is seen; position float16 [S, S, 3] of it in metres
+    about the head's middle; and of the bare head alone, as a capture would register it: here bool [S, S], normal int8
+    [S, S, 3] of 127, transfer float16 [S, S, 9] of the sky's coefficients and reach uint8 [S, S, LAMPS] of 255, what it
+    lets through to itself."""
 
     unlit: Unlit
     position: np.ndarray
@@ -86,13 +90,14 @@ class Sitter:
         normal[here], transfer[here] = towards, raster.interpolate(self.transfer, mesh.faces, face[here], bary[here])
         for k, lamp in enumerate(unlit.lamps):
             reach[here, k] = ~self.bald.blocked(points, np.repeat(lamp[None], len(points), 0))
-        return RelightableView(unlit, self._position(view), here, np.round(127 * normal).astype(np.int8), transfer.astype(np.float16),
-                               np.round(255 * reach).astype(np.uint8))
+        return RelightableView(unlit, self._position(view), here, np.round(127 * normal).astype(np.int8),
+                               transfer.astype(np.float16), np.round(255 * reach).astype(np.uint8))
 
     def _position(self, view: View) -> np.ndarray:
         face, bary, _ = raster.render_view(self.scene.whole, view, 1)
         mesh = self.scene.whole.mesh
-        points = raster.interpolate(mesh.vertices, mesh.faces, np.maximum(face, 0), bary) - self.bald.mesh.vertices.mean(0)
+        points = raster.interpolate(mesh.vertices, mesh.faces, np.maximum(face, 0),
+                                    bary) - self.bald.mesh.vertices.mean(0)
         return np.where(face[..., None] >= 0, points, 0).astype(np.float16)
 
 
@@ -128,15 +133,19 @@ def colours_of(stage: RelightableView, rng: np.random.Generator) -> Colours:
     return Colours(*with_open_mouth(albedo, shares, stage.unlit.landmarks, rng))
 
 
-def portray(stage: RelightableView, colours: Colours, rng: np.random.Generator, panoramas: list[np.ndarray] = ()) -> Portrait:
-    """A person under a random light. Where hair grows, and on the eyes, `even` is that of the bare head; `fitted` is that of all pixels, row by row, and 0
-    off the bare head."""
+def portray(stage: RelightableView, colours: Colours, rng: np.random.Generator,
+            panoramas: list[np.ndarray] = ()) -> Portrait:
+    """A person under a random light. Where hair grows, and on the eyes, `even` is that of the bare head; `fitted` is
+    that of all pixels, row by row, and 0 off the bare head."""
     sight, (albedo, shares) = stage.unlit, (colours.albedo, colours.shares)
-    environment = panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas) and rng.random() < 0.6 else made_environment(rng)
+    environment = (panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas)
+                   and rng.random() < 0.6 else made_environment(rng))
     sky = (BASIS.T @ environment.radiance * (4 * np.pi / LIGHTS)).astype(np.float32)
     lamps, tints, before = _lamps(stage, environment, rng)
     radius = np.exp(rng.uniform(np.log(0.2), np.log(2.5)))
-    (diffuse, shine), (own, own_shine) = (_lit(stage, surface, sky, lamps, tints, before, radius) for surface in _surfaces(stage, shares, sky, rng))
+    (diffuse, shine), (own,
+                       own_shine) = (_lit(stage, surface, sky, lamps, tints, before, radius)
+                                     for surface in _surfaces(stage, shares, sky, rng))
     seen = shares[..., :-1].sum(-1) > 0.5
     light = float(np.mean(diffuse[seen])) if seen.any() else 1.0
     behind = shares[..., -1:]
@@ -147,20 +156,24 @@ def portray(stage: RelightableView, colours: Colours, rng: np.random.Generator, 
     tone = (albedo[face] if face.sum() > 50 else albedo[seen] if seen.any() else albedo.reshape(-1, 3)).mean(0)
     grown = 1 - shares[..., [PARTS.index(name) for name in (*BARE, "background")]].sum(-1)
     grown = (np.clip(grown, 0, 1) * stage.here)[..., None]
-    # What the camera would make of skin of one tone under this light: its curve bends pigment, too, and that is to stay in the albedo.
+    # What the camera would make of skin of one tone under this light: its curve bends pigment, too, and that is to stay
+    # in the albedo.
     even = tone * ((1 - grown) * diffuse + grown * own) + (1 - grown) * shine + grown * own_shine
     picture, below = np.split(curve(np.concatenate([linear, np.clip(even * gains, 0, 1).astype(np.float32)]), rng), 2)
     even = (images.srgb_to_linear(below) / np.maximum(tone, 0.004)).astype(np.float32)
     head = (1 - shares[..., -1]).astype(np.float32)
     shading = images.srgb_to_linear(picture) / np.maximum(albedo, 0.004) * head[..., None]
-    skin = np.clip(head - shares[..., PARTS.index("hair")] - shares[..., PARTS.index("clothes")], 0, 1)  # what nobody can tell is not asked for
+    # what nobody can tell is not asked for
+    skin = np.clip(head - shares[..., PARTS.index("hair")] - shares[..., PARTS.index("clothes")], 0, 1)
     shadow, strong = _shadow(stage, lamps, tints, before, grown, diffuse)
-    return Portrait(develop(picture, rng), albedo * head[..., None], shading.astype(np.float32), even, shadow, strong, skin, skin, skin,
-                    _fitted(stage, environment, lamps, tints, tone * gains, rng))
+    return Portrait(develop(picture, rng), albedo * head[..., None], shading.astype(np.float32), even, shadow, strong,
+                    skin, skin, skin, _fitted(stage, environment, lamps, tints, tone * gains, rng))
 
 
-def _lamps(stage: RelightableView, environment: Environment, rng: np.random.Generator) -> tuple[list[int], list[np.ndarray], list]:
-    """Which of the sight's lamps shine, their colours [3] as irradiance over pi, and what gobos let through [S, S] or 1."""
+def _lamps(stage: RelightableView, environment: Environment,
+           rng: np.random.Generator) -> tuple[list[int], list[np.ndarray], list]:
+    """Which of the sight's lamps shine, their colours [3] as irradiance over pi, and what gobos let through [S, S] or
+    1."""
     chosen, tints, before = [], [], []
     side = len(stage.position)
     for k in rng.permutation(len(stage.unlit.lamps))[:rng.choice([0, 1, 1, 1, 1, 2])]:
@@ -168,7 +181,8 @@ def _lamps(stage: RelightableView, environment: Environment, rng: np.random.Gene
         tint = strength * np.exp([0.6 * warm, rng.normal(0, 0.04), -warm])
         if environment.colour.any() and rng.random() < 0.5:
             tint = strength * environment.colour / max(float(environment.colour.mean()), 1e-6)
-        lost = gobo(stage.position.reshape(-1, 3).astype(np.float32), stage.unlit.lamps[k], 0.01, str(rng.choice(GOBOS)), rng)
+        lost = gobo(stage.position.reshape(-1, 3).astype(np.float32), stage.unlit.lamps[k], 0.01,
+                    str(rng.choice(GOBOS)), rng)
         chosen.append(int(k))
         tints.append(tint.astype(np.float32))
         before.append(1 - np.reshape(lost, (side, side)).astype(np.float32) if np.ndim(lost) else 1.0)
@@ -177,8 +191,8 @@ def _lamps(stage: RelightableView, environment: Environment, rng: np.random.Gene
 
 @dataclass(frozen=True)
 class _Surface:
-    """normal [S, S, 3]; reach [S, S, LAMPS] of the lamps; sky [S, S, 3] irradiance over pi; free [S, S, 1] of the sky; there [S, S]: what light spreads in;
-    rough [S, S] and reflectance [S, S, 1]: of its gloss."""
+    """normal [S, S, 3]; reach [S, S, LAMPS] of the lamps; sky [S, S, 3] irradiance over pi; free [S, S, 1] of the sky;
+    there [S, S]: what light spreads in; rough [S, S] and reflectance [S, S, 1]: of its gloss."""
 
     normal: np.ndarray
     reach: np.ndarray
@@ -189,7 +203,8 @@ class _Surface:
     reflectance: np.ndarray
 
 
-def _surfaces(stage: RelightableView, shares: np.ndarray, sky: np.ndarray, rng: np.random.Generator) -> tuple[_Surface, _Surface]:
+def _surfaces(stage: RelightableView, shares: np.ndarray, sky: np.ndarray,
+              rng: np.random.Generator) -> tuple[_Surface, _Surface]:
     """What is seen, and the bare head below."""
     sight, lambert = stage.unlit, np.float32(per_function(LAMBERT))
     normal, smooth = sight.normal.astype(np.float32) / 127, stage.normal.astype(np.float32) / 127
@@ -198,20 +213,23 @@ def _surfaces(stage: RelightableView, shares: np.ndarray, sky: np.ndarray, rng: 
     own = np.maximum(transfer @ sky, 0.02)
     own_free = np.clip(transfer[..., :1] * np.float32(np.sqrt(4 * np.pi)), 0.2, 1)  # under a sky of radiance one
     strands = np.maximum((sh_basis(normal) * lambert) @ sky, 0.02) * free ** rng.uniform(0.6, 1.3)
-    body = shares[..., [PARTS.index(name) for name in ("skin", "lips", "eyes")]].sum(-1, keepdims=True) * stage.here[..., None]
+    body = shares[...,
+                  [PARTS.index(name) for name in ("skin", "lips", "eyes")]].sum(-1,
+                                                                                keepdims=True) * stage.here[..., None]
     seen = body * own * np.clip(free / own_free, 0.25, 1) + (1 - body) * strands
     rougher, brighter = rng.uniform(0.75, 1.15), rng.uniform(0.4, 2.0)
     gloss = np.float32([GLOSS[name] for name in PARTS])
     rough, reflectance = shares @ gloss[:, 0] * rougher, (shares @ gloss[:, 1])[..., None] * brighter
     skin = np.broadcast_to(gloss[SKIN], (*stage.here.shape, 2))
     return (_Surface(normal, sight.reach.astype(np.float32) / 255, seen, free, 1 - shares[..., -1], rough, reflectance),
-            _Surface(smooth, stage.reach.astype(np.float32) / 255, own, own_free, stage.here.astype(np.float32), skin[..., 0] * rougher,
-                     skin[..., 1:] * brighter))
+            _Surface(smooth, stage.reach.astype(np.float32) / 255, own, own_free, stage.here.astype(np.float32),
+                     skin[..., 0] * rougher, skin[..., 1:] * brighter))
 
 
 def _lit(stage: RelightableView, surface: _Surface, sky: np.ndarray, lamps: list[int], tints: list, before: list,
          radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Irradiance over pi [S, S, 3] of a surface, and what shines on it [S, S, 3]; radius: in pixels, how far red light spreads in it."""
+    """Irradiance over pi [S, S, 3] of a surface, and what shines on it [S, S, 3]; radius: in pixels, how far red light
+    spreads in it."""
     towards = -directions(stage.unlit)
     cosine = np.clip((surface.normal * towards).sum(-1, keepdims=True), 0, 1)
     mirror = 2 * cosine * surface.normal - towards
@@ -221,12 +239,14 @@ def _lit(stage: RelightableView, surface: _Surface, sky: np.ndarray, lamps: list
         lamp = stage.unlit.lamps[k]
         arrives = surface.reach[..., k] * through
         diffuse = diffuse + _softened(np.maximum(surface.normal @ lamp, 0) * arrives, surface.there, radius) * tint
-        shine = shine + (highlight(surface.normal, towards, lamp, surface.rough) * arrives)[..., None] * surface.reflectance * tint
+        shine = shine + (highlight(surface.normal, towards, lamp, surface.rough)
+                         * arrives)[..., None] * surface.reflectance * tint
     return diffuse.astype(np.float32), shine.astype(np.float32)
 
 
 def _softened(direct: np.ndarray, there: np.ndarray, radius: float) -> np.ndarray:
-    """Direct light [S, S] -> [S, S, 3] spread under the skin, red farthest (d'Eon et al. 2007); `radius` in pixels, of the red."""
+    """Direct light [S, S] -> [S, S, 3] spread under the skin, red farthest (d'Eon et al. 2007); `radius` in pixels, of
+    the red."""
     channels = []
     for share in (1.0, 0.4, 0.2):
         lit, base = (cv2.GaussianBlur(part, (0, 0), max(share * radius, 0.3)) for part in (direct * there, there))
@@ -234,7 +254,8 @@ def _softened(direct: np.ndarray, there: np.ndarray, radius: float) -> np.ndarra
     return np.stack(channels, -1)
 
 
-def _shadow(stage: RelightableView, lamps: list[int], tints: list, before: list, grown: np.ndarray, diffuse: np.ndarray) -> tuple[np.ndarray, float]:
+def _shadow(stage: RelightableView, lamps: list[int], tints: list, before: list, grown: np.ndarray,
+            diffuse: np.ndarray) -> tuple[np.ndarray, float]:
     """The lost share [S, S] of the lamps' light, weighted by their strength, and how much of all light they are."""
     side = len(stage.here)
     if not lamps:
@@ -243,17 +264,23 @@ def _shadow(stage: RelightableView, lamps: list[int], tints: list, before: list,
     lost = np.zeros((side, side), np.float32)
     for k, share, through in zip(lamps, strength, before, strict=True):
         lamp = stage.unlit.lamps[k]
-        facing = [np.clip(1 + (n.astype(np.float32) / 127 @ lamp) / 0.06, 0, 1) for n in (stage.unlit.normal, stage.normal)]
+        facing = [np.clip(1 + (n.astype(np.float32) / 127 @ lamp) / 0.06, 0, 1)
+                  for n in (stage.unlit.normal, stage.normal)]
         reach = [r[..., k].astype(np.float32) / 255 for r in (stage.unlit.reach, stage.reach)]
         arrives = [f * r * through for f, r in zip(facing, reach, strict=True)]
         lost += share * (1 - (1 - grown[..., 0]) * arrives[0] - grown[..., 0] * arrives[1])
     seen = diffuse[stage.here].mean() if stage.here.any() else 1.0
-    return lost / np.float32(strength.sum()), float(np.clip(strength.sum() / (strength.sum() + 2 * max(seen - 0.5 * strength.sum(), 0.05)), 0, 1))
+    return lost / np.float32(strength.sum()), float(np.clip(strength.sum()
+                                                            / (strength.sum() + 2
+                                                               * max(seen - 0.5 * strength.sum(), 0.05)), 0, 1))
 
 
-def _fitted(stage: RelightableView, environment: Environment, lamps: list[int], tints: list, tone: np.ndarray, rng: np.random.Generator) -> FittedLight:
+def _fitted(stage: RelightableView, environment: Environment, lamps: list[int], tints: list, tone: np.ndarray,
+            rng: np.random.Generator) -> FittedLight:
     here = stage.here.ravel()
-    transfer, smooth = stage.transfer.reshape(-1, 9).astype(np.float32), stage.normal.reshape(-1, 3).astype(np.float32) / 127
+    transfer, smooth = stage.transfer.reshape(-1,
+                                              9).astype(np.float32), stage.normal.reshape(-1,
+                                                                                          3).astype(np.float32) / 127
     shining = [LampOnHead(stage.unlit.lamps[k], tint, stage.reach[..., k].ravel().astype(np.float32)[here] / 255)
                for k, tint in zip(lamps, tints, strict=True)]
     found = fitted_light(transfer[here], smooth[here], shining, environment, tone, rng)

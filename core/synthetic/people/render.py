@@ -4,7 +4,8 @@
 
     python -m core.synthetic.people.render JOB.json
 
-The job, written by filmed.py, names meshes (.npz) with their materials, strands (.npz), the light, the cameras and where the head is in each frame.
+The job, written by filmed.py, names meshes (.npz) with their materials, strands (.npz), the light, the cameras and
+where the head is in each frame.
 """
 
 from __future__ import annotations
@@ -86,7 +87,9 @@ def _material(name: str, part: dict) -> bpy.types.Material:
         links.new(normal.outputs["Normal"], shader.inputs["Normal"])
         shader.inputs["Roughness"].default_value = 0.5
     else:
-        shader.inputs["Roughness"].default_value, shader.inputs["Specular IOR Level"].default_value = GLOSS[part["kind"]]
+        shader.inputs["Roughness"].default_value, shader.inputs["Specular IOR Level"].default_value = GLOSS[
+            part["kind"]
+        ]
     return material
 
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head that registration's identity basis cannot reach: a member of the basis plus a smooth, mostly symmetric displacement from which everything that
-the basis or a motion of the head explains has been taken.
+"""A head that registration's identity basis cannot reach: a member of the basis plus a smooth, mostly symmetric
+displacement from which everything that the basis or a motion of the head explains has been taken.
 
 The displacement is a random field and, where its folder is given, one of ICT-FaceKit's identities as well (facekit.py).
 """
@@ -23,7 +23,9 @@ from .facekit import fields
 WAVELENGTHS_MM = [140.0, 90.0]  # of the random field: smaller ones are caricatures at this strength
 ASYMMETRY = 0.35  # deviation of the asymmetric part over that of the symmetric one
 WITHIN = 0.6  # of the bald subjects' strength in the basis, so that both parts together stay a plausible head
-FACEKIT = 0.6  # share of ICT-FaceKit in the displacement where its folder is given, the rest is the random field: alone and this strong it ages every face
+# share of ICT-FaceKit in the displacement where its folder is given, the rest is the random field: alone and this
+# strong it ages every face
+FACEKIT = 0.6
 RESIDUAL_MM = 2.05, 2.3  # root mean square over the face that the basis leaves
 
 
@@ -39,13 +41,14 @@ def person_mesh(seed: int, facekit: Path | None = None) -> Mesh:
 
 
 def unexplained(displacement: np.ndarray) -> np.ndarray:
-    """The part of a displacement [V, 3] of the template that no identity, rotation, translation or scale explains, by least squares over the face."""
+    """The part of a displacement [V, 3] of the template that no identity, rotation, translation or scale explains, by
+    least squares over the face."""
     return _without_basis(displacement, face_weight())
 
 
 def _lessened(displacement: np.ndarray) -> np.ndarray:
-    """The smallest displacement over the whole head that a basis fit to the face leaves as much of: what the basis explains may go, but so that the back of
-    the head stays where it is."""
+    """The smallest displacement over the whole head that a basis fit to the face leaves as much of: what the basis
+    explains may go, but so that the back of the head stays where it is."""
     return _without_basis(displacement, 0.25 + 0.75 * face_weight())
 
 
@@ -94,7 +97,8 @@ def _random_field(rng: np.random.Generator) -> np.ndarray:
     mirrored = points * [-1, 1, 1]
 
     def field(at: np.ndarray, seed: int) -> np.ndarray:
-        return np.stack([octaves(at, WAVELENGTHS_MM, np.random.default_rng([seed, axis]), smooth=True) for axis in range(3)], 1)
+        return np.stack([octaves(at, WAVELENGTHS_MM, np.random.default_rng([seed, axis]), smooth=True)
+                         for axis in range(3)], 1)
 
     even, odd = rng.integers(2**31, size=2)
     symmetric = field(points, even) + field(mirrored, even) * [-1, 1, 1]

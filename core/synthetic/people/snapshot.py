@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A photograph of what unlit.py saw: other colours, a sky and up to two lamps, a background, what covers a face, and a phone's processing.
+"""A photograph of what unlit.py saw: other colours, a sky and up to two lamps, a background, what covers a face, and a
+phone's processing.
 
-Colours are varied far beyond the figures' own: a parser is to know hair by where it is and how it looks, not by how dark it is.
+Colours are varied far beyond the figures' own: a parser is to know hair by where it is and how it looks, not by how
+dark it is.
 """
 
 from __future__ import annotations
@@ -22,20 +24,24 @@ from .clutter import RIMS, backdrop, cover, with_open_mouth
 from .person import BROWS
 from .unlit import Unlit
 
-GLOSS = {"skin": (0.45, 0.028), "lips": (0.3, 0.05), "brows": (0.4, 0.03), "beard": (0.4, 0.03), "hair": (0.38, 0.05), "eyes": (0.12, 0.05),
-         "clothes": (0.8, 0.01), "background": (1.0, 0.0)}
+GLOSS = {"skin": (0.45, 0.028), "lips": (0.3, 0.05), "brows": (0.4, 0.03), "beard": (0.4, 0.03), "hair": (0.38, 0.05),
+         "eyes": (0.12, 0.05), "clothes": (0.8, 0.01), "background": (1.0, 0.0)}
 """Roughness, and reflectance at normal incidence."""
-SKIN, HAIR, BROW, BEARD, LIPS, CLOTHES = (PARTS.index(name) for name in ("skin", "hair", "brows", "beard", "lips", "clothes"))
+SKIN, HAIR, BROW, BEARD, LIPS, CLOTHES = (PARTS.index(name)
+                                          for name in ("skin", "hair", "brows", "beard", "lips", "clothes"))
 
 
-def photograph(sight: Unlit, rng: np.random.Generator, panoramas: list[np.ndarray] = (), worn: Callable | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """An sRGB picture [S, S, 3] of a sight and the shares of its parts [S, S, len(PARTS)], float32 in [0, 1]. worn(radiance [S, S, 3], light) -> radiance
-    puts on what the person wears, of which the shares know nothing; otherwise some wear the rims of glasses."""
+def photograph(sight: Unlit, rng: np.random.Generator, panoramas: list[np.ndarray] = (),
+               worn: Callable | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """An sRGB picture [S, S, 3] of a sight and the shares of its parts [S, S, len(PARTS)], float32 in [0, 1].
+    worn(radiance [S, S, 3], light) -> radiance puts on what the person wears, of which the shares know nothing;
+    otherwise some wear the rims of glasses."""
     shares = sight.shares.astype(np.float32) / 255
     shares /= np.maximum(shares.sum(-1, keepdims=True), 1e-6)
     albedo = recoloured(images.srgb_to_linear(sight.albedo.astype(np.float32) / 255), shares, rng)
     albedo, shares = with_open_mouth(albedo, shares, sight.landmarks, rng)
-    environment = panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas) and rng.random() < 0.6 else made_environment(rng)
+    environment = (panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas)
+                   and rng.random() < 0.6 else made_environment(rng))
     radiance, light = _lit(sight, albedo, shares, environment, rng)
     behind = shares[..., -1:]
     radiance = radiance * (1 - behind) + backdrop(directions(sight), environment, light, rng) * behind
@@ -48,7 +54,8 @@ def photograph(sight: Unlit, rng: np.random.Generator, panoramas: list[np.ndarra
 
 
 def recoloured(albedo: np.ndarray, shares: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The linear albedo [S, S, 3] with other tones of skin, hair, brows, beard, lips and clothes, each moved as a whole."""
+    """The linear albedo [S, S, 3] with other tones of skin, hair, brows, beard, lips and clothes, each moved as a
+    whole."""
     log = np.zeros_like(albedo)
 
     def move(part: int, gain: np.ndarray) -> None:
@@ -63,11 +70,13 @@ def recoloured(albedo: np.ndarray, shares: np.ndarray, rng: np.random.Generator)
     move(SKIN, skin)
     move(LIPS, skin * (np.exp(rng.normal(0, 0.35, 3)) if rng.random() < 0.3 else np.exp(rng.normal(0, 0.1, 3))))
     colour = BROWS[rng.integers(len(BROWS))] * np.exp(rng.normal(0, 0.35)) * np.exp(rng.normal(0, 0.1, 3))
-    for part, own in ((HAIR, 0.25), (BEARD, 0.35), (BROW, 0.35)):  # some keep their own, some have a colour that no other hair of theirs has
+    # some keep their own, some have a colour that no other hair of theirs has
+    for part, own in ((HAIR, 0.25), (BEARD, 0.35), (BROW, 0.35)):
         kind = rng.random()
         if kind > own:
             goal = BROWS[rng.integers(len(BROWS))] * np.exp(rng.normal(0, 0.3)) if kind > 0.85 else colour
-            share = rng.uniform(0.5, 1.0) if part != HAIR else 1.0  # what lies between the roots moves with it: less than all the way
+            # what lies between the roots moves with it: less than all the way
+            share = rng.uniform(0.5, 1.0) if part != HAIR else 1.0
             move(part, towards(part, goal) ** share)
     cloth = np.exp(rng.uniform(np.log(0.01), np.log(0.8))) * np.exp(rng.normal(0, 0.45, 3))
     move(CLOTHES, towards(CLOTHES, np.clip(cloth, 0.005, 0.85)) if rng.random() < 0.8 else np.ones(3))
@@ -84,12 +93,14 @@ def weave(size: int, rng: np.random.Generator) -> np.ndarray:
     kind = rng.integers(3)
     if kind == 2:
         count = int(rng.integers(6, 60))
-        return strength * cv2.resize(rng.normal(0, 0.8, (count, count, 3)).astype(np.float32), (size, size), interpolation=cv2.INTER_CUBIC)
+        return strength * cv2.resize(rng.normal(0, 0.8, (count, count, 3)).astype(np.float32), (size, size),
+                                     interpolation=cv2.INTER_CUBIC)
     wavy = np.sin(2 * np.pi * along / wave) + (np.sin(2 * np.pi * across / wave) if kind else 0)
     return (strength * np.clip(3 * wavy, -1, 1))[..., None] * rng.uniform(0.3, 1.0, 3).astype(np.float32)
 
 
-def _lit(sight: Unlit, albedo: np.ndarray, shares: np.ndarray, environment: Environment, rng: np.random.Generator) -> tuple[np.ndarray, float]:
+def _lit(sight: Unlit, albedo: np.ndarray, shares: np.ndarray, environment: Environment,
+         rng: np.random.Generator) -> tuple[np.ndarray, float]:
     """The person's radiance [S, S, 3] and how bright the light is."""
     normal = sight.normal.astype(np.float32) / 127
     towards = -directions(sight)
@@ -129,7 +140,8 @@ def highlight(normal: np.ndarray, towards: np.ndarray, lamp: np.ndarray, rough: 
 
 
 def directions(sight: Unlit) -> np.ndarray:
-    """Unit directions [S, S, 3] from the camera through the pixels, in the head's axes; the principal point lies next to the middle and counts as that."""
+    """Unit directions [S, S, 3] from the camera through the pixels, in the head's axes; the principal point lies next
+    to the middle and counts as that."""
     size = len(sight.albedo)
     y, x = (np.mgrid[0:size, 0:size] + 0.5 - size / 2).astype(np.float32) / sight.focal
     plane = np.stack([x, y, np.ones_like(x)], -1)

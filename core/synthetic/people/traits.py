@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Broad pigment of a face: flushed cheeks, nose and ears, darker brows and lips' surroundings, tan lines of hats, glasses and collars, sallow or ruddy parts.
+"""Broad pigment of a face: flushed cheeks, nose and ears, darker brows and lips' surroundings, tan lines of hats,
+glasses and collars, sallow or ruddy parts.
 
-Such traits are mostly alike on the left and the right: of the variance over the skin a share of SYMMETRIC is that of the part which mirroring leaves as it is.
+Such traits are mostly alike on the left and the right: of the variance over the skin a share of SYMMETRIC is that of
+the part which mirroring leaves as it is.
 """
 
 from __future__ import annotations
@@ -25,11 +27,17 @@ def broad_traits(person: Person, on: Canvas) -> tuple[np.ndarray, np.ndarray]:
     """What they add to the logarithms of melanin and of blood, float32 [N] each."""
     rng = np.random.default_rng([person.seed, 62])
     area = regions(on)
-    melanin = rng.normal(0, 0.10) * area["forehead"] + abs(rng.normal(0, 0.16)) * area["mouth_surround"] + rng.normal(0.05, 0.10) * area["cheeks"]
+    melanin = (
+        rng.normal(0, 0.10) * area["forehead"]
+        + abs(rng.normal(0, 0.16)) * area["mouth_surround"]
+        + rng.normal(0.05, 0.10) * area["cheeks"]
+    )
     melanin = melanin + abs(rng.normal(0, 0.12)) * area["sockets"] - person.tan * _shaded(on, rng)
-    blood = (abs(rng.normal(0, 0.35)) * area["cheeks"] + abs(rng.normal(0, 0.45)) * area["nose"] + abs(rng.normal(0, 0.4)) * area["ears"]
+    blood = (abs(rng.normal(0, 0.35)) * area["cheeks"] + abs(rng.normal(0, 0.45)) * area["nose"]
+             + abs(rng.normal(0, 0.4)) * area["ears"]
              + rng.normal(0, 0.2) * area["chin"] + rng.normal(0, 0.12) * area["forehead"])
-    return tuple(_with_sides(field + share * _even_noise(on, rng), on, rng) for field, share in ((melanin, 0.06), (blood, 0.10)))
+    return tuple(_with_sides(field + share * _even_noise(on, rng), on, rng)
+                 for field, share in ((melanin, 0.06), (blood, 0.10)))
 
 
 def shaded(person: Person, on: Canvas, diffuse: np.ndarray) -> np.ndarray:
@@ -67,7 +75,8 @@ def _even_noise(on: Canvas, rng: np.random.Generator) -> np.ndarray:
 
 
 def _with_sides(field: np.ndarray, on: Canvas, rng: np.random.Generator) -> np.ndarray:
-    """The field [N] made even, and as much that differs between the sides as leaves it symmetric to a share of SYMMETRIC."""
+    """The field [N] made even, and as much that differs between the sides as leaves it symmetric to a share of
+    SYMMETRIC."""
     picture, skin = on.spread(field), on.spread(regions(on)["bald"])
     even = (picture + picture[:, ::-1]) / 2
     odd = on.spread(on.soft(lambda at: octaves(at, WAVELENGTHS_MM, rng, smooth=True)))

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a camera sees of a person before there is light, by rays on the CPU: albedo with and without what grows and is worn, parts, normals, shadow.
+"""What a camera sees of a person before there is light, by rays on the CPU: albedo with and without what grows and is
+worn, parts, normals, shadow.
 
 Strands are slim prisms here and curves in Cycles; neither Blender nor a GPU is needed.
 """
@@ -24,9 +25,10 @@ FACIAL = [PARTS.index(name) for name in ("brows", "lashes", "beard")]
 
 @dataclass(frozen=True)
 class Truth:
-    """seen, bare float32 [h, w, 3]: linear albedo as it is seen, and of the skin and eyes below hair and clothes; alpha [h, w]; parts [h, w, len(PARTS)]: how
-    much of a pixel each part covers; face bool [h, w]: the face with its brows and beard, without the eyes and what head hair or clothes hide;
-    normal [h, w, 3] of the head, unit, in its own axes; shadow bool [h, w]: where the sun does not reach."""
+    """seen, bare float32 [h, w, 3]: linear albedo as it is seen, and of the skin and eyes below hair and clothes; alpha
+    [h, w]; parts [h, w, len(PARTS)]: how much of a pixel each part covers; face bool [h, w]: the face with its brows
+    and beard, without the eyes and what head hair or clothes hide; normal [h, w, 3] of the head, unit, in its own axes;
+    shadow bool [h, w]: where the sun does not reach."""
 
     seen: np.ndarray
     bare: np.ndarray
@@ -43,7 +45,8 @@ class Scene:
     def __init__(self, figure: Figure, blockers: Mesh | None = None):
         body = [figure.opened.skin, *(ball.mesh for ball in figure.opened.balls)]
         meshes, part = [*body, figure.shirt], [SKIN, EYES, EYES, CLOTHES]
-        flat = [np.zeros((len(mesh.faces), 3), np.float32) for mesh in body] + [np.full((len(figure.shirt.faces), 3), figure.person.clothes, np.float32)]
+        flat = [np.zeros((len(mesh.faces), 3), np.float32)
+                for mesh in body] + [np.full((len(figure.shirt.faces), 3), figure.person.clothes, np.float32)]
         for strands in figure.strands:
             mesh = prisms(strands)
             meshes.append(mesh)
@@ -70,7 +73,8 @@ class Scene:
 
 
 def look(scene: Scene, view: View, sun: np.ndarray | None = None, over: int = 3) -> Truth:
-    """The truth through a view in the head's own axes; sun: unit direction to it, in the same axes; `over`: rays along a pixel's side."""
+    """The truth through a view in the head's own axes; sun: unit direction to it, in the same axes; `over`: rays along
+    a pixel's side."""
     face, bary, _ = raster.render_view(scene.whole, view, over)
     hit = face >= 0
     seen, parts = np.zeros((*hit.shape, 3), np.float32), np.zeros((*hit.shape, len(PARTS)), np.float32)
@@ -88,11 +92,12 @@ def look(scene: Scene, view: View, sun: np.ndarray | None = None, over: int = 3)
         normal = np.cross(b - a, c - a)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         points = a * bary[hit, :1] + b * bary[hit, 1:2] + c * bary[hit, 2:]
-        dark[hit] = (normal @ sun <= 0) | scene.opaque.blocked(points + 5e-4 * normal, np.repeat(sun[None], hit.sum(), 0))
+        dark[hit] = (normal @ sun <= 0) | scene.opaque.blocked(points + 5e-4 * normal,
+                                                               np.repeat(sun[None], hit.sum(), 0))
     bare, normal = _bare(scene, view, over)
     cover = _shrunk(hit.astype(np.float32), over)
-    return Truth(_shrunk(seen, over) / np.maximum(cover, 1e-6)[..., None], bare, cover, _shrunk(parts, over), (_shrunk(in_face, over) > 0.5) & (cover > 0.99),
-                 normal, _shrunk(dark, over) > 0.5)
+    return Truth(_shrunk(seen, over) / np.maximum(cover, 1e-6)[..., None], bare, cover, _shrunk(parts, over),
+                 (_shrunk(in_face, over) > 0.5) & (cover > 0.99), normal, _shrunk(dark, over) > 0.5)
 
 
 def _bare(scene: Scene, view: View, over: int) -> tuple[np.ndarray, np.ndarray]:
@@ -103,7 +108,9 @@ def _bare(scene: Scene, view: View, over: int) -> tuple[np.ndarray, np.ndarray]:
     colour[hit] = scene.albedo(face[hit], bary[hit], scene.figure.skin.diffuse)
     normal[hit] = raster.interpolate(scene.normals, scene.body.mesh.faces, face[hit], bary[hit])
     cover, normal = _shrunk(hit.astype(np.float32), over)[..., None], _shrunk(normal, over)
-    return _shrunk(colour, over) / np.maximum(cover, 1e-6), normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+    return _shrunk(colour, over) / np.maximum(cover,
+                                              1e-6), normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True),
+                                                                         1e-6)
 
 
 def _of_uv(scene: Scene, name: str, face: np.ndarray, bary: np.ndarray) -> np.ndarray:

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a camera sees of a person before there is light, small enough to be kept, so that any number of lights can be put on it (snapshot.py).
+"""What a camera sees of a person before there is light, small enough to be kept, so that any number of lights can be
+put on it (snapshot.py).
 
-A square around the head from wherever a phone may be held; each ray also learns whether two lamps and one random direction of the sky are free.
+A square around the head from wherever a phone may be held; each ray also learns whether two lamps and one random
+direction of the sky are free.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ from .truth import Scene
 SIZE, OVER = 288, 2  # of the square in pixels; rays along a pixel's side
 WIDER = 1.33  # than the crop in which a parser looks: what shifts and turns of it may show
 LAMPS = 2
-OF_TRUTH = {"skin": "skin", "lips": "lips", "brows": "brows", "lashes": "eyes", "beard": "beard", "hair": "hair", "eyes": "eyes", "clothes": "clothes"}
+OF_TRUTH = {"skin": "skin", "lips": "lips", "brows": "brows", "lashes": "eyes", "beard": "beard", "hair": "hair",
+            "eyes": "eyes", "clothes": "clothes"}
 """The part of face/parts.py that each part of the truth belongs to."""
 THICKER = {"hair": (1.0, 2.6), "beard": (0.9, 1.8), "brows": (0.9, 1.5), "lashes": (0.8, 1.4)}
 """Factors on the hairs' radii: people have four times as many hairs as figures."""
@@ -34,9 +37,10 @@ THICKER = {"hair": (1.0, 2.6), "beard": (0.9, 1.8), "brows": (0.9, 1.5), "lashes
 
 @dataclass(frozen=True)
 class Unlit:
-    """albedo uint8 [S, S, 3] sRGB; shares uint8 [S, S, len(PARTS)] of 255; normal int8 [S, S, 3] in the head's axes, of 127; reach uint8 [S, S, LAMPS]: how
-    much of each lamp arrives and faces the surface; free uint8 [S, S]: of the sky; lamps [LAMPS, 3] unit; rotation [3, 3] head to camera; centre [3] of the
-    camera; focal in pixels; landmarks [468, 2] in pixels."""
+    """albedo uint8 [S, S, 3] sRGB; shares uint8 [S, S, len(PARTS)] of 255; normal int8 [S, S, 3] in the head's axes, of
+    127; reach uint8 [S, S, LAMPS]: how much of each lamp arrives and faces the surface; free uint8 [S, S]: of the sky;
+    lamps [LAMPS, 3] unit; rotation [3, 3] head to camera; centre [3] of the camera; focal in pixels; landmarks [468, 2]
+    in pixels."""
 
     albedo: np.ndarray
     shares: np.ndarray
@@ -52,7 +56,8 @@ class Unlit:
 
 def scene_of(figure: Figure, rng: np.random.Generator) -> Scene:
     """A figure ready for rays, its hair as dense as some people's is."""
-    dense = [replace(strands, radius=(strands.radius * rng.uniform(*THICKER[strands.part])).astype(np.float32)) for strands in figure.strands]
+    dense = [replace(strands, radius=(strands.radius * rng.uniform(*THICKER[strands.part])).astype(np.float32))
+             for strands in figure.strands]
     return Scene(replace(figure, strands=tuple(dense)))
 
 
@@ -62,9 +67,10 @@ def landmarks_of(figure: Figure) -> np.ndarray:
 
 
 def random_view(figure: Figure, rng: np.random.Generator, size: int = SIZE, margin: float = WIDER * MARGIN) -> View:
-    """A square picture around the head, `margin` times as large as the face's landmarks, from the front to beyond the profile, from above and below, near and
-    far, held askew."""
-    yaw, pitch, roll = np.radians([rng.uniform(-100, 100) if rng.random() < 0.45 else rng.normal(0, 25), rng.normal(0, 13), rng.normal(0, 6)])
+    """A square picture around the head, `margin` times as large as the face's landmarks, from the front to beyond the
+    profile, from above and below, near and far, held askew."""
+    yaw, pitch, roll = np.radians([rng.uniform(-100, 100) if rng.random() < 0.45 else rng.normal(0, 25),
+                                   rng.normal(0, 13), rng.normal(0, 6)])
     back = np.array([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)])
     right = np.cross([0, 0, 1.0], back)
     right /= np.linalg.norm(right)
@@ -98,25 +104,32 @@ def see(scene: Scene, view: View, rng: np.random.Generator, over: int = OVER) ->
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
     points = (corners * weight[..., None]).sum(1) + 5e-4 * flat
     lamps = _lamps(view, rng)
-    reach = [((normal @ lamp > 0) & ~scene.opaque.blocked(points, np.repeat(lamp[None], len(points), 0))).astype(np.float32) for lamp in lamps]
+    reach = [((normal @ lamp > 0)
+              & ~scene.opaque.blocked(points, np.repeat(lamp[None], len(points), 0))).astype(np.float32)
+             for lamp in lamps]
     sky = normal + _unit(rng.normal(size=normal.shape))  # cosine-weighted about the normal
     free = ~scene.opaque.blocked(points, _unit(sky))
-    layers = np.concatenate([scene.albedo(triangle, weight, scene.figure.seen), _shares(scene, triangle, weight), normal, np.stack(reach, 1), free[:, None]], 1)
+    layers = np.concatenate([scene.albedo(triangle, weight, scene.figure.seen), _shares(scene, triangle, weight),
+                             normal, np.stack(reach, 1), free[:, None]], 1)
     picture = np.zeros((*hit.shape, layers.shape[1] + 1), np.float32)
     picture[hit, :-1], picture[hit, -1] = layers, 1
     size = view.height
     picture = picture.reshape(size, over, size, over, -1).mean((1, 3))
-    albedo, shares, normal, reach, free = np.split(picture[..., :-1] / np.maximum(picture[..., -1:], 1e-6), np.cumsum([3, len(PARTS), 3, LAMPS]), 2)
+    albedo, shares, normal, reach, free = np.split(picture[..., :-1] / np.maximum(picture[..., -1:], 1e-6),
+                                                   np.cumsum([3, len(PARTS), 3, LAMPS]), 2)
     shares = shares * picture[..., -1:]
     shares[..., -1] = 1 - picture[..., -1]
-    return Unlit(_bytes(images.linear_to_srgb(albedo)), _bytes(shares), np.round(127 * normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-                                                                                   ).astype(np.int8), _bytes(reach), _bytes(free[..., 0]),
-                 lamps.astype(np.float32), view.rotation.astype(np.float32), view.centre.astype(np.float32), np.float32(view.camera.params[0]),
-                 view.project(landmarks_of(scene.figure))[0].astype(np.float32))
+    return Unlit(_bytes(images.linear_to_srgb(albedo)), _bytes(shares),
+                 np.round(127 * normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+                                                                                   ).astype(np.int8), _bytes(reach),
+                 _bytes(free[..., 0]),
+                 lamps.astype(np.float32), view.rotation.astype(np.float32), view.centre.astype(np.float32),
+                 np.float32(view.camera.params[0]), view.project(landmarks_of(scene.figure))[0].astype(np.float32))
 
 
 def true_shares(parts: np.ndarray) -> np.ndarray:
-    """The parts [..., len(figure.PARTS)] of truth.look as shares of face/parts.py [..., len(PARTS)]; the rest is background."""
+    """The parts [..., len(figure.PARTS)] of truth.look as shares of face/parts.py [..., len(PARTS)]; the rest is
+    background."""
     out = np.zeros((*parts.shape[:-1], len(PARTS)), np.float32)
     for k, name in enumerate(GROWN):
         out[..., PARTS.index(OF_TRUTH[name])] += parts[..., k]
@@ -135,7 +148,8 @@ def load(path: Path) -> Unlit:
 
 
 def _shares(scene: Scene, triangle: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """What each hit belongs to [N, len(PARTS)]: the skin where hair grows belongs to the hair as far as it is dense there."""
+    """What each hit belongs to [N, len(PARTS)]: the skin where hair grows belongs to the hair as far as it is dense
+    there."""
     part = scene.part[triangle]
     shares = true_shares(np.eye(len(GROWN), dtype=np.float32)[part])
     skin = np.flatnonzero(part == GROWN.index("skin"))

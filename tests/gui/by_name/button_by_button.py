@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The way of flows/one_button.py as it was before Make My Head, and still can be gone: Reconstruct, a stroke on the shadow mask, Solve, Assemble Material,
-Render, each by its own button. Clicks and minutes are counted in the same manner."""
+"""The way of flows/one_button.py as it was before Make My Head, and still can be gone: Reconstruct, a stroke on the
+shadow mask, Solve, Assemble Material, Render, each by its own button. Clicks and minutes are counted in the same
+manner."""
 
 import sys
 from pathlib import Path

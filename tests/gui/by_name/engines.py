@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""EEVEE beside Cycles on the lit cheek of the sample head: same maps, lamps and camera, in linear light, without the denoiser.
+"""EEVEE beside Cycles on the lit cheek of the sample head: same maps, lamps and camera, in linear light, without the
+denoiser.
 
-Leaves dist/gui/engines.json, which benchmarks/engines.py reads, {light: {what: {channel: EEVEE over Cycles}}}, and the pictures beside it. What: `surface`
-has no subsurface; `random_walk_skin` is WildCap Skin as it comes, `random_walk` the same with Cycles's other random walk, as it was in 0.1.0.
+Leaves dist/gui/engines.json, which benchmarks/engines.py reads, {light: {what: {channel: EEVEE over Cycles}}}, and the
+pictures beside it. What: `surface` has no subsurface; `random_walk_skin` is WildCap Skin as it comes, `random_walk` the
+same with Cycles's other random walk, as it was in 0.1.0.
 """
 
 import json
@@ -22,11 +24,14 @@ SIDE, SAMPLES = 640, 32  # pixels of the whole picture; Cycles takes scattering 
 CHEEK = (0.45, 0.38)
 """A place on the lit cheek, from the lower left, as shares of the picture."""
 MEASURED, RENDERED = 0.03, 0.08
-"""Half a side of the square there that is measured, and of what is rendered, for EEVEE scatters between the pixels that it has."""
+"""Half a side of the square there that is measured, and of what is rendered, for EEVEE scatters between the pixels that
+it has."""
 SURFACE_AGREES = 0.05
-"""Largest difference in any channel where lamps light a surface alone, as a share: lamps and gloss are the same in both."""
+"""Largest difference in any channel where lamps light a surface alone, as a share: lamps and gloss are the same in
+both."""
 SKIN_AGREES = 0.08
-"""The same with subsurface: seen from the front, Cycles's random walk gives back a little less than its Base Color, EEVEE's diffusion all of it."""
+"""The same with subsurface: seen from the front, Cycles's random walk gives back a little less than its Base Color,
+EEVEE's diffusion all of it."""
 EEVEE = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
 
 
@@ -38,7 +43,8 @@ def flow():
         found[light] = {"surface": surface}
         for method in ("random_walk_skin", "random_walk"):
             found[light][method] = yield from ratio(root, light, 1.0, method)
-        d.say(light, *(f"{what} {' '.join(f'{r:.3f}' for r in ratios.values())}" for what, ratios in found[light].items()))
+        d.say(light,
+              *(f"{what} {' '.join(f'{r:.3f}' for r in ratios.values())}" for what, ratios in found[light].items()))
     (d.OUT / "engines.json").write_text(json.dumps(found), encoding="utf-8")
     for light in LIGHTS[:2]:
         for what, limit in (("surface", SURFACE_AGREES), ("random_walk_skin", SKIN_AGREES)):
@@ -57,7 +63,9 @@ def ratio(root: Path, light: str, subsurface: float, method: str):
         path = root / "renders" / "engine.png"
         addon.module("relight.output").still(scene, path, True)
         yield 0.2
-        name = f"engines_{light}_{method if subsurface else 'surface'}_{'cycles' if engine == 'CYCLES' else 'eevee'}.png"
+        name = (
+            f"engines_{light}_{method if subsurface else 'surface'}_{'cycles' if engine == 'CYCLES' else 'eevee'}.png"
+        )
         (d.OUT / name).write_bytes(path.read_bytes())
         means.append(cheek(path.with_suffix(".exr")))
     return dict(zip(("red", "green", "blue"), (means[0] / means[1]).round(4).tolist(), strict=True))

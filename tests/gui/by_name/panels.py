@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of the tab's panels for docs/guide, unfolded, on the finished sample capture that `make demo` leaves (.demo/); and the eyedropper clicked."""
+"""Pictures of the tab's panels for docs/guide, unfolded, on the finished sample capture that `make demo` leaves
+(.demo/); and the eyedropper clicked."""
 
 import shutil
 import subprocess

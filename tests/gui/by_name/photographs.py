@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Photographs of a face dropped into an empty Blender, Make My Head clicked, and nothing else: a relit head that looks back. The photographs are of a synthetic
-person with open eyes; photographed.py made them."""
+"""Photographs of a face dropped into an empty Blender, Make My Head clicked, and nothing else: a relit head that looks
+back. The photographs are of a synthetic person with open eyes; photographed.py made them."""
 
 import shutil
 import sys
@@ -34,11 +34,13 @@ def flow():
 
 
 def drop(folder: Path):
-    """All photographs dropped at once on the tab, by the operator that Blender calls for it; returns the capture's folder."""
+    """All photographs dropped at once on the tab, by the operator that Blender calls for it; returns the capture's
+    folder."""
     shutil.copytree(PHOTOGRAPHS, folder)
     d.act()
     with d.in_view('UI'):
-        bpy.ops.wm.drop_import_file('INVOKE_DEFAULT', directory=str(folder), files=[{"name": path.name} for path in sorted(folder.iterdir())])
+        bpy.ops.wm.drop_import_file('INVOKE_DEFAULT', directory=str(folder),
+                                    files=[{"name": path.name} for path in sorted(folder.iterdir())])
     yield 1.0
     d.screenshot("photographs_1_drop_menu")
     yield from d.key('C')  # Blender asks: a reference, or Choose Video
@@ -58,7 +60,8 @@ def looks_back() -> None:
     head = own_head.head()
     keys = head.data.shape_keys.key_blocks
     assert min(keys[f"eyesOpen{side}"].value for side in ("Left", "Right")) > 0.9, "the lids are closed"
-    assert any("Eyes" in material.name for material in head.data.materials if material), "there are no eyes behind the lids"
+    assert any("Eyes" in material.name for material in head.data.materials
+               if material), "there are no eyes behind the lids"
 
 
 d.play(flow(), limit_s=1700)

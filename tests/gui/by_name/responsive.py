@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How Blender feels while the real solver runs and a mask is painted: stalls of the main thread and redraws of the 3D view, idle and busy in one run.
+"""How Blender feels while the real solver runs and a mask is painted: stalls of the main thread and redraws of the 3D
+view, idle and busy in one run.
 
-A timer of ours notes when it is called; what a call is late by, the main thread was held. Prints the figures for the docs.
+A timer of ours notes when it is called; what a call is late by, the main thread was held. Prints the figures for the
+docs.
 """
 
 import json
@@ -19,9 +21,11 @@ import driver as d  # noqa: E402
 CHECKOUT = Path(__file__).resolve().parents[3]
 PERIOD_S = 0.01
 LIMIT_P99_MS, LIMIT_GAP_MS, SHARE = 50, 250, 0.8
-"""How late the main thread may be, how long two redraws may lie apart, and which part of the idle redraw rate must stay."""
+"""How late the main thread may be, how long two redraws may lie apart, and which part of the idle redraw rate must
+stay."""
 SLACK = 1.5
-"""Where Blender without a solver misses these already, as with a software renderer on two cores: how much worse it may be with one."""
+"""Where Blender without a solver misses these already, as with a software renderer on two cores: how much worse it may
+be with one."""
 
 
 class Watch:
@@ -40,7 +44,8 @@ class Watch:
         ticks, draws = (np.array([t for t in moments if start <= t <= end]) for moments in (self.ticks, self.draws))
         late = 1000 * np.maximum(np.diff(ticks) - PERIOD_S, 0)
         middle, p99 = np.percentile(late, (50, 99))
-        return {"seconds": round(end - start, 1), "late_p50_ms": round(float(middle), 1), "late_p99_ms": round(float(p99), 1),
+        return {"seconds": round(end - start, 1), "late_p50_ms": round(float(middle), 1),
+                "late_p99_ms": round(float(p99), 1),
                 "late_max_ms": round(float(late.max()), 1), "redraws_per_s": round(len(draws) / (end - start), 1),
                 "worst_redraw_gap_ms": round(1000 * float(np.diff(draws).max()), 1) if len(draws) > 1 else None}
 
@@ -52,7 +57,8 @@ def flow():
     yield from d.until(lambda: "sample_head" in bpy.data.objects, "the sample head", 20)
     bpy.ops.wildcap.use_python(filepath=str(CHECKOUT / ".venv"))
     settings = bpy.context.scene.wildcap.captures[0]
-    settings.solve.size, settings.solve.steps, settings.solve.checkpoint_every = 512, 60, 2  # it takes all cores at any size
+    # it takes all cores at any size
+    settings.solve.size, settings.solve.steps, settings.solve.checkpoint_every = 512, 60, 2
     root = module("captures").root(settings)
     jobs = module("jobs")
     watch = Watch()
@@ -68,7 +74,8 @@ def flow():
     yield from d.until(lambda: bpy.context.mode == 'OBJECT', "leaving", 10)
     yield 2.0
     bpy.ops.wildcap.solve()
-    yield from d.until(lambda: jobs.of(root) is None or jobs.of(root).progress is not None and jobs.of(root).progress.done >= 1, "the first step", 600)
+    yield from d.until(lambda: jobs.of(root) is None or jobs.of(root).progress is not None
+                       and jobs.of(root).progress.done >= 1, "the first step", 600)
     assert jobs.of(root) is not None, str(module("problems").of(root))
     bpy.ops.wildcap.paint_mask()
     yield 1.0
@@ -77,7 +84,8 @@ def flow():
     assert jobs.of(root) is not None, "the solver ran all the time"
     d.screenshot("responsive")
     d.say("solving", json.dumps(busy))
-    d.say(f"redraw rate {busy['redraws_per_s'] / idle['redraws_per_s']:.2f} of idle, p99 lateness {busy['late_p99_ms']} ms against {idle['late_p99_ms']} ms")
+    d.say(f"redraw rate {busy['redraws_per_s'] / idle['redraws_per_s']:.2f} of idle, p99 lateness "
+          f"{busy['late_p99_ms']} ms against {idle['late_p99_ms']} ms")
 
     bpy.ops.wildcap.finish_mask()
     yield 1.0

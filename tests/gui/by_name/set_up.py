@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solver installed for real by the large button, in an empty profile: asked, cancelled on the way, continued, used for a solve, removed.
+"""The solver installed for real by the large button, in an empty profile: asked, cancelled on the way, continued, used
+for a solve, removed.
 
-Downloads 0.5 GB and takes minutes. Packages come from where pip is set up to look; run.sh lets pip's variables in, and the paths of WILDCAP_MOUNTS, colons
-between them (resolv.conf, certificates, an index on the disk).
+Downloads 0.5 GB and takes minutes. Packages come from where pip is set up to look; run.sh lets pip's variables in, and
+the paths of WILDCAP_MOUNTS, colons between them (resolv.conf, certificates, an index on the disk).
 """
 
 import sys
@@ -29,7 +30,8 @@ def flow():
     assert addon.problem() == "", addon.problem()
     yield from confirmed("set_up_1_asked")
 
-    yield from d.until(lambda: addon.job("").progress is not None and addon.job("").progress.done >= 5, "the first packages", 300)
+    yield from d.until(lambda: addon.job("").progress is not None and addon.job("").progress.done >= 5,
+                       "the first packages", 300)
     d.screenshot("set_up_2_installing")
     yield from d.lead("wildcap.cancel")
     yield from d.until(lambda: addon.job("") is None, "the end of it", 5)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The skin tone and the white point by their buttons, on the finished sample capture that `make demo` leaves (.demo/), with a grey card drawn into its
-frames: click on the card in a frame, estimate, choose by hand."""
+"""The skin tone and the white point by their buttons, on the finished sample capture that `make demo` leaves (.demo/),
+with a grey card drawn into its frames: click on the card in a frame, estimate, choose by hand."""
 
 import shutil
 import sys

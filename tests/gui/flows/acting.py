@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Face units by clicks: added in the panel, lids and jaw opened, back by Rest; hair grown, taken back by Ctrl-Z, and grown again; eyes and
-mouth for a close-up, and a render of all of it."""
+"""Face units by clicks: added in the panel, lids and jaw opened, back by Rest; hair grown, taken back by Ctrl-Z, and
+grown again; eyes and mouth for a close-up, and a render of all of it."""
 
 import sys
 from pathlib import Path
@@ -32,7 +32,8 @@ def flow():
     assert keys().key_blocks["eyesOpenLeft"].value > 0.99, "the slider does not open the lids"
     d.screenshot("acting_open")
     yield from d.press("wildcap.rest_face")
-    yield from d.until(lambda: keys().key_blocks["jawOpen"].value == 0 and keys()["eyesOpen"] == 0, "the face at rest", 20)
+    yield from d.until(lambda: keys().key_blocks["jawOpen"].value == 0 and keys()["eyesOpen"] == 0, "the face at rest",
+                       20)
     d.say(f"{len(keys().key_blocks) - 1} units")
     yield from grow_hair()
     yield from d.move(d.middle())

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sample head delivered to Unreal: the preset chosen, Deliver clicked, its question answered, and the folder is there as a whole; then again, over it."""
+"""The sample head delivered to Unreal: the preset chosen, Deliver clicked, its question answered, and the folder is
+there as a whole; then again, over it."""
 
 import json
 import sys
@@ -29,7 +30,8 @@ def flow():
     yield from d.until(lambda: target.is_dir() or addon.problem(root), "the delivery", LIMIT_S)
     assert target.is_dir(), addon.problem(root)
     told = json.loads((target / "provenance.json").read_text(encoding="utf-8"))
-    assert told["versions"]["Blender"] and {f"{root.stem}.fbx", f"textures/T_{root.stem}_N.png"} <= set(told["files"]), told["files"]
+    assert told["versions"]["Blender"] and {f"{root.stem}.fbx",
+                                            f"textures/T_{root.stem}_N.png"} <= set(told["files"]), told["files"]
     assert not [path for path in target.parent.iterdir() if path.name.startswith(".")]
     yield from d.park()
     d.screenshot("deliver_3_done")
@@ -42,7 +44,8 @@ def again_and_cancelled(root: Path, target: Path):
     """A second delivery over the first, stopped on its way: the first one stays."""
     before = {path: path.stat().st_mtime_ns for path in target.rglob("*")}
     yield from click_deliver(root)
-    yield from d.until(lambda: addon.job(root) is not None and addon.job(root).progress is not None, "the worker's start", 120, every_s=0.02)
+    yield from d.until(lambda: addon.job(root) is not None and addon.job(root).progress is not None,
+                       "the worker's start", 120, every_s=0.02)
     bpy.ops.wildcap.cancel()
     yield from d.until(lambda: addon.job(root) is None, "the cancel", 5)
     assert {path: path.stat().st_mtime_ns for path in target.rglob("*")} == before
@@ -55,7 +58,8 @@ def click_deliver(root: Path):
     yield 1.0
     d.screenshot("deliver_2_question")
     yield from d.key('RET')
-    yield from d.until(lambda: addon.job(root) is not None or addon.problem(root) or (root / "exports").is_dir(), "the delivery's start", 20)
+    yield from d.until(lambda: addon.job(root) is not None or addon.problem(root) or (root / "exports").is_dir(),
+                       "the delivery's start", 20)
 
 
 d.play(flow(), limit_s=900)

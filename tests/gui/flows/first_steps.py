@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several faces in one .blend: a dropped video, a capture opened, the sample head; what a head was made from, each gone with one Ctrl-Z; Save As keeps the
-links, and folders that were moved are found by one click, or shown in the file browser."""
+"""Several faces in one .blend: a dropped video, a capture opened, the sample head; what a head was made from, each gone
+with one Ctrl-Z; Save As keeps the links, and folders that were moved are found by one click, or shown in the file
+browser."""
 
 import shutil
 import sys
@@ -31,7 +32,8 @@ def flow():
 
 
 def drop(home: Path):
-    """A video dropped on the tab, by the operator that Blender calls for it: a capture with accents and spaces in its name, ready for its large button."""
+    """A video dropped on the tab, by the operator that Blender calls for it: a capture with accents and spaces in its
+    name, ready for its large button."""
     video = home / "Mein Gesicht é.mp4"
     video.write_bytes(b"no video yet")
     with d.in_view('UI'):
@@ -63,7 +65,8 @@ def open_another(home: Path):
 
 
 def evidence():
-    """Cameras and scan come in by a click, and go one at a time by Ctrl-Z, the head last; Ctrl-Shift-Z brings each again."""
+    """Cameras and scan come in by a click, and go one at a time by Ctrl-Z, the head last; Ctrl-Shift-Z brings each
+    again."""
     seen = [names()]
     for name, kind in (("cameras", 'CAMERA'), ("scan", 'MESH')):
         yield from d.press(f"wildcap.bring_in_{name}")
@@ -142,7 +145,8 @@ def missed():
     """The tab of that face says that its folder is gone."""
     bpy.context.view_layer.objects.active = bpy.data.objects["other face"]
     status = addon.module("status")
-    yield from d.until(lambda: status.of(items()[1]) is not None and status.of(items()[1]).missing, "that it is missed", 10)
+    yield from d.until(lambda: status.of(items()[1]) is not None and status.of(items()[1]).missing, "that it is missed",
+                       10)
     yield from d.park()
 
 

@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A job of the real worker while its artist does other things: cancelled within two seconds and continued, gone on with through an undo past its start, a new
-scene and another .blend, beside an autosave; ended by disabling the add-on; and killed from outside, with what the tab then says."""
+"""A job of the real worker while its artist does other things: cancelled within two seconds and continued, gone on with
+through an undo past its start, a new scene and another .blend, beside an autosave; ended by disabling the add-on; and
+killed from outside, with what the tab then says."""
 
 import os
 import signal
@@ -53,7 +54,8 @@ def run_and_cancel(root: Path):
 
 
 def undo_past_start(root: Path):
-    """Ctrl-Z to before the capture was in the scene, and forward again: the job takes no notice of it, and the tab tells of it in both."""
+    """Ctrl-Z to before the capture was in the scene, and forward again: the job takes no notice of it, and the tab
+    tells of it in both."""
     for _ in range(8):
         yield from d.key('Z', ctrl=True)
     yield from d.until(lambda: len(bpy.context.scene.wildcap.captures) == 0, "the undo past the sample head", 10)
@@ -104,7 +106,8 @@ def autosave(root: Path):
     bpy.ops.ed.undo_push()
     started = time.time()
     folder = Path(tempfile.gettempdir())
-    yield from d.until(lambda: any(path.stat().st_mtime > started for path in folder.glob("*autosave.blend")), f"an autosave in {folder}", 100)
+    yield from d.until(lambda: any(path.stat().st_mtime > started for path in folder.glob("*autosave.blend")),
+                       f"an autosave in {folder}", 100)
     assert addon.job(root) is not None, addon.problem(root)
     d.say(f"autosaved after {time.time() - started:.0f} s, the job running")
 
@@ -148,7 +151,8 @@ def cancelled(root: Path):
     position = yield from d.find("wildcap.cancel")
     clicked = time.monotonic()
     yield from d.click(position)
-    yield from d.until(lambda: addon.job(root) is None and process.poll() is not None, "the end after Cancel", 30, every_s=d.TICK_S)
+    yield from d.until(lambda: addon.job(root) is None and process.poll() is not None, "the end after Cancel", 30,
+                       every_s=d.TICK_S)
     _cancelled.append(time.monotonic() - clicked)
     d.say(f"cancelled {_cancelled[-1]:.1f} s after the click")
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender that is killed, or closed, while its solver runs and its mask is painted: no stroke is lost, no worker outlives it, and another Blender goes on."""
+"""A Blender that is killed, or closed, while its solver runs and its mask is painted: no stroke is lost, no worker
+outlives it, and another Blender goes on."""
 
 import sys
 import tempfile
@@ -49,7 +50,8 @@ def closed_after_a_stroke(root: Path, folder: Path):
     yield from ended(told["worker"])
     yield from same(root, folder)
     d.say("closed in the moment of a stroke: it is in the capture")
-    yield from d.until(lambda: addon.next_step().label == "Solve", f"a solve anew, of the mask with the stroke, instead of {addon.next_step()}", 10)
+    yield from d.until(lambda: addon.next_step().label == "Solve",
+                       f"a solve anew, of the mask with the stroke, instead of {addon.next_step()}", 10)
 
 
 def killed_while_solving(root: Path, folder: Path):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A painting session's ends, in the window: leaving gives the artist's things back, a file saved in the middle goes on, and six seconds after a stroke
-it is on the disk, where another Blender finds it."""
+"""A painting session's ends, in the window: leaving gives the artist's things back, a file saved in the middle goes on,
+and six seconds after a stroke it is on the disk, where another Blender finds it."""
 
 import shutil
 import subprocess
@@ -36,7 +36,8 @@ def flow():
 
 
 def own_things() -> None:
-    """What an artist has set up for another project: brush, colours, canvas, stencil, and a view that looks different from ours in everything."""
+    """What an artist has set up for another project: brush, colours, canvas, stencil, and a view that looks different
+    from ours in everything."""
     space, paint = d.view().spaces.active, bpy.context.scene.tool_settings.image_paint
     space.shading.light, space.shading.color_type = 'MATCAP', 'RANDOM'
     space.overlay.show_overlays, space.overlay.texture_paint_mode_opacity = False, 0.35
@@ -48,7 +49,8 @@ def own_things() -> None:
     unified = bpy.context.scene.tool_settings.unified_paint_settings
     unified.size, unified.use_unified_size, unified.use_unified_color, unified.color = 123, True, True, (0.9, 0.2, 0.6)
     paint.mode, paint.canvas = 'IMAGE', bpy.data.images.new("My Canvas", 8, 8)
-    paint.stencil_image, paint.stencil_color, paint.invert_stencil = bpy.data.images.new("My Stencil", 8, 8), (0.25, 0.5, 0.75), True
+    paint.stencil_image, paint.stencil_color, paint.invert_stencil = bpy.data.images.new("My Stencil", 8,
+                                                                                         8), (0.25, 0.5, 0.75), True
     bpy.ops.object.mode_set(mode='OBJECT')
 
 
@@ -80,13 +82,18 @@ def state() -> dict:
     """All there is to read of the brush, the paint settings, shading, overlays and mode, as plain values."""
     space, tools = d.view().spaces.active, bpy.context.scene.tool_settings
     paint = tools.image_paint
-    things = {"paint": paint, "brush": paint.brush, "unified": tools.unified_paint_settings, "asset": paint.brush_asset_reference,
-              "weights": tools.weight_paint, "sculpting": tools.sculpt, "shading": space.shading, "overlay": space.overlay}
-    values = {f"{name}.{key}": value for name, thing in things.items() if thing is not None for key, value in plain(thing).items()}
+    things = {"paint": paint, "brush": paint.brush, "unified": tools.unified_paint_settings,
+              "asset": paint.brush_asset_reference,
+              "weights": tools.weight_paint, "sculpting": tools.sculpt, "shading": space.shading,
+              "overlay": space.overlay}
+    values = {f"{name}.{key}": value for name, thing in things.items() if thing is not None
+              for key, value in plain(thing).items()}
     layer = bpy.context.view_layer
     for thing in layer.objects:
-        values[thing.name] = thing.mode, thing.select_get(), thing.hide_get(), thing.data.use_mirror_x if thing.type == 'MESH' else None
-    return {**values, "mode": bpy.context.mode, "active": layer.objects.active.name, "brushes": sorted(b.name for b in bpy.data.brushes)}
+        values[thing.name] = (thing.mode, thing.select_get(), thing.hide_get(),
+                              thing.data.use_mirror_x if thing.type == 'MESH' else None)
+    return {**values, "mode": bpy.context.mode, "active": layer.objects.active.name,
+            "brushes": sorted(b.name for b in bpy.data.brushes)}
 
 
 def plain(thing) -> dict:
@@ -97,7 +104,8 @@ def plain(thing) -> dict:
         if each.type == 'POINTER':
             found[each.identifier] = value.name if isinstance(value, bpy.types.ID) else None
         elif each.type != 'COLLECTION':
-            found[each.identifier] = tuple(value) if getattr(each, "is_array", False) else sorted(value) if isinstance(value, set) else value
+            found[each.identifier] = (tuple(value) if getattr(each, "is_array", False) else sorted(value)
+                                      if isinstance(value, set) else value)
     return found
 
 
@@ -123,7 +131,8 @@ def reopen():
 
 
 def killed(root: Path):
-    """What the disk holds six seconds after a stroke is all that would be left if Blender were killed now: another Blender reads it."""
+    """What the disk holds six seconds after a stroke is all that would be left if Blender were killed now: another
+    Blender reads it."""
     bpy.ops.wildcap.paint_mask()
     yield from painting.in_hand()
     x, y = d.middle()
@@ -132,7 +141,8 @@ def killed(root: Path):
     found = Path(tempfile.mkdtemp()) / "found.png"
     shutil.copyfile(root / "shadow_mask.png", found)
     (found.parent / "find.py").write_text(FIND)
-    subprocess.run(["blender", "-b", "--factory-startup", "-P", str(found.parent / "find.py"), "--", str(found)], check=True, timeout=120, capture_output=True)
+    subprocess.run(["blender", "-b", "--factory-startup", "-P", str(found.parent / "find.py"), "--", str(found)],
+                   check=True, timeout=120, capture_output=True)
     assert np.abs(np.load(f"{found}.npy") - painting.mask()).max() < 0.01
     d.say("six seconds after a stroke another Blender finds it")
 

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The artist's loop: the sample head, a mask painted on the head and on the sheet, the real solver, the material, a picture.
+"""The artist's loop: the sample head, a mask painted on the head and on the sheet, the real solver, the material, a
+picture.
 
 Nothing is called that an artist could not click, except where a file browser would open.
 """
@@ -70,14 +71,20 @@ def open_sample_head():
 def shade(root: Path) -> None:
     """Casts a shadow on the left cheek of the capture's texture: what a mask is there for, in a place that is known."""
     place = painting.uv_under(head(), painting.facing(head(), CHEEK))
-    subprocess.run([addon.CHECKOUT / ".venv" / "bin" / "python", "-c", SHADE, root, *map(str, (*place, RADIUS, SHADOW))], cwd=addon.CHECKOUT, check=True)
+    subprocess.run([addon.CHECKOUT / ".venv" / "bin" / "python", "-c", SHADE, root,
+                    *map(str, (*place, RADIUS, SHADOW))], cwd=addon.CHECKOUT, check=True)
 
 
 def paint(root: Path):
-    """From a capture that is finished up to its mask: strokes in 3D and on the sheet arrive in shadow_mask.png where they were painted."""
+    """From a capture that is finished up to its mask: strokes in 3D and on the sheet arrive in shadow_mask.png where
+    they were painted."""
     addon.unsolved(root)
     brushes = {b.name for b in bpy.data.brushes}
-    shading = d.view().spaces.active.shading.type, d.view().spaces.active.shading.light, d.view().spaces.active.shading.color_type
+    shading = (
+        d.view().spaces.active.shading.type,
+        d.view().spaces.active.shading.light,
+        d.view().spaces.active.shading.color_type,
+    )
     yield 1.5
     yield from d.press("wildcap.paint_mask")
     yield from painting.in_hand()
@@ -87,7 +94,8 @@ def paint(root: Path):
     x, y = painting.facing(head(), CHEEK)
     assert x > d.middle()[0]
     texel = painting.texel(painting.uv_under(head(), (x, y)), len(before))
-    # What is in the proposal already cannot change: the stroke goes where the mask is empty, or takes away where it is full.
+    # What is in the proposal already cannot change: the stroke goes where the mask is empty, or takes away where it is
+    # full.
     erase = bool(before[texel] > 0.5)
     yield from painting.dab(x, y, ctrl=erase)
     after = mask()
@@ -124,8 +132,10 @@ def paint(root: Path):
     yield from d.until(lambda: bpy.context.mode == 'OBJECT', "leaving", 5)
     saved = on_disk(root / "shadow_mask.png")
     assert np.abs(saved - painted).max() < 0.01
-    assert (d.view().spaces.active.shading.type, d.view().spaces.active.shading.light, d.view().spaces.active.shading.color_type) == shading
-    own = bpy.context.scene.tool_settings.image_paint.brush  # where Blender has a library of brushes, it links one as it enters the mode
+    assert (d.view().spaces.active.shading.type, d.view().spaces.active.shading.light,
+            d.view().spaces.active.shading.color_type) == shading
+    # where Blender has a library of brushes, it links one as it enters the mode
+    own = bpy.context.scene.tool_settings.image_paint.brush
     assert {b.name for b in bpy.data.brushes} == brushes | ({own.name} if own is not None else set())
     assert "WildCap Mask Sheet" not in bpy.data.objects
     d.say("shadow_mask.png holds both strokes")
@@ -151,15 +161,18 @@ def solve(root: Path):
 
 
 def lit_as_painted(root: Path) -> None:
-    """The light the solver found is as dark under the stroke on the left cheek as the shadow that was cast there, and not darker on the right one."""
+    """The light the solver found is as dark under the stroke on the left cheek as the shadow that was cast there, and
+    not darker on the right one."""
     shading = painting.on_disk(root / "maps" / "shading.exr")
     u, v = painting.uv_under(head(), painting.facing(head(), CHEEK))
     found = {}
     for side, across in (("left", u), ("right", 1 - u)):
         rows, columns = np.mgrid[:len(shading), :len(shading)] + 0.5
         distance = np.hypot(columns / len(shading) - across, 1 - rows / len(shading) - v)
-        found[side] = float(np.median(shading[distance < 0.6 * RADIUS]) / np.median(shading[(distance > 1.4 * RADIUS) & (distance < 2.2 * RADIUS)]))
-    d.say(f"Light inside of the place against around it: left cheek {found['left']:.2f}, right cheek {found['right']:.2f}; the shadow left {SHADOW}")
+        found[side] = float(np.median(shading[distance < 0.6 * RADIUS])
+                            / np.median(shading[(distance > 1.4 * RADIUS) & (distance < 2.2 * RADIUS)]))
+    d.say(f"Light inside of the place against around it: left cheek {found['left']:.2f}, right cheek "
+          f"{found['right']:.2f}; the shadow left {SHADOW}")
     assert abs(found["left"] - SHADOW) < 0.15 and 0.95 < found["right"] < 1.05, found
 
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strokes and buttons on the mask, on the head and on the sheet, in any order: Ctrl-Z goes back through all of them, one by one, and Ctrl-Shift-Z
-forward again."""
+"""Strokes and buttons on the mask, on the head and on the sheet, in any order: Ctrl-Z goes back through all of them,
+one by one, and Ctrl-Shift-Z forward again."""
 
 import sys
 from pathlib import Path
@@ -22,11 +22,13 @@ def flow():
     yield from mirrored()
     x, y = d.middle()
     states = [mask()]
-    for step in (button('MIRROR'), stroke(x + 30, y), button('GROW'), button('SHRINK'), stroke(x - 30, y - 60, 'SHEET'), button('INVERT'),
+    for step in (button('MIRROR'), stroke(x + 30, y), button('GROW'), button('SHRINK'), stroke(x - 30, y - 60, 'SHEET'),
+                 button('INVERT'),
                  stroke(x + 20, y - 80, 'HEAD'), button('SOFTEN'), button('CLEAR'), button('PROPOSAL')):
         yield from step
         states.append(mask())
-    assert all(np.abs(a - b).max() > 0.2 for a, b in zip(states, states[1:], strict=False)), "each of them changed the mask"
+    assert all(np.abs(a - b).max() > 0.2
+               for a, b in zip(states, states[1:], strict=False)), "each of them changed the mask"
     d.screenshot("mask_tools")
     yield from walk(states[::-1], "Ctrl-Z", ctrl=True)
     yield from walk(states, "Ctrl-Shift-Z", ctrl=True, shift=True)
@@ -48,7 +50,8 @@ def past_the_end(root: Path):
 
 
 def walk(states, name, **keys):
-    """Presses the key until the last state is reached; every state must be passed, in order, and nothing else be seen."""
+    """Presses the key until the last state is reached; every state must be passed, in order, and nothing else be
+    seen."""
     at, presses, session = 0, [], addon.module("paint.session")
     while at < len(states) - 1:
         presses.append(0)
@@ -62,7 +65,9 @@ def walk(states, name, **keys):
                 at += 1
                 break
             nearest = [round(float(np.abs(seen - state).max()), 2) for state in states]
-            assert nearest[at] < 0.01, f"{name}: after {presses} presses per step the mask differs from its states by {nearest}"
+            assert nearest[at] < 0.01, (
+                f"{name}: after {presses} presses per step the mask differs from its states by {nearest}"
+            )
             assert presses[-1] < 3, f"{name}: step {at} is never left"
     d.say(f"{name}: presses per step {presses}")
 
@@ -79,7 +84,8 @@ def mirrored():
             yield 0.3
             yield from dab(x + 50, y - 30)
             halves = [int((half > 0.5).sum()) for half in np.split(mask(), 2, axis=1)]
-            d.say(f"a stroke to the right, {on}, {'mirrored' if both else 'plain'}: texels of the left and right half {halves}")
+            d.say(f"a stroke to the right, {on}, {'mirrored' if both else 'plain'}: texels of the left and right half "
+                  f"{halves}")
             assert halves[1] > 100 and (halves[0] > 100) == both
     bpy.ops.wildcap.paint_mask(on='HEAD')
     bpy.ops.wildcap.edit_mask(kind='PROPOSAL')

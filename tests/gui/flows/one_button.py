@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From a Blender without the add-on to a picture: the zip dragged in, a video chosen, Make My Head clicked, and nothing painted; clicks and minutes are
-counted. by_name/button_by_button.py goes there by the single buttons.
+"""From a Blender without the add-on to a picture: the zip dragged in, a video chosen, Make My Head clicked, and nothing
+painted; clicks and minutes are counted. by_name/button_by_button.py goes there by the single buttons.
 """
 
 import sys

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Relight panel, wide and narrow; contact sheet and turntable by their buttons, from a terminal, and a render stopped by Esc."""
+"""The Relight panel, wide and narrow; contact sheet and turntable by their buttons, from a terminal, and a render
+stopped by Esc."""
 
 import ctypes
 import os
@@ -56,7 +57,8 @@ def contact_sheet(root: Path):
     yield from d.until(sheet.is_file, "the contact sheet", 180)
     image = bpy.data.images.load(str(sheet))
     assert tuple(image.size) == (192, 2 * 64 + 3 * 8), tuple(image.size)
-    assert all((root / "renders" / f"{name}.{kind}").is_file() for name in ("three_point", "coloured") for kind in ("png", "exr"))
+    assert all((root / "renders" / f"{name}.{kind}").is_file() for name in ("three_point", "coloured")
+               for kind in ("png", "exr"))
     d.say("contact sheet")
 
 
@@ -72,9 +74,11 @@ def turntable(root: Path):
 
 def from_a_terminal(root: Path) -> None:
     (root / "renders" / "window.png").unlink()
-    command = ["blender", "--command", "wildcap", "relight", str(root), "window", "--resolution", "32", "--samples", "1"]
+    command = ["blender", "--command", "wildcap", "relight", str(root), "window", "--resolution", "32", "--samples",
+               "1"]
     done = subprocess.run(command, env=os.environ, capture_output=True, text=True, timeout=180)
-    assert done.returncode == 0 and (root / "renders" / "window.png").is_file(), done.stdout[-2000:] + done.stderr[-2000:]
+    assert done.returncode == 0 and (root / "renders"
+                                     / "window.png").is_file(), done.stdout[-2000:] + done.stderr[-2000:]
     d.say("blender --command wildcap relight")
 
 
@@ -94,13 +98,15 @@ def stopped(root: Path):
 
 
 def escape() -> None:
-    """The key from the X server, over the render's window: Blender looks for it where keys come in, past which simulated ones are made."""
+    """The key from the X server, over the render's window: Blender looks for it where keys come in, past which
+    simulated ones are made."""
     bpy.app.use_event_simulate = False  # it heeds no other keys while that is on
     x11, test = ctypes.CDLL("libX11.so.6"), ctypes.CDLL("libXtst.so.6")
     x11.XOpenDisplay.restype = ctypes.c_void_p
     x11.XKeysymToKeycode.argtypes, x11.XKeysymToKeycode.restype = [ctypes.c_void_p, ctypes.c_ulong], ctypes.c_ubyte
     display = ctypes.c_void_p(x11.XOpenDisplay(None))
-    test.XTestFakeMotionEvent(display, 0, *(side // 2 for side in (d.window().width, d.window().height)), ctypes.c_ulong(0))
+    test.XTestFakeMotionEvent(display, 0, *(side // 2 for side in (d.window().width, d.window().height)),
+                              ctypes.c_ulong(0))
     for pressed in (1, 0):
         test.XTestFakeKeyEvent(display, x11.XKeysymToKeycode(display, ESCAPE), pressed, ctypes.c_ulong(0))
     x11.XCloseDisplay(display)

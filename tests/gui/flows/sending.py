@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""SwitchLight in the window: its card, the large button that asks before anything is sent, the dialog, and the worker that then sends two frames to a
-server on this machine, once."""
+"""SwitchLight in the window: its card, the large button that asks before anything is sent, the dialog, and the worker
+that then sends two frames to a server on this machine, once."""
 
 import os
 import struct
@@ -61,7 +61,8 @@ def artist(server: Service):
     d.screenshot("sending_5_agreed")
     started = time.monotonic()
     yield from d.lead("wildcap.reconstruct")
-    yield from d.until(lambda: len(server.charged) == 2 and (root / "delit" / "00002.png").is_file(), "the answers", addon.START_LIMIT_S)
+    yield from d.until(lambda: len(server.charged) == 2 and (root / "delit" / "00002.png").is_file(), "the answers",
+                       addon.START_LIMIT_S)
     d.say(f"two frames were sent and answered {time.monotonic() - started:.0f} s after the click")
     if addon.job(root) is not None:
         addon.module("jobs").cancel(str(root))

@@ -38,13 +38,16 @@ def flow():
 def refused(blender, folder: Path, root: Path):
     told = yield from second.heard(blender, folder, "refused", 120)
     worker = addon.worker_process(root).pid
-    assert f"Another worker (process {worker}" in told["text"] and "Wait for it or cancel it there" in told["text"], told
+    assert f"Another worker (process {worker}" in told["text"] and "Wait for it or cancel it there" in told["text"], (
+        told
+    )
     assert not told["job"] and addon.job(root) is not None
     d.say("the second Blender was told:", told["text"].strip())
 
 
 def both_paint(blender, folder: Path, root: Path):
-    """Each loaded the mask before the other painted; the later stroke is the capture's mask, the earlier ones are in the history."""
+    """Each loaded the mask before the other painted; the later stroke is the capture's mask, the earlier ones are in
+    the history."""
     yield from second.heard(blender, folder, "painting", 60)
     bpy.ops.wildcap.paint_mask()
     yield from painting.in_hand()
@@ -67,7 +70,8 @@ def both_paint(blender, folder: Path, root: Path):
 
 
 def in_history(root: Path, mask: np.ndarray) -> bool:
-    return any(np.abs(painting.on_disk(path) - mask).max() < 0.01 for path in (root / "mask_history").glob("shadow_mask_*.png"))
+    return any(np.abs(painting.on_disk(path) - mask).max() < 0.01
+               for path in (root / "mask_history").glob("shadow_mask_*.png"))
 
 
 d.play(flow(), limit_s=600)

@@ -17,8 +17,8 @@ WHITE = 0.6
 
 @dataclass(frozen=True)
 class RiggedEyeball:
-    """centre [3] and radius in metres, in the head's axes; pitch and yaw in radians: where it looks at rest, upwards and to the person's left;
-    turns: what each look unit at 1 adds to them."""
+    """centre [3] and radius in metres, in the head's axes; pitch and yaw in radians: where it looks at rest, upwards
+    and to the person's left; turns: what each look unit at 1 adds to them."""
 
     centre: np.ndarray
     radius: float
@@ -29,7 +29,8 @@ class RiggedEyeball:
 
 @dataclass(frozen=True)
 class LidRims:
-    """Of one eye, from the nose outwards: vertices of the upper rim [N] and of the lower one [N], opposite one another, and the inner corner's."""
+    """Of one eye, from the nose outwards: vertices of the upper rim [N] and of the lower one [N], opposite one another,
+    and the inner corner's."""
 
     upper: np.ndarray
     lower: np.ndarray
@@ -42,12 +43,14 @@ def of(obj, number: int) -> RiggedEyeball:
     inner = np.flatnonzero(asset.kind == LEFT_EYE + number)
     rows, out = len(asset.template) + len(asset.copies) + inner, np.linalg.norm(asset.uvs[inner] - 0.5, axis=1)
     rest = places(keys[0])
-    white = rest[rows[np.pi * (2 * out) ** (1 / 0.6) > WHITE]]  # the UV grows with the angle from the gaze (core/assets/acting.py)
+    # the UV grows with the angle from the gaze (core/assets/acting.py)
+    white = rest[rows[np.pi * (2 * out) ** (1 / 0.6) > WHITE]]
     fit = np.linalg.lstsq(np.concatenate([2 * white, np.ones((len(white), 1))], 1), (white**2).sum(1), rcond=None)[0]
     centre, pupil = fit[:3], rows[out.argmin()]
     pitch, yaw = _angles(rest[pupil] - centre)
     turned = {way: _angles(places(keys[f"eyeLook{way}{SIDES[number]}"])[pupil] - centre) for way in WAYS}
-    return RiggedEyeball(centre, float(np.sqrt(fit[3] + centre @ centre)), pitch, yaw, {way: (a - pitch, b - yaw) for way, (a, b) in turned.items()})
+    return RiggedEyeball(centre, float(np.sqrt(fit[3] + centre @ centre)), pitch, yaw,
+                         {way: (a - pitch, b - yaw) for way, (a, b) in turned.items()})
 
 
 def rims(asset: FaceUnits, number: int) -> LidRims:

@@ -54,18 +54,23 @@ def remove(obj) -> None:
         nodes.modify(obj, modifier.node_group, Lining=None)  # Blender 5.2 would go on counting it as a user
         obj.modifiers.remove(modifier)
     things = of(obj)
-    made = {slot.material for thing in things for slot in thing.material_slots if slot.material is not None and of_the_head.KEY in slot.material}
+    made = {slot.material for thing in things for slot in thing.material_slots if slot.material is not None
+            and of_the_head.KEY in slot.material}
     data = [thing.data for thing in things]
     for thing in things:
         bpy.data.objects.remove(thing)
     _drop(bpy.data.meshes, data)
     _drop(bpy.data.materials, made)
-    _drop(bpy.data.images, [image for image in map(bpy.data.images.get, (pictures.IRIS, pictures.WHITE)) if image is not None])
-    _drop(bpy.data.node_groups, [tree for tree in map(bpy.data.node_groups.get, (nodes.LIDS, nodes.MARGIN, nodes.WET, nodes.CARUNCLE)) if tree is not None])
+    _drop(bpy.data.images,
+          [image for image in map(bpy.data.images.get, (pictures.IRIS, pictures.WHITE)) if image is not None])
+    _drop(bpy.data.node_groups,
+          [tree for tree in map(bpy.data.node_groups.get, (nodes.LIDS, nodes.MARGIN, nodes.WET, nodes.CARUNCLE))
+           if tree is not None])
 
 
 def keep_up(obj, _capture) -> None:
-    """The close-up of a head that was reconstructed anew is made for its new shape; one of a head that has its units no more goes. `head.complete` asks."""
+    """The close-up of a head that was reconstructed anew is made for its new shape; one of a head that has its units no
+    more goes. `head.complete` asks."""
     if of(obj) and mesh.has(obj):
         add(bpy.context, obj)
     elif of(obj):

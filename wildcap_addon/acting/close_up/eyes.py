@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The close-up's objects of both eyes, children of the head: what turns is turned by the head's look units, what lies on the lids finds them by geometry nodes.
+"""The close-up's objects of both eyes, children of the head: what turns is turned by the head's look units, what lies
+on the lids finds them by geometry nodes.
 
-No object hangs on the head's vertices: the head's lids keep to these eyes, so that the eyes cannot wait for the head's shape."""
+No object hangs on the head's vertices: the head's lids keep to these eyes, so that the eyes cannot wait for the head's
+shape."""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ REACH_M = 0.00042
 ACROSS = 5
 """Vertices of the margin and of the wet line from the lid to the ball."""
 CARUNCLE_M = 0.0054
-"""From the inner corner outwards, over which the caruncle comes down to the ball: life's is some 5 mm wide, and its fold follows."""
+"""From the inner corner outwards, over which the caruncle comes down to the ball: life's is some 5 mm wide, and its
+fold follows."""
 BOWED = 0.5
 """How much sooner it comes down in its middle than at the lids: its edge is a crescent."""
 LIFT = 0.10
@@ -26,7 +29,8 @@ LIFT = 0.10
 
 
 def build(obj, keep, iris_m: tuple[float, float]) -> None:
-    """Makes or renews the objects of both eyes; `keep(kind, data)` gives the object of a kind with new mesh data. iris_m: radii in metres."""
+    """Makes or renews the objects of both eyes; `keep(kind, data)` gives the object of a kind with new mesh data.
+    iris_m: radii in metres."""
     asset = load()
     shells = []
     for number, side in enumerate(SIDES):
@@ -36,7 +40,8 @@ def build(obj, keep, iris_m: tuple[float, float]) -> None:
         shell = keep(f"{side} Cornea", _turned(f"{obj.name} {side} Cornea", shapes.shell(eye.radius, edge), 0))
         for thing in (inner, shell):
             _place(thing, obj, eye, side)
-        materials.fill(inner, materials.white(obj.name), materials.iris(obj.name, of_the_head.colour_of(obj)), materials.pupil(obj.name))
+        materials.fill(inner, materials.white(obj.name), materials.iris(obj.name, of_the_head.colour_of(obj)),
+                       materials.pupil(obj.name))
         materials.fill(shell, materials.cornea(obj.name))
         _let_light_in(shell)
         rims = ball.rims(asset, number)
@@ -76,8 +81,9 @@ def _along_lids(name: str, rims: ball.LidRims, constant: dict[str, float]):
     opposite = np.concatenate([rims.lower, rims.upper])
     across = np.tile(np.linspace(0, 1, ACROSS), len(rim))
     strips = [_grid(len(rims.upper), ACROSS, flipped=True), len(rims.upper) * ACROSS + _grid(len(rims.lower), ACROSS)]
-    return _strip(name, np.concatenate(strips), {"rim": rim.repeat(ACROSS), "opposite": opposite.repeat(ACROSS), "across": across,
-                                                 **{key: np.full(len(across), value) for key, value in constant.items()}})
+    return _strip(name, np.concatenate(strips),
+                  {"rim": rim.repeat(ACROSS), "opposite": opposite.repeat(ACROSS), "across": across,
+                   **{key: np.full(len(across), value) for key, value in constant.items()}})
 
 
 def _margin(name: str, rims: ball.LidRims, head):
@@ -107,8 +113,9 @@ def _caruncle(name: str, rims: ball.LidRims, asset: FaceUnits):
     t = np.clip((along.repeat(rows) * early - 0.3) / 0.7, 0, 1)
     onto = t * t * (3 - 2 * t)
     hump = np.sin(np.pi * across) * (1 - 0.5 * onto)
-    return _strip(name, _grid(count + 1, rows, flipped=True), {"rim": upper.repeat(rows), "opposite": lower.repeat(rows), "across": across, "onto": onto,
-                                                               "lift": LIFT * hump})
+    return _strip(name, _grid(count + 1, rows, flipped=True),
+                  {"rim": upper.repeat(rows), "opposite": lower.repeat(rows), "across": across, "onto": onto,
+                   "lift": LIFT * hump})
 
 
 def _grid(count: int, rows: int, flipped: bool = False) -> np.ndarray:

@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the close-up's eyes, tears and mouth are made of. The cornea refracts in Cycles; EEVEE, whose refraction shows nothing of what is behind without its
-ray tracing switched on, gets the same highlights over a clear pane: each engine has an output of its own."""
+"""What the close-up's eyes, tears and mouth are made of. The cornea refracts in Cycles; EEVEE, whose refraction shows
+nothing of what is behind without its ray tracing switched on, gets the same highlights over a clear pane: each engine
+has an output of its own."""
 
 import bpy
 
@@ -20,7 +21,8 @@ WARM = (1.5, 1.05, 0.55)
 FADED = 0.08
 """v of the white's UVs at which it is opaque: over the limbus it fades to the iris' rim."""
 DEEP_M, DEEP_DARK = 0.035, 0.92
-"""Metres behind the front teeth where the mouth is darkest in EEVEE, and how dark: without ray tracing it lights a mouth as if nothing were before it."""
+"""Metres behind the front teeth where the mouth is darkest in EEVEE, and how dark: without ray tracing it lights a
+mouth as if nothing were before it."""
 FLESH, FOLD, GUMS, TONGUE = (0.50, 0.20, 0.17), (0.60, 0.39, 0.35), (0.44, 0.135, 0.125), (0.42, 0.15, 0.135)
 ENAMEL = (0.80, 0.735, 0.62)
 
@@ -31,12 +33,15 @@ def white(name: str) -> bpy.types.Material:
         return material
     tree = material.node_tree
     told = _told(tree, pictures.white())
-    pink = _mixed(tree, told["Green"], (*WHITE_COLOUR, 1), (*(a * b for a, b in zip(WHITE_COLOUR, PINK, strict=True)), 1))
-    tree.links.new(_mixed(tree, math(tree, 'MULTIPLY', told["Red"], 0.75), pink, (*VESSEL_COLOUR, 1)), shader.inputs["Base Color"])
+    pink = _mixed(tree, told["Green"], (*WHITE_COLOUR, 1),
+                  (*(a * b for a, b in zip(WHITE_COLOUR, PINK, strict=True)), 1))
+    tree.links.new(_mixed(tree, math(tree, 'MULTIPLY', told["Red"], 0.75), pink, (*VESSEL_COLOUR, 1)),
+                   shader.inputs["Base Color"])
     _moist(shader, 0.35, (1.0, 0.45, 0.3), 0.0012, 0.0)  # its wet layer is the shell
     _bumped(tree, shader, told["Blue"], 0.25, 0.0001)
     uv = add(tree, 'ShaderNodeUVMap').outputs[0]
-    fading = add(tree, 'ShaderNodeMapRange', {"Value": add(tree, 'ShaderNodeSeparateXYZ', (uv,)).outputs[1], "From Min": 0.0, "From Max": FADED},
+    fading = add(tree, 'ShaderNodeMapRange',
+                 {"Value": add(tree, 'ShaderNodeSeparateXYZ', (uv,)).outputs[1], "From Min": 0.0, "From Max": FADED},
                  interpolation_type='SMOOTHSTEP').outputs[0]
     _seen_through(tree, shader, fading)
     return material
@@ -107,7 +112,8 @@ def tears(name: str) -> bpy.types.Material:
 
 
 def teeth(name: str, front: float) -> bpy.types.Material:
-    """Enamel over dentine: some light goes in, and the surface is moist. front, here and below: y of the front teeth."""
+    """Enamel over dentine: some light goes in, and the surface is moist. front, here and below: y of the front
+    teeth."""
     material, shader = _new(f"{name} Enamel", "enamel", ENAMEL, 0.22)
     if shader is not None:
         _shaded_by_lips(material.node_tree, shader, front)
@@ -156,7 +162,8 @@ def _shaded_by_lips(tree, shader, front: float) -> None:
     """In EEVEE the deeper the darker, by an output of its own; Cycles finds it out."""
     _output(tree).target = 'CYCLES'
     depth = add(tree, 'ShaderNodeSeparateXYZ', (add(tree, 'ShaderNodeTexCoord').outputs["Object"],)).outputs[1]
-    dark = add(tree, 'ShaderNodeMapRange', {"Value": depth, "From Min": front, "From Max": front + DEEP_M, "To Max": DEEP_DARK}).outputs[0]
+    dark = add(tree, 'ShaderNodeMapRange',
+               {"Value": depth, "From Min": front, "From Max": front + DEEP_M, "To Max": DEEP_DARK}).outputs[0]
     black = add(tree, 'ShaderNodeBsdfDiffuse', {"Color": (0, 0, 0, 1)}).outputs[0]
     mixed = add(tree, 'ShaderNodeMixShader', (dark, shader.outputs[0], black)).outputs[0]
     add(tree, 'ShaderNodeOutputMaterial', {"Surface": mixed}, target='EEVEE').location = (300, -200)
@@ -164,11 +171,13 @@ def _shaded_by_lips(tree, shader, front: float) -> None:
 
 def _uneven(tree, shader, scale: float, strength: float, distance: float) -> None:
     place = add(tree, 'ShaderNodeTexCoord').outputs["Object"]
-    _bumped(tree, shader, add(tree, 'ShaderNodeTexNoise', {"Vector": place, "Scale": scale, "Detail": 2.0}).outputs[0], strength, distance)
+    _bumped(tree, shader, add(tree, 'ShaderNodeTexNoise', {"Vector": place, "Scale": scale, "Detail": 2.0}).outputs[0],
+            strength, distance)
 
 
 def _new(name: str, kind: str, colour: tuple, roughness: float) -> tuple:
-    """The material of a name and its shader; None for the shader of one that is there and keeps the artist's changes."""
+    """The material of a name and its shader; None for the shader of one that is there and keeps the artist's
+    changes."""
     found = bpy.data.materials.get(name)
     if found is not None and found.get(materials.KEY) == kind:
         return found, None
@@ -183,7 +192,8 @@ def _new(name: str, kind: str, colour: tuple, roughness: float) -> tuple:
 
 def _told(tree, image):
     picture = add(tree, 'ShaderNodeTexImage', interpolation='Cubic', image=image)
-    tree.nodes.active = add(tree, 'ShaderNodeTexImage', label="None")  # what Solid shading shows: no picture, so the material's own colour
+    # what Solid shading shows: no picture, so the material's own colour
+    tree.nodes.active = add(tree, 'ShaderNodeTexImage', label="None")
     return add(tree, 'ShaderNodeSeparateColor', (picture.outputs["Color"],)).outputs
 
 
@@ -208,14 +218,17 @@ def _output(tree):
 
 
 def _seen_through(tree, shader, opaque) -> None:
-    mixed = add(tree, 'ShaderNodeMixShader', (opaque, add(tree, 'ShaderNodeBsdfTransparent').outputs[0], shader.outputs[0]))
+    mixed = add(tree, 'ShaderNodeMixShader',
+                (opaque, add(tree, 'ShaderNodeBsdfTransparent').outputs[0], shader.outputs[0]))
     tree.links.new(mixed.outputs[0], _output(tree).inputs["Surface"])
 
 
 def _pane(tree, ior: float):
     """Clear, with the reflections of a surface."""
-    return add(tree, 'ShaderNodeMixShader', (add(tree, 'ShaderNodeFresnel', {"IOR": ior}).outputs[0], add(tree, 'ShaderNodeBsdfTransparent').outputs[0],
-                                             add(tree, 'ShaderNodeBsdfGlossy', {"Roughness": 0.03}).outputs[0])).outputs[0]
+    return add(tree, 'ShaderNodeMixShader',
+               (add(tree, 'ShaderNodeFresnel', {"IOR": ior}).outputs[0],
+                add(tree, 'ShaderNodeBsdfTransparent').outputs[0],
+                add(tree, 'ShaderNodeBsdfGlossy', {"Roughness": 0.03}).outputs[0])).outputs[0]
 
 
 def _clear(material) -> None:

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The close-up's objects of the mouth: teeth in gums, and a tongue, carried to the head as its own bands are, with shape keys that go along with its units."""
+"""The close-up's objects of the mouth: teeth in gums, and a tongue, carried to the head as its own bands are, with
+shape keys that go along with its units."""
 
 from __future__ import annotations
 
@@ -13,15 +14,16 @@ from ..asset import FaceUnits, load
 from . import ball, materials, mouth_shapes, nodes
 
 SHOWN_M, FARTHEST_M = 0.001, 0.006
-"""How far the upper teeth end below where the lips meet, as most people's do, and how far they are moved for it at most: the bands of the built-in head
-are carried by the face around them, which knows nothing of where lips end."""
+"""How far the upper teeth end below where the lips meet, as most people's do, and how far they are moved for it at
+most: the bands of the built-in head are carried by the face around them, which knows nothing of where lips end."""
 WIDE_M = 0.009
 """Half the width of the upper front teeth that are looked at for it."""
 LEAST_M = 3e-4
 """A unit that moves jaw and tongue by less moves the lips alone."""
 OUT, OVER = "tongueOut", "tongueOver"
 RISE_M, OVER_M = 0.004, 0.006
-"""How much higher than by the unit the tip lies when the tongue is out, and how far it rises on its way: over the lower teeth and the lip."""
+"""How much higher than by the unit the tip lies when the tongue is out, and how far it rises on its way: over the lower
+teeth and the lip."""
 OUT_BY = "min(tongueOut, jawOpen)"
 """Through closed lips no tongue comes: it goes as far as the jaw is open."""
 
@@ -34,27 +36,32 @@ def build(obj, keep) -> None:
     keys = obj.data.shape_keys.key_blocks
     rest = ball.places(keys[0])[first:]
     moves = {name: ball.places(keys[name])[first:] - rest for name in asset.units}
-    moves = {name: moved for name, moved in moves.items() if np.abs(moved[np.concatenate([lower, tongue])]).max() > LEAST_M}
+    moves = {name: moved for name, moved in moves.items()
+             if np.abs(moved[np.concatenate([lower, tongue])]).max() > LEAST_M}
     shape = mouth_shapes.teeth_and_gums(asset)
     placed = _affine(asset.parts[np.concatenate([upper, lower])], rest[np.concatenate([upper, lower])], shape.vertices)
     lower_by = _lowering(asset, ball.places(keys[0]), placed[~shape.lower])
     placed = placed + lower_by
-    turned = {name: np.where(shape.lower[:, None], _affine(rest[lower], moved[lower], placed), 0) for name, moved in moves.items()}
+    turned = {name: np.where(shape.lower[:, None], _affine(rest[lower], moved[lower], placed), 0)
+              for name, moved in moves.items()}
     teeth = keep("Teeth", _data(f"{obj.name} Teeth and Gums", placed, shape.faces, shape.slots))
     front = float(placed[:, 1].min())
     materials.fill(teeth, materials.teeth(obj.name, front), materials.gums(obj.name, front))
     nodes.modify(obj, nodes.lids_on_eyes(), Lining=materials.gums(obj.name, front))
     _keyed(teeth, obj, placed, turned)
-    faces = [[int(where) for where in np.searchsorted(tongue, [i - first for i in face if i >= 0])] for face in _faces(asset, first, tongue)]
+    faces = [[int(where) for where in np.searchsorted(tongue, [i - first for i in face if i >= 0])]
+             for face in _faces(asset, first, tongue)]
     flesh = keep("Tongue", _data(f"{obj.name} Tongue", rest[tongue] + lower_by, faces, np.zeros(len(faces))))
     materials.fill(flesh, materials.tongue(obj.name, front))
-    _keyed(flesh, obj, rest[tongue] + lower_by, _tongue_moves(moves, tongue), {OUT: OUT_BY, OVER: f"4 * {OUT_BY} * (1 - {OUT_BY})"})
+    _keyed(flesh, obj, rest[tongue] + lower_by, _tongue_moves(moves, tongue),
+           {OUT: OUT_BY, OVER: f"4 * {OUT_BY} * (1 - {OUT_BY})"})
     modifier = flesh.modifiers.get("Subdivision") or flesh.modifiers.new("Subdivision", 'SUBSURF')
     modifier.levels, modifier.render_levels = 1, 2
 
 
 def _tongue_moves(moves: dict[str, np.ndarray], tongue: np.ndarray) -> dict[str, np.ndarray]:
-    """What each unit adds to the tongue's vertices; the one that puts it out has a second key, which is there half way alone."""
+    """What each unit adds to the tongue's vertices; the one that puts it out has a second key, which is there half way
+    alone."""
     moves = {name: moved[tongue] for name, moved in moves.items()}
     ahead = np.clip(-moves[OUT][:, 1:2], 0, None)
     up = ahead / ahead.max() * [0, 0, 1.0]
@@ -62,7 +69,8 @@ def _tongue_moves(moves: dict[str, np.ndarray], tongue: np.ndarray) -> dict[str,
 
 
 def _lowering(asset: FaceUnits, head: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """The way [3] from where the upper teeth [N, 3] were carried to where the lips of the head at rest meet before them."""
+    """The way [3] from where the upper teeth [N, 3] were carried to where the lips of the head at rest meet before
+    them."""
     lips = asset.copies[asset.seam == 0]
     meet = head[lips[np.abs(asset.template[lips, 0]).argmin()]]
     edge = upper[np.abs(upper[:, 0] - meet[0]) < WIDE_M, 2].min()
@@ -90,7 +98,8 @@ def _data(name: str, vertices: np.ndarray, faces: list, slots: np.ndarray):
 
 
 def _keyed(thing, obj, rest: np.ndarray, moves: dict[str, np.ndarray], led_by: dict[str, str] | None = None) -> None:
-    """Shape keys of the units that move it, driven by the head's own. led_by: expressions of units for keys that more than one unit leads."""
+    """Shape keys of the units that move it, driven by the head's own. led_by: expressions of units for keys that more
+    than one unit leads."""
     thing.shape_key_add(name="Basis", from_mix=False)
     for name, moved in moves.items():
         if np.abs(moved).max() < LEAST_M:

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes of a mouth: single teeth in their gums, along the bands that stand for teeth in the built-in head and within their outsides; its tongue, rounder.
+"""Shapes of a mouth: single teeth in their gums, along the bands that stand for teeth in the built-in head and within
+their outsides; its tongue, rounder.
 
 Lengths in metres, in the template's axes: -y is ahead, z up."""
 
@@ -33,7 +34,8 @@ TEETH, GUMS = range(2)
 
 @dataclass(frozen=True)
 class Mouth:
-    """vertices [V, 3]; faces: quads and others; slot of each face; lower [V]: whether a vertex goes along with the jaw."""
+    """vertices [V, 3]; faces: quads and others; slot of each face; lower [V]: whether a vertex goes along with the
+    jaw."""
 
     vertices: np.ndarray
     faces: list[list[int]]
@@ -43,7 +45,8 @@ class Mouth:
 
 @dataclass(frozen=True)
 class _Arch:
-    """The band's outer edge from one end to the other: places [N, 3], and their distances from the middle [N], metres, negative to the right."""
+    """The band's outer edge from one end to the other: places [N, 3], and their distances from the middle [N], metres,
+    negative to the right."""
 
     places: np.ndarray
     along: np.ndarray
@@ -52,14 +55,16 @@ class _Arch:
         """Places [..., 3] and ways outwards [..., 3], level, at distances from the middle."""
         place = np.stack([np.interp(along, self.along, column) for column in self.places.T], -1)
         step = 0.004
-        before, after = (np.stack([np.interp(along + s, self.along, column) for column in self.places.T], -1) for s in (-step, step))
+        before, after = (np.stack([np.interp(along + s, self.along, column) for column in self.places.T], -1)
+                         for s in (-step, step))
         run = after - before
         out = np.stack([run[..., 1], -run[..., 0], 0 * run[..., 0]], -1)
         return place, out / np.linalg.norm(out, axis=-1, keepdims=True)
 
 
 def bands(asset: FaceUnits) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rows, among the inner vertices, of the upper teeth, the lower ones and the tongue: the parts that move with the jaws, each joined by its faces."""
+    """Rows, among the inner vertices, of the upper teeth, the lower ones and the tongue: the parts that move with the
+    jaws, each joined by its faces."""
     first = len(asset.template) + len(asset.copies)
     part = np.arange(len(asset.parts))
     edges = np.concatenate([asset.faces[:, [a, (a + 1) % 4]] for a in range(4)]) - first
@@ -98,7 +103,8 @@ def teeth_and_gums(asset: FaceUnits) -> Mouth:
 def _arch(band: np.ndarray, up: float) -> _Arch:
     """The biting edge of a band [N, 3], smooth, from the right end to the left one."""
     outer = []
-    for x in np.linspace(0, 0.999 * band[:, 0].max(), 40):  # the outermost and farthest from the root, along the left side
+    # the outermost and farthest from the root, along the left side
+    for x in np.linspace(0, 0.999 * band[:, 0].max(), 40):
         near = band[np.abs(np.abs(band[:, 0]) - x) < 0.006]
         score = -near[:, 1] + 1.2 * np.abs(near[:, 0]) - 0.8 * up * near[:, 2]
         outer.append(np.abs(near[score.argmax()]) * [1, 0, 0] + near[score.argmax()] * [0, 1, 1])
@@ -117,7 +123,8 @@ def _arch(band: np.ndarray, up: float) -> _Arch:
 
 
 def _sizes(jaw: str, arch: _Arch) -> tuple[np.ndarray, float]:
-    """Where each tooth of a side begins and ends along the arch [7], and how much larger than life they are to fill it."""
+    """Where each tooth of a side begins and ends along the arch [7], and how much larger than life they are to fill
+    it."""
     widths = np.append(0, np.cumsum(WIDTHS_MM[jaw])) / 1000
     larger = min(1.25, 0.97 * arch.along[-1] / widths[-1])
     return widths * larger, larger
@@ -133,7 +140,8 @@ def _teeth(jaw: str, arch: _Arch, up: float) -> list[tuple[np.ndarray, np.ndarra
     for number in range(len(WIDTHS_MM[jaw])):
         h = np.concatenate([np.linspace(-0.45, 0.9, ALONG), [0.965, 1.0]])  # 0 at the gum, 1 at the edge
         front = number <= CANINE
-        swell = np.interp(h, [-0.45, 0, 0.35, 0.75, 0.93, 1.0], [0.62, 0.86, 0.98, 1.0, 0.93, 0.72] if front else [0.66, 0.90, 1.0, 1.0, 0.86, 0.55])
+        swell = np.interp(h, [-0.45, 0, 0.35, 0.75, 0.93, 1.0],
+                          [0.62, 0.86, 0.98, 1.0, 0.93, 0.72] if front else [0.66, 0.90, 1.0, 1.0, 0.86, 0.55])
         deep = np.interp(h, [-0.45, 0, 0.3, 0.7, 0.95, 1.0], [0.7, 1.0, 0.92, 0.5, 0.26, 0.14] if number < INCISORS else
                          [0.7, 1.0, 0.98, 0.66, 0.36, 0.16] if front else [0.75, 0.94, 1.0, 0.95, 0.70, 0.40])
         width, depth = (ends[number + 1] - ends[number]) * 0.985, DEPTHS_MM[jaw][number] / 1000 * larger
@@ -144,13 +152,21 @@ def _teeth(jaw: str, arch: _Arch, up: float) -> list[tuple[np.ndarray, np.ndarra
             run = np.array([-out[1], out[0], 0])
             lean = 0.10 if number < INCISORS else 0.04  # the crowns of front teeth lean towards the lips
             reach = (h[:, None] - tip[None] * np.clip(h[:, None] - 0.6, 0, 1) / 0.4)
-            away = -INSET_M[jaw] - depth / 2 * deep[:, None] * (1 - square[1][None]) - lean * length * (1 - h[:, None]) * (h[:, None] < 1)
+            away = (
+                -INSET_M[jaw]
+                - depth / 2 * deep[:, None] * (1 - square[1][None])
+                - lean * length * (1 - h[:, None]) * (h[:, None] < 1)
+            )
             away = away - 0.0011 * larger * np.clip(0.25 - h[:, None], 0, 1)
             down = -up * (reach - 1) * length - up * -LAP_M
-            points = place + square[0][None, :, None] * (swell[:, None] * width / 2)[..., None] * run + away[..., None] * out + down[..., None] * [0, 0, 1.0]
+            points = place + square[0][None, :,
+                                       None] * (swell[:, None] * width
+                                                / 2)[...,
+                                                     None] * run + away[..., None] * out + down[..., None] * [0, 0, 1.0]
             points = points.reshape(-1, 3)
             k = np.arange(AROUND)
-            quads = [np.stack([r * AROUND + k, r * AROUND + (k + 1) % AROUND, (r + 1) * AROUND + (k + 1) % AROUND, (r + 1) * AROUND + k], 1)
+            quads = [np.stack([r * AROUND + k, r * AROUND + (k + 1) % AROUND, (r + 1) * AROUND + (k + 1) % AROUND,
+                               (r + 1) * AROUND + k], 1)
                      for r in range(len(h) - 1)]
             last = (len(h) - 1) * AROUND
             half = np.arange(AROUND // 2 - 1)
@@ -160,7 +176,8 @@ def _teeth(jaw: str, arch: _Arch, up: float) -> list[tuple[np.ndarray, np.ndarra
 
 
 def _gum(jaw: str, arch: _Arch, up: float) -> tuple[np.ndarray, np.ndarray]:
-    """The gum's sheet over the necks: from the fold before the teeth down to a margin in arcs, and behind them up again."""
+    """The gum's sheet over the necks: from the fold before the teeth down to a margin in arcs, and behind them up
+    again."""
     ends, larger = _sizes(jaw, arch)
     along = np.linspace(-ends[-1] - 0.001, ends[-1] + 0.001, GUM_COLUMNS)
     tooth = np.clip(np.searchsorted(ends, np.abs(along)) - 1, 0, len(ends) - 2)

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Nodes in one line each, and the geometry nodes by which lids, tears and caruncle keep to an eye, whatever opens, turns or reshapes the head."""
+"""Nodes in one line each, and the geometry nodes by which lids, tears and caruncle keep to an eye, whatever opens,
+turns or reshapes the head."""
 
 import bpy
 
@@ -43,7 +44,8 @@ def vector(tree, operation: str, *values):
 
 
 def scaled(tree, direction, factor):
-    return add(tree, 'ShaderNodeVectorMath', {"Vector": direction, "Scale": factor}, operation='SCALE').outputs["Vector"]
+    return add(tree, 'ShaderNodeVectorMath', {"Vector": direction, "Scale": factor},
+               operation='SCALE').outputs["Vector"]
 
 
 def group(name: str, inputs: dict[str, str], build) -> bpy.types.NodeTree:
@@ -76,25 +78,29 @@ def modify(obj, tree, **inputs) -> None:
 
 
 def lids_on_eyes() -> bpy.types.NodeTree:
-    """Moves lids out of the eyes, takes away what the close-up's own objects stand for (vertices from First on, which are the head's last ones), and gives the
-    inside of the cheeks the material Lining."""
-    return group(LIDS, {"Left": 'NodeSocketObject', "Right": 'NodeSocketObject', "First": 'NodeSocketInt', "Lining": 'NodeSocketMaterial'}, _lids)
+    """Moves lids out of the eyes, takes away what the close-up's own objects stand for (vertices from First on, which
+    are the head's last ones), and gives the inside of the cheeks the material Lining."""
+    return group(LIDS,
+                 {"Left": 'NodeSocketObject', "Right": 'NodeSocketObject', "First": 'NodeSocketInt',
+                  "Lining": 'NodeSocketMaterial'}, _lids)
 
 
 def lid_margin() -> bpy.types.NodeTree:
-    """The edge of a lid, from its rim down to the ball. Attributes: rim, opposite: vertices of the head; across: from the rim (0) to the ball (1)."""
+    """The edge of a lid, from its rim down to the ball. Attributes: rim, opposite: vertices of the head; across: from
+    the rim (0) to the ball (1)."""
     return group(MARGIN, {"Head": 'NodeSocketObject', "Shell": 'NodeSocketObject'}, _margin)
 
 
 def wet_line() -> bpy.types.NodeTree:
-    """A strip of fluid in the corner between a lid's margin and the ball. Attributes: rim, opposite: vertices of the head; reach: how far up the margin and
-    onto the ball, metres; across: from the margin (0) to the ball (1)."""
+    """A strip of fluid in the corner between a lid's margin and the ball. Attributes: rim, opposite: vertices of the
+    head; reach: how far up the margin and onto the ball, metres; across: from the margin (0) to the ball (1)."""
     return group(WET, {"Head": 'NodeSocketObject', "Shell": 'NodeSocketObject'}, _wet)
 
 
 def caruncle() -> bpy.types.NodeTree:
-    """Flesh between the lids' rims at the inner corner. Attributes: rim, opposite; across: from the upper rim (0) to the lower one; onto: 1 where it has
-    come down to the ball; lift: how far it stands out, as a share of the opening there."""
+    """Flesh between the lids' rims at the inner corner. Attributes: rim, opposite; across: from the upper rim (0) to
+    the lower one; onto: 1 where it has come down to the ball; lift: how far it stands out, as a share of the opening
+    there."""
     return group(CARUNCLE, {"Head": 'NodeSocketObject', "Shell": 'NodeSocketObject'}, _caruncle)
 
 
@@ -106,22 +112,28 @@ def _lids(tree, inputs):
         near, out, centre = _on_shell(tree, inputs[side], place)
         above = vector(tree, 'DOT_PRODUCT', vector(tree, 'SUBTRACT', place, near), out)
         short = math(tree, 'SUBTRACT', CLEAR_M, above)
-        ahead = math(tree, 'MULTIPLY', add(tree, 'ShaderNodeSeparateXYZ', (vector(tree, 'SUBTRACT', place, centre),)).outputs[1], -1.0)
+        ahead = math(tree, 'MULTIPLY',
+                     add(tree, 'ShaderNodeSeparateXYZ', (vector(tree, 'SUBTRACT', place, centre),)).outputs[1], -1.0)
         lid = math(tree, 'MULTIPLY', math(tree, 'GREATER_THAN', ahead, AHEAD_M),
-                   math(tree, 'MULTIPLY', math(tree, 'LESS_THAN', short, MOST_M), math(tree, 'GREATER_THAN', short, 0.0)))
+                   math(tree, 'MULTIPLY', math(tree, 'LESS_THAN', short, MOST_M),
+                        math(tree, 'GREATER_THAN', short, 0.0)))
         lid = math(tree, 'MULTIPLY', lid, math(tree, 'LESS_THAN', index, inputs["First"]))
-        geometry = add(tree, 'GeometryNodeSetPosition', {"Geometry": geometry, "Selection": lid, "Offset": scaled(tree, out, short)}).outputs[0]
+        geometry = add(tree, 'GeometryNodeSetPosition',
+                       {"Geometry": geometry, "Selection": lid, "Offset": scaled(tree, out, short)}).outputs[0]
     beyond = math(tree, 'GREATER_THAN', index, math(tree, 'SUBTRACT', inputs["First"], 0.5))
-    kept = add(tree, 'GeometryNodeDeleteGeometry', {"Geometry": geometry, "Selection": beyond}, domain='POINT').outputs[0]
+    kept = add(tree, 'GeometryNodeDeleteGeometry', {"Geometry": geometry, "Selection": beyond},
+               domain='POINT').outputs[0]
     mouth = math(tree, 'COMPARE', add(tree, 'GeometryNodeInputMaterialIndex').outputs[0], float(MOUTH_SLOT), 0.5)
-    return add(tree, 'GeometryNodeSetMaterial', {"Geometry": kept, "Selection": mouth, "Material": inputs["Lining"]}).outputs[0]
+    return add(tree, 'GeometryNodeSetMaterial',
+               {"Geometry": kept, "Selection": mouth, "Material": inputs["Lining"]}).outputs[0]
 
 
 def _margin(tree, inputs):
     lid, _, across = _lid(tree, inputs["Head"])
     below, out, _ = _on_shell(tree, inputs["Shell"], lid)
     foot = vector(tree, 'SUBTRACT', below, scaled(tree, out, FOOT_M))
-    return add(tree, 'GeometryNodeSetPosition', {"Geometry": inputs["Geometry"], "Position": _between(tree, lid, foot, across)}).outputs[0]
+    return add(tree, 'GeometryNodeSetPosition',
+               {"Geometry": inputs["Geometry"], "Position": _between(tree, lid, foot, across)}).outputs[0]
 
 
 def _wet(tree, inputs):
@@ -129,7 +141,8 @@ def _wet(tree, inputs):
     reach = _attribute(tree, "reach", 'FLOAT')
     towards = vector(tree, 'NORMALIZE', vector(tree, 'SUBTRACT', other, rim))
     below, _, _ = _on_shell(tree, inputs["Shell"], rim)
-    down = math(tree, 'MAXIMUM', 0.0, math(tree, 'SUBTRACT', 1.0, math(tree, 'DIVIDE', reach, vector(tree, 'DISTANCE', rim, below))))
+    down = math(tree, 'MAXIMUM', 0.0,
+                math(tree, 'SUBTRACT', 1.0, math(tree, 'DIVIDE', reach, vector(tree, 'DISTANCE', rim, below))))
     lid = _between(tree, rim, below, down)
     ball, out, _ = _on_shell(tree, inputs["Shell"], vector(tree, 'ADD', lid, scaled(tree, towards, reach)))
     ball = vector(tree, 'SUBTRACT', ball, scaled(tree, out, 0.00003))  # its edge lies below the shell, not above it
@@ -147,7 +160,8 @@ def _caruncle(tree, inputs):
     flesh = vector(tree, 'ADD', middle, scaled(tree, out, lift))
     ball = vector(tree, 'SUBTRACT', ball, scaled(tree, out, SUNK_M))
     return add(tree, 'GeometryNodeSetPosition', {"Geometry": inputs["Geometry"],
-                                                 "Position": _between(tree, flesh, ball, _attribute(tree, "onto", 'FLOAT'))}).outputs[0]
+                                                 "Position": _between(tree, flesh, ball,
+                                                                      _attribute(tree, "onto", 'FLOAT'))}).outputs[0]
 
 
 def _on_shell(tree, shell, place) -> tuple:
@@ -163,8 +177,9 @@ def _lid(tree, head) -> tuple:
     """Where a vertex' rim is, the one opposite, and its share of the way across."""
     surface = add(tree, 'GeometryNodeObjectInfo', {"Object": head}, transform_space='RELATIVE').outputs["Geometry"]
     place = add(tree, 'GeometryNodeInputPosition').outputs[0]
-    found = [add(tree, 'GeometryNodeSampleIndex', {"Geometry": surface, "Value": place, "Index": _attribute(tree, name, 'INT')}, data_type='FLOAT_VECTOR',
-                 domain='POINT').outputs[0] for name in ("rim", "opposite")]
+    found = [add(tree, 'GeometryNodeSampleIndex',
+                 {"Geometry": surface, "Value": place, "Index": _attribute(tree, name, 'INT')},
+                 data_type='FLOAT_VECTOR', domain='POINT').outputs[0] for name in ("rim", "opposite")]
     return *found, _attribute(tree, "across", 'FLOAT')
 
 

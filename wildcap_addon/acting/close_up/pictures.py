@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of an iris and of a white without their colours, once around the gaze in each row: packed into the file, one pair for all heads in it."""
+"""Pictures of an iris and of a white without their colours, once around the gaze in each row: packed into the file, one
+pair for all heads in it."""
 
 import bpy
 import numpy as np
@@ -28,7 +29,8 @@ def white() -> bpy.types.Image:
 
 
 def iris_pattern() -> np.ndarray:
-    """[rows, columns, 3]: strands of the stroma from the collarette outwards, the sphincter within, crypts between them, furrows, a dark limbal ring."""
+    """[rows, columns, 3]: strands of the stroma from the collarette outwards, the sphincter within, crypts between
+    them, furrows, a dark limbal ring."""
     rows, columns = IRIS_SIZE
     rng = np.random.default_rng(SEED)
     out = (np.arange(rows) + 0.5)[:, None] / rows
@@ -53,7 +55,8 @@ def iris_pattern() -> np.ndarray:
 
 
 def white_pattern() -> np.ndarray:
-    """[rows, columns, 3]: vessels that come in from the corners and branch towards the limbus, where a fine net ends them."""
+    """[rows, columns, 3]: vessels that come in from the corners and branch towards the limbus, where a fine net ends
+    them."""
     rows, columns = WHITE_SIZE
     rng = np.random.default_rng(SEED)
     dots: tuple[list, list] = ([], [])
@@ -61,17 +64,24 @@ def white_pattern() -> np.ndarray:
         at_corner = number % 4 != 0
         around = (rng.integers(2) * np.pi + rng.normal(0, CORNER / 2)) if at_corner else rng.uniform(0, 2 * np.pi)
         width = rng.uniform(0.7, 1.9) if at_corner else rng.uniform(0.5, 1.0)
-        dots[number % 3 == 0].extend(_vessel(rng, around, rows * rng.uniform(0.75, 1.0), width, rng.uniform(0.06, 0.45) * rows))
+        dots[number % 3
+             == 0].extend(_vessel(rng, around, rows * rng.uniform(0.75, 1.0), width, rng.uniform(0.06, 0.45) * rows))
     vessels, deep = _drawn(dots[0]), _blur(_drawn(dots[1]), 3.0)
     out, turn = (np.arange(rows) + 0.5)[:, None] / rows, np.arange(columns)[None] * 2 * np.pi / columns
     mottled = 0.5 + 0.25 * _noise(rng, WHITE_SIZE, 5, 14)
-    pink = (0.12 + 0.88 * np.abs(np.cos(turn)) ** 1.5) * _smooth(out, 0.06, 0.6) * (0.6 + 0.8 * mottled) + 0.12 * np.exp(-(((out - 0.13) / 0.07) ** 2))
+    pink = (0.12 + 0.88
+            * np.abs(np.cos(turn)) ** 1.5) * _smooth(out, 0.06,
+                                                     0.6) * (0.6 + 0.8
+                                                             * mottled) + 0.12 * np.exp(-(((out - 0.13) / 0.07) ** 2))
     red = np.clip(0.9 * _blur(vessels, 0.6) + 0.45 * deep, 0, 1)
-    return np.stack([red, np.clip(pink, 0, 1), np.clip(0.5 + 0.3 * red + 0.06 * _noise(rng, WHITE_SIZE, 20, 60), 0, 1)], -1)
+    return np.stack([red, np.clip(pink, 0, 1), np.clip(0.5 + 0.3 * red + 0.06 * _noise(rng, WHITE_SIZE, 20, 60), 0, 1)],
+                    -1)
 
 
-def _vessel(rng: np.random.Generator, around: float, row: float, width: float, ends: float) -> list[tuple[float, float, float]]:
-    """Column, row and width in pixels of the dots along a vessel from a row inwards to where it ends, winding, with branches."""
+def _vessel(rng: np.random.Generator, around: float, row: float, width: float,
+            ends: float) -> list[tuple[float, float, float]]:
+    """Column, row and width in pixels of the dots along a vessel from a row inwards to where it ends, winding, with
+    branches."""
     rows, columns = WHITE_SIZE
     dots, inwards = [], -np.pi / 2
     pending = [(around * columns / (2 * np.pi), row, inwards + rng.normal(0, 0.25), width, ends)]
@@ -118,7 +128,8 @@ def _blur(picture: np.ndarray, sigma: float) -> np.ndarray:
     """Gaussian, of a sigma in pixels; closed around, mirrored at the ends."""
     twice = np.concatenate([picture, picture[::-1]])
     down, round_ = np.fft.fftfreq(len(twice))[:, None], np.fft.rfftfreq(picture.shape[1])[None]
-    return np.fft.irfft2(np.fft.rfft2(twice) * np.exp(-2 * (np.pi * sigma) ** 2 * (down**2 + round_**2)), s=twice.shape)[:len(picture)]
+    return np.fft.irfft2(np.fft.rfft2(twice) * np.exp(-2 * (np.pi * sigma) ** 2 * (down**2 + round_**2)),
+                         s=twice.shape)[:len(picture)]
 
 
 def _smooth(value: np.ndarray, low: np.ndarray | float, high: np.ndarray | float) -> np.ndarray:

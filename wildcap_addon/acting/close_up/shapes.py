@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes of an eye: a white that ends softly over a recessed iris with a true hole for a pupil, and the clear shell over both. The gaze is -y, lengths are
-metres, and all lies inside of the ball that the head's own lids were fitted to."""
+"""Shapes of an eye: a white that ends softly over a recessed iris with a true hole for a pupil, and the clear shell
+over both. The gaze is -y, lengths are metres, and all lies inside of the ball that the head's own lids were fitted
+to."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ import numpy as np
 IRIS_M = 0.0059
 """Radius of an adult's iris."""
 LIMBUS_AT = (0.33, 0.46)
-"""Radians from the gaze between which the iris ends, however large the ball is: the cornea over it has to end within the ball's own, at 0.52."""
+"""Radians from the gaze between which the iris ends, however large the ball is: the cornea over it has to end within
+the ball's own, at 0.52."""
 BULGE = 0.06
 """How far the cornea stands out before the white's sphere, as a share of the radius: 0.9 to 1 mm."""
 EDGE = 0.08
@@ -33,7 +35,8 @@ WHITE, IRIS, PUPIL_SLOT = range(3)
 
 @dataclass(frozen=True)
 class Turned:
-    """A mesh turned about the gaze: vertices [V, 3]; quads [F, 4]; UVs [F, 4, 2], around and from the middle outwards; slot [F]."""
+    """A mesh turned about the gaze: vertices [V, 3]; quads [F, 4]; UVs [F, 4, 2], around and from the middle outwards;
+    slot [F]."""
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -61,8 +64,10 @@ def shell(radius: float, edge: float) -> Turned:
 def inner(radius: float, edge: float) -> Turned:
     """White, iris and the dark behind the pupil."""
     white = radius - FILM_M
-    angle = np.concatenate([np.linspace(edge - SOFT, edge + SOFT, 8), np.linspace(edge + SOFT, 1.6, 14)[1:], np.linspace(1.6, BACK, 6)[1:]])
-    outside = (white * np.sin(angle), -white * np.cos(angle), np.clip((angle - edge + SOFT) / (1.6 - edge + SOFT), 0.002, 0.998), WHITE)
+    angle = np.concatenate([np.linspace(edge - SOFT, edge + SOFT, 8), np.linspace(edge + SOFT, 1.6, 14)[1:],
+                            np.linspace(1.6, BACK, 6)[1:]])
+    outside = (white * np.sin(angle), -white * np.cos(angle),
+               np.clip((angle - edge + SOFT) / (1.6 - edge + SOFT), 0.002, 0.998), WHITE)
     rim, plane = white * np.sin(edge), -white * np.cos(edge) + ROOT_M
     across = np.linspace(0, 1.04, 20)  # a little farther than the white begins
     hole = PUPIL * rim
@@ -73,16 +78,19 @@ def inner(radius: float, edge: float) -> Turned:
 
 
 def _turn(parts: list[tuple]) -> Turned:
-    """Each part: distance [R] from the axis, y [R], the UVs' v [R], and a slot. Rings are told from the gaze outwards, but for the dark behind the pupil."""
+    """Each part: distance [R] from the axis, y [R], the UVs' v [R], and a slot. Rings are told from the gaze outwards,
+    but for the dark behind the pupil."""
     k, first = np.arange(TURNS), 0
     n, turn = (k + 1) % TURNS, k * 2 * np.pi / TURNS
     vertices, faces, uvs, slots = [], [], [], []
     for away, y, v, slot in parts:
-        vertices.append(np.stack([away[:, None] * np.cos(turn), y[:, None] + 0 * turn, away[:, None] * np.sin(turn)], -1).reshape(-1, 3))
+        vertices.append(np.stack([away[:, None] * np.cos(turn), y[:, None] + 0 * turn, away[:, None] * np.sin(turn)],
+                                 -1).reshape(-1, 3))
         for ring in range(len(away) - 1):
             a, b = first + ring * TURNS, first + (ring + 1) * TURNS
             quad = np.stack([a + k, b + k, b + n, a + n], 1)
-            uv = np.stack([np.stack([(k + step) / TURNS, 0 * k + v[row]], 1) for step, row in ((0, ring), (0, ring + 1), (1, ring + 1), (1, ring))], 1)
+            uv = np.stack([np.stack([(k + step) / TURNS, 0 * k + v[row]], 1)
+                           for step, row in ((0, ring), (0, ring + 1), (1, ring + 1), (1, ring))], 1)
             order = slice(None, None, -1 if slot == PUPIL_SLOT else 1)
             faces.append(quad[:, order])
             uvs.append(uv[:, order])
