@@ -28,7 +28,7 @@ EEVEE_SAMPLES = 32
 
 
 @dataclass(frozen=True)
-class Shot:
+class CloseUp:
     """What a picture shows: opened: how far the eyes are open; units: face units and their values; at: one of SEAMS,
     `above_m` metres above it, seen from the side `way` [3] in the head's axes through a lens of `lens_mm`."""
 
@@ -45,12 +45,12 @@ class Shot:
     iris: str = ""
 
 
-Shots = Callable[[str], dict[str, Shot]]
+Shots = Callable[[str], dict[str, CloseUp]]
 
 
 def run(module: str, told: str, shots: Shots, resolution: int, samples: int) -> None:
     """The command of `module`, whose docstring is `told`: a row for each person, its pictures those of `shots`, name ->
-    Shot for the name of a person."""
+    CloseUp for the name of a person."""
     parser = argparse.ArgumentParser(description=told, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="keeps captures and renders; finished renders are taken as they are")
     parser.add_argument("out", type=Path)
@@ -104,7 +104,7 @@ def prepare(folder: Path, name: str, seed: int) -> Path:
     return capture.root
 
 
-def render(root: Path, shots: dict[str, Shot], resolution: int, samples: int) -> None:
+def render(root: Path, shots: dict[str, CloseUp], resolution: int, samples: int) -> None:
     """The renders of a capture that are not there yet."""
     left = {name: shot for name, shot in shots.items() if not (root / "renders" / f"{name}.png").is_file()}
     if not left:
@@ -131,7 +131,7 @@ def render(root: Path, shots: dict[str, Shot], resolution: int, samples: int) ->
             shoot(thing, shot, resolution, samples, root / "renders" / f"{name}.png")
 
 
-def shoot(thing, shot: Shot, resolution: int, samples: int, path: Path) -> None:
+def shoot(thing, shot: CloseUp, resolution: int, samples: int, path: Path) -> None:
     import bpy
     from bl_ext.user_default.wildcap.wildcap_addon.relight import picture
 
@@ -151,7 +151,7 @@ def shoot(thing, shot: Shot, resolution: int, samples: int, path: Path) -> None:
     bpy.ops.render.render(write_still=True, scene=scene.name)
 
 
-def aim(camera, thing, shot: Shot) -> None:
+def aim(camera, thing, shot: CloseUp) -> None:
     from bl_ext.user_default.wildcap.wildcap_addon.acting import asset
     from mathutils import Vector
 

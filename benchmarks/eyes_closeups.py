@@ -9,7 +9,7 @@ the squares of a chessboard do, Cycles first. The first and the fourth row are u
 fifth under Overcast, the third and the sixth under Sun.
 """
 
-from .closeups import LIGHTS, Shot, run
+from .closeups import LIGHTS, CloseUp, run
 from .people import PEOPLE
 
 ENGINES = ("CYCLES", "EEVEE")
@@ -25,11 +25,11 @@ FACES = {
 }
 
 
-def shots(name: str) -> dict[str, Shot]:
+def shots(name: str) -> dict[str, CloseUp]:
     """Picture -> what it shows."""
     number = [person.name for person in PEOPLE].index(name)
     light, iris = LIGHTS[number % len(LIGHTS)], IRISES[number]
-    return {face: Shot(light, engine=ENGINES[(number + place) % 2], close_up=True, iris=iris, **told)
+    return {face: CloseUp(light, engine=ENGINES[(number + place) % 2], close_up=True, iris=iris, **told)
             for place, (face, told) in enumerate(FACES.items())}
 
 

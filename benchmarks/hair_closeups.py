@@ -8,16 +8,16 @@ A row for each person: the albedo with its painted brow under the first light, t
 skin below under all three, the eyes half open in the last.
 """
 
-from .closeups import LIGHTS, Shot, run
+from .closeups import LIGHTS, CloseUp, run
 
 HALF_OPEN = 0.5
 BROW = {"at": "eye", "above_m": 0.008, "way": (0.35, -1.0, 0.1), "lens_mm": 220.0}
 
 
-def shots(_name: str) -> dict[str, Shot]:
+def shots(_name: str) -> dict[str, CloseUp]:
     """Picture -> what it shows."""
-    grown = {f"grown_{light}": Shot(light, opened=HALF_OPEN * (light == LIGHTS[-1]), **BROW) for light in LIGHTS}
-    return {"painted": Shot(LIGHTS[0], hair=False, **BROW), **grown}
+    grown = {f"grown_{light}": CloseUp(light, opened=HALF_OPEN * (light == LIGHTS[-1]), **BROW) for light in LIGHTS}
+    return {"painted": CloseUp(LIGHTS[0], hair=False, **BROW), **grown}
 
 
 if __name__ == "__main__":

@@ -63,20 +63,7 @@ def open_head(base: Base, builder: HeadBuilder, body: np.ndarray, uvs: np.ndarra
     target = _targets(builder, polygons, inner, parent, used, number)
     welded = len(builder.mirror)
     lower = _lower(base, builder, parent).astype(float)
-    order, copies, parts = np.empty(len(target), int), [], []
-    share = fine @ lower[used]  # of the two claimants of a seam's vertex, the lower one takes more from the lower rim
-    claimants = [[] for _ in range(welded)]
-    for i in np.flatnonzero(target >= 0):
-        claimants[target[i]].append(i)
-    for t, claim in enumerate(claimants):
-        first, *second = sorted(claim, key=lambda i: share[i])
-        order[first] = t
-        for i in second:
-            order[i] = welded + len(copies)
-            copies.append(t)
-    for i in np.flatnonzero(target < 0):
-        order[i] = welded + len(copies) + len(parts)
-        parts.append(i)
+    order, copies = _order(target, fine @ lower[used], welded)
     matrix = fine @ extended[used]
     rows = np.argsort(order)
     matrix = matrix[rows]
@@ -86,7 +73,6 @@ def open_head(base: Base, builder: HeadBuilder, body: np.ndarray, uvs: np.ndarra
     face, corner = np.nonzero(outer != builder.faces)
     eyes, teeth = _balls(base, body), _jaws(base)
     strips = triangles[len(builder.faces):]
-    copies = np.array(copies)
     placed = _placed(matrix @ closed, body, base)
     placed[:welded] = builder.head(body)
     placed[welded:welded + len(copies)] = placed[copies]
@@ -117,6 +103,26 @@ def open_head(base: Base, builder: HeadBuilder, body: np.ndarray, uvs: np.ndarra
                                        for chain in (builder._lips[0],
                                                      *(upper for upper, _ in builder._lids.values()))]),
                       sparse.vstack(matrices).tocsr(), balls)
+
+
+def _order(target: np.ndarray, lower: np.ndarray, welded: int) -> tuple[np.ndarray, np.ndarray]:
+    """The new number of each vertex [N], which is vertex `target` of the welded head, or none of it where that is
+    negative; and which welded vertices have a second one, [C]. lower [N]: how much of it comes from the lower rim: of
+    the two claimants of a seam's vertex, the lower one takes more."""
+    order, copies, parts = np.empty(len(target), int), [], []
+    claimants = [[] for _ in range(welded)]
+    for i in np.flatnonzero(target >= 0):
+        claimants[target[i]].append(i)
+    for t, claim in enumerate(claimants):
+        first, *second = sorted(claim, key=lambda i: lower[i])
+        order[first] = t
+        for i in second:
+            order[i] = welded + len(copies)
+            copies.append(t)
+    for i in np.flatnonzero(target < 0):
+        order[i] = welded + len(copies) + len(parts)
+        parts.append(i)
+    return order, np.array(copies)
 
 
 def _split(base: Base, builder: HeadBuilder) -> tuple[list, list, np.ndarray, sparse.csr_matrix]:

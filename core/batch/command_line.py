@@ -41,45 +41,8 @@ def add_commands(commands) -> None:
     many = commands.add_parser("batch",
                                help="many faces: plan them from a table, run them here or on a farm, review them")
     many = many.add_subparsers(required=True, metavar="plan|run|status|retry|accept|review|commands|task")
-    plan = many.add_parser("plan",
-                           help="make a batch of a table of videos, or of a folder of them; planned again, it takes in "
-                                "what is new")
-    plan.add_argument("shots", metavar="SHOTS", type=Path,
-                      help=f"a CSV with the columns {', '.join(HEADINGS)}, of which video alone is needed; or a folder")
-    plan.add_argument("batch", metavar="BATCH", type=Path, help="the batch's folder, with a capture for each face")
-    plan.add_argument("--quality", choices=settings.QUALITIES, default="standard")
-    plan.add_argument(
-        "--gate",
-        choices=GATES,
-        help="artist: no face is solved before somebody has looked at its shadow mask; automatic: at once",
-    )
-    plan.add_argument("--deliver", metavar="PRESET",
-                      help="deliver each head for that program as well (`presets` lists them); none: no more")
-    plan.add_argument("--to", metavar="FOLDER", type=Path,
-                      help="folder of the deliveries; without it they lie in the captures")
-    plan.add_argument("--blender", metavar="PROGRAM",
-                      help="a Blender with the extension, which renders a contact sheet of each face; none: no more")
-    command_settings.add_assignments(plan, "run")
-    plan.set_defaults(command=_plan)
-    for word, words in (("run", "do what is left; what has stopped with a problem stays"),
-                        ("retry", "the same, and what has stopped is tried again")):
-        run = many.add_parser(word, help=words)
-        run.add_argument("batch", metavar="BATCH", type=Path)
-        run.add_argument("names", metavar="NAME", nargs="*", help="faces; without one, all")
-        run.add_argument("--on", choices=("local", "ray"), default="local", help="this machine, or a cluster of Ray's")
-        run.add_argument("--address",
-                         help="Ray's head node, as `ray start` tells it; without it, this machine becomes a cluster of "
-                              "one")
-        run.add_argument("--at-once", metavar="N", type=int,
-                         help="faces that this machine works on at the same time, else 1")
-        run.add_argument(
-            "--cores",
-            metavar="N",
-            type=int,
-            help="cores of a node of Ray's that a task takes, else 2: the same number gives the same bytes",
-        )
-        run.add_argument("--until", choices=[group.name for group in GROUPS], help="end each face with this task")
-        run.set_defaults(command=_run, retry=word == "retry")
+    _add_plan(many)
+    _add_runs(many)
     status = many.add_parser("status", help="say how far each face is")
     status.add_argument("batch", metavar="BATCH", type=Path)
     status.set_defaults(command=_status)
@@ -106,6 +69,51 @@ def add_commands(commands) -> None:
     task.add_argument("name", metavar="NAME")
     task.add_argument("group", metavar="TASK", help=", ".join(group.name for group in GROUPS))
     task.set_defaults(command=_task)
+
+
+def _add_plan(many) -> None:
+    plan = many.add_parser("plan",
+                           help="make a batch of a table of videos, or of a folder of them; planned again, it takes in "
+                                "what is new")
+    plan.add_argument("shots", metavar="SHOTS", type=Path,
+                      help=f"a CSV with the columns {', '.join(HEADINGS)}, of which video alone is needed; or a folder")
+    plan.add_argument("batch", metavar="BATCH", type=Path, help="the batch's folder, with a capture for each face")
+    plan.add_argument("--quality", choices=settings.QUALITIES, default="standard")
+    plan.add_argument(
+        "--gate",
+        choices=GATES,
+        help="artist: no face is solved before somebody has looked at its shadow mask; automatic: at once",
+    )
+    plan.add_argument("--deliver", metavar="PRESET",
+                      help="deliver each head for that program as well (`presets` lists them); none: no more")
+    plan.add_argument("--to", metavar="FOLDER", type=Path,
+                      help="folder of the deliveries; without it they lie in the captures")
+    plan.add_argument("--blender", metavar="PROGRAM",
+                      help="a Blender with the extension, which renders a contact sheet of each face; none: no more")
+    command_settings.add_assignments(plan, "run")
+    plan.set_defaults(command=_plan)
+
+
+def _add_runs(many) -> None:
+    for word, words in (("run", "do what is left; what has stopped with a problem stays"),
+                        ("retry", "the same, and what has stopped is tried again")):
+        run = many.add_parser(word, help=words)
+        run.add_argument("batch", metavar="BATCH", type=Path)
+        run.add_argument("names", metavar="NAME", nargs="*", help="faces; without one, all")
+        run.add_argument("--on", choices=("local", "ray"), default="local", help="this machine, or a cluster of Ray's")
+        run.add_argument("--address",
+                         help="Ray's head node, as `ray start` tells it; without it, this machine becomes a cluster of "
+                              "one")
+        run.add_argument("--at-once", metavar="N", type=int,
+                         help="faces that this machine works on at the same time, else 1")
+        run.add_argument(
+            "--cores",
+            metavar="N",
+            type=int,
+            help="cores of a node of Ray's that a task takes, else 2: the same number gives the same bytes",
+        )
+        run.add_argument("--until", choices=[group.name for group in GROUPS], help="end each face with this task")
+        run.set_defaults(command=_run, retry=word == "retry")
 
 
 def _plan(options: argparse.Namespace) -> int:

@@ -106,8 +106,8 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     shapes = (own.shapes[:, first] @ pose.turn.T.astype(np.float32)) * np.float32(render_landmarks.FACE_M / pose.width)
 
     known = np.flatnonzero(np.isfinite(found.points).all(1))
-    at, bary = surfaces.Surface(whole, 0.004).nearest(found.points[known], _facing_camera(whole, found.points[known]),
-                                                      0.02, -1.0)
+    seen = found.points[known]
+    at, bary = surfaces.Surface(whole, 0.004).nearest(seen, _facing_camera(whole, seen), 0.02, -1.0)
     label = _components(whole)
     main = np.bincount(label[whole.faces[at[at >= 0], 0]]).argmax()
     used = np.flatnonzero(label == main)
@@ -116,13 +116,9 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     skin = Mesh(whole.vertices[used], np.searchsorted(used, whole.faces[label[whole.faces[:, 0]] == main]))
     good = (at >= 0) & (label[whole.faces[np.maximum(at, 0), 0]] == main)
     of_skin = np.cumsum(label[whole.faces[:, 0]] == main) - 1  # triangle of the whole -> of the skin
-    weight, marks_at, marks_bary = np.zeros(len(found.points)), np.zeros(len(found.points),
-                                                                         int), np.full((len(found.points), 3), 1 / 3)
-    weight[known[good]], marks_at[known[good]], marks_bary[known[good]] = (
-        found.trust[known[good]],
-        of_skin[at[good]],
-        bary[good],
-    )
+    count, told = len(found.points), known[good]
+    weight, marks_at, marks_bary = np.zeros(count), np.zeros(count, int), np.full((count, 3), 1 / 3)
+    weight[told], marks_at[told], marks_bary[told] = found.trust[told], of_skin[at[good]], bary[good]
     model = alignment.HeadModel(skin, shapes[:, used], marks_at, marks_bary, weight)
 
     target = _at_landmarks(head)
@@ -157,8 +153,8 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     everything = carried.along(everything, whole.faces, label, used, vertices, report)
     counterpart = np.zeros(len(whole.vertices), bool)
     normals = vertex_normals(final)
-    counterpart[used] = (surface.nearest(vertices, normals, PAINTED_M)[0]
-                         >= 0) & (_free_sky(final, normals) > OPEN_SKY_SHARES[0])
+    near = surface.nearest(vertices, normals, PAINTED_M)[0] >= 0
+    counterpart[used] = near & (_free_sky(final, normals) > OPEN_SKY_SHARES[0])
     return FittedTemplate(everything[index], counterpart[whole.faces].any(1), distances,
                           nonrigid.flipped_triangles(skin.moved(start), final), pictures)
 

@@ -44,7 +44,7 @@ FAR_M = 9.0
 
 
 @dataclass(frozen=True)
-class Sight:
+class BareSight:
     """What a camera sees of a figure before there is light, how far away that is [S, S] in metres, and the head's
     landmarks [468, 3]."""
 
@@ -112,16 +112,17 @@ def prepare(of: list[int], work: Path, report: Reporter) -> None:
                                     translation=view.translation, params=view.camera.params)
 
 
-def read(work: Path, seed: int, number: int) -> Sight:
+def read(work: Path, seed: int, number: int) -> BareSight:
     sight = unlit.load(_path(work, seed, number).with_suffix(".unlit.npz"))
     with np.load(_path(work, seed, number), allow_pickle=False) as stored:
         side = len(sight.albedo)
         camera = pycolmap.Camera(model="PINHOLE", width=side, height=side, params=stored["params"].tolist())
         view = View("", Path(), camera, sight.rotation.astype(np.float64), stored["translation"], True)
-        return Sight(sight, np.where(np.isfinite(stored["depth"]), stored["depth"], FAR_M), stored["landmarks"], view)
+        depth = np.where(np.isfinite(stored["depth"]), stored["depth"], FAR_M)
+        return BareSight(sight, depth, stored["landmarks"], view)
 
 
-def photographed(sight: Sight, pair: glasses.Glasses | None, rng: np.random.Generator,
+def photographed(sight: BareSight, pair: glasses.Glasses | None, rng: np.random.Generator,
                  panoramas: list[np.ndarray] = ()) -> np.ndarray:
     """An sRGB photograph [S, S, 3] of a sight, with a pair of glasses or without."""
     def worn(radiance: np.ndarray, light: float) -> np.ndarray:

@@ -103,7 +103,8 @@ def put_on(radiance: np.ndarray, view: View, depth: np.ndarray, glasses: Glasses
         at = np.clip(pixels.astype(int), 0, [depth.shape[1] - 1, depth.shape[0] - 1])
         seen = away < depth[at[:, 1], at[:, 0]] + 0.002
         width = thick * view.camera.mean_focal_length() / distance
-        where, shade = _drawn(radiance.shape[:2], pixels, width, seen * solid, closed, glasses, light, rng)
+        seen_curve = SeenCurve(pixels, width, seen * solid, closed)
+        where, shade = _drawn(radiance.shape[:2], seen_curve, glasses, light, rng)
         frame, colour = frame + where * (1 - frame), colour * (1 - where[..., None]) + shade * where[..., None]
         if closed:
             lens = np.maximum(lens, _filled(radiance.shape[:2], pixels))
@@ -126,25 +127,35 @@ def _curves(glasses: Glasses) -> list[tuple]:
             (bridge, False, glasses.bar, np.ones(len(bridge)))]
 
 
-def _drawn(shape: tuple, pixels: np.ndarray, width: np.ndarray, solid: np.ndarray, closed: bool, glasses: Glasses,
-           light: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+@dataclass(frozen=True)
+class SeenCurve:
+    """A curve of a frame in a picture: pixels [N, 2]; width [N] in pixels; solid [N]: its opacity, 0 where the head
+    hides it; closed: whether its end is its beginning."""
+
+    pixels: np.ndarray
+    width: np.ndarray
+    solid: np.ndarray
+    closed: bool
+
+
+def _drawn(shape: tuple, curve: SeenCurve, glasses: Glasses, light: float,
+           rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """How much of each pixel [H, W] a curve covers, and its radiance there [H, W, 3]."""
     big = (shape[0] * OVER, shape[1] * OVER)
     where, shade = np.zeros(big, np.float32), np.zeros((*big, 3), np.float32)
-    count = len(pixels)
+    pixels, solid, count = curve.pixels, curve.solid, len(curve.pixels)
     base = glasses.colour * light * np.exp(rng.normal(-0.3, 0.4))
     along = np.interp(np.arange(count), np.linspace(0, count, 7), np.exp(rng.normal(0, 0.25, 7)))
-    bright = glasses.shiny * 0.5 * light * np.exp(-0.5
-                                                  * ((np.arange(count)[:, None] - rng.uniform(0, count, 3))
-                                                     / (0.03 * count + 1)) ** 2).max(1)
+    off = (np.arange(count)[:, None] - rng.uniform(0, count, 3)) / (0.03 * count + 1)
+    bright = glasses.shiny * 0.5 * light * np.exp(-0.5 * off**2).max(1)
     edge, lean = np.exp(rng.normal(0.3, 0.5)), rng.normal(0, 0.25, 2)
     points = np.round(OVER * pixels).astype(int)
-    for step in range(count if closed else count - 1):
+    for step in range(count if curve.closed else count - 1):
         other = (step + 1) % count
         opaque = min(solid[step], solid[other])
         if opaque <= 0:
             continue
-        thick = max(1, int(round(OVER * width[step])))
+        thick = max(1, int(round(OVER * curve.width[step])))
         value = (base * along[step] + bright[step]).tolist()
         cv2.line(where, points[step].tolist(), points[other].tolist(), float(opaque), thick)
         cv2.line(shade, points[step].tolist(), points[other].tolist(), value, thick + 2)
