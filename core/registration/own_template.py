@@ -145,10 +145,7 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     final = skin.moved(vertices)
     drawn = follow > 0.5
     distances = dense.distances(vertices[drawn], vertex_normals(final)[drawn], 0.01)
-    if len(distances) < 0.5 * drawn.sum() or not len(distances) or np.median(distances) > 0.002:
-        raise Problem(f"{own.path.name} could not be laid over the head.",
-                      "Choose a head in a neutral pose with its mouth closed, or leave the template empty; the "
-                      "built-in head is not affected.")
+    _require_laid(own, distances, int(drawn.sum()))
     everything = placed.apply(whole.vertices + np.tensordot(coefficients, shapes, 1))
     everything = carried.along(everything, whole.faces, label, used, vertices, report)
     counterpart = np.zeros(len(whole.vertices), bool)
@@ -157,6 +154,14 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
     counterpart[used] = near & (_free_sky(final, normals) > OPEN_SKY_SHARES[0])
     return FittedTemplate(everything[index], counterpart[whole.faces].any(1), distances,
                           nonrigid.flipped_triangles(skin.moved(start), final), pictures)
+
+
+def _require_laid(own: own_mesh.OwnMesh, distances: np.ndarray, drawn: int) -> None:
+    """Raises Problem where fewer than half of the `drawn` vertices have a distance [N] to the head, or these are large."""
+    if len(distances) < 0.5 * drawn or not len(distances) or np.median(distances) > 0.002:
+        raise Problem(f"{own.path.name} could not be laid over the head.",
+                      "Choose a head in a neutral pose with its mouth closed, or leave the template empty; the "
+                      "built-in head is not affected.")
 
 
 def _matched(model: alignment.HeadModel, start: np.ndarray, follow: np.ndarray, head: Mesh, ours: BuiltIn,
