@@ -157,7 +157,7 @@ def fit(own: own_mesh.OwnMesh, head: Mesh, ours: BuiltIn, report: Reporter) -> F
 
 
 def _require_laid(own: own_mesh.OwnMesh, distances: np.ndarray, drawn: int) -> None:
-    """Raises Problem where fewer than half of the `drawn` vertices have a distance [N] to the head, or these are large."""
+    """Raises Problem where fewer than half of the `drawn` vertices have a distance [N] to the head, or it is large."""
     if len(distances) < 0.5 * drawn or not len(distances) or np.median(distances) > 0.002:
         raise Problem(f"{own.path.name} could not be laid over the head.",
                       "Choose a head in a neutral pose with its mouth closed, or leave the template empty; the "
