@@ -4,6 +4,7 @@
 a traceback."""
 
 import shutil
+from types import SimpleNamespace
 
 import pytest
 
@@ -16,7 +17,8 @@ ASKS = {"choose_video": {"filepath": "/none.mp4"}, "open_capture": {"directory":
 @pytest.fixture
 def operators(addon, monkeypatch, tmp_path):
     """All of the add-on's operators; whatever would start a process, a browser or a long render is kept from it."""
-    monkeypatch.setattr(addon("jobs"), "start", lambda *_, **__: None)
+    for name in ("start", "start_tool"):
+        monkeypatch.setattr(addon("jobs"), name, lambda *_, **__: SimpleNamespace())
     for name in ("still", "stills", "frames"):
         monkeypatch.setattr(addon("relight.output"), name, lambda *_: None)
     addon("preferences").get().captures = str(tmp_path / "captures")
