@@ -17,7 +17,7 @@ from core.geometry import meshes
 from core.geometry.meshes import Mesh
 from core.geometry.views import read_views
 from core.imaging import images
-from core.registration import alignment, bust, landmarks, nonrigid
+from core.registration import alignment, landmarks, nonrigid
 from core.registration.correspondence import Scan
 
 from .painted_egg import HEIGHT, WIDTH, write_cameras
@@ -111,9 +111,6 @@ def test_the_stage_writes_a_head_of_the_frozen_topology(tmp_path, monkeypatch, k
     follow = registration.weights_of(model)[0] > 0.5
     assert np.median(np.linalg.norm(head.vertices - truth, axis=1)[follow]) < 0.001
     assert report.figures["flipped_triangles"] == 0 and report.figures["head_to_scan_median_mm"] < 0.5
-    edge = head.vertices[bust.open_edge(head)]
-    assert np.linalg.svd(edge
-                         - edge.mean(0))[1][2] < 1e-5, "the neck ends in a plane, whatever was smoothed after the fit"
     stored = json.loads(capture.landmarks.read_text())
     assert np.linalg.norm(np.array(stored["points"]["152"]) - points[152]) < 0.001
     assert set(stored["images"]) == {view.name for view in read_views(capture)}

@@ -320,11 +320,11 @@ def find_setting(name: str) -> Field:
 
 @cache
 def tooltips(kind: type) -> dict[str, str]:
-    """Field name -> the docstring under it, read from this module's source."""
+    """Field name -> the docstring under it, in one line, read from this module's source."""
     body = ast.parse(inspect.getsource(kind)).body[0].body
     found = {}
     for node, following in zip(body, body[1:], strict=False):
-        if isinstance(node, ast.AnnAssign) and isinstance(following,
-                                                          ast.Expr) and isinstance(following.value, ast.Constant):
-            found[node.target.id] = following.value.value
+        described = isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant)
+        if isinstance(node, ast.AnnAssign) and described:
+            found[node.target.id] = " ".join(following.value.value.split())
     return found

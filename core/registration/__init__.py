@@ -115,10 +115,8 @@ def _by_views(capture: Capture, settings: Settings, views: list[View], subject: 
     fitted = unscanned.fit(model, unscanned.ShownByViews(views, found, subject.trust, points, seen), report, 10,
                            0.9 * STEPS)
     placed = model.mesh.moved(fitted.pose.apply(model.mesh.vertices))
-    vertices = intersections.mended(placed, fitted.vertices,
-                                    lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
-    vertices = bust.level_edge(model.mesh, vertices)
-    head, aligned = model.mesh.moved(vertices), model.mesh.moved(fitted.pose.apply(model.shape(fitted.coefficients)))
+    aligned = model.mesh.moved(fitted.pose.apply(model.shape(fitted.coefficients)))
+    head = model.mesh.moved(_finished(placed, aligned, fitted.vertices, report))
     quality.figures(report, model, quality.HeadFit(head, aligned, fitted.coefficients, np.zeros(0)), found,
                     subject.follow)
     quality.figures_of_views(report, fitted, views, head)
@@ -153,15 +151,25 @@ def _by_scan(capture: Capture, settings: Settings, views: list[View], surface: m
                             lambda share: report.progress(20 + (0.9 * STEPS - 20) * share, 0.9 * STEPS,
                                                           "fitting the head to the scan"))
     placed = model.mesh.moved(pose.apply(model.mesh.vertices))
-    vertices = intersections.mended(placed, vertices, lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
-    vertices = bust.level_edge(model.mesh, vertices)  # last: where folds are smoothed at the edge, it would bend again
+    aligned = model.mesh.moved(start)
+    vertices = _finished(placed, aligned, vertices, report)
 
-    head, aligned = model.mesh.moved(vertices), model.mesh.moved(start)
+    head = model.mesh.moved(vertices)
     distances = scan.distances(vertices[follow > 0.5], meshes.vertex_normals(head)[follow > 0.5])
     quality.figures(report, model, quality.HeadFit(head, aligned, coefficients, distances), found, follow)
     quality.judge(report, head, scan, distances, follow, least_share)
     _finish(capture, settings, views, head, subject, report)
     return head
+
+
+def _finished(placed: meshes.Mesh, aligned: meshes.Mesh, vertices: np.ndarray, report: Reporter) -> np.ndarray:
+    """Vertices [V, 3] with the neck's edge in a plane and without folds. Smoothing a fold near the edge bends it again:
+    it is levelled once more where that folds nothing and turns no triangle over."""
+    vertices = intersections.mended(placed, bust.level_edge(placed, vertices),
+                                    lambda done: report.progress(90 + done, STEPS, "smoothing folds"))
+    levelled = bust.level_edge(placed, vertices)
+    turned = intersections.flipped(aligned, levelled).sum() > intersections.flipped(aligned, vertices).sum()
+    return vertices if turned or intersections.wrong(placed, levelled).any() else levelled
 
 
 def _finish(capture: Capture, settings: Settings, views: list[View], head: meshes.Mesh, subject: Subject,

@@ -31,10 +31,10 @@ def mended(placed: Mesh, vertices: np.ndarray, tick=lambda done: None) -> np.nda
     vertices = vertices.copy()
     for rings in range(1, ROUNDS + 1):
         tick(rings)
-        wrong = _wrong(placed, vertices)
-        if not wrong.any():
+        folded = wrong(placed, vertices)
+        if not folded.any():
             break
-        free = wrong
+        free = folded
         for _ in range(rings):
             free = free | (graph @ free > 0)
         if free.all():
@@ -71,12 +71,12 @@ def flipped(before: Mesh, vertices: np.ndarray) -> np.ndarray:
     return (face_normals(before) * face_normals(before.moved(vertices))).sum(1) < 0
 
 
-def _wrong(placed: Mesh, vertices: np.ndarray) -> np.ndarray:
+def wrong(placed: Mesh, vertices: np.ndarray) -> np.ndarray:
     """bool [V]: corners of triangles that are flipped or cut another."""
-    wrong = np.zeros(len(vertices), bool)
-    wrong[placed.faces[np.unique(intersecting(vertices, placed.faces))]] = True
-    wrong[placed.faces[flipped(placed, vertices)]] = True
-    return wrong
+    corners = np.zeros(len(vertices), bool)
+    corners[placed.faces[np.unique(intersecting(vertices, placed.faces))]] = True
+    corners[placed.faces[flipped(placed, vertices)]] = True
+    return corners
 
 
 def _pierced(vertices: np.ndarray, faces: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:

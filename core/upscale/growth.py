@@ -24,6 +24,9 @@ LOUDEST = 4.0
 """Deviations of the bare skin's grain beyond which a stroke says no more: one mole is no beard."""
 USUAL_LOUDNESS = float(np.sqrt(2 / np.pi))
 """Mean size of what has a normal distribution, in its deviations."""
+TOLD_BY_STROKES = 2.0
+"""How many times likelier on hair than on bare skin strokes must be to tell of a beard that the parser doubts: 1.6
+times on the bare jaw of the sample, 6 on painted stubble."""
 BESIDE = 6.0
 """mm beyond the template's brows in which the parser may see brows: they differ, and a head is fitted to a millimetre
 or two."""
@@ -56,19 +59,28 @@ def find(light: np.ndarray, confidence: np.ndarray, zones: dict[str, np.ndarray]
     if parts is None:
         return Growth(zones["brows"], beard.presence(fine, grain, bare, zones["beard"], surface.texel), head, grain,
                       False)
-    likely = {name: _likely(name, parts, np.minimum(np.abs(fine) / max(grain, 1e-6), LOUDEST), texel) for name in ALIKE}
-    # hard shadows on a bare jaw are half a beard to the parser
-    bearded = keep_present(likely["beard"] * _bearable(zones["beard"]))
-    return Growth(_faded(likely["brows"]) * _near_brows(surface), _faded(bearded), head, grain, True)
+    loud = np.minimum(np.abs(fine) / max(grain, 1e-6), LOUDEST)
+    power = {name: (cv2.GaussianBlur(loud, (0, 0), reach / texel) / USUAL_LOUDNESS) ** 2
+             for name, reach in ALIKE.items()}
+    bearded = _present(_likely("beard", parts, power) * _bearable(zones["beard"]), power["beard"])
+    return Growth(_faded(_likely("brows", parts, power)) * _near_brows(surface), _faded(bearded), head, grain, True)
 
 
-def _likely(name: str, parts: np.ndarray, loud: np.ndarray, texel: float) -> np.ndarray:
+def _likely(name: str, parts: np.ndarray, power: dict[str, np.ndarray]) -> np.ndarray:
     """Probability of that hair [S, S], by Bayes' rule: the parser's shares before, and strokes, which are as much
-    likelier on hair of any kind as their power is over that of bare skin's grain. loud [S, S]: fine detail in
-    deviations of that grain."""
-    power = (cv2.GaussianBlur(loud, (0, 0), ALIKE[name] / texel) / USUAL_LOUDNESS) ** 2
+    likelier on hair of any kind as their power is over that of bare skin's grain."""
     hairy = parts.sum(-1)
-    return parts[..., GROWTHS.index(name)] * power / np.maximum(hairy * power + np.clip(1 - hairy, 0, 1), 1e-6)
+    there = parts[..., GROWTHS.index(name)] * power[name]
+    return there / np.maximum(hairy * power[name] + np.clip(1 - hairy, 0, 1), 1e-6)
+
+
+def _present(bearded: np.ndarray, power: np.ndarray) -> np.ndarray:
+    """The probabilities of a beard [S, S], or zeros where neither parser and strokes together are sure of one on the
+    whole nor the strokes by themselves: hard shadows on a bare jaw are half a beard to the parser."""
+    there = bearded > 0.5
+    if there.any() and np.log(power[there]).mean() > np.log(TOLD_BY_STROKES):
+        return bearded
+    return keep_present(bearded)
 
 
 def _bearable(zone: np.ndarray) -> np.ndarray:
