@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Each delivered file, brought back by Blender's own importer and rendered beside the head that it was made of.
 
-    python -m benchmarks.reimported [--resolution 384] [--samples 64] [--picture OUT.jpg] [--json OUT.json]
+    python -m benchmarks.reimported [--resolution 320] [--samples 48] [--picture OUT.jpg] [--json OUT.json]
 
 A copy of the sample head is delivered to a folder that is gone afterwards. Both heads stand under the same light before
 the same camera, with the same noise. The original is shown with and without scattering under the skin, which no
@@ -47,8 +47,8 @@ class Returned:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--resolution", type=int, default=384)
-    parser.add_argument("--samples", type=int, default=64)
+    parser.add_argument("--resolution", type=int, default=320)
+    parser.add_argument("--samples", type=int, default=48)
     parser.add_argument("--picture", type=Path)
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
