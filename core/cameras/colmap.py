@@ -172,8 +172,8 @@ def _map_film(job: dict, chosen: list[str]) -> list[pycolmap.Reconstruction]:
     mapped = {image.name for image in best.images.values() if image.has_pose}
     _match(job, skeleton.pairs_between(film, [name for name in chosen if name in mapped]))
     others = [name for name, _, _ in film if name not in mapped]
-    skeleton.place_others(best, Path(job["database"]), others, job["seed"], lambda done,
-                          of: _say("placing cameras", len(mapped) + done, len(mapped) + of))
+    skeleton.place_others(best, Path(job["database"]), others, job["seed"],
+                          lambda done, of: _say("placing cameras", len(mapped) + done, len(mapped) + of))
     return [best]
 
 

@@ -49,9 +49,8 @@ def find(light: np.ndarray, confidence: np.ndarray, zones: dict[str, np.ndarray]
     """From the log albedo's mean [S, S], how well each texel was seen, where hair may grow, and what the parser saw [S,
     S, len(GROWTHS)], or None."""
     size, texel = surface.size, float(np.median(surface.texel))
-    bare = (template.mask("skin", size) > 0.99) & (zones["beard"]
-                                                   < 0.05) & (zones["brows"]
-                                                              < 0.01) & (seen_well(confidence, surface) >= 1)
+    bare = ((template.mask("skin", size) > 0.99) & (zones["beard"] < 0.05) & (zones["brows"] < 0.01)
+            & (seen_well(confidence, surface) >= 1))
     head = np.zeros((size, size), np.float32) if parts is None else _faded(parts[..., GROWTHS.index("hair")])
     bare &= head == 0
     fine = beard.fine(light, texel)
@@ -96,6 +95,6 @@ def _faded(share: np.ndarray) -> np.ndarray:
 
 def _near_brows(surface: HeadSurface) -> np.ndarray:
     """[S, S] in [0, 1]: the template's brows, and what is BESIDE them."""
-    away = cv2.distanceTransform((template.mask("brows", surface.size) < 0.5).astype(np.uint8), cv2.DIST_L2,
-                                 5) * float(np.median(surface.texel))
+    off = (template.mask("brows", surface.size) < 0.5).astype(np.uint8)
+    away = cv2.distanceTransform(off, cv2.DIST_L2, 5) * float(np.median(surface.texel))
     return np.clip(2 - 2 * away / BESIDE, 0, 1)
