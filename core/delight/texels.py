@@ -16,7 +16,6 @@ import cv2
 import numpy as np
 
 from ..contract.messages import Reporter
-from ..face import template
 from ..geometry import raster
 from ..geometry.views import View, lengths
 from ..imaging import images
@@ -35,9 +34,6 @@ BORDER_TEXELS = 24.0
 """Distance from the border of the sun's light at which it does not matter any more."""
 EVERY = 16
 """Of so many texels one tells how the views' exposures differ."""
-MOST_LOG = 2.5
-"""Natural log units beyond which a colour has nothing to do with the skin under the fitted light."""
-CHANNELS = 24
 
 
 @dataclass(frozen=True)
@@ -46,7 +42,7 @@ class Texels:
     mean; spread: how far the views' luminance lies from it, in log units; seen in [0, 1]; normal [3]: unit, in the
     head's axes; open in [0, 1]: the share of an even sky that reaches the surface; ambient [3]: the linear colour of
     the head's skin under the fitted sky; direct [3]: what the fitted sun adds where nothing blocks it; free in [0, 1]:
-    where the head itself lets the sun through; covered bool: texels of the head."""
+    where the head itself lets the sun through. The built-in head covers every texel."""
 
     log: np.ndarray
     spread: np.ndarray
@@ -56,7 +52,6 @@ class Texels:
     ambient: np.ndarray
     direct: np.ndarray
     free: np.ndarray
-    covered: np.ndarray
 
 
 def gather(head: LitHead, views: list[View], report: Reporter) -> Texels:
@@ -77,7 +72,7 @@ def gather(head: LitHead, views: list[View], report: Reporter) -> Texels:
     return Texels(surface.spread(mean), surface.spread(spread), surface.spread(weights[..., 0].max(0)),
                   normal.astype(np.float32),
                   ambient_occlusion(transfer).astype(np.float32), ambient.astype(np.float32), direct.astype(np.float32),
-                  free.astype(np.float32), surface.covered)
+                  free.astype(np.float32))
 
 
 def _colours_seen(points: np.ndarray, normals: np.ndarray, caster: raster.RayCaster,
@@ -119,43 +114,10 @@ def robust_mean(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return mean
 
 
-def network_input(texels: Texels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """[CHANNELS, S, S] and light [6, S, S] for TexelNet, and the mean log colour [3] of the face that was seen, by
-    which the log-shading that comes out is lower. light: what the fitted sky gives and the fitted sun would add, each
-    channel over the mean of both on the face."""
-    side = len(texels.log)
-    seen, covered = (np.clip(texels.seen, 0, 1)
-                     * texels.covered)[..., None], texels.covered[..., None].astype(np.float32)
-    known = np.minimum(seen[..., 0] / 0.2, 1) * template.mask("face", side)
-    middle = np.average(texels.log.reshape(-1, 3), axis=0, weights=known.reshape(-1) + 1e-9).astype(np.float32)
-    sun = texels.direct.max(-1) * texels.free
-    lit = sun / np.maximum(texels.ambient.max(-1) + sun, 1e-6)
-    sunlit = texels.ambient + texels.direct * texels.free[..., None]
-    layers = [(texels.log - middle) * (seen > 0), texels.spread[..., None], seen, texels.normal * covered,
-              texels.open[..., None] * covered]
-    layers += [np.clip(texels.log - np.log(np.maximum(light, DARKEST / 4)), -MOST_LOG, MOST_LOG) * (seen > 0)
-               for light in (texels.ambient, sunlit)]
-    layers += [lit[..., None] * covered, border_distance(lit > 1e-3, texels.covered)[..., None], covered, _place(side)]
-    whole = np.average((texels.ambient + texels.direct).reshape(-1, 3), axis=0, weights=known.reshape(-1) + 1e-9)
-    light = np.concatenate([texels.ambient / np.maximum(whole, 1e-6), texels.direct / np.maximum(whole, 1e-6)], -1)
-    return np.concatenate(layers, -1).transpose(2, 0,
-                                                1).astype(np.float32), light.transpose(2, 0,
-                                                                                       1).astype(np.float32), middle
-
-
-def border_distance(lit: np.ndarray, covered: np.ndarray) -> np.ndarray:
+def border_distance(lit: np.ndarray) -> np.ndarray:
     """Signed distance [S, S] to the border of where the fitted sun falls (bool [S, S]), in [-1, 1]: positive within, 1
-    from BORDER_TEXELS on, 0 where there is no sun or no head."""
-    if not (lit & covered).any() or not (~lit & covered).any():
+    from BORDER_TEXELS on, 0 where there is no sun."""
+    if not lit.any() or lit.all():
         return np.zeros(lit.shape, np.float32)
-    within, beyond = (cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5)
-                      for part in (lit | ~covered, ~lit | ~covered))
-    return np.tanh(np.where(lit, within, -beyond) * SIDE / len(lit) / BORDER_TEXELS).astype(np.float32) * covered
-
-
-def _place(side: int) -> np.ndarray:
-    """Where on the face a texel lies [S, S, 6]: masks of brows, lips, eyes and nostrils, and u (from the middle, alike
-    on both sides) and v in [-1, 1]."""
-    v, u = (np.mgrid[0:side, 0:side] + 0.5) * 2 / side - 1
-    masks = [template.mask(name, side) for name in ("brows", "lips", "eyes", "nostrils")]
-    return np.stack([*masks, np.abs(u), v], -1).astype(np.float32)
+    within, beyond = (cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5) for part in (lit, ~lit))
+    return np.tanh(np.where(lit, within, -beyond) * SIDE / len(lit) / BORDER_TEXELS).astype(np.float32)

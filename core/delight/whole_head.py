@@ -26,8 +26,8 @@ from ..geometry.views import View, read_views
 from ..imaging import images
 from .contract import Delit
 from .lit_head import BRIGHTEST, LitHead, lit_head
-from .texel_net import TexelNet
-from .texels import Texels, gather, network_input
+from .texel_net import TexelNet, maps_of, network_input
+from .texels import Texels, gather
 
 DATA_FILES = ("weights/texels.safetensors", "weights/texels.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
@@ -58,7 +58,7 @@ def whole_head(capture: Capture, settings: Settings, report: Reporter) -> Iterat
     found = Shading(found.log + np.log(_exposure(texels, found)), found.shadow, found.spread)
     for i, view in enumerate(views):
         report.progress(3 * len(views) + i, 4 * len(views), f"Delighting frame {i + 1} of {len(views)}")
-        yield _delit(view, head, found, texels.covered)
+        yield _delit(view, head, found)
 
 
 def load(device: str, weights: Path = WEIGHTS) -> TexelNet:
@@ -77,16 +77,14 @@ def load(device: str, weights: Path = WEIGHTS) -> TexelNet:
 @torch.inference_mode()
 def tell_shading(net: TexelNet, texels: Texels) -> Shading:
     """The mean of what the network says of a head and of its mirror image."""
-    layers, light, middle = network_input(texels)
-    turned = layers[:, :, ::-1].copy()
-    turned[5] *= -1
-    device = next(net.parameters()).device
-    both = (torch.from_numpy(np.stack(pair)).to(device, memory_format=torch.channels_last)
-            for pair in ((layers, turned), (light, light[:, :, ::-1])))
-    parts = net(*both)
-    shading, shadow, spread = ((part[0] + part[1].flip(-1)).cpu().numpy() / 2
-                               for part in (parts[0], parts[1].sigmoid(), parts[2]))
-    return Shading(shading.transpose(1, 2, 0) + middle, shadow[0], np.exp(spread))
+    layers, light, middle = network_input(maps_of(texels, next(net.parameters()).device))
+    turned = layers.flip(-1)
+    turned[:, 5] *= -1
+    parts = net(*(torch.cat(pair).contiguous(memory_format=torch.channels_last)
+                  for pair in ((layers, turned), (light, light.flip(-1)))))
+    shading, shadow, spread = ((part[0] + part[1].flip(-1)) / 2 for part in (parts[0], parts[1].sigmoid(), parts[2]))
+    return Shading((shading + middle[0]).permute(1, 2, 0).cpu().numpy(), shadow[0].cpu().numpy(),
+                   spread.exp().cpu().numpy())
 
 
 def _exposure(texels: Texels, found: Shading) -> float:
@@ -98,13 +96,13 @@ def _exposure(texels: Texels, found: Shading) -> float:
     return max(1.0, float(np.quantile(albedo, 0.75)) / BRIGHTEST)
 
 
-def _delit(view: View, head: LitHead, found: Shading, covered: np.ndarray) -> Delit:
+def _delit(view: View, head: LitHead, found: Shading) -> Delit:
     srgb = images.read_srgb(view.path)
     face, bary, _ = render_view(head.caster, view)
     here = face >= 0
     uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, face[here], bary[here])
     at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * len(found.log)
-    maps = bleed(np.concatenate([found.log, found.shadow[..., None]], -1).astype(np.float32), covered)
+    maps = np.concatenate([found.log, found.shadow[..., None]], -1).astype(np.float32)
     seen = np.zeros((*here.shape, 4), np.float32)
     seen[here] = sample(maps, at)
     seen = bleed(seen, here)

@@ -21,8 +21,7 @@ from ..geometry.meshes import vertex_normals
 from ..imaging import images
 from .olat import LightStage, light_stage, sun_visibility
 from .people.figure import paint
-from .people.markings import moles, stains, tufts
-from .people.person import BROWS, sample_person
+from .people.person import sample_person
 from .people.shape import person_mesh
 
 SIDE = 512
@@ -85,41 +84,6 @@ def load(path: Path) -> UnlitPerson:
         return UnlitPerson(**{field.name: stored[field.name] for field in fields(UnlitPerson)})
 
 
-def colours_of(person: UnlitPerson, side: int, rng: np.random.Generator) -> np.ndarray:
-    """The person's linear albedo [S, S, 3] with other tones, hair of other colours, stains, moles and tufts."""
-    albedo = images.srgb_to_linear(_resized(person.skin.astype(np.float32) / 255, side))
-    growth = _resized(person.growth.astype(np.float32) / 255, side)
-    albedo = albedo * np.exp(rng.normal(0, 0.3) + rng.normal(0, 0.08, 3)).astype(np.float32)
-    log = np.zeros_like(albedo)
-    if rng.random() < 0.4:
-        log += stains(side, rng)
-    if rng.random() < 0.4:
-        log += moles(side, rng)
-    if rng.random() < 0.5:
-        log += tufts(side, _landmarks(side), rng)
-    albedo = albedo * np.exp(log)
-    common = BROWS[rng.integers(len(BROWS))]
-    for part in range(len(GROWTH)):
-        colour = (common if rng.random() < 0.6
-                  else BROWS[rng.integers(len(BROWS))]) * np.exp(rng.normal(0, 0.35) + rng.normal(0, 0.08, 3))
-        strands = cv2.GaussianBlur(rng.standard_normal((side, side), np.float32), (0, 0),
-                                   rng.uniform(0.5, 1.5) * side / SIDE)
-        share = growth[..., part] * rng.uniform(0.4,
-                                                1.2) * (1 + rng.uniform(0.1, 0.5) * strands
-                                                        / max(float(strands.std()), 1e-6))
-        share = np.clip(share, 0, 1)[..., None]
-        albedo = albedo * (1 - share) + colour.astype(np.float32) * share
-    return np.clip(albedo, 0.003, 0.92).astype(np.float32)
-
-
-def reach_of(person: UnlitPerson, lamp: int, side: int) -> np.ndarray:
-    """What of a lamp the head itself lets through, float32 [S, S]."""
-    covered = template_raster(SIDE)[0] >= 0
-    picture = np.zeros((SIDE, SIDE), np.float32)
-    picture[covered] = person.reach[lamp].astype(np.float32) / 255
-    return _resized(raster.bleed(picture, covered), side)
-
-
 def _lamps(rng: np.random.Generator) -> np.ndarray:
     """Unit directions [LAMPS, 3]: seldom from behind the person, seldom from below."""
     found: list[np.ndarray] = []
@@ -137,7 +101,7 @@ def template_raster(side: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def _landmarks(side: int) -> np.ndarray:
+def landmarks_in_uv(side: int) -> np.ndarray:
     """Where MediaPipe's landmarks lie in the map, [468, 2] in texels."""
     face, bary = template.landmarks()
     head = template.load()

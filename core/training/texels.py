@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Trains the delighting network of the head's own UV space on synthetic people whose light is known.
 
-    python -m core train texels --config cpu|gpu [--minutes 120] [--hdri FOLDER] [--start FILE] [--growing] [--work DIR]
+    python -m core train texels --config cpu|gpu [--minutes 45] [--hdri FOLDER] [--start FILE] [--growing] [--work DIR]
     python -m core train texels --prepare [--config cpu|gpu] [--work DIR]   make the people and stop
     python -m core train texels --export [--work DIR] [--out FILE]          write the running training's averaged
     weights now
@@ -16,12 +16,8 @@ from __future__ import annotations
 
 import math
 import tempfile
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
-from multiprocessing import get_context
 from pathlib import Path
 
-import cv2
 import numpy as np
 import torch
 from safetensors.torch import load_file
@@ -30,86 +26,40 @@ from torch.utils.data import Dataset
 
 from ..contract.messages import Problem, Reporter
 from ..delight.texel_net import BANDS, TexelNet
-from ..delight.texels import SIDE, network_input
-from ..face import template
+from ..delight.texels import SIDE
 from ..solve.prior import fast_dtype
-from ..synthetic import unfolded
-from ..synthetic.environments import read_panoramas
 from ..synthetic.identities import reserved_seeds
 from . import command_line, descent
 from .prior import FIRST_SEED, HELD_OUT_SEED
 from .release import TrainingCard, again, release
 from .shading_errors import disagreement, mean_deviation, mean_size, slope_error, split_tone
-from .unfolded import LitPerson, light_up
+from .texel_batches import (
+    TexelBatch,
+    UnfoldedPeople,
+    is_prepared,
+    mirrored,
+    person_path,
+    prepare_people,
+    prepare_props,
+)
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights" / "texels.safetensors"
-_MODEL = {"widths": [48, 96, 160, 224], "depths": [1, 2, 2, 2]}
+_MODEL = {"widths": [48, 80, 128, 160], "depths": [1, 2, 2, 2]}
 CONFIGS = {
     "cpu": {"model": _MODEL,
-            "training": {"pairs": 2, "fine_every": 3, "rate": 6e-4, "minutes": 120, "people": 96, "held_out": 6,
-                         "seed": 0, "workers": 1}},
+            "training": {"pairs": 2, "fine_every": 6, "rate": 3e-4, "minutes": 45, "people": 96, "props": 96,
+                         "held_out": 6, "seed": 0}},
     "gpu": {"model": _MODEL,
-            "training": {"pairs": 8, "fine_every": 2, "rate": 1e-3, "minutes": 24, "people": 320, "held_out": 6,
-                         "seed": 0, "workers": 14}},
+            "training": {"pairs": 16, "fine_every": 2, "rate": 1e-3, "minutes": 11, "people": 240, "props": 240,
+                         "held_out": 6, "seed": 0}},
 }
 """A step shows `pairs` of the people under two lights each at half the maps' side, where four fit into the time of one;
 every `fine_every`th step shows a pair at the whole."""
 TONE, SLOPE, AGREEMENT, SHADOW, SPREAD = 0.25, 1.0, 0.25, 0.2, 0.05
 """Weights beside the log-shading's error: its mean over the face, its slopes, the albedo of one person under two
 lights, the shadows, and how well the size of the error is foretold."""
-OFF_FACE = 0.3
-"""How much scalp, ears and neck count beside the face."""
-
-
-@dataclass(frozen=True)
-class TexelBatch:
-    """layers [N, CHANNELS, S, S] and light [N, 6, S, S]; shading [N, 3, S, S] the true log-shading less the face's mean
-    log colour, weight [N, 1, S, S] of its error; shadow and shadow_weight [N, 1, S, S]. 2 k and 2 k + 1 are the same
-    person and colours under two lights."""
-
-    layers: torch.Tensor
-    light: torch.Tensor
-    shading: torch.Tensor
-    weight: torch.Tensor
-    shadow: torch.Tensor
-    shadow_weight: torch.Tensor
-
-
-class UnfoldedPeople:
-    """Draws batches of the people that are prepared in a work folder; what is prepared later is drawn from then on."""
-
-    def __init__(self, seeds: list[int], work: Path, panoramas: Path | None):
-        self.seeds, self.work, self.panoramas = seeds, work, read_panoramas(panoramas)
-
-    def draw(self, pairs: int, side: int, rng: np.random.Generator) -> TexelBatch:
-        ready = [seed for seed in self.seeds if _path(self.work, seed).is_file()]
-        drawn = []
-        for _ in range(pairs):
-            person = unfolded.load(_path(self.work, ready[rng.integers(len(ready))]))
-            albedo = unfolded.colours_of(person, side, rng)
-            drawn += [example(light_up(person, albedo, rng, self.panoramas)) for _ in range(2)]
-        return TexelBatch(*(torch.from_numpy(np.stack(part)) for part in zip(*drawn, strict=True)))
-
-
-def example(lit: LitPerson) -> tuple[np.ndarray, ...]:
-    """What a TexelBatch holds of a person under a light."""
-    layers, light, middle = network_input(lit.texels)
-    side = len(lit.shading)
-    face = template.mask("face", side)
-    weight = np.clip(lit.texels.seen / 0.15, 0, 1) * lit.texels.covered * (OFF_FACE + (1 - OFF_FACE) * face)
-    trust = 1.0 if lit.strong > 0.4 or lit.strong < 0.1 else 0.3  # in between it is a matter of taste what is a shadow
-    parts = (layers, light, (lit.shading - middle).transpose(2, 0, 1), weight[None],
-             (lit.shadow * (lit.strong > 0.2))[None], trust * weight[None])
-    return tuple(np.ascontiguousarray(part, np.float32) for part in parts)
-
-
-def mirrored(batch: TexelBatch) -> TexelBatch:
-    """Left and right exchanged; a normal's x changes its sign."""
-    layers = batch.layers.flip(-1)  # a copy
-    layers[:, 5] *= -1
-    return replace(batch, layers=layers,
-                   **{name: getattr(batch, name).flip(-1)
-                      for name in ("light", "shading", "weight", "shadow", "shadow_weight")})
+LOOK_EVERY = 50
+"""Steps after which a growing training takes in who has been prepared since."""
 
 
 def train_texels(config: str, out: Path, report: Reporter, run: descent.TrainingRun) -> dict:
@@ -141,11 +91,12 @@ def train_texels(config: str, out: Path, report: Reporter, run: descent.Training
             "held_out_skins": [], "notices": []}
     if not run.growing:
         prepare(config, work, report)
-    if not all(any(_path(work, seed).is_file() for seed in data[kind]) for kind in ("seeds", "held_out_seeds")):
+    if not all(is_prepared(data[kind], work) for kind in ("seeds", "held_out_seeds")):
         raise Problem(f"There are no people in {work} yet.",
                       "Wait for `train texels --prepare`, or train without --growing.")
-    unseen = UnfoldedPeople(data["held_out_seeds"], work,
-                            hdri).draw(2 * t["held_out"], SIDE // 2, np.random.default_rng(1))
+    prepare_props(t["props"], work, hdri, t["seed"])
+    unseen = UnfoldedPeople(data["held_out_seeds"], work, device).draw(2 * t["held_out"], SIDE // 2,
+                                                                       np.random.default_rng(1))
     torch.manual_seed(t["seed"])
     network = TexelNet(**CONFIGS[config]["model"])
     if start:
@@ -155,23 +106,18 @@ def train_texels(config: str, out: Path, report: Reporter, run: descent.Training
                                     rate=lambda step,
                                     share: t["rate"] * min(1.0, (step + 1) / 200)
                                     * max(0.01, 0.5 + 0.5 * math.cos(math.pi * share)),
-                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=t["workers"],
-                                    save_every=180)
-    objective = descent.Objective(_TexelSteps(UnfoldedPeople(data["seeds"], work, hdri), t),
+                                    betas=(0.9, 0.98), weight_decay=1e-2, averaging=0.998, workers=0, save_every=180)
+    objective = descent.Objective(_TexelSteps(UnfoldedPeople(data["seeds"], work, device), t, run.growing),
                                   lambda batch, step, share: sum(losses(network, batch, device).values()),
                                   lambda average: figures(average, config, unseen, device))
     descent.descend(network, state, objective, recipe, work, device, report)
     return export(work, out)
 
 
-def prepare(config: str, work: Path, report: Reporter, processes: int = 2) -> None:
+def prepare(config: str, work: Path, report: Reporter) -> None:
     """Makes the people that the work folder lacks, those held out first."""
     t = CONFIGS[config]["training"]
-    Path(work).mkdir(parents=True, exist_ok=True)
-    jobs = [(seed, work) for seed in (*_held_out(t), *_people(t)) if not _path(work, seed).is_file()]
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        for i, _ in enumerate(pool.map(_prepare_one, jobs)):
-            report.progress(i + 1, len(jobs), f"person {i + 1} of {len(jobs)}")
+    prepare_people([*_held_out(t), *_people(t)], work, report)
 
 
 def losses(network: TexelNet, batch: TexelBatch, device: str) -> dict[str, torch.Tensor]:
@@ -227,7 +173,7 @@ def figures(average: dict, config: str, batch: TexelBatch, device: str) -> dict[
     network.to(device, memory_format=torch.channels_last).eval()
     found = [network(*(part.to(device) for part in pair))
              for pair in zip(batch.layers.split(4), batch.light.split(4), strict=True)]
-    shading, spread = (torch.cat([each[k].cpu() for each in found]) for k in (0, 2))
+    shading, spread = (torch.cat([each[k] for each in found]) for k in (0, 2))
     told = {"network": mean_deviation(shading - batch.shading, batch.weight),
             "none": mean_deviation(batch.shading, batch.weight)}
     _, error = split_tone(shading - batch.shading, batch.weight)
@@ -252,7 +198,7 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
             "colours as they are; gain_N: nats by which its own sizes of the error in bands of N texels foretell it "
             "better than the best constant")
     command = again("texels", state) + (" --hdri hdri" if data["panoramas"] else "")
-    ready = sum(_path(work, seed).is_file() for seed in data["seeds"])
+    ready = sum(person_path(work, seed).is_file() for seed in data["seeds"])
     more = {"panoramas": data["panoramas"], "people": ready, "started": data["started"]}
     return release(out, state,
                    TrainingCard(CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what},
@@ -260,16 +206,18 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
 
 
 class _TexelSteps(Dataset):
-    """`[step]` is the step's batch, whichever process asks for it; mirrored at every other one."""
+    """`[step]` is the step's batch; mirrored at every other one."""
 
-    def __init__(self, people: UnfoldedPeople, t: dict):
-        self.people, self.t = people, t
+    def __init__(self, people: UnfoldedPeople, t: dict, growing: bool):
+        self.people, self.t, self.growing = people, t, growing
 
     def __len__(self) -> int:
         return 10**9
 
+    @torch.no_grad()
     def __getitem__(self, step: int) -> TexelBatch:
-        torch.set_num_threads(1)
+        if self.growing and step % LOOK_EVERY == 0:
+            self.people.look_again()
         rng = np.random.default_rng([self.t["seed"], step])
         fine = step % self.t["fine_every"] == self.t["fine_every"] - 1
         batch = self.people.draw(max(1, self.t["pairs"] // 2) if fine else self.t["pairs"], SIDE if fine else SIDE // 2,
@@ -285,16 +233,6 @@ def _people(t: dict) -> list[int]:
 
 def _held_out(t: dict) -> list[int]:
     return list(range(HELD_OUT_SEED, HELD_OUT_SEED + t["held_out"]))
-
-
-def _path(work: Path, seed: int) -> Path:
-    return Path(work) / f"person_{seed}.npz"
-
-
-def _prepare_one(job: tuple[int, Path]) -> None:
-    seed, work = job
-    cv2.setNumThreads(1)
-    unfolded.save(_path(work, seed), unfolded.make_person(seed))
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -1,209 +1,139 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 """People in the head's UV space under any light, as the views of a capture would give them, with the shading that is to
-be found.
+be found: many at once, on the device that learns from them.
 
 Light knows no brows: the shading of what grows is that of the bare skin. What a capture gets wrong is put in: views
 that lie beside each other, a head that lies beside its views, a fit of the light that errs, exposures that drift.
+
+All maps are float32 [N, channels, S, S] of N heads. Of what is drawn at random, numbers come from the processor and
+noise from the device.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
+import torch
+from torch.nn import functional
 
-from ..delight.texels import DARKEST, Texels
-from ..face import template
-from ..geometry import raster
-from ..imaging import images
-from ..light.skylight import ambient_occlusion
-from ..synthetic.environments import Environment, made_environment, panorama_environment
-from ..synthetic.olat import BASIS, DIRECTIONS, LightStage, mirrored, transport
-from ..synthetic.people.snapshot import highlight
-from ..synthetic.portrait import GOBOS, LampOnHead, fitted_light, gobo
-from ..synthetic.response import curve, expose
-from ..synthetic.unfolded import LAMPS, SIDE, UnlitPerson, reach_of, template_raster, unit
+from ..delight.texel_net import HeadMaps
+from ..delight.texels import DARKEST
+from ..synthetic.olat import DIRECTIONS, GLOSS, LIGHTS
+from ..synthetic.unfolded import LAMPS, SIDE
+from ..upscale.network import srgb_to_linear
+from .captured import Lamps, as_captured, curve, drift, expose, fit_light, misplaced, sweep
+from .crowd import Crowd
+from .dice import Dice
+from .head_maps import TEXEL_MM, at_texels, bits, blurred, face_mask, mean_over, on_device, resized, unit
+from .props import REACH_M, Props
 
-TEXEL_MM = 0.8
-"""Of a map of SIDE, in the face."""
-COPIES = 3
-"""Views whose misplaced pictures are averaged."""
-GLOSS, SHARP = 0.03, (0.3, 0.5)
+SHINE, SHARP = 0.03, (0.3, 0.5)
 """Reflectance of skin at normal incidence, and its roughness."""
+BLOCKED, SPARSE = 0.6, 0.5
+"""Share of the lamps before which something stands, and of those before which it is in pieces: single shadows."""
 
 
 @dataclass(frozen=True)
-class LitPerson:
-    """One person under one light at side S. texels: as a capture would give them; shading float32 [S, S, 3]: natural
-    log of what the skin's mean colour is multiplied by; shadow [S, S] in [0, 1]: the lost share of the lamps' light,
-    and strong, how much of all light they are; albedo [S, S, 3] linear."""
+class LitPeople:
+    """maps: as captures would give them; shading [N, 3, S, S]: natural log of what the skin's mean colour is multiplied
+    by; shadow [N, 1, S, S] in [0, 1]: the lost share of the lamps' light, and strong [N], how much of all light they
+    are."""
 
-    texels: Texels
-    shading: np.ndarray
-    shadow: np.ndarray
-    strong: float
-    albedo: np.ndarray
-
-
-@dataclass(frozen=True)
-class SeenTexels:
-    """What the views of a capture give of S x S texels: natural log of linear colour [S, S, 3], how far apart the views
-    are [S, S], and how well they see [S, S]."""
-
-    log: np.ndarray
-    apart: np.ndarray
-    weight: np.ndarray
+    maps: HeadMaps
+    shading: torch.Tensor
+    shadow: torch.Tensor
+    strong: torch.Tensor
 
 
-def light_up(person: UnlitPerson, albedo: np.ndarray, rng: np.random.Generator,
-             panoramas: list[np.ndarray] = ()) -> LitPerson:
-    """A person of these colours [S, S, 3] under a random light, seen from a random sweep of views."""
-    side, stage = len(albedo), person.stage
-    face, bary = template_raster(side)
-    covered = face >= 0
-    environment = (panorama_environment(panoramas[rng.integers(len(panoramas))], rng) if len(panoramas)
-                   and rng.random() < 0.6 else made_environment(rng))
-    carried = transport(stage, np.arange(len(stage.normals)))
-
-    def at_texels(values: np.ndarray) -> np.ndarray:
-        return raster.interpolate(np.asarray(values, np.float32), stage.mesh.faces, face, bary)
-
-    normal, position = unit(at_texels(stage.normals)), at_texels(person.vertices)
-    eye = np.array([rng.uniform(-0.3, 0.3), -0.7, rng.uniform(-0.1, 0.2)])
-    shine = mirrored(stage, np.arange(len(stage.normals)), environment.radiance, eye)
-    diffuse, gloss = at_texels(carried @ environment.radiance), at_texels(shine) * GLOSS
-    chosen, tints, arrives = _shining(person, environment, position[covered].astype(np.float64), side, rng)
-    towards, spread = unit(eye - position), np.exp(rng.uniform(np.log(0.2), np.log(2.5))) / TEXEL_MM * side / SIDE
-    facing = [np.maximum(normal @ person.lamps[k], 0) for k in chosen]
-    for k, tint, cosine, through in zip(chosen, tints, facing, arrives, strict=True):
-        diffuse = diffuse + _softened(cosine * through, covered, spread) * tint
-        gloss = gloss + (highlight(normal, towards, person.lamps[k], np.full(covered.shape, rng.uniform(*SHARP)))
-                         * through)[..., None] * GLOSS * tint
-    gloss = gloss * rng.uniform(0.0, 1.0)  # highlights move from view to view: of their mean less is left
-    seen = at_texels(_views(stage, rng)[:, None])[..., 0]
-    skin = covered & (template.mask("face", side) > 0.5) & (seen > 0.1)
-    where = skin if skin.sum() > 50 else covered
-    tone = albedo[where].mean(0)
-    linear, gains = expose(albedo * diffuse + gloss, where, rng)
-    both = np.concatenate([linear, np.clip((tone * diffuse + gloss) * gains, 0, 1).astype(np.float32)])
-    log, even = np.split(np.log(np.maximum(images.srgb_to_linear(curve(both, rng)), DARKEST)).astype(np.float32), 2)
-    log, even, apart = _misplaced(log, even, side, rng)
-    log += _drift(side, rng) + 0.01 * rng.standard_normal(log.shape, np.float32)
-    lost = _lost(tints, facing, arrives, covered)
-    strong = sum(float(tint.mean()) for tint in tints)
-    lamps = [LampOnHead(person.lamps[k], tint, reach_of(person, k, side)[covered])
-             for k, tint in zip(chosen, tints, strict=True)]
-    texels = _as_captured(stage, carried, environment, lamps, tone * gains, SeenTexels(log, apart, seen), rng)
-    light = float(diffuse[where].mean()) if strong else 1.0
-    return LitPerson(texels, even - np.log(np.maximum(tone, DARKEST)).astype(np.float32), lost,
-                     min(1.0, 0.6 * strong / max(light, 1e-6)), albedo)
-
-
-def _as_captured(stage: LightStage, carried: np.ndarray, environment: Environment, lamps: list[LampOnHead],
-                 tone: np.ndarray, seen: SeenTexels, rng: np.random.Generator) -> Texels:
-    """What a capture would know: the light as a fit would find it, and all that comes from the head's shape moved by
-    how far registration is off."""
-    log, apart, weight = seen.log, seen.apart, seen.weight
-    side = len(log)
-    face, bary = template_raster(side)
-    covered = face >= 0
-    transfer = raster.interpolate((carried @ BASIS).astype(np.float32), stage.mesh.faces, face, bary)[covered]
-    smooth = raster.interpolate(stage.normals, stage.mesh.faces, face, bary)[covered]
-    fitted = fitted_light(transfer, smooth, lamps, environment, tone, rng)
-    free = (fitted.sunlit - fitted.ambient).max(-1) / np.maximum(fitted.direct.max(-1), 1e-6)
-    field = _displacement(side, np.exp(rng.uniform(np.log(0.4), np.log(2.5))), rng)
-
-    def moved(values: np.ndarray) -> np.ndarray:
-        picture = np.zeros((side, side, *values.shape[1:]), np.float32)
-        picture[covered] = values
-        return cv2.remap(raster.bleed(picture, covered), *field, cv2.INTER_LINEAR,
-                         borderMode=cv2.BORDER_REPLICATE) * covered.reshape(
-            side, side, *(1,) * (values.ndim - 1))
-
-    weight = weight * covered
-    return Texels(log * (weight > 0.02)[..., None], apart * (weight > 0.02), weight.astype(np.float32),
-                  unit(moved(fitted.normal)),
-                  moved(ambient_occlusion(transfer)), moved(fitted.ambient), moved(fitted.direct), moved(free), covered)
+def light_up(crowd: Crowd, who: torch.Tensor, albedo: torch.Tensor, props: Props, dice: Dice) -> LitPeople:
+    """These of the crowd [N] in these colours [N, 3, S, S], each under a random light and seen from a random sweep of
+    views."""
+    n, side, device = len(who), albedo.shape[-1], albedo.device
+    normals, visible = crowd.normals[who], bits(crowd.visible[who])
+    carried = (normals @ on_device(device, DIRECTIONS).T).clamp_min(0) * visible * (4 / LIGHTS)
+    chosen = dice.whole(len(props.radiance), n)
+    radiance = props.radiance[chosen]
+    normal, position = unit(at_texels(normals, side)), at_texels(crowd.vertices[who], side)
+    eye = torch.stack([dice.uniform(-0.3, 0.3, n), torch.full((n,), -0.7, device=device), dice.uniform(-0.1, 0.2, n)],
+                      -1)
+    diffuse = at_texels(carried @ radiance, side)
+    gloss = at_texels(_mirrored(crowd, who, visible, radiance, eye), side) * SHINE
+    lamps = _lamps(crowd, who, props.colour[chosen], position, props, dice)
+    towards = unit(eye[..., None, None] - position)
+    spread = np.exp(dice.rng.uniform(np.log(0.2), np.log(2.5), (n, 1))) / TEXEL_MM * side / SIDE
+    facing = torch.einsum("ncij,nkc->nkij", normal, lamps.towards).clamp_min(0)
+    for k in range(2):
+        tint = lamps.tint[:, k, :, None, None]
+        lit = blurred((facing[:, k:k + 1] * lamps.arrives[:, k:k + 1]).expand(n, 3, side, side),
+                      np.maximum(spread * [1.0, 0.4, 0.2], 0.3))  # red farthest (d'Eon et al. 2007)
+        diffuse = diffuse + lit * tint
+        bright = _highlight(normal, towards, lamps.towards[:, k], dice.uniform(*SHARP, n, 1, 1, 1))
+        gloss = gloss + bright * lamps.arrives[:, k:k + 1] * SHINE * tint
+    gloss = gloss * dice.uniform(0, 1, n, 1, 1, 1)  # highlights move from view to view: of their mean less is left
+    seen = at_texels(sweep(crowd, who, visible, dice)[..., None], side)
+    skin = ((face_mask(side, device) > 0.5) & (seen > 0.1)).float()
+    skin = torch.where(skin.sum((1, 2, 3), keepdim=True) > 50, skin, torch.ones_like(skin))
+    tone = mean_over(albedo, skin)
+    linear, gains = expose(albedo * diffuse + gloss, skin, dice)
+    both = torch.cat([linear, ((tone * diffuse + gloss) * gains).clamp(0, 1)], -1)
+    both = srgb_to_linear(curve(both, dice)).clamp_min(DARKEST).log()
+    log, even, apart = misplaced(*both.chunk(2, -1), dice)
+    log = log + drift(side, dice, n) + 0.01 * dice.noise(*log.shape)
+    strength = lamps.tint.mean(-1)
+    turned = (facing / 0.06).clamp(0, 1)
+    lost = (strength[..., None, None] * (1 - turned * lamps.arrives)).sum(1, keepdim=True)
+    lost = lost / strength.sum(1).clamp_min(1e-6)[:, None, None, None]
+    found = fit_light(carried, radiance, lamps, tone * gains, normal, dice)
+    maps = as_captured(log, apart, seen, found, dice)
+    strong = (0.6 * strength.sum(1) / mean_over(diffuse, skin).mean(1).flatten().clamp_min(1e-6)).clamp_max(1)
+    return LitPeople(maps, even - tone.clamp_min(DARKEST).log(), lost, strong)
 
 
-def _shining(person: UnlitPerson, environment: Environment, position: np.ndarray, side: int,
-             rng: np.random.Generator) -> tuple[list[int], list, list]:
-    """Up to two lamps: which, their colours [3] as irradiance over pi, and the share [S, S] of each that arrives past
-    the head and what stands before it."""
-    chosen, tints, arrives = [], [], []
-    covered = template_raster(side)[0] >= 0
-    for k in rng.permutation(LAMPS)[:rng.choice([0, 1, 1, 1, 1, 2])]:
-        strength, warm = np.exp(rng.uniform(np.log(0.35), np.log(9.0))), rng.normal(0.12, 0.22)
-        tint = strength * np.exp([0.6 * warm, rng.normal(0, 0.04), -warm])
-        if environment.colour.any() and rng.random() < 0.5:
-            tint = strength * environment.colour / max(float(environment.colour.mean()), 1e-6)
-        through = reach_of(person, k, side)
-        through[covered] *= 1 - gobo(position, person.lamps[k].astype(np.float64), float(person.radius[k]),
-                                     str(rng.choice(GOBOS)), rng)
-        chosen.append(int(k))
-        tints.append(tint.astype(np.float32))
-        arrives.append(through)
-    return chosen, tints, arrives
+def _lamps(crowd: Crowd, who: torch.Tensor, sun: torch.Tensor, position: torch.Tensor, props: Props,
+           dice: Dice) -> Lamps:
+    """Two of each head's lamps, of which none, one or both shine; some have the colour `sun` [N, 3] of what shines
+    hardest around."""
+    n, side, device = len(who), position.shape[-1], position.device
+    which = torch.as_tensor(np.stack([dice.rng.permutation(LAMPS)[:2] for _ in range(n)]), device=device)
+    count = torch.as_tensor(dice.rng.choice([0, 1, 1, 1, 1, 2], n), device=device)
+    on = torch.stack([count > 0, count > 1], 1)
+    strength, warm = dice.spread(0.35, 9.0, n, 2, 1), dice.normal(0.12, 0.22, n, 2)
+    tint = torch.exp(torch.stack([0.6 * warm, dice.normal(0, 0.04, n, 2), -warm], -1))
+    outside = sun / sun.mean(-1, keepdim=True).clamp_min(1e-6)
+    taken = dice.happens(0.5, n, 2, 1) * (sun.amax(-1) > 0)[:, None, None]
+    tint = strength * (taken * outside[:, None] + (1 - taken) * tint) * on[..., None]
+    towards = crowd.lamps[who[:, None], which]
+    reach = resized(crowd.reach[who[:, None], which].float() / 255, side)
+    axis = torch.where((towards[..., 2:].abs() < 0.9), on_device(device, [0.0, 0, 1]), on_device(device, [1.0, 0, 0]))
+    right = unit(torch.linalg.cross(towards, axis), -1)
+    plane = torch.stack([right, torch.linalg.cross(right, towards)], 2)  # [N, 2, 2, 3]
+    middle = position.mean((2, 3), keepdim=True)
+    at = torch.einsum("nkac,ncij->nkija", plane, position - middle) / REACH_M
+    at = (at + dice.uniform(-0.15, 0.15, n, 2, 1, 1, 2)).flatten(0, 1)
+    before, other = (props.gobos[dice.whole(len(props.gobos), n * 2)][:, None].float() / 255 for _ in range(2))
+    before = before * torch.maximum(other, 1 - dice.happens(SPARSE, n * 2, 1, 1, 1))
+    taken = functional.grid_sample(before, at, padding_mode="reflection", align_corners=False).reshape(reach.shape)
+    return Lamps(towards, tint, reach, reach * (1 - taken * dice.happens(BLOCKED, n, 2, 1, 1)))
 
 
-def _lost(tints: list, facing: list, arrives: list, covered: np.ndarray) -> np.ndarray:
-    """The share [S, S] of the lamps' light that does not arrive, weighted by their strength."""
-    if not tints:
-        return np.zeros(covered.shape, np.float32)
-    strength = np.array([float(tint.mean()) for tint in tints])
-    turned = [np.clip(cosine / 0.06, 0, 1) for cosine in facing]
-    lost = sum(s * (1 - t * a) for s, t, a in zip(strength, turned, arrives, strict=True)) / strength.sum()
-    return (lost * covered).astype(np.float32)
+def _mirrored(crowd: Crowd, who: torch.Tensor, visible: torch.Tensor, radiance: torch.Tensor,
+              eye: torch.Tensor) -> torch.Tensor:
+    """The environment as a lobe about the mirrored view shows it, blocked by the head [N, V, 3] (olat.mirrored)."""
+    normals = crowd.normals[who]
+    towards = unit(eye[:, None] - crowd.vertices[who], -1)
+    reflected = 2 * (normals * towards).sum(-1, keepdim=True) * normals - towards
+    lobe = (reflected @ on_device(radiance.device, DIRECTIONS).T).clamp_min(0) ** GLOSS
+    return (lobe * visible) @ radiance / lobe.sum(-1, keepdim=True).clamp_min(1e-6)
 
 
-def _views(stage: LightStage, rng: np.random.Generator) -> np.ndarray:
-    """How well some views of a sweep about the face see each vertex [V], by the cosine of the angle."""
-    left, right, height = rng.uniform(20, 95), rng.uniform(20, 95), rng.uniform(-15, 25)
-    seen = np.zeros(len(stage.normals), np.float32)
-    for azimuth, lift in zip(np.radians(np.linspace(-left, right, 7)), np.radians(height + rng.normal(0, 8, 7)),
-                             strict=True):
-        way = np.array([np.sin(azimuth) * np.cos(lift), -np.cos(azimuth) * np.cos(lift), np.sin(lift)])
-        cosine = stage.normals @ way.astype(np.float32)
-        seen = np.maximum(seen, np.clip((cosine - 0.2) / 0.8, 0, 1) * stage.visible[:, np.argmax(DIRECTIONS @ way)])
-    return seen
-
-
-def _misplaced(log: np.ndarray, even: np.ndarray, side: int,
-               rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The mean of what some views see whose registration is off, of a picture and of its shading alike, and how far
-    they lie apart [S, S]."""
-    reach = np.exp(rng.uniform(np.log(0.2), np.log(2.0)))
-    copies = []
-    for _ in range(COPIES):
-        field = _displacement(side, reach, rng)
-        copies.append(cv2.remap(np.concatenate([log, even], -1), *field, cv2.INTER_LINEAR,
-                                borderMode=cv2.BORDER_REPLICATE))
-    mean, apart = np.mean(copies, 0), np.std([copy[..., :3].mean(-1) for copy in copies], 0)
-    return mean[..., :3], mean[..., 3:], (apart + rng.uniform(0.01, 0.05)).astype(np.float32)
-
-
-def _displacement(side: int, reach_mm: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """A smooth random displacement as the two maps [S, S] of cv2.remap; `reach_mm`: its deviation."""
-    y, x = np.mgrid[0:side, 0:side].astype(np.float32)
-    far = [cv2.resize(rng.standard_normal((6, 6), np.float32), (side, side), interpolation=cv2.INTER_CUBIC) * reach_mm
-           / TEXEL_MM * side / SIDE for _ in "xy"]
-    return x + far[0].astype(np.float32), y + far[1].astype(np.float32)
-
-
-def _drift(side: int, rng: np.random.Generator) -> np.ndarray:
-    """What exposures that differ leave where one view gives way to another [S, S, 3], natural log."""
-    return cv2.resize(rng.normal(0, rng.uniform(0, 0.03), (7, 7, 3)).astype(np.float32), (side, side),
-                      interpolation=cv2.INTER_CUBIC)
-
-
-def _softened(direct: np.ndarray, covered: np.ndarray, radius: float) -> np.ndarray:
-    """Direct light [S, S] -> [S, S, 3] spread under the skin, red farthest (d'Eon et al. 2007); `radius` in texels, of
-    the red."""
-    there, channels = covered.astype(np.float32), []
-    for share in (1.0, 0.4, 0.2):
-        lit, base = (cv2.GaussianBlur(part.astype(np.float32), (0, 0), max(share * radius, 0.3))
-                     for part in (direct * there, there))
-        channels.append(lit / np.maximum(base, 1e-3))
-    return np.stack(channels, -1)
+def _highlight(normal: torch.Tensor, towards: torch.Tensor, lamp: torch.Tensor, rough: torch.Tensor) -> torch.Tensor:
+    """GGX over the reflectance [N, 1, S, S], times the cosine and pi (Walter et al. 2007); lamp [N, 3]."""
+    lamp = lamp[..., None, None]
+    half, a2 = unit(towards + lamp), rough**4
+    cosine = (normal * lamp).sum(1, keepdim=True).clamp_min(0)
+    facing = (normal * towards).sum(1, keepdim=True).clamp_min(0.05)
+    spread = a2 / ((normal * half).sum(1, keepdim=True).clamp_min(0) ** 2 * (a2 - 1) + 1) ** 2
+    masked = 0.5 / (cosine * (a2 + (1 - a2) * facing**2).sqrt() + facing * (a2 + (1 - a2) * cosine**2).sqrt() + 1e-4)
+    return (spread * masked * cosine).clamp_max(60)
