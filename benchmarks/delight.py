@@ -27,6 +27,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,7 @@ from core import delight
 from core.contract.capture import Capture
 from core.contract.messages import Problem, Reporter
 from core.contract.settings import Settings
+from core.delight.whole_head import whole_head
 from core.imaging import images
 
 from . import figures
@@ -67,6 +69,8 @@ def main() -> None:
     parser.add_argument("--opendelight", default="", help="the authors' checkpoint")
     parser.add_argument("--weights", type=Path,
                         help="weights of our network, with their card beside them, instead of those that are shipped")
+    parser.add_argument("--texels", type=Path, metavar="FILE",
+                        help="weights of `core train texels`, for a row of their own on captures: whole head")
     parser.add_argument("--device", choices=("cpu", "cuda", "mps"), default="cpu")
     parser.add_argument("--quick", action="store_true", help=f"every {QUICK}th picture, without the feature distance")
     parser.add_argument("--json", type=Path, help="where the results go; what it holds of other sets and rows stays")
@@ -77,6 +81,8 @@ def main() -> None:
         settings = replace(settings, delight=replace(settings.delight, checkpoint=options.opendelight))
     if options.weights:
         importlib.import_module("core.delight.network").WEIGHTS = options.weights
+    if options.texels:
+        delight.DELIGHTERS["whole head"] = partial(whole_head, weights=options.texels)
     captures = dict(pair.split("=", 1) for pair in options.capture)
     results = (figures.read(options.json.stem, options.json.parent)["figures"] if options.json
                and options.json.is_file() else {})

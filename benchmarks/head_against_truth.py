@@ -23,9 +23,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from core.contract.capture import Capture  # noqa: E402
 from core.contract.frame_records import read_frames  # noqa: E402
 from core.geometry import meshes, raster
-from core.geometry.views import read_views  # noqa: E402
+from core.geometry.views import View, read_views  # noqa: E402
 from core.imaging import images  # noqa: E402
-from core.registration.alignment import similarity  # noqa: E402
+from core.registration.alignment import Similarity, similarity  # noqa: E402
 from core.synthetic.identities import subject_mesh  # noqa: E402
 from core.synthetic.sample import RESERVED  # noqa: E402
 
@@ -33,13 +33,9 @@ from core.synthetic.sample import RESERVED  # noqa: E402
 def compare(capture: Capture, truth: Path, mesh: Path | None, surface: str = "head.obj") -> dict:
     """Median, 90th and 95th percentile in mm over the face's pixels, as placed by the cameras and after ICP beside
     it."""
-    views = read_views(capture)
+    pose, shared, theirs = pose_of_truth(capture, truth)
     frames = {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()}
-    cameras = {c["frame"]: np.array(c["matrix_world"])[:3, 3]
-               for c in json.loads((truth / "cameras.json").read_text())["cameras"]}
-    shared = [v for v in views if frames[v.name] in cameras]
-    ours, theirs = np.stack([v.centre for v in shared]), np.stack([cameras[frames[v.name]] for v in shared])
-    pose = similarity(theirs, ours, np.ones(len(ours)))
+    ours = np.stack([v.centre for v in shared])
 
     points, normals = _surface(mesh)
     points, normals = pose.apply(points), normals @ pose.rotation.T
@@ -56,6 +52,17 @@ def compare(capture: Capture, truth: Path, mesh: Path | None, surface: str = "he
         hits = _moved(hits, points[index], normals[index], np.abs(gap) < 3 * np.median(np.abs(gap)))
     figures["after_icp"] = _percentiles(_distances(hits, tree, points, normals))
     return figures
+
+
+def pose_of_truth(capture: Capture, truth: Path) -> tuple[Similarity, list[View], np.ndarray]:
+    """What brings the world of TRUTH's cameras.json into the capture's, the views that are in both, and their true
+    centres [N, 3]."""
+    frames = {name: frame.video_frame for name, frame in read_frames(capture).by_name.items()}
+    cameras = {c["frame"]: np.array(c["matrix_world"])[:3, 3]
+               for c in json.loads((truth / "cameras.json").read_text())["cameras"]}
+    shared = [v for v in read_views(capture) if frames[v.name] in cameras]
+    ours, theirs = np.stack([v.centre for v in shared]), np.stack([cameras[frames[v.name]] for v in shared])
+    return similarity(theirs, ours, np.ones(len(ours))), shared, theirs
 
 
 def _surface(mesh: Path | None, count: int = 1_500_000) -> tuple[np.ndarray, np.ndarray]:

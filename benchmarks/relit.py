@@ -13,6 +13,7 @@ picture is exposed so that the true subject's face has the mean luminance MIDDLE
         delivered         plain          the solved albedo, with no relief and an even gloss
   true_albedo, true_normal, true_specular            solved, with one map swapped for the true one: what that map costs
   floor          the truth with other random numbers: what the rendering's noise costs
+The true maps are worn where the registered surface lies on the true head (benchmarks/relit_maps.py).
 All albedos share the true skin tone as mean, and all rows but plain the solved relief and gloss.
 WORK keeps the renders; those that are newer than the maps and textures are taken as they are.
 """
@@ -24,6 +25,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -32,14 +34,16 @@ from core.contract.capture import Capture
 from core.contract.files import write_json
 from core.imaging import images
 from core.synthetic import sample
+from core.synthetic.identities import subject_mesh
 from core.synthetic.parameters import sample_parameters
 from core.synthetic.pigment import LUMINANCE
 from core.synthetic.skin import make_skin
 
 from . import figures
+from .head_against_truth import pose_of_truth
 from .measures.pictures import differences, face_box
 from .people import PEOPLE, write_maps
-from .relit_maps import face_mask, read_rows, read_worn, write_row
+from .relit_maps import Worn, face_mask, read_rows, read_worn, worn_by, write_row
 from .relit_renders import MARGIN
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -69,8 +73,9 @@ def main() -> int:
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS)
     arguments = parser.parse_args()
     work, results = arguments.work.resolve(), {}
-    for name, capture, truth in _subjects(arguments, work):
-        render(capture, truth, work / name, arguments.lights, arguments.rows)
+    for subject in _subjects(arguments, work):
+        name = subject.name
+        render(subject, work / name, arguments.lights, arguments.rows)
         results[name] = score(work / name, arguments.lights, arguments.rows)
         write_json(work / f"{name}.json", results[name])
         print(f"{name}: {shortfall(mean_over_lights(results[name])) or 'as asked'}", file=sys.stderr)
@@ -87,23 +92,44 @@ def main() -> int:
     return 0
 
 
-def _subjects(arguments: argparse.Namespace, work: Path) -> Iterator[tuple[str, Capture, Path]]:
-    """Name, solved capture and folder of true maps of each subject that was asked for and has been solved."""
+@dataclass(frozen=True)
+class Subject:
+    """name; capture, solved; maps: the folder of the true ones; truth: where cameras.json lies; seed: whose head it
+    is."""
+
+    name: str
+    capture: Capture
+    maps: Path
+    truth: Path
+    seed: int
+
+    def worn(self) -> Worn:
+        """The true maps on the capture's head."""
+        head = subject_mesh(self.seed)
+        pose, *_ = pose_of_truth(self.capture, self.truth)
+        return worn_by(self.capture, read_worn(self.maps), head.moved(pose.apply(head.vertices)))
+
+
+def _subjects(arguments: argparse.Namespace, work: Path) -> Iterator[Subject]:
+    """Each subject that was asked for and has been solved."""
     if arguments.sample:
         maps = work / "sample_truth"
         if not (maps / "normal.png").exists():  # written last
             write_maps(maps, make_skin(sample_parameters(sample.RESERVED["sample"]), sample.MAPS))
-        yield "sample", Capture(arguments.sample.resolve()), maps
+        truth = Path(sample.__file__).parent / "sample"
+        yield Subject("sample", Capture(arguments.sample.resolve()), maps, truth, sample.RESERVED["sample"])
     for person in (p for p in PEOPLE if arguments.people and p.name in arguments.only):
         capture = Capture(arguments.people.resolve() / f"{person.name}.wildcap")
         if (capture.maps / "normal.png").is_file():
-            yield person.name, capture, arguments.people.resolve() / person.name / "maps"
+            truth = arguments.people.resolve() / person.name
+            yield Subject(person.name, capture, truth / "maps", truth, person.seed)
         else:
             print(f"{person.name} has not been solved and is left out.", file=sys.stderr)
 
 
-def render(capture: Capture, truth: Path, work: Path, lights: list[str], wanted: list[str]) -> None:
+def render(subject: Subject, work: Path, lights: list[str], wanted: list[str]) -> None:
     """work/renders/ROW_LIGHT.exr of all rows, and face.exr."""
+    capture, truth = subject.capture, subject.maps
     renders, mask = work / "renders", work / "mask.png"
     renders.mkdir(parents=True, exist_ok=True)
     pictures = [renders / name
@@ -116,7 +142,7 @@ def render(capture: Capture, truth: Path, work: Path, lights: list[str], wanted:
         picture.unlink(missing_ok=True)
     face_mask(mask)
     rows = []
-    for name, worn in read_rows(capture, read_worn(truth)).items():
+    for name, worn in read_rows(capture, subject.worn()).items():
         if name not in ("truth", *wanted):
             continue
         folder = work / f"{name}.wildcap"

@@ -3,9 +3,10 @@
 """What benchmarks/relit.py renders of a subject: one head, and per row the maps that it wears, as captures that the
 add-on opens.
 
-All rows share the registered head, whose UVs are the true subject's, so that pixels can be compared. All albedos have
-the same mean over confident facial skin, the true tone that the solver was given: what the rows differ in is not
-brightness.
+All rows share the registered head, so that pixels can be compared. It wears the true maps where its surface lies on the
+true head, not where their UVs agree: these are a millimetre apart, by which all fine detail would count as an error.
+All albedos have the same mean over confident facial skin, the true tone that the solver was given: what the rows differ
+in is not brightness.
 """
 
 from __future__ import annotations
@@ -19,12 +20,17 @@ import numpy as np
 from core.contract.capture import Capture
 from core.contract.files import write_json
 from core.face import template
+from core.face.head import read_head
+from core.geometry.baking import Source, bake, bake_normals, places
+from core.geometry.meshes import Mesh
 from core.imaging import images
 from core.upscale.gloss import on_cheeks_and_forehead
 
 SIZE = 1024
 """Texels of every row's maps; what is delivered at 4096 is averaged to it, for a texel is smaller than a pixel of the
 pictures as it is."""
+FARTHEST_M = 0.01
+"""Between the registered head and the true one, beyond which they do not show the same place."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +74,19 @@ def read_worn(folder: Path, size: int = SIZE) -> Worn:
     return Worn(_sized(images.read_linear(folder / "diffuse_albedo.png"), size),
                 normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-6),
                 _sized(images.read_mask(folder / "specular_albedo.png"), size))
+
+
+def worn_by(capture: Capture, true: Worn, subject: Mesh) -> Worn:
+    """The true maps on the capture's head: each texel shows what lies nearest on the subject [m, in the capture's
+    world], and its own where nothing does within FARTHEST_M."""
+    at = places(read_head(capture).mesh, (0, 0), Source(subject), len(true.specular), FARTHEST_M, lambda share: None)
+
+    def carried(baked: np.ndarray, own: np.ndarray) -> np.ndarray:
+        known = at.known.reshape(at.known.shape + (1,) * (own.ndim - 2))
+        return np.where(known, baked.reshape(own.shape), own).astype(np.float32)
+
+    normal = carried(bake_normals(true.normal / 2 + 0.5, at) * 2 - 1, true.normal)
+    return Worn(carried(bake(true.albedo, at), true.albedo), normal, carried(bake(true.specular, at), true.specular))
 
 
 def read_rows(capture: Capture, true: Worn) -> dict[str, Worn]:

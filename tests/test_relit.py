@@ -3,6 +3,7 @@
 """The people that benchmarks photograph, and the measure of relit heads: answers known beforehand."""
 
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,9 +12,10 @@ pytest.importorskip("flip_evaluator")
 
 from benchmarks import gallery, people, people_lights, relit  # noqa: E402
 from benchmarks.delight_measures import TONES, tone_group  # noqa: E402
-from benchmarks.relit_maps import Worn, read_worn, rows_of, write_row  # noqa: E402
+from benchmarks.relit_maps import Worn, read_worn, rows_of, worn_by, write_row  # noqa: E402
 from core.contract.capture import Capture  # noqa: E402
 from core.face import template
+from core.geometry.meshes import write_obj  # noqa: E402
 from core.imaging import images  # noqa: E402
 from core.synthetic import pigment  # noqa: E402
 from core.synthetic.identities import reserved_seeds  # noqa: E402
@@ -91,6 +93,24 @@ def test_each_swapped_row_takes_one_true_map_and_no_other(maps):
     np.testing.assert_allclose(rows["plain"].normal[..., 2], 1)
     np.testing.assert_allclose(rows["plain"].specular, 0.4, rtol=1e-6)
     assert rows["plain"].albedo is solved.albedo
+
+
+def test_the_registered_head_wears_what_lies_where_its_surface_is_and_its_own_elsewhere(tmp_path):
+    """The subject's surface is the head's, its UVs lie a fortieth of the map to the right; a subject a metre away has
+    nothing to give."""
+    mesh, u = template.load(), np.tile((np.arange(128) + 0.5) / 128, (128, 1)).astype(np.float32)
+    capture = Capture(tmp_path / "a.wildcap")
+    capture.root.mkdir()
+    write_obj(capture.head, mesh)
+    true = Worn(np.repeat(u[..., None], 3, 2), np.broadcast_to(np.float32([0, 0, 1]), (128, 128, 3)), u)
+    beside = replace(mesh, uvs=np.clip(mesh.uvs + [0.025, 0], 0, 1))
+    worn = worn_by(capture, true, beside)
+    middle = np.s_[40:88, 30:98]
+    assert np.abs(worn.albedo[..., 0] - u - 0.025)[middle].max() < 0.005
+    assert np.abs(worn.specular - u - 0.025)[middle].max() < 0.005
+    assert worn.normal[middle][..., 2].min() > 0.999
+    away = worn_by(capture, true, mesh.moved(mesh.vertices + [1.0, 0, 0]))
+    assert np.array_equal(away.albedo, true.albedo) and np.array_equal(away.specular, true.specular)
 
 
 def test_a_row_is_a_capture_that_holds_its_maps(maps, tmp_path):

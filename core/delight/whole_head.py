@@ -44,10 +44,10 @@ class Shading:
     spread: np.ndarray
 
 
-def whole_head(capture: Capture, settings: Settings, report: Reporter) -> Iterator[Delit]:
+def whole_head(capture: Capture, settings: Settings, report: Reporter, weights: Path = WEIGHTS) -> Iterator[Delit]:
     """The selected frames without their shading. Raises Problem where the weights are missing or the views hardly see
     the head."""
-    net, views = load(settings.compute_device), read_views(capture, selected_only=True)
+    net, views = load(settings.compute_device, weights), read_views(capture, selected_only=True)
     filmed = read_head(capture)
     if not filmed.built_in:
         raise Problem("Whole Head knows the built-in head's UVs alone, and this capture's head has others.",

@@ -78,11 +78,28 @@ def _draw(seed: list[int], folder: Path | None) -> tuple[np.ndarray, ...]:
 
 
 def _gobo(rng: np.random.Generator) -> np.ndarray:
-    """What leaves, blinds or an edge take away, uint8 [SIDE, SIDE]."""
-    y, x = (np.mgrid[0:SIDE, 0:SIDE] + 0.5) / SIDE * 2 * REACH_M - REACH_M
+    """What leaves, blinds, an edge or scattered pieces take away, uint8 [SIDE, SIDE]."""
     radius, away = np.exp(rng.uniform(np.log(0.004), np.log(0.03))), rng.uniform(0.1, 0.8)
-    kind = str(rng.choice(["leaves", "leaves", "blinds", "edge"]))
-    return np.round(255 * in_the_way(x, y, max(2 * away * radius, 4e-4), kind, rng)).astype(np.uint8)
+    blur = max(2 * away * radius, 4e-4)
+    kind = str(rng.choice(["pieces", "pieces", "pieces", "leaves", "leaves", "blinds", "edge"]))
+    if kind == "pieces":
+        return _pieces(blur, rng)
+    y, x = (np.mgrid[0:SIDE, 0:SIDE] + 0.5) / SIDE * 2 * REACH_M - REACH_M
+    return np.round(255 * in_the_way(x, y, blur, kind, rng)).astype(np.uint8)
+
+
+def _pieces(blur: float, rng: np.random.Generator) -> np.ndarray:
+    """Single leaves, twigs and other things with corners, each far from the next: what is easily taken for pigment.
+    Edges are `blur` metres wide."""
+    drawn, texel = np.zeros((SIDE, SIDE), np.uint8), 2 * REACH_M / SIDE
+    for _ in range(int(rng.integers(8, 60))):
+        size = np.exp(rng.uniform(np.log(0.006), np.log(0.04))) / texel
+        axes = size * np.array([1.0, np.exp(rng.uniform(np.log(0.15), 0))])
+        angles, turn = np.sort(rng.uniform(0, 2 * np.pi, rng.integers(3, 9))), rng.uniform(0, np.pi)
+        points = np.stack([np.cos(angles), np.sin(angles)], -1) * axes
+        points = points @ [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]] + rng.uniform(0, SIDE, 2)
+        cv2.fillPoly(drawn, [np.round(16 * points).astype(np.int32)], 255, cv2.LINE_AA, 4)
+    return cv2.GaussianBlur(drawn, (0, 0), max(0.3, blur / texel / 3.5))  # as wide as a ramp of that width
 
 
 def _kept(log: np.ndarray) -> np.ndarray:
