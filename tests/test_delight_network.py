@@ -18,7 +18,7 @@ from core.delight.evening import ShadingEstimate, even_out
 from core.delight.lift import lift, lift_share
 from core.delight.lit_head import LitHead
 from core.delight.network import WEIGHTS, crop, face_box, load
-from core.delight.second_opinion import FITTED, beyond, of_both
+from core.delight.second_opinion import FITTED, WHOLE, HeadInLook, beyond, of_both, with_whole_head
 from core.delight.unet import CHANNELS, DelightNet, network_input
 from core.face import template
 from core.face.head import Head
@@ -202,6 +202,26 @@ def test_two_answers_are_weighed_where_they_agree_and_the_network_wins_where_the
     (both,) = of_both([look], [fitted], [skin])
     assert both.shading[:4] == pytest.approx(FITTED * 0.1, rel=0.05)
     assert both.shading[8:-8] == pytest.approx(0, abs=1e-6) and np.abs(both.shading[-4:]).max() < 0.15
+
+
+def test_the_whole_heads_answer_is_met_in_part_where_the_head_is_whatever_its_level():
+    face, skin = np.zeros((32, 32), int), np.ones((32, 32), np.float32)
+    face[:, 28:] = -1
+    shadow = 0 * skin
+    shadow[20:26, 4:10] = 1
+    look = ShadingEstimate((0, 0, 32), np.zeros((32, 32, 3), np.float32), shadow, np.zeros((32, 32, 3), np.float32),
+                           face)
+    log = np.zeros((32, 32, 3), np.float32) + 5
+    log[:8] += 1
+    log[19:26] += 1
+    (both,) = with_whole_head([look], [HeadInLook(log, 0 * skin)], [skin])
+    assert both.shading[:8, :28] == pytest.approx(WHOLE, rel=1e-3)
+    assert both.shading[19:26, 16:28] == pytest.approx(WHOLE, rel=1e-3)
+    assert not both.shading[8:19].any() and not both.shading[:, 28:].any()
+    assert not both.shading[21:25, 5:9].any(), "a shadow of which the whole head does not know"
+    (knowing,) = with_whole_head([look], [HeadInLook(log, shadow)], [skin])
+    assert knowing.shading[21:25, 5:9] == pytest.approx(WHOLE, rel=1e-3)
+    assert with_whole_head([look], [HeadInLook(log, shadow)], [0 * skin]) == [look], "no skin tells the level"
 
 
 def test_below_hair_the_fitted_light_goes_on_at_the_level_of_the_skin_around():

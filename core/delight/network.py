@@ -6,8 +6,9 @@ known of the head.
 It sees a square around the face at SIDE pixels and answers at half of that; the answer is lifted to the picture's
 pixels along its edges (lift.py), and the picture is divided by it, so pores are kept and none can be invented. In a
 capture the frames' answers are evened out over the head (evening.py) and brought together with the light that was
-fitted to all frames (second_opinion.py), which is all that is believed below hair; in a single photograph the skin
-around brows and eyes answers for them (below_hair.py). `core train delighter` makes the weights.
+fitted to all frames, which is all that is believed below hair, and with one answer for the whole head
+(second_opinion.py, whole_head.py); in a single photograph the skin around brows and eyes answers for them
+(below_hair.py). `core train delighter` makes the weights.
 """
 
 from __future__ import annotations
@@ -37,9 +38,10 @@ from .contract import Delit
 from .evening import ShadingEstimate, even_out
 from .lift import lift, lift_share
 from .lit_head import BRIGHTEST, LitHead, lit_head
-from .second_opinion import beyond, coarse, of_both
+from .second_opinion import beyond, coarse, of_both, with_whole_head
 from .shading import light_in_frame, light_seen
 from .unet import DARKEST, SIDE, DelightNet, network_input
+from .whole_head import READING, answers_in_looks
 
 DATA_FILES = ("weights/delighter.safetensors", "weights/delighter.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
@@ -54,12 +56,17 @@ def network(capture: Capture, settings: Settings, report: Reporter) -> Iterator[
     head = lit_head(read_head(capture), views, report)
     looks, fitted = [], []
     for i, view in enumerate(views):
-        report.progress(4 * len(views) + 3 * i, 8 * len(views), f"Looking at frame {i + 1} of {len(views)}")
+        report.progress(4 * len(views) + 2 * i, 8 * len(views), f"Looking at frame {i + 1} of {len(views)}")
         look, log = _look_at_view(net, view, head)
         looks.append(look)
         fitted.append(log)
     skins, hair = ([_seen(head, values, look) for look in looks] for values in (head.skin, head.hair))
     looks = of_both(even_out(head, views, looks), fitted, skins)
+    if head.head.built_in:
+        def step(done: int, of: int) -> None:
+            report.progress(6 * of + done, 8 * of, READING)
+
+        looks = with_whole_head(looks, answers_in_looks(head, views, looks, settings.compute_device, step), skins)
     looks = [without_hair(look, log, share) for look, log, share in zip(looks, fitted, hair, strict=True)]
     looks = without_casts(looks, skins)
     for i, (view, look) in enumerate(zip(views, looks, strict=True)):

@@ -1,15 +1,16 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In a capture there are two answers: the network's, and that of the light fitted to all frames. Their errors differ,
-so a mean of both is better than either.
+"""In a capture there are three answers: the network's for each frame, that of the light fitted to all frames, and the
+whole head's. Their errors differ, so a mean is better than any.
 
 The fit holds over the whole head and knows the colours of sun and sky; the network knows what no fit explains. Where
-they are far apart the fit is wrong more often: a lamp it did not find, a lifted hand, hair.
+they are far apart the fit is wrong more often: a lamp it did not find, a lifted hand, hair. The whole head's answer
+cannot follow pigment, so it keeps brows, beards and blotches, and takes a single small shadow for one of them.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -18,6 +19,19 @@ from .evening import ShadingEstimate
 
 FITTED = 0.8  # weight of the fitted light's answer where the two agree ...
 DOUBT = 1.0  # ... and natural log units of luminance between them at which it is half of that
+
+WHOLE = 0.5  # weight of the whole head's answer ...
+MISSED = 0.5  # ... which is nothing where so much of the sun is lost of which it does not know ...
+MISSED_CELLS = 1.0  # ... on average over a Gaussian of that deviation: borders are not where a shadow is missed
+
+
+@dataclass(frozen=True)
+class HeadInLook:
+    """The whole head's answer where a look shows the head, 0 elsewhere: log [h, h, 3], its log-shading, and shadow [h,
+    h] in [0, 1]."""
+
+    log: np.ndarray
+    shadow: np.ndarray
 
 
 def of_both(looks: list[ShadingEstimate], fitted: list[np.ndarray], skins: list[np.ndarray]) -> list[ShadingEstimate]:
@@ -28,6 +42,25 @@ def of_both(looks: list[ShadingEstimate], fitted: list[np.ndarray], skins: list[
         return looks
     level = np.median(np.concatenate(apart), 0)
     return [_towards(look, log - level) for look, log in zip(looks, fitted, strict=True)]
+
+
+def with_whole_head(looks: list[ShadingEstimate], heads: list[HeadInLook],
+                    skins: list[np.ndarray]) -> list[ShadingEstimate]:
+    """The looks moved by WHOLE towards the whole head's log-shading in each, brought to their level over bare skin
+    (skins [h, h], above 0.5 there). A shadow that a look shows and the whole head does not know is one that it took for
+    pigment: there the look keeps its own."""
+    apart = [(head.log - look.shading)[skin > 0.5] for look, head, skin in zip(looks, heads, skins, strict=True)]
+    if not sum(map(len, apart)):
+        return looks
+    level = np.median(np.concatenate(apart), 0)
+    return [_halfway(look, head, level) for look, head in zip(looks, heads, strict=True)]
+
+
+def _halfway(look: ShadingEstimate, head: HeadInLook, level: np.ndarray) -> ShadingEstimate:
+    missed = np.clip(look.shadow - head.shadow, 0, 1).astype(np.float32)
+    known = 1 - np.clip(cv2.GaussianBlur(missed, (0, 0), MISSED_CELLS) / MISSED, 0, 1)
+    weight = (WHOLE * known * (look.face >= 0))[..., None]
+    return replace(look, shading=(look.shading + weight * (head.log - level - look.shading)).astype(np.float32))
 
 
 def beyond(shading: np.ndarray, shadow: np.ndarray, known: np.ndarray, box: tuple[slice, slice], light: np.ndarray,

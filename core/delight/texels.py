@@ -10,12 +10,12 @@ each texel sees, and the light that was fitted to the skin.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from ..contract.messages import Reporter
 from ..geometry import raster
 from ..geometry.views import View, lengths
 from ..imaging import images
@@ -54,13 +54,12 @@ class Texels:
     free: np.ndarray
 
 
-def gather(head: LitHead, views: list[View], report: Reporter) -> Texels:
-    """What these views say of the head. The head has the built-in UVs; progress is reported in the third quarter of the
-    stage's."""
+def gather(head: LitHead, views: list[View], step: Callable[[int, int], None] = lambda done, of: None) -> Texels:
+    """What these views say of the head. The head has the built-in UVs; step(done, of) is told of each view."""
     surface = head.head.unfold(SIDE)
     colours, weights = (np.zeros((len(views), len(surface.points), n), np.float32) for n in (3, 1))
     for i, view in enumerate(views):
-        report.progress(2 * len(views) + i, 4 * len(views), f"Reading frame {i + 1} of {len(views)}")
+        step(i, len(views))
         colours[i], weights[i, :, 0] = _colours_seen(surface.points, surface.normals, surface.caster, view)
     some = np.s_[:, ::EVERY]
     colours -= exposures(colours[some], weights[..., 0][some])[:, None]

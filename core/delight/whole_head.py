@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture's frames without their light, by one shading of the whole head: a network tells it in the head's own UV
-space from what all views saw (texels.py), and every frame is divided by it where it shows the head. `core train texels`
-makes the weights."""
+"""One shading of the whole head: a network tells it in the head's own UV space from what all views saw (texels.py). The
+delighter *network* asks it beside its own answers; alone, every frame is divided by it where it shows the head.
+`core train texels` makes the weights."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,12 +25,18 @@ from ..geometry.raster import bleed, interpolate, render_view, sample
 from ..geometry.views import View, read_views
 from ..imaging import images
 from .contract import Delit
+from .evening import ShadingEstimate
 from .lit_head import BRIGHTEST, LitHead, lit_head
+from .packed import unpack
+from .second_opinion import HeadInLook
 from .texel_net import TexelNet, maps_of, network_input
 from .texels import Texels, gather
 
 DATA_FILES = ("weights/texels.safetensors", "weights/texels.json")
 WEIGHTS = Path(__file__).resolve().parent.parent / DATA_FILES[0]
+LOOKED_AT = 128
+"""Texels along a side that are as coarse as a pixel of a look at a face."""
+READING = "Reading the whole head"
 
 
 @dataclass(frozen=True)
@@ -53,12 +59,27 @@ def whole_head(capture: Capture, settings: Settings, report: Reporter, weights: 
         raise Problem("Whole Head knows the built-in head's UVs alone, and this capture's head has others.",
                       "Choose Network or Shading to delight with.")
     head = lit_head(filmed, views, report)
-    texels = gather(head, views, report)
+    texels = gather(head, views, lambda done, of: report.progress(2 * of + done, 4 * of, READING))
     found = tell_shading(net, texels)
     found = Shading(found.log + np.log(_exposure(texels, found)), found.shadow, found.spread)
     for i, view in enumerate(views):
         report.progress(3 * len(views) + i, 4 * len(views), f"Delighting frame {i + 1} of {len(views)}")
         yield _delit(view, head, found)
+
+
+def answers_in_looks(head: LitHead, views: list[View], looks: list[ShadingEstimate], device: str,
+                     step: Callable[[int, int], None]) -> list[HeadInLook]:
+    """The whole head's answer in each look, as coarse as a look is. The head has the built-in UVs."""
+    found = tell_shading(load(device), gather(head, views, step))
+    coarse = images.resize(np.concatenate([np.exp(found.log), found.shadow[..., None]], -1), LOOKED_AT, LOOKED_AT)
+    maps = np.concatenate([np.log(coarse[..., :3]), coarse[..., 3:]], -1).astype(np.float32)
+    answers = []
+    for look in looks:
+        uv = interpolate(head.mesh.uvs, head.mesh.face_uvs, look.face, look.bary).reshape(-1, 2)
+        at = np.stack([uv[:, 0], 1 - uv[:, 1]], 1) * LOOKED_AT
+        seen = sample(maps, at).reshape(*look.face.shape, 4) * (look.face >= 0)[..., None]
+        answers.append(HeadInLook(seen[..., :3], seen[..., 3]))
+    return answers
 
 
 def load(device: str, weights: Path = WEIGHTS) -> TexelNet:
@@ -70,7 +91,7 @@ def load(device: str, weights: Path = WEIGHTS) -> TexelNet:
     if weights == WEIGHTS:
         shipped_files.require_whole(weights)
     net = TexelNet(**json.loads(card.read_text(encoding="utf-8"))["model"])
-    net.load_state_dict({name: value.float() for name, value in load_file(weights).items()})
+    net.load_state_dict(unpack(load_file(weights)))
     return net.eval().to(torch.device(device), memory_format=torch.channels_last)
 
 

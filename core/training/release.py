@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -27,15 +28,21 @@ class TrainingCard:
     more: dict = field(default_factory=dict)
 
 
-def release(out: Path, state: dict, card: TrainingCard, tensors: dict[str, torch.Tensor] | None = None) -> dict:
+def in_half(weights: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    return {name: value.half().contiguous() for name, value in weights.items()}
+
+
+def release(out: Path, state: dict, card: TrainingCard, tensors: dict[str, torch.Tensor] | None = None,
+            store: Callable[[dict], dict] = in_half) -> dict:
     """Writes the averaged weights of a training and their card.
 
     Parameters
     ----------
-    out : safetensors, fp16; the card is written beside it, as JSON
+    out : safetensors; the card is written beside it, as JSON
     state : the training's (descent.py)
     card : what the state does not tell
     tensors : go into the file beside the weights, as they are
+    store : weights as they are written, in 16 bits if nothing else is said
 
     Returns
     -------
@@ -43,8 +50,7 @@ def release(out: Path, state: dict, card: TrainingCard, tensors: dict[str, torch
     """
     out, named = Path(out), state["data"]
     with replacing(out) as temporary:
-        save_file({**{name: value.half().contiguous() for name, value in state["average"].items()}, **(tensors or {})},
-                  temporary)
+        save_file({**store(state["average"]), **(tensors or {})}, temporary)
     told = {**card.config, "data": card.data, "licence": "GPL-3.0-or-later", "notices": named["notices"],
             "command": card.command, "steps": state["step"],
             "minutes": round(state["seconds"] / 60, 1), "parameters": sum(v.numel() for v in state["average"].values()),

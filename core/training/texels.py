@@ -25,6 +25,7 @@ from torch.nn import functional
 from torch.utils.data import Dataset
 
 from ..contract.messages import Problem, Reporter
+from ..delight.packed import pack, unpack
 from ..delight.texel_net import BANDS, TexelNet
 from ..delight.texels import SIDE
 from ..solve.prior import fast_dtype
@@ -68,7 +69,7 @@ def train_texels(config: str, out: Path, report: Reporter, run: descent.Training
     Parameters
     ----------
     config : one of CONFIGS
-    out : safetensors, fp16; its card is written beside it
+    out : safetensors, packed; its card is written beside it
     report : hears of progress
     run : minutes, folders, what it begins with
 
@@ -100,7 +101,7 @@ def train_texels(config: str, out: Path, report: Reporter, run: descent.Training
     torch.manual_seed(t["seed"])
     network = TexelNet(**CONFIGS[config]["model"])
     if start:
-        network.load_state_dict({name: value.float() for name, value in load_file(start).items()})
+        network.load_state_dict(unpack(load_file(start)))
     state = descent.resumed(work, descent.beginning(config, data, network))
     recipe = descent.TrainingRecipe(run.minutes or t["minutes"],
                                     rate=lambda step,
@@ -185,7 +186,8 @@ def figures(average: dict, config: str, batch: TexelBatch, device: str) -> dict[
 
 
 def export(work: Path, out: Path = WEIGHTS) -> dict:
-    """The averaged weights of a training folder as fp16 safetensors, with the card that says where they come from."""
+    """The averaged weights of a training folder as packed safetensors (core/delight/packed.py), with the card that says
+    where they come from."""
     state = descent.read_state(work)
     data = state["data"]
     told = ("Synthetic people with brows, beards and hair (core/synthetic/unfolded.py) on heads of the built-in "
@@ -202,7 +204,7 @@ def export(work: Path, out: Path = WEIGHTS) -> dict:
     more = {"panoramas": data["panoramas"], "people": ready, "started": data["started"]}
     return release(out, state,
                    TrainingCard(CONFIGS[state["config"]], told, command, {**state["history"][-1][2], "what": what},
-                                more))
+                                more), store=pack)
 
 
 class _TexelSteps(Dataset):
