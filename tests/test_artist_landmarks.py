@@ -46,6 +46,7 @@ def test_points_of_a_file_are_taken(capture, tmp_path):
     other.write_text('{"points": {"4": [0, -0.05, -0.04], "152": [0, -0.02, -0.11]}}')
     assert cli.main(["landmarks", "import", str(capture.root), str(other)]) == 0
     assert set(json.loads(capture.landmarks_artist.read_text())["points"]) == {"4", "152"}
+    assert cli.main(["landmarks", "import", str(capture.root), str(tmp_path / "none.json")]) == 2
 
 
 @pytest.mark.parametrize("text",

@@ -137,7 +137,7 @@ def test_a_result_comes_in_when_the_batch_lets_go_of_the_face(addon, batches, mo
     capture = batch_faces.filmed(tmp_path / "films", "anna", {"cameras": "slow"})
     open_captures(batch_faces.filmed(tmp_path / "films", "bert"), capture)
     came = []
-    monkeypatch.setattr(addon("jobs"), "bring_in_results", came.append)
+    monkeypatch.setattr(addon("incoming"), "bring_in", came.append)
     bpy.ops.wildcap.reconstruct_all()
     batch_faces.wait(addon, lambda: batches.works_on(str(capture.root)))
     assert not came

@@ -30,9 +30,8 @@ def settings_group(stage: str, kind: type) -> type:
 
 def _property(field, tooltip: str):
     unit = field.metadata.get("unit")
-    name = field.metadata.get("label") or field.name.removesuffix(f"_{unit}").replace("_",
-                                                                                      " ").title() + (f" ({unit})"
-                                                                                                      if unit else "")
+    words = field.name.removesuffix(f"_{unit}").replace("_", " ").title()
+    name = field.metadata.get("label") or words + (f" ({unit})" if unit else "")
     common = {"name": name, "description": tooltip, "default": field.default}
     limits = {k: field.metadata[k] for k in ("min", "max") if k in field.metadata}
     if "choices" in field.metadata:

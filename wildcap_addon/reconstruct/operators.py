@@ -161,8 +161,8 @@ class WILDCAP_OT_fit_landmarks(BaseOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        shown = cls.in_object_mode(context) and cls.allowed(landmarks.shown_landmarks(),
-                                                            "No landmarks are shown: click Show Landmarks first")
+        shown = cls.in_object_mode(context) and cls.allowed(
+            landmarks.shown_landmarks(), "No landmarks are shown: click Show Landmarks first")
         return shown and jobs.can_start(cls, context)
 
     def work(self, context):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 WildCap for Blender contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The picture on an eyeball: white with its vessels, iris with fibres and a darker rim, pupil. Rings about the middle,
-as lids.Ball says."""
+as lids.PosedEyeball says."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def eye_picture(iris: np.ndarray, ball_radius: float, seed: int, size: int = 512
     vessel = np.clip(gaussian_filter(rng.normal(size=(size, size)), 1.2) * 4 - 0.9, 0,
                      1) * np.clip((angle - 1.25 * rim) / rim, 0, 1)
     yellow = 1 - np.array([0.02, 0.06, 0.14]) * rng.random() * np.clip((angle - rim) / rim, 0, 1)[..., None]
-    white = WHITE * np.exp(rng.normal(0, 0.05)) * yellow * (1 - 0.35
-                                                            * vessel[..., None]) + 0.35 * vessel[..., None] * VESSELS
+    white = WHITE * np.exp(rng.normal(0, 0.05)) * yellow * (1 - 0.35 * vessel[..., None])
+    white = white + 0.35 * vessel[..., None] * VESSELS
     outside = _step(angle, rim, 0.05)[..., None]
     return (coloured * (1 - outside) + white * outside).astype(np.float32)
 
